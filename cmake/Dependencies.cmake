@@ -1,0 +1,54 @@
+# Finds what the parts need and says plainly what is missing.
+#
+#   nlohmann_json::nlohmann_json   reads the finger description (runtime/description)
+#   Python_EXECUTABLE              runs the generators; with TENDONFMU_PYTHON also the headers of extension modules
+#   TENDONFMU_FMI_INCLUDE_DIR      folder of fmi2Functions.h, taken from the installed Python package fmpy
+#   tendonfmu_fmi_headers          the same as an INTERFACE target
+#   GTest::gtest_main              with TENDONFMU_BUILD_TESTS
+#   benchmark::benchmark_main      with TENDONFMU_BUILD_BENCH
+
+find_package(nlohmann_json 3.9 QUIET)
+if(NOT nlohmann_json_FOUND)
+  message(FATAL_ERROR "nlohmann-json >= 3.9 not found: install nlohmann-json3-dev (Debian, Ubuntu) or nlohmann-json (Homebrew)")
+endif()
+
+if(TENDONFMU_PYTHON)
+  find_package(Python 3.10 REQUIRED COMPONENTS Interpreter Development.Module)
+elseif(TENDONFMU_BUILD_FMU)
+  find_package(Python 3.10 REQUIRED COMPONENTS Interpreter)
+endif()
+
+if(TENDONFMU_BUILD_FMU)
+  if(NOT EXISTS "${TENDONFMU_FMI_INCLUDE_DIR}/fmi2Functions.h")
+    # find_spec locates the package without importing it: fmpy's import takes half a second.
+    execute_process(
+      COMMAND "${Python_EXECUTABLE}" -c
+              "import importlib.util as u; s = u.find_spec('fmpy'); print(s.submodule_search_locations[0] if s else '')"
+      OUTPUT_VARIABLE fmpy_folder
+      OUTPUT_STRIP_TRAILING_WHITESPACE)
+    file(TO_CMAKE_PATH "${fmpy_folder}/c-code" fmi_folder)
+    set(TENDONFMU_FMI_INCLUDE_DIR "${fmi_folder}" CACHE PATH "Folder of fmi2Functions.h" FORCE)
+  endif()
+  if(NOT EXISTS "${TENDONFMU_FMI_INCLUDE_DIR}/fmi2Functions.h")
+    message(FATAL_ERROR "FMI headers not found: install the Python package fmpy for ${Python_EXECUTABLE}, "
+                        "or set TENDONFMU_FMI_INCLUDE_DIR to the folder of fmi2Functions.h")
+  endif()
+  add_library(tendonfmu_fmi_headers INTERFACE)
+  target_include_directories(tendonfmu_fmi_headers SYSTEM INTERFACE "${TENDONFMU_FMI_INCLUDE_DIR}")
+endif()
+
+if(TENDONFMU_BUILD_TESTS)
+  find_package(GTest QUIET)
+  if(NOT GTest_FOUND)
+    message(FATAL_ERROR "GoogleTest not found: install libgtest-dev (Debian, Ubuntu) or googletest (Homebrew), "
+                        "or configure with -DTENDONFMU_BUILD_TESTS=OFF")
+  endif()
+  include(GoogleTest)
+endif()
+
+if(TENDONFMU_BUILD_BENCH)
+  find_package(benchmark QUIET)
+  if(NOT benchmark_FOUND)
+    message(FATAL_ERROR "Google Benchmark not found: install libbenchmark-dev (Debian, Ubuntu) or google-benchmark (Homebrew)")
+  endif()
+endif()

@@ -1,0 +1,35 @@
+# Installs the C library: header, static libraries, CMake config package and pkg-config file.
+
+if(NOT TARGET tendonfmu_core OR NOT TARGET tendonfmu_description)
+  return()
+endif()
+
+include(CMakePackageConfigHelpers)
+
+set_target_properties(tendonfmu_core PROPERTIES EXPORT_NAME tendonfmu OUTPUT_NAME tendonfmu)
+set_target_properties(tendonfmu_description PROPERTIES EXPORT_NAME description)
+
+install(TARGETS tendonfmu_core tendonfmu_description EXPORT tendonfmuTargets
+        ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}" INCLUDES DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
+install(DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}/runtime/include/" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}"
+        FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
+
+set(config_folder "${CMAKE_INSTALL_LIBDIR}/cmake/tendonfmu")
+install(EXPORT tendonfmuTargets NAMESPACE tendonfmu:: DESTINATION "${config_folder}")
+configure_package_config_file(cmake/tendonfmuConfig.cmake.in tendonfmuConfig.cmake INSTALL_DESTINATION "${config_folder}")
+write_basic_package_version_file(tendonfmuConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES "${CMAKE_CURRENT_BINARY_DIR}/tendonfmuConfig.cmake" "${CMAKE_CURRENT_BINARY_DIR}/tendonfmuConfigVersion.cmake"
+        DESTINATION "${config_folder}")
+
+# Paths relative to the file itself, so that the installed folder may be moved.
+file(RELATIVE_PATH pc_prefix "/${CMAKE_INSTALL_LIBDIR}/pkgconfig" "/")
+configure_file(cmake/tendonfmu.pc.in tendonfmu.pc @ONLY)
+install(FILES "${CMAKE_CURRENT_BINARY_DIR}/tendonfmu.pc" DESTINATION "${CMAKE_INSTALL_LIBDIR}/pkgconfig")
+
+# The same names inside a build that takes the project by add_subdirectory.
+if(NOT TARGET tendonfmu::tendonfmu)
+  add_library(tendonfmu::tendonfmu ALIAS tendonfmu_core)
+endif()
+if(NOT TARGET tendonfmu::description)
+  add_library(tendonfmu::description ALIAS tendonfmu_description)
+endif()
