@@ -28,26 +28,26 @@ extern "C" {
 #endif
 
 typedef enum tendonfmu_status {
-    TENDONFMU_OK = 0,
-    TENDONFMU_BAD_ARGUMENT = 1,  /* a null pointer, an index or a size out of range */
-    TENDONFMU_BAD_IMAGE = 2,     /* not a model image, damaged, or a finger that cannot be */
-    TENDONFMU_BAD_PARAMETER = 3, /* a value out of its range, or fixed and already in use */
-    TENDONFMU_BAD_SAMPLE = 4,    /* not finite, out of range, or time going back */
-    TENDONFMU_BAD_STATE = 5,     /* saved bytes that are damaged or of another finger */
-    TENDONFMU_WRONG_ORDER = 6    /* a step before the initialisation, or a second initialisation */
+  TENDONFMU_OK = 0,
+  TENDONFMU_BAD_ARGUMENT = 1,  /* a null pointer, an index or a size out of range */
+  TENDONFMU_BAD_IMAGE = 2,     /* not a model image, damaged, or a finger that cannot be */
+  TENDONFMU_BAD_PARAMETER = 3, /* a value out of its range, or fixed and already in use */
+  TENDONFMU_BAD_SAMPLE = 4,    /* not finite, out of range, or time going back */
+  TENDONFMU_BAD_STATE = 5,     /* saved bytes that are damaged or of another finger */
+  TENDONFMU_WRONG_ORDER = 6    /* a step before the initialisation, or a second initialisation */
 } tendonfmu_status;
 
 typedef enum tendonfmu_kinematics_source {
-    TENDONFMU_TENDON_POSITIONS = 1,  /* q = R⁺(x0 − f0/k), q̇ by the velocity filter (eqs. 2, 4) */
-    TENDONFMU_JOINT_POSITIONS = 2,   /* q measured, q̇ by the velocity filter */
-    TENDONFMU_JOINT_VELOCITIES = 3   /* q and q̇ measured */
+  TENDONFMU_TENDON_POSITIONS = 1, /* q = R⁺(x0 − f0/k), q̇ by the velocity filter (eqs. 2, 4) */
+  TENDONFMU_JOINT_POSITIONS = 2,  /* q measured, q̇ by the velocity filter */
+  TENDONFMU_JOINT_VELOCITIES = 3  /* q and q̇ measured */
 } tendonfmu_kinematics_source;
 
 /* One finger: model, parameters and state in one block of memory. Opaque. */
 typedef struct tendonfmu_finger tendonfmu_finger;
 
 /* Version of the library, "major.minor.patch". Static text. */
-const char *tendonfmu_version(void);
+const char* tendonfmu_version(void);
 
 /* --- Creation -------------------------------------------------------------------------------------------------- */
 
@@ -55,68 +55,68 @@ const char *tendonfmu_version(void);
  *   image         [image_size] bytes, any alignment, not modified
  *   message       [message_size] receives one line when the image is refused; may be NULL when message_size is 0
  * Returns TENDONFMU_OK or TENDONFMU_BAD_IMAGE / TENDONFMU_BAD_ARGUMENT. */
-tendonfmu_status tendonfmu_check_image(const void *image, size_t image_size, char *message, size_t message_size);
+tendonfmu_status tendonfmu_check_image(const void* image, size_t image_size, char* message, size_t message_size);
 
 /* Bytes of memory that a finger of this image needs; 0 when the image is refused. */
-size_t tendonfmu_memory_size(const void *image, size_t image_size);
+size_t tendonfmu_memory_size(const void* image, size_t image_size);
 
 /* Places a finger into memory of the caller: no allocation, for microcontrollers and real-time start-up.
  *   memory        [memory_size >= tendonfmu_memory_size()] bytes, any alignment; must not be moved while in use
  * The image is copied and may be freed afterwards. Returns NULL when refused, with the reason in message. */
-tendonfmu_finger *tendonfmu_place(void *memory, size_t memory_size, const void *image, size_t image_size, char *message,
+tendonfmu_finger* tendonfmu_place(void* memory, size_t memory_size, const void* image, size_t image_size, char* message,
                                   size_t message_size);
 
 /* The same in memory from one malloc(), to be freed by tendonfmu_destroy(). */
-tendonfmu_finger *tendonfmu_create(const void *image, size_t image_size, char *message, size_t message_size);
+tendonfmu_finger* tendonfmu_create(const void* image, size_t image_size, char* message, size_t message_size);
 
 /* Frees a finger of tendonfmu_create(). NULL is allowed. Never for a finger of tendonfmu_place(). */
-void tendonfmu_destroy(tendonfmu_finger *finger);
+void tendonfmu_destroy(tendonfmu_finger* finger);
 
 /* Writes "{xxxxxxxx-xxxx-xxxx-xxxx-xxxxxxxxxxxx}" and a zero: an identifier of the image's content, the same on every
  * machine. salt is mixed in (any number). Nothing is checked but the pointers. */
-tendonfmu_status tendonfmu_image_guid(const void *image, size_t image_size, unsigned long long salt, char guid[39]);
+tendonfmu_status tendonfmu_image_guid(const void* image, size_t image_size, unsigned long long salt, char guid[39]);
 
 /* Number of joints n (1..16) and tendons m (1..64). */
-size_t tendonfmu_joint_count(const tendonfmu_finger *finger);
-size_t tendonfmu_tendon_count(const tendonfmu_finger *finger);
+size_t tendonfmu_joint_count(const tendonfmu_finger* finger);
+size_t tendonfmu_tendon_count(const tendonfmu_finger* finger);
 
 /* One line about the last call that failed on this finger, "" when none has. Valid until the next call. */
-const char *tendonfmu_last_error(const tendonfmu_finger *finger);
+const char* tendonfmu_last_error(const tendonfmu_finger* finger);
 
 /* --- Samples --------------------------------------------------------------------------------------------------- */
 
 /* Inputs of one sample, or of many (tendonfmu_run): row-major [samples × m] or [samples × n].
  * joint_position may be NULL for source 1, joint_velocity for sources 1 and 2, tendon_position for 2 and 3. */
 typedef struct tendonfmu_inputs {
-    const double *tendon_force;    /* [m] N    f0, tension at the spring; negative only on bidirectional tendons */
-    const double *tendon_position; /* [m] m    x0, motor side */
-    const double *joint_position;  /* [n] rad  q */
-    const double *joint_velocity;  /* [n] rad/s */
+  const double* tendon_force;    /* [m] N    f0, tension at the spring; negative only on bidirectional tendons */
+  const double* tendon_position; /* [m] m    x0, motor side */
+  const double* joint_position;  /* [n] rad  q */
+  const double* joint_velocity;  /* [n] rad/s */
 } tendonfmu_inputs;
 
 /* Outputs of one sample, or of many. A NULL array is not wanted. Flags are 0 or 1. */
 typedef struct tendonfmu_outputs {
-    double *compensated_torque;   /* [n] N·m   τ − T_eff */
-    double *joint_torque;         /* [n] N·m   τ = Rᵀ f0 (eq. 3) */
-    double *friction_torque;      /* [n] N·m   T_eff (eq. 10 and fig. 5) */
-    double *bias_torque;          /* [n] N·m   b_eff */
-    double *joint_angle;          /* [n] rad   the kinematics in use */
-    double *joint_speed;          /* [n] rad/s */
-    unsigned char *joint_contact; /* [n] */
-    unsigned char *contact;       /* [1] any of joint_contact */
-    unsigned char *slack;         /* [m] a modelled tendon force came out negative */
+  double* compensated_torque;   /* [n] N·m   τ − T_eff */
+  double* joint_torque;         /* [n] N·m   τ = Rᵀ f0 (eq. 3) */
+  double* friction_torque;      /* [n] N·m   T_eff (eq. 10 and fig. 5) */
+  double* bias_torque;          /* [n] N·m   b_eff */
+  double* joint_angle;          /* [n] rad   the kinematics in use */
+  double* joint_speed;          /* [n] rad/s */
+  unsigned char* joint_contact; /* [n] */
+  unsigned char* contact;       /* [1] any of joint_contact */
+  unsigned char* slack;         /* [m] a modelled tendon force came out negative */
 } tendonfmu_outputs;
 
 /* Chooses where joint angles and velocities come from. Default 1. Before tendonfmu_initialise() only. */
-tendonfmu_status tendonfmu_set_kinematics_source(tendonfmu_finger *finger, int source);
-int tendonfmu_get_kinematics_source(const tendonfmu_finger *finger);
+tendonfmu_status tendonfmu_set_kinematics_source(tendonfmu_finger* finger, int source);
+int tendonfmu_get_kinematics_source(const tendonfmu_finger* finger);
 
 /* Takes the first sample. Values must be finite and of magnitude at most 1e12. */
-tendonfmu_status tendonfmu_initialise(tendonfmu_finger *finger, double time, const tendonfmu_inputs *inputs);
+tendonfmu_status tendonfmu_initialise(tendonfmu_finger* finger, double time, const tendonfmu_inputs* inputs);
 
 /* Takes the sample at `time`. A time equal to that of the sample already taken changes nothing; an earlier one, or a
  * value that is not finite, is TENDONFMU_BAD_SAMPLE and leaves the finger untouched. */
-tendonfmu_status tendonfmu_step(tendonfmu_finger *finger, double time, const tendonfmu_inputs *inputs);
+tendonfmu_status tendonfmu_step(tendonfmu_finger* finger, double time, const tendonfmu_inputs* inputs);
 
 /* Takes `samples` samples in one call: initialises with the first where the finger is not initialised yet.
  *   time          [samples] s, increasing
@@ -124,88 +124,88 @@ tendonfmu_status tendonfmu_step(tendonfmu_finger *finger, double time, const ten
  *   outputs       arrays of [samples × n], [samples × m], contact [samples]; NULL arrays are not wanted
  *   done          receives the number of samples taken (may be NULL); on an error it is the row that was refused,
  *                 and the outputs of the rows before it are written */
-tendonfmu_status tendonfmu_run(tendonfmu_finger *finger, size_t samples, const double *time,
-                               const tendonfmu_inputs *inputs, const tendonfmu_outputs *outputs, size_t *done);
+tendonfmu_status tendonfmu_run(tendonfmu_finger* finger, size_t samples, const double* time,
+                               const tendonfmu_inputs* inputs, const tendonfmu_outputs* outputs, size_t* done);
 
 /* Copies the outputs of the sample last taken. */
-tendonfmu_status tendonfmu_get_outputs(const tendonfmu_finger *finger, const tendonfmu_outputs *outputs);
+tendonfmu_status tendonfmu_get_outputs(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs);
 
 /* Time of the sample last taken; 0 before the initialisation. */
-double tendonfmu_get_time(const tendonfmu_finger *finger);
+double tendonfmu_get_time(const tendonfmu_finger* finger);
 
 /* 1 once the first sample is taken. */
-int tendonfmu_is_initialised(const tendonfmu_finger *finger);
+int tendonfmu_is_initialised(const tendonfmu_finger* finger);
 
 /* Directional derivative of the outputs of the last sample by the inputs of that sample, along `direction`; all that is
  * remembered is held fixed, branch decisions are frozen.
  *   direction     derivatives of the inputs: [m], [m], [n], [n]; a NULL array stands for zeros
  *   derivative    receives derivatives of the six real outputs, each [n] or NULL; the flags are left alone
  * TENDONFMU_WRONG_ORDER before the initialisation. */
-tendonfmu_status tendonfmu_get_directional_derivative(tendonfmu_finger *finger, const tendonfmu_inputs *direction,
-                                                      const tendonfmu_outputs *derivative);
+tendonfmu_status tendonfmu_get_directional_derivative(tendonfmu_finger* finger, const tendonfmu_inputs* direction,
+                                                      const tendonfmu_outputs* derivative);
 
 /* --- Parameters ------------------------------------------------------------------------------------------------ */
 
 typedef struct tendonfmu_parameter_info {
-    double start;     /* value in the image */
-    double minimum;   /* allowed range */
-    double maximum;
-    int above_minimum; /* 1: the minimum itself is not allowed */
-    int tunable;      /* 1: may be written between steps; 0: before tendonfmu_initialise() only */
-    const char *unit; /* static text in FMI notation: "N", "m/s", "N.m", "1", ... */
+  double start;   /* value in the image */
+  double minimum; /* allowed range */
+  double maximum;
+  int above_minimum; /* 1: the minimum itself is not allowed */
+  int tunable;       /* 1: may be written between steps; 0: before tendonfmu_initialise() only */
+  const char* unit;  /* static text in FMI notation: "N", "m/s", "N.m", "1", ... */
 } tendonfmu_parameter_info;
 
 /* Number of parameters p; indices run from 0 to p − 1. */
-size_t tendonfmu_parameter_count(const tendonfmu_finger *finger);
+size_t tendonfmu_parameter_count(const tendonfmu_finger* finger);
 
-/* Writes the path, such as "tendons[1].edge_friction[2].laws[1].coulomb", and a zero into path [path_size]. 80 bytes are
- * enough for every path. */
-tendonfmu_status tendonfmu_get_parameter_path(const tendonfmu_finger *finger, size_t index, char *path,
+/* Writes the path, such as "tendons[1].edge_friction[2].laws[1].coulomb", and a zero into path [path_size]. 80 bytes
+ * are enough for every path. */
+tendonfmu_status tendonfmu_get_parameter_path(const tendonfmu_finger* finger, size_t index, char* path,
                                               size_t path_size);
 
 /* Index of a path; p when there is none. */
-size_t tendonfmu_find_parameter(const tendonfmu_finger *finger, const char *path);
+size_t tendonfmu_find_parameter(const tendonfmu_finger* finger, const char* path);
 
-tendonfmu_status tendonfmu_get_parameter_info(const tendonfmu_finger *finger, size_t index,
-                                              tendonfmu_parameter_info *info);
+tendonfmu_status tendonfmu_get_parameter_info(const tendonfmu_finger* finger, size_t index,
+                                              tendonfmu_parameter_info* info);
 
 /* Reads `count` parameters: indices [count], values [count]. indices NULL stands for 0..count − 1. */
-tendonfmu_status tendonfmu_get_parameters(const tendonfmu_finger *finger, size_t count, const size_t *indices,
-                                          double *values);
+tendonfmu_status tendonfmu_get_parameters(const tendonfmu_finger* finger, size_t count, const size_t* indices,
+                                          double* values);
 
 /* Writes `count` parameters, all or none. Each value is checked against its range, and together they must still be a
  * finger (static >= coulomb, angles increasing, moment arms of full column rank). Takes effect with the next sample. */
-tendonfmu_status tendonfmu_set_parameters(tendonfmu_finger *finger, size_t count, const size_t *indices,
-                                          const double *values);
+tendonfmu_status tendonfmu_set_parameters(tendonfmu_finger* finger, size_t count, const size_t* indices,
+                                          const double* values);
 
 /* One parameter by its path. */
-tendonfmu_status tendonfmu_get_parameter(const tendonfmu_finger *finger, const char *path, double *value);
-tendonfmu_status tendonfmu_set_parameter(tendonfmu_finger *finger, const char *path, double value);
+tendonfmu_status tendonfmu_get_parameter(const tendonfmu_finger* finger, const char* path, double* value);
+tendonfmu_status tendonfmu_set_parameter(tendonfmu_finger* finger, const char* path, double value);
 
 /* --- State ----------------------------------------------------------------------------------------------------- */
 
-/* Bytes of a saved state: header, parameter values, everything that is remembered, outputs. The same for every finger of
- * one image. */
-size_t tendonfmu_state_size(const tendonfmu_finger *finger);
+/* Bytes of a saved state: header, parameter values, everything that is remembered, outputs. The same for every finger
+ * of one image. */
+size_t tendonfmu_state_size(const tendonfmu_finger* finger);
 
 /* Copies the whole state into bytes [size = tendonfmu_state_size()], any alignment. Little-endian, checksummed. */
-tendonfmu_status tendonfmu_save_state(const tendonfmu_finger *finger, void *bytes, size_t size);
+tendonfmu_status tendonfmu_save_state(const tendonfmu_finger* finger, void* bytes, size_t size);
 
 /* Takes over a saved state, in any process on any machine; what follows is then bit-identical on the same kind of
  * machine. Damaged bytes and those of another image are TENDONFMU_BAD_STATE and change nothing. */
-tendonfmu_status tendonfmu_restore_state(tendonfmu_finger *finger, const void *bytes, size_t size);
+tendonfmu_status tendonfmu_restore_state(tendonfmu_finger* finger, const void* bytes, size_t size);
 
 /* Back to what tendonfmu_create() gave: parameters of the image, kinematics source 1, not initialised. */
-tendonfmu_status tendonfmu_reset(tendonfmu_finger *finger);
+tendonfmu_status tendonfmu_reset(tendonfmu_finger* finger);
 
 /* --- Kernels --------------------------------------------------------------------------------------------------- */
 
 /* The step exists for several instruction sets; all give the same bits. Creation takes the fastest one that the
  * processor and operating system allow. */
-const char *tendonfmu_get_kernel(const tendonfmu_finger *finger); /* "plain", "sse2" or "avx2" */
+const char* tendonfmu_get_kernel(const tendonfmu_finger* finger); /* "plain", "sse2" or "avx2" */
 
 /* Takes another one, "auto" for the choice above; TENDONFMU_BAD_ARGUMENT where it cannot run here. */
-tendonfmu_status tendonfmu_set_kernel(tendonfmu_finger *finger, const char *name);
+tendonfmu_status tendonfmu_set_kernel(tendonfmu_finger* finger, const char* name);
 
 #ifdef __cplusplus
 }

@@ -14,11 +14,11 @@ extern "C" {
  *   image         receives a block of *image_size bytes, to be given back by tendonfmu_free_image(); NULL on failure
  *   message       [message_size] receives one line: key path, value, allowed range, unit
  * Returns TENDONFMU_OK, TENDONFMU_BAD_IMAGE (the description is refused) or TENDONFMU_BAD_ARGUMENT. */
-tendonfmu_status tendonfmu_image_from_json(const char *json, size_t json_size, void **image, size_t *image_size,
-                                           char *message, size_t message_size);
+tendonfmu_status tendonfmu_image_from_json(const char* json, size_t json_size, void** image, size_t* image_size,
+                                           char* message, size_t message_size);
 
 /* Frees an image of tendonfmu_image_from_json(). NULL is allowed. */
-void tendonfmu_free_image(void *image);
+void tendonfmu_free_image(void* image);
 
 #ifdef __cplusplus
 }

@@ -1,0 +1,8 @@
+#ifndef TENDONFMU_COVER_HARDENING_H
+#define TENDONFMU_COVER_HARDENING_H
+
+#include "effect.h"
+
+extern const effect_type cover_hardening;
+
+#endif

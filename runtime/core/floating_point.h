@@ -1,0 +1,14 @@
+/* Included first by every source: no contraction of a*b + c into one rounding, whatever flags an importer compiles
+ * with, so that all machines give the same bits. */
+#ifndef TENDONFMU_FLOATING_POINT_H
+#define TENDONFMU_FLOATING_POINT_H
+
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__)
+#pragma GCC optimize("fp-contract=off")
+#elif defined(_MSC_VER)
+#pragma fp_contract(off)
+#endif
+
+#endif

@@ -1,0 +1,44 @@
+/* The friction law, eq. (1): the one place where it is written.
+ *
+ *   F(v) = sgn(v)·(Fc + (Fs − Fc)·exp(−|v|/vs) + Fv·|v|)
+ *
+ * A law has a side for v > 0 and one for v < 0; a symmetric law has two equal ones. A side is kept as four numbers:
+ * Fc, Fs − Fc, 1/vs, Fv (paper VII: 1/vs behaves, vs does not). */
+#ifndef TENDONFMU_FRICTION_LAW_H
+#define TENDONFMU_FRICTION_LAW_H
+
+enum { LAW_COULOMB, LAW_DROP, LAW_RATE, LAW_VISCOUS, LAW_SIDE_NUMBERS };
+
+enum { LAW_NUMBERS = 2 * LAW_SIDE_NUMBERS }; /* positive side, negative side */
+
+/* Value and slopes of one side at speed |v|, all for v > 0: mirror the value for v < 0. */
+typedef struct law_slopes {
+  double value;      /* Fc + (Fs − Fc)·exp(−|v|/vs) + Fv·|v| */
+  double by_speed;   /* ∂/∂|v| */
+  double by_static;  /* ∂/∂Fs */
+  double by_coulomb; /* ∂/∂Fc */
+  double by_rate;    /* ∂/∂(1/vs) */
+  double by_viscous; /* ∂/∂Fv */
+} law_slopes;
+
+/* side [LAW_SIDE_NUMBERS]; speed >= 0. The value has the bits of law_magnitude(). */
+law_slopes law_with_slopes(const double* side, double speed);
+
+/* exp(−x) for x >= 0 as the kernels have it, and 1 − exp(−x) without cancellation. */
+double law_exponential(double x);
+double law_one_minus_exponential(double x);
+
+/* Fills one side of a law from the numbers of a description. */
+void law_pack_side(double* side, double fs, double fc, double vs, double fv);
+
+#ifdef TENDONFMU_EXPONENTIAL_H
+
+/* Fc + (Fs − Fc)·exp(−|v|/vs) + Fv·|v| for four sides at once; exponent(v) is the smooth part of eq. (1) */
+static inline quad law_magnitude(const quad side[LAW_SIDE_NUMBERS], quad speed) {
+  const quad stribeck = quad_mul(side[LAW_DROP], exp_of_minus(quad_mul(speed, side[LAW_RATE])));
+  return quad_add(quad_add(side[LAW_COULOMB], stribeck), quad_mul(side[LAW_VISCOUS], speed));
+}
+
+#endif
+
+#endif

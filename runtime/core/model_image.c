@@ -1,0 +1,290 @@
+#include "model_image.h"
+
+#include <string.h>
+
+#include "bytes.h"
+
+static const char magic[8] = "TFMUIMG";
+
+uint32_t model_law_count(law_kind kind) {
+  return kind == LAW_ABSENT ? 0 : kind == LAW_SYMMETRIC ? 4 : 8;
+}
+
+/* --- walking over the items ------------------------------------------------------------------------------------- */
+
+typedef struct walk {
+  const model_shape* shape;
+  int (*visit)(void* context, const model_item* item);
+  void* context;
+  uint32_t next; /* parameter index */
+  int result;
+} walk;
+
+/* passes on one item unless it has no numbers or an earlier visit has ended the walk */
+static void emit(walk* w, model_item item, uint32_t count) {
+  item.first = w->next;
+  item.count = count;
+  w->next += count;
+  if (count && w->result == 0) {
+    w->result = w->visit(w->context, &item);
+  }
+}
+
+static void emit_law(walk* w, model_item item, uint32_t kind) {
+  item.law = (law_kind)kind;
+  emit(w, item, model_law_count(item.law));
+}
+
+static void walk_joints(walk* w) {
+  for (uint32_t j = 0; j < w->shape->joints; ++j) {
+    const uint32_t word = w->shape->words[j];
+    emit(w, (model_item){.kind = ITEM_COVER, .joint = j}, word & 1 ? 2 : 0);
+    emit_law(w, (model_item){.kind = ITEM_JOINT_FRICTION, .joint = j}, word >> 1 & 3);
+    emit_law(w, (model_item){.kind = ITEM_LOAD_FRICTION, .joint = j}, word >> 3 & 3);
+  }
+}
+
+static const uint32_t* walk_tendon(walk* w, uint32_t tendon, const uint32_t* word) {
+  const uint32_t n = w->shape->joints;
+  emit(w, (model_item){.kind = ITEM_STIFFNESS, .tendon = tendon}, 1);
+  emit(w, (model_item){.kind = ITEM_MOMENT_ARMS, .tendon = tendon}, n);
+  ++word; /* flags */
+  for (uint32_t j = 0; j < n; ++j) {
+    emit_law(w, (model_item){.kind = ITEM_PULLEY_FRICTION, .tendon = tendon, .joint = j}, *word++);
+  }
+  for (uint32_t j = 0; j < n; ++j) {
+    const uint32_t points = *word & ~MODEL_EDGE_HAS_ANGLES;
+    const int has_angles = (*word++ & MODEL_EDGE_HAS_ANGLES) != 0;
+    model_item item = {.kind = ITEM_EDGE_ANGLES, .tendon = tendon, .joint = j, .has_angles = has_angles};
+    emit(w, item, has_angles ? points : 0);
+    item.kind = ITEM_EDGE_FRICTION;
+    for (item.point = 0; item.point < points; ++item.point) {
+      emit_law(w, item, *word++);
+    }
+  }
+  return word;
+}
+
+static void walk_finger(walk* w) {
+  const uint32_t n = w->shape->joints, options = w->shape->options;
+  const struct {
+    model_item_kind kind;
+    uint32_t count;
+  } items[] = {
+      {ITEM_TENDON_THRESHOLD, 1},
+      {ITEM_JOINT_THRESHOLD, 1},
+      {ITEM_FILTER_CUTOFF, 1},
+      {ITEM_DRIFT_VARIANCE, 1},
+      {ITEM_NOISE_STD, 1},
+      {ITEM_NOISE_STD_PER_FORCE, 1},
+      {ITEM_INITIAL_VARIANCE, options & MODEL_HAS_INITIAL_VARIANCE ? 1 : 0},
+      {ITEM_FORGET_RATE, 1},
+      {ITEM_INITIAL_TORQUE, options & MODEL_HAS_INITIAL_TORQUE ? n : 0},
+      {ITEM_NOISE_TIME, options & MODEL_HAS_NOISE_TIME ? 1 : 0},
+      {ITEM_CONTACT_THRESHOLD, n},
+      {ITEM_CONTACT_PER_FORCE, n},
+  };
+  for (size_t i = 0; i < sizeof items / sizeof items[0]; ++i) {
+    emit(w, (model_item){.kind = items[i].kind}, items[i].count);
+  }
+}
+
+static void walk_extensions(walk* w) {
+  for (uint32_t i = 0; i < w->shape->extension_count; ++i) {
+    const uint32_t* row = w->shape->extensions + i * MODEL_EXTENSION_WORDS;
+    const effect_type* effect = effect_by_id(row[0]);
+    emit(w, (model_item){.kind = ITEM_EXTENSION, .extension = i, .effect = effect, .joint = row[1] - 1},
+         effect->parameter_count);
+  }
+}
+
+static uint32_t run_walk(walk* w) {
+  const uint32_t* word = w->shape->words + w->shape->joints;
+  walk_joints(w);
+  for (uint32_t i = 0; i < w->shape->tendons; ++i) {
+    word = walk_tendon(w, i, word);
+  }
+  walk_finger(w);
+  walk_extensions(w);
+  return w->next;
+}
+
+int model_visit(const model_shape* shape, int (*visit)(void* context, const model_item* item), void* context) {
+  walk w = {shape, visit, context, 0, 0};
+  run_walk(&w);
+  return w.result;
+}
+
+static int visit_nothing(void* context, const model_item* item) {
+  (void)context;
+  (void)item;
+  return 0;
+}
+
+uint32_t model_count_parameters(const model_shape* shape) {
+  walk w = {shape, visit_nothing, NULL, 0, 0};
+  return run_walk(&w);
+}
+
+/* --- reading ---------------------------------------------------------------------------------------------------- */
+
+static int refuse(message_line message, const char* reason) {
+  message_start(message, reason);
+  return -1;
+}
+
+/* "<what> <value>, expected <expectation>" */
+static int refuse_value(message_line message, const char* what, size_t value, const char* expectation) {
+  message_start(message, what);
+  message_text(message, " ");
+  message_count(message, value);
+  message_text(message, ", expected ");
+  message_text(message, expectation);
+  return -1;
+}
+
+static uint64_t unpadded_size(const model_shape* shape) {
+  return MODEL_HEADER_BYTES +
+         4u * ((uint64_t)shape->word_count + (uint64_t)MODEL_EXTENSION_WORDS * shape->extension_count);
+}
+
+static uint64_t values_offset(const model_shape* shape) {
+  return (unpadded_size(shape) + 7u) & ~(uint64_t)7u;
+}
+
+int model_read_header(const void* image, size_t image_size, model_shape* shape, message_line message) {
+  const unsigned char* bytes = image;
+  if (!image || image_size < MODEL_HEADER_BYTES || memcmp(bytes, magic, sizeof magic) != 0) {
+    return refuse(message, "not a model image: it does not begin with \"TFMUIMG\"");
+  }
+  if (load_u32(bytes + 8) != MODEL_VERSION) {
+    return refuse_value(message, "model image of version", load_u32(bytes + 8), "1");
+  }
+  if (load_u64(bytes + 16) != image_size) {
+    return refuse(message, "model image cut off: its size is not the one in its header");
+  }
+  if (load_u64(bytes + 24) != hash_bytes(bytes + 32, image_size - 32, 0)) {
+    return refuse(message, "damaged model image: its checksum does not match");
+  }
+  *shape = (model_shape){.joints = load_u32(bytes + 32),
+                         .tendons = load_u32(bytes + 36),
+                         .options = load_u32(bytes + 40),
+                         .word_count = load_u32(bytes + 44),
+                         .extension_count = load_u32(bytes + 48),
+                         .parameter_count = load_u32(bytes + 52)};
+  if (shape->joints < 1 || shape->joints > MODEL_MAX_JOINTS) {
+    return refuse_value(message, "model image: joints", shape->joints, "1 to 16");
+  }
+  if (shape->tendons < 1 || shape->tendons > MODEL_MAX_TENDONS) {
+    return refuse_value(message, "model image: tendons", shape->tendons, "1 to 64");
+  }
+  if (shape->extension_count > MODEL_MAX_EXTENSIONS) {
+    return refuse_value(message, "model image: extensions", shape->extension_count, "at most 64");
+  }
+  if (shape->options & ~(uint32_t)MODEL_OPTION_BITS) {
+    return refuse_value(message, "model image: option bits", shape->options, "0 to 7");
+  }
+  if (values_offset(shape) + 8u * (uint64_t)shape->parameter_count != image_size) {
+    return refuse(message, "model image whose counts do not add up to its size");
+  }
+  return 0;
+}
+
+/* follows the shape words without trusting their number */
+static int check_shape(const model_shape* shape, message_line message) {
+  const uint32_t n = shape->joints;
+  uint32_t at = 0;
+  for (uint32_t j = 0; j < n; ++j, ++at) {
+    if (at >= shape->word_count || shape->words[at] > 31 || (shape->words[at] >> 1 & 3) == 3 ||
+        shape->words[at] >> 3 == 3) {
+      return refuse(message, "model image with a damaged shape: joints");
+    }
+  }
+  for (uint32_t i = 0; i < shape->tendons; ++i) {
+    if ((uint64_t)at + 1 + n > shape->word_count || shape->words[at] > 1 || shape->words[at + n] != LAW_ABSENT) {
+      return refuse(message, "model image with a damaged shape: tendons");
+    }
+    ++at;
+    for (uint32_t j = 0; j < n; ++j, ++at) {
+      if (shape->words[at] > LAW_ASYMMETRIC) {
+        return refuse(message, "model image with a damaged shape: pulleys");
+      }
+    }
+    for (uint32_t j = 0; j < n; ++j) {
+      const uint32_t word = at < shape->word_count ? shape->words[at] : UINT32_MAX;
+      const uint32_t points = word & ~MODEL_EDGE_HAS_ANGLES;
+      const int has_angles = (word & MODEL_EDGE_HAS_ANGLES) != 0;
+      if (points > MODEL_MAX_POINTS || (has_angles ? points == 0 : points > 1) ||
+          (uint64_t)at + 1 + points > shape->word_count) {
+        return refuse(message, "model image with a damaged shape: edges");
+      }
+      ++at;
+      for (uint32_t k = 0; k < points; ++k, ++at) {
+        if (shape->words[at] < LAW_SYMMETRIC || shape->words[at] > LAW_ASYMMETRIC) {
+          return refuse(message, "model image with a damaged shape: laws of edges");
+        }
+      }
+    }
+  }
+  return at == shape->word_count ? 0 : refuse(message, "model image with a damaged shape: words left over");
+}
+
+static int check_extensions(const model_shape* shape, message_line message) {
+  for (uint32_t i = 0; i < shape->extension_count; ++i) {
+    const uint32_t* row = shape->extensions + i * MODEL_EXTENSION_WORDS;
+    if (!effect_by_id(row[0])) {
+      return refuse_value(message, "model image: effect number", row[0], "one that this version knows");
+    }
+    if (row[1] < 1 || row[1] > shape->joints || row[2] || row[3]) {
+      return refuse_value(message, "model image: joint of an extension", row[1], "a joint of the finger");
+    }
+  }
+  return 0;
+}
+
+int model_read_body(const void* image, model_shape* shape, uint32_t* words, double* values, message_line message) {
+  const unsigned char* bytes = (const unsigned char*)image + MODEL_HEADER_BYTES;
+  const uint32_t count = shape->word_count + MODEL_EXTENSION_WORDS * shape->extension_count;
+  for (uint32_t i = 0; i < count; ++i) {
+    words[i] = load_u32(bytes + 4u * (size_t)i);
+  }
+  shape->words = words;
+  shape->extensions = words + shape->word_count;
+  if (check_shape(shape, message) || check_extensions(shape, message)) {
+    return -1;
+  }
+  if (model_count_parameters(shape) != shape->parameter_count) {
+    return refuse_value(message, "model image: parameters", shape->parameter_count, "as many as its shape has");
+  }
+  load_doubles(values, (const unsigned char*)image + values_offset(shape), shape->parameter_count);
+  return 0;
+}
+
+/* --- writing ---------------------------------------------------------------------------------------------------- */
+
+size_t model_image_size(const model_shape* shape) {
+  return (size_t)(values_offset(shape) + 8u * (uint64_t)shape->parameter_count);
+}
+
+void model_write(const model_shape* shape, const double* values, void* image) {
+  unsigned char* bytes = image;
+  const size_t size = model_image_size(shape);
+  const uint32_t counts[] = {shape->joints,     shape->tendons,         shape->options,
+                             shape->word_count, shape->extension_count, shape->parameter_count};
+  memset(bytes, 0, size);
+  memcpy(bytes, magic, sizeof magic);
+  store_u32(bytes + 8, MODEL_VERSION);
+  store_u64(bytes + 16, size);
+  for (size_t i = 0; i < 6; ++i) {
+    store_u32(bytes + 32 + 4 * i, counts[i]);
+  }
+  unsigned char* to = bytes + MODEL_HEADER_BYTES;
+  for (uint32_t i = 0; i < shape->word_count; ++i, to += 4) {
+    store_u32(to, shape->words[i]);
+  }
+  for (uint32_t i = 0; i < MODEL_EXTENSION_WORDS * shape->extension_count; ++i, to += 4) {
+    store_u32(to, shape->extensions[i]);
+  }
+  store_doubles(bytes + values_offset(shape), values, shape->parameter_count);
+  store_u64(bytes + 24, hash_bytes(bytes + 32, size - 32, 0));
+}

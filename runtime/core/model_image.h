@@ -1,0 +1,116 @@
+/* The model image: a finger as a flat block of numbers, version 1, little-endian.
+ *
+ *   offset  0  8 bytes   "TFMUIMG" and a zero
+ *           8  u32       version = 1
+ *          12  u32       0
+ *          16  u64       size of the whole block in bytes, a multiple of 8
+ *          24  u64       checksum of all that follows (hash_bytes, seed 0)
+ *          32  u32       n joints, 1..16
+ *          36  u32       m tendons, 1..64
+ *          40  u32       option bits (MODEL_HAS_*)
+ *          44  u32       w, number of shape words
+ *          48  u32       e, number of extensions, 0..64
+ *          52  u32       p, number of parameters
+ *          56  u32[w]    shape words: which friction exists (below)
+ *              u32[4·e]  table of extensions: effect id, joint (1..n), 0, 0
+ *              zeros up to a multiple of 8
+ *              f64[p]    parameter values in canonical order (model_item)
+ *
+ * Shape words   a joint    bit 0 cover, bits 1-2 friction (law_kind), bits 3-4 load_friction
+ *               a tendon   bit 0 bidirectional; then n words: pulley_friction (the last is LAW_ABSENT);
+ *                          then for each of n edges: points K, bit 31 where it has angles; K words law_kind */
+#ifndef TENDONFMU_MODEL_IMAGE_H
+#define TENDONFMU_MODEL_IMAGE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "effect.h"
+#include "message.h"
+
+enum {
+  MODEL_VERSION = 1,
+  MODEL_MAX_JOINTS = 16,
+  MODEL_MAX_TENDONS = 64,
+  MODEL_MAX_POINTS = 256,
+  MODEL_MAX_EXTENSIONS = 64,
+  MODEL_HEADER_BYTES = 56,
+  MODEL_EXTENSION_WORDS = 4
+};
+
+enum { MODEL_HAS_INITIAL_VARIANCE = 1, MODEL_HAS_INITIAL_TORQUE = 2, MODEL_HAS_NOISE_TIME = 4, MODEL_OPTION_BITS = 7 };
+
+#define MODEL_EDGE_HAS_ANGLES 0x80000000u
+
+typedef enum law_kind { LAW_ABSENT, LAW_SYMMETRIC, LAW_ASYMMETRIC } law_kind;
+
+/* What exists on a finger; the numbers are kept apart. words and extensions are in the host's byte order. */
+typedef struct model_shape {
+  uint32_t joints, tendons, options;
+  uint32_t word_count, extension_count, parameter_count;
+  const uint32_t* words;
+  const uint32_t* extensions;
+} model_shape;
+
+/* The parameters come in items, in this order: joints, tendons, finger, extensions. */
+typedef enum model_item_kind {
+  ITEM_COVER,            /* stiffness, rest_angle */
+  ITEM_JOINT_FRICTION,   /* a law */
+  ITEM_LOAD_FRICTION,    /* a law */
+  ITEM_STIFFNESS,        /* 1 */
+  ITEM_MOMENT_ARMS,      /* n */
+  ITEM_PULLEY_FRICTION,  /* a law */
+  ITEM_EDGE_ANGLES,      /* K */
+  ITEM_EDGE_FRICTION,    /* a law, at one working point */
+  ITEM_TENDON_THRESHOLD, /* velocity_threshold.tendon */
+  ITEM_JOINT_THRESHOLD,  /* velocity_threshold.joint */
+  ITEM_FILTER_CUTOFF,    /* velocity_filter_cutoff */
+  ITEM_DRIFT_VARIANCE,   /* bias.… */
+  ITEM_NOISE_STD,
+  ITEM_NOISE_STD_PER_FORCE,
+  ITEM_INITIAL_VARIANCE,
+  ITEM_FORGET_RATE,
+  ITEM_INITIAL_TORQUE, /* n */
+  ITEM_NOISE_TIME,
+  ITEM_CONTACT_THRESHOLD, /* n */
+  ITEM_CONTACT_PER_FORCE, /* n */
+  ITEM_EXTENSION          /* as many as the effect has */
+} model_item_kind;
+
+typedef struct model_item {
+  model_item_kind kind;
+  uint32_t first, count; /* parameter indices first .. first + count − 1 */
+  uint32_t joint;        /* 0-based; of pulleys and edges: the position in the list */
+  uint32_t tendon;       /* 0-based */
+  uint32_t point;        /* working point, 0-based */
+  int has_angles;        /* the edge is a list of working points */
+  law_kind law;          /* of laws */
+  uint32_t extension;    /* 0-based */
+  const effect_type* effect;
+} model_item;
+
+/* Calls visit for each item in order; stops at the first result other than 0 and returns it. */
+int model_visit(const model_shape* shape, int (*visit)(void* context, const model_item* item), void* context);
+
+/* Numbers of a law of this kind: 0, 4 or 8. */
+uint32_t model_law_count(law_kind kind);
+
+/* Checks header, sizes and checksum, and fills the counts of shape; words and extensions stay NULL.
+ * Returns 0, or −1 with one line in message. */
+int model_read_header(const void* image, size_t image_size, model_shape* shape, message_line message);
+
+/* Copies what a checked header announces, and checks that the shape is one.
+ *   words         [word_count + 4·extension_count] receives shape words and extensions in the host's order
+ *   values        [parameter_count] receives the values, unchecked (parameters.h checks them) */
+int model_read_body(const void* image, model_shape* shape, uint32_t* words, double* values, message_line message);
+
+/* Number of parameters that the shape words ask for; sets parameter_count where the shape is built by hand. */
+uint32_t model_count_parameters(const model_shape* shape);
+
+/* Size in bytes of an image of this shape. */
+size_t model_image_size(const model_shape* shape);
+
+/* Writes an image [model_image_size] from a shape and its values [parameter_count]. */
+void model_write(const model_shape* shape, const double* values, void* image);
+
+#endif
