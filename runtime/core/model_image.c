@@ -152,7 +152,7 @@ static uint64_t values_offset(const model_shape* shape) {
   return (unpadded_size(shape) + 7u) & ~(uint64_t)7u;
 }
 
-int model_read_header(const void* image, size_t image_size, model_shape* shape, message_line message) {
+static int read_counts(const void* image, size_t image_size, model_shape* shape, message_line message) {
   const unsigned char* bytes = image;
   if (!image || image_size < MODEL_HEADER_BYTES || memcmp(bytes, magic, sizeof magic) != 0) {
     return refuse(message, "not a model image: it does not begin with \"TFMUIMG\"");
@@ -190,56 +190,115 @@ int model_read_header(const void* image, size_t image_size, model_shape* shape, 
   return 0;
 }
 
-/* follows the shape words without trusting their number */
-static int check_shape(const model_shape* shape, message_line message) {
-  const uint32_t n = shape->joints;
-  uint32_t at = 0;
-  for (uint32_t j = 0; j < n; ++j, ++at) {
-    if (at >= shape->word_count || shape->words[at] > 31 || (shape->words[at] >> 1 & 3) == 3 ||
-        shape->words[at] >> 3 == 3) {
+/* a checked walk over the shape words as they stand in the image */
+typedef struct word_reader {
+  const unsigned char* bytes;
+  uint32_t left;
+  int overrun;
+} word_reader;
+
+static uint32_t next_word(word_reader* r) {
+  if (r->left == 0) {
+    r->overrun = 1;
+    return 0;
+  }
+  const uint32_t word = load_u32(r->bytes);
+  r->bytes += 4;
+  r->left -= 1;
+  return word;
+}
+
+static int check_edge(word_reader* r, model_shape* shape, uint32_t joint) {
+  const uint32_t word = next_word(r), points = word & ~MODEL_EDGE_HAS_ANGLES;
+  const int has_angles = (word & MODEL_EDGE_HAS_ANGLES) != 0;
+  if (points > MODEL_MAX_POINTS || (has_angles ? points == 0 : points > 1)) {
+    return -1;
+  }
+  for (uint32_t k = 0; k < points; ++k) {
+    const uint32_t kind = next_word(r);
+    if (kind != LAW_SYMMETRIC && kind != LAW_ASYMMETRIC) {
+      return -1;
+    }
+  }
+  shape->edge_count += points > 0;
+  shape->edge_law_count += points;
+  if (has_angles && points > shape->most_points[joint]) {
+    shape->most_points[joint] = points;
+  }
+  return 0;
+}
+
+static int check_tendon(word_reader* r, model_shape* shape) {
+  if (next_word(r) > 1) {
+    return -1;
+  }
+  for (uint32_t j = 0; j < shape->joints; ++j) {
+    const uint32_t last_allowed = j + 1 == shape->joints ? LAW_ABSENT : LAW_ASYMMETRIC;
+    if (next_word(r) > last_allowed) {
+      return -1;
+    }
+  }
+  for (uint32_t j = 0; j < shape->joints; ++j) {
+    if (check_edge(r, shape, j)) {
+      return -1;
+    }
+  }
+  return 0;
+}
+
+static int check_shape(const unsigned char* words, model_shape* shape, message_line message) {
+  word_reader r = {words, shape->word_count, 0};
+  for (uint32_t j = 0; j < shape->joints; ++j) {
+    const uint32_t word = next_word(&r);
+    if (word > 31 || (word >> 1 & 3) == 3 || word >> 3 == 3) {
       return refuse(message, "model image with a damaged shape: joints");
     }
   }
   for (uint32_t i = 0; i < shape->tendons; ++i) {
-    if ((uint64_t)at + 1 + n > shape->word_count || shape->words[at] > 1 || shape->words[at + n] != LAW_ABSENT) {
+    if (check_tendon(&r, shape)) {
       return refuse(message, "model image with a damaged shape: tendons");
     }
-    ++at;
-    for (uint32_t j = 0; j < n; ++j, ++at) {
-      if (shape->words[at] > LAW_ASYMMETRIC) {
-        return refuse(message, "model image with a damaged shape: pulleys");
-      }
-    }
-    for (uint32_t j = 0; j < n; ++j) {
-      const uint32_t word = at < shape->word_count ? shape->words[at] : UINT32_MAX;
-      const uint32_t points = word & ~MODEL_EDGE_HAS_ANGLES;
-      const int has_angles = (word & MODEL_EDGE_HAS_ANGLES) != 0;
-      if (points > MODEL_MAX_POINTS || (has_angles ? points == 0 : points > 1) ||
-          (uint64_t)at + 1 + points > shape->word_count) {
-        return refuse(message, "model image with a damaged shape: edges");
-      }
-      ++at;
-      for (uint32_t k = 0; k < points; ++k, ++at) {
-        if (shape->words[at] < LAW_SYMMETRIC || shape->words[at] > LAW_ASYMMETRIC) {
-          return refuse(message, "model image with a damaged shape: laws of edges");
-        }
-      }
-    }
   }
-  return at == shape->word_count ? 0 : refuse(message, "model image with a damaged shape: words left over");
+  return r.overrun || r.left ? refuse(message, "model image with a damaged shape: number of words") : 0;
 }
 
-static int check_extensions(const model_shape* shape, message_line message) {
-  for (uint32_t i = 0; i < shape->extension_count; ++i) {
-    const uint32_t* row = shape->extensions + i * MODEL_EXTENSION_WORDS;
-    if (!effect_by_id(row[0])) {
-      return refuse_value(message, "model image: effect number", row[0], "one that this version knows");
+/* the effects' parameters are the last ones, in the order of the table */
+static int check_extensions(const unsigned char* image, model_shape* shape, message_line message) {
+  const unsigned char* row = image + MODEL_HEADER_BYTES + 4u * (size_t)shape->word_count;
+  uint32_t numbers = 0;
+  for (uint32_t i = 0; i < shape->extension_count; ++i, row += 4 * MODEL_EXTENSION_WORDS) {
+    const effect_type* effect = effect_by_id(load_u32(row));
+    if (!effect) {
+      return refuse_value(message, "model image: effect number", load_u32(row), "one that this version knows");
     }
-    if (row[1] < 1 || row[1] > shape->joints || row[2] || row[3]) {
-      return refuse_value(message, "model image: joint of an extension", row[1], "a joint of the finger");
+    if (load_u32(row + 4) < 1 || load_u32(row + 4) > shape->joints || load_u32(row + 8) || load_u32(row + 12)) {
+      return refuse_value(message, "model image: joint of an extension", load_u32(row + 4), "a joint of the finger");
     }
+    numbers += effect->parameter_count;
+  }
+  if (numbers > shape->parameter_count) {
+    return refuse(message, "model image with too few parameters for its extensions");
+  }
+  const unsigned char* values = image + values_offset(shape) + 8u * (size_t)(shape->parameter_count - numbers);
+  row = image + MODEL_HEADER_BYTES + 4u * (size_t)shape->word_count;
+  for (uint32_t i = 0; i < shape->extension_count; ++i, row += 4 * MODEL_EXTENSION_WORDS) {
+    const effect_type* effect = effect_by_id(load_u32(row));
+    double parameters[EFFECT_MAX_PARAMETERS];
+    load_doubles(parameters, values, effect->parameter_count);
+    values += 8u * (size_t)effect->parameter_count;
+    shape->extension_memory += effect->state_count(parameters);
   }
   return 0;
+}
+
+int model_read_header(const void* image, size_t image_size, model_shape* shape, message_line message) {
+  if (read_counts(image, image_size, shape, message)) {
+    return -1;
+  }
+  return check_shape((const unsigned char*)image + MODEL_HEADER_BYTES, shape, message) ||
+                 check_extensions(image, shape, message)
+             ? -1
+             : 0;
 }
 
 int model_read_body(const void* image, model_shape* shape, uint32_t* words, double* values, message_line message) {
@@ -250,9 +309,6 @@ int model_read_body(const void* image, model_shape* shape, uint32_t* words, doub
   }
   shape->words = words;
   shape->extensions = words + shape->word_count;
-  if (check_shape(shape, message) || check_extensions(shape, message)) {
-    return -1;
-  }
   if (model_count_parameters(shape) != shape->parameter_count) {
     return refuse_value(message, "model image: parameters", shape->parameter_count, "as many as its shape has");
   }
@@ -260,7 +316,7 @@ int model_read_body(const void* image, model_shape* shape, uint32_t* words, doub
   return 0;
 }
 
-/* --- writing ---------------------------------------------------------------------------------------------------- */
+/* --- writing ------------------------------------------------------------------------------------------------------ */
 
 size_t model_image_size(const model_shape* shape) {
   return (size_t)(values_offset(shape) + 8u * (uint64_t)shape->parameter_count);

@@ -50,6 +50,10 @@ typedef struct model_shape {
   uint32_t word_count, extension_count, parameter_count;
   const uint32_t* words;
   const uint32_t* extensions;
+  /* filled by model_read_header(): what the memory of a finger depends on */
+  uint32_t edge_count, edge_law_count;    /* edges with friction, their laws */
+  uint32_t most_points[MODEL_MAX_JOINTS]; /* largest number of working points before each joint; 0 without angles */
+  size_t extension_memory;                /* numbers that the extensions remember */
 } model_shape;
 
 /* The parameters come in items, in this order: joints, tendons, finger, extensions. */
@@ -95,11 +99,11 @@ int model_visit(const model_shape* shape, int (*visit)(void* context, const mode
 /* Numbers of a law of this kind: 0, 4 or 8. */
 uint32_t model_law_count(law_kind kind);
 
-/* Checks header, sizes and checksum, and fills the counts of shape; words and extensions stay NULL.
- * Returns 0, or −1 with one line in message. */
+/* Checks header, sizes, checksum and shape where they stand, and fills all counts of shape; words and extensions stay
+ * NULL. Returns 0, or −1 with one line in message. */
 int model_read_header(const void* image, size_t image_size, model_shape* shape, message_line message);
 
-/* Copies what a checked header announces, and checks that the shape is one.
+/* Copies what a checked header announces.
  *   words         [word_count + 4·extension_count] receives shape words and extensions in the host's order
  *   values        [parameter_count] receives the values, unchecked (parameters.h checks them) */
 int model_read_body(const void* image, model_shape* shape, uint32_t* words, double* values, message_line message);
