@@ -23,8 +23,17 @@ install(FILES "${CMAKE_CURRENT_BINARY_DIR}/tendonfmuConfig.cmake" "${CMAKE_CURRE
 
 # Paths relative to the file itself, so that the installed folder may be moved.
 file(RELATIVE_PATH pc_prefix "/${CMAKE_INSTALL_LIBDIR}/pkgconfig" "/")
-configure_file(cmake/tendonfmu.pc.in tendonfmu.pc @ONLY)
-install(FILES "${CMAKE_CURRENT_BINARY_DIR}/tendonfmu.pc" DESTINATION "${CMAKE_INSTALL_LIBDIR}/pkgconfig")
+string(REGEX REPLACE "/$" "" pc_prefix "${pc_prefix}")
+# A C program links with the C++ runtime of the compiler that made the description library.
+if(CMAKE_CXX_COMPILER_ID STREQUAL "AppleClang")
+  set(pc_cxx_runtime "-lc++")
+else()
+  set(pc_cxx_runtime "-lstdc++")
+endif()
+foreach(name IN ITEMS tendonfmu tendonfmu-description)
+  configure_file(cmake/${name}.pc.in ${name}.pc @ONLY)
+  install(FILES "${CMAKE_CURRENT_BINARY_DIR}/${name}.pc" DESTINATION "${CMAKE_INSTALL_LIBDIR}/pkgconfig")
+endforeach()
 
 # The same names inside a build that takes the project by add_subdirectory.
 if(NOT TARGET tendonfmu::tendonfmu)

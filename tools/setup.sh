@@ -104,24 +104,24 @@ apt_get_install() {
 set_up_system() {
   local flavour=$1 missing
   if [ "$(uname)" = Darwin ]; then
-    missing=$(missing_packages brew "$flavour" | tr '\n' ' ')
+    missing=$(missing_packages brew "$flavour" | xargs)
     [ -n "$missing" ] || return 0
-    command -v brew >/dev/null || die "missing: $missing- install them (for example with Homebrew), then call again"
+    command -v brew >/dev/null || die "missing: $missing - install them (for example with Homebrew), then call again"
     # shellcheck disable=SC2086
     quietly "installing with Homebrew: $missing" brew install --quiet $missing
   else
-    missing=$(missing_packages apt "$flavour" | tr '\n' ' ')
+    missing=$(missing_packages apt "$flavour" | xargs)
     [ -n "$missing" ] || return 0
-    command -v apt-get >/dev/null || die "missing (named as on Debian): $missing- install them, then call again"
+    command -v apt-get >/dev/null || die "missing (named as on Debian): $missing - install them, then call again"
     if [ "$(id -u)" -ne 0 ]; then
-      command -v sudo >/dev/null || die "missing: $missing- as root: apt-get install --no-install-recommends $missing"
+      command -v sudo >/dev/null || die "missing: $missing - as root: apt-get install --no-install-recommends $missing"
       # Asks for the password here, where the terminal is still the user's.
-      sudo -v || die "missing: $missing- as root: apt-get install --no-install-recommends $missing"
+      sudo -v || die "missing: $missing - as root: apt-get install --no-install-recommends $missing"
     fi
     # shellcheck disable=SC2086
     quietly "installing with apt: $missing" apt_install $missing
   fi
-  missing=$(missing_packages apt "$flavour" | tr '\n' ' ')
+  missing=$(missing_packages apt "$flavour" | xargs)
   [ -z "$missing" ] || die "still missing after the installation (named as on Debian): $missing"
 }
 

@@ -1,0 +1,145 @@
+"""The installed C library as another project takes it: find_package and pkg-config, after moving the folder."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
+
+CONSUMER_CMAKE = """\
+cmake_minimum_required(VERSION 3.22)
+project(consumer LANGUAGES C CXX)
+find_package(tendonfmu {version} REQUIRED)
+add_executable(version version.c)
+target_link_libraries(version PRIVATE tendonfmu::tendonfmu)
+add_executable(sizes sizes.cpp)
+target_link_libraries(sizes PRIVATE tendonfmu::description)
+"""
+
+VERSION_C = """\
+#include <stdio.h>
+#include <tendonfmu.h>
+
+int main(void) { return puts(tendonfmu_version()) < 0; }
+"""
+
+SIZES_CPP = """\
+#include <tendonfmu_description.h>
+
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <string>
+
+int main(int, char** arguments) {
+  std::ifstream file(arguments[1]);
+  const std::string json{std::istreambuf_iterator<char>(file), {}};
+  char message[512] = "";
+  void* image = nullptr;
+  size_t size = 0;
+  if (tendonfmu_image_from_json(json.data(), json.size(), &image, &size, message, sizeof message) != TENDONFMU_OK) {
+    std::cerr << message << '\\n';
+    return 1;
+  }
+  tendonfmu_finger* finger = tendonfmu_create(image, size, message, sizeof message);
+  tendonfmu_free_image(image);
+  if (!finger) return 1;
+  std::cout << tendonfmu_joint_count(finger) << ' ' << tendonfmu_tendon_count(finger) << '\\n';
+  tendonfmu_destroy(finger);
+}
+"""
+
+
+def call(*command: str | Path, env: Mapping[str, str] | None = None) -> str:
+    result = subprocess.run(
+        [str(part) for part in command], capture_output=True, text=True, env={**os.environ, **(env or {})}, check=False
+    )
+    assert result.returncode == 0, f"{command}\n{result.stdout}\n{result.stderr}"
+    return result.stdout.strip()
+
+
+def project_version() -> str:
+    match = re.search(r"project\(tendonfmu VERSION (\S+)", (ROOT / "CMakeLists.txt").read_text(encoding="utf-8"))
+    assert match
+    return match[1]
+
+
+@pytest.fixture(scope="module")
+def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Built and installed, then moved: nothing in it may depend on where it was made."""
+    folder = tmp_path_factory.mktemp("library")
+    call(
+        *("cmake", "-G", "Ninja", "-S", ROOT, "-B", folder / "build", "-DCMAKE_INSTALL_LIBDIR=lib"),
+        *("-DTENDONFMU_BUILD_TESTS=OFF", "-DTENDONFMU_BUILD_FMU=OFF"),
+    )
+    call("cmake", "--build", folder / "build", "--parallel", "2")
+    call("cmake", "--install", folder / "build", "--prefix", folder / "made here")
+    shutil.rmtree(folder / "build")
+    return (folder / "made here").rename(folder / "moved")
+
+
+@pytest.fixture(scope="module")
+def consumer(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("consumer")
+    (folder / "CMakeLists.txt").write_text(CONSUMER_CMAKE.format(version=project_version()), encoding="utf-8")
+    (folder / "version.c").write_text(VERSION_C, encoding="utf-8")
+    (folder / "sizes.cpp").write_text(SIZES_CPP, encoding="utf-8")
+    return folder
+
+
+def test_find_package_gives_both_libraries(prefix: Path, consumer: Path) -> None:
+    build = consumer / "build"
+    call("cmake", "-G", "Ninja", "-S", consumer, "-B", build, f"-DCMAKE_PREFIX_PATH={prefix}")
+    call("cmake", "--build", build)
+    assert call(build / "version") == project_version()
+    assert call(build / "sizes", FINGER) == "4 8"
+
+
+def test_find_package_refuses_a_newer_version(prefix: Path, consumer: Path, tmp_path: Path) -> None:
+    (tmp_path / "CMakeLists.txt").write_text(CONSUMER_CMAKE.format(version="999.0"), encoding="utf-8")
+    command = ["cmake", "-S", str(tmp_path), "-B", str(tmp_path / "build"), f"-DCMAKE_PREFIX_PATH={prefix}"]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert result.returncode != 0
+    assert 'requested version "999.0"' in " ".join(result.stderr.split())
+
+
+@pytest.mark.parametrize(
+    ("module", "source", "compiler", "arguments", "expected"),
+    [
+        ("tendonfmu", "version.c", "cc", [], project_version()),
+        ("tendonfmu-description", "sizes.cpp", "c++", [FINGER], "4 8"),
+    ],
+)
+def test_pkg_config(
+    prefix: Path,
+    consumer: Path,
+    tmp_path: Path,
+    module: str,
+    source: str,
+    compiler: str,
+    arguments: list[Path],
+    expected: str,
+) -> None:
+    if not shutil.which("pkg-config"):
+        pytest.skip("pkg-config is not installed")
+    search = {"PKG_CONFIG_PATH": str(prefix / "lib" / "pkgconfig")}
+    assert call("pkg-config", "--modversion", module, env=search) == project_version()
+    flags = call("pkg-config", "--cflags", "--libs", module, env=search).split()
+    call(compiler, consumer / source, "-o", tmp_path / "program", *flags)
+    assert call(tmp_path / "program", *arguments) == expected
+
+
+def test_installed_text_names_no_folder_of_the_build(prefix: Path) -> None:
+    texts = [p for p in prefix.rglob("*") if p.is_file() and p.suffix in {".cmake", ".pc", ".h", ".hpp"}]
+    assert len(texts) >= 7
+    assert [
+        p.name for p in texts if str(ROOT) in p.read_text(encoding="utf-8") or "made here" in p.read_text("utf-8")
+    ] == []
