@@ -1,0 +1,176 @@
+#include "floating_point.h"
+
+#include "derived_numbers.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "pseudo_inverse.h"
+
+static const double two_pi = 6.28318530717958647692;
+
+typedef struct derivation {
+  tendonfmu_finger* finger;
+  const double* values;
+  uint32_t next_record; /* of edges */
+  uint32_t points;      /* working points of the edge being read */
+} derivation;
+
+/* numbers of a law in the description to the packed law; both sides of a symmetric law are equal */
+static void pack_law(double* law, const double* numbers, law_kind kind) {
+  const double* negative = numbers + (kind == LAW_ASYMMETRIC ? 4 : 0);
+  law_pack_side(law, numbers[0], numbers[1], numbers[2], numbers[3]);
+  law_pack_side(law + LAW_SIDE_NUMBERS, negative[0], negative[1], negative[2], negative[3]);
+}
+
+/* --- edges: K working points become K + 1 segments, of which the first and the last are constant -------------------
+ */
+
+static void begin_grid(derivation* d, const model_item* item) {
+  const derived_numbers* to = &d->finger->derived;
+  const size_t lanes = d->finger->tendon_lanes;
+  const double* angles = d->values + item->first;
+  double* column = to->edge_angle + to->edge_angle_row[item->joint] + item->tendon;
+  double* segment = to->edge_segment + (size_t)d->next_record * 2;
+  d->points = item->count;
+  for (uint32_t k = 0; k < item->count; ++k) {
+    column[k * lanes] = angles[k];
+    segment[2 * (k + 1)] = angles[k];
+    segment[2 * (k + 1) + 1] = k + 1 < item->count ? 1.0 / (angles[k + 1] - angles[k]) : 0.0;
+  }
+}
+
+static void pack_edge(derivation* d, const model_item* item) {
+  const derived_numbers* to = &d->finger->derived;
+  double* first = to->edge_law + (size_t)d->next_record * LAW_NUMBERS;
+  double* law = first + (size_t)(item->point + 1) * LAW_NUMBERS;
+  const uint32_t points = item->has_angles ? d->points : 1;
+  pack_law(law, d->values + item->first, item->law);
+  if (item->point == 0) {
+    memcpy(first, law, LAW_NUMBERS * sizeof(double));
+    to->edge_record[item->joint * d->finger->tendon_lanes + item->tendon] = d->next_record;
+  }
+  if (item->point + 1 == points) {
+    memcpy(law + LAW_NUMBERS, law, LAW_NUMBERS * sizeof(double));
+    d->next_record += points + 2;
+  }
+}
+
+/* --- everything else is a copy -------------------------------------------------------------------------------------
+ */
+
+static void derive_tendon(derivation* d, const model_item* item) {
+  const derived_numbers* to = &d->finger->derived;
+  const size_t lanes = d->finger->tendon_lanes;
+  const double* values = d->values + item->first;
+  switch (item->kind) {
+    case ITEM_STIFFNESS: to->inverse_stiffness[item->tendon] = 1.0 / values[0]; break;
+    case ITEM_MOMENT_ARMS:
+      for (uint32_t j = 0; j < item->count; ++j) {
+        to->moment_arm[j * lanes + item->tendon] = values[j];
+      }
+      break;
+    case ITEM_PULLEY_FRICTION:
+      pack_law(to->pulley_law + ((item->joint + 1) * lanes + item->tendon) * LAW_NUMBERS, values, item->law);
+      break;
+    case ITEM_EDGE_ANGLES: begin_grid(d, item); break;
+    default: pack_edge(d, item); break;
+  }
+}
+
+static void derive_joint(derivation* d, const model_item* item) {
+  const derived_numbers* to = &d->finger->derived;
+  const double* values = d->values + item->first;
+  if (item->kind == ITEM_COVER) {
+    to->cover_stiffness[item->joint] = values[0];
+    to->cover_rest[item->joint] = values[1];
+  } else {
+    double* laws = item->kind == ITEM_JOINT_FRICTION ? to->joint_law : to->load_law;
+    pack_law(laws + item->joint * LAW_NUMBERS, values, item->law);
+  }
+}
+
+static void derive_finger(derivation* d, const model_item* item) {
+  derived_numbers* to = &d->finger->derived;
+  finger_settings* settings = &to->settings;
+  const double* values = d->values + item->first;
+  const size_t bytes = item->count * sizeof(double);
+  switch (item->kind) {
+    case ITEM_TENDON_THRESHOLD: settings->tendon_threshold = values[0]; break;
+    case ITEM_JOINT_THRESHOLD: settings->joint_threshold = values[0]; break;
+    case ITEM_FILTER_CUTOFF: settings->cutoff_rate = two_pi * values[0]; break;
+    case ITEM_DRIFT_VARIANCE: settings->drift_variance = values[0]; break;
+    case ITEM_NOISE_STD: settings->noise_std = values[0]; break;
+    case ITEM_NOISE_STD_PER_FORCE: settings->noise_std_per_force = values[0]; break;
+    case ITEM_INITIAL_VARIANCE: settings->initial_variance = values[0]; break;
+    case ITEM_FORGET_RATE: settings->forget_rate = values[0]; break;
+    case ITEM_NOISE_TIME: settings->noise_time = values[0]; break;
+    case ITEM_INITIAL_TORQUE:
+      settings->has_initial_torque = 1;
+      memcpy(to->initial_torque, values, bytes);
+      break;
+    case ITEM_CONTACT_THRESHOLD: memcpy(to->contact_threshold, values, bytes); break;
+    case ITEM_CONTACT_PER_FORCE: memcpy(to->contact_per_force, values, bytes); break;
+    default: break; /* extensions read their parameters where they are */
+  }
+}
+
+static int derive_item(void* context, const model_item* item) {
+  derivation* d = context;
+  if (item->kind <= ITEM_LOAD_FRICTION) {
+    derive_joint(d, item);
+  } else if (item->kind <= ITEM_EDGE_FRICTION) {
+    derive_tendon(d, item);
+  } else {
+    derive_finger(d, item);
+  }
+  return 0;
+}
+
+/* angles that no edge has lie at infinity, where no joint angle reaches them */
+static void clear_grids(tendonfmu_finger* f) {
+  size_t row = 0;
+  for (size_t j = 0; j < f->joints; ++j) {
+    f->derived.edge_angle_row[j] = row;
+    for (size_t i = 0; i < f->shape.most_points[j] * f->tendon_lanes; ++i) {
+      f->derived.edge_angle[row++] = INFINITY;
+    }
+  }
+}
+
+static void derive_routing(tendonfmu_finger* f) {
+  double rows[MODEL_MAX_TENDONS * MODEL_MAX_JOINTS], inverse[MODEL_MAX_TENDONS * MODEL_MAX_JOINTS];
+  const size_t n = f->joints, m = f->tendons, lanes = f->tendon_lanes;
+  for (size_t i = 0; i < m; ++i) {
+    for (size_t j = 0; j < n; ++j) {
+      rows[i * n + j] = f->derived.moment_arm[j * lanes + i];
+    }
+  }
+  pseudo_inverse(m, n, rows, inverse);
+  for (size_t j = 0; j < n; ++j) {
+    memcpy(f->derived.inverse_routing + j * lanes, inverse + j * m, m * sizeof(double));
+  }
+}
+
+static void derive_flags(tendonfmu_finger* f) {
+  const uint32_t* word = f->shape.words + f->joints;
+  for (size_t i = 0; i < f->tendons; ++i) {
+    f->derived.bidirectional[i] = *word & 1 ? 1.0 : 0.0;
+    word += 1 + f->joints;
+    for (size_t j = 0; j < f->joints; ++j) {
+      word += 1 + (*word & ~MODEL_EDGE_HAS_ANGLES);
+    }
+  }
+}
+
+void derive_numbers(tendonfmu_finger* finger, int routing_changed) {
+  /* record 0 and 1 stay zero: edges without friction */
+  derivation d = {.finger = finger, .values = finger->parameters, .next_record = 2};
+  finger->derived.settings = (finger_settings){.initial_variance = -1.0, .noise_time = -1.0};
+  clear_grids(finger);
+  model_visit(&finger->shape, derive_item, &d);
+  derive_flags(finger);
+  if (routing_changed) {
+    derive_routing(finger);
+  }
+}

@@ -1,0 +1,11 @@
+/* The one place where all numbers that follow from the parameters are computed. */
+#ifndef TENDONFMU_DERIVED_NUMBERS_H
+#define TENDONFMU_DERIVED_NUMBERS_H
+
+#include "finger_memory.h"
+
+/* Recomputes finger->derived from finger->parameters: at creation, and after parameters were written or restored.
+ * R⁺ is only computed again where `routing_changed`. */
+void derive_numbers(tendonfmu_finger* finger, int routing_changed);
+
+#endif

@@ -1,0 +1,259 @@
+#include "floating_point.h"
+
+#include "directional_derivative.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "extensions.h"
+
+/* A number and its derivative along the direction. */
+typedef struct dual {
+  double value, slope;
+} dual;
+
+static dual product(dual a, dual b) {
+  return (dual){a.value * b.value, a.slope * b.value + a.value * b.slope};
+}
+static dual sum(dual a, dual b) {
+  return (dual){a.value + b.value, a.slope + b.slope};
+}
+static dual difference(dual a, dual b) {
+  return (dual){a.value - b.value, a.slope - b.slope};
+}
+static dual scaled(double factor, dual a) {
+  return (dual){factor * a.value, factor * a.slope};
+}
+
+/* The sample, its direction, and what is summed over the tendons. */
+typedef struct linearisation {
+  const tendonfmu_finger* finger;
+  dual angle[MODEL_MAX_JOINTS], speed[MODEL_MAX_JOINTS];
+  dual friction[MODEL_MAX_JOINTS];  /* T of eq. (10) */
+  dual load[MODEL_MAX_JOINTS];      /* Σ f_B */
+  dual bias_step[MODEL_MAX_JOINTS]; /* Δb */
+  double torque_slope[MODEL_MAX_JOINTS];
+  double mean_force, mean_force_slope;
+} linearisation;
+
+static double seed(const double* direction, size_t i) {
+  return direction ? direction[i] : 0.0;
+}
+
+static void linearise_kinematics(linearisation* l, const tendonfmu_inputs* direction) {
+  const tendonfmu_finger* f = l->finger;
+  const finger_state* s = &f->remembered;
+  const int source = (int)s->scalar[STATE_SOURCE];
+  for (size_t j = 0; j < f->joints; ++j) {
+    double angle = seed(direction->joint_position, j);
+    if (source == TENDONFMU_TENDON_POSITIONS) {
+      angle = 0.0;
+      for (size_t i = 0; i < f->tendons; ++i) {
+        const double stretch = seed(direction->tendon_force, i) * f->derived.inverse_stiffness[i];
+        angle += f->derived.inverse_routing[j * f->tendon_lanes + i] * (seed(direction->tendon_position, i) - stretch);
+      }
+    }
+    const double speed = source == TENDONFMU_JOINT_VELOCITIES ? seed(direction->joint_velocity, j)
+                                                              : s->scalar[STATE_VELOCITY_GAIN] * angle;
+    l->angle[j] = (dual){s->angle[j], angle};
+    l->speed[j] = (dual){s->speed[j], speed};
+  }
+}
+
+/* --- friction values and bias jumps ---------------------------------------------------------------------------------
+ */
+
+/* |F| on one side of a law at a speed that varies */
+static dual law_at(const double* law, int negative, dual speed) {
+  const law_slopes slopes = law_with_slopes(law + negative * LAW_SIDE_NUMBERS, speed.value);
+  return (dual){slopes.value, slopes.by_speed * speed.slope};
+}
+
+/* Laws of one effect: a single one, or those of the segment between two working points. */
+typedef struct effect_laws {
+  const double *below, *above; /* above NULL: no working points */
+  dual weight;
+} effect_laws;
+
+static effect_laws edge_laws(const linearisation* l, size_t j, size_t i) {
+  const tendonfmu_finger* f = l->finger;
+  const derived_numbers* d = &f->derived;
+  const dual angle = j ? l->angle[j - 1] : (dual){0.0, 0.0};
+  size_t at = d->edge_record[j * f->tendon_lanes + i];
+  for (size_t k = 0; k < f->shape.most_points[j]; ++k) {
+    at += angle.value >= d->edge_angle[d->edge_angle_row[j] + k * f->tendon_lanes + i];
+  }
+  const double* segment = d->edge_segment + at * 2;
+  return (effect_laws){.below = d->edge_law + at * LAW_NUMBERS,
+                       .above = d->edge_law + (at + 1) * LAW_NUMBERS,
+                       .weight = {(angle.value - segment[0]) * segment[1], angle.slope * segment[1]}};
+}
+
+static dual magnitude_at(const effect_laws* laws, int negative, dual speed) {
+  const dual below = law_at(laws->below, negative, speed);
+  if (!laws->above) {
+    return below;
+  }
+  return sum(below, product(laws->weight, difference(law_at(laws->above, negative, speed), below)));
+}
+
+/* F at the present velocity: 0 where the effect sticks */
+static dual friction_at(const linearisation* l, const effect_laws* laws, size_t slot, dual velocity) {
+  if (l->finger->remembered.moving[slot] == 0.0) {
+    return (dual){0.0, 0.0};
+  }
+  const double side = l->finger->remembered.side[slot];
+  return scaled(side, magnitude_at(laws, side < 0.0, scaled(side, velocity)));
+}
+
+/* b of fig. 5 at the last sample */
+static dual bias_at(const linearisation* l, const effect_laws* laws, size_t slot, double threshold) {
+  const finger_state* s = &l->finger->remembered;
+  const dual speed = {threshold, 0.0};
+  const double before = s->side_before[slot], now = s->side[slot];
+  if (s->event[slot] == 0.0) {
+    return (dual){0.0, 0.0};
+  }
+  const dual friction_before = scaled(before, magnitude_at(laws, before < 0.0, speed));
+  if (s->event[slot] > 0.0) {
+    return friction_before;
+  }
+  const dual friction_now = scaled(now, magnitude_at(laws, now < 0.0, speed));
+  const double rested = s->last_stuck[slot] - s->stuck_since[slot];
+  const double kept = before == 0.0 ? 0.0 : law_exponential(l->finger->derived.settings.forget_rate * rested);
+  return sum(scaled(-1.0, friction_now), scaled(-kept, difference(friction_before, friction_now)));
+}
+
+/* --- forces along one tendon ----------------------------------------------------------------------------------------
+ */
+
+/* |f| of a bidirectional tendon, f of others; a negative f of others is slack, held at 0 */
+static dual acting(const tendonfmu_finger* f, size_t i, dual* force) {
+  if (f->derived.bidirectional[i] != 0.0) {
+    return force->value < 0.0 ? scaled(-1.0, *force) : *force;
+  }
+  if (force->value < 0.0) {
+    *force = (dual){0.0, 0.0};
+  }
+  return *force;
+}
+
+static void linearise_tendon(linearisation* l, size_t i, double force_slope) {
+  const tendonfmu_finger* f = l->finger;
+  const size_t lanes = f->tendon_lanes;
+  const double threshold = f->derived.settings.tendon_threshold;
+  dual velocity[MODEL_MAX_JOINTS + 1] = {{0.0, 0.0}};
+  velocity[f->joints] = (dual){0.0, 0.0};
+  for (size_t j = f->joints; j-- > 0;) {
+    velocity[j] = sum(velocity[j + 1], scaled(f->derived.moment_arm[j * lanes + i], l->speed[j]));
+  }
+  dual force = {f->remembered.force[i], force_slope}, lost = {0.0, 0.0}, jumped = {0.0, 0.0};
+  dual acts = acting(f, i, &force);
+  for (size_t j = 0; j < f->joints; ++j) {
+    const size_t slot = j * lanes + i;
+    const effect_laws edge = edge_laws(l, j, i);
+    const dual edge_loss = product(acts, friction_at(l, &edge, slot, velocity[j]));
+    jumped = sum(jumped, product(acts, bias_at(l, &edge, slot, threshold)));
+    lost = sum(lost, edge_loss);
+    force = difference(force, edge_loss);
+    acts = acting(f, i, &force);
+    l->load[j] = sum(l->load[j], acts);
+    if (j + 1 < f->joints) {
+      const effect_laws pulley = {.below = f->derived.pulley_law + (slot + lanes) * LAW_NUMBERS};
+      const dual pulley_loss = product(acts, friction_at(l, &pulley, slot + lanes, velocity[j + 1]));
+      jumped = sum(jumped, product(acts, bias_at(l, &pulley, slot + lanes, threshold)));
+      lost = sum(lost, pulley_loss);
+      force = difference(force, pulley_loss);
+      acts = acting(f, i, &force);
+    }
+    const double arm = f->derived.moment_arm[slot];
+    l->friction[j] = sum(l->friction[j], scaled(arm, lost));
+    l->bias_step[j] = sum(l->bias_step[j], scaled(arm, jumped));
+  }
+}
+
+/* --- totals ---------------------------------------------------------------------------------------------------------
+ */
+
+static void linearise_joints(linearisation* l) {
+  const tendonfmu_finger* f = l->finger;
+  const size_t joint_row = f->joints * f->tendon_lanes;
+  const double threshold = f->derived.settings.joint_threshold;
+  for (size_t j = 0; j < f->joints; ++j) {
+    const effect_laws own = {.below = f->derived.joint_law + j * LAW_NUMBERS};
+    const effect_laws loaded = {.below = f->derived.load_law + j * LAW_NUMBERS};
+    const dual own_friction = friction_at(l, &own, joint_row + j, l->speed[j]);
+    const dual load_friction = friction_at(l, &loaded, joint_row + j, l->speed[j]);
+    const dual own_bias = bias_at(l, &own, joint_row + j, threshold);
+    const dual load_bias = bias_at(l, &loaded, joint_row + j, threshold);
+    const dual cover = scaled(f->derived.cover_stiffness[j], l->angle[j]);
+    l->friction[j] = sum(l->friction[j], sum(own_friction, sum(product(load_friction, l->load[j]), cover)));
+    l->bias_step[j] = sum(l->bias_step[j], sum(own_bias, product(load_bias, l->load[j])));
+  }
+  for (uint32_t i = 0; i < f->shape.extension_count; ++i) {
+    size_t j;
+    const effect_torque torque = extension_torque(f, i, &j);
+    l->friction[j].slope += torque.by_angle * l->angle[j].slope + torque.by_velocity * l->speed[j].slope;
+  }
+}
+
+static void linearise_forces(linearisation* l, const tendonfmu_inputs* direction) {
+  const tendonfmu_finger* f = l->finger;
+  for (size_t i = 0; i < f->tendons; ++i) {
+    const double force = f->remembered.force[i], slope = seed(direction->tendon_force, i);
+    l->mean_force += fabs(force) / (double)f->tendons;
+    l->mean_force_slope += (force < 0.0 ? -slope : slope) / (double)f->tendons;
+    for (size_t j = 0; j < f->joints; ++j) {
+      l->torque_slope[j] += f->derived.moment_arm[j * f->tendon_lanes + i] * slope;
+    }
+    linearise_tendon(l, i, slope);
+  }
+}
+
+/* what the Kalman step of the last sample adds: d(K·r), where the gain varies with the mean tendon force */
+static double correction_slope(const linearisation* l, size_t j, double residual_slope) {
+  const finger_settings* settings = &l->finger->derived.settings;
+  const finger_state* s = &l->finger->remembered;
+  const double noise = settings->noise_std + settings->noise_std_per_force * l->mean_force;
+  /* dK·r = −K·(1 − K)·r·dN/N with N the noise variance, and (1 − K)·r is the compensated torque */
+  const double relative = noise > 0.0 ? 2.0 * settings->noise_std_per_force * l->mean_force_slope / noise : 0.0;
+  return s->gain[j] * (residual_slope - s->compensated[j] * relative);
+}
+
+static void write_slope(double* to, size_t j, double slope) {
+  if (to) {
+    to[j] = slope;
+  }
+}
+
+static void write_joint(const linearisation* l, size_t j, const tendonfmu_outputs* derivative) {
+  const tendonfmu_finger* f = l->finger;
+  const double torque = l->torque_slope[j], friction = l->friction[j].slope;
+  double bias = l->bias_step[j].slope;
+  double total = friction + bias;
+  if (f->remembered.scalar[STATE_FIRST_SAMPLE] != 0.0) {
+    bias = f->derived.settings.has_initial_torque ? 0.0 : torque - friction;
+    total = f->derived.settings.has_initial_torque ? friction : torque;
+  } else {
+    const double correction = correction_slope(l, j, torque - total);
+    bias += correction;
+    total += correction;
+  }
+  write_slope(derivative->compensated_torque, j, torque - total);
+  write_slope(derivative->joint_torque, j, torque);
+  write_slope(derivative->friction_torque, j, total);
+  write_slope(derivative->bias_torque, j, bias);
+  write_slope(derivative->joint_angle, j, l->angle[j].slope);
+  write_slope(derivative->joint_speed, j, l->speed[j].slope);
+}
+
+void directional_derivative(const tendonfmu_finger* finger, const tendonfmu_inputs* direction,
+                            const tendonfmu_outputs* derivative) {
+  linearisation l = {.finger = finger};
+  linearise_kinematics(&l, direction);
+  linearise_forces(&l, direction);
+  linearise_joints(&l);
+  for (size_t j = 0; j < finger->joints; ++j) {
+    write_joint(&l, j, derivative);
+  }
+}

@@ -1,0 +1,11 @@
+/* Directional derivative of the last sample's outputs by its inputs. */
+#ifndef TENDONFMU_DIRECTIONAL_DERIVATIVE_H
+#define TENDONFMU_DIRECTIONAL_DERIVATIVE_H
+
+#include "finger_memory.h"
+
+/* direction and derivative as in tendonfmu.h; the finger is initialised and nothing in it changes. */
+void directional_derivative(const tendonfmu_finger* finger, const tendonfmu_inputs* direction,
+                            const tendonfmu_outputs* derivative);
+
+#endif

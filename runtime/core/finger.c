@@ -1,0 +1,467 @@
+/* The public interface, tendonfmu.h. */
+#include "floating_point.h"
+
+#include "finger_memory.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "bytes.h"
+#include "derived_numbers.h"
+#include "directional_derivative.h"
+#include "kernel_choice.h"
+#include "message.h"
+#include "parameters.h"
+#include "samples.h"
+#include "saved_state.h"
+
+#ifndef TENDONFMU_VERSION
+#error "TENDONFMU_VERSION comes from the build, which has it from CMakeLists.txt"
+#endif
+
+const char* tendonfmu_version(void) {
+  return TENDONFMU_VERSION;
+}
+
+/* --- errors ---------------------------------------------------------------------------------------------------------
+ */
+
+/* the text of the last error may be written on a finger that is otherwise only read */
+static message_line error_line(const tendonfmu_finger* finger) {
+  return (message_line){((tendonfmu_finger*)(uintptr_t)finger)->error, ERROR_BYTES};
+}
+
+static tendonfmu_status fail(const tendonfmu_finger* finger, tendonfmu_status status, const char* reason) {
+  message_start(error_line(finger), reason);
+  return status;
+}
+
+const char* tendonfmu_last_error(const tendonfmu_finger* finger) {
+  return finger ? finger->error : "no finger: NULL";
+}
+
+/* --- creation -------------------------------------------------------------------------------------------------------
+ */
+
+tendonfmu_status tendonfmu_check_image(const void* image, size_t image_size, char* message, size_t message_size) {
+  model_shape shape;
+  if (!image || (!message && message_size)) {
+    return TENDONFMU_BAD_ARGUMENT;
+  }
+  const message_line line = {message, message_size};
+  message_start(line, "");
+  /* the numbers themselves are checked where there is memory to read them into */
+  return model_read_header(image, image_size, &shape, line) ? TENDONFMU_BAD_IMAGE : TENDONFMU_OK;
+}
+
+size_t tendonfmu_memory_size(const void* image, size_t image_size) {
+  model_shape shape;
+  const message_line nowhere = {NULL, 0};
+  return image && model_read_header(image, image_size, &shape, nowhere) == 0 ? finger_memory_size(&shape) : 0;
+}
+
+static void begin(tendonfmu_finger* finger) {
+  memcpy(finger->parameters, finger->start, finger->shape.parameter_count * sizeof(double));
+  memset(finger->state, 0, finger->state_count * sizeof(double));
+  finger->remembered.scalar[STATE_SOURCE] = TENDONFMU_TENDON_POSITIONS;
+  derive_numbers(finger, 1);
+}
+
+tendonfmu_finger* tendonfmu_place(void* memory, size_t memory_size, const void* image, size_t image_size, char* message,
+                                  size_t message_size) {
+  const message_line line = {message, message ? message_size : 0};
+  model_shape shape;
+  uint32_t* words;
+  message_start(line, "");
+  if (!memory || !image) {
+    message_start(line, "memory and image must not be NULL");
+    return NULL;
+  }
+  if (model_read_header(image, image_size, &shape, line)) {
+    return NULL;
+  }
+  if (memory_size < finger_memory_size(&shape)) {
+    message_start(line, "too little memory for this finger: expected at least ");
+    message_count(line, finger_memory_size(&shape));
+    message_text(line, " bytes");
+    return NULL;
+  }
+  tendonfmu_finger* finger = finger_lay_out(&shape, memory, &words);
+  if (model_read_body(image, &finger->shape, words, finger->start, line) ||
+      parameter_check_all(&finger->shape, finger->start, line)) {
+    return NULL;
+  }
+  finger->image_id = load_u64((const unsigned char*)image + 24);
+  finger->kernel = kernel_choose("auto");
+  begin(finger);
+  return finger;
+}
+
+tendonfmu_finger* tendonfmu_create(const void* image, size_t image_size, char* message, size_t message_size) {
+  const message_line line = {message, message ? message_size : 0};
+  const size_t size = tendonfmu_memory_size(image, image_size);
+  void* memory = size ? malloc(size) : NULL;
+  if (size && !memory) {
+    message_start(line, "out of memory: expected ");
+    message_count(line, size);
+    message_text(line, " bytes");
+    return NULL;
+  }
+  unsigned char unused[1]; /* so that a refused image is refused with its reason */
+  tendonfmu_finger* finger =
+      tendonfmu_place(memory ? memory : unused, memory ? size : 0, image, image_size, message, message_size);
+  if (finger) {
+    finger->allocation = memory;
+  } else {
+    free(memory);
+  }
+  return finger;
+}
+
+void tendonfmu_destroy(tendonfmu_finger* finger) {
+  if (finger) {
+    free(finger->allocation);
+  }
+}
+
+static char hexadecimal(uint64_t four_bits) {
+  return "0123456789abcdef"[four_bits & 15];
+}
+
+tendonfmu_status tendonfmu_image_guid(const void* image, size_t image_size, unsigned long long salt, char guid[39]) {
+  if (!image || !guid) {
+    return TENDONFMU_BAD_ARGUMENT;
+  }
+  const uint64_t halves[2] = {hash_bytes(image, image_size, salt), hash_bytes(image, image_size, salt ^ 0x5bd1e995u)};
+  char* to = guid;
+  *to++ = '{';
+  for (int i = 0; i < 32; ++i) {
+    if (i == 8 || i == 12 || i == 16 || i == 20) {
+      *to++ = '-';
+    }
+    *to++ = hexadecimal(halves[i / 16] >> (60 - 4 * (i % 16)));
+  }
+  *to++ = '}';
+  *to = 0;
+  return TENDONFMU_OK;
+}
+
+size_t tendonfmu_joint_count(const tendonfmu_finger* finger) {
+  return finger ? finger->joints : 0;
+}
+size_t tendonfmu_tendon_count(const tendonfmu_finger* finger) {
+  return finger ? finger->tendons : 0;
+}
+
+/* --- samples --------------------------------------------------------------------------------------------------------
+ */
+
+int tendonfmu_is_initialised(const tendonfmu_finger* finger) {
+  return finger && finger->remembered.scalar[STATE_INITIALISED] != 0.0;
+}
+
+double tendonfmu_get_time(const tendonfmu_finger* finger) {
+  return finger ? finger->remembered.scalar[STATE_TIME] : 0.0;
+}
+
+int tendonfmu_get_kinematics_source(const tendonfmu_finger* finger) {
+  return finger ? (int)finger->remembered.scalar[STATE_SOURCE] : 0;
+}
+
+tendonfmu_status tendonfmu_set_kinematics_source(tendonfmu_finger* finger, int source) {
+  if (!finger) {
+    return TENDONFMU_BAD_ARGUMENT;
+  }
+  if (source < TENDONFMU_TENDON_POSITIONS || source > TENDONFMU_JOINT_VELOCITIES) {
+    return fail(finger, TENDONFMU_BAD_PARAMETER,
+                "kinematics_source: expected 1 (tendon positions), 2 (joint positions) "
+                "or 3 (joint positions and velocities)");
+  }
+  if (tendonfmu_is_initialised(finger)) {
+    return fail(finger, TENDONFMU_WRONG_ORDER, "kinematics_source is fixed once the first sample is taken");
+  }
+  finger->remembered.scalar[STATE_SOURCE] = source;
+  return TENDONFMU_OK;
+}
+
+static tendonfmu_status take(tendonfmu_finger* finger, double time, const tendonfmu_inputs* inputs) {
+  if (samples_take_inputs(finger, time, inputs, error_line(finger))) {
+    return TENDONFMU_BAD_SAMPLE;
+  }
+  if (tendonfmu_is_initialised(finger) && time == finger->remembered.scalar[STATE_TIME]) {
+    return TENDONFMU_OK; /* the sample already taken */
+  }
+  if (finger->kernel->take_sample(finger, time)) {
+    message_start(error_line(finger), "the sample at time ");
+    message_number(error_line(finger), time);
+    message_text(error_line(finger), " s overflows: expected forces and velocities for which all torques are finite");
+    return TENDONFMU_BAD_SAMPLE;
+  }
+  return TENDONFMU_OK;
+}
+
+tendonfmu_status tendonfmu_initialise(tendonfmu_finger* finger, double time, const tendonfmu_inputs* inputs) {
+  if (!finger || !inputs) {
+    return TENDONFMU_BAD_ARGUMENT;
+  }
+  if (tendonfmu_is_initialised(finger)) {
+    return fail(finger, TENDONFMU_WRONG_ORDER,
+                "the first sample is already taken: expected a reset before another one");
+  }
+  return take(finger, time, inputs);
+}
+
+tendonfmu_status tendonfmu_step(tendonfmu_finger* finger, double time, const tendonfmu_inputs* inputs) {
+  if (!finger || !inputs) {
+    return TENDONFMU_BAD_ARGUMENT;
+  }
+  if (!tendonfmu_is_initialised(finger)) {
+    return fail(finger, TENDONFMU_WRONG_ORDER, "a step before the first sample: expected tendonfmu_initialise()");
+  }
+  return take(finger, time, inputs);
+}
+
+tendonfmu_status tendonfmu_run(tendonfmu_finger* finger, size_t samples, const double* time,
+                               const tendonfmu_inputs* inputs, const tendonfmu_outputs* outputs, size_t* done) {
+  if (done) {
+    *done = 0;
+  }
+  if (!finger || !inputs || !outputs || (!time && samples)) {
+    return TENDONFMU_BAD_ARGUMENT;
+  }
+  for (size_t row = 0; row < samples; ++row) {
+    const tendonfmu_inputs sample = samples_row(finger, inputs, row);
+    const tendonfmu_status status = take(finger, time[row], &sample);
+    if (status != TENDONFMU_OK) {
+      return status;
+    }
+    samples_give_outputs(finger, outputs, row);
+    if (done) {
+      *done = row + 1;
+    }
+  }
+  return TENDONFMU_OK;
+}
+
+tendonfmu_status tendonfmu_get_outputs(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs) {
+  if (!finger || !outputs) {
+    return TENDONFMU_BAD_ARGUMENT;
+  }
+  if (!tendonfmu_is_initialised(finger)) {
+    return fail(finger, TENDONFMU_WRONG_ORDER, "no outputs before the first sample");
+  }
+  samples_give_outputs(finger, outputs, 0);
+  return TENDONFMU_OK;
+}
+
+tendonfmu_status tendonfmu_get_directional_derivative(tendonfmu_finger* finger, const tendonfmu_inputs* direction,
+                                                      const tendonfmu_outputs* derivative) {
+  if (!finger || !direction || !derivative) {
+    return TENDONFMU_BAD_ARGUMENT;
+  }
+  if (!tendonfmu_is_initialised(finger)) {
+    return fail(finger, TENDONFMU_WRONG_ORDER, "no derivative before the first sample");
+  }
+  directional_derivative(finger, direction, derivative);
+  return TENDONFMU_OK;
+}
+
+/* --- parameters -----------------------------------------------------------------------------------------------------
+ */
+
+size_t tendonfmu_parameter_count(const tendonfmu_finger* finger) {
+  return finger ? finger->shape.parameter_count : 0;
+}
+
+static int has_parameter(const tendonfmu_finger* finger, size_t index) {
+  if (index < finger->shape.parameter_count) {
+    return 1;
+  }
+  message_start(error_line(finger), "parameter index ");
+  message_count(error_line(finger), index);
+  message_text(error_line(finger), ": expected below ");
+  message_count(error_line(finger), finger->shape.parameter_count);
+  return 0;
+}
+
+tendonfmu_status tendonfmu_get_parameter_path(const tendonfmu_finger* finger, size_t index, char* path,
+                                              size_t path_size) {
+  if (!finger || !path || !path_size || !has_parameter(finger, index)) {
+    return TENDONFMU_BAD_ARGUMENT;
+  }
+  char whole[PARAMETER_PATH_BYTES];
+  const model_item item = parameter_item(&finger->shape, (uint32_t)index);
+  parameter_path(&item, (uint32_t)index, whole);
+  if (strlen(whole) + 1 > path_size) {
+    return fail(finger, TENDONFMU_BAD_ARGUMENT, "path_size is too small: 80 bytes are enough");
+  }
+  memcpy(path, whole, strlen(whole) + 1);
+  return TENDONFMU_OK;
+}
+
+size_t tendonfmu_find_parameter(const tendonfmu_finger* finger, const char* path) {
+  return finger && path ? parameter_find(&finger->shape, path) : 0;
+}
+
+tendonfmu_status tendonfmu_get_parameter_info(const tendonfmu_finger* finger, size_t index,
+                                              tendonfmu_parameter_info* info) {
+  if (!finger || !info || !has_parameter(finger, index)) {
+    return TENDONFMU_BAD_ARGUMENT;
+  }
+  const model_item item = parameter_item(&finger->shape, (uint32_t)index);
+  const parameter_range range = parameter_range_of(&item, (uint32_t)index);
+  *info = (tendonfmu_parameter_info){.start = finger->start[index],
+                                     .minimum = range.minimum,
+                                     .maximum = range.maximum,
+                                     .above_minimum = range.above_minimum,
+                                     .tunable = range.tunable,
+                                     .unit = range.unit};
+  return TENDONFMU_OK;
+}
+
+tendonfmu_status tendonfmu_get_parameters(const tendonfmu_finger* finger, size_t count, const size_t* indices,
+                                          double* values) {
+  if (!finger || (count && !values)) {
+    return TENDONFMU_BAD_ARGUMENT;
+  }
+  for (size_t i = 0; i < count; ++i) {
+    if (!has_parameter(finger, indices ? indices[i] : i)) {
+      return TENDONFMU_BAD_ARGUMENT;
+    }
+  }
+  for (size_t i = 0; i < count; ++i) {
+    values[i] = finger->parameters[indices ? indices[i] : i];
+  }
+  return TENDONFMU_OK;
+}
+
+/* checks one value on its way into the candidate; sets *routing when it moves a tendon */
+static tendonfmu_status check_candidate(tendonfmu_finger* finger, size_t index, double value, int* routing) {
+  if (!has_parameter(finger, index)) {
+    return TENDONFMU_BAD_ARGUMENT;
+  }
+  const model_item item = parameter_item(&finger->shape, (uint32_t)index);
+  if (parameter_check_value(&item, (uint32_t)index, value, error_line(finger))) {
+    return TENDONFMU_BAD_PARAMETER;
+  }
+  if (tendonfmu_is_initialised(finger) && !parameter_range_of(&item, (uint32_t)index).tunable) {
+    char path[PARAMETER_PATH_BYTES];
+    parameter_path(&item, (uint32_t)index, path);
+    message_start(error_line(finger), path);
+    message_text(error_line(finger), " is fixed once the first sample is taken");
+    return TENDONFMU_WRONG_ORDER;
+  }
+  *routing |= item.kind == ITEM_MOMENT_ARMS;
+  finger->candidate[index] = value;
+  return TENDONFMU_OK;
+}
+
+tendonfmu_status tendonfmu_set_parameters(tendonfmu_finger* finger, size_t count, const size_t* indices,
+                                          const double* values) {
+  if (!finger || (count && !values)) {
+    return TENDONFMU_BAD_ARGUMENT;
+  }
+  const size_t bytes = finger->shape.parameter_count * sizeof(double);
+  int routing = 0;
+  memcpy(finger->candidate, finger->parameters, bytes);
+  for (size_t i = 0; i < count; ++i) {
+    const tendonfmu_status status = check_candidate(finger, indices ? indices[i] : i, values[i], &routing);
+    if (status != TENDONFMU_OK) {
+      return status;
+    }
+  }
+  if (parameter_check_relations(&finger->shape, finger->candidate, error_line(finger)) ||
+      (routing && parameter_check_routing(&finger->shape, finger->candidate, error_line(finger)))) {
+    return TENDONFMU_BAD_PARAMETER;
+  }
+  memcpy(finger->parameters, finger->candidate, bytes);
+  derive_numbers(finger, routing);
+  return TENDONFMU_OK;
+}
+
+static int find_or_fail(const tendonfmu_finger* finger, const char* path, size_t* index) {
+  *index = parameter_find(&finger->shape, path);
+  if (*index < finger->shape.parameter_count) {
+    return 0;
+  }
+  message_start(error_line(finger), "no parameter \"");
+  message_text(error_line(finger), path);
+  message_text(error_line(finger), "\" in this finger");
+  return -1;
+}
+
+tendonfmu_status tendonfmu_get_parameter(const tendonfmu_finger* finger, const char* path, double* value) {
+  size_t index;
+  if (!finger || !path || !value || find_or_fail(finger, path, &index)) {
+    return TENDONFMU_BAD_ARGUMENT;
+  }
+  *value = finger->parameters[index];
+  return TENDONFMU_OK;
+}
+
+tendonfmu_status tendonfmu_set_parameter(tendonfmu_finger* finger, const char* path, double value) {
+  size_t index;
+  if (!finger || !path || find_or_fail(finger, path, &index)) {
+    return TENDONFMU_BAD_ARGUMENT;
+  }
+  return tendonfmu_set_parameters(finger, 1, &index, &value);
+}
+
+/* --- state ----------------------------------------------------------------------------------------------------------
+ */
+
+size_t tendonfmu_state_size(const tendonfmu_finger* finger) {
+  return finger ? saved_state_size(finger) : 0;
+}
+
+tendonfmu_status tendonfmu_save_state(const tendonfmu_finger* finger, void* bytes, size_t size) {
+  if (!finger || !bytes) {
+    return TENDONFMU_BAD_ARGUMENT;
+  }
+  if (size != saved_state_size(finger)) {
+    return fail(finger, TENDONFMU_BAD_ARGUMENT, "size: expected that of tendonfmu_state_size()");
+  }
+  save_state(finger, bytes);
+  return TENDONFMU_OK;
+}
+
+tendonfmu_status tendonfmu_restore_state(tendonfmu_finger* finger, const void* bytes, size_t size) {
+  if (!finger || !bytes) {
+    return TENDONFMU_BAD_ARGUMENT;
+  }
+  if (size != saved_state_size(finger)) {
+    return fail(finger, TENDONFMU_BAD_STATE,
+                "saved state of another finger or cut off: expected as many bytes as "
+                "tendonfmu_state_size() says");
+  }
+  return restore_state(finger, bytes, error_line(finger)) ? TENDONFMU_BAD_STATE : TENDONFMU_OK;
+}
+
+tendonfmu_status tendonfmu_reset(tendonfmu_finger* finger) {
+  if (!finger) {
+    return TENDONFMU_BAD_ARGUMENT;
+  }
+  begin(finger);
+  return TENDONFMU_OK;
+}
+
+/* --- kernels --------------------------------------------------------------------------------------------------------
+ */
+
+const char* tendonfmu_get_kernel(const tendonfmu_finger* finger) {
+  return finger ? finger->kernel->name : "";
+}
+
+tendonfmu_status tendonfmu_set_kernel(tendonfmu_finger* finger, const char* name) {
+  if (!finger || !name) {
+    return TENDONFMU_BAD_ARGUMENT;
+  }
+  const step_kernel* kernel = kernel_choose(name);
+  if (!kernel) {
+    return fail(finger, TENDONFMU_BAD_ARGUMENT,
+                "kernel: expected \"auto\", \"plain\", or \"sse2\" or \"avx2\" where "
+                "processor and build have it");
+  }
+  finger->kernel = kernel;
+  return TENDONFMU_OK;
+}

@@ -1,0 +1,138 @@
+#include "floating_point.h"
+
+#include "finger_memory.h"
+
+#include <string.h>
+
+/* Rows of doubles begin at multiples of 64 bytes: aligned loads in every kernel, no row split over cache lines. */
+enum { ROW_BYTES = 64 };
+
+typedef struct cursor {
+  unsigned char* base; /* NULL: only count */
+  size_t used;
+} cursor;
+
+static void* take(cursor* c, size_t bytes) {
+  void* place = c->base ? c->base + c->used : NULL;
+  c->used += (bytes + ROW_BYTES - 1) / ROW_BYTES * ROW_BYTES;
+  return place;
+}
+
+static double* take_numbers(cursor* c, size_t count) {
+  return take(c, count * sizeof(double));
+}
+
+/* consecutive rows, each [count], with no gap: `state` must be one run */
+static double* part(double** run, size_t count) {
+  double* place = *run;
+  *run = place ? place + count : NULL;
+  return place;
+}
+
+static void lay_out_parameters(tendonfmu_finger* f, cursor* c) {
+  const size_t p = f->shape.parameter_count;
+  f->start = take_numbers(c, p);
+  f->parameters = take_numbers(c, p);
+  f->candidate = take_numbers(c, p);
+}
+
+static void lay_out_derived(tendonfmu_finger* f, cursor* c) {
+  derived_numbers* d = &f->derived;
+  const size_t n = f->joints, lanes = f->tendon_lanes, joints = f->joint_lanes;
+  const size_t records = 2 + (size_t)f->shape.edge_law_count + 2 * (size_t)f->shape.edge_count;
+  size_t angles = 0;
+  for (size_t j = 0; j < n; ++j) {
+    angles += f->shape.most_points[j] * lanes;
+  }
+  d->inverse_stiffness = take_numbers(c, lanes);
+  d->bidirectional = take_numbers(c, lanes);
+  d->moment_arm = take_numbers(c, n * lanes);
+  d->inverse_routing = take_numbers(c, n * lanes);
+  d->pulley_law = take_numbers(c, n * lanes * LAW_NUMBERS);
+  d->edge_law = take_numbers(c, records * LAW_NUMBERS);
+  d->edge_segment = take_numbers(c, records * 2);
+  d->edge_angle = take_numbers(c, angles);
+  d->edge_angle_row = take(c, n * sizeof(size_t));
+  d->edge_record = take(c, n * lanes * sizeof(uint32_t));
+  d->joint_law = take_numbers(c, joints * LAW_NUMBERS);
+  d->load_law = take_numbers(c, joints * LAW_NUMBERS);
+  d->cover_stiffness = take_numbers(c, joints);
+  d->cover_rest = take_numbers(c, joints);
+  d->contact_threshold = take_numbers(c, joints);
+  d->contact_per_force = take_numbers(c, joints);
+  d->initial_torque = take_numbers(c, joints);
+}
+
+static void lay_out_state(tendonfmu_finger* f, cursor* c) {
+  finger_state* s = &f->remembered;
+  const size_t joints = f->joint_lanes, tendons = f->tendon_lanes, slots = f->slots;
+  f->state_count = STATE_SCALARS + 10 * joints + 2 * tendons + 6 * slots + f->shape.extension_memory;
+  f->state = take_numbers(c, f->state_count);
+  double* run = f->state;
+  s->scalar = part(&run, STATE_SCALARS);
+  double** const joint_rows[] = {&s->angle, &s->speed,         &s->torque,   &s->friction,           &s->compensated,
+                                 &s->bias,  &s->joint_contact, &s->variance, &s->predicted_variance, &s->gain};
+  for (size_t i = 0; i < sizeof joint_rows / sizeof joint_rows[0]; ++i) {
+    *joint_rows[i] = part(&run, joints);
+  }
+  s->force = part(&run, tendons);
+  s->slack = part(&run, tendons);
+  double** const slot_rows[] = {&s->moving, &s->side, &s->side_before, &s->event, &s->stuck_since, &s->last_stuck};
+  for (size_t i = 0; i < sizeof slot_rows / sizeof slot_rows[0]; ++i) {
+    *slot_rows[i] = part(&run, slots);
+  }
+  s->extension = run;
+}
+
+static void lay_out_scratch(tendonfmu_finger* f, cursor* c) {
+  finger_scratch* s = &f->scratch;
+  const size_t matrix = f->joints * f->tendon_lanes;
+  double** const tendon_rows[] = {&s->force, &s->position, &s->slack};
+  double** const joint_rows[] = {&s->angle,         &s->raw_angle,  &s->torque,           &s->friction,
+                                 &s->bias_step,     &s->load,       &s->extension_torque, &s->joint_friction,
+                                 &s->load_friction, &s->joint_bias, &s->load_bias};
+  double** const matrices[] = {&s->edge, &s->pulley, &s->edge_bias, &s->pulley_bias, &s->force_at, &s->force_between};
+  for (size_t i = 0; i < sizeof tendon_rows / sizeof tendon_rows[0]; ++i) {
+    *tendon_rows[i] = take_numbers(c, f->tendon_lanes);
+  }
+  for (size_t i = 0; i < sizeof joint_rows / sizeof joint_rows[0]; ++i) {
+    *joint_rows[i] = take_numbers(c, f->joint_lanes);
+  }
+  for (size_t i = 0; i < sizeof matrices / sizeof matrices[0]; ++i) {
+    *matrices[i] = take_numbers(c, matrix);
+  }
+  s->velocity = take_numbers(c, f->slots);
+}
+
+static size_t lay_out(const model_shape* shape, tendonfmu_finger* f, unsigned char* base, uint32_t** words) {
+  cursor c = {base, 0};
+  take(&c, sizeof *f);
+  f->shape = *shape;
+  f->joints = shape->joints;
+  f->tendons = shape->tendons;
+  f->joint_lanes = (f->joints + 3) / 4 * 4;
+  f->tendon_lanes = (f->tendons + 3) / 4 * 4;
+  f->slots = f->joints * f->tendon_lanes + f->joint_lanes;
+  *words = take(&c, sizeof(uint32_t) * (shape->word_count + (size_t)MODEL_EXTENSION_WORDS * shape->extension_count));
+  lay_out_parameters(f, &c);
+  lay_out_derived(f, &c);
+  lay_out_state(f, &c);
+  lay_out_scratch(f, &c);
+  return c.used;
+}
+
+size_t finger_memory_size(const model_shape* shape) {
+  tendonfmu_finger counted;
+  uint32_t* words;
+  return lay_out(shape, &counted, NULL, &words) + ROW_BYTES; /* room to align what the caller gives */
+}
+
+tendonfmu_finger* finger_lay_out(const model_shape* shape, void* memory, uint32_t** words) {
+  const size_t size = finger_memory_size(shape);
+  memset(memory, 0, size);
+  const size_t skip = (ROW_BYTES - (uintptr_t)memory % ROW_BYTES) % ROW_BYTES;
+  unsigned char* base = (unsigned char*)memory + skip;
+  tendonfmu_finger* finger = (tendonfmu_finger*)(void*)base;
+  lay_out(shape, finger, base, words);
+  return finger;
+}

@@ -1,0 +1,119 @@
+/* Everything a finger consists of, laid out in one block of memory.
+ *
+ * Lanes: tendons lie side by side in rows of M = 4·⌈m/4⌉, joints in rows of N = 4·⌈n/4⌉; lanes without a tendon or
+ * joint hold zeros and stay zero. Slots: every relative velocity has one slot, n rows of tendon lanes (ẋ_ij, eq. 5) and
+ * then a row of joint lanes (q̇_j). The friction effects that share a velocity (F_B before joint j and F_A of pulley
+ * j−1; T_jv0 and T_jvf) move and stick together, so what fig. 5 remembers of an effect is kept once per slot. */
+#ifndef TENDONFMU_FINGER_MEMORY_H
+#define TENDONFMU_FINGER_MEMORY_H
+
+#include "friction_law.h"
+#include "model_image.h"
+#include "tendonfmu.h"
+
+enum { ERROR_BYTES = 400 };
+
+/* Numbers of the description that are neither per joint nor per tendon. */
+typedef struct finger_settings {
+  double tendon_threshold, joint_threshold; /* v_min: m/s, rad/s */
+  double cutoff_rate;                       /* 2π·cutoff, 1/s; 0 unfiltered */
+  double drift_variance, noise_std, noise_std_per_force, forget_rate;
+  double initial_variance; /* < 0: from the noise at the first sample */
+  double noise_time;       /* < 0: noise per sample */
+  int has_initial_torque;
+} finger_settings;
+
+/* All that follows from the parameters; filled in one place, derived_numbers.c. Arrays of [n × M] have a row a joint.
+ */
+typedef struct derived_numbers {
+  finger_settings settings;
+  double* inverse_stiffness; /* [M] 1/k */
+  double* bidirectional;     /* [M] 1 or 0 */
+  double* moment_arm;        /* [n × M] r_ij */
+  double* inverse_routing;   /* [n × M] R⁺ */
+  double* pulley_law;     /* [n × M × LAW_NUMBERS] row j: the pulley whose tendon moves with slot j, at joint j−1 */
+  double* edge_law;       /* [records × LAW_NUMBERS] per edge with K laws K+2 records: L1 L1 L2 … LK LK */
+  double* edge_segment;   /* [records × 2] angle at which the segment begins, 1/length; 0 outside the grid */
+  double* edge_angle;     /* per joint: [most points × M], ∞ where an edge has fewer */
+  size_t* edge_angle_row; /* [n] where the angles of a joint begin, in numbers */
+  uint32_t* edge_record;  /* [n × M] first record of the edge; 0 holds zeros for edges without friction */
+  double* joint_law;      /* [N × LAW_NUMBERS] T_jv0 */
+  double* load_law;       /* [N × LAW_NUMBERS] T_jvf */
+  double *cover_stiffness, *cover_rest;          /* [N] */
+  double *contact_threshold, *contact_per_force; /* [N] */
+  double* initial_torque;                        /* [N] */
+} derived_numbers;
+
+/* What the finger remembers from sample to sample, with the outputs of the last one: one plain run of doubles. */
+enum {
+  STATE_INITIALISED,   /* 0 or 1 */
+  STATE_SOURCE,        /* kinematics source 1, 2, 3 */
+  STATE_TIME,          /* s */
+  STATE_FIRST_SAMPLE,  /* 1 while the last sample is the first */
+  STATE_VELOCITY_GAIN, /* ∂v_k/∂q_k of the last sample, 1/s */
+  STATE_NOISE_SCALE,   /* factor on the noise variance of the last sample */
+  STATE_CONTACT,       /* 0 or 1 */
+  STATE_SPARE,         /* 0; keeps the rows aligned */
+  STATE_SCALARS
+};
+
+typedef struct finger_state {
+  double* scalar; /* [STATE_SCALARS] */
+  /* [N] per joint */
+  double *angle, *speed, *torque, *friction, *compensated, *bias, *joint_contact;
+  double* variance;           /* P after the sample, (N·m)² */
+  double* predicted_variance; /* P before its update */
+  double* gain;               /* K; 0 in contact */
+  /* [M] per tendon */
+  double *force, *slack;
+  /* [n × M + N] per slot, fig. 5 */
+  double* moving;                   /* 1 or 0 at the last sample */
+  double* side;                     /* sgn(v) of the last moving sample; 0: never moved */
+  double* side_before;              /* side before the last sample */
+  double* event;                    /* of the last sample: 1 came to rest, −1 began to move, 0 neither */
+  double *stuck_since, *last_stuck; /* s */
+  double* extension;                /* as the extensions ask for */
+} finger_state;
+
+/* Of one sample only; nothing in it is read by the next. */
+typedef struct finger_scratch {
+  double *force, *position;        /* [M] inputs, padded */
+  double* velocity;                /* [n × M + N] */
+  double *angle, *raw_angle;       /* [N] */
+  double *edge, *pulley;           /* [n × M] F_B, F_A; pulley in the row of its slot */
+  double *edge_bias, *pulley_bias; /* [n × M] b of the same */
+  double *force_at,
+      *force_between; /* [n × M] f_A before each joint and f_B, as they multiply an F: |f| if bidirectional */
+  double* slack;      /* [M] */
+  double *torque, *friction, *bias_step, *load, *extension_torque; /* [N] τ, T, Δb, Σ f_B */
+  double *joint_friction, *load_friction, *joint_bias, *load_bias; /* [N] T_jv0, T_jvf and their b */
+} finger_scratch;
+
+typedef struct step_kernel step_kernel;
+
+struct tendonfmu_finger {
+  model_shape shape;
+  size_t joints, tendons;           /* n, m */
+  size_t joint_lanes, tendon_lanes; /* N, M */
+  size_t slots;                     /* n·M + N */
+  uint64_t image_id;                /* checksum of the image */
+  const step_kernel* kernel;
+  double *start, *parameters, *candidate; /* [p] of the image, in force, being checked */
+  double* state;                          /* [state_count], what `remembered` points into */
+  size_t state_count;
+  derived_numbers derived;
+  finger_state remembered;
+  finger_scratch scratch;
+  int owns_memory;
+  void* allocation;
+  char error[ERROR_BYTES];
+};
+
+/* Bytes needed for a finger of a checked image header. */
+size_t finger_memory_size(const model_shape* shape);
+
+/* Lays a finger of a checked image header into memory of that size, all zeros; words receives room for the shape words.
+ */
+tendonfmu_finger* finger_lay_out(const model_shape* shape, void* memory, uint32_t** words);
+
+#endif

@@ -1,0 +1,18 @@
+/* Samples from the caller's arrays into the finger, and outputs back. */
+#ifndef TENDONFMU_SAMPLES_H
+#define TENDONFMU_SAMPLES_H
+
+#include "finger_memory.h"
+#include "message.h"
+
+/* Checks the inputs that the kinematics source uses, and the time, and copies them into scratch.
+ * Returns 0, or −1 with one line in message. */
+int samples_take_inputs(tendonfmu_finger* finger, double time, const tendonfmu_inputs* inputs, message_line message);
+
+/* Copies the outputs of the last sample into row `row` of the caller's arrays. */
+void samples_give_outputs(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs, size_t row);
+
+/* Row `row` of many samples. */
+tendonfmu_inputs samples_row(const tendonfmu_finger* finger, const tendonfmu_inputs* inputs, size_t row);
+
+#endif

@@ -1,0 +1,181 @@
+/* One sample of the finger, as a recipe. Compiled once for each instruction set: step_plain.c, step_sse2.c, step_avx2.c
+ * include a quad and then this. */
+#ifndef TENDONFMU_STEP_KERNEL_H
+#define TENDONFMU_STEP_KERNEL_H
+
+#include "bias_tracker.h"
+#include "contact_detector.h"
+#include "extensions.h"
+#include "force_propagation.h"
+#include "kernel_choice.h"
+#include "kinematics.h"
+
+static inline int is_first(const tendonfmu_finger* f) {
+  return f->remembered.scalar[STATE_INITIALISED] == 0.0;
+}
+
+/* joint angles and all velocities, into scratch; returns ∂v/∂q of this sample (1/s) */
+static inline double find_kinematics(tendonfmu_finger* f, double step) {
+  const finger_scratch* s = &f->scratch;
+  double* joint_velocity = s->velocity + f->joints * f->tendon_lanes;
+  const int source = (int)f->remembered.scalar[STATE_SOURCE];
+  double gain = 0.0;
+  if (source == TENDONFMU_TENDON_POSITIONS) {
+    angles_from_tendons(f, s->force, s->position, s->angle);
+  }
+  if (source != TENDONFMU_JOINT_VELOCITIES) {
+    if (is_first(f)) {
+      for (size_t j = 0; j < f->joint_lanes; ++j) {
+        joint_velocity[j] = 0.0;
+      }
+    } else {
+      const double share = filter_share(f->derived.settings.cutoff_rate, step);
+      filter_velocities(f, s->angle, step, share, joint_velocity);
+      gain = share / step;
+    }
+  }
+  relative_velocities(f, s->velocity);
+  return gain;
+}
+
+/* τ = Rᵀ f0 (eq. 3), with the measured forces */
+static inline void measured_torques(tendonfmu_finger* f) {
+  for (size_t j = 0; j < f->joints; ++j) {
+    f->scratch.torque[j] = tendon_sum(f->derived.moment_arm + j * f->tendon_lanes, f->scratch.force, f->tendon_lanes);
+  }
+}
+
+/* mean |f0| over the tendons */
+static inline double mean_tendon_force(const tendonfmu_finger* f) {
+  quad sum = quad_set(0.0);
+  for (size_t i = 0; i < f->tendon_lanes; i += 4) {
+    sum = quad_add(sum, quad_abs(quad_load(f->scratch.force + i)));
+  }
+  return quad_sum(sum) / (double)f->tendons;
+}
+
+/* 0 when anything that is about to be remembered is not finite */
+static inline int all_finite(const tendonfmu_finger* f) {
+  const finger_scratch* s = &f->scratch;
+  const double* joint_velocity = s->velocity + f->joints * f->tendon_lanes;
+  double probe = 0.0; /* stays 0 unless something is infinite or NaN */
+  for (size_t j = 0; j < f->joints; ++j) {
+    probe += 0.0 * (s->torque[j] - s->friction[j] - s->bias_step[j] - f->remembered.bias[j]);
+    probe += 0.0 * s->angle[j] + 0.0 * joint_velocity[j];
+  }
+  return probe == 0.0;
+}
+
+static inline void copy_row(double* to, const double* from, size_t lanes) {
+  for (size_t i = 0; i < lanes; i += 4) {
+    quad_store(to + i, quad_load(from + i));
+  }
+}
+
+/* T_eff = b_eff + T with b_eff already stepped */
+static inline void effective_friction(tendonfmu_finger* f) {
+  const finger_state* s = &f->remembered;
+  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+    quad_store(s->friction + j, quad_add(quad_load(s->bias + j), quad_load(f->scratch.friction + j)));
+  }
+}
+
+/* kinematics, forces and memory of the slots: what every accepted sample leaves behind */
+static inline void remember_sample(tendonfmu_finger* f, double time, double velocity_gain) {
+  const finger_state* s = &f->remembered;
+  remember_slots(f, time);
+  copy_row(s->angle, f->scratch.angle, f->joint_lanes);
+  copy_row(s->speed, f->scratch.velocity + f->joints * f->tendon_lanes, f->joint_lanes);
+  copy_row(s->torque, f->scratch.torque, f->joint_lanes);
+  copy_row(s->force, f->scratch.force, f->tendon_lanes);
+  copy_row(s->slack, f->scratch.slack, f->tendon_lanes);
+  remember_extensions(f);
+  s->scalar[STATE_TIME] = time;
+  s->scalar[STATE_VELOCITY_GAIN] = velocity_gain;
+}
+
+/* the first sample: b_eff = τ − T unless it is given, nothing detected, nothing tracked */
+static inline void begin_tracking(tendonfmu_finger* f, double time, double mean_force) {
+  const finger_state* s = &f->remembered;
+  const finger_settings* settings = &f->derived.settings;
+  const double variance =
+      settings->initial_variance >= 0.0 ? settings->initial_variance : noise_variance(settings, mean_force, 1.0);
+  for (size_t slot = 0; slot < f->slots; ++slot) {
+    s->event[slot] = 0.0;
+    s->stuck_since[slot] = s->last_stuck[slot] = time;
+  }
+  for (size_t j = 0; j < f->joints; ++j) {
+    s->bias[j] = settings->has_initial_torque ? f->derived.initial_torque[j] : s->torque[j] - f->scratch.friction[j];
+    s->variance[j] = s->predicted_variance[j] = variance;
+    s->gain[j] = s->joint_contact[j] = 0.0;
+  }
+  effective_friction(f);
+  if (!settings->has_initial_torque) {
+    copy_row(s->friction, s->torque, f->joint_lanes); /* to the last bit */
+  }
+  s->scalar[STATE_INITIALISED] = 1.0;
+  s->scalar[STATE_FIRST_SAMPLE] = 1.0;
+  s->scalar[STATE_NOISE_SCALE] = 1.0;
+  s->scalar[STATE_CONTACT] = 0.0;
+}
+
+/* steps 4 to 6 of the contract for every later sample */
+static inline void track_sample(tendonfmu_finger* f, double time, double step, double mean_force) {
+  const finger_state* s = &f->remembered;
+  const finger_settings* settings = &f->derived.settings;
+  const double wanted = settings->noise_time >= 0.0 ? settings->noise_time / step : 1.0;
+  const double scale = wanted < 1e300 ? wanted : 1e300; /* finite, however short the step */
+  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+    quad_store(s->bias + j, quad_add(quad_load(s->bias + j), quad_load(f->scratch.bias_step + j)));
+  }
+  effective_friction(f);
+  const int contact = detect_contact(f, mean_force);
+  if (contact) {
+    restart_rest(f, time);
+    for (size_t j = 0; j < f->joint_lanes; ++j) {
+      s->gain[j] = 0.0;
+    }
+  } else {
+    track_bias(f, step, noise_variance(settings, mean_force, scale));
+  }
+  s->scalar[STATE_FIRST_SAMPLE] = 0.0;
+  s->scalar[STATE_NOISE_SCALE] = scale;
+  s->scalar[STATE_CONTACT] = contact ? 1.0 : 0.0;
+}
+
+/* The recipe. Inputs stand in scratch; returns 0, or −1 when the sample overflows, and then nothing is remembered. */
+static int take_sample(tendonfmu_finger* f, double time) {
+  const finger_state* s = &f->remembered;
+  const int first = is_first(f);
+  const double step = time - s->scalar[STATE_TIME];
+
+  const double velocity_gain = find_kinematics(f, step);
+  friction_values(f);
+  total_friction(f);
+  add_extension_torques(f);
+  measured_torques(f);
+  const double mean_force = mean_tendon_force(f);
+  if (first) {
+    for (size_t j = 0; j < f->joint_lanes; ++j) {
+      f->scratch.bias_step[j] = 0.0;
+    }
+  } else {
+    bias_steps(f);
+  }
+  if (!all_finite(f)) {
+    return -1;
+  }
+
+  remember_sample(f, time, velocity_gain);
+  if (first) {
+    begin_tracking(f, time, mean_force);
+  } else {
+    track_sample(f, time, step, mean_force);
+  }
+  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+    quad_store(s->compensated + j, quad_sub(quad_load(s->torque + j), quad_load(s->friction + j)));
+  }
+  return 0;
+}
+
+#endif

@@ -1,0 +1,12 @@
+#ifndef TENDONFMU_STEP_KERNELS_H
+#define TENDONFMU_STEP_KERNELS_H
+
+#include "kernel_choice.h"
+
+extern const step_kernel step_plain;
+#if defined(__x86_64__) || defined(_M_X64)
+extern const step_kernel step_sse2;
+extern const step_kernel step_avx2;
+#endif
+
+#endif
