@@ -1,0 +1,107 @@
+"""What the oracle knows of a finger: laws, friction effects, tendons and joints, read from a description.
+
+Part of the oracle (see oracle.py): naive, for tests alone, sharing no code with the runtime.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+MAGNITUDES = ("static", "coulomb", "stribeck_velocity", "viscous")
+
+
+@dataclass
+class Law:
+    """Friction law of one place, eq. (1): four magnitudes for each direction of motion."""
+
+    positive: tuple[float, ...]
+    negative: tuple[float, ...]
+
+    def value(self, side: int, speed: float) -> float:
+        """F at |v| = speed on the given side (+1 or -1). At speed 0 this is side * Fs."""
+        static, coulomb, stribeck_velocity, viscous = self.positive if side > 0 else self.negative
+        decay = math.exp(-speed / stribeck_velocity)
+        return side * (coulomb + (static - coulomb) * decay + viscous * speed)
+
+
+@dataclass
+class Effect:
+    """One friction effect: its laws over the angle, and what the bias procedure (fig. 5) remembers."""
+
+    laws: list[Law]
+    angles: list[float]
+    threshold: float
+    side: int | None = None  # direction of the last moving sample
+    stuck: bool | None = None  # None before the first sample
+    stuck_since: float = math.nan
+    last_stuck: float = math.nan
+
+    def value(self, side: int, speed: float, angle: float) -> float:
+        """F(side * speed); the laws' values are interpolated over the angle, constant outside."""
+        values = [law.value(side, speed) for law in self.laws]
+        if angle <= self.angles[0]:
+            return values[0]
+        if angle >= self.angles[-1]:
+            return values[-1]
+        k = max(i for i, a in enumerate(self.angles) if a <= angle)
+        weight = (angle - self.angles[k]) / (self.angles[k + 1] - self.angles[k])
+        return (1.0 - weight) * values[k] + weight * values[k + 1]
+
+    def at_threshold(self, side: int, angle: float) -> float:
+        """F(side * v_min) at the present angle."""
+        return self.value(side, self.threshold, angle)
+
+
+@dataclass
+class Tendon:
+    """Constants of one tendon; pulley[j] is F_A of joint j, edge[j] is F_B before joint j."""
+
+    stiffness: float
+    bidirectional: bool
+    pulley: list[Effect | None]
+    edge: list[Effect | None]
+
+
+@dataclass
+class Joint:
+    """Constants of one joint: cover spring, T_jv0, T_jvf, and the cubic cover extension."""
+
+    cover_stiffness: float
+    rest_angle: float
+    friction: Effect | None
+    load_friction: Effect | None
+    hardening: float = 0.0
+
+
+def given(table: Mapping[str, Any] | None, key: str, default: Any) -> Any:
+    """The entry, or the default when the table or the key is absent or null."""
+    value = None if table is None else table.get(key)
+    return default if value is None else value
+
+
+def read_side(side: Mapping[str, Any]) -> tuple[float, ...]:
+    return tuple(float(given(side, name, 0.0)) for name in MAGNITUDES)
+
+
+def read_law(law: Mapping[str, Any]) -> Law:
+    if "positive" in law:
+        return Law(read_side(law["positive"]), read_side(law["negative"]))
+    return Law(read_side(law), read_side(law))
+
+
+def read_effect(entry: Mapping[str, Any] | None, threshold: float) -> Effect | None:
+    """A null entry is no effect; a single law is a table of working points with one entry."""
+    if entry is None:
+        return None
+    if "laws" in entry:
+        return Effect([read_law(law) for law in entry["laws"]], [float(a) for a in entry["angles"]], threshold)
+    return Effect([read_law(entry)], [0.0], threshold)
+
+
+def read_effects(entries: list[Any] | None, joints: int, threshold: float) -> list[Effect | None]:
+    filled = list(entries or [])
+    filled += [None] * (joints - len(filled))
+    return [read_effect(entry, threshold) for entry in filled]

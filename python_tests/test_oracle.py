@@ -1,0 +1,179 @@
+"""The analytic cases and the general properties, on the oracle and on every other runner."""
+
+from __future__ import annotations
+
+import copy
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+
+import analytic_cases
+import analytic_force_cases
+import oracle
+from analytic_cases import DRY, LAW, Case, finger, one_edge, recording
+from random_fingers import random_case, random_law, random_moment_arms
+from runners import RUNNERS, Runner
+
+CASES = analytic_cases.CASES + analytic_force_cases.CASES
+
+
+@pytest.fixture(params=RUNNERS, ids=lambda runner: runner.name)
+def runner(request: pytest.FixtureRequest) -> Runner:
+    chosen: Runner = request.param
+    return chosen
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_case(runner: Runner, case: Case) -> None:
+    if case.repeated_time and not runner.repeated_time:
+        pytest.skip(f"{runner.name} takes recordings of strictly increasing time only")
+    if case.extensions and not runner.extensions:
+        pytest.skip(f"{runner.name} has no extensions yet")
+    case.check([runner(case.description, each, case.source) for each in case.recordings])
+
+
+def slow_crossings(step: float) -> dict[str, Any]:
+    """Smooth motion with rests and reversals, sampled every `step` s."""
+    time = np.arange(round(4.0 / step) + 1) * step
+    return recording(time, 10.0 + 2.0 * np.sin(3.0 * time), np.sin(2.0 * time) ** 3, np.cos(time))
+
+
+def test_halving_the_step_changes_only_what_the_signals_change(runner: Runner) -> None:
+    """At common times the difference is of the order of the step (an entry or exit is seen a step later)."""
+    bias = {"drift_variance": 1e-4, "noise_std": 0.02, "noise_time": 0.01, "initial_variance": 1e-4}
+    description = one_edge(bias=bias)
+    steps = [0.004, 0.002, 0.001, 0.0005]
+    runs = [runner(description, slow_crossings(step), 3)["friction_torque"][:, 0] for step in steps]
+    finest = runs[-1]
+    errors = [np.abs(run - finest[:: 2 ** (3 - k)]).mean() for k, run in enumerate(runs[:-1])]
+    assert errors[0] > 0.0
+    for coarse, fine in itertools.pairwise(errors):
+        assert fine < 0.65 * coarse
+    assert errors[-1] < 0.01 * np.ptp(finest)
+
+
+def test_the_step_does_not_matter_while_moving(runner: Runner) -> None:
+    """No entry, no exit and no filter: the rate of sampling leaves no trace at all."""
+    time = np.linspace(0.0, 2.0, 401)
+    fine = recording(time, 10.0 + np.sin(time), 0.2 + 0.1 * np.sin(5.0 * time))
+    coarse = {name: values[::4] for name, values in fine.items()}
+    runs = [runner(one_edge(), each, 3) for each in (fine, coarse)]
+    for name in ("friction_torque", "compensated_torque", "bias_torque"):
+        np.testing.assert_array_equal(runs[0][name][::4], runs[1][name])
+
+
+def dissipative_finger(rng: np.random.Generator) -> dict[str, Any]:
+    """Edges and joint friction everywhere, no cover, no pulley."""
+    n = int(rng.integers(1, 5))
+    arms = random_moment_arms(rng, n + 2, n)
+    tendons = [
+        {
+            "moment_arms": row.tolist(),
+            "edge_friction": [random_law(rng, 0.05, 0.005) for _ in range(n)],
+            "bidirectional": bool(rng.random() < 0.3),
+        }
+        for row in arms
+    ]
+    joints = [
+        {"name": f"j{j}", "friction": random_law(rng, 0.01, 0.1), "load_friction": random_law(rng, 1e-4, 0.1)}
+        for j in range(n)
+    ]
+    return finger(tendons, joints)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_friction_never_drives(runner: Runner, seed: int) -> None:
+    """At constant velocity the friction of edges and joints takes power out: Σ_j T_j q̇_j ≥ 0."""
+    rng = np.random.default_rng(seed)
+    description = dissipative_finger(rng)
+    m, n = len(description["tendons"]), len(description["joints"])
+    forces = rng.uniform(0.0, 20.0, (50, m))
+    for i, tendon in enumerate(description["tendons"]):
+        forces[:, i] *= -1.0 if tendon["bidirectional"] and rng.random() < 0.5 else 1.0
+    speed = rng.uniform(-2.0, 2.0, n)
+    out = runner(description, recording(np.arange(50) * 0.01, forces, speed, tendons=m, joints=n), 3)
+    power = (out["friction_torque"] - out["bias_torque"]) @ speed
+    assert (power > 0.0).all()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_pulley_friction_takes_power_out_where_the_tendon_keeps_its_direction(runner: Runner, seed: int) -> None:
+    """Eq. (10) lets F_A(ẋ_{j+1}) act on joint j too, so its power is f_B·F_A(ẋ_{j+1})·ẋ_j.
+
+    It is positive where ẋ_j and ẋ_{j+1} have one sign; where they differ, the paper's equation may drive.
+    """
+    rng = np.random.default_rng([seed, 5])
+    arms = rng.uniform(0.004, 0.01, 3)
+    law = random_law(rng, 0.1, 0.005)
+    tendons = [
+        {"moment_arms": arms.tolist(), "pulley_friction": [law, law]},
+        {"moment_arms": [0.0, 0.01, 0.0]},
+        {"moment_arms": [0.0, 0.0, 0.01]},
+    ]
+    speed = rng.choice([-1.0, 1.0]) * rng.uniform(0.2, 1.0, 3)
+    out = runner(finger(tendons, 3), recording([0.0, 0.1], 10.0, speed, tendons=3, joints=3), 3)
+    power = (out["friction_torque"] - out["bias_torque"]) @ speed
+    assert (power > 0.0).all()
+
+
+def test_defaults_are_those_of_the_contract(runner: Runner) -> None:
+    """A finger with the required keys only equals one with every default written out."""
+    short: dict[str, Any] = {
+        "format": "tendonfmu-finger-1",
+        "name": "short",
+        "joints": [{"name": "a"}, {"name": "b"}],
+        "tendons": [
+            {"name": "t1", "stiffness": 2000.0, "moment_arms": [0.01, 0.008], "edge_friction": [DRY]},
+            {"name": "t2", "stiffness": 2000.0, "moment_arms": [0.01, -0.008]},
+        ],
+        "contact": {"threshold": [0.02, 0.02]},
+    }
+    short["joints"][0]["cover"] = {"stiffness": 0.1}
+    short["joints"][1]["friction"] = {"static": 0.01, "coulomb": 0.01, "stribeck_velocity": 0.1}
+    written: dict[str, Any] = copy.deepcopy(short)
+    written["joints"][0]["cover"]["rest_angle"] = 0.0
+    written["joints"][1]["friction"]["viscous"] = 0.0
+    written["joints"][1] |= {"cover": None, "load_friction": None}
+    written["tendons"][0] |= {"edge_friction": [DRY, None], "pulley_friction": [None, None], "bidirectional": False}
+    written |= {
+        "velocity_threshold": {"tendon": 0.0005, "joint": 0.01},
+        "velocity_filter_cutoff": 20.0,
+        "bias": {"drift_variance": 1e-6, "noise_std": 0.01, "noise_std_per_force": 0.0, "forget_rate": 5.0},
+        "extensions": [],
+    }
+    written["bias"]["initial_variance"] = 0.01**2
+    written["contact"]["threshold_per_force"] = [0.0, 0.0]
+    time = np.arange(400) * 0.005
+    angle = 0.3 * np.sin(np.stack([2.0 * time, 3.0 * time], axis=1))
+    force = 10.0 + np.sin(np.stack([time, 5.0 * time], axis=1))
+    inputs = recording(time, force, 0.0, angle, tendons=2, joints=2)
+    runs = [runner(description, inputs, 2) for description in (short, written)]
+    assert runs[0]["contact"].any()
+    for name, series in runs[0].items():
+        np.testing.assert_array_equal(series, runs[1][name], err_msg=name)
+
+
+def test_routing_without_full_column_rank_is_refused() -> None:
+    twice = finger([{"moment_arms": [0.01, 0.01]}, {"moment_arms": [0.02, 0.02]}], 2)
+    with pytest.raises(ValueError, match="full column rank"):
+        oracle.FingerOracle(twice)
+
+
+def test_time_that_goes_back_is_refused() -> None:
+    rec = recording([0.0, 0.2, 0.1], 10.0, 1.0)
+    with pytest.raises(ValueError, match="before the last sample"):
+        oracle.run(one_edge(LAW), rec, 3)
+
+
+def test_a_run_is_the_same_sample_by_sample() -> None:
+    """A copied oracle continues as the original: nothing is remembered outside the object."""
+    description, inputs = random_case(3, samples=60)
+    whole = oracle.run(description, inputs, 1).outputs
+    finger_oracle = oracle.FingerOracle(description, 1)
+    for k, time in enumerate(inputs["time"]):
+        finger_oracle = copy.deepcopy(finger_oracle)
+        step = finger_oracle.step(time, {name: inputs[name][k] for name in oracle.INPUTS})
+        for name, series in whole.items():
+            np.testing.assert_array_equal(step.values[name], series[k])

@@ -1,0 +1,210 @@
+"""The random fingers take every branch of contract section 5; every runner agrees with the oracle on them."""
+
+from __future__ import annotations
+
+import functools
+from collections import Counter
+from typing import Any
+
+import numpy as np
+import pytest
+
+import agreement
+import oracle
+from random_fingers import Description, Recording, random_case
+from runners import RUNNERS, Runner
+
+FINGERS = 50
+SOURCES = (1, 2, 3)
+
+# Every branch of section 5 as the oracle counts them; a new one there must be added here.
+BRANCHES = {
+    "first_sample_moves",
+    "first_sample_stuck",
+    "initial_bias",
+    "initial_torque",
+    "keeps_moving",
+    "reversal_between_samples",
+    "enter",
+    "enter_in_contact",
+    "stays_stuck",
+    "first_exit",
+    "first_exit_in_contact",
+    "exit_after_one_sample",
+    "exit_with_memory",
+    "exit_same_side",
+    "exit_other_side",
+    "exit_in_contact",
+    "moves_above_zero_threshold",
+    "symmetric_positive",
+    "symmetric_negative",
+    "asymmetric_positive",
+    "asymmetric_negative",
+    "working_points_below",
+    "working_points_inside",
+    "working_points_above",
+    "slack_at_spring",
+    "slack_by_loss",
+    "bidirectional_pulls",
+    "bidirectional_pushes",
+    "contact",
+    "no_contact",
+    "stuck_in_contact",
+    "noise_time",
+    "gain_zero_of_zero",
+}
+
+
+@functools.cache
+def case(seed: int) -> tuple[Description, Recording]:
+    return random_case(seed)
+
+
+@functools.cache
+def oracle_run(seed: int, source: int) -> oracle.Result:
+    return oracle.run(*case(seed), source)
+
+
+def test_fifty_fingers_take_every_branch() -> None:
+    branches: Counter[str] = Counter()
+    for seed in range(FINGERS):
+        branches += oracle_run(seed, 1 + seed % 3).branches
+    rare = {name: branches[name] for name in BRANCHES if branches[name] < 10}
+    assert not rare
+    assert set(branches) == BRANCHES
+
+
+def test_fifty_fingers_have_every_structure() -> None:
+    seen: Counter[str] = Counter()
+    for seed in range(FINGERS):
+        description, recording = case(seed)
+        joints, tendons = description["joints"], description["tendons"]
+        edges = [edge for tendon in tendons for edge in tendon.get("edge_friction", [])]
+        grids = [edge["angles"] for edge in edges if edge and "angles" in edge]
+        bias = description.get("bias", {})
+        seen[f"{len(joints)} joints"] += 1
+        seen["8 tendons"] += len(tendons) == 8
+        seen["as many tendons as joints"] += len(tendons) == len(joints)
+        seen["null edge"] += None in edges
+        seen["single edge law"] += any(edge and "angles" not in edge for edge in edges)
+        seen["short list"] += any(len(t.get("edge_friction", joints)) < len(joints) for t in tendons)
+        seen["key left out"] += any("edge_friction" not in t or "pulley_friction" not in t for t in tendons)
+        seen["pulleys"] += any(any(t.get("pulley_friction", [])) for t in tendons)
+        seen["cover"] += any("cover" in joint for joint in joints)
+        seen["bidirectional"] += any(t.get("bidirectional", False) for t in tendons)
+        seen["v_min 0"] += description.get("velocity_threshold", {}).get("tendon") == 0.0
+        seen["cutoff 0"] += description.get("velocity_filter_cutoff") == 0.0
+        seen["no bias table"] += "bias" not in description
+        for key in ("noise_time", "initial_torque", "initial_variance", "noise_std_per_force"):
+            seen[key] += key in bias
+        for key in ("drift_variance", "noise_std", "initial_variance", "forget_rate"):
+            seen[f"{key} 0"] += bias.get(key) == 0.0
+        for grid in grids:
+            seen[f"{len(grid)} working points"] += 1
+            seen["uneven grid"] += len(grid) > 2 and np.ptp(np.diff(grid)) > 0.05
+        seen["jittered steps"] += np.ptp(np.diff(recording["time"])) > 1e-3
+        seen["threshold per force"] += "threshold_per_force" in description["contact"]
+    assert all(seen.values()), [name for name, count in seen.items() if not count]
+    assert {f"{k} joints" for k in range(1, 5)} | {f"{k} working points" for k in range(1, 6)} <= set(seen)
+
+
+def test_positions_fit_the_kinematics() -> None:
+    """x0 = R q + f0/k but for the sensors' noise: the three sources see the same motion."""
+    for seed in range(FINGERS):
+        description, recording = case(seed)
+        R = np.array([tendon["moment_arms"] for tendon in description["tendons"]])
+        k = np.array([tendon["stiffness"] for tendon in description["tendons"]])
+        expected = recording["joint_position"] @ R.T + recording["tendon_force"] / k
+        np.testing.assert_allclose(recording["tendon_position"], expected, rtol=0.0, atol=1e-6)
+        assert (np.diff(recording["time"]) > 0.0).all()
+
+
+@pytest.mark.parametrize("runner", RUNNERS, ids=lambda runner: runner.name)
+def test_agrees_with_the_oracle_on_fifty_fingers(runner: Runner) -> None:
+    results = []
+    wrong = []
+    for seed in range(FINGERS):
+        for source in SOURCES:
+            description, recording = case(seed)
+            outputs = runner(description, recording, source)
+            found = agreement.agree_with_oracle(description, recording, source, outputs, oracle_run(seed, source))
+            results.append(found)
+            if not found.agrees:
+                wrong.append(f"finger {seed}, source {source}: {found}")
+    assert not wrong, "\n".join(wrong[:10])
+    assert agreement.few_left_out(results)
+    left_out = sum(len(each.left_out) for each in results)
+    samples = sum(each.samples for each in results)
+    print(f"{runner.name}: {samples} samples, {left_out} left out, worst {max(each.worst for each in results):.3g}")
+
+
+# --- the agreement rule itself
+
+
+def changed(outputs: dict[str, Any], name: str, k: int, by: float) -> dict[str, Any]:
+    copy = {key: np.array(series) for key, series in outputs.items()}
+    copy[name][k, 0] = not copy[name][k, 0] if copy[name].dtype == bool else copy[name][k, 0] + by
+    return copy
+
+
+def test_tolerance_is_that_of_the_contract() -> None:
+    outputs = oracle_run(0, 1).outputs
+    for name in agreement.REAL_OUTPUTS:
+        source = ("joint_torque", "friction_torque") if name == "compensated_torque" else (name,)
+        allowed = 1e-9 * max(np.abs(outputs[each][:, 0]).max() for each in source) + 1e-12
+        assert agreement.compare(outputs, changed(outputs, name, 7, 0.99 * allowed)).agrees
+        found = agreement.compare(outputs, changed(outputs, name, 7, 1.01 * allowed))
+        assert found.first is not None
+        assert found.first[:3] == (7, name, 0)
+
+
+def test_booleans_and_nan_never_agree_by_tolerance() -> None:
+    outputs = oracle_run(0, 1).outputs
+    for name in ("joint_contact", "slack"):
+        assert not agreement.compare(outputs, changed(outputs, name, 9, 0.0)).agrees
+    assert not agreement.compare(outputs, changed(outputs, "bias_torque", 9, np.nan)).agrees
+
+
+def near_case() -> tuple[Description, Recording]:
+    """A joint velocity 2e-10 above v_min at sample 5: either decision is allowed there."""
+    law = {"static": 0.2, "coulomb": 0.1, "stribeck_velocity": 0.1}
+    description = {
+        "format": "tendonfmu-finger-1",
+        "name": "near",
+        "joints": [{"name": "j", "friction": law}],
+        "tendons": [{"name": "t", "stiffness": 1e3, "moment_arms": [0.01]}],
+        "contact": {"threshold": [0.5]},
+    }
+    speed = np.array([0.0, 0.5, 0.4, 0.3, 0.2, 0.01 + 2e-10, 0.002, -0.3, -0.2, 0.005, 0.2])[:, None]
+    time = np.arange(len(speed)) * 0.01
+    recording = {"time": time, "tendon_force": np.full((len(speed), 1), 10.0), "joint_velocity": speed}
+    return description, recording | {"joint_position": np.zeros_like(speed)}
+
+
+def test_a_near_decision_taken_otherwise_is_followed_and_counted() -> None:
+    description, recording = near_case()
+    reference = oracle.run(description, recording, 3)
+    assert list(reference.alternatives) == [5]
+    assert np.flatnonzero(reference.near).tolist() == [5]
+    other = oracle.run(description, recording, 3, forced={(5, "joint", 0): 0}).outputs
+    assert not agreement.compare(reference.outputs, other).agrees
+    # without following, the rest that began a sample earlier keeps the later samples apart
+    assert not agreement.compare(reference.outputs, other, reference.near).agrees
+    found = agreement.agree_with_oracle(description, recording, 3, other)
+    assert found.agrees, str(found)
+    assert found.left_out == [5]
+    assert not agreement.few_left_out([found])
+
+
+def test_an_error_after_a_near_decision_is_still_found() -> None:
+    description, recording = near_case()
+    other = oracle.run(description, recording, 3, forced={(5, "joint", 0): 0}).outputs
+    found = agreement.agree_with_oracle(description, recording, 3, changed(other, "bias_torque", 8, 1e-6))
+    assert found.first is not None
+    assert found.first[0] == 8
+
+
+def test_a_decision_that_is_not_near_may_not_be_taken_otherwise() -> None:
+    description, recording = near_case()
+    other = oracle.run(description, recording, 3, forced={(4, "joint", 0): 0}).outputs
+    assert not agreement.agree_with_oracle(description, recording, 3, other).agrees
