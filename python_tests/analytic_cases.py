@@ -326,15 +326,18 @@ def contact_threshold() -> Case:
     forces = [[10.0, 10.0], [14.9, 10.0], [15.1, 10.0], [10.0, 13.2], [10.0, 13.1], [10.0, 6.9], [10.0, 7.2]]
     rec = recording(np.arange(7) * 0.1, forces, 0.0, tendons=2, joints=2)
 
+    pushed = recording([0.0, 0.1, 0.2], [[10.0, -10.0], [10.0, -13.1], [10.0, -13.2]], 0.0, tendons=2, joints=2)
+
     def check(runs: list[Outputs]) -> None:
-        (out,) = runs
+        out, out_pushed = runs
         # joint 2 at 13.2 N: 0.032 against 0.02 + 0.001·11.6 = 0.0316; at 13.1 N: 0.031 against 0.03155;
         # at 6.9 N: 0.031 against 0.02845; at 7.2 N: 0.028 against 0.0286
         expected = [[0, 0], [0, 0], [1, 0], [0, 1], [0, 0], [0, 1], [0, 0]]
         np.testing.assert_array_equal(out["joint_contact"], expected)
         np.testing.assert_array_equal(out["contact"].ravel(), [0, 0, 1, 1, 0, 1, 0])
+        np.testing.assert_array_equal(out_pushed["joint_contact"], [[0, 0], [0, 0], [0, 1]])  # mean of |f0|
 
-    return Case("contact_threshold", finger(tendons, 2, contact=contact), [rec], check)
+    return Case("contact_threshold", finger(tendons, 2, contact=contact), [rec, pushed], check)
 
 
 def kinematics_of_tendon_positions() -> Case:

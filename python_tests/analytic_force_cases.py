@@ -24,9 +24,10 @@ def chain_product_over_pulleys() -> Case:
     joints: list[Description] = [{"name": f"j{j}", "load_friction": None} for j in (1, 2, 3)]
     joints[2] = {"name": "j3", "load_friction": {"static": 1e-3, "coulomb": 1e-3, "stribeck_velocity": 1.0}}
     forward = recording([0.0, 0.1], [[20.0, 10.0, 10.0]] * 2, 1.0, tendons=3, joints=3)
+    folding = recording([0.0, 0.1], [[20.0, 10.0, 10.0]] * 2, [4.0, -3.0, 1.0], tendons=3, joints=3)
 
     def check(runs: list[Outputs]) -> None:
-        (out,) = runs
+        out, folded = runs
         T = out["friction_torque"] - out["bias_torque"]
         # at joint j the losses up to and including its own pulley count, eq. (10)
         kept = [0.9 * 0.8, 0.9 * 0.8 * 0.95 * 0.85, 0.9 * 0.8 * 0.95 * 0.85 * 0.7]
@@ -34,8 +35,13 @@ def chain_product_over_pulleys() -> Case:
         expected[2] += 1e-3 * (20.0 * kept[2] + 10.0 + 10.0)
         close(T[0], expected)
         close(T[1], expected)
+        # ẋ = 0.02, −0.02, 0.01 m/s: the pulley of joint 1 sees ẋ_2, so it rubs backward as edge 2 does
+        kept = [0.9 * 1.2, 0.9 * 1.2 * 1.05 * 0.85, 0.9 * 1.2 * 1.05 * 0.85 * 0.7]
+        expected = [0.01 * 20.0 * (1.0 - each) for each in kept]
+        expected[2] += 1e-3 * (20.0 * kept[2] + 10.0 + 10.0)
+        close(folded["friction_torque"][1] - folded["bias_torque"][1], expected)
 
-    return Case("chain_product_over_pulleys", finger(tendons, joints), [forward], check)
+    return Case("chain_product_over_pulleys", finger(tendons, joints), [forward, folding], check)
 
 
 def slack() -> Case:
