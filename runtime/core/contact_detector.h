@@ -6,7 +6,7 @@
 
 /* |τ_j − T_eff,j| > threshold_j + threshold_per_force_j·mean|f0|, into joint_contact; returns whether any joint is in
  * contact. Lanes without a joint have residual and threshold 0. */
-static inline int detect_contact(tendonfmu_finger* f, double mean_force) {
+HOT_INLINE int detect_contact(tendonfmu_finger* f, double mean_force) {
   const finger_state* s = &f->remembered;
   int any = 0;
   for (size_t j = 0; j < f->joint_lanes; j += 4) {

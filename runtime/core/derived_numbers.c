@@ -139,7 +139,7 @@ static void clear_grids(tendonfmu_finger* f) {
 }
 
 static void derive_routing(tendonfmu_finger* f) {
-  double rows[MODEL_MAX_TENDONS * MODEL_MAX_JOINTS], inverse[MODEL_MAX_TENDONS * MODEL_MAX_JOINTS];
+  double rows[MODEL_MAX_TENDONS * MODEL_MAX_JOINTS] = {0}, inverse[MODEL_MAX_TENDONS * MODEL_MAX_JOINTS];
   const size_t n = f->joints, m = f->tendons, lanes = f->tendon_lanes;
   for (size_t i = 0; i < m; ++i) {
     for (size_t j = 0; j < n; ++j) {
@@ -172,5 +172,8 @@ void derive_numbers(tendonfmu_finger* finger, int routing_changed) {
   derive_flags(finger);
   if (routing_changed) {
     derive_routing(finger);
+  }
+  for (size_t k = 0; k < finger->slots / 4; ++k) {
+    finger->scratch.view[k].key[0] = -1.0;
   }
 }

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "extensions.h"
+#include "slot_view.h"
 
 /* A number and its derivative along the direction. */
 typedef struct dual {
@@ -79,10 +80,7 @@ static effect_laws edge_laws(const linearisation* l, size_t j, size_t i) {
   const tendonfmu_finger* f = l->finger;
   const derived_numbers* d = &f->derived;
   const dual angle = j ? l->angle[j - 1] : (dual){0.0, 0.0};
-  size_t at = d->edge_record[j * f->tendon_lanes + i];
-  for (size_t k = 0; k < f->shape.most_points[j]; ++k) {
-    at += angle.value >= d->edge_angle[d->edge_angle_row[j] + k * f->tendon_lanes + i];
-  }
+  const size_t at = d->edge_record[j * f->tendon_lanes + i] + slot_segment(f, j, i, angle.value);
   const double* segment = d->edge_segment + at * 2;
   return (effect_laws){.below = d->edge_law + at * LAW_NUMBERS,
                        .above = d->edge_law + (at + 1) * LAW_NUMBERS,

@@ -191,13 +191,16 @@ static tendonfmu_status take(tendonfmu_finger* finger, double time, const tendon
   if (tendonfmu_is_initialised(finger) && time == finger->remembered.scalar[STATE_TIME]) {
     return TENDONFMU_OK; /* the sample already taken */
   }
-  if (finger->kernel->take_sample(finger, time)) {
-    message_start(error_line(finger), "the sample at time ");
-    message_number(error_line(finger), time);
-    message_text(error_line(finger), " s overflows: expected forces and velocities for which all torques are finite");
-    return TENDONFMU_BAD_SAMPLE;
+  switch (finger->kernel->take_sample(finger, time)) {
+    case SAMPLE_OUT_OF_RANGE: samples_name_bad_input(finger, time, inputs, error_line(finger)); break;
+    case SAMPLE_OVERFLOWS:
+      message_start(error_line(finger), "the sample at time ");
+      message_number(error_line(finger), time);
+      message_text(error_line(finger), " s overflows: expected forces and velocities whose torques are finite");
+      break;
+    default: return TENDONFMU_OK;
   }
-  return TENDONFMU_OK;
+  return TENDONFMU_BAD_SAMPLE;
 }
 
 tendonfmu_status tendonfmu_initialise(tendonfmu_finger* finger, double time, const tendonfmu_inputs* inputs) {

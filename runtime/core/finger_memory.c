@@ -102,6 +102,7 @@ static void lay_out_scratch(tendonfmu_finger* f, cursor* c) {
     *matrices[i] = take_numbers(c, matrix);
   }
   s->velocity = take_numbers(c, f->slots);
+  s->view = take(c, f->slots / 4 * sizeof *s->view);
 }
 
 static size_t lay_out(const model_shape* shape, tendonfmu_finger* f, unsigned char* base, uint32_t** words) {

@@ -75,10 +75,23 @@ typedef struct finger_state {
   double* extension;                /* as the extensions ask for */
 } finger_state;
 
-/* Of one sample only; nothing in it is read by the next. */
+/* The laws of four neighbouring slots as they look at present: on the side to which each lane moves, and between the
+ * working points among which the joint before stands. A view is valid until a velocity changes sign or the angle leaves
+ * [low, high); most samples find it valid. Rows of four lanes; laws by number (LAW_COULOMB, …). */
+typedef struct slot_view {
+  double key[4];                      /* lane 0: bits of the negative sides; −1: to be filled */
+  double low[4], high[4];             /* rad */
+  double begin[4], inverse_length[4]; /* of the segment: rad, 1/rad; 0 outside the grid */
+  double below[LAW_SIDE_NUMBERS][4];  /* F_B at the working point below; joints: T_jv0 */
+  double above[LAW_SIDE_NUMBERS][4];  /* F_B at the one above */
+  double other[LAW_SIDE_NUMBERS][4];  /* F_A of the pulley with the same velocity; joints: T_jvf */
+} slot_view;
+
+/* Of one sample only; nothing in it decides what the next one gives. */
 typedef struct finger_scratch {
   double *force, *position;        /* [M] inputs, padded */
   double* velocity;                /* [n × M + N] */
+  slot_view* view;                 /* [(n × M + N) / 4] */
   double *angle, *raw_angle;       /* [N] */
   double *edge, *pulley;           /* [n × M] F_B, F_A; pulley in the row of its slot */
   double *edge_bias, *pulley_bias; /* [n × M] b of the same */

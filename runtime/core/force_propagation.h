@@ -3,147 +3,135 @@
 #ifndef TENDONFMU_FORCE_PROPAGATION_H
 #define TENDONFMU_FORCE_PROPAGATION_H
 
-#include "finger_memory.h"
+#include "slot_view.h"
 
-/* four laws, one a lane: the side that the bits choose (1: negative) */
-static inline void load_sides(const double* laws, int negative, quad side[LAW_SIDE_NUMBERS]) {
-  const double* const record[4] = {
-      laws + (negative & 1) * LAW_SIDE_NUMBERS,
-      laws + LAW_NUMBERS + (negative >> 1 & 1) * LAW_SIDE_NUMBERS,
-      laws + 2 * LAW_NUMBERS + (negative >> 2 & 1) * LAW_SIDE_NUMBERS,
-      laws + 3 * LAW_NUMBERS + (negative >> 3 & 1) * LAW_SIDE_NUMBERS,
-  };
-  quad_load_records(record, side);
+/* lanes that moved at the last sample */
+HOT_INLINE quad_mask moved_before(const tendonfmu_finger* f, size_t slot) {
+  return quad_greater(quad_load(f->remembered.moving + slot), quad_set(0.5));
 }
 
-/* |F| of four neighbouring laws at speed |v| */
-static inline quad laws_magnitude(const double* laws, int negative, quad speed) {
-  quad side[LAW_SIDE_NUMBERS];
-  load_sides(laws, negative, side);
+/* one bit a lane: it comes to rest or begins to move */
+HOT_INLINE int transition_bits(const tendonfmu_finger* f, size_t slot, quad_mask moving) {
+  return quad_mask_bits(quad_differ(moving, moved_before(f, slot)));
+}
+
+/* four laws of a view, one a lane */
+HOT_INLINE quad laws_magnitude(const double rows[LAW_SIDE_NUMBERS][4], quad speed) {
+  const quad side[LAW_SIDE_NUMBERS] = {quad_load(rows[0]), quad_load(rows[1]), quad_load(rows[2]), quad_load(rows[3])};
   return law_magnitude(side, speed);
 }
 
-/* |F_B| before joint j of the tendons from `lane` on, at speed |v|: the values of the two neighbouring working points,
- * interpolated linearly in the angle of the joint before; constant outside the grid */
-static inline quad edges_magnitude(const tendonfmu_finger* f, size_t j, size_t lane, double angle_before, int negative,
-                                   quad speed) {
-  const derived_numbers* d = &f->derived;
-  const size_t lanes = f->tendon_lanes, points = f->shape.most_points[j];
-  const uint32_t* record = d->edge_record + j * lanes + lane;
-  const quad angle = quad_set(angle_before);
-  quad passed = quad_set(0.0); /* number of working points at or below the angle: the segment */
-  for (size_t k = 0; k < points; ++k) {
-    const quad point = quad_load(d->edge_angle + d->edge_angle_row[j] + k * lanes + lane);
-    passed = quad_add(passed, quad_keep(quad_at_least(angle, point), quad_set(1.0)));
-  }
-  _Alignas(32) double segment[4];
-  quad_store(segment, passed);
-  const double *lower[4], *upper[4], *begin[4];
-  for (int i = 0; i < 4; ++i) {
-    const size_t at = record[i] + (size_t)(int)segment[i];
-    lower[i] = d->edge_law + at * LAW_NUMBERS + (negative >> i & 1) * LAW_SIDE_NUMBERS;
-    upper[i] = lower[i] + LAW_NUMBERS;
-    begin[i] = d->edge_segment + at * 2;
-  }
-  quad side[LAW_SIDE_NUMBERS];
-  quad_load_records(lower, side);
-  const quad below = law_magnitude(side, speed);
-  if (points == 0) {
-    return below;
-  }
-  quad_load_records(upper, side);
-  const quad above = law_magnitude(side, speed);
-  quad where[2];
-  quad_load_pairs(begin, where);
-  const quad weight = quad_mul(quad_sub(angle, where[0]), where[1]);
+/* |F_B| at speed |v|: the values of the two neighbouring working points, interpolated linearly in the angle of the
+ * joint before; constant outside the grid */
+HOT_INLINE quad edges_magnitude(const slot_view* view, quad angle, quad speed) {
+  const quad below = laws_magnitude(view->below, speed), above = laws_magnitude(view->above, speed);
+  const quad weight = quad_mul(quad_sub(angle, quad_load(view->begin)), quad_load(view->inverse_length));
   return quad_add(below, quad_mul(weight, quad_sub(above, below)));
 }
 
-/* F(v) with the sign of v where |v| > v_min, 0 where the effect sticks (fig. 2b) */
-static inline quad when_moving(quad magnitude, quad velocity, quad speed, quad threshold) {
-  return quad_keep(quad_greater(speed, threshold), quad_with_sign(magnitude, velocity));
-}
-
-static inline int negative_bits(quad velocity) {
+HOT_INLINE int negative_bits(quad velocity) {
   return quad_mask_bits(quad_greater(quad_set(0.0), velocity));
 }
 
 /* angle of the joint before joint j; q_0 = 0 */
-static inline double angle_before(const double* angle, size_t j) {
+HOT_INLINE double angle_before(const double* angle, size_t j) {
   return j ? angle[j - 1] : 0.0;
 }
 
-/* F_B and F_A of every tendon, T_jv0 and T_jvf of every joint, at the velocities in scratch */
-static inline void friction_values(tendonfmu_finger* f) {
+/* the view of four slots, filled anew where a moving lane is on another side or the angle has left its segment; a lane
+ * that sticks keeps its side, so that noise around zero velocity costs nothing */
+HOT_INLINE const slot_view* view_at(tendonfmu_finger* f, size_t slot, quad velocity, quad_mask moving, double angle) {
+  slot_view* view = f->scratch.view + slot / 4;
+  const int moves = quad_mask_bits(moving), known = (int)view->key[0];
+  const int negative = known < 0 ? negative_bits(velocity) : (negative_bits(velocity) & moves) | (known & ~moves);
+  const quad q = quad_set(angle);
+  const quad_mask inside = quad_both(quad_at_least(q, quad_load(view->low)), quad_greater(quad_load(view->high), q));
+  if (negative != known || quad_mask_bits(inside) != 15) {
+    slot_view_fill(f, slot, angle, negative, view);
+  }
+  return view;
+}
+
+/* F(v) with the sign of v where |v| > v_min, 0 where the effect sticks (fig. 2b) */
+HOT_INLINE quad when_moving(quad_mask moving, quad magnitude, quad velocity) {
+  return quad_keep(moving, quad_with_sign(magnitude, velocity));
+}
+
+/* F_B and F_A of every tendon, T_jv0 and T_jvf of every joint, at the velocities in scratch; returns whether any slot
+ * comes to rest or begins to move */
+HOT_INLINE int friction_values(tendonfmu_finger* f) {
   const finger_scratch* s = &f->scratch;
-  const derived_numbers* d = &f->derived;
   const size_t lanes = f->tendon_lanes, joint_row = f->joints * lanes;
-  quad threshold = quad_set(d->settings.tendon_threshold);
+  int transitions = 0;
+  quad threshold = quad_set(f->derived.settings.tendon_threshold);
   for (size_t j = 0; j < f->joints; ++j) {
-    for (size_t i = 0; i < lanes; i += 4) {
-      const size_t at = j * lanes + i;
+    const double before = angle_before(s->angle, j);
+    for (size_t at = j * lanes; at < (j + 1) * lanes; at += 4) {
       const quad v = quad_load(s->velocity + at), speed = quad_abs(v);
-      const int negative = negative_bits(v);
-      const quad edge = edges_magnitude(f, j, i, angle_before(s->angle, j), negative, speed);
-      quad_store(s->edge + at, when_moving(edge, v, speed, threshold));
-      if (j > 0) {
-        const quad pulley = laws_magnitude(d->pulley_law + at * LAW_NUMBERS, negative, speed);
-        quad_store(s->pulley + at, when_moving(pulley, v, speed, threshold));
-      }
+      const quad_mask moving = quad_greater(speed, threshold);
+      const slot_view* view = view_at(f, at, v, moving, before);
+      quad_store(s->edge + at, when_moving(moving, edges_magnitude(view, quad_set(before), speed), v));
+      quad_store(s->pulley + at, when_moving(moving, laws_magnitude(view->other, speed), v));
+      transitions |= transition_bits(f, at, moving);
     }
   }
-  threshold = quad_set(d->settings.joint_threshold);
+  threshold = quad_set(f->derived.settings.joint_threshold);
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     const quad v = quad_load(s->velocity + joint_row + j), speed = quad_abs(v);
-    const int negative = negative_bits(v);
-    const quad joint = laws_magnitude(d->joint_law + j * LAW_NUMBERS, negative, speed);
-    const quad load = laws_magnitude(d->load_law + j * LAW_NUMBERS, negative, speed);
-    quad_store(s->joint_friction + j, when_moving(joint, v, speed, threshold));
-    quad_store(s->load_friction + j, when_moving(load, v, speed, threshold));
+    const quad_mask moving = quad_greater(speed, threshold);
+    const slot_view* view = view_at(f, joint_row + j, v, moving, 0.0);
+    quad_store(s->joint_friction + j, when_moving(moving, laws_magnitude(view->below, speed), v));
+    quad_store(s->load_friction + j, when_moving(moving, laws_magnitude(view->other, speed), v));
+    transitions |= transition_bits(f, joint_row + j, moving);
   }
+  return transitions != 0;
 }
 
 /* a force that friction made negative is slack, replaced by 0; of a bidirectional tendon it is a force like any other
  */
-static inline quad without_slack(quad force, quad_mask bidirectional, quad* slack) {
+HOT_INLINE quad without_slack(quad force, quad_mask bidirectional, quad_mask* slack) {
   const quad_mask negative = quad_only_first(quad_greater(quad_set(0.0), force), bidirectional);
-  *slack = quad_select(negative, quad_set(1.0), *slack);
-  return quad_select(negative, quad_set(0.0), force);
+  *slack = quad_either(*slack, negative);
+  return quad_drop(negative, force);
 }
 
-/* f_A and f_B along every tendon, as a recursion, and the friction they make at each joint: the sums over the tendons
- * in eqs. (8) and (10). sum [n] of each is accumulated over the tendons. */
-static inline void propagate_forces(tendonfmu_finger* f, quad* tendon_friction, quad* load) {
+/* the force as it multiplies an F or a b */
+HOT_INLINE quad acting_force(quad force, quad_mask bidirectional) {
+  return quad_select(bidirectional, quad_abs(force), force);
+}
+
+/* f_A and f_B along every tendon, as a recursion, and what they make at each joint: the sums over the tendons in eqs.
+ * (8) and (10), accumulated into tendon_friction [n] and load [n] */
+HOT_INLINE void propagate_forces(tendonfmu_finger* f, quad* tendon_friction, quad* load) {
   const finger_scratch* s = &f->scratch;
-  const size_t n = f->joints, lanes = f->tendon_lanes;
+  const size_t lanes = f->tendon_lanes, last = (f->joints - 1) * lanes;
   for (size_t i = 0; i < lanes; i += 4) {
+    const quad zero = quad_set(0.0);
     const quad_mask bidirectional = quad_greater(quad_load(f->derived.bidirectional + i), quad_set(0.5));
-    quad slack = quad_set(0.0), lost = quad_set(0.0);
-    quad force = without_slack(quad_load(s->force + i), bidirectional, &slack);
-    for (size_t j = 0; j < n; ++j) {
-      const size_t at = j * lanes + i;
-      const quad force_at = quad_select(bidirectional, quad_abs(force), force); /* f_A,j−1 */
+    quad_mask slack = quad_greater(zero, zero);
+    quad lost = zero, force = without_slack(quad_load(s->force + i), bidirectional, &slack);
+    for (size_t at = i, j = 0; j < f->joints; at += lanes, ++j) {
+      const quad force_at = acting_force(force, bidirectional); /* f_A,j−1 */
       const quad edge_loss = quad_mul(force_at, quad_load(s->edge + at));
       force = without_slack(quad_sub(force, edge_loss), bidirectional, &slack);
-      const quad force_between = quad_select(bidirectional, quad_abs(force), force); /* f_Bj */
+      const quad force_between = acting_force(force, bidirectional); /* f_Bj */
       lost = quad_add(lost, edge_loss);
-      if (j + 1 < n) {
+      if (at < last) {
         const quad pulley_loss = quad_mul(force_between, quad_load(s->pulley + at + lanes));
         force = without_slack(quad_sub(force, pulley_loss), bidirectional, &slack);
         lost = quad_add(lost, pulley_loss);
       }
-      const quad arm = quad_load(f->derived.moment_arm + at);
-      tendon_friction[j] = quad_add(tendon_friction[j], quad_mul(arm, lost));
+      tendon_friction[j] = quad_add(tendon_friction[j], quad_mul(quad_load(f->derived.moment_arm + at), lost));
       load[j] = quad_add(load[j], force_between);
       quad_store(s->force_at + at, force_at);
       quad_store(s->force_between + at, force_between);
     }
-    quad_store(s->slack + i, slack);
+    quad_store(s->slack + i, quad_keep(slack, quad_set(1.0)));
   }
 }
 
 /* T_j of eq. (10), with the joint's own friction and cover of eq. (8) */
-static inline void total_friction(tendonfmu_finger* f) {
+HOT_INLINE void total_friction(tendonfmu_finger* f) {
   const finger_scratch* s = &f->scratch;
   const derived_numbers* d = &f->derived;
   quad tendon_friction[MODEL_MAX_JOINTS], load[MODEL_MAX_JOINTS];

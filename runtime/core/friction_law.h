@@ -34,7 +34,7 @@ void law_pack_side(double* side, double fs, double fc, double vs, double fv);
 #ifdef TENDONFMU_EXPONENTIAL_H
 
 /* Fc + (Fs − Fc)·exp(−|v|/vs) + Fv·|v| for four sides at once; exponent(v) is the smooth part of eq. (1) */
-static inline quad law_magnitude(const quad side[LAW_SIDE_NUMBERS], quad speed) {
+HOT_INLINE quad law_magnitude(const quad side[LAW_SIDE_NUMBERS], quad speed) {
   const quad stribeck = quad_mul(side[LAW_DROP], exp_of_minus(quad_mul(speed, side[LAW_RATE])));
   return quad_add(quad_add(side[LAW_COULOMB], stribeck), quad_mul(side[LAW_VISCOUS], speed));
 }

@@ -4,10 +4,12 @@
 
 #include "finger_memory.h"
 
+typedef enum sample_result { SAMPLE_TAKEN, SAMPLE_OUT_OF_RANGE, SAMPLE_OVERFLOWS } sample_result;
+
 struct step_kernel {
   const char* name;
-  /* Takes the sample whose inputs stand in scratch; 0, or −1 when it overflows and nothing was remembered. */
-  int (*take_sample)(tendonfmu_finger* finger, double time);
+  /* Takes the sample whose inputs stand in scratch; unless SAMPLE_TAKEN is returned, nothing is remembered. */
+  sample_result (*take_sample)(tendonfmu_finger* finger, double time);
 };
 
 /* The fastest kernel that processor and operating system allow ("auto"), or the one of that name; NULL where it cannot

@@ -5,7 +5,7 @@
 #include "finger_memory.h"
 
 /* Σ over the tendons of row[i]·x[i] */
-static inline double tendon_sum(const double* row, const double* x, size_t lanes) {
+HOT_INLINE double tendon_sum(const double* row, const double* x, size_t lanes) {
   quad sum = quad_mul(quad_load(row), quad_load(x));
   for (size_t i = 4; i < lanes; i += 4) {
     sum = quad_add(sum, quad_mul(quad_load(row + i), quad_load(x + i)));
@@ -14,8 +14,7 @@ static inline double tendon_sum(const double* row, const double* x, size_t lanes
 }
 
 /* q = R⁺·x1 with x1 = x0 − f0/k, into angle [n]; position is overwritten by x1 */
-static inline void angles_from_tendons(const tendonfmu_finger* f, const double* force, double* position,
-                                       double* angle) {
+HOT_INLINE void angles_from_tendons(const tendonfmu_finger* f, const double* force, double* position, double* angle) {
   for (size_t i = 0; i < f->tendon_lanes; i += 4) {
     const quad stretch = quad_mul(quad_load(force + i), quad_load(f->derived.inverse_stiffness + i));
     quad_store(position + i, quad_sub(quad_load(position + i), stretch));
@@ -26,13 +25,13 @@ static inline void angles_from_tendons(const tendonfmu_finger* f, const double* 
 }
 
 /* share of the raw velocity that the filter takes in a step: 1 − exp(−2π·cutoff·Δt), 1 without a filter */
-static inline double filter_share(double cutoff_rate, double step) {
+HOT_INLINE double filter_share(double cutoff_rate, double step) {
   return cutoff_rate > 0.0 ? law_one_minus_exponential(cutoff_rate * step) : 1.0;
 }
 
 /* v_k = v_{k−1} + share·((q_k − q_{k−1})/Δt − v_{k−1}) for all joints; cutoff 0: the raw velocity itself */
-static inline void filter_velocities(const tendonfmu_finger* f, const double* angle, double step, double share,
-                                     double* velocity) {
+HOT_INLINE void filter_velocities(const tendonfmu_finger* f, const double* angle, double step, double share,
+                                  double* velocity) {
   const finger_state* s = &f->remembered;
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     const quad raw = quad_div(quad_sub(quad_load(angle + j), quad_load(s->angle + j)), quad_set(step));
@@ -43,7 +42,7 @@ static inline void filter_velocities(const tendonfmu_finger* f, const double* an
 }
 
 /* ẋ_ij = Σ_{j' >= j} r_ij'·q̇_j' (eq. 5) into rows of velocity; the joint velocities stand in its last row */
-static inline void relative_velocities(const tendonfmu_finger* f, double* velocity) {
+HOT_INLINE void relative_velocities(const tendonfmu_finger* f, double* velocity) {
   const size_t lanes = f->tendon_lanes;
   const double* joint_velocity = velocity + f->joints * lanes;
   for (size_t i = 0; i < lanes; i += 4) {

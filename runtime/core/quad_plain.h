@@ -13,137 +13,154 @@ typedef struct quad_mask {
   uint64_t lane[4]; /* all ones or zero */
 } quad_mask;
 
-#define QUAD_EACH(expression)     \
-  do {                            \
-    for (int i = 0; i < 4; ++i) { \
-      expression;                 \
-    }                             \
+/* the expression for each lane i, written out: compilers leave a loop of four a loop */
+#define QUAD_EACH(expression) \
+  do {                        \
+    {                         \
+      enum { i = 0 };         \
+      expression;             \
+    }                         \
+    {                         \
+      enum { i = 1 };         \
+      expression;             \
+    }                         \
+    {                         \
+      enum { i = 2 };         \
+      expression;             \
+    }                         \
+    {                         \
+      enum { i = 3 };         \
+      expression;             \
+    }                         \
   } while (0)
 
-static inline uint64_t quad_bits(double x) {
+HOT_INLINE uint64_t quad_bits(double x) {
   uint64_t bits;
   memcpy(&bits, &x, sizeof bits);
   return bits;
 }
 
-static inline double quad_from_bits(uint64_t bits) {
+HOT_INLINE double quad_from_bits(uint64_t bits) {
   double x;
   memcpy(&x, &bits, sizeof x);
   return x;
 }
 
-static inline quad quad_load(const double* from) {
+HOT_INLINE quad quad_load(const double* from) {
   quad r;
   QUAD_EACH(r.lane[i] = from[i]);
   return r;
 }
 
-static inline void quad_store(double* to, quad a) {
+HOT_INLINE void quad_store(double* to, quad a) {
   QUAD_EACH(to[i] = a.lane[i]);
 }
 
-static inline quad quad_set(double x) {
+HOT_INLINE quad quad_set(double x) {
   quad r;
   QUAD_EACH(r.lane[i] = x);
   return r;
 }
 
-static inline quad quad_add(quad a, quad b) {
+HOT_INLINE quad quad_add(quad a, quad b) {
   QUAD_EACH(a.lane[i] += b.lane[i]);
   return a;
 }
 
-static inline quad quad_sub(quad a, quad b) {
+HOT_INLINE quad quad_sub(quad a, quad b) {
   QUAD_EACH(a.lane[i] -= b.lane[i]);
   return a;
 }
 
-static inline quad quad_mul(quad a, quad b) {
+HOT_INLINE quad quad_mul(quad a, quad b) {
   QUAD_EACH(a.lane[i] *= b.lane[i]);
   return a;
 }
 
-static inline quad quad_div(quad a, quad b) {
+HOT_INLINE quad quad_div(quad a, quad b) {
   QUAD_EACH(a.lane[i] /= b.lane[i]);
   return a;
 }
 
-static inline quad quad_abs(quad a) {
+HOT_INLINE quad quad_abs(quad a) {
   QUAD_EACH(a.lane[i] = quad_from_bits(quad_bits(a.lane[i]) & 0x7fffffffffffffffu));
   return a;
 }
 
 /* a where sign >= 0, -a where the sign bit of `sign` is set */
-static inline quad quad_with_sign(quad a, quad sign) {
+HOT_INLINE quad quad_with_sign(quad a, quad sign) {
   QUAD_EACH(a.lane[i] = quad_from_bits(quad_bits(a.lane[i]) ^ (quad_bits(sign.lane[i]) & 0x8000000000000000u)));
   return a;
 }
 
-static inline quad_mask quad_greater(quad a, quad b) {
+HOT_INLINE quad_mask quad_greater(quad a, quad b) {
   quad_mask m;
   QUAD_EACH(m.lane[i] = a.lane[i] > b.lane[i] ? UINT64_MAX : 0);
   return m;
 }
 
-static inline quad_mask quad_at_least(quad a, quad b) {
+HOT_INLINE quad_mask quad_at_least(quad a, quad b) {
   quad_mask m;
   QUAD_EACH(m.lane[i] = a.lane[i] >= b.lane[i] ? UINT64_MAX : 0);
   return m;
 }
 
-static inline quad_mask quad_both(quad_mask a, quad_mask b) {
+HOT_INLINE quad_mask quad_both(quad_mask a, quad_mask b) {
   QUAD_EACH(a.lane[i] &= b.lane[i]);
   return a;
 }
 
-static inline quad_mask quad_only_first(quad_mask a, quad_mask b) {
+HOT_INLINE quad_mask quad_either(quad_mask a, quad_mask b) {
+  QUAD_EACH(a.lane[i] |= b.lane[i]);
+  return a;
+}
+
+HOT_INLINE quad_mask quad_only_first(quad_mask a, quad_mask b) {
   QUAD_EACH(a.lane[i] &= ~b.lane[i]);
   return a;
 }
 
-static inline quad_mask quad_differ(quad_mask a, quad_mask b) {
+HOT_INLINE quad_mask quad_differ(quad_mask a, quad_mask b) {
   QUAD_EACH(a.lane[i] ^= b.lane[i]);
   return a;
 }
 
 /* one bit a lane */
-static inline int quad_mask_bits(quad_mask m) {
+HOT_INLINE int quad_mask_bits(quad_mask m) {
   return (int)((m.lane[0] & 1) | (m.lane[1] & 2) | (m.lane[2] & 4) | (m.lane[3] & 8));
 }
 
-static inline quad quad_select(quad_mask m, quad a, quad b) {
+HOT_INLINE quad quad_select(quad_mask m, quad a, quad b) {
   QUAD_EACH(a.lane[i] = m.lane[i] ? a.lane[i] : b.lane[i]);
   return a;
 }
 
 /* a where the mask is set, +0 elsewhere */
-static inline quad quad_keep(quad_mask m, quad a) {
+HOT_INLINE quad quad_keep(quad_mask m, quad a) {
   QUAD_EACH(a.lane[i] = m.lane[i] ? a.lane[i] : 0.0);
   return a;
 }
 
-static inline double quad_sum(quad a) {
+/* a where the mask is not set, +0 elsewhere */
+HOT_INLINE quad quad_drop(quad_mask m, quad a) {
+  QUAD_EACH(a.lane[i] = m.lane[i] ? 0.0 : a.lane[i]);
+  return a;
+}
+
+/* the smaller one; neither is NaN */
+HOT_INLINE quad quad_min(quad a, quad b) {
+  QUAD_EACH(a.lane[i] = a.lane[i] < b.lane[i] ? a.lane[i] : b.lane[i]);
+  return a;
+}
+
+HOT_INLINE double quad_sum(quad a) {
   return (a.lane[0] + a.lane[2]) + (a.lane[1] + a.lane[3]);
 }
 
 /* a · 2^k, where the low bits of the double `shifted` hold the integer k (see exponential.h) */
-static inline quad quad_scale(quad a, quad shifted) {
+HOT_INLINE quad quad_scale(quad a, quad shifted) {
   QUAD_EACH(a.lane[i] = quad_from_bits(quad_bits(a.lane[i]) + (quad_bits(shifted.lane[i]) << 52)));
   return a;
-}
-
-/* four records of four numbers, one a lane, to four quads of one number each */
-static inline void quad_load_records(const double* const record[4], quad number[4]) {
-  for (int k = 0; k < 4; ++k) {
-    QUAD_EACH(number[k].lane[i] = record[i][k]);
-  }
-}
-
-/* the same for records of two numbers */
-static inline void quad_load_pairs(const double* const record[4], quad number[2]) {
-  for (int k = 0; k < 2; ++k) {
-    QUAD_EACH(number[k].lane[i] = record[i][k]);
-  }
 }
 
 #endif

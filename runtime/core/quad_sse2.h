@@ -11,104 +11,103 @@ typedef quad quad_mask;
 
 #define QUAD_BOTH_HALVES(operation, a, b) ((quad){operation((a).low, (b).low), operation((a).high, (b).high)})
 
-static inline quad quad_load(const double* from) {
+HOT_INLINE quad quad_load(const double* from) {
   return (quad){_mm_load_pd(from), _mm_load_pd(from + 2)};
 }
 
-static inline void quad_store(double* to, quad a) {
+HOT_INLINE void quad_store(double* to, quad a) {
   _mm_store_pd(to, a.low);
   _mm_store_pd(to + 2, a.high);
 }
 
-static inline quad quad_set(double x) {
+HOT_INLINE quad quad_set(double x) {
   return (quad){_mm_set1_pd(x), _mm_set1_pd(x)};
 }
 
-static inline quad quad_add(quad a, quad b) {
+HOT_INLINE quad quad_add(quad a, quad b) {
   return QUAD_BOTH_HALVES(_mm_add_pd, a, b);
 }
 
-static inline quad quad_sub(quad a, quad b) {
+HOT_INLINE quad quad_sub(quad a, quad b) {
   return QUAD_BOTH_HALVES(_mm_sub_pd, a, b);
 }
 
-static inline quad quad_mul(quad a, quad b) {
+HOT_INLINE quad quad_mul(quad a, quad b) {
   return QUAD_BOTH_HALVES(_mm_mul_pd, a, b);
 }
 
-static inline quad quad_div(quad a, quad b) {
+HOT_INLINE quad quad_div(quad a, quad b) {
   return QUAD_BOTH_HALVES(_mm_div_pd, a, b);
 }
 
-static inline quad quad_abs(quad a) {
+HOT_INLINE quad quad_abs(quad a) {
   const quad sign = quad_set(-0.0);
   return QUAD_BOTH_HALVES(_mm_andnot_pd, sign, a);
 }
 
-static inline quad quad_with_sign(quad a, quad sign) {
+HOT_INLINE quad quad_with_sign(quad a, quad sign) {
   const quad bit = quad_set(-0.0);
   const quad flip = QUAD_BOTH_HALVES(_mm_and_pd, bit, sign);
   return QUAD_BOTH_HALVES(_mm_xor_pd, a, flip);
 }
 
-static inline quad_mask quad_greater(quad a, quad b) {
+HOT_INLINE quad_mask quad_greater(quad a, quad b) {
   return QUAD_BOTH_HALVES(_mm_cmpgt_pd, a, b);
 }
 
-static inline quad_mask quad_at_least(quad a, quad b) {
+HOT_INLINE quad_mask quad_at_least(quad a, quad b) {
   return QUAD_BOTH_HALVES(_mm_cmpge_pd, a, b);
 }
 
-static inline quad_mask quad_both(quad_mask a, quad_mask b) {
+HOT_INLINE quad_mask quad_both(quad_mask a, quad_mask b) {
   return QUAD_BOTH_HALVES(_mm_and_pd, a, b);
 }
 
-static inline quad_mask quad_only_first(quad_mask a, quad_mask b) {
+HOT_INLINE quad_mask quad_either(quad_mask a, quad_mask b) {
+  return QUAD_BOTH_HALVES(_mm_or_pd, a, b);
+}
+
+HOT_INLINE quad_mask quad_only_first(quad_mask a, quad_mask b) {
   return QUAD_BOTH_HALVES(_mm_andnot_pd, b, a);
 }
 
-static inline quad_mask quad_differ(quad_mask a, quad_mask b) {
+HOT_INLINE quad_mask quad_differ(quad_mask a, quad_mask b) {
   return QUAD_BOTH_HALVES(_mm_xor_pd, a, b);
 }
 
-static inline int quad_mask_bits(quad_mask m) {
+HOT_INLINE int quad_mask_bits(quad_mask m) {
   return _mm_movemask_pd(m.low) | _mm_movemask_pd(m.high) << 2;
 }
 
-static inline quad quad_keep(quad_mask m, quad a) {
+HOT_INLINE quad quad_keep(quad_mask m, quad a) {
   return QUAD_BOTH_HALVES(_mm_and_pd, m, a);
 }
 
-static inline quad quad_select(quad_mask m, quad a, quad b) {
+HOT_INLINE quad quad_select(quad_mask m, quad a, quad b) {
   const quad first = quad_keep(m, a);
   const quad second = QUAD_BOTH_HALVES(_mm_andnot_pd, m, b);
   return QUAD_BOTH_HALVES(_mm_or_pd, first, second);
 }
 
-static inline double quad_sum(quad a) {
+HOT_INLINE quad quad_drop(quad_mask m, quad a) {
+  return QUAD_BOTH_HALVES(_mm_andnot_pd, m, a);
+}
+
+HOT_INLINE quad quad_min(quad a, quad b) {
+  return QUAD_BOTH_HALVES(_mm_min_pd, a, b);
+}
+
+HOT_INLINE double quad_sum(quad a) {
   const __m128d s = _mm_add_pd(a.low, a.high);
   return _mm_cvtsd_f64(_mm_add_sd(s, _mm_unpackhi_pd(s, s)));
 }
 
-static inline __m128d quad_scale_half(__m128d a, __m128d shifted) {
+HOT_INLINE __m128d quad_scale_half(__m128d a, __m128d shifted) {
   return _mm_castsi128_pd(_mm_add_epi64(_mm_castpd_si128(a), _mm_slli_epi64(_mm_castpd_si128(shifted), 52)));
 }
 
-static inline quad quad_scale(quad a, quad shifted) {
+HOT_INLINE quad quad_scale(quad a, quad shifted) {
   return QUAD_BOTH_HALVES(quad_scale_half, a, shifted);
-}
-
-static inline void quad_load_pairs(const double* const record[4], quad number[2]) {
-  const __m128d a = _mm_load_pd(record[0]), b = _mm_load_pd(record[1]);
-  const __m128d c = _mm_load_pd(record[2]), d = _mm_load_pd(record[3]);
-  number[0] = (quad){_mm_unpacklo_pd(a, b), _mm_unpacklo_pd(c, d)};
-  number[1] = (quad){_mm_unpackhi_pd(a, b), _mm_unpackhi_pd(c, d)};
-}
-
-static inline void quad_load_records(const double* const record[4], quad number[4]) {
-  const double* const second[4] = {record[0] + 2, record[1] + 2, record[2] + 2, record[3] + 2};
-  quad_load_pairs(record, number);
-  quad_load_pairs(second, number + 2);
 }
 
 #endif

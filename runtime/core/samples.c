@@ -16,30 +16,19 @@ typedef struct input_row {
   double* to;
 } input_row;
 
-static int refuse_input(message_line message, const input_row* row, size_t i, double time) {
-  message_element(message, row->name, i + 1);
-  message_text(message, " = ");
-  message_number(message, row->values[i]);
-  message_text(message, " at time ");
-  message_number(message, time);
-  message_text(message, " s: expected a finite number of magnitude at most 1e+12 ");
-  message_text(message, row->unit);
-  return -1;
-}
-
-static int take_row(const input_row* row, double time, message_line message) {
-  if (!row->values) {
-    message_start(message, row->name);
-    message_text(message, " is missing: this kinematics source needs it");
-    return -1;
+/* the rows that the kinematics source uses; returns how many */
+static size_t used_rows(const tendonfmu_finger* f, const tendonfmu_inputs* inputs, input_row rows[3]) {
+  const finger_scratch* s = &f->scratch;
+  const int source = (int)f->remembered.scalar[STATE_SOURCE];
+  const size_t m = f->tendons, n = f->joints;
+  rows[0] = (input_row){"tendon_force", "N", inputs->tendon_force, m, s->force};
+  if (source == TENDONFMU_TENDON_POSITIONS) {
+    rows[1] = (input_row){"tendon_position", "m", inputs->tendon_position, m, s->position};
+    return 2;
   }
-  for (size_t i = 0; i < row->count; ++i) {
-    if (!(fabs(row->values[i]) <= largest_input)) {
-      return refuse_input(message, row, i, time);
-    }
-    row->to[i] = row->values[i];
-  }
-  return 0;
+  rows[1] = (input_row){"joint_position", "rad", inputs->joint_position, n, s->angle};
+  rows[2] = (input_row){"joint_velocity", "rad/s", inputs->joint_velocity, n, s->velocity + n * f->tendon_lanes};
+  return source == TENDONFMU_JOINT_VELOCITIES ? 3 : 2;
 }
 
 static int check_time(const tendonfmu_finger* f, double time, message_line message) {
@@ -60,24 +49,41 @@ static int check_time(const tendonfmu_finger* f, double time, message_line messa
 }
 
 int samples_take_inputs(tendonfmu_finger* finger, double time, const tendonfmu_inputs* inputs, message_line message) {
-  const finger_scratch* s = &finger->scratch;
-  const int source = (int)finger->remembered.scalar[STATE_SOURCE];
-  const size_t m = finger->tendons, n = finger->joints;
-  double* joint_velocity = s->velocity + n * finger->tendon_lanes;
-  const input_row force = {"tendon_force", "N", inputs->tendon_force, m, s->force};
-  const input_row position = {"tendon_position", "m", inputs->tendon_position, m, s->position};
-  const input_row angle = {"joint_position", "rad", inputs->joint_position, n, s->angle};
-  const input_row velocity = {"joint_velocity", "rad/s", inputs->joint_velocity, n, joint_velocity};
-  if (check_time(finger, time, message) || take_row(&force, time, message)) {
+  input_row rows[3];
+  const size_t count = used_rows(finger, inputs, rows);
+  if (check_time(finger, time, message)) {
     return -1;
   }
-  if (source == TENDONFMU_TENDON_POSITIONS) {
-    return take_row(&position, time, message);
+  for (size_t k = 0; k < count; ++k) {
+    if (!rows[k].values) {
+      message_start(message, rows[k].name);
+      message_text(message, " is missing: this kinematics source needs it");
+      return -1;
+    }
+    memcpy(rows[k].to, rows[k].values, rows[k].count * sizeof(double));
   }
-  if (take_row(&angle, time, message)) {
-    return -1;
+  return 0;
+}
+
+void samples_name_bad_input(const tendonfmu_finger* finger, double time, const tendonfmu_inputs* inputs,
+                            message_line message) {
+  input_row rows[3];
+  const size_t count = used_rows(finger, inputs, rows);
+  for (size_t k = 0; k < count; ++k) {
+    for (size_t i = 0; i < rows[k].count; ++i) {
+      const double value = rows[k].values[i];
+      if (!(fabs(value) <= largest_input)) {
+        message_element(message, rows[k].name, i + 1);
+        message_text(message, " = ");
+        message_number(message, value);
+        message_text(message, " at time ");
+        message_number(message, time);
+        message_text(message, " s: expected a finite number of magnitude at most 1e+12 ");
+        message_text(message, rows[k].unit);
+        return;
+      }
+    }
   }
-  return source == TENDONFMU_JOINT_VELOCITIES ? take_row(&velocity, time, message) : 0;
 }
 
 static void give_numbers(double* to, const double* from, size_t count, size_t row) {

@@ -5,9 +5,13 @@
 #include "finger_memory.h"
 #include "message.h"
 
-/* Checks the inputs that the kinematics source uses, and the time, and copies them into scratch.
- * Returns 0, or −1 with one line in message. */
+/* Checks the time and copies the inputs that the kinematics source uses into scratch; their values are left to the
+ * kernel. Returns 0, or −1 with one line in message. */
 int samples_take_inputs(tendonfmu_finger* finger, double time, const tendonfmu_inputs* inputs, message_line message);
+
+/* Says in message which input is out of range, after the kernel refused them. */
+void samples_name_bad_input(const tendonfmu_finger* finger, double time, const tendonfmu_inputs* inputs,
+                            message_line message);
 
 /* Copies the outputs of the last sample into row `row` of the caller's arrays. */
 void samples_give_outputs(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs, size_t row);

@@ -10,12 +10,37 @@
 #include "kernel_choice.h"
 #include "kinematics.h"
 
-static inline int is_first(const tendonfmu_finger* f) {
+HOT_INLINE int is_first(const tendonfmu_finger* f) {
   return f->remembered.scalar[STATE_INITIALISED] == 0.0;
 }
 
+/* Beyond this nothing is a measurement; NaN is refused with it. */
+#define LARGEST_INPUT 1e12
+
+HOT_INLINE int row_in_range(const double* row, size_t lanes) {
+  int inside = 15;
+  for (size_t i = 0; i < lanes; i += 4) {
+    inside &= quad_mask_bits(quad_at_least(quad_set(LARGEST_INPUT), quad_abs(quad_load(row + i))));
+  }
+  return inside == 15;
+}
+
+HOT_INLINE int inputs_in_range(const tendonfmu_finger* f) {
+  const finger_scratch* s = &f->scratch;
+  const int source = (int)f->remembered.scalar[STATE_SOURCE];
+  if (!row_in_range(s->force, f->tendon_lanes)) {
+    return 0;
+  }
+  if (source == TENDONFMU_TENDON_POSITIONS) {
+    return row_in_range(s->position, f->tendon_lanes);
+  }
+  return row_in_range(s->angle, f->joint_lanes) &&
+         (source != TENDONFMU_JOINT_VELOCITIES ||
+          row_in_range(s->velocity + f->joints * f->tendon_lanes, f->joint_lanes));
+}
+
 /* joint angles and all velocities, into scratch; returns ∂v/∂q of this sample (1/s) */
-static inline double find_kinematics(tendonfmu_finger* f, double step) {
+HOT_INLINE double find_kinematics(tendonfmu_finger* f, double step) {
   const finger_scratch* s = &f->scratch;
   double* joint_velocity = s->velocity + f->joints * f->tendon_lanes;
   const int source = (int)f->remembered.scalar[STATE_SOURCE];
@@ -39,14 +64,14 @@ static inline double find_kinematics(tendonfmu_finger* f, double step) {
 }
 
 /* τ = Rᵀ f0 (eq. 3), with the measured forces */
-static inline void measured_torques(tendonfmu_finger* f) {
+HOT_INLINE void measured_torques(tendonfmu_finger* f) {
   for (size_t j = 0; j < f->joints; ++j) {
     f->scratch.torque[j] = tendon_sum(f->derived.moment_arm + j * f->tendon_lanes, f->scratch.force, f->tendon_lanes);
   }
 }
 
 /* mean |f0| over the tendons */
-static inline double mean_tendon_force(const tendonfmu_finger* f) {
+HOT_INLINE double mean_tendon_force(const tendonfmu_finger* f) {
   quad sum = quad_set(0.0);
   for (size_t i = 0; i < f->tendon_lanes; i += 4) {
     sum = quad_add(sum, quad_abs(quad_load(f->scratch.force + i)));
@@ -55,7 +80,7 @@ static inline double mean_tendon_force(const tendonfmu_finger* f) {
 }
 
 /* 0 when anything that is about to be remembered is not finite */
-static inline int all_finite(const tendonfmu_finger* f) {
+HOT_INLINE int all_finite(const tendonfmu_finger* f) {
   const finger_scratch* s = &f->scratch;
   const double* joint_velocity = s->velocity + f->joints * f->tendon_lanes;
   double probe = 0.0; /* stays 0 unless something is infinite or NaN */
@@ -66,14 +91,14 @@ static inline int all_finite(const tendonfmu_finger* f) {
   return probe == 0.0;
 }
 
-static inline void copy_row(double* to, const double* from, size_t lanes) {
+HOT_INLINE void copy_row(double* to, const double* from, size_t lanes) {
   for (size_t i = 0; i < lanes; i += 4) {
     quad_store(to + i, quad_load(from + i));
   }
 }
 
 /* T_eff = b_eff + T with b_eff already stepped */
-static inline void effective_friction(tendonfmu_finger* f) {
+HOT_INLINE void effective_friction(tendonfmu_finger* f) {
   const finger_state* s = &f->remembered;
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     quad_store(s->friction + j, quad_add(quad_load(s->bias + j), quad_load(f->scratch.friction + j)));
@@ -81,8 +106,13 @@ static inline void effective_friction(tendonfmu_finger* f) {
 }
 
 /* kinematics, forces and memory of the slots: what every accepted sample leaves behind */
-static inline void remember_sample(tendonfmu_finger* f, double time, double velocity_gain) {
+HOT_INLINE void remember_sample(tendonfmu_finger* f, double time, double velocity_gain, int transitions) {
   const finger_state* s = &f->remembered;
+  if (transitions) {
+    remember_transitions(f, time);
+  } else {
+    forget_transitions(f);
+  }
   remember_slots(f, time);
   copy_row(s->angle, f->scratch.angle, f->joint_lanes);
   copy_row(s->speed, f->scratch.velocity + f->joints * f->tendon_lanes, f->joint_lanes);
@@ -95,7 +125,7 @@ static inline void remember_sample(tendonfmu_finger* f, double time, double velo
 }
 
 /* the first sample: b_eff = τ − T unless it is given, nothing detected, nothing tracked */
-static inline void begin_tracking(tendonfmu_finger* f, double time, double mean_force) {
+HOT_INLINE void begin_tracking(tendonfmu_finger* f, double time, double mean_force) {
   const finger_state* s = &f->remembered;
   const finger_settings* settings = &f->derived.settings;
   const double variance =
@@ -120,7 +150,7 @@ static inline void begin_tracking(tendonfmu_finger* f, double time, double mean_
 }
 
 /* steps 4 to 6 of the contract for every later sample */
-static inline void track_sample(tendonfmu_finger* f, double time, double step, double mean_force) {
+HOT_INLINE void track_sample(tendonfmu_finger* f, double time, double step, double mean_force) {
   const finger_state* s = &f->remembered;
   const finger_settings* settings = &f->derived.settings;
   const double wanted = settings->noise_time >= 0.0 ? settings->noise_time / step : 1.0;
@@ -143,30 +173,33 @@ static inline void track_sample(tendonfmu_finger* f, double time, double step, d
   s->scalar[STATE_CONTACT] = contact ? 1.0 : 0.0;
 }
 
-/* The recipe. Inputs stand in scratch; returns 0, or −1 when the sample overflows, and then nothing is remembered. */
-static int take_sample(tendonfmu_finger* f, double time) {
+/* The recipe. Inputs stand in scratch; unless SAMPLE_TAKEN is returned, nothing is remembered. */
+static sample_result take_sample(tendonfmu_finger* f, double time) {
   const finger_state* s = &f->remembered;
   const int first = is_first(f);
   const double step = time - s->scalar[STATE_TIME];
 
+  if (!inputs_in_range(f)) {
+    return SAMPLE_OUT_OF_RANGE;
+  }
   const double velocity_gain = find_kinematics(f, step);
-  friction_values(f);
+  const int transitions = friction_values(f);
   total_friction(f);
   add_extension_torques(f);
   measured_torques(f);
   const double mean_force = mean_tendon_force(f);
-  if (first) {
-    for (size_t j = 0; j < f->joint_lanes; ++j) {
-      f->scratch.bias_step[j] = 0.0;
-    }
-  } else {
+  if (transitions && !first) {
     bias_steps(f);
+  } else {
+    for (size_t j = 0; j < f->joint_lanes; j += 4) {
+      quad_store(f->scratch.bias_step + j, quad_set(0.0));
+    }
   }
   if (!all_finite(f)) {
-    return -1;
+    return SAMPLE_OVERFLOWS;
   }
 
-  remember_sample(f, time, velocity_gain);
+  remember_sample(f, time, velocity_gain, transitions);
   if (first) {
     begin_tracking(f, time, mean_force);
   } else {
@@ -175,7 +208,7 @@ static int take_sample(tendonfmu_finger* f, double time) {
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     quad_store(s->compensated + j, quad_sub(quad_load(s->torque + j), quad_load(s->friction + j)));
   }
-  return 0;
+  return SAMPLE_TAKEN;
 }
 
 #endif
