@@ -221,13 +221,17 @@ def random_forces(rng: np.random.Generator, description: Description, R: Array, 
     return np.asarray(force + rng.normal(0.0, 0.005, force.shape))
 
 
-def random_recording(description: Description, seed: int, samples: int = SAMPLES) -> Recording:
-    """All inputs of a finger: `time` [N], forces and positions [N, m], joints [N, n]."""
+def random_recording(
+    description: Description, seed: int, samples: int = SAMPLES, time: Array | None = None
+) -> Recording:
+    """All inputs of a finger: `time` [N] (random unless given), forces and positions [N, m], joints [N, n]."""
     rng = np.random.default_rng([seed, 2])
     R = np.array([tendon["moment_arms"] for tendon in description["tendons"]])
     k = np.array([tendon["stiffness"] for tendon in description["tendons"]])
     m, n = R.shape
-    time = random_times(rng, samples)
+    if time is None:
+        time = random_times(rng, samples)
+    samples = len(time)
     rest = intervals(rng, samples, 0.15, samples // 8)
     thresholds = description.get("velocity_threshold", {})
     v_small = thresholds.get("joint", 0.01) or 0.01
