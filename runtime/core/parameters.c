@@ -189,18 +189,24 @@ static void say_value(message_line message, const model_item* item, uint32_t ind
   message_number(message, value);
 }
 
+void parameter_say_range(const model_item* item, uint32_t index, message_line message) {
+  const parameter_range range = parameter_range_of(item, index);
+  message_text(message, range.above_minimum ? "above " : "");
+  message_number(message, range.minimum);
+  message_text(message, range.above_minimum ? " and at most " : " to ");
+  message_number(message, range.maximum);
+  message_text(message, " ");
+  message_text(message, range.unit);
+}
+
 int parameter_check_value(const model_item* item, uint32_t index, double value, message_line message) {
   const parameter_range range = parameter_range_of(item, index);
   if (value <= range.maximum && (range.above_minimum ? value > range.minimum : value >= range.minimum)) {
     return 0;
   }
   say_value(message, item, index, value);
-  message_text(message, range.above_minimum ? ": expected above " : ": expected ");
-  message_number(message, range.minimum);
-  message_text(message, range.above_minimum ? " and at most " : " to ");
-  message_number(message, range.maximum);
-  message_text(message, " ");
-  message_text(message, range.unit);
+  message_text(message, ": expected ");
+  parameter_say_range(item, index, message);
   return -1;
 }
 

@@ -25,6 +25,9 @@ model_item parameter_item(const model_shape* shape, uint32_t index);
 /* Index of a path, parameter_count when there is none. */
 uint32_t parameter_find(const model_shape* shape, const char* path);
 
+/* Appends the range with its unit: "0 to 1e+09 N.m", "above 0 and at most 1e+12 N/m". */
+void parameter_say_range(const model_item* item, uint32_t index, message_line message);
+
 /* Checks one value. Returns 0, or −1 with one line in message: path, value, range, unit. */
 int parameter_check_value(const model_item* item, uint32_t index, double value, message_line message);
 

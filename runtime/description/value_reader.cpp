@@ -1,0 +1,81 @@
+#include "value_reader.h"
+
+#include <exception>
+#include <optional>
+#include <string>
+
+namespace tendonfmu {
+namespace {
+
+/* Values of numbers left out. The two thresholds keep sensor noise of a finger at rest below v_min, the cutoff passes
+ * the motion of a hand (up to some 5 Hz) with little delay, and the filter's figures suit torques of about 1 N·m. */
+std::optional<double> default_value(const model_item& item, std::uint32_t offset) {
+  if (item.law != LAW_ABSENT) {
+    return offset % 4 == 3 ? std::optional<double>(0.0) : std::nullopt; /* viscous */
+  }
+  switch (item.kind) {
+    case ITEM_COVER: return offset == 1 ? std::optional<double>(0.0) : std::nullopt; /* rest_angle */
+    case ITEM_TENDON_THRESHOLD: return 0.0005;
+    case ITEM_JOINT_THRESHOLD: return 0.01;
+    case ITEM_FILTER_CUTOFF: return 20.0;
+    case ITEM_DRIFT_VARIANCE: return 1e-6;
+    case ITEM_NOISE_STD: return 0.01;
+    case ITEM_NOISE_STD_PER_FORCE: return 0.0;
+    case ITEM_FORGET_RATE: return 5.0;
+    case ITEM_CONTACT_PER_FORCE: return 0.0;
+    case ITEM_EXTENSION:
+      return item.effect->parameters[offset].required
+                 ? std::nullopt
+                 : std::optional<double>(item.effect->parameters[offset].missing_value);
+    default: return std::nullopt;
+  }
+}
+
+double read_value(const json_node& document, const model_item& item, std::uint32_t index) {
+  char path[PARAMETER_PATH_BYTES];
+  parameter_path(&item, index, path);
+  const json_node node = document.find(path);
+  if (node.value().is_number()) {
+    return node.value().get<double>();
+  }
+  const std::optional<double> missing = default_value(item, index - item.first);
+  if (node.absent() && missing) {
+    return *missing;
+  }
+  char range[120];
+  parameter_say_range(&item, index, message_line{range, sizeof range});
+  node.refuse("a number, " + std::string(range));
+}
+
+/* No exception may pass through the C code that calls visit(), so one is carried around it. */
+struct reading {
+  const json_node& document;
+  std::vector<double> values;
+  std::exception_ptr failure;
+};
+
+int visit(void* context, const model_item* item) {
+  reading& r = *static_cast<reading*>(context);
+  try {
+    for (std::uint32_t i = item->first; i < item->first + item->count; ++i) {
+      r.values[i] = read_value(r.document, *item, i);
+    }
+    return 0;
+  } catch (...) {
+    r.failure = std::current_exception();
+    return -1;
+  }
+}
+
+}  // namespace
+
+std::vector<double> read_values(const json_node& document, const model_shape& shape) {
+  reading r{document, std::vector<double>(shape.parameter_count), nullptr};
+  model_visit(&shape, visit, &r);
+  if (r.failure) {
+    std::rethrow_exception(r.failure);
+  }
+  return r.values;
+}
+
+}  // namespace tendonfmu
