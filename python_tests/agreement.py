@@ -37,6 +37,7 @@ REAL_OUTPUTS = (
 )
 BOOLEAN_OUTPUTS = ("joint_contact", "contact", "slack")
 FLIPS_TRIED_TOGETHER = 6  # more near decisions in one sample are tried one by one
+MOST_FOLLOWED = 10  # more near decisions in one recording than any rule allows: give up
 NEAR_SAMPLES_TRIED = 3  # how many near samples before a difference may explain it
 
 
@@ -140,6 +141,8 @@ def agree_with_oracle(
         found = compare(result.outputs, candidate, left_out)
         if found.first is None:
             found.left_out = np.flatnonzero(left_out).tolist()
+            return found
+        if left_out.sum() == MOST_FOLLOWED:
             return found
         followed = _follow(description, recording, kinematics_source, candidate, result, forced, left_out, found)
         if followed is None:

@@ -244,7 +244,8 @@ def random_recording(
     for held in np.flatnonzero(rest):  # a rest is held to the last bit, also by the sensors
         if held > 0 and rest[held - 1]:
             position[held], measured_angle[held] = position[held - 1], measured_angle[held - 1]
-            if rng.random() < 0.9:
+            # with v_min = 0 a compensated step would leave the direction of motion to rounding
+            if rng.random() < 0.9 or thresholds.get("tendon") == 0.0:
                 force[held] = force[held - 1]
             else:  # a force step at rest, without a change of the angle
                 position[held] = position[held - 1] + (force[held] - force[held - 1]) / k
