@@ -1,0 +1,176 @@
+// A step must allocate nothing, make no system call and leave the host as it was: counted on the release build.
+#include <fenv.h>
+#include <gtest/gtest.h>
+#include <locale.h>
+#include <signal.h>
+
+#include <cstdlib>
+#include <cstring>
+#include <vector>
+
+#include "test_finger.h"
+
+#if defined(__linux__)
+#include <linux/seccomp.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#endif
+
+#if defined(__has_feature)
+#if __has_feature(address_sanitizer)
+#define UNDER_SANITIZER 1
+#endif
+#endif
+#if defined(__SANITIZE_ADDRESS__)
+#define UNDER_SANITIZER 1
+#endif
+
+using test_finger::Finger;
+using test_finger::Motion;
+using test_finger::Outputs;
+
+namespace {
+long allocations = 0; /* calls of malloc, calloc, realloc, aligned_alloc and free since it was set to 0 */
+}
+
+#if defined(__GLIBC__) && !defined(UNDER_SANITIZER)
+#define COUNTS_ALLOCATIONS 1
+extern "C" {
+void* __libc_malloc(size_t);
+void* __libc_calloc(size_t, size_t);
+void* __libc_realloc(void*, size_t);
+void* __libc_memalign(size_t, size_t);
+void __libc_free(void*);
+void* malloc(size_t size) {
+  ++allocations;
+  return __libc_malloc(size);
+}
+void* calloc(size_t count, size_t size) {
+  ++allocations;
+  return __libc_calloc(count, size);
+}
+void* realloc(void* block, size_t size) {
+  ++allocations;
+  return __libc_realloc(block, size);
+}
+void* aligned_alloc(size_t alignment, size_t size) {
+  ++allocations;
+  return __libc_memalign(alignment, size);
+}
+void free(void* block) {
+  ++allocations;
+  __libc_free(block);
+}
+}
+#endif
+
+namespace {
+
+/* everything that the header promises to be fit for real time; returns how many calls did not answer as they should */
+int exercise(tendonfmu_finger* finger, const Motion& motion, Outputs& outputs, std::vector<unsigned char>& state) {
+  int wrong = 0;
+  const std::size_t samples = motion.time.size();
+  const tendonfmu_outputs view = outputs.view();
+  tendonfmu_inputs inputs = motion.row(0);
+  std::size_t done = 0;
+  double value = 0.0;
+  wrong += tendonfmu_initialise(finger, motion.time[0], &inputs) != TENDONFMU_OK;
+  for (std::size_t k = 1; k < samples / 2; ++k) {
+    inputs = motion.row(k);
+    wrong += tendonfmu_step(finger, motion.time[k], &inputs) != TENDONFMU_OK;
+    wrong += tendonfmu_get_outputs(finger, &view) != TENDONFMU_OK;
+  }
+  inputs = motion.row(samples / 2);
+  wrong += tendonfmu_run(finger, samples / 2, &motion.time[samples / 2], &inputs, &view, &done) != TENDONFMU_OK;
+  wrong += tendonfmu_get_directional_derivative(finger, &inputs, &view) != TENDONFMU_OK;
+  wrong += tendonfmu_save_state(finger, state.data(), state.size()) != TENDONFMU_OK;
+  wrong += tendonfmu_set_parameter(finger, "joints[1].friction.static", 0.0041) != TENDONFMU_OK;
+  wrong += tendonfmu_get_parameter(finger, "contact.threshold[2]", &value) != TENDONFMU_OK;
+  wrong += tendonfmu_restore_state(finger, state.data(), state.size()) != TENDONFMU_OK;
+  wrong += tendonfmu_reset(finger) != TENDONFMU_OK;
+  return wrong;
+}
+
+TEST(QuietStep, AllocatesNothing) {
+#if !defined(COUNTS_ALLOCATIONS)
+  GTEST_SKIP() << "SKIPPED: malloc can only be counted with glibc and without sanitizers";
+#else
+  const Motion motion(20000);
+  for (const char* kernel : {"plain", "sse2", "avx2"}) {
+    Finger finger;
+    if (tendonfmu_set_kernel(finger, kernel) != TENDONFMU_OK) continue;
+    Outputs outputs(motion.time.size());
+    std::vector<unsigned char> state(tendonfmu_state_size(finger));
+    allocations = 0;
+    void* volatile block = std::malloc(1);
+    std::free(block);
+    ASSERT_EQ(allocations, 2) << "the counter does not count";
+    allocations = 0;
+    const int wrong = exercise(finger, motion, outputs, state);
+    const long counted = allocations;
+    EXPECT_EQ(wrong, 0);
+    EXPECT_EQ(counted, 0) << kernel;
+  }
+#endif
+}
+
+#if defined(__linux__) && !defined(UNDER_SANITIZER)
+
+/* Runs in a child that the kernel kills at its first system call other than exit; a lock that blocks would be one. */
+template <typename Action>
+int exit_status_without_system_calls(Action action) {
+  const pid_t child = fork();
+  if (child == 0) {
+    if (prctl(PR_SET_SECCOMP, SECCOMP_MODE_STRICT) != 0) _exit(77);
+    const int result = action();
+    syscall(SYS_exit, result);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+}
+
+TEST(QuietStep, MakesNoSystemCall) {
+  const Motion motion(20000);
+  Finger finger;
+  Outputs outputs(motion.time.size());
+  std::vector<unsigned char> state(tendonfmu_state_size(finger));
+  const int caught = exit_status_without_system_calls([] { return getppid() > 0 ? 0 : 1; });
+  if (caught == 77) GTEST_SKIP() << "SKIPPED: this kernel has no seccomp";
+  ASSERT_EQ(caught, -SIGKILL) << "a system call went unnoticed";
+  EXPECT_EQ(exit_status_without_system_calls([&] { return exercise(finger, motion, outputs, state); }), 0);
+}
+
+#endif
+
+TEST(QuietStep, LeavesTheHostAsItWas) {
+  const Motion motion(2000);
+  Finger finger;
+  Outputs outputs(motion.time.size());
+  std::vector<unsigned char> state(tendonfmu_state_size(finger));
+  fenv_t before, after;
+  fegetenv(&before);
+  feclearexcept(FE_ALL_EXCEPT);
+  const int rounding = fegetround();
+  const std::string locale = setlocale(LC_ALL, nullptr);
+  struct sigaction handler_before = {}, handler_after = {};
+  sigaction(SIGFPE, nullptr, &handler_before);
+  EXPECT_EQ(exercise(finger, motion, outputs, state), 0);
+  EXPECT_EQ(fegetround(), rounding);
+  EXPECT_EQ(fetestexcept(FE_INVALID | FE_DIVBYZERO | FE_OVERFLOW), 0);
+  EXPECT_EQ(setlocale(LC_ALL, nullptr), locale);
+  sigaction(SIGFPE, nullptr, &handler_after);
+  EXPECT_EQ(handler_before.sa_handler, handler_after.sa_handler);
+  fegetenv(&after);
+#if defined(__x86_64__) && defined(__GLIBC__)
+  const unsigned control = 0xffc0u; /* rounding, masks, flush to zero, denormals are zero */
+  EXPECT_EQ(before.__mxcsr & control, after.__mxcsr & control);
+#endif
+  /* denormals still work */
+  volatile double tiny = 1e-310;
+  EXPECT_GT(tiny / 2.0, 0.0);
+}
+
+}  // namespace

@@ -1,0 +1,133 @@
+// A finger and a motion for the tests of the runtime: two joints, three tendons, every kind of term, 1 kHz.
+#pragma once
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "tendonfmu_description.h"
+
+namespace test_finger {
+
+inline const char* const json = R"({
+  "format": "tendonfmu-finger-1", "name": "test",
+  "joints": [
+    {"name": "base", "cover": {"stiffness": 0.05, "rest_angle": 0.1},
+     "friction": {"static": 0.004, "coulomb": 0.003, "stribeck_velocity": 0.1, "viscous": 0.001},
+     "load_friction": {"static": 1e-4, "coulomb": 8e-5, "stribeck_velocity": 0.1}},
+    {"name": "tip", "friction": {"positive": {"static": 0.003, "coulomb": 0.002, "stribeck_velocity": 0.1},
+                                 "negative": {"static": 0.004, "coulomb": 0.002, "stribeck_velocity": 0.2}}}],
+  "tendons": [
+    {"stiffness": 4000, "moment_arms": [0.008, 0.006],
+     "pulley_friction": [{"static": 0.02, "coulomb": 0.015, "stribeck_velocity": 0.004, "viscous": 0.1}],
+     "edge_friction": [null, {"angles": [-0.5, 0.1, 0.6], "laws": [
+        {"static": 0.03, "coulomb": 0.02, "stribeck_velocity": 0.005, "viscous": 0.3},
+        {"static": 0.02, "coulomb": 0.02, "stribeck_velocity": 0.004, "viscous": 0.2},
+        {"static": 0.05, "coulomb": 0.03, "stribeck_velocity": 0.006, "viscous": 0.1}]}]},
+    {"stiffness": 3000, "moment_arms": [-0.008, -0.006],
+     "edge_friction": [{"static": 0.03, "coulomb": 0.02, "stribeck_velocity": 0.005}]},
+    {"stiffness": 5000, "moment_arms": [-0.007, 0.005], "bidirectional": true,
+     "pulley_friction": [{"static": 0.02, "coulomb": 0.01, "stribeck_velocity": 0.004}]}],
+  "velocity_threshold": {"tendon": 0.0005, "joint": 0.02},
+  "bias": {"noise_std_per_force": 1e-4},
+  "contact": {"threshold": [0.04, 0.04], "threshold_per_force": [1e-4, 1e-4]},
+  "extensions": [{"effect": "cover_hardening", "joint": 1, "stiffness": 0.01}]})";
+
+constexpr std::size_t joints = 2, tendons = 3;
+
+inline std::vector<unsigned char> image(const std::string& text = json) {
+  void* block = nullptr;
+  std::size_t size = 0;
+  char message[400] = "";
+  if (tendonfmu_image_from_json(text.data(), text.size(), &block, &size, message, sizeof message) != TENDONFMU_OK) {
+    std::fprintf(stderr, "test finger refused: %s\n", message);
+    std::abort();
+  }
+  const auto* bytes = static_cast<const unsigned char*>(block);
+  std::vector<unsigned char> copy(bytes, bytes + size);
+  tendonfmu_free_image(block);
+  return copy;
+}
+
+// Inputs of a motion with reversals, rests and two pushes; row-major as tendonfmu_run() takes them.
+struct Motion {
+  std::vector<double> time, force, position, angle, velocity;
+
+  explicit Motion(std::size_t samples) {
+    const double arm[tendons][joints] = {{0.008, 0.006}, {-0.008, -0.006}, {-0.007, 0.005}};
+    const double stiffness[tendons] = {4000, 3000, 5000};
+    double phase = 0.0;
+    for (std::size_t k = 0; k < samples; ++k) {
+      const double t = 1e-3 * static_cast<double>(k);
+      const bool rests = std::fmod(t, 1.5) > 1.1;
+      phase += rests ? 0.0 : 4e-3;
+      const double q[joints] = {0.6 * std::sin(phase), 0.5 * std::sin(1.7 * phase) + 0.1};
+      const double v[joints] = {rests ? 0.0 : 2.4 * std::cos(phase), rests ? 0.0 : 3.4 * std::cos(1.7 * phase)};
+      const bool pushed = std::fmod(t, 2.0) > 1.8;
+      time.push_back(t);
+      for (std::size_t i = 0; i < tendons; ++i) {
+        const double f = 15.0 + 2.0 * static_cast<double>(i) + std::sin(3.0 * t + static_cast<double>(i)) -
+                         (i == 2 ? 19.0 : 0.0) + (pushed && i == 0 ? 9.0 : 0.0);
+        force.push_back(f);
+        position.push_back(arm[i][0] * q[0] + arm[i][1] * q[1] + f / stiffness[i]);
+      }
+      angle.insert(angle.end(), q, q + joints);
+      velocity.insert(velocity.end(), v, v + joints);
+    }
+  }
+
+  tendonfmu_inputs row(std::size_t k) const {
+    return {&force[k * tendons], &position[k * tendons], &angle[k * joints], &velocity[k * joints]};
+  }
+  tendonfmu_inputs all() const { return row(0); }
+};
+
+// Room for the outputs of a run.
+struct Outputs {
+  std::vector<double> compensated, torque, friction, bias, angle, speed;
+  std::vector<unsigned char> joint_contact, contact, slack;
+
+  explicit Outputs(std::size_t samples) {
+    for (auto* row : {&compensated, &torque, &friction, &bias, &angle, &speed}) row->assign(samples * joints, NAN);
+    joint_contact.assign(samples * joints, 9);
+    contact.assign(samples, 9);
+    slack.assign(samples * tendons, 9);
+  }
+  tendonfmu_outputs view() {
+    return {compensated.data(), torque.data(),        friction.data(), bias.data(), angle.data(),
+            speed.data(),       joint_contact.data(), contact.data(),  slack.data()};
+  }
+  bool operator==(const Outputs& o) const {
+    return compensated == o.compensated && torque == o.torque && friction == o.friction && bias == o.bias &&
+           angle == o.angle && speed == o.speed && joint_contact == o.joint_contact && contact == o.contact &&
+           slack == o.slack;
+  }
+};
+
+// A created finger that frees itself.
+struct Finger {
+  tendonfmu_finger* handle;
+
+  explicit Finger(const std::vector<unsigned char>& bytes = image()) {
+    char message[400] = "";
+    handle = tendonfmu_create(bytes.data(), bytes.size(), message, sizeof message);
+    if (handle == nullptr) {
+      std::fprintf(stderr, "finger refused: %s\n", message);
+      std::abort();
+    }
+  }
+  ~Finger() { tendonfmu_destroy(handle); }
+  Finger(const Finger&) = delete;
+  Finger& operator=(const Finger&) = delete;
+  operator tendonfmu_finger*() const { return handle; }
+
+  std::vector<unsigned char> saved() const {
+    std::vector<unsigned char> bytes(tendonfmu_state_size(handle));
+    tendonfmu_save_state(handle, bytes.data(), bytes.size());
+    return bytes;
+  }
+};
+
+}  // namespace test_finger
