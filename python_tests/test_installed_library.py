@@ -143,3 +143,14 @@ def test_installed_text_names_no_folder_of_the_build(prefix: Path) -> None:
     assert [
         p.name for p in texts if str(ROOT) in p.read_text(encoding="utf-8") or "made here" in p.read_text("utf-8")
     ] == []
+
+
+def test_control_loop_of_the_examples_feels_the_push(prefix: Path, tmp_path: Path) -> None:
+    call("cmake", "-S", ROOT / "examples" / "c_control_loop", "-B", tmp_path, f"-DCMAKE_PREFIX_PATH={prefix}")
+    call("cmake", "--build", tmp_path)
+    lines = call(tmp_path / "control_loop", FINGER, "2.2").splitlines()
+    begins = [float(line.split()[0]) for line in lines if "contact, compensated" in line]
+    ends = [float(line.split()[0]) for line in lines if "free again" in line]
+    # one push, from 1.5 s to 1.8 s; generous, since a busy machine reads the sensors late
+    assert any(1.5 <= time < 1.7 for time in begins), lines
+    assert any(1.8 <= time < 2.1 for time in ends), lines
