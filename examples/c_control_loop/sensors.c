@@ -23,8 +23,7 @@ int sensors_begin(sensors* hand, const tendonfmu_finger* finger) {
 }
 
 void sensors_read(const sensors* hand, double time, double* force, double* position) {
-  const double phase = fmod(time, 2.0); /* moves for 1.2 s, rests for 0.8 s */
-  const double angle = phase < 1.2 ? 0.1 * (1.0 - cos(2.0 * 3.14159265 * phase / 1.2)) : 0.0;
+  const double phase = fmod(time, 2.0), angle = 0.2;
   const double pushed = phase > 1.5 && phase < 1.8 ? 8.0 : 0.0; /* N, by the environment */
   for (size_t i = 0; i < hand->tendons; ++i) {
     double travel = 0.0;

@@ -1,5 +1,4 @@
-/* Stands for the drivers of your hand. Here: a finger that closes, opens, rests, and is pushed
- * for 0.3 s while it rests. */
+/* Stands for the drivers of your hand. Here: a finger that holds still and is pushed for 0.3 s of every 2 s. */
 #ifndef SENSORS_H
 #define SENSORS_H
 
