@@ -80,6 +80,7 @@ typedef struct finger_state {
  * [low, high); most samples find it valid. Rows of four lanes; laws by number (LAW_COULOMB, …). */
 typedef struct slot_view {
   double key[4];                      /* lane 0: bits of the negative sides; −1: to be filled */
+  double blends[4];                   /* lane 0: 1 where any lane stands between two working points */
   double low[4], high[4];             /* rad */
   double begin[4], inverse_length[4]; /* of the segment: rad, 1/rad; 0 outside the grid */
   double below[LAW_SIDE_NUMBERS][4];  /* F_B at the working point below; joints: T_jv0 */

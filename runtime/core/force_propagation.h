@@ -24,7 +24,11 @@ HOT_INLINE quad laws_magnitude(const double rows[LAW_SIDE_NUMBERS][4], quad spee
 /* |F_B| at speed |v|: the values of the two neighbouring working points, interpolated linearly in the angle of the
  * joint before; constant outside the grid */
 HOT_INLINE quad edges_magnitude(const slot_view* view, quad angle, quad speed) {
-  const quad below = laws_magnitude(view->below, speed), above = laws_magnitude(view->above, speed);
+  const quad below = laws_magnitude(view->below, speed);
+  if (view->blends[0] == 0.0) {
+    return below;
+  }
+  const quad above = laws_magnitude(view->above, speed);
   const quad weight = quad_mul(quad_sub(angle, quad_load(view->begin)), quad_load(view->inverse_length));
   return quad_add(below, quad_mul(weight, quad_sub(above, below)));
 }
@@ -71,7 +75,9 @@ HOT_INLINE int friction_values(tendonfmu_finger* f) {
       const quad_mask moving = quad_greater(speed, threshold);
       const slot_view* view = view_at(f, at, v, moving, before);
       quad_store(s->edge + at, when_moving(moving, edges_magnitude(view, quad_set(before), speed), v));
-      quad_store(s->pulley + at, when_moving(moving, laws_magnitude(view->other, speed), v));
+      if (j > 0) { /* before the first joint there is no pulley */
+        quad_store(s->pulley + at, when_moving(moving, laws_magnitude(view->other, speed), v));
+      }
       transitions |= transition_bits(f, at, moving);
     }
   }

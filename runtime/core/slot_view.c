@@ -40,10 +40,14 @@ static void fill_tendon_lane(const tendonfmu_finger* f, size_t joint, size_t ten
   view->high[lane] = passed < points ? point[passed * f->tendon_lanes] : INFINITY;
   view->begin[lane] = d->edge_segment[2 * record];
   view->inverse_length[lane] = d->edge_segment[2 * record + 1];
+  if (view->inverse_length[lane] != 0.0) {
+    view->blends[0] = 1.0;
+  }
 }
 
 void slot_view_fill(const tendonfmu_finger* finger, size_t slot, double angle, int negative, slot_view* view) {
   const size_t joint = slot / finger->tendon_lanes, tendon = slot % finger->tendon_lanes;
+  view->blends[0] = 0.0;
   for (int lane = 0; lane < 4; ++lane) {
     const int side = negative >> lane & 1;
     if (joint < finger->joints) {

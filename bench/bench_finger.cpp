@@ -1,0 +1,114 @@
+#include "bench_finger.h"
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+#include <sstream>
+
+#include "tendonfmu_description.h"
+
+namespace bench_finger {
+namespace {
+
+double moment_arm(int tendon, int joint) {
+  const double size = 0.009 - 0.0005 * joint + 0.0001 * tendon;
+  return joint <= tendon / 2 ? (tendon % 2 == 0 ? size : -size) : 0.0;
+}
+
+double stiffness(int tendon) {
+  return 4000.0 + 100.0 * tendon;
+}
+
+// A law whose numbers differ from those of every other place.
+std::string law(double scale, double velocity, int place) {
+  std::ostringstream s;
+  const double vary = 1.0 + 0.01 * (place % 17);
+  s << R"({"static": )" << 1.4 * scale * vary << R"(, "coulomb": )" << scale * vary << R"(, "stribeck_velocity": )"
+    << velocity * (1.0 + 0.02 * (place % 11)) << R"(, "viscous": )" << 0.1 * scale << "}";
+  return s.str();
+}
+
+std::string list(int count, const std::function<std::string(int)>& item) {
+  std::string s = "[";
+  for (int i = 0; i < count; ++i) {
+    s += (i > 0 ? ", " : "") + item(i);
+  }
+  return s + "]";
+}
+
+std::string number(double x) {
+  std::ostringstream s;
+  s << x;
+  return s.str();
+}
+
+std::string edge(int tendon, int joint, int points) {
+  return R"({"angles": )" + list(points, [&](int k) { return number(-1.0 + 0.5 * k + 0.013 * tendon); }) +
+         R"(, "laws": )" + list(points, [&](int k) { return law(0.02, 0.005, 7 * tendon + 3 * joint + k); }) + "}";
+}
+
+std::string tendon(int i, int joints, int points) {
+  return R"({"stiffness": )" + number(stiffness(i)) + R"(, "moment_arms": )" +
+         list(joints, [&](int j) { return number(moment_arm(i, j)); }) + R"(, "pulley_friction": )" +
+         list(joints - 1, [&](int j) { return law(0.01, 0.004, i + 5 * j); }) + R"(, "edge_friction": )" +
+         list(joints, [&](int j) { return edge(i, j, points); }) + "}";
+}
+
+Recording record(int joints, int tendons, std::size_t samples, const std::function<double(int, double)>& angle) {
+  Recording r;
+  for (std::size_t k = 0; k < samples; ++k) {
+    const double t = 1e-3 * static_cast<double>(k);
+    r.time.push_back(t);
+    for (int i = 0; i < tendons; ++i) {
+      double travel = 0.0;
+      for (int j = 0; j < joints; ++j) {
+        travel += moment_arm(i, j) * angle(j, t);
+      }
+      r.force.push_back(20.0 + i + 3.0 * std::sin(t + i));
+      r.position.push_back(travel + r.force.back() / stiffness(i));
+    }
+  }
+  return r;
+}
+
+}  // namespace
+
+std::string description(int joints, int tendons, int points) {
+  return R"({"format": "tendonfmu-finger-1", "name": "bench", "joints": )" +
+         list(joints,
+              [&](int j) {
+                return R"({"cover": {"stiffness": 0.02}, "friction": )" + law(0.005, 0.1, j) +
+                       R"(, "load_friction": )" + law(1e-4, 0.1, j + 3) + "}";
+              }) +
+         R"(, "tendons": )" + list(tendons, [&](int i) { return tendon(i, joints, points); }) +
+         R"(, "contact": {"threshold": )" + list(joints, [](int) { return std::string("5"); }) + "}}";
+}
+
+std::vector<unsigned char> image(const std::string& json) {
+  void* block = nullptr;
+  std::size_t size = 0;
+  char message[400];
+  if (tendonfmu_image_from_json(json.data(), json.size(), &block, &size, message, sizeof message) != TENDONFMU_OK) {
+    std::fprintf(stderr, "bench finger refused: %s\n", message);
+    std::exit(2);
+  }
+  const auto* bytes = static_cast<const unsigned char*>(block);
+  std::vector<unsigned char> copy(bytes, bytes + size);
+  tendonfmu_free_image(block);
+  return copy;
+}
+
+Recording motion(int joints, int tendons, std::size_t samples) {
+  return record(joints, tendons, samples,
+                [](int j, double t) { return 0.8 * std::sin(t * (0.7 + 0.3 * j) + j) + 0.1 * std::sin(3.1 * t); });
+}
+
+Recording shaking(int joints, int tendons, std::size_t samples) {
+  return record(joints, tendons, samples, [](int j, double t) {
+    const auto k = static_cast<long>(std::lround(1e3 * t));
+    return (k % 4 < 2 ? 0.01 : -0.01) * (k % 2 == 0 ? 1.0 : 1.2) * (1 + j);
+  });
+}
+
+}  // namespace bench_finger

@@ -1,0 +1,28 @@
+// The finger of the figures in docs/performance.md: joints × tendons × working points, every friction term present.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tendonfmu.h"
+
+namespace bench_finger {
+
+// A description with n joints, m tendons and `points` working points at every edge, all laws different.
+std::string description(int joints, int tendons, int points);
+
+std::vector<unsigned char> image(const std::string& json);
+
+// Inputs at 1 kHz, row-major.
+struct Recording {
+  std::vector<double> time, force, position;
+  tendonfmu_inputs inputs() const { return {force.data(), position.data(), nullptr, nullptr}; }
+};
+
+// All joints move at once with different velocities; about one transition of fig. 5 in a hundred samples.
+Recording motion(int joints, int tendons, std::size_t samples);
+
+// Every joint reverses at every sample: the most work a step can have.
+Recording shaking(int joints, int tendons, std::size_t samples);
+
+}  // namespace bench_finger

@@ -1,0 +1,121 @@
+// Time of a step of the C interface, by kernel and size. Counter per_step is the figure of docs/performance.md.
+#include <benchmark/benchmark.h>
+
+#include <vector>
+
+#include "bench_finger.h"
+
+namespace {
+
+constexpr std::size_t samples = 20000;
+
+// A finger with room for its outputs that runs over a recording again and again.
+class Runner {
+ public:
+  Runner(int joints, int tendons, int points, const char* kernel)
+      : image_(bench_finger::image(bench_finger::description(joints, tendons, points))) {
+    char message[400];
+    finger_ = tendonfmu_create(image_.data(), image_.size(), message, sizeof message);
+    usable_ = tendonfmu_set_kernel(finger_, kernel) == TENDONFMU_OK;
+    torque_.resize(static_cast<std::size_t>(joints));
+  }
+  ~Runner() { tendonfmu_destroy(finger_); }
+  Runner(const Runner&) = delete;
+  Runner& operator=(const Runner&) = delete;
+
+  bool usable() const { return usable_; }
+  tendonfmu_finger* finger() { return finger_; }
+
+  // steps one by one, as a control loop does
+  void run(const bench_finger::Recording& r) {
+    const std::size_t m = tendonfmu_tendon_count(finger_);
+    tendonfmu_outputs outputs = {};
+    outputs.compensated_torque = torque_.data();
+    tendonfmu_reset(finger_);
+    for (std::size_t k = 0; k < r.time.size(); ++k) {
+      const tendonfmu_inputs inputs = {&r.force[k * m], &r.position[k * m], nullptr, nullptr};
+      if (k == 0) {
+        tendonfmu_initialise(finger_, r.time[k], &inputs);
+      } else {
+        tendonfmu_step(finger_, r.time[k], &inputs);
+      }
+      tendonfmu_get_outputs(finger_, &outputs);
+      benchmark::DoNotOptimize(torque_.data());
+    }
+  }
+
+ private:
+  std::vector<unsigned char> image_;
+  tendonfmu_finger* finger_ = nullptr;
+  bool usable_ = false;
+  std::vector<double> torque_;
+};
+
+void steps(benchmark::State& state, const char* kernel, int joints, int tendons, int points, bool shaking) {
+  Runner runner(joints, tendons, points, kernel);
+  if (!runner.usable()) {
+    state.SkipWithError("this kernel cannot run here");
+    return;
+  }
+  const bench_finger::Recording recording =
+      shaking ? bench_finger::shaking(joints, tendons, samples) : bench_finger::motion(joints, tendons, samples);
+  for (auto _ : state) {
+    runner.run(recording);
+  }
+  state.counters["per_step"] = benchmark::Counter(static_cast<double>(state.iterations()) * samples,
+                                                  benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+}
+
+// name, kernel, joints, tendons, points, every sample reverses
+const auto* const registered = [] {
+  const auto add = [](const char* name, const char* kernel, int joints, int tendons, int points, bool shaking) {
+    return benchmark::RegisterBenchmark(
+               name, [=](benchmark::State& state) { steps(state, kernel, joints, tendons, points, shaking); })
+        ->Unit(benchmark::kMillisecond);
+  };
+  add("step/avx2/4x8x5", "avx2", 4, 8, 5, false);
+  add("step/sse2/4x8x5", "sse2", 4, 8, 5, false);
+  add("step/plain/4x8x5", "plain", 4, 8, 5, false);
+  add("step/avx2/4x8x5/every_sample_reverses", "avx2", 4, 8, 5, true);
+  add("step/avx2/1x2x1", "avx2", 1, 2, 1, false);
+  return add("step/avx2/16x64x5", "avx2", 16, 64, 5, false);
+}();
+
+void save_and_restore(benchmark::State& state) {
+  Runner runner(4, 8, 5, "auto");
+  runner.run(bench_finger::motion(4, 8, 100));
+  std::vector<unsigned char> bytes(tendonfmu_state_size(runner.finger()));
+  for (auto _ : state) {
+    tendonfmu_save_state(runner.finger(), bytes.data(), bytes.size());
+    tendonfmu_restore_state(runner.finger(), bytes.data(), bytes.size());
+  }
+}
+BENCHMARK(save_and_restore)->Unit(benchmark::kMicrosecond);
+
+void write_a_parameter(benchmark::State& state) {
+  Runner runner(4, 8, 5, "auto");
+  const std::size_t index = tendonfmu_find_parameter(runner.finger(), "joints[1].friction.static");
+  double value = 0.01;
+  for (auto _ : state) {
+    value = value < 0.02 ? value + 1e-6 : 0.01;
+    tendonfmu_set_parameters(runner.finger(), 1, &index, &value);
+  }
+}
+BENCHMARK(write_a_parameter)->Unit(benchmark::kMicrosecond);
+
+void one_directional_derivative(benchmark::State& state) {
+  Runner runner(4, 8, 5, "auto");
+  const bench_finger::Recording recording = bench_finger::motion(4, 8, 100);
+  runner.run(recording);
+  double slope[4];
+  tendonfmu_outputs derivative = {};
+  derivative.compensated_torque = slope;
+  const tendonfmu_inputs direction = recording.inputs();
+  for (auto _ : state) {
+    tendonfmu_get_directional_derivative(runner.finger(), &direction, &derivative);
+    benchmark::DoNotOptimize(slope);
+  }
+}
+BENCHMARK(one_directional_derivative)->Unit(benchmark::kMicrosecond);
+
+}  // namespace
