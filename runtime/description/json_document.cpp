@@ -1,6 +1,7 @@
 #include "json_document.h"
 
 #include <algorithm>
+#include <cstring>
 #include <string>
 #include <utility>
 #include <vector>
@@ -9,6 +10,17 @@
 
 namespace tendonfmu {
 namespace {
+
+/* at a place in a text; lines and columns (bytes) count from 1 */
+description_error syntax_error(const char* text, const char* place, const std::string& reason) {
+  const auto line = std::count(text, place, '\n') + 1;
+  const char* start = place;
+  while (start > text && start[-1] != '\n') {
+    --start;
+  }
+  return description_error("JSON, line " + std::to_string(line) + ", column " + std::to_string(place - start + 1) +
+                           ": " + reason);
+}
 
 /* Builds the tree from the parser's events. The parser's own tree keeps the last of two equal keys without a word, and
  * knows no limit of depth. */
@@ -41,14 +53,7 @@ class tree_builder : public nlohmann::json_sax<json> {
   bool parse_error(std::size_t position, const std::string&, const nlohmann::detail::exception& error) override {
     /* the parser counts the character it stumbled over */
     const std::size_t before = std::min(position > 0 ? position - 1 : 0, size_);
-    const char* end = text_ + before;
-    const auto line = std::count(text_, end, '\n') + 1;
-    const char* start = end;
-    while (start > text_ && start[-1] != '\n') {
-      --start;
-    }
-    throw description_error("JSON, line " + std::to_string(line) + ", column " + std::to_string(end - start + 1) +
-                            ": " + reason(error.what()));
+    throw syntax_error(text_, text_ + before, reason(error.what()));
   }
 
  private:
@@ -126,6 +131,10 @@ json parse_document(const char* text, std::size_t size) {
   if (size > max_document_bytes) {
     throw description_error("JSON of " + std::to_string(size) + " bytes: expected at most " +
                             std::to_string(max_document_bytes));
+  }
+  /* the parser would take it for the end of the text */
+  if (const void* zero = std::memchr(text, 0, size)) {
+    throw syntax_error(text, static_cast<const char*>(zero), "a zero byte; expected text");
   }
   tree_builder builder(text, size);
   json::sax_parse(text, text + size, &builder);

@@ -42,7 +42,7 @@ double read_value(const json_node& document, const model_item& item, std::uint32
   if (node.absent() && missing) {
     return *missing;
   }
-  char range[120];
+  char range[120] = "";
   parameter_say_range(&item, index, message_line{range, sizeof range});
   node.refuse("a number, " + std::string(range));
 }

@@ -1,0 +1,31 @@
+/* exp(−x) of the avx2 kernel as a function, for exponential_test.cpp. */
+#include "floating_point.h"
+
+#if defined(__x86_64__) || defined(_M_X64)
+
+#if defined(__clang__)
+#pragma clang attribute push(__attribute__((target("avx2"))), apply_to = function)
+#elif defined(__GNUC__)
+#pragma GCC push_options
+#pragma GCC target("avx2")
+#endif
+
+#include "quad_avx2.h"
+
+#include "exponential.h"
+
+#include "exponential_kernels.h"
+
+void exponential_avx2(const double* x, double* result, size_t count) {
+  for (size_t i = 0; i < count; i += 4) {
+    quad_store(result + i, exp_of_minus(quad_load(x + i)));
+  }
+}
+
+#if defined(__clang__)
+#pragma clang attribute pop
+#elif defined(__GNUC__)
+#pragma GCC pop_options
+#endif
+
+#endif

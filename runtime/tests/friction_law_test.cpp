@@ -1,0 +1,109 @@
+// Eq. (1), one side: values by regime, dissipation, slopes.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+extern "C" {
+#include "friction_law.h"
+}
+
+namespace {
+
+struct Side {
+  double fs, fc, vs, fv;
+  double numbers[LAW_SIDE_NUMBERS];
+
+  Side(double s, double c, double stribeck, double viscous) : fs(s), fc(c), vs(stribeck), fv(viscous) {
+    law_pack_side(numbers, fs, fc, vs, fv);
+  }
+  law_slopes at(double speed) const { return law_with_slopes(numbers, speed); }
+};
+
+TEST(FrictionLaw, IsEquationOne) {
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<> unit(0.0, 1.0);
+  for (int i = 0; i < 10000; ++i) {
+    const double fc = unit(random), vs = 1e-3 + unit(random);
+    const Side side(fc + unit(random), fc, vs, unit(random));
+    const double v = unit(random) * 5.0 * vs;
+    const double expected = side.fc + (side.fs - side.fc) * std::exp(-v / vs) + side.fv * v;
+    EXPECT_NEAR(side.at(v).value, expected, 4e-15 * expected);
+  }
+}
+
+TEST(FrictionLaw, BreaksAwayAtStaticForceAndSlidesAtCoulombForce) {
+  const Side side(0.03, 0.02, 0.005, 0.0);
+  EXPECT_DOUBLE_EQ(side.at(0.0).value, 0.03);
+  EXPECT_DOUBLE_EQ(side.at(1.0).value, 0.02);
+  EXPECT_NEAR(side.at(0.005).value, 0.02 + 0.01 / std::exp(1.0), 1e-16);
+}
+
+TEST(FrictionLaw, GrowsLinearlyWithSpeedWhereViscous) {
+  const Side side(0.03, 0.02, 0.005, 0.3);
+  EXPECT_NEAR(side.at(3.0).value - side.at(2.0).value, 0.3, 1e-15);
+}
+
+TEST(FrictionLaw, FallsBetweenStaticAndCoulombWithoutViscousPart) {
+  const Side side(0.05, 0.01, 0.01, 0.0);
+  double before = side.at(0.0).value;
+  for (double v = 1e-4; v < 0.2; v += 1e-4) {
+    const double now = side.at(v).value;
+    EXPECT_LT(now, before);
+    EXPECT_GT(now, side.fc);
+    before = now;
+  }
+}
+
+TEST(FrictionLaw, NeverDrives) {
+  std::mt19937_64 random(2);
+  std::uniform_real_distribution<> unit(0.0, 1.0);
+  for (int i = 0; i < 10000; ++i) {
+    const double fc = unit(random);
+    const Side side(fc + unit(random), fc, std::exp2(-20.0 * unit(random)), unit(random));
+    EXPECT_GE(side.at(std::exp2(40.0 * unit(random) - 30.0)).value, 0.0);
+  }
+}
+
+TEST(FrictionLaw, WithoutStribeckEffectIsFreeOfTheExponential) {
+  const Side side(0.02, 0.02, 1e-300, 0.1);
+  for (const double v : {0.0, 1e-12, 1e-3, 10.0}) EXPECT_EQ(side.at(v).value, 0.02 + 0.1 * v);
+}
+
+TEST(FrictionLaw, StaysFiniteAtTheSmallestStribeckVelocity) {
+  const Side side(0.03, 0.02, 5e-324, 0.0);
+  EXPECT_EQ(side.at(0.0).value, 0.03);
+  EXPECT_EQ(side.at(1e-12).value, 0.02);
+  EXPECT_TRUE(std::isfinite(side.at(0.0).by_speed));
+}
+
+TEST(FrictionLaw, SlopesAreThoseOfCentralDifferences) {
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<> unit(0.0, 1.0);
+  for (int i = 0; i < 2000; ++i) {
+    const double fc = 0.01 + unit(random), vs = 0.1 + unit(random);
+    double side[LAW_SIDE_NUMBERS];
+    law_pack_side(side, fc + unit(random), fc, vs, unit(random));
+    const double v = 0.01 + 2.0 * unit(random);
+    const law_slopes slopes = law_with_slopes(side, v);
+    // h = 1e-5: truncation h²/6·|F'''| ~ 1e-8, rounding 1e-16·|F|/h ~ 1e-11
+    const double h = 1e-5, tolerance = 3e-7;
+    const auto difference = [&](int number, double sign_of_drop) {
+      double up[LAW_SIDE_NUMBERS], down[LAW_SIDE_NUMBERS];
+      for (int k = 0; k < LAW_SIDE_NUMBERS; ++k) up[k] = down[k] = side[k];
+      up[number] += h;
+      down[number] -= h;
+      up[LAW_DROP] += sign_of_drop * h;
+      down[LAW_DROP] -= sign_of_drop * h;
+      return (law_with_slopes(up, v).value - law_with_slopes(down, v).value) / (2 * h);
+    };
+    const double by_speed = (law_with_slopes(side, v + h).value - law_with_slopes(side, v - h).value) / (2 * h);
+    EXPECT_NEAR(slopes.by_speed, by_speed, tolerance);
+    EXPECT_NEAR(slopes.by_static, difference(LAW_DROP, 0.0), tolerance);
+    EXPECT_NEAR(slopes.by_coulomb, difference(LAW_COULOMB, -1.0), tolerance); /* Fs held */
+    EXPECT_NEAR(slopes.by_rate, difference(LAW_RATE, 0.0), tolerance);
+    EXPECT_NEAR(slopes.by_viscous, difference(LAW_VISCOUS, 0.0), tolerance);
+  }
+}
+
+}  // namespace
