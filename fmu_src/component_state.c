@@ -1,0 +1,191 @@
+#include "component_state.h"
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+/* byte offsets of the header; the checksum covers all that follows it */
+enum { MAGIC = 0, VERSION = 8, SIZE = 16, CHECKSUM = 24, SALT = 32, NUMBERS = 40 };
+enum { STATE_VERSION = 1 };
+
+/* numbers before the inputs and parameters */
+enum { AT_PHASE, AT_PENDING, AT_STOP_DEFINED, AT_START, AT_STOP, AT_END, LIFE_COUNT };
+
+static const unsigned char magic[8] = {'T', 'F', 'M', 'U', 'F', 'M', 'I', '2'};
+
+static void put_u64(unsigned char* to, uint64_t value) {
+  for (int i = 0; i < 8; ++i) {
+    to[i] = (unsigned char)(value >> (8 * i));
+  }
+}
+
+static uint64_t get_u64(const unsigned char* from) {
+  uint64_t value = 0;
+  for (int i = 0; i < 8; ++i) {
+    value |= (uint64_t)from[i] << (8 * i);
+  }
+  return value;
+}
+
+static void put_number(unsigned char* to, size_t index, double value) {
+  uint64_t bits;
+  memcpy(&bits, &value, sizeof bits);
+  put_u64(to + NUMBERS + 8 * index, bits);
+}
+
+static double get_number(const unsigned char* from, size_t index) {
+  const uint64_t bits = get_u64(from + NUMBERS + 8 * index);
+  double value;
+  memcpy(&value, &bits, sizeof value);
+  return value;
+}
+
+/* FNV-1a */
+static uint64_t checksum(const unsigned char* bytes, size_t size) {
+  uint64_t hash = 0xcbf29ce484222325u;
+  for (size_t i = SALT; i < size; ++i) {
+    hash = (hash ^ bytes[i]) * 0x100000001b3u;
+  }
+  return hash;
+}
+
+static size_t finger_offset(const component* c) {
+  return NUMBERS + 8 * (LIFE_COUNT + c->values.input_count + c->values.parameter_count);
+}
+
+size_t component_state_size(const component* c) {
+  return finger_offset(c) + c->state_size;
+}
+
+void component_save(const component* c, void* bytes) {
+  unsigned char* to = bytes;
+  const variables* v = &c->values;
+  const size_t size = component_state_size(c);
+  const double life[LIFE_COUNT] = {[AT_PHASE] = (double)c->phase,
+                                   [AT_PENDING] = c->parameters_pending,
+                                   [AT_STOP_DEFINED] = c->stop_time_defined,
+                                   [AT_START] = c->start_time,
+                                   [AT_STOP] = c->stop_time,
+                                   [AT_END] = c->end_of_step};
+  memcpy(to + MAGIC, magic, sizeof magic);
+  put_u64(to + VERSION, STATE_VERSION);
+  put_u64(to + SIZE, size);
+  put_u64(to + SALT, VARIABLE_TABLE_SALT);
+  for (size_t i = 0; i < LIFE_COUNT; ++i) {
+    put_number(to, i, life[i]);
+  }
+  for (size_t i = 0; i < v->input_count; ++i) {
+    put_number(to, LIFE_COUNT + i, v->numbers[i]);
+  }
+  for (size_t i = 0; i < v->parameter_count; ++i) {
+    put_number(to, LIFE_COUNT + v->input_count + i, v->parameters[i]);
+  }
+  tendonfmu_save_state(c->finger, to + finger_offset(c), c->state_size);
+  put_u64(to + CHECKSUM, checksum(to, size));
+}
+
+static int is_flag(double x) {
+  return x == 0.0 || x == 1.0;
+}
+
+static int life_is_sound(const unsigned char* from) {
+  const double phase = get_number(from, AT_PHASE);
+  return phase >= 0.0 && phase < PHASE_COUNT && phase == floor(phase) && is_flag(get_number(from, AT_PENDING)) &&
+         is_flag(get_number(from, AT_STOP_DEFINED)) && isfinite(get_number(from, AT_START)) &&
+         !isnan(get_number(from, AT_STOP)) && isfinite(get_number(from, AT_END));
+}
+
+/* inputs and parameters within their ranges */
+static int values_are_sound(const component* c, const unsigned char* from) {
+  log_text nowhere = {.length = 0};
+  size_t at = LIFE_COUNT;
+  for (int g = 0; g < GROUP_COUNT; ++g) {
+    const variable_group* group = &variable_groups[g];
+    const size_t count = group->causality == CAUSALITY_INPUT ? variables_group_count(&c->values, group) : 0;
+    for (size_t i = 0; i < count; ++i) {
+      const variable input = {group, (variable_group_id)g, i};
+      if (variables_check_real(&nowhere, c->finger, &input, get_number(from, at++))) {
+        return 0;
+      }
+    }
+  }
+  for (size_t i = 0; i < c->values.parameter_count; ++i) {
+    const variable parameter = {NULL, GROUP_COUNT, i};
+    if (variables_check_real(&nowhere, c->finger, &parameter, get_number(from, at++))) {
+      return 0;
+    }
+  }
+  return 1;
+}
+
+/* the finger's part, and whether it has samples exactly when the phase says so; puts the finger back afterwards */
+static const char* check_finger(component* c, const unsigned char* from) {
+  const double phase = get_number(from, AT_PHASE);
+  const char* reason = NULL;
+  tendonfmu_save_state(c->finger, c->scratch, c->state_size);
+  if (tendonfmu_restore_state(c->finger, from + finger_offset(c), c->state_size) != TENDONFMU_OK) {
+    return tendonfmu_last_error(c->finger);
+  }
+  if (tendonfmu_is_initialised(c->finger) != (phase >= PHASE_STEP_COMPLETE)) {
+    reason = "damaged state: its phase does not fit its finger";
+  }
+  tendonfmu_restore_state(c->finger, c->scratch, c->state_size);
+  return reason;
+}
+
+static const char* check_header(const component* c, const unsigned char* from) {
+  if (memcmp(from + MAGIC, magic, sizeof magic) != 0 || get_u64(from + VERSION) != STATE_VERSION) {
+    return "not a state of an FMU of this kind and version";
+  }
+  if (get_u64(from + SIZE) != component_state_size(c) || get_u64(from + SALT) != VARIABLE_TABLE_SALT) {
+    return "state of another FMU";
+  }
+  return NULL;
+}
+
+const char* component_check_state(component* c, const void* bytes, size_t size) {
+  if (size != component_state_size(c)) {
+    return "size is not that of fmi2SerializedFMUstateSize";
+  }
+  const char* reason = check_header(c, bytes);
+  if (reason) {
+    return reason;
+  }
+  if (get_u64((const unsigned char*)bytes + CHECKSUM) != checksum(bytes, size)) {
+    return "damaged state: its checksum does not match";
+  }
+  if (!life_is_sound(bytes) || !values_are_sound(c, bytes)) {
+    return "damaged state: a number in it cannot be";
+  }
+  return check_finger(c, bytes);
+}
+
+const char* component_restore(component* c, const void* bytes) {
+  const unsigned char* from = bytes;
+  variables* v = &c->values;
+  const char* reason = check_header(c, from);
+  if (reason) {
+    return reason;
+  }
+  if (tendonfmu_restore_state(c->finger, from + finger_offset(c), c->state_size) != TENDONFMU_OK) {
+    return tendonfmu_last_error(c->finger);
+  }
+  c->failed = 0;
+  c->phase = (fmu_phase)get_number(from, AT_PHASE);
+  c->parameters_pending = get_number(from, AT_PENDING) != 0.0;
+  c->stop_time_defined = get_number(from, AT_STOP_DEFINED) != 0.0;
+  c->start_time = get_number(from, AT_START);
+  c->stop_time = get_number(from, AT_STOP);
+  c->end_of_step = get_number(from, AT_END);
+  for (size_t i = 0; i < v->input_count; ++i) {
+    v->numbers[i] = get_number(from, LIFE_COUNT + i);
+  }
+  for (size_t i = 0; i < v->parameter_count; ++i) {
+    v->parameters[i] = get_number(from, LIFE_COUNT + v->input_count + i);
+  }
+  c->outputs_pending = c->phase == PHASE_INITIALISATION;
+  if (tendonfmu_is_initialised(c->finger)) {
+    component_fetch_outputs(c);
+  }
+  return NULL;
+}

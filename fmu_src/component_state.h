@@ -1,0 +1,22 @@
+/* The whole state of an instance as bytes: life cycle, inputs, parameters, and the finger's own saved state.
+ * Little-endian, checksummed, without pointers: the same bytes serve in the process and outside. */
+#ifndef TENDONFMU_COMPONENT_STATE_H
+#define TENDONFMU_COMPONENT_STATE_H
+
+#include <stddef.h>
+
+#include "component.h"
+
+/* Bytes of a state; the same for every instance of one FMU. */
+size_t component_state_size(const component* c);
+
+/* Writes the state into bytes [component_state_size()]. Logging and the state "error" are no part of it. */
+void component_save(const component* c, void* bytes);
+
+/* Why these bytes [size] cannot be a state of this FMU, NULL when they can. Changes nothing. */
+const char* component_check_state(component* c, const void* bytes, size_t size);
+
+/* Takes over a state; an instance in the state "error" leaves it. Returns NULL, or with nothing changed the reason. */
+const char* component_restore(component* c, const void* bytes);
+
+#endif

@@ -1,0 +1,41 @@
+/* Messages of the FMU: one line of text put together without the heap, and the importer's logger. */
+#ifndef TENDONFMU_LOG_H
+#define TENDONFMU_LOG_H
+
+#include <stddef.h>
+
+#include "fmi2FunctionTypes.h"
+#include "fmi2TypesPlatform.h"
+#include "variable_table.h"
+
+enum { LOG_TEXT_BYTES = 512 };
+
+typedef struct log_text {
+  char bytes[LOG_TEXT_BYTES];
+  size_t length;
+} log_text;
+
+/* Appends; too long a line is cut. Numbers have a decimal point in every locale. */
+void log_append(log_text* text, const char* more);
+void log_append_number(log_text* text, double value);
+void log_append_count(log_text* text, size_t value);
+
+/* "<function>: <reason>" */
+log_text log_start(const char* function, const char* reason);
+
+/* Where messages go and which are wanted. */
+typedef struct log_target {
+  fmi2CallbackLogger logger; /* may be NULL */
+  fmi2ComponentEnvironment environment;
+  const char* instance_name;
+  unsigned wanted; /* bit 1 << category */
+} log_target;
+
+enum { LOG_NOTHING = 0, LOG_EVERYTHING = (1 << LOG_CATEGORY_COUNT) - 1 };
+
+void log_send(const log_target* target, fmi2Status status, log_category category, const log_text* text);
+
+/* Category of a declared name; LOG_CATEGORY_COUNT when there is none. */
+log_category log_find_category(const char* name);
+
+#endif
