@@ -1,0 +1,200 @@
+// The C interface as the Python module _native: numpy arrays in and out, one call for a whole recording.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "tendonfmu_description.h"
+
+namespace nb = nanobind;
+
+namespace {
+
+using Rows = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Times = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+
+nb::bytes image_from_json(const nb::bytes& json) {
+  void* image = nullptr;
+  std::size_t size = 0;
+  char message[600] = "";
+  const tendonfmu_status status =
+      tendonfmu_image_from_json(static_cast<const char*>(json.data()), json.size(), &image, &size, message, sizeof message);
+  if (status != TENDONFMU_OK) throw nb::value_error(message);
+  nb::bytes result(image, size);
+  tendonfmu_free_image(image);
+  return result;
+}
+
+std::string image_guid(const nb::bytes& image, unsigned long long salt) {
+  char guid[39];
+  tendonfmu_image_guid(image.data(), image.size(), salt, guid);
+  return guid;
+}
+
+// A numpy array that owns `values`.
+template <typename Number>
+nb::object as_array(std::vector<Number> values, std::vector<std::size_t> shape) {
+  auto* kept = new std::vector<Number>(std::move(values));
+  nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<Number>*>(p); });
+  return nb::cast(nb::ndarray<nb::numpy, Number>(kept->data(), shape.size(), shape.data(), owner));
+}
+
+struct OutputRows {
+  std::vector<double> numbers[6];
+  std::vector<unsigned char> flags[3];
+
+  OutputRows(std::size_t samples, std::size_t n, std::size_t m) {
+    for (auto& row : numbers) row.resize(samples * n);
+    flags[0].resize(samples * n);
+    flags[1].resize(samples);
+    flags[2].resize(samples * m);
+  }
+  tendonfmu_outputs view() {
+    return {numbers[0].data(), numbers[1].data(), numbers[2].data(), numbers[3].data(), numbers[4].data(),
+            numbers[5].data(), flags[0].data(),   flags[1].data(),   flags[2].data()};
+  }
+};
+
+class Finger {
+ public:
+  explicit Finger(const nb::bytes& image) {
+    char message[600] = "";
+    handle_ = tendonfmu_create(image.data(), image.size(), message, sizeof message);
+    if (handle_ == nullptr) throw nb::value_error(message);
+  }
+  ~Finger() { tendonfmu_destroy(handle_); }
+  Finger(const Finger&) = delete;
+  Finger& operator=(const Finger&) = delete;
+
+  std::size_t joints() const { return tendonfmu_joint_count(handle_); }
+  std::size_t tendons() const { return tendonfmu_tendon_count(handle_); }
+  std::size_t parameter_count() const { return tendonfmu_parameter_count(handle_); }
+  std::string kernel() const { return tendonfmu_get_kernel(handle_); }
+  void set_kernel(const std::string& name) { check(tendonfmu_set_kernel(handle_, name.c_str())); }
+  int source() const { return tendonfmu_get_kinematics_source(handle_); }
+  void set_source(int source) { check(tendonfmu_set_kinematics_source(handle_, source)); }
+  void reset() { check(tendonfmu_reset(handle_)); }
+
+  std::string parameter_path(std::size_t index) const {
+    char path[80];
+    check(tendonfmu_get_parameter_path(handle_, index, path, sizeof path));
+    return path;
+  }
+  nb::tuple parameter_info(std::size_t index) const {
+    tendonfmu_parameter_info i;
+    check(tendonfmu_get_parameter_info(handle_, index, &i));
+    return nb::make_tuple(i.start, i.minimum, i.maximum, i.above_minimum != 0, i.tunable != 0, i.unit);
+  }
+  std::size_t find_parameter(const std::string& path) const { return tendonfmu_find_parameter(handle_, path.c_str()); }
+  std::vector<double> get_parameters(const std::vector<std::size_t>& indices) const {
+    std::vector<double> values(indices.size());
+    check(tendonfmu_get_parameters(handle_, indices.size(), indices.data(), values.data()));
+    return values;
+  }
+  void set_parameters(const std::vector<std::size_t>& indices, const std::vector<double>& values) {
+    if (indices.size() != values.size()) throw nb::value_error("as many values as indices expected");
+    check(tendonfmu_set_parameters(handle_, indices.size(), indices.data(), values.data()));
+  }
+
+  nb::bytes save_state() const {
+    std::vector<unsigned char> bytes(tendonfmu_state_size(handle_));
+    check(tendonfmu_save_state(handle_, bytes.data(), bytes.size()));
+    return nb::bytes(bytes.data(), bytes.size());
+  }
+  void restore_state(const nb::bytes& bytes) { check(tendonfmu_restore_state(handle_, bytes.data(), bytes.size())); }
+
+  nb::tuple run(const Times& time, const std::optional<Rows>& force, const std::optional<Rows>& position,
+                const std::optional<Rows>& angle, const std::optional<Rows>& velocity) {
+    const std::size_t samples = time.shape(0), n = joints(), m = tendons();
+    const tendonfmu_inputs inputs = {rows(force, samples, m, "tendon_force"),
+                                     rows(position, samples, m, "tendon_position"),
+                                     rows(angle, samples, n, "joint_position"),
+                                     rows(velocity, samples, n, "joint_velocity")};
+    OutputRows outputs(samples, n, m);
+    const tendonfmu_outputs view = outputs.view();
+    std::size_t done = 0;
+    tendonfmu_status status;
+    {
+      nb::gil_scoped_release released;
+      status = tendonfmu_run(handle_, samples, time.data(), &inputs, &view, &done);
+    }
+    if (status != TENDONFMU_OK) throw nb::value_error(("row " + std::to_string(done + 1) + ": " + tendonfmu_last_error(handle_)).c_str());
+    nb::list arrays;
+    for (auto& row : outputs.numbers) arrays.append(as_array(std::move(row), {samples, n}));
+    arrays.append(as_array(std::move(outputs.flags[0]), {samples, n}));
+    arrays.append(as_array(std::move(outputs.flags[1]), {samples}));
+    arrays.append(as_array(std::move(outputs.flags[2]), {samples, m}));
+    return nb::tuple(arrays);
+  }
+
+  std::vector<std::vector<double>> directional_derivative(const std::vector<double>& force,
+                                                          const std::vector<double>& position,
+                                                          const std::vector<double>& angle,
+                                                          const std::vector<double>& velocity) {
+    const std::size_t n = joints(), m = tendons();
+    if (force.size() != m || position.size() != m || angle.size() != n || velocity.size() != n) {
+      throw nb::value_error("directional_derivative: expected m, m, n and n numbers");
+    }
+    std::vector<std::vector<double>> slopes(6, std::vector<double>(n));
+    tendonfmu_outputs derivative = {};
+    double** const rows[] = {&derivative.compensated_torque, &derivative.joint_torque, &derivative.friction_torque,
+                             &derivative.bias_torque,        &derivative.joint_angle,  &derivative.joint_speed};
+    for (std::size_t k = 0; k < 6; ++k) *rows[k] = slopes[k].data();
+    const tendonfmu_inputs direction = {force.data(), position.data(), angle.data(), velocity.data()};
+    check(tendonfmu_get_directional_derivative(handle_, &direction, &derivative));
+    return slopes;
+  }
+
+ private:
+  tendonfmu_finger* handle_ = nullptr;
+
+  void check(tendonfmu_status status) const {
+    if (status == TENDONFMU_OK) return;
+    const std::string reason = tendonfmu_last_error(handle_);
+    throw nb::value_error(reason.empty() ? "bad argument" : reason.c_str());
+  }
+
+  static const double* rows(const std::optional<Rows>& array, std::size_t samples, std::size_t columns,
+                            const char* name) {
+    if (!array) return nullptr;
+    if (array->shape(0) != samples || array->shape(1) != columns) {
+      throw nb::value_error((std::string(name) + ": expected " + std::to_string(samples) + " x " +
+                             std::to_string(columns) + " numbers")
+                                .c_str());
+    }
+    return array->data();
+  }
+};
+
+}  // namespace
+
+NB_MODULE(_native, m) {
+  m.def("version", &tendonfmu_version);
+  m.def("image_from_json", &image_from_json);
+  m.def("image_guid", &image_guid);
+  nb::class_<Finger>(m, "Finger")
+      .def(nb::init<const nb::bytes&>())
+      .def_prop_ro("joints", &Finger::joints)
+      .def_prop_ro("tendons", &Finger::tendons)
+      .def_prop_ro("parameter_count", &Finger::parameter_count)
+      .def_prop_rw("kernel", &Finger::kernel, &Finger::set_kernel)
+      .def_prop_rw("kinematics_source", &Finger::source, &Finger::set_source)
+      .def("reset", &Finger::reset)
+      .def("parameter_path", &Finger::parameter_path)
+      .def("parameter_info", &Finger::parameter_info)
+      .def("find_parameter", &Finger::find_parameter)
+      .def("get_parameters", &Finger::get_parameters)
+      .def("set_parameters", &Finger::set_parameters)
+      .def("save_state", &Finger::save_state)
+      .def("restore_state", &Finger::restore_state)
+      .def("run", &Finger::run, nb::arg("time"), nb::arg("tendon_force").none(), nb::arg("tendon_position").none(),
+           nb::arg("joint_position").none(), nb::arg("joint_velocity").none())
+      .def("directional_derivative", &Finger::directional_derivative);
+}
