@@ -66,7 +66,8 @@ def test_it_has_the_papers_472_numbers(finger: dict[str, Any]) -> None:
 
 def test_readme_states_the_same_count() -> None:
     text = README.read_text(encoding="utf-8")
-    rows = [[cell.strip(" *") for cell in line.strip("|").split("|")] for line in text.splitlines() if line.startswith("|")]
+    lines = [line for line in text.splitlines() if line.startswith("|")]
+    rows = [[cell.strip(" *") for cell in line.strip("|").split("|")] for line in lines]
     table = {row[0]: row[2:] for row in rows if len(row) == 4}
     assert table["friction model"] == ["116", "468"]
     assert table["together"] == ["", "472"]
@@ -105,28 +106,28 @@ def test_a_tendon_has_no_friction_beyond_its_last_joint(finger: dict[str, Any]) 
         assert all(pulley is not None for pulley in tendon["pulley_friction"][:last])
 
 
+def edges_over_angles(finger: dict[str, Any]) -> list[dict[str, Any]]:
+    edges = [edge for tendon in finger["tendons"] for edge in tendon["edge_friction"] if edge]
+    return [edge for edge in edges if "angles" in edge]
+
+
 def test_working_points_are_increasing_uneven_and_differ(finger: dict[str, Any]) -> None:
-    grids = [tuple(edge["angles"]) for t in finger["tendons"] for edge in t["edge_friction"] if edge and "angles" in edge]
-    assert len(grids) == 14 == len(set(grids))
-    for grid in grids:
-        steps = np.diff(grid)
+    edges = edges_over_angles(finger)
+    assert len(edges) == 14 == len({tuple(edge["angles"]) for edge in edges})
+    for edge in edges:
+        assert len(edge["angles"]) == len(edge["laws"])
+        steps = np.diff(edge["angles"])
         assert np.all(steps > 0)
         assert steps.max() > 1.2 * steps.min()
-    counts = {
-        len(edge["angles"]) == len(edge["laws"]) for t in finger["tendons"] for edge in t["edge_friction"] if edge and "angles" in edge
-    }
-    assert counts == {True}
 
 
 def test_edges_rub_more_towards_the_ends_of_the_range(finger: dict[str, Any]) -> None:
-    for tendon in finger["tendons"]:
-        for edge in tendon["edge_friction"]:
-            if edge and "laws" in edge:
-                coulomb = [law["coulomb"] for law in edge["laws"]]
-                lowest = int(np.argmin(coulomb))
-                assert 0 < lowest < len(coulomb) - 1
-                assert np.all(np.diff(coulomb[: lowest + 1]) < 0)
-                assert np.all(np.diff(coulomb[lowest:]) > 0)
+    for edge in edges_over_angles(finger):
+        coulomb = [law["coulomb"] for law in edge["laws"]]
+        lowest = int(np.argmin(coulomb))
+        assert 0 < lowest < len(coulomb) - 1
+        assert np.all(np.diff(coulomb[: lowest + 1]) < 0)
+        assert np.all(np.diff(coulomb[lowest:]) > 0)
 
 
 def test_every_tendon_keeps_some_of_its_force(finger: dict[str, Any]) -> None:
