@@ -16,7 +16,10 @@ void message_text(message_line line, const char* text) {
   }
   const size_t used = strlen(line.text), room = line.size - 1 - used;
   const size_t wanted = strlen(text), taken = wanted < room ? wanted : room;
-  memcpy(line.text + used, text, taken);
+  for (size_t i = 0; i < taken; ++i) {
+    /* texts of the caller may hold anything; a line stays a line */
+    line.text[used + i] = (unsigned char)text[i] < 0x20 || text[i] == 0x7f ? '?' : text[i];
+  }
   line.text[used + taken] = 0;
 }
 

@@ -42,6 +42,14 @@ TEST(Message, IsCutAtTheEndOfItsRoom) {
   EXPECT_EQ(text[7], 42);
 }
 
+TEST(Message, StaysOnOneLineWhateverItIsGiven) {
+  char text[40] = "";
+  const message_line line = {text, sizeof text};
+  message_start(line, "a\nb\tc\x7f\x01");
+  message_text(line, "\r\nd\u00fc");
+  EXPECT_STREQ(text, "a?b?c????d\u00fc");
+}
+
 TEST(Message, MayHaveNoRoomAtAll) {
   const message_line nowhere = {nullptr, 0};
   message_start(nowhere, "abc");

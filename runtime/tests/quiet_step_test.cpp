@@ -32,7 +32,8 @@ using test_finger::Motion;
 using test_finger::Outputs;
 
 namespace {
-long allocations = 0; /* calls of malloc, calloc, realloc, aligned_alloc and free since it was set to 0 */
+[[maybe_unused]] long allocations =
+    0; /* calls of malloc, calloc, realloc, aligned_alloc and free since it was set to 0 */
 }
 
 #if defined(__GLIBC__) && !defined(UNDER_SANITIZER)

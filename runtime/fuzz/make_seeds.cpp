@@ -1,0 +1,76 @@
+// make_seeds FOLDER FINGER.json...: writes what the fuzzers begin with, corpus/fuzz_json, corpus/fuzz_image and
+// keys.dict. Besides the given fingers it takes the one of the tests and a least one.
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "../tests/test_finger.h"
+
+namespace {
+
+const char* const least_finger = R"({"format": "tendonfmu-finger-1", "name": "least", "joints": [{}],
+  "tendons": [{"stiffness": 4000, "moment_arms": [0.01]}], "contact": {"threshold": [0.03]}})";
+
+void write(const std::filesystem::path& path, const std::string& bytes) {
+  std::ofstream file(path, std::ios::binary);
+  file << bytes;
+  if (!file.flush()) {
+    std::fprintf(stderr, "make_seeds: cannot write %s\n", path.string().c_str());
+    std::exit(1);
+  }
+}
+
+// all keys and texts of a description
+void collect(const nlohmann::json& value, std::set<std::string>& words) {
+  if (value.is_string()) {
+    words.insert(value.dump());
+  }
+  for (auto item = value.begin(); value.is_structured() && item != value.end(); ++item) {
+    if (value.is_object()) {
+      words.insert("\"" + item.key() + "\":");
+    }
+    collect(*item, words);
+  }
+}
+
+std::string quoted(const std::string& word) {
+  std::string text = "\"";
+  for (const char c : word) {
+    text += c == '"' || c == '\\' ? std::string("\\") + c : std::string(1, c);
+  }
+  return text + "\"\n";
+}
+
+}  // namespace
+
+int main(int count, char** arguments) {
+  if (count < 2) {
+    std::fprintf(stderr, "usage: make_seeds FOLDER FINGER.json...\n");
+    return 2;
+  }
+  std::vector<std::string> fingers = {test_finger::json, least_finger};
+  for (int i = 2; i < count; ++i) {
+    std::ifstream file(arguments[i], std::ios::binary);
+    fingers.emplace_back(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
+  }
+  const std::filesystem::path folder = arguments[1];
+  std::filesystem::create_directories(folder / "corpus" / "fuzz_json");
+  std::filesystem::create_directories(folder / "corpus" / "fuzz_image");
+  std::set<std::string> words = {"null", "true", "\"positive\":", "\"negative\":", "\"noise_time\":", "1e999"};
+  for (std::size_t i = 0; i < fingers.size(); ++i) {
+    const std::string name = "finger" + std::to_string(i);
+    const auto document = nlohmann::json::parse(fingers[i]);
+    const std::vector<unsigned char> image = test_finger::image(fingers[i]);
+    write(folder / "corpus" / "fuzz_json" / name, document.dump());
+    write(folder / "corpus" / "fuzz_image" / name, std::string(image.begin(), image.end()));
+    collect(document, words);
+  }
+  std::string dictionary;
+  for (const std::string& word : words) dictionary += quoted(word);
+  write(folder / "keys.dict", dictionary);
+}

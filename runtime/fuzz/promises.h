@@ -1,0 +1,128 @@
+// What tendonfmu.h promises for every finger and every call, as checks that end a fuzzer.
+#pragma once
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <vector>
+
+#include "tendonfmu.h"
+
+#define PROMISE(condition)                                                         \
+  do {                                                                             \
+    if (!(condition)) {                                                            \
+      std::fprintf(stderr, "%s:%d: broken: %s\n", __FILE__, __LINE__, #condition); \
+      std::abort();                                                                \
+    }                                                                              \
+  } while (0)
+
+namespace promises {
+
+using Bytes = std::vector<unsigned char>;
+
+inline Bytes saved(const tendonfmu_finger* finger) {
+  Bytes bytes(tendonfmu_state_size(finger));
+  PROMISE(tendonfmu_save_state(finger, bytes.data(), bytes.size()) == TENDONFMU_OK);
+  return bytes;
+}
+
+// Room for outputs of some samples; a check that the real ones are finite and the flags 0 or 1.
+struct Outputs {
+  std::size_t joints, tendons;
+  std::vector<double> real;
+  std::vector<unsigned char> flags;
+
+  Outputs(const tendonfmu_finger* finger, std::size_t samples)
+      : joints(samples * tendonfmu_joint_count(finger)),
+        tendons(samples * tendonfmu_tendon_count(finger)),
+        real(6 * joints),
+        flags(joints + samples + tendons) {}
+
+  tendonfmu_outputs view() {
+    double* r = real.data();
+    unsigned char* f = flags.data();
+    return {r,
+            r + joints,
+            r + 2 * joints,
+            r + 3 * joints,
+            r + 4 * joints,
+            r + 5 * joints,
+            f,
+            f + joints,
+            f + (flags.size() - tendons)};
+  }
+
+  void check() const {
+    for (const double x : real) PROMISE(std::isfinite(x));
+    for (const unsigned char f : flags) PROMISE(f <= 1);
+  }
+};
+
+inline void outputs_are_finite(const tendonfmu_finger* finger) {
+  Outputs outputs(finger, 1);
+  const tendonfmu_outputs view = outputs.view();
+  PROMISE(tendonfmu_get_outputs(finger, &view) == TENDONFMU_OK);
+  outputs.check();
+}
+
+inline void failure_has_a_reason(const tendonfmu_finger* finger) {
+  const char* reason = tendonfmu_last_error(finger);
+  PROMISE(std::strlen(reason) > 0);
+  PROMISE(std::strchr(reason, '\n') == nullptr);
+}
+
+// Every parameter is in its range and found under its path.
+inline void parameters_are_sound(const tendonfmu_finger* finger) {
+  const std::size_t count = tendonfmu_parameter_count(finger);
+  for (std::size_t i = 0; i < count; i += 1 + count / 50) {
+    char path[80];
+    tendonfmu_parameter_info info;
+    double value = NAN;
+    PROMISE(tendonfmu_get_parameter_path(finger, i, path, sizeof path) == TENDONFMU_OK);
+    PROMISE(tendonfmu_find_parameter(finger, path) == i);
+    PROMISE(tendonfmu_get_parameter_info(finger, i, &info) == TENDONFMU_OK);
+    PROMISE(tendonfmu_get_parameters(finger, 1, &i, &value) == TENDONFMU_OK);
+    PROMISE(info.above_minimum ? value > info.minimum : value >= info.minimum);
+    PROMISE(value <= info.maximum);
+  }
+}
+
+// A finger moved through some samples, back and forth and at rest, by each kinematics source.
+inline void finger_can_be_used(const Bytes& image) {
+  char message[400] = "";
+  tendonfmu_finger* finger = tendonfmu_create(image.data(), image.size(), message, sizeof message);
+  PROMISE((finger == nullptr) == (std::strlen(message) > 0));
+  if (!finger) {
+    return;
+  }
+  parameters_are_sound(finger);
+  const std::size_t n = tendonfmu_joint_count(finger), m = tendonfmu_tendon_count(finger);
+  for (int source = 1; source <= 3; ++source) {
+    PROMISE(tendonfmu_reset(finger) == TENDONFMU_OK);
+    PROMISE(tendonfmu_set_kinematics_source(finger, source) == TENDONFMU_OK);
+    for (int k = 0; k < 8; ++k) {
+      const double sign = k < 3 ? 1.0 : k < 5 ? 0.0 : -1.0;
+      const std::vector<double> force(m, 10.0 + k), position(m, 0.003 + 1e-4 * sign * k);
+      const std::vector<double> angle(n, 0.01 * sign * k), velocity(n, sign);
+      const tendonfmu_inputs inputs = {force.data(), position.data(), angle.data(), velocity.data()};
+      const Bytes before = saved(finger);
+      const tendonfmu_status status =
+          k ? tendonfmu_step(finger, 0.01 * k, &inputs) : tendonfmu_initialise(finger, 0.0, &inputs);
+      PROMISE(status == TENDONFMU_OK || status == TENDONFMU_BAD_SAMPLE); /* numbers at the ends may overflow */
+      if (status != TENDONFMU_OK) {
+        failure_has_a_reason(finger);
+        PROMISE(saved(finger) == before);
+        break;
+      }
+      outputs_are_finite(finger);
+    }
+  }
+  const Bytes bytes = saved(finger);
+  PROMISE(tendonfmu_reset(finger) == TENDONFMU_OK);
+  PROMISE(tendonfmu_restore_state(finger, bytes.data(), bytes.size()) == TENDONFMU_OK);
+  PROMISE(saved(finger) == bytes);
+  tendonfmu_destroy(finger);
+}
+
+}  // namespace promises
