@@ -15,15 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu import _native
-
-NUMBERS = ("compensated_torque", "joint_torque", "friction_torque", "bias_torque", "joint_angle", "joint_speed")
-FLAGS = ("joint_contact", "contact", "slack")
-INPUTS = ("tendon_force", "tendon_position", "joint_position", "joint_velocity")
+from tendonfmu.errors import InputError
+from tendonfmu.signals import FLAGS, INPUTS, NUMBERS
 
 Array = NDArray[Any]
 
 
-class NativeError(ValueError):
+class NativeError(InputError):
     """Refused by the runtime: a description, an image, a parameter, a sample or a state."""
 
 

@@ -1,0 +1,200 @@
+"""The command `tendonfmu`: parses, calls, prints, and ends with 0 (done), 1 (the answer is no) or 2 (bad usage or input).
+
+The only module that prints. Results go to files or standard output, messages to standard error.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from tendonfmu.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="Friction of tendon-driven robot fingers: what the finger feels, without a tactile sensor.",
+)
+
+FingerFile = Annotated[Path, typer.Argument(metavar="FINGER.json", help="finger description")]
+
+
+def main() -> None:
+    """Entry point: every refusal is one line on standard error and exit status 2."""
+    try:
+        app()
+    except InputError as refused:
+        print(f"tendonfmu: {refused}", file=sys.stderr)
+        sys.exit(2)
+    except BrokenPipeError:
+        sys.stderr.close()
+        sys.exit(0)
+    except KeyboardInterrupt:
+        print("tendonfmu: interrupted; no file was left half written", file=sys.stderr)
+        sys.exit(130)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from tendonfmu import __version__
+
+        print(f"tendonfmu {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="show the version and exit")
+    ] = False,
+) -> None:
+    """Friction of tendon-driven robot fingers: what the finger feels, without a tactile sensor."""
+
+
+@app.command()
+def check(finger: FingerFile) -> None:
+    """Validate a finger description and say what the finger is. Exit 1 when it is refused."""
+    from tendonfmu.description import read_finger
+
+    try:
+        found = read_finger(finger)
+    except InputError as refused:
+        # the question was whether the description is sound; a file that cannot be read is bad input
+        print(f"tendonfmu: {refused}", file=sys.stderr)
+        raise typer.Exit(1 if finger.is_file() else 2) from None
+    for line in found.summary():
+        print(line)
+
+
+@app.command()
+def build(
+    finger: FingerFile,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FINGER.fmu", help="FMU to write")],
+    binaries: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="folder of binaries by FMI platform, instead of those of this installation"),
+    ] = None,
+) -> None:
+    """Pack an FMI 2.0 co-simulation FMU. Needs no compiler; the same input gives the same bytes."""
+    from tendonfmu.packaging import build_fmu
+
+    build_fmu(finger, output, binaries=binaries)
+    _say(f"{output}: {output.stat().st_size / 1024:.0f} KiB")
+
+
+@app.command()
+def run(
+    model: Annotated[Path, typer.Argument(metavar="FINGER.json|FINGER.fmu", help="description, or FMU of one")],
+    recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="recording, .csv or .parquet")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT.csv", help="outputs, .csv or .parquet")],
+    kinematics: Annotated[
+        int,
+        typer.Option(
+            min=1, max=3, help="1: tendon positions, 2: measured joint positions, 3: joint positions and velocities"
+        ),
+    ] = 1,
+) -> None:
+    """Run the FMU over a recording: time and all outputs, one row per sample, each at its own sample's time."""
+    from tendonfmu.recording import FORMATS, read_recording, write_table
+    from tendonfmu.running import run_model
+
+    if output.suffix.lower() not in FORMATS:
+        raise InputError(f"{output}: unknown format {output.suffix!r}; expected .csv or .parquet")
+    samples = read_recording(recording)
+    with _progress() as bar:
+        task = bar.add_task("samples", total=len(samples))
+        table = run_model(
+            model, samples, kinematics_source=kinematics, progress=lambda done: bar.update(task, completed=done)
+        )
+    write_table(output, table)
+    _say(f"{output}: {len(samples)} samples, {int(table['contact'].sum())} of them in contact")
+
+
+@app.command()
+def convert(
+    source: Annotated[str, typer.Argument(metavar="FORMAT", help="davinci")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="third-party recording")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="REC.csv", help="recording, .csv or .parquet")],
+    radius: Annotated[
+        float, typer.Option(min=1e-6, max=1.0, help="m; of the pulley on which the recorded torque acts")
+    ] = 0.005,
+) -> None:
+    """Turn a third-party recording into one of ours."""
+    from tendonfmu.converters import converter
+    from tendonfmu.recording import write_table
+
+    table = converter(source)(file, radius)
+    write_table(output, table)
+    _say(f"{output}: {len(table['time'])} samples, {table['time'][-1] - table['time'][0]:.3f} s")
+
+
+@app.command()
+def demo(
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder for the results")] = Path(
+        "tendonfmu-demo"
+    ),
+) -> None:
+    """The whole story on built-in data: build an FMU, run it over a recording, show what it feels."""
+    from tendonfmu.demo import run_demo
+
+    with _progress() as bar:
+        task = bar.add_task("samples", total=None)
+
+        def show(done: int, total: int) -> None:
+            bar.update(task, completed=done, total=total)
+
+        result = run_demo(output, progress=show)
+    _print_demo(result)
+
+
+def _print_demo(result: Any) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=f"{result.finger}: {result.seconds:.0f} s of motion, {result.pushes} pushes")
+    for heading in ("joint", "measured torque, rms", "left after compensation, rms, free", "in contact, rms"):
+        table.add_column(heading, justify="left" if heading == "joint" else "right")
+    for joint in result.joints:
+        table.add_row(
+            joint.name,
+            f"{1e3 * joint.torque_rms:.1f} mN·m",
+            f"{1e3 * joint.free_rms:.1f} mN·m",
+            f"{1e3 * joint.contact_rms:.1f} mN·m",
+        )
+    console = Console()
+    console.print(table)
+    console.print(f"{result.found} of {result.pushes} pushes found, {result.false_alarms} false alarms")
+    for path, what in result.files.items():
+        console.print(f"  {path}  {what}", highlight=False, soft_wrap=True)
+
+
+def _progress() -> Progress:
+    """A progress bar on standard error, silent where that is not a terminal."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        console=console,
+        disable=not console.is_terminal,
+        transient=True,
+    )
+
+
+def _say(message: str) -> None:
+    print(message, file=sys.stderr)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,78 @@
+"""da Vinci tool characterisation (O'Neill, Stephens, Kowalewski, IEEE RA-L 2018): one jaw, driven through its spindle.
+
+The instrument becomes a finger of one joint and one bidirectional tendon of a stated radius r: the cable loop on the
+spindle. Signs of a left spindle, as in the data's own notes: with theta = -col2, torque = +col3 and load = -col6
+everything is positive when the motor closes against the load.
+
+| recording | from | unit |
+| --- | --- | --- |
+| time | col 1 (the header says ms, it is s) | s |
+| tendon_position[1] = r theta | col 2, 8192 counts a turn | m |
+| tendon_force[1] = torque / r | col 3, 0.000039811 N.m a count | N |
+| joint_position[1] | col 5, 4000 counts a turn: grows with theta | rad |
+| external_torque[1] = load | col 6, 0.000039811 N.m a count | N.m |
+
+With a moment arm of r, joint_torque = R^T f0 is the torque of the spindle, and joint_torque - external_torque is friction:
+it opposes the motion, positive while theta grows.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.errors import InputError
+
+COLUMNS = 10
+SPINDLE_COUNTS = 8192  # a turn
+JAW_COUNTS = 4000  # a turn
+TORQUE = 0.000039811  # N.m a count
+
+
+def convert(file: Path, radius: float) -> dict[str, NDArray[Any]]:
+    """Columns of the recording, radius in m. Raises InputError naming row and column."""
+    rows = _read(file)
+    spindle = -rows[:, 1] * (2 * math.pi / SPINDLE_COUNTS)
+    jaw = rows[:, 4] * (2 * math.pi / JAW_COUNTS)
+    return {
+        "time": rows[:, 0],
+        "tendon_force[1]": rows[:, 2] * TORQUE / radius,
+        "tendon_position[1]": spindle * radius,
+        "joint_position[1]": jaw,
+        "external_torque[1]": -rows[:, 5] * TORQUE,
+    }
+
+
+def _read(file: Path) -> NDArray[np.float64]:
+    try:
+        lines = file.read_text(encoding="ascii").splitlines()
+    except OSError as error:
+        raise InputError(f"{file}: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{file}: not a text file of the da Vinci data") from None
+    numbered = [(i, line) for i, line in enumerate(lines, start=1) if line.strip() and not line.startswith("%")]
+    if not numbered or not lines[0].startswith("%"):
+        raise InputError(f"{file}: no da Vinci recording; expected lines of {COLUMNS} numbers below lines with %")
+    rows = np.empty((len(numbered), COLUMNS))
+    for k, (i, line) in enumerate(numbered):
+        fields = line.split(",")
+        if len(fields) != COLUMNS:
+            raise InputError(
+                f"{file}: line {i}: {len(fields)} columns; expected {COLUMNS} ({k} rows before it are good)"
+            )
+        for column, field in enumerate(fields):
+            try:
+                rows[k, column] = float(field)
+            except ValueError:
+                raise InputError(f"{file}: line {i}, column {column + 1}: {field!r}; expected a number") from None
+    if not np.isfinite(rows).all():
+        k, column = (int(index[0]) for index in np.nonzero(~np.isfinite(rows)))
+        raise InputError(f"{file}: line {numbered[k][0]}, column {column + 1}: expected a finite number")
+    if (np.diff(rows[:, 0]) <= 0).any():
+        k = int(np.flatnonzero(np.diff(rows[:, 0]) <= 0)[0]) + 1
+        raise InputError(f"{file}: line {numbered[k][0]}, column 1: time does not increase")
+    return rows

@@ -1,0 +1,162 @@
+"""Which inputs can matter to which outputs: the dependencies in the FMU's ModelStructure.
+
+They follow from the finger's structure: which friction exists, which tendon passes which joint (a moment arm of 0 in
+the description is a tendon that does not pass), which angles R⁺ takes from which tendon. They hold for all three
+kinematics sources and all values of the tunable parameters. Only numbers that structure cannot rule out count.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from tendonfmu import native
+from tendonfmu.description import FingerDescription
+
+# Of an extension's torque; an effect that is not named here may use both.
+ANGLE_ONLY = frozenset({"cover_hardening"})
+
+Dependencies = dict[str, list[dict[str, list[int]]]]
+
+
+@dataclass
+class Motion:
+    """Joints, 0-based, whose angle or velocity can matter."""
+
+    angles: set[int] = field(default_factory=set)
+    velocities: set[int] = field(default_factory=set)
+
+    def add(self, other: Motion) -> None:
+        self.angles |= other.angles
+        self.velocities |= other.velocities
+
+
+@dataclass(frozen=True)
+class Structure:
+    """What of a description decides on dependencies.
+
+    passes: [m, n] true where a tendon has a moment arm. inverse: [n, m] true where R⁺ has an entry.
+    """
+
+    data: Mapping[str, Any]
+    passes: np.ndarray[Any, np.dtype[np.bool_]]
+    inverse: np.ndarray[Any, np.dtype[np.bool_]]
+
+    @property
+    def tendons(self) -> int:
+        return int(self.passes.shape[0])
+
+    @property
+    def joints(self) -> int:
+        return int(self.passes.shape[1])
+
+
+def structure_of(description: FingerDescription) -> Structure:
+    passes = np.array(description.moment_arms) != 0.0
+    return Structure(description.data, passes, _inverse_routing(description.image, *passes.shape) != 0.0)
+
+
+def _inverse_routing(image: bytes, tendons: int, joints: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """[n, m] R⁺ as the runtime has it: the slopes of the joint angles by the tendon positions."""
+    finger = native.Finger(image, kinematics_source=1)
+    finger.run({"time": np.zeros(1), "tendon_force": np.zeros((1, tendons)), "tendon_position": np.zeros((1, tendons))})
+    columns = [finger.directional_derivative({"tendon_position": unit})["joint_angle"] for unit in np.eye(tendons)]
+    return np.array(columns).T.reshape(joints, tendons)
+
+
+def dependencies(structure: Structure) -> Dependencies:
+    """For each output and element (0-based): input name to the elements, 0-based and ascending, that can matter."""
+    n, m = structure.joints, structure.tendons
+    torques = [_torque(structure, j) for j in range(n)]
+    by_joint = [_inputs(structure, motion, set(range(m))) for motion in torques]
+    everything = Motion()
+    for motion in torques:
+        everything.add(motion)
+    result: Dependencies = {
+        "joint_torque": [
+            {"tendon_force": [i for i in range(m) if structure.passes[i, j]]} for j in range(n)
+        ],
+        "joint_angle": [_inputs(structure, Motion(angles={j}), set()) for j in range(n)],
+        "joint_speed": [_inputs(structure, Motion(velocities={j}), set()) for j in range(n)],
+        "contact": [_inputs(structure, everything, set(range(m)))],
+        "slack": [_slack(structure, i) for i in range(m)],
+    }
+    for name in ("compensated_torque", "friction_torque", "bias_torque", "joint_contact"):
+        result[name] = by_joint
+    return result
+
+
+def _inputs(structure: Structure, motion: Motion, forces: set[int]) -> dict[str, list[int]]:
+    """Inputs behind joint angles and velocities, beside forces that matter by themselves.
+
+    Source 1 takes both from forces and positions by R⁺, source 2 velocities from positions, source 3 both as measured.
+    """
+    moving = motion.angles | motion.velocities
+    tendons = {i for j in moving for i in range(structure.tendons) if structure.inverse[j, i]}
+    return {
+        "tendon_force": sorted(forces | tendons),
+        "tendon_position": sorted(tendons),
+        "joint_position": sorted(moving),
+        "joint_velocity": sorted(motion.velocities),
+    }
+
+
+def _torque(structure: Structure, j: int) -> Motion:
+    """What friction and bias of joint j follow from, beside the forces.
+
+    All forces matter to them at every joint: the Kalman gain takes the noise by the mean of |f0|.
+    """
+    joint = structure.data["joints"][j]
+    motion = Motion()
+    if joint.get("cover") is not None:
+        motion.angles.add(j)
+    for kind in ("friction", "load_friction"):
+        if joint.get(kind) is not None:
+            motion.velocities.add(j)
+    for extension in structure.data.get("extensions") or []:
+        if extension["joint"] == j + 1:
+            motion.add(Motion({j}, set() if extension["effect"] in ANGLE_ONLY else {j}))
+    for i in range(structure.tendons):
+        # losses act over this tendon's moment arm (eq. 10), and on the load on the joint's bearing (Σ f_B of eq. 8)
+        if structure.passes[i, j] or joint.get("load_friction") is not None:
+            motion.add(_along_tendon(structure, i, j))
+    return motion
+
+
+def _along_tendon(structure: Structure, i: int, last: int) -> Motion:
+    """What the losses of tendon i up to its force before joint `last` follow from: edges 0..last, pulleys before it."""
+    motion = Motion()
+    for before, beyond, depends_on_angle in _effects(structure, i):
+        if before > last:
+            continue
+        moving = {j for j in range(beyond, structure.joints) if structure.passes[i, j]}
+        if not moving:  # ẋ = 0 whatever the joints do: this effect never acts
+            continue
+        motion.velocities |= moving
+        if depends_on_angle:
+            motion.angles.add(before - 1)
+    return motion
+
+
+def _effects(structure: Structure, i: int) -> Iterator[tuple[int, int, bool]]:
+    """(position, first joint of its ẋ, has working points) of each effect of a tendon.
+
+    A pulley moves with ẋ_{j+1} and counts from the joint behind it, where its loss is first felt.
+    """
+    tendon = structure.data["tendons"][i]
+    for j, law in enumerate(tendon.get("pulley_friction") or []):
+        if law is not None and j + 1 < structure.joints:
+            yield j + 1, j + 1, False
+    for j, edge in enumerate(tendon.get("edge_friction") or []):
+        if edge is not None:
+            yield j, j, j > 0 and len(edge.get("angles") or []) > 1
+
+
+def _slack(structure: Structure, i: int) -> dict[str, list[int]]:
+    """A cable loop is never slack; the others by their own force and all their losses."""
+    if structure.data["tendons"][i].get("bidirectional"):
+        return {}
+    return _inputs(structure, _along_tendon(structure, i, structure.joints - 1), {i})

@@ -1,0 +1,168 @@
+"""The finger description (contract section 2): read from a file, and counted.
+
+What a description may hold is decided by the native reader alone; `schema/finger.schema.json` says the same to editors.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tendonfmu import native
+
+Law = Mapping[str, Any]
+
+
+class DescriptionError(ValueError):
+    """A description that cannot be read or is refused; one line with file, key path and expectation."""
+
+
+@dataclass(frozen=True)
+class FingerDescription:
+    """A description that the native reader has accepted.
+
+    path: where it was read. text: the file's bytes. data: the parsed JSON. image: the model image made of it.
+    """
+
+    path: Path
+    text: bytes
+    data: Mapping[str, Any]
+    image: bytes
+
+    @property
+    def name(self) -> str:
+        return str(self.data["name"])
+
+    @property
+    def joint_names(self) -> list[str]:
+        """[n] names, `joint 2` where there is none."""
+        return [joint.get("name") or f"joint {j}" for j, joint in enumerate(self.data["joints"], start=1)]
+
+    @property
+    def tendon_names(self) -> list[str]:
+        """[m] names, `tendon 2` where there is none."""
+        return [tendon.get("name") or f"tendon {i}" for i, tendon in enumerate(self.data["tendons"], start=1)]
+
+    @property
+    def moment_arms(self) -> list[list[float]]:
+        """[m][n] routing matrix R, m."""
+        return [[float(arm) for arm in tendon["moment_arms"]] for tendon in self.data["tendons"]]
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a finger is, in numbers.
+
+    laws: by kind, each working point counted; an asymmetric law counts once. parameters: all numbers of the FMU.
+    estimated_numbers: those that a fit estimates, the biases included (see `estimated_numbers()`).
+    """
+
+    name: str
+    joint_names: list[str]
+    tendon_names: list[str]
+    bidirectional_tendons: int
+    pulleys: int
+    edges: int
+    working_points: int
+    laws: dict[str, int]
+    asymmetric_laws: int
+    covers: int
+    extensions: list[str]
+    parameters: int
+    tunable_parameters: int
+    estimated_numbers: dict[str, int]
+
+    @property
+    def joints(self) -> int:
+        return len(self.joint_names)
+
+    @property
+    def tendons(self) -> int:
+        return len(self.tendon_names)
+
+
+def read_finger(path: Path) -> FingerDescription:
+    """Reads a finger description. Raises DescriptionError, one line that begins with the path."""
+    try:
+        text = path.read_bytes()
+    except OSError as failed:
+        raise DescriptionError(f"{path}: {failed.strerror}; expected a finger description (JSON)") from None
+    try:
+        image = native.image_from_json(text)
+    except native.NativeError as refused:
+        raise DescriptionError(f"{path}: {refused}") from None
+    return FingerDescription(path=path, text=text, data=json.loads(text), image=image)
+
+
+def laws(data: Mapping[str, Any]) -> Iterator[tuple[str, Law]]:
+    """(kind, law) of every law of a valid description; kind is its key, each working point is a law of its own."""
+    for joint in data["joints"]:
+        for kind in ("friction", "load_friction"):
+            if joint.get(kind) is not None:
+                yield kind, joint[kind]
+    for tendon in data["tendons"]:
+        for law in tendon.get("pulley_friction") or []:
+            if law is not None:
+                yield "pulley_friction", law
+        for edge in tendon.get("edge_friction") or []:
+            if edge is not None:
+                for law in edge.get("laws") or [edge]:
+                    yield "edge_friction", law
+
+
+def estimated_numbers(data: Mapping[str, Any]) -> dict[str, int]:
+    """How many numbers a fit estimates, by kind.
+
+    What is absent stays absent (contract section 7): viscous 0 is no viscous friction, static equal to coulomb no
+    Stribeck effect. So a side has up to four numbers; a cover has its stiffness, an extension all it has, and every
+    joint a bias.
+    """
+    counts = dict.fromkeys(("friction", "load_friction", "pulley_friction", "edge_friction"), 0)
+    for kind, law in laws(data):
+        counts[kind] += sum(_numbers_of_side(side) for side in sides(law))
+    counts["cover"] = sum(1 for joint in data["joints"] if (joint.get("cover") or {}).get("stiffness"))
+    counts["extensions"] = sum(len(extension.keys() - {"effect", "joint"}) for extension in data.get("extensions") or [])
+    counts["bias"] = len(data["joints"])
+    return counts
+
+
+def sides(law: Law) -> list[Law]:
+    """The sides of a law: one that serves both directions, or the positive and the negative one."""
+    return [law] if law.get("positive") is None else [law["positive"], law["negative"]]
+
+
+def _numbers_of_side(side: Law) -> int:
+    stribeck = 2 if side["static"] != side["coulomb"] else 0
+    return 1 + stribeck + (1 if side.get("viscous") else 0)
+
+
+def _entries(data: Mapping[str, Any], key: str) -> list[Any]:
+    return [entry for tendon in data["tendons"] for entry in tendon.get(key) or [] if entry is not None]
+
+
+def summary(description: FingerDescription) -> Summary:
+    """Counts what a description holds."""
+    data = description.data
+    found = list(laws(data))
+    parameters = native.Finger(description.image).parameters()
+    edges = _entries(data, "edge_friction")
+    kinds = ("friction", "load_friction", "pulley_friction", "edge_friction")
+    return Summary(
+        name=description.name,
+        joint_names=description.joint_names,
+        tendon_names=description.tendon_names,
+        bidirectional_tendons=sum(1 for tendon in data["tendons"] if tendon.get("bidirectional")),
+        pulleys=len(_entries(data, "pulley_friction")),
+        edges=len(edges),
+        working_points=sum(len(edge.get("angles") or []) for edge in edges),
+        laws={kind: sum(1 for k, _ in found if k == kind) for kind in kinds},
+        asymmetric_laws=sum(1 for _, law in found if len(sides(law)) == 2),
+        covers=sum(1 for joint in data["joints"] if joint.get("cover") is not None),
+        extensions=[extension["effect"] for extension in data.get("extensions") or []],
+        parameters=len(parameters),
+        tunable_parameters=sum(1 for parameter in parameters if parameter.tunable),
+        estimated_numbers=estimated_numbers(data),
+    )

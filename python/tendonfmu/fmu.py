@@ -1,0 +1,216 @@
+"""FMUs through fmpy, and only here: runs one over a recording, sample by sample."""
+
+from __future__ import annotations
+
+import ctypes
+import re
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.errors import InputError
+from tendonfmu.recording import Recording
+from tendonfmu.signals import FLAGS, INPUTS, INPUTS_OF_SOURCE, NUMBERS
+
+Progress = Callable[[int], None]
+
+
+@dataclass(frozen=True)
+class Variables:
+    """Value references of one FMU: group -> references in the order of their index."""
+
+    references: Mapping[str, list[int]]
+
+    def names(self, group: str) -> list[str]:
+        """`contact`, or `slack[1]`, `slack[2]`, ..."""
+        count = len(self.references[group])
+        return [group] if group == "contact" else [f"{group}[{i}]" for i in range(1, count + 1)]
+
+    @property
+    def joints(self) -> int:
+        return len(self.references["compensated_torque"])
+
+    @property
+    def tendons(self) -> int:
+        return len(self.references["slack"])
+
+
+def run_fmu(
+    path: Path,
+    recording: Recording,
+    *,
+    kinematics_source: int = 1,
+    parameters: Mapping[str, float] | None = None,
+    progress: Progress | None = None,
+) -> dict[str, NDArray[Any]]:
+    """Runs a friction FMU over a recording and returns one row per sample, each at its own sample's time.
+
+    The FMU is stepped by hand: the inputs of sample k are set, fmi2DoStep takes it at t_k, and the outputs after it
+    belong to t_k; the last step goes one sample beyond the recording.
+
+    parameters: start values by path, beside `kinematics_source` (contract section 4).
+    Returns column name -> [N], `time` first. Raises InputError, with the FMU's own words where it refuses something.
+    """
+    with _unpacked(path) as folder:
+        run = _Run(path, folder, parameters or {})
+        recording.require(run.variables.joints, run.variables.tendons, INPUTS_OF_SOURCE[kinematics_source])
+        return run.over(recording, kinematics_source, progress)
+
+
+@contextmanager
+def _unpacked(path: Path) -> Iterator[Path]:
+    from fmpy import extract
+
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    folder = Path(tempfile.mkdtemp(prefix="tendonfmu-"))
+    try:
+        extract(str(path), unzipdir=str(folder))
+        yield folder
+    except (OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{path}: not an FMU ({error})") from None
+    except Exception as error:  # fmpy raises bare exceptions for broken archives
+        if type(error) is not Exception and type(error).__module__ != "zipfile":
+            raise
+        raise InputError(f"{path}: not an FMU ({error})") from None
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+class _Run:
+    """One instance of an FMU with arrays laid out once, so that a step is three calls."""
+
+    def __init__(self, path: Path, folder: Path, parameters: Mapping[str, float]) -> None:
+        from fmpy import read_model_description
+        from fmpy.fmi2 import FMU2Slave
+
+        self.path = path
+        self._parameters = parameters
+        self._messages: list[str] = []
+        description = read_model_description(str(folder), validate=False)
+        if description.fmiVersion != "2.0" or description.coSimulation is None:
+            raise InputError(f"{path}: FMI {description.fmiVersion}; expected an FMI 2.0 co-simulation FMU")
+        self._all = {variable.name: variable for variable in description.modelVariables}
+        self.variables = Variables({group: self._group(group) for group in (*NUMBERS, *FLAGS)})
+        self._inputs = {group: self._group(group) for group in INPUTS}
+        self._slave = FMU2Slave(
+            guid=description.guid,
+            unzipDirectory=str(folder),
+            modelIdentifier=description.coSimulation.modelIdentifier,
+            instanceName=description.modelName,
+        )
+
+    def _group(self, group: str) -> list[int]:
+        if group in self._all:
+            return [self._all[group].valueReference]
+        found = {}
+        for name, variable in self._all.items():
+            if match := re.fullmatch(rf"{group}\[(\d+)\]", name):
+                found[int(match[1])] = variable.valueReference
+        if not found:
+            raise InputError(f"{self.path}: no variable {group}[1]; expected a friction FMU of `tendonfmu build`")
+        return [found[i] for i in sorted(found)]
+
+    @contextmanager
+    def _refusals(self) -> Iterator[None]:
+        """Turns fmpy's exceptions into one line with the FMU's own words."""
+        from fmpy import FMICallException
+
+        try:
+            yield
+        except (FMICallException, Exception) as error:
+            if isinstance(error, InputError | KeyboardInterrupt):
+                raise
+            reason = self._messages[-1] if self._messages else str(error)
+            raise InputError(f"{self.path}: {reason}") from None
+
+    def _instantiate(self) -> None:
+        from fmpy import calloc, free
+        from fmpy.fmi2 import (
+            fmi2CallbackAllocateMemoryTYPE,
+            fmi2CallbackFreeMemoryTYPE,
+            fmi2CallbackFunctions,
+            fmi2CallbackLoggerTYPE,
+        )
+
+        def log(_environment: Any, _instance: bytes, status: int, _category: bytes, message: bytes) -> None:
+            if status > 1:
+                self._messages.append(message.decode("utf-8", "replace").replace("%%", "%"))
+
+        self._callbacks = fmi2CallbackFunctions()
+        self._callbacks.logger = fmi2CallbackLoggerTYPE(log)
+        self._callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
+        self._callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
+        self._slave.instantiate(callbacks=self._callbacks)
+
+    def _initialise(self, start: float, source: int) -> None:
+        self._slave.setupExperiment(startTime=start)
+        self._slave.setInteger([self._all["kinematics_source"].valueReference], [source])
+        for path, value in self._parameters.items():
+            if path not in self._all:
+                raise InputError(f"{self.path}: no parameter {path!r} in this FMU")
+            self._slave.setReal([self._all[path].valueReference], [value])
+        self._slave.enterInitializationMode()
+
+    def over(self, recording: Recording, source: int, progress: Progress | None) -> dict[str, NDArray[Any]]:
+        with self._refusals():
+            self._instantiate()
+        try:
+            with self._refusals():
+                self._initialise(float(recording.time[0]), source)
+                numbers, flags = self._step(recording, INPUTS_OF_SOURCE[source], progress)
+                self._slave.terminate()
+        finally:
+            self._slave.freeInstance()
+        return {"time": recording.time, **self._columns(NUMBERS, numbers), **self._columns(FLAGS, flags)}
+
+    def _step(
+        self, recording: Recording, groups: tuple[str, ...], progress: Progress | None
+    ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+        slave, component = self._slave, self._slave.component
+        set_vr = _references([vr for group in groups for vr in self._inputs[group]])
+        get_vr = _references([vr for group in NUMBERS for vr in self.variables.references[group]])
+        flag_vr = _references([vr for group in FLAGS for vr in self.variables.references[group]])
+        samples = np.ascontiguousarray(np.hstack([recording.groups[group] for group in groups]))
+        numbers = np.empty((len(recording), len(get_vr)))
+        flags = np.empty((len(recording), len(flag_vr)), dtype=np.int32)
+        times = recording.time.tolist()
+        steps = np.diff(recording.time).tolist()
+        steps.append(steps[-1] if steps else 1e-3)
+
+        slave.fmi2SetReal(component, set_vr, len(set_vr), _row(samples, 0))
+        slave.exitInitializationMode()
+        for k, (time, step) in enumerate(zip(times, steps, strict=True)):
+            slave.fmi2SetReal(component, set_vr, len(set_vr), _row(samples, k))
+            slave.fmi2DoStep(component, time, step, 1)
+            slave.fmi2GetReal(component, get_vr, len(get_vr), _row(numbers, k))
+            slave.fmi2GetBoolean(component, flag_vr, len(flag_vr), _row(flags, k))
+            if progress and (k + 1) % 500 == 0:
+                progress(k + 1)
+        if progress:
+            progress(len(times))
+        return numbers, flags
+
+    def _columns(self, groups: tuple[str, ...], rows: NDArray[Any]) -> dict[str, NDArray[Any]]:
+        names = [name for group in groups for name in self.variables.names(group)]
+        flags = groups is FLAGS
+        return {name: rows[:, i].astype(bool) if flags else rows[:, i] for i, name in enumerate(names)}
+
+
+def _references(values: list[int]) -> Any:
+    return (ctypes.c_uint * len(values))(*values)
+
+
+def _row(rows: NDArray[Any], k: int) -> Any:
+    """Row k where it stands, as FMI's array of numbers."""
+    kind = ctypes.c_double if rows.dtype == np.float64 else ctypes.c_int
+    return ctypes.cast(rows.ctypes.data + k * rows.strides[0], ctypes.POINTER(kind))

@@ -1,0 +1,14 @@
+"""Names of the FMU's inputs and outputs (contract section 4), in the order in which they are passed."""
+
+from __future__ import annotations
+
+INPUTS = ("tendon_force", "tendon_position", "joint_position", "joint_velocity")
+NUMBERS = ("compensated_torque", "joint_torque", "friction_torque", "bias_torque", "joint_angle", "joint_speed")
+FLAGS = ("joint_contact", "contact", "slack")
+
+# inputs that a kinematics source uses
+INPUTS_OF_SOURCE = {
+    1: ("tendon_force", "tendon_position"),
+    2: ("tendon_force", "joint_position"),
+    3: ("tendon_force", "joint_position", "joint_velocity"),
+}
