@@ -1,0 +1,272 @@
+"""The layering of the code: who may know whom, one file for one thing, no file too long to read."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGE = ROOT / "python" / "tendonfmu"
+MODULES = sorted(PACKAGE.rglob("*.py"))
+LONGEST = 500  # lines; a file that fits in a head
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
+C_LIBRARY = {
+    "assert.h",
+    "errno.h",
+    "float.h",
+    "limits.h",
+    "math.h",
+    "stddef.h",
+    "stdint.h",
+    "stdio.h",
+    "stdlib.h",
+    "string.h",
+}
+# what a kernel or a platform needs beyond C, and the only files that may
+BEYOND_C = {
+    "kernel_choice.c": {"cpuid.h", "intrin.h"},
+    "quad_sse2.h": {"emmintrin.h"},
+    "quad_avx2.h": {"immintrin.h"},
+    "resource.c": {"windows.h"},
+}
+
+# --- Python: one module for each thing --------------------------------------------------------------------------------
+
+ONLY = {
+    "fmpy": "fmu.py",
+    "tendonfmu._native": "native.py",
+    "matplotlib": "plots.py",
+    "typer": "cli.py",
+    "rich": "cli.py",
+}
+
+
+def imports_of(tree: ast.AST) -> Iterator[str]:
+    """Full names of what a module imports, also inside functions; `from tendonfmu import x` counts as tendonfmu.x."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "relative import"
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def users_of(library: str) -> set[str]:
+    return {
+        module.relative_to(PACKAGE).as_posix()
+        for module in MODULES
+        for name in imports_of(ast.parse(module.read_text(encoding="utf-8")))
+        if name == library or name.startswith(f"{library}.")
+    }
+
+
+@pytest.mark.parametrize("library", ONLY)
+def test_one_module_imports(library: str) -> None:
+    assert users_of(library) == {ONLY[library]}
+
+
+def test_one_module_prints() -> None:
+    printing = set()
+    for module in MODULES:
+        for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):
+            calls_print = isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "print"
+            takes_stream = isinstance(node, ast.Attribute) and node.attr in ("stdout", "stderr")
+            if calls_print or takes_stream:
+                printing.add(module.name)
+    assert printing == {"cli.py"}
+
+
+def test_plots_computes_nothing() -> None:
+    """It draws arrays that others made: no numpy mathematics, no model, no files of numbers."""
+    allowed = {
+        "matplotlib",
+        "__future__",
+        "collections",
+        "pathlib",
+        "typing",
+        "numpy",
+        "tendonfmu",
+        "io",
+        "dataclasses",
+        "math",
+    }
+    names = set(imports_of(ast.parse((PACKAGE / "plots.py").read_text(encoding="utf-8"))))
+    assert {name.split(".")[0] for name in names} <= allowed
+    assert not {name for name in names if name.startswith(("tendonfmu.native", "tendonfmu.fmu", "tendonfmu.recording"))}
+
+
+def test_native_knows_no_other_part() -> None:
+    names = set(imports_of(ast.parse((PACKAGE / "native.py").read_text(encoding="utf-8"))))
+    own = {name for name in names if name.startswith("tendonfmu.")}
+    assert all(name.startswith(("tendonfmu._native", "tendonfmu.errors", "tendonfmu.signals")) for name in own), own
+
+
+# --- C and C++: the source lists are the architecture -----------------------------------------------------------------
+
+
+def listed_sources(cmake: Path, opening: str) -> list[str]:
+    """Files of a CMake list, in order; comments are dropped."""
+    text = re.sub(r"#.*", "", cmake.read_text(encoding="utf-8"))
+    match = re.search(re.escape(opening) + r"([^)]*)\)", text)
+    assert match, opening
+    return [word for word in match[1].split() if re.search(r"\.(c|h|cpp)$", word)]
+
+
+def includes_of(file: Path) -> list[tuple[bool, str]]:
+    """(in angle brackets, name) of each include."""
+    return [(mark == "<", name) for mark, name in INCLUDE.findall(file.read_text(encoding="utf-8"))]
+
+
+def is_ordered(folder: Path, sources: list[str], known: set[str]) -> list[str]:
+    """Includes of headers that belong to files further down the list, or to none. known: headers from outside."""
+    wrong: list[str] = []
+    allowed = set(known)
+    for source in sources:
+        path = folder / source
+        own = [path] if path.suffix == ".h" else [path.with_suffix(".h"), path]
+        allowed |= {each.name for each in own}
+        for file in own:
+            if file.exists():
+                wrong += [
+                    f"{file.name}: {name}" for angle, name in includes_of(file) if not angle and name not in allowed
+                ]
+    return wrong
+
+
+CORE = listed_sources(ROOT / "runtime" / "CMakeLists.txt", "set(TENDONFMU_CORE_SOURCES")
+DESCRIPTION = listed_sources(
+    ROOT / "runtime" / "description" / "CMakeLists.txt", "add_library(tendonfmu_description STATIC"
+)
+
+
+def test_core_includes_only_what_stands_above_it() -> None:
+    assert len(CORE) > 20
+    assert is_ordered(ROOT / "runtime", CORE, {"tendonfmu.h"}) == []
+
+
+def test_description_includes_only_what_stands_above_it() -> None:
+    known = {"tendonfmu.h", "tendonfmu_description.h", "core_inside.h"}
+    assert is_ordered(ROOT / "runtime" / "description", DESCRIPTION, known) == []
+
+
+def test_the_order_test_sees_a_wrong_include(tmp_path: Path) -> None:
+    (tmp_path / "low.c").write_text('#include "high.h"\n', encoding="utf-8")
+    (tmp_path / "high.c").write_text('#include "high.h"\n', encoding="utf-8")
+    assert is_ordered(tmp_path, ["low.c", "high.c"], set()) == ["low.c: high.h"]
+    (tmp_path / "low.c").write_text('#include "low.h"\n', encoding="utf-8")
+    assert is_ordered(tmp_path, ["low.c", "high.c"], set()) == []
+
+
+def test_every_core_file_is_in_the_list() -> None:
+    folder = ROOT / "runtime" / "core"
+    listed = {(ROOT / "runtime" / source).with_suffix("") for source in CORE}
+    files = {file.with_suffix("") for file in folder.rglob("*") if file.suffix in (".c", ".h")}
+    assert files == listed
+
+
+@pytest.mark.parametrize("part", ["runtime/core", "fmu_src"])
+def test_c_needs_the_c_library_alone(part: str) -> None:
+    wrong = [
+        f"{file.name}: <{name}>"
+        for file in sorted((ROOT / part).rglob("*.[ch]"))
+        for angle, name in includes_of(file)
+        if angle and name not in C_LIBRARY | BEYOND_C.get(file.name, set())
+    ]
+    assert wrong == []
+
+
+def test_the_fmu_knows_fmi_and_the_c_interface_only() -> None:
+    folder = ROOT / "fmu_src"
+    own = {file.name for file in folder.glob("*.h")}
+    outside = {"fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h", "tendonfmu.h", "variable_table.h"}
+    sources = sorted(folder.glob("*.[ch]"))
+    assert len(sources) > 10
+    wrong = [
+        f"{file.name}: {name}"
+        for file in sources
+        for angle, name in includes_of(file)
+        if not angle and name not in own | outside
+    ]
+    assert wrong == []
+
+
+def test_the_core_knows_nothing_of_fmi() -> None:
+    for file in (ROOT / "runtime" / "core").rglob("*.[ch]"):
+        assert not re.search(r"fmi2|fmu_src", file.read_text(encoding="utf-8")), file.name
+
+
+def test_only_the_description_reader_knows_json() -> None:
+    users = {
+        file.relative_to(ROOT).parts[:2]
+        for folder in ("runtime", "fmu_src")
+        for file in (ROOT / folder).rglob("*")
+        if file.suffix in (".c", ".h", ".cpp") and any("nlohmann" in name for _, name in includes_of(file))
+    }
+    assert users - {("runtime", "tests"), ("runtime", "fuzz")} == {("runtime", "description")}
+
+
+# --- the repository ---------------------------------------------------------------------------------------------------
+
+
+def tracked() -> list[str]:
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False)
+    if listed.returncode != 0:
+        pytest.skip("SKIPPED: not a git work tree")
+    return [name for name in listed.stdout.split("\0") if name and (ROOT / name).is_file()]
+
+
+def test_no_source_is_too_long() -> None:
+    code = [
+        name
+        for name in tracked()
+        if Path(name).suffix in (".c", ".h", ".cpp", ".py", ".pyi", ".sh", ".cmake", ".jinja")
+    ]
+    lengths = {name: len((ROOT / name).read_text(encoding="utf-8").splitlines()) for name in code}
+    assert {name: length for name, length in lengths.items() if length > LONGEST} == {}
+
+
+def test_names_say_what_they_hold() -> None:
+    vague = re.compile(r"(^|_)(utils?|helpers?|manager|misc|common)(\.|_|$)")
+    assert [name for name in tracked() if any(vague.search(part) for part in Path(name).parts)] == []
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "README.md",
+        "LICENSE",
+        "CMakeLists.txt",
+        "run",
+        "test",
+        "pyproject.toml",
+        "requirements.lock",
+        "modelDescription",
+        "fmu_src",
+        "runtime/CMakeLists.txt",
+        "runtime/include/tendonfmu.h",
+        "runtime/core",
+        "runtime/description",
+        "runtime/tests",
+        "bench",
+        "python/tendonfmu",
+        "python_tests/oracle.py",
+        "examples/fingers/index_finger.json",
+        "docs",
+    ],
+)
+def test_the_layout_is_there(path: str) -> None:
+    assert (ROOT / path).exists()
+
+
+def test_the_oracle_is_for_tests_alone() -> None:
+    users = [
+        name
+        for name in tracked()
+        if name.startswith("python/") and "oracle" in (ROOT / name).read_text(encoding="utf-8", errors="replace")
+    ]
+    assert users == []
