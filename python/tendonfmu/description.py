@@ -12,12 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from tendonfmu import native
+from tendonfmu.errors import InputError
 
 Law = Mapping[str, Any]
-
-
-class DescriptionError(ValueError):
-    """A description that cannot be read or is refused; one line with file, key path and expectation."""
 
 
 @dataclass(frozen=True)
@@ -85,15 +82,15 @@ class Summary:
 
 
 def read_finger(path: Path) -> FingerDescription:
-    """Reads a finger description. Raises DescriptionError, one line that begins with the path."""
+    """Reads a finger description. Raises InputError, one line that begins with the path."""
     try:
         text = path.read_bytes()
     except OSError as failed:
-        raise DescriptionError(f"{path}: {failed.strerror}; expected a finger description (JSON)") from None
+        raise InputError(f"{path}: {failed.strerror}; expected a finger description (JSON)") from None
     try:
         image = native.image_from_json(text)
     except native.NativeError as refused:
-        raise DescriptionError(f"{path}: {refused}") from None
+        raise InputError(f"{path}: {refused}") from None
     return FingerDescription(path=path, text=text, data=json.loads(text), image=image)
 
 

@@ -1,0 +1,85 @@
+"""What the figure of a compensated recording shows, computed for `plots.py`: joint torques, thresholds, contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.description import FingerDescription
+
+Array = NDArray[Any]
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class JointCurves:
+    """Curves of one joint, [N] N·m each; external: reference sensor, None without one."""
+
+    name: str
+    measured: Array
+    predicted: Array
+    compensated: Array
+    threshold: Array
+    external: Array | None
+
+
+@dataclass(frozen=True)
+class CompensationFigure:
+    """time: [N] s. found, labelled: contact intervals (begin, end) in s; labelled is None without labels."""
+
+    title: str
+    time: Array
+    joints: list[JointCurves]
+    found: list[Interval]
+    labelled: list[Interval] | None
+
+
+def compensation_figure(
+    description: FingerDescription, recording: Mapping[str, Array], outputs: Mapping[str, Array], most_joints: int = 2
+) -> CompensationFigure:
+    """Curves of the joints with the largest compensated torque, base first.
+
+    recording: `time` [N], `tendon_force` [N, m], maybe `external_torque` [N, n] and `contact` [N].
+    outputs: those of `native.Finger.run`, [N, n] and [N].
+    """
+    largest = np.argsort(-np.abs(outputs["compensated_torque"]).max(axis=0), kind="stable")[:most_joints]
+    thresholds = contact_thresholds(description, recording["tendon_force"])
+    time = recording["time"]
+    labels, external = recording.get("contact"), recording.get("external_torque")
+    return CompensationFigure(
+        title=description.name,
+        time=time,
+        joints=[
+            JointCurves(
+                name=description.joint_names[j],
+                measured=outputs["joint_torque"][:, j],
+                predicted=outputs["friction_torque"][:, j],
+                compensated=outputs["compensated_torque"][:, j],
+                threshold=thresholds[:, j],
+                external=None if external is None else external[:, j],
+            )
+            for j in sorted(largest)
+        ],
+        found=intervals(time, outputs["contact"]),
+        labelled=None if labels is None else intervals(time, labels),
+    )
+
+
+def contact_thresholds(description: FingerDescription, tendon_force: Array) -> Array:
+    """[N, n] N·m: threshold + threshold_per_force·mean|f0| (contract section 5, step 5) of every sample."""
+    contact = description.data["contact"]
+    n = len(contact["threshold"])
+    per_force = [value or 0.0 for value in contact.get("threshold_per_force") or [0.0] * n]
+    mean_force = np.abs(tendon_force).mean(axis=1)
+    return np.asarray(np.array(contact["threshold"]) + mean_force[:, None] * np.array(per_force))
+
+
+def intervals(time: Array, flags: Array) -> list[Interval]:
+    """Begin and end (s) of each stretch of samples whose flag is set; a stretch lasts until the next sample."""
+    steps = np.diff(np.concatenate([[0], np.asarray(flags).astype(bool).astype(int), [0]]))
+    begins, ends = np.flatnonzero(steps > 0), np.flatnonzero(steps < 0)
+    return [(float(time[a]), float(time[min(b, len(time) - 1)])) for a, b in zip(begins, ends, strict=True)]

@@ -1,0 +1,193 @@
+"""From a finger description to an FMU: an archive put together from parts that stand ready, without a compiler.
+
+Same input, same bytes: members are sorted, their times and permissions fixed.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+import os
+import re
+import tempfile
+import unicodedata
+import zipfile
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from tendonfmu import native
+from tendonfmu.description import FingerDescription, read_finger
+from tendonfmu.errors import InputError
+from tendonfmu.model_variables import VariableTable, describe_model, read_table
+
+if TYPE_CHECKING:
+    from importlib.abc import Traversable
+
+BINARY_SUFFIXES = (".so", ".dll", ".dylib")
+BINARY_STEM = "tendonfmu"
+
+# A model identifier names files and C functions: no words that a compiler or a file system keeps to itself.
+RESERVED = frozenset(
+    "auto break case char const continue default do double else enum extern float for goto if inline int long register "
+    "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while "
+    "con prn aux nul".split()
+)
+
+
+def build_fmu(description_path: Path, output_path: Path, *, binaries: Path | None = None) -> Path:
+    """Packs the FMU of a finger description and returns its path.
+
+    binaries: a folder of <FMI platform>/tendonfmu.<so, dll or dylib> in place of the installed ones.
+    Raises InputError. output_path appears whole or not at all.
+    """
+    description = read_finger(description_path)
+    archive = pack(members(description, binaries=binaries))
+    write_whole(output_path, archive)
+    return output_path
+
+
+def model_identifier(name: str) -> str:
+    """The name as a C identifier: `Zeigefinger, rechts` becomes `Zeigefinger_rechts`."""
+    plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode("ascii")
+    identifier = re.sub(r"[^A-Za-z0-9]+", "_", plain).strip("_")
+    if not identifier:
+        return "finger"
+    if identifier[0].isdigit() or identifier.lower() in RESERVED:
+        return f"finger_{identifier}"
+    return identifier
+
+
+def guid(image: bytes, table: VariableTable) -> str:
+    """Identifier that the binary expects: of the image and of the table that it was compiled with."""
+    return native.image_guid(image, _variable_generator().salt(table.data))
+
+
+def members(description: FingerDescription, *, binaries: Path | None = None) -> dict[str, bytes]:
+    """Path in the archive to content, for all files of the FMU."""
+    from tendonfmu.documentation import documentation_page
+    from tendonfmu.drawing import finger_drawing
+    from tendonfmu.plots import draw_finger
+
+    table = read_table(_package_file("model_description", "variables.json").read_text(encoding="utf-8"))
+    identifier = model_identifier(description.name)
+    sources = _sources()
+    model = describe_model(description, table)
+    context: dict[str, Any] = {
+        **model,
+        "model_identifier": identifier,
+        "guid": guid(description.image, table),
+        "version": native.version(),
+        "source_files": sources.pop("sources.txt").decode("ascii").split(),
+    }
+    picture = io.BytesIO()
+    draw_finger(finger_drawing(description), picture)
+    content = {
+        "modelDescription.xml": _checked(_render_xml(context)),
+        "model.png": picture.getvalue(),
+        "documentation/finger.png": picture.getvalue(),
+        "documentation/index.html": documentation_page(description, context).encode(),
+        "resources/model.image": description.image,
+        "resources/finger.json": description.text,
+    }
+    content |= {f"sources/{name}": data for name, data in sources.items()}
+    content |= {f"binaries/{path}": data for path, data in _binaries(binaries, identifier).items()}
+    return content
+
+
+# --- parts -----------------------------------------------------------------------------------------------------------
+
+
+def _package_file(*parts: str) -> Traversable:
+    return files("tendonfmu").joinpath(*parts)
+
+
+def _variable_generator() -> ModuleType:
+    """generate_variables.py, which wrote the table's salt into the C header."""
+    path = Path(str(_package_file("model_description", "generate_variables.py")))
+    spec = importlib.util.spec_from_file_location("tendonfmu_generate_variables", path)
+    if spec is None or spec.loader is None:
+        raise InputError(f"{path}: not found; expected in the installed package")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def _sources() -> dict[str, bytes]:
+    return {file.name: file.read_bytes() for file in _package_file("sources").iterdir() if file.is_file()}
+
+
+def _binaries(folder: Path | None, identifier: str) -> dict[str, bytes]:
+    """<platform>/<identifier>.<suffix> to content."""
+    root: Traversable = _package_file("binaries") if folder is None else folder
+    found = {}
+    for platform in root.iterdir() if root.is_dir() else []:
+        for file in platform.iterdir() if platform.is_dir() else []:
+            suffix = Path(file.name).suffix
+            if Path(file.name).stem == BINARY_STEM and suffix in BINARY_SUFFIXES:
+                found[f"{platform.name}/{identifier}{suffix}"] = file.read_bytes()
+    if not found:
+        raise InputError(f"{root}: no binary; expected <FMI platform>/{BINARY_STEM}.so, .dll or .dylib in it")
+    return found
+
+
+def _render_xml(context: Mapping[str, Any]) -> bytes:
+    import jinja2
+
+    template = _package_file("model_description", "modelDescription.xml.jinja").read_text(encoding="utf-8")
+    environment = jinja2.Environment(undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
+    return environment.from_string(template).render(context).encode()
+
+
+def _checked(xml: bytes) -> bytes:
+    """The same XML, once FMI's schema accepts it. The schema comes with fmpy, whose import would take half a second."""
+    from lxml import etree
+
+    spec = importlib.util.find_spec("fmpy")
+    if spec is None or not spec.submodule_search_locations:
+        raise InputError("modelDescription.xml: FMI's schema not found; expected the Python package fmpy")
+    schema_path = Path(spec.submodule_search_locations[0]) / "schema" / "fmi2" / "fmi2ModelDescription.xsd"
+    schema = etree.XMLSchema(etree.parse(str(schema_path)))
+    if not schema.validate(etree.fromstring(xml)):
+        error = schema.error_log[0]
+        raise InputError(f"modelDescription.xml, line {error.line}: {error.message}")
+    return xml
+
+
+# --- archive ---------------------------------------------------------------------------------------------------------
+
+
+def pack(content: Mapping[str, bytes]) -> bytes:
+    """Zip archive with the members sorted by path, all of 1980-01-01 and readable by everyone."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as archive:
+        for path in sorted(content):
+            member = zipfile.ZipInfo(path, date_time=(1980, 1, 1, 0, 0, 0))
+            member.compress_type = zipfile.ZIP_DEFLATED
+            member.create_system = 3
+            member.external_attr = (0o755 if path.startswith("binaries/") else 0o644) << 16
+            archive.writestr(member, content[path])
+    return buffer.getvalue()
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Writes a file so that it appears whole or not at all. Raises InputError."""
+    temporary = None
+    try:
+        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as file:
+            temporary = Path(file.name)
+            file.write(content)
+        temporary.chmod(0o666 & ~_umask())
+        os.replace(temporary, path)
+    except OSError as failed:
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
+        raise InputError(f"{path}: {failed.strerror}; expected a file that can be written") from None
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
