@@ -123,13 +123,11 @@ class _Run:
     @contextmanager
     def _refusals(self) -> Iterator[None]:
         """Turns fmpy's exceptions into one line with the FMU's own words."""
-        from fmpy import FMICallException
-
         try:
             yield
-        except (FMICallException, Exception) as error:
-            if isinstance(error, InputError | KeyboardInterrupt):
-                raise
+        except InputError:
+            raise
+        except Exception as error:  # fmpy raises bare exceptions
             reason = self._messages[-1] if self._messages else str(error)
             raise InputError(f"{self.path}: {reason}") from None
 
