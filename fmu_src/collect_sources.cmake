@@ -1,3 +1,5 @@
+cmake_minimum_required(VERSION 3.22)
+
 # Copies FILES (separated by bars) flat into FOLDER and writes FOLDER/sources.txt: the C files to compile, in order.
 #
 # finger.c wants the version on the command line, where a source FMU cannot give it; so finger_of_version.c, made here,
