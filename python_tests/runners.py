@@ -7,11 +7,16 @@ of all outputs of contract section 4 ([N, n], [N, m]; `contact` [N]).
 
 from __future__ import annotations
 
+import functools
 import importlib
+import json
+import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from numpy.typing import NDArray
 
@@ -42,20 +47,81 @@ def run_oracle(
     return oracle.run(description, recording, kinematics_source).outputs
 
 
+def product(module: str) -> Any:
+    """A module of the installed product; skips where it is not built."""
+    try:
+        return importlib.import_module(f"tendonfmu.{module}")
+    except ImportError as missing:
+        pytest.skip(f"SKIPPED: the product is not built ({missing})")
+
+
 def run_native(
     description: Mapping[str, Any], recording: Mapping[str, NDArray[Any]], kinematics_source: int
 ) -> Outputs:
-    """The batch run of the C interface, through the one module that binds it; skips when it is not built."""
-    try:
-        native = importlib.import_module("tendonfmu.native")
-    except ImportError as missing:
-        pytest.skip(f"SKIPPED: the native module is not built ({missing})")
-    outputs: Outputs = native.run_recording(description, recording, kinematics_source)
+    """The batch run of the C interface, through the one module that binds it."""
+    outputs: Outputs = product("native").run_recording(description, recording, kinematics_source)
     return outputs
 
 
-ORACLE = Runner("oracle", run_oracle)
-# A recording's time is strictly increasing, so the batch run need not take a time twice.
-NATIVE = Runner("native", run_native, repeated_time=False)
+def run_plain_kernel(
+    description: Mapping[str, Any], recording: Mapping[str, NDArray[Any]], kinematics_source: int
+) -> Outputs:
+    """The same on the kernel in plain C, which any machine can run."""
+    finger = product("native").Finger.from_description(description, kinematics_source)
+    finger.kernel = "plain"
+    outputs: Outputs = finger.run(recording)
+    return outputs
 
-RUNNERS: list[Runner] = [ORACLE, NATIVE]
+
+def run_single_steps(
+    description: Mapping[str, Any], recording: Mapping[str, NDArray[Any]], kinematics_source: int
+) -> Outputs:
+    """One call of the C interface a sample, the state saved and restored into a fresh finger half way."""
+    native = product("native")
+    finger = native.Finger.from_description(description, kinematics_source)
+    samples = len(recording["time"])
+    rows = []
+    for k in range(samples):
+        if k == samples // 2 and k > 0:
+            state = finger.save_state()
+            finger = native.Finger.from_description(description)
+            finger.restore_state(state)
+        rows.append(finger.run({name: np.asarray(array)[k : k + 1] for name, array in recording.items()}))
+    return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
+
+
+@functools.cache
+def packed(text: str) -> Path:
+    """An FMU of a description's text, kept while the tests run."""
+    folder = Path(tempfile.mkdtemp(prefix="tendonfmu-tests-"))
+    (folder / "finger.json").write_text(text, encoding="utf-8")
+    fmu: Path = product("packaging").build_fmu(folder / "finger.json", folder / "finger.fmu")
+    return fmu
+
+
+def run_fmu(description: Mapping[str, Any], recording: Mapping[str, NDArray[Any]], kinematics_source: int) -> Outputs:
+    """The FMU through fmpy, stepped by hand."""
+    samples = product("recording").Recording(
+        Path("recording"),
+        np.asarray(recording["time"], dtype=float),
+        {name: np.asarray(array, dtype=float) for name, array in recording.items() if name != "time"},
+    )
+    fmu = packed(json.dumps(description))
+    columns = product("fmu").run_fmu(fmu, samples, kinematics_source=kinematics_source)
+    groups: dict[str, list[NDArray[Any]]] = {}
+    for name, column in columns.items():
+        groups.setdefault(name.split("[")[0], []).append(column)
+    outputs = {name: np.column_stack(each) for name, each in groups.items() if name != "time"}
+    return outputs | {"contact": columns["contact"]}
+
+
+ORACLE = Runner("oracle", run_oracle)
+NATIVE = Runner("native", run_native)
+
+RUNNERS: list[Runner] = [
+    ORACLE,
+    NATIVE,
+    Runner("plain_kernel", run_plain_kernel),
+    Runner("single_steps", run_single_steps),
+    Runner("fmu", run_fmu),
+]

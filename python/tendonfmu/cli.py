@@ -1,4 +1,6 @@
-"""The command `tendonfmu`: parses, calls, prints, and ends with 0 (done), 1 (the answer is no) or 2 (bad usage or input).
+"""The command `tendonfmu`: parses, calls, prints.
+
+Exit status: 0 done, 1 the answer is no, 2 bad usage or input.
 
 The only module that prints. Results go to files or standard output, messages to standard error.
 """

@@ -4,7 +4,6 @@ nothing.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import as_file, files
@@ -14,10 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.errors import InputError
+from tendonfmu.figure_data import Interval, compensation_figure, intervals
 from tendonfmu.fmu import run_fmu
 from tendonfmu.packaging import build_fmu
 from tendonfmu.recording import Recording, read_recording, write_table
+from tendonfmu.signals import NUMBERS
+from tendonfmu.whole_file import whole_file
 
 FINGER = "index_finger.json"
 RECORDING = "index_finger_demo.parquet"
@@ -56,34 +59,42 @@ def run_demo(folder: Path, *, progress: Callable[[int, int], None]) -> DemoResul
         raise InputError(f"{folder}: cannot be made ({error.strerror})") from None
     data = files("tendonfmu") / "data"
     fmu, csv, figure = (folder / name for name in ("index_finger.fmu", "compensated.csv", "compensated.png"))
-    with as_file(data / FINGER) as description, as_file(data / RECORDING) as path:
-        finger = json.loads(description.read_text(encoding="utf-8"))
-        recording = read_recording(path)
-        build_fmu(description, fmu)
+    with as_file(data / FINGER) as finger, as_file(data / RECORDING) as path:
+        description, recording = read_finger(finger), read_recording(path)
+        build_fmu(finger, fmu)
     outputs = run_fmu(fmu, recording, progress=lambda done: progress(done, len(recording)))
     write_table(csv, outputs)
-    _draw(finger, recording, outputs, figure)
+    _draw(description, recording, outputs, figure)
     what = {fmu: "the FMU", csv: "its outputs", figure: "torques, what is left of them, contacts"}
-    return _summarise(finger, recording, outputs, what)
+    return _summarise(description, recording, outputs, what)
 
 
-def rows(outputs: dict[str, NDArray[Any]], name: str) -> NDArray[Any]:
+def _draw(description: FingerDescription, recording: Recording, outputs: dict[str, NDArray[Any]], figure: Path) -> None:
+    from tendonfmu.plots import draw_compensation
+
+    measured: dict[str, NDArray[Any]] = recording.arrays()
+    if recording.contact is not None:
+        measured["contact"] = recording.contact
+    series = {name: _rows(outputs, name) for name in NUMBERS} | {"contact": outputs["contact"]}
+    with whole_file(figure) as temporary:
+        draw_compensation(compensation_figure(description, measured, series), temporary)
+
+
+def _rows(outputs: dict[str, NDArray[Any]], name: str) -> NDArray[Any]:
     """[N, n] the columns name[1], name[2], ..."""
     count = sum(column.startswith(f"{name}[") for column in outputs)
     return np.column_stack([outputs[f"{name}[{i}]"] for i in range(1, count + 1)])
 
 
-def intervals(time: NDArray[np.float64], flag: NDArray[np.bool_], merge: float = 0.0) -> list[tuple[float, float]]:
-    """Times [begin, end] (s) during which a flag holds; gaps up to `merge` are closed."""
-    edges = np.diff(np.concatenate(([0], flag.astype(int), [0])))
-    begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
-    found: list[tuple[float, float]] = []
-    for begin, end in zip(time[begins], time[ends], strict=True):
-        if found and begin - found[-1][1] <= merge:
-            found[-1] = (found[-1][0], float(end))
+def _merged(found: list[Interval]) -> list[Interval]:
+    """Intervals with gaps up to `MERGE` closed."""
+    merged: list[Interval] = []
+    for begin, end in found:
+        if merged and begin - merged[-1][1] <= MERGE:
+            merged[-1] = (merged[-1][0], end)
         else:
-            found.append((float(begin), float(end)))
-    return found
+            merged.append((begin, end))
+    return merged
 
 
 def _rms(values: NDArray[np.float64]) -> float:
@@ -91,22 +102,17 @@ def _rms(values: NDArray[np.float64]) -> float:
 
 
 def _summarise(
-    finger: dict[str, Any], recording: Recording, outputs: dict[str, NDArray[Any]], written: dict[Path, str]
+    description: FingerDescription, recording: Recording, outputs: dict[str, NDArray[Any]], written: dict[Path, str]
 ) -> DemoResult:
-    torque, left = rows(outputs, "joint_torque"), rows(outputs, "compensated_torque")
+    torque, left = _rows(outputs, "joint_torque"), _rows(outputs, "compensated_torque")
     label = np.zeros(len(recording), bool) if recording.contact is None else recording.contact
-    pushes = intervals(recording.time, label, MERGE)
-    alarms = intervals(recording.time, outputs["contact"], MERGE)
+    pushes = _merged(intervals(recording.time, label))
+    alarms = _merged(intervals(recording.time, outputs["contact"]))
     found = [any(a[0] <= push[1] and a[1] >= push[0] for a in alarms) for push in pushes]
     false = [not any(a[0] <= push[1] + START and a[1] >= push[0] for push in pushes) for a in alarms]
     joints = [
-        JointResult(
-            str(joint.get("name", f"joint {j + 1}")),
-            _rms(torque[:, j]),
-            _rms(left[~label, j]),
-            _rms(left[label, j]),
-        )
-        for j, joint in enumerate(finger["joints"])
+        JointResult(name, _rms(torque[:, j]), _rms(left[~label, j]), _rms(left[label, j]))
+        for j, name in enumerate(description.joint_names)
     ]
     seconds = float(recording.time[-1] - recording.time[0])
-    return DemoResult(str(finger["name"]), seconds, joints, len(pushes), sum(found), sum(false), written)
+    return DemoResult(description.name, seconds, joints, len(pushes), sum(found), sum(false), written)

@@ -8,9 +8,7 @@ from __future__ import annotations
 import csv
 import os
 import re
-import tempfile
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,6 +18,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
+from tendonfmu.whole_file import whole_file
 
 # group: unit, and whether every recording has it
 GROUPS: dict[str, tuple[str, bool]] = {
@@ -148,7 +147,7 @@ def _read_parquet(file: Path) -> pd.DataFrame:
     import pyarrow.parquet as pq
 
     try:
-        table = pq.read_table(file)  # type: ignore[no-untyped-call]
+        table = pq.read_table(file)
     except (pa.ArrowInvalid, OSError) as error:
         raise InputError(f"{file}: not a whole Parquet file ({str(error).splitlines()[0]})") from None
     _check_duplicates(file, table.column_names)
@@ -213,10 +212,7 @@ def _check_field(file: Path, name: str, row: int, rows: int, field: str) -> None
     try:
         number = float(field)
     except ValueError:
-        if row == rows:
-            hint = f"; if the file was cut off, the {row - 1} rows before it are good"
-        else:
-            hint = ""
+        hint = f"; if the file was cut off, the {row - 1} rows before it are good" if row == rows else ""
         raise InputError(f"{file}: column {name}, row {row}: {field!r}; expected a number{hint}") from None
     if not np.isfinite(number):
         raise InputError(f"{file}: column {name}, row {row}: {field}; expected a finite number")
@@ -237,25 +233,3 @@ def write_table(path: str | os.PathLike[str], table: Mapping[str, NDArray[Any]])
             frame.to_csv(temporary, index=False, lineterminator="\n")
         else:
             frame.to_parquet(temporary, index=False)
-
-
-@contextmanager
-def whole_file(file: Path) -> Iterator[Path]:
-    """A temporary file beside `file` that takes its place at the end, or vanishes when an error ends it."""
-    if not file.parent.is_dir():
-        raise InputError(f"{file}: no folder {file.parent}")
-    try:
-        handle, name = tempfile.mkstemp(dir=file.parent, prefix=f".{file.name}-", suffix=file.suffix)
-    except OSError as error:
-        raise InputError(f"{file}: cannot be written ({error.strerror})") from None
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        yield temporary
-        # mkstemp's files are private; a result is as readable as any other file
-        mask = os.umask(0)
-        os.umask(mask)
-        temporary.chmod(0o666 & ~mask)
-        os.replace(temporary, file)
-    finally:
-        temporary.unlink(missing_ok=True)

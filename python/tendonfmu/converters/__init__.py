@@ -1,7 +1,7 @@
 """Third-party recordings to ours: one foreign format a file.
 
-A converter is a function (file, radius) -> columns of a recording (contract section 3). To add one, write a module beside
-this and name it in `CONVERTERS`.
+A converter is a function (file, radius) -> columns of a recording (contract section 3). To add one, write a module
+beside this and name it in `CONVERTERS`.
 """
 
 from __future__ import annotations

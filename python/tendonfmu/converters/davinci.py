@@ -12,8 +12,8 @@ everything is positive when the motor closes against the load.
 | joint_position[1] | col 5, 4000 counts a turn: grows with theta | rad |
 | external_torque[1] = load | col 6, 0.000039811 N.m a count | N.m |
 
-With a moment arm of r, joint_torque = R^T f0 is the torque of the spindle, and joint_torque - external_torque is friction:
-it opposes the motion, positive while theta grows.
+With a moment arm of r, joint_torque = R^T f0 is the torque of the spindle, and joint_torque - external_torque is
+friction: it opposes the motion, positive while theta grows.
 """
 
 from __future__ import annotations

@@ -1,0 +1,33 @@
+"""Files that appear whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from tendonfmu.errors import InputError
+
+
+@contextmanager
+def whole_file(file: Path) -> Iterator[Path]:
+    """A temporary file beside `file` that takes its place at the end, or vanishes when an error ends it."""
+    if not file.parent.is_dir():
+        raise InputError(f"{file}: no folder {file.parent}")
+    try:
+        handle, name = tempfile.mkstemp(dir=file.parent, prefix=f".{file.name}-", suffix=file.suffix)
+    except OSError as error:
+        raise InputError(f"{file}: cannot be written ({error.strerror})") from None
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        # mkstemp's files are private; a result is as readable as any other file
+        mask = os.umask(0)
+        os.umask(mask)
+        temporary.chmod(0o666 & ~mask)
+        os.replace(temporary, file)
+    finally:
+        temporary.unlink(missing_ok=True)
