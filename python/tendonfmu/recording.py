@@ -6,6 +6,7 @@ A column is `time` (s) or one of the groups below with an index from 1, such as 
 from __future__ import annotations
 
 import csv
+import itertools
 import os
 import re
 from collections.abc import Mapping
@@ -112,7 +113,8 @@ def _check_columns(file: Path, names: list[str]) -> None:
     for name, indices in counts.items():
         if not indices and GROUPS[name][1]:
             raise InputError(f"{file}: no column {name}[1]; expected one {name}[i] per tendon, in {GROUPS[name][0]}")
-        for missing in set(range(1, max(indices, default=0) + 1)) - indices:
+        if indices and len(indices) < max(indices):
+            missing = next(i for i in itertools.count(1) if i not in indices)
             raise InputError(f"{file}: no column {name}[{missing}], but {name}[{max(indices)}]; expected all from 1 on")
 
 
