@@ -64,7 +64,7 @@ def _inverse_routing(image: bytes, tendons: int, joints: int) -> np.ndarray[Any,
     finger = native.Finger(image, kinematics_source=1)
     finger.run({"time": np.zeros(1), "tendon_force": np.zeros((1, tendons)), "tendon_position": np.zeros((1, tendons))})
     columns = [finger.directional_derivative({"tendon_position": unit})["joint_angle"] for unit in np.eye(tendons)]
-    return np.array(columns).T.reshape(joints, tendons)
+    return np.asarray(np.array(columns).T.reshape(joints, tendons), dtype=np.float64)
 
 
 def dependencies(structure: Structure) -> Dependencies:
@@ -76,9 +76,7 @@ def dependencies(structure: Structure) -> Dependencies:
     for motion in torques:
         everything.add(motion)
     result: Dependencies = {
-        "joint_torque": [
-            {"tendon_force": [i for i in range(m) if structure.passes[i, j]]} for j in range(n)
-        ],
+        "joint_torque": [{"tendon_force": [i for i in range(m) if structure.passes[i, j]]} for j in range(n)],
         "joint_angle": [_inputs(structure, Motion(angles={j}), set()) for j in range(n)],
         "joint_speed": [_inputs(structure, Motion(velocities={j}), set()) for j in range(n)],
         "contact": [_inputs(structure, everything, set(range(m)))],

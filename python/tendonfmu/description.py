@@ -48,9 +48,13 @@ class FingerDescription:
         """[m][n] routing matrix R, m."""
         return [[float(arm) for arm in tendon["moment_arms"]] for tendon in self.data["tendons"]]
 
+    def summary(self) -> list[str]:
+        """What the finger is, in lines of text."""
+        return _summary_lines(count(self))
+
 
 @dataclass(frozen=True)
-class Summary:
+class Counts:
     """What a finger is, in numbers.
 
     laws: by kind, each working point counted; an asymmetric law counts once. parameters: all numbers of the FMU.
@@ -121,7 +125,9 @@ def estimated_numbers(data: Mapping[str, Any]) -> dict[str, int]:
     for kind, law in laws(data):
         counts[kind] += sum(_numbers_of_side(side) for side in sides(law))
     counts["cover"] = sum(1 for joint in data["joints"] if (joint.get("cover") or {}).get("stiffness"))
-    counts["extensions"] = sum(len(extension.keys() - {"effect", "joint"}) for extension in data.get("extensions") or [])
+    counts["extensions"] = sum(
+        len(extension.keys() - {"effect", "joint"}) for extension in data.get("extensions") or []
+    )
     counts["bias"] = len(data["joints"])
     return counts
 
@@ -140,14 +146,14 @@ def _entries(data: Mapping[str, Any], key: str) -> list[Any]:
     return [entry for tendon in data["tendons"] for entry in tendon.get(key) or [] if entry is not None]
 
 
-def summary(description: FingerDescription) -> Summary:
+def count(description: FingerDescription) -> Counts:
     """Counts what a description holds."""
     data = description.data
     found = list(laws(data))
     parameters = native.Finger(description.image).parameters()
     edges = _entries(data, "edge_friction")
     kinds = ("friction", "load_friction", "pulley_friction", "edge_friction")
-    return Summary(
+    return Counts(
         name=description.name,
         joint_names=description.joint_names,
         tendon_names=description.tendon_names,
@@ -163,3 +169,23 @@ def summary(description: FingerDescription) -> Summary:
         tunable_parameters=sum(1 for parameter in parameters if parameter.tunable),
         estimated_numbers=estimated_numbers(data),
     )
+
+
+def _summary_lines(counts: Counts) -> list[str]:
+    laws = ", ".join(f"{number} {kind}" for kind, number in counts.laws.items() if number) or "none"
+    estimated = ", ".join(f"{number} {kind}" for kind, number in counts.estimated_numbers.items() if number)
+    loops = f", {counts.bidirectional_tendons} of them cable loops" if counts.bidirectional_tendons else ""
+    asymmetric = f"; {counts.asymmetric_laws} of them asymmetric" if counts.asymmetric_laws else ""
+    lines = [
+        f"{counts.name}: a valid finger description",
+        f"joints             {counts.joints}: {', '.join(counts.joint_names)}",
+        f"tendons            {counts.tendons}: {', '.join(counts.tendon_names)}{loops}",
+        f"pulleys, edges     {counts.pulleys}, {counts.edges} with {counts.working_points} working points",
+        f"friction laws      {sum(counts.laws.values())}: {laws}{asymmetric}",
+        f"covers             {counts.covers}",
+        f"parameters         {counts.parameters}, {counts.tunable_parameters} of them tunable",
+        f"estimated numbers  {sum(counts.estimated_numbers.values())}: {estimated}",
+    ]
+    if counts.extensions:
+        lines.insert(-2, f"extensions         {len(counts.extensions)}: {', '.join(counts.extensions)}")
+    return lines

@@ -1,8 +1,8 @@
 """Geometry of the routing drawing of a finger, after the paper's fig. 3: where each line and mark goes, in units of
 its own. `plots.py` draws it.
 
-The finger lies along x, base on the left. A tendon passes a joint above it where its moment arm is positive, below where
-it is negative. Tendons that end early run inside, so that they need not cross those that go on.
+The finger lies along x, base on the left. A tendon passes a joint above it where its moment arm is positive, below
+where it is negative. Tendons that end early run inside, so that they need not cross those that go on.
 """
 
 from __future__ import annotations
@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from tendonfmu.description import FingerDescription
 
-JOINT_SPACING = 2.4
+JOINT_SPACING = 2.5
 HUB_RADIUS = 0.32  # of the disc that stands for a joint
 LANE = 0.17  # between tendons on one side of a joint
-FLAT = 0.25  # how far before and behind a joint a tendon runs straight
-EDGE_BEFORE = 0.62  # how far before a joint its edge stands
+FLAT_BEFORE = 0.75  # how far before and behind a joint a tendon runs straight
+FLAT_BEHIND = 0.3
+EDGE_BEFORE = 0.6  # how far before a joint its edge stands
 MARGIN = 0.2  # of the finger's outline around its tendons
 SPRING_LENGTH = 0.9
 BASE = 1.9  # from the springs to the first joint
@@ -29,20 +30,19 @@ Points = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class DrawnJoint:
-    """A joint at (x, 0) with its disc; half_height: of the finger's outline there."""
+    """A joint at (x, 0) with its disc."""
 
     name: str
     x: float
     radius: float
-    half_height: float
 
 
 @dataclass(frozen=True)
 class DrawnTendon:
     """A tendon from its spring to where it ends.
 
-    line, spring: [k, 2] points. pulleys: [k, 2] where there is pulley friction. edges, varying_edges: [k, 2] where there
-    is friction before a joint, without and with working points.
+    line, spring: [k, 2] points. pulleys: [k, 2] where there is pulley friction. edges, varying_edges: [k, 2] where
+    there is friction before a joint, without and with working points.
     """
 
     name: str
@@ -56,11 +56,14 @@ class DrawnTendon:
 
 @dataclass(frozen=True)
 class FingerDrawing:
-    """links: [n, 2] x of begin and end of the link behind each joint. left, right, height: bounds, −height to height."""
+    """links: [n, 2] x of begin and end of the link behind each joint. outline: [k, 3] x, lower and upper side of the
+    finger around its tendons. left, right, height: bounds, −height to height.
+    """
 
     name: str
     joints: list[DrawnJoint]
     links: Points
+    outline: Points
     tendons: list[DrawnTendon]
     left: float
     right: float
@@ -69,14 +72,13 @@ class FingerDrawing:
 
 def finger_drawing(description: FingerDescription) -> FingerDrawing:
     """Geometry of a finger of up to 16 joints and 64 tendons."""
-    R = np.array(description.moment_arms)
+    R: Points = np.array(description.moment_arms)
     heights = _heights(R)
-    x = JOINT_SPACING * np.arange(R.shape[1])
+    x: Points = JOINT_SPACING * np.arange(float(R.shape[1]))
     starts = _starts(heights)
-    outline = np.maximum(np.abs(heights).max(axis=0, initial=0.0), HUB_RADIUS) + MARGIN
-    joints = [
-        DrawnJoint(name, float(x[j]), HUB_RADIUS, float(outline[j])) for j, name in enumerate(description.joint_names)
-    ]
+    tip = float(x[-1] + 0.75 * JOINT_SPACING)
+    outline = _outline(x, heights, tip)
+    joints = [DrawnJoint(name, float(x[j]), HUB_RADIUS) for j, name in enumerate(description.joint_names)]
     tendons = [
         _tendon(tendon, name, x, R[i], heights[i], float(starts[i]))
         for i, (tendon, name) in enumerate(zip(description.data["tendons"], description.tendon_names, strict=True))
@@ -84,12 +86,26 @@ def finger_drawing(description: FingerDescription) -> FingerDrawing:
     return FingerDrawing(
         name=description.name,
         joints=joints,
-        links=np.column_stack([x, np.append(x[1:], x[-1] + 0.75 * JOINT_SPACING)]),
+        links=np.column_stack([x, np.append(x[1:], tip - 2.0 * MARGIN)]),
+        outline=outline,
         tendons=tendons,
         left=-BASE - SPRING_LENGTH,
-        right=float(x[-1] + 0.9 * JOINT_SPACING),
-        height=float(max(outline.max(), np.abs(starts).max() + LABEL_SPACING)),
+        right=tip + MARGIN,
+        height=float(max(np.abs(outline[:, 1:]).max(), np.abs(starts).max() + LABEL_SPACING)),
     )
+
+
+def _outline(x: Points, heights: Points, tip: float) -> Points:
+    """[k, 3] x, lower and upper side: around the tendons at each joint, smooth between, round at the tip."""
+    upper = np.maximum(heights.max(axis=0), HUB_RADIUS) + MARGIN
+    lower = np.minimum(heights.min(axis=0), -HUB_RADIUS) - MARGIN
+    at = np.linspace(x[0] - FLAT_BEFORE - 0.1, tip, 40 * len(x) + 40)
+    sides = [at]
+    for side in (lower, upper):
+        line = _smooth_line(x, side, float(side[0]))
+        bend = np.clip(1.0 - 2.0 * (tip - at) / (tip - x[-1]), 0.0, 1.0)
+        sides.append(np.interp(at, line[:, 0], line[:, 1]) * np.sqrt(1.0 - bend * bend))
+    return np.column_stack(sides)
 
 
 def _last_joints(R: Points) -> NDArray[np.intp]:
@@ -154,7 +170,7 @@ def _points(pairs: list[tuple[float, float]]) -> Points:
 
 def _smooth_line(x: Points, y: Points, start: float) -> Points:
     """[k, 2] from the spring over all joints: straight at each, smooth between."""
-    knots_x = np.concatenate([[-BASE], np.column_stack([x - FLAT, x + FLAT]).ravel()])
+    knots_x = np.concatenate([[-BASE], np.column_stack([x - FLAT_BEFORE, x + FLAT_BEHIND]).ravel()])
     knots_y = np.concatenate([[start], np.repeat(y, 2)])
     share = np.linspace(0.0, 1.0, 24)
     ease = share * share * (3.0 - 2.0 * share)

@@ -46,7 +46,7 @@ def compensation_figure(
     recording: `time` [N], `tendon_force` [N, m], maybe `external_torque` [N, n] and `contact` [N].
     outputs: those of `native.Finger.run`, [N, n] and [N].
     """
-    largest = np.argsort(-np.abs(outputs["compensated_torque"]).max(axis=0), kind="stable")[:most_joints]
+    largest = np.argsort(-np.abs(outputs["compensated_torque"]).max(axis=0), kind="stable")[:most_joints].tolist()
     thresholds = contact_thresholds(description, recording["tendon_force"])
     time = recording["time"]
     labels, external = recording.get("contact"), recording.get("external_torque")
@@ -81,5 +81,5 @@ def contact_thresholds(description: FingerDescription, tendon_force: Array) -> A
 def intervals(time: Array, flags: Array) -> list[Interval]:
     """Begin and end (s) of each stretch of samples whose flag is set; a stretch lasts until the next sample."""
     steps = np.diff(np.concatenate([[0], np.asarray(flags).astype(bool).astype(int), [0]]))
-    begins, ends = np.flatnonzero(steps > 0), np.flatnonzero(steps < 0)
-    return [(float(time[a]), float(time[min(b, len(time) - 1)])) for a, b in zip(begins, ends, strict=True)]
+    begins, ends = np.flatnonzero(steps > 0), np.minimum(np.flatnonzero(steps < 0), len(time) - 1)
+    return [(float(time[a]), float(time[b])) for a, b in zip(begins, ends, strict=True)]

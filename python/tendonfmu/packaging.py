@@ -7,9 +7,7 @@ from __future__ import annotations
 
 import importlib.util
 import io
-import os
 import re
-import tempfile
 import unicodedata
 import zipfile
 from collections.abc import Mapping
@@ -22,6 +20,7 @@ from tendonfmu import native
 from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.errors import InputError
 from tendonfmu.model_variables import VariableTable, describe_model, read_table
+from tendonfmu.whole_file import whole_file
 
 if TYPE_CHECKING:
     from importlib.abc import Traversable
@@ -31,9 +30,46 @@ BINARY_STEM = "tendonfmu"
 
 # A model identifier names files and C functions: no words that a compiler or a file system keeps to itself.
 RESERVED = frozenset(
-    "auto break case char const continue default do double else enum extern float for goto if inline int long register "
-    "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while "
-    "con prn aux nul".split()
+    [
+        "auto",
+        "break",
+        "case",
+        "char",
+        "const",
+        "continue",
+        "default",
+        "do",
+        "double",
+        "else",
+        "enum",
+        "extern",
+        "float",
+        "for",
+        "goto",
+        "if",
+        "inline",
+        "int",
+        "long",
+        "register",
+        "restrict",
+        "return",
+        "short",
+        "signed",
+        "sizeof",
+        "static",
+        "struct",
+        "switch",
+        "typedef",
+        "union",
+        "unsigned",
+        "void",
+        "volatile",
+        "while",
+        "con",
+        "prn",
+        "aux",
+        "nul",
+    ]
 )
 
 
@@ -45,7 +81,8 @@ def build_fmu(description_path: Path, output_path: Path, *, binaries: Path | Non
     """
     description = read_finger(description_path)
     archive = pack(members(description, binaries=binaries))
-    write_whole(output_path, archive)
+    with whole_file(output_path) as file:
+        file.write_bytes(archive)
     return output_path
 
 
@@ -71,7 +108,7 @@ def members(description: FingerDescription, *, binaries: Path | None = None) -> 
     from tendonfmu.drawing import finger_drawing
     from tendonfmu.plots import draw_finger
 
-    table = read_table(_package_file("model_description", "variables.json").read_text(encoding="utf-8"))
+    table = read_table(_package_file("model_description/variables.json").read_text(encoding="utf-8"))
     identifier = model_identifier(description.name)
     sources = _sources()
     model = describe_model(description, table)
@@ -100,13 +137,13 @@ def members(description: FingerDescription, *, binaries: Path | None = None) -> 
 # --- parts -----------------------------------------------------------------------------------------------------------
 
 
-def _package_file(*parts: str) -> Traversable:
-    return files("tendonfmu").joinpath(*parts)
+def _package_file(path: str) -> Traversable:
+    return files("tendonfmu") / path
 
 
 def _variable_generator() -> ModuleType:
     """generate_variables.py, which wrote the table's salt into the C header."""
-    path = Path(str(_package_file("model_description", "generate_variables.py")))
+    path = Path(str(_package_file("model_description/generate_variables.py")))
     spec = importlib.util.spec_from_file_location("tendonfmu_generate_variables", path)
     if spec is None or spec.loader is None:
         raise InputError(f"{path}: not found; expected in the installed package")
@@ -136,7 +173,7 @@ def _binaries(folder: Path | None, identifier: str) -> dict[str, bytes]:
 def _render_xml(context: Mapping[str, Any]) -> bytes:
     import jinja2
 
-    template = _package_file("model_description", "modelDescription.xml.jinja").read_text(encoding="utf-8")
+    template = _package_file("model_description/modelDescription.xml.jinja").read_text(encoding="utf-8")
     environment = jinja2.Environment(undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
     return environment.from_string(template).render(context).encode()
 
@@ -170,24 +207,3 @@ def pack(content: Mapping[str, bytes]) -> bytes:
             member.external_attr = (0o755 if path.startswith("binaries/") else 0o644) << 16
             archive.writestr(member, content[path])
     return buffer.getvalue()
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Writes a file so that it appears whole or not at all. Raises InputError."""
-    temporary = None
-    try:
-        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as file:
-            temporary = Path(file.name)
-            file.write(content)
-        temporary.chmod(0o666 & ~_umask())
-        os.replace(temporary, path)
-    except OSError as failed:
-        if temporary is not None:
-            temporary.unlink(missing_ok=True)
-        raise InputError(f"{path}: {failed.strerror}; expected a file that can be written") from None
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

@@ -5,8 +5,6 @@ Colours are those of Okabe and Ito, which colour-blind readers tell apart.
 
 from __future__ import annotations
 
-import os
-import tempfile
 from pathlib import Path
 from typing import IO
 
@@ -14,15 +12,16 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle, Patch
+from matplotlib.patches import Circle
 
 from tendonfmu.drawing import DrawnTendon, FingerDrawing
 from tendonfmu.figure_data import CompensationFigure, Interval, JointCurves
+from tendonfmu.whole_file import whole_file
 
 BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION = "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00"
 DARK, GREY, LIGHT, SKIN = "#222222", "#8A8A8A", "#D5D8DC", "#F4F1EC"
 EDGE_RED = "#CC1F1A"
-TENDON_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, "#5A5A5A")
+TENDON_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, "#5A5A5A", "#332288", "#999933")
 
 Target = Path | IO[bytes]
 
@@ -30,35 +29,28 @@ Target = Path | IO[bytes]
 def _save(figure: Figure, target: Target, dpi: int) -> None:
     """PNG without a date or version in it: the same drawing, the same bytes. A file appears whole or not at all."""
     FigureCanvasAgg(figure)
-    if not isinstance(target, Path):
+    if isinstance(target, Path):
+        with whole_file(target) as partial:
+            figure.savefig(partial, format="png", dpi=dpi, facecolor="white", metadata={"Software": None})
+    else:
         figure.savefig(target, format="png", dpi=dpi, facecolor="white", metadata={"Software": None})
-        return
-    handle, partial = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            _save(figure, file, dpi)
-        Path(partial).chmod(0o644)
-        os.replace(partial, target)
-    except BaseException:
-        Path(partial).unlink(missing_ok=True)
-        raise
 
 
 # --- routing of a finger ---------------------------------------------------------------------------------------------
 
 
 def draw_finger(drawing: FingerDrawing, target: Target) -> None:
-    """Routing drawing as PNG: links, joints, tendons over and under them, pulleys, edges in red (the paper's fig. 3)."""
+    """Routing drawing as PNG: links, joints, tendons over and under them, pulleys, edges (red), as in fig. 3."""
     longest = max(len(tendon.name) for tendon in drawing.tendons)
     labels = 0.5 + 0.115 * longest  # room for names on the left, in drawing units
-    width, height = drawing.right - drawing.left + labels, 2.0 * drawing.height + 1.9
-    scale = min(max(10.0 / width, 0.42), 1.15)
+    width, height = drawing.right - drawing.left + labels, 2.0 * drawing.height + 1.6
+    scale = min(max(10.0 / width, 0.48), 1.15)
     figure = Figure(figsize=(width * scale, height * scale))
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
     axes.set_aspect("equal")
     axes.set_xlim(drawing.left - labels, drawing.right)
-    axes.set_ylim(-drawing.height - 0.95, drawing.height + 0.95)
+    axes.set_ylim(-drawing.height - 0.8, drawing.height + 0.8)
     size = 72.0 * scale * 0.145
     _draw_skeleton(axes, drawing, size)
     for i, tendon in enumerate(drawing.tendons):
@@ -68,14 +60,15 @@ def draw_finger(drawing: FingerDrawing, target: Target) -> None:
 
 
 def _draw_skeleton(axes: Axes, drawing: FingerDrawing, size: float) -> None:
+    x, lower, upper = drawing.outline.T
+    axes.fill_between(x, lower, upper, facecolor=SKIN, edgecolor=LIGHT, linewidth=0.1 * size, zorder=0.5)
     for begin, end in drawing.links:
         axes.plot([begin, end], [0.0, 0.0], color=LIGHT, linewidth=size * 1.6, solid_capstyle="round", zorder=1)
     for number, joint in enumerate(drawing.joints, start=1):
-        axes.add_patch(
-            Circle((joint.x, 0.0), joint.half_height, facecolor=SKIN, edgecolor=LIGHT, linewidth=0.1 * size, zorder=0.5)
-        )
-        axes.add_patch(Circle((joint.x, 0.0), joint.radius, facecolor="white", edgecolor=DARK, linewidth=0.11 * size, zorder=2))
-        axes.text(joint.x, 0.0, str(number), ha="center", va="center", fontsize=size, color=DARK, zorder=3)
+        disc = Circle((joint.x, 0.0), joint.radius, facecolor="white", edgecolor=DARK, linewidth=0.11 * size, zorder=2)
+        axes.add_patch(disc)
+        label = axes.text(joint.x, 0.0, str(number), ha="center", va="center_baseline", fontsize=size, zorder=8)
+        label.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 0.1 * size})
         axes.text(joint.x, drawing.height + 0.25, joint.name, ha="center", va="bottom", fontsize=size, color=DARK)
 
 
@@ -86,10 +79,22 @@ def _draw_tendon(axes: Axes, tendon: DrawnTendon, colour: str, left: float, size
     axes.plot(*tendon.line.T, color=colour, linewidth=thin, linestyle=style, zorder=4)
     axes.plot(*tendon.line[-1], marker="s", markersize=0.38 * size, color=colour, zorder=5)
     axes.plot(
-        *tendon.pulleys.T, "o", markersize=0.52 * size, color="white", markeredgecolor=colour, markeredgewidth=thin, zorder=6
+        *tendon.pulleys.T,
+        "o",
+        markersize=0.52 * size,
+        color="white",
+        markeredgecolor=colour,
+        markeredgewidth=thin,
+        zorder=6,
     )
     axes.plot(
-        *tendon.edges.T, "o", markersize=0.44 * size, color="white", markeredgecolor=EDGE_RED, markeredgewidth=thin, zorder=7
+        *tendon.edges.T,
+        "o",
+        markersize=0.44 * size,
+        color="white",
+        markeredgecolor=EDGE_RED,
+        markeredgewidth=thin,
+        zorder=7,
     )
     axes.plot(*tendon.varying_edges.T, "o", markersize=0.52 * size, color=EDGE_RED, zorder=7)
     axes.text(left - 0.12, tendon.spring[0, 1], tendon.name, ha="right", va="center", fontsize=0.9 * size, color=DARK)
@@ -97,18 +102,28 @@ def _draw_tendon(axes: Axes, tendon: DrawnTendon, colour: str, left: float, size
 
 def _draw_finger_legend(axes: Axes, drawing: FingerDrawing, size: float) -> None:
     def mark(face: str, edge: str, label: str) -> Line2D:
-        return Line2D([], [], linestyle="", marker="o", color=face, markeredgecolor=edge, markersize=0.55 * size, label=label)
+        return Line2D(
+            [], [], linestyle="", marker="o", color=face, markeredgecolor=edge, markersize=0.55 * size, label=label
+        )
 
-    handles = [
-        mark("white", GREY, "pulley friction"),
-        mark("white", EDGE_RED, "edge friction"),
-        mark(EDGE_RED, EDGE_RED, "edge friction varying with the angle"),
-        Line2D([], [], linestyle="", marker="s", color=GREY, markersize=0.4 * size, label="end of a tendon"),
-    ]
-    if any(tendon.bidirectional for tendon in drawing.tendons):
+    tendons = drawing.tendons
+    handles = [Line2D([], [], linestyle="", marker="s", color=GREY, markersize=0.4 * size, label="end of a tendon")]
+    if any(len(tendon.pulleys) for tendon in tendons):
+        handles.append(mark("white", GREY, "pulley friction"))
+    if any(len(tendon.edges) for tendon in tendons):
+        handles.append(mark("white", EDGE_RED, "edge friction"))
+    if any(len(tendon.varying_edges) for tendon in tendons):
+        handles.append(mark(EDGE_RED, EDGE_RED, "edge friction that varies with the angle"))
+    if any(tendon.bidirectional for tendon in tendons):
         handles.append(Line2D([], [], color=GREY, linestyle=(0, (5, 2)), label="cable loop"))
+    columns = 2 if len(drawing.joints) == 1 else len(handles)
     axes.legend(
-        handles=handles, loc="lower center", ncols=len(handles), frameon=False, fontsize=0.85 * size, handletextpad=0.4,
+        handles=handles,
+        loc="lower center",
+        ncols=columns,
+        frameon=False,
+        fontsize=0.85 * size,
+        handletextpad=0.4,
         borderaxespad=0.2,
     )
 
@@ -120,14 +135,16 @@ def draw_compensation(data: CompensationFigure, target: Target) -> None:
     """Torques measured, predicted and compensated, and contacts found, as PNG (the paper's figs. 6 and 8)."""
     rows = 2 * len(data.joints)
     figure = Figure(figsize=(16.0, 2.6 * rows + 1.6), layout="constrained")
-    grid = figure.subplots(rows + 1, 1, sharex=True, squeeze=False, height_ratios=[1.0, 0.9] * len(data.joints) + [0.36])
+    grid = figure.subplots(
+        rows + 1, 1, sharex=True, squeeze=False, height_ratios=[1.0, 0.9] * len(data.joints) + [0.36]
+    )
     panels = [row[0] for row in grid]
     for k, joint in enumerate(data.joints):
         _draw_torques(panels[2 * k], data, joint)
         _draw_compensated(panels[2 * k + 1], data, joint)
     _draw_contacts(panels[-1], data)
-    figure.suptitle(f"{data.title}: friction compensation", fontsize=15, color=DARK)
-    panels[-1].set_xlabel("time (s)")
+    figure.suptitle(f"{data.title}: friction compensation", fontsize=17, color=DARK)
+    panels[-1].set_xlabel("time (s)", fontsize=13)
     panels[-1].set_xlim(data.time[0], data.time[-1])
     figure.align_ylabels(panels)
     _save(figure, target, 100)
@@ -137,10 +154,13 @@ def _clean(axes: Axes) -> None:
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(axis="y", color="#E6E6E6", linewidth=0.8)
     axes.set_axisbelow(True)
+    axes.tick_params(labelsize=12)
 
 
 def _legend(axes: Axes, entries: int) -> None:
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=entries, frameon=False, fontsize=11, borderaxespad=0.0)
+    axes.legend(
+        loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=entries, frameon=False, fontsize=13, borderaxespad=0.0
+    )
 
 
 def _shade(axes: Axes, found: list[Interval]) -> None:
@@ -152,8 +172,8 @@ def _draw_torques(axes: Axes, data: CompensationFigure, joint: JointCurves) -> N
     _clean(axes)
     axes.plot(data.time, joint.measured, color=DARK, linewidth=1.1, label="measured joint torque")
     axes.plot(data.time, joint.predicted, color=SKY, linewidth=1.4, label="predicted friction and bias")
-    axes.set_ylabel("torque (N·m)")
-    axes.set_title(joint.name, loc="left", fontsize=12.5, fontweight="bold", color=DARK)
+    axes.set_ylabel("torque (N·m)", fontsize=13)
+    axes.set_title(joint.name, loc="left", fontsize=14, fontweight="bold", color=DARK)
     _legend(axes, 2)
 
 
@@ -161,11 +181,11 @@ def _draw_compensated(axes: Axes, data: CompensationFigure, joint: JointCurves) 
     _clean(axes)
     _shade(axes, data.found)
     if joint.external is not None:
-        axes.plot(data.time, joint.external, color=GREEN, linewidth=2.2, alpha=0.75, label="external torque (sensor)")
+        axes.plot(data.time, joint.external, color=GREEN, linewidth=3.4, alpha=0.55, label="external torque (sensor)")
     axes.plot(data.time, joint.compensated, color=BLUE, linewidth=1.1, label="compensated torque")
     axes.plot(data.time, joint.threshold, color=VERMILION, linewidth=1.1, linestyle="--", label="contact threshold")
     axes.plot(data.time, -joint.threshold, color=VERMILION, linewidth=1.1, linestyle="--")
-    axes.set_ylabel("torque (N·m)")
+    axes.set_ylabel("torque (N·m)", fontsize=13)
     _legend(axes, 3)
 
 
@@ -177,7 +197,7 @@ def _draw_contacts(axes: Axes, data: CompensationFigure) -> None:
         axes.broken_barh([(begin, end - begin) for begin, end in found], (-row - 0.36, 0.72), color=colour, linewidth=0)
     axes.set_ylim(-len(rows) + 0.4, 0.6)
     axes.set_yticks([-row for row in range(len(rows))], [f"{name}  " for name, _, _ in rows])
+    axes.tick_params(labelsize=12)
     axes.tick_params(axis="y", length=0)
-    axes.set_ylabel("contact")
+    axes.set_ylabel("contact", fontsize=13)
     axes.spines[["top", "right", "left"]].set_visible(False)
-    axes.legend(handles=[Patch(color=colour, label=name) for name, _, colour in rows]).set_visible(False)
