@@ -148,7 +148,7 @@ class _Run:
         self._callbacks.logger = fmi2CallbackLoggerTYPE(log)
         self._callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
         self._callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
-        self._slave.instantiate(callbacks=self._callbacks)
+        self._slave.instantiate(callbacks=self._callbacks, loggingOn=True)
 
     def _initialise(self, start: float, source: int) -> None:
         self._slave.setupExperiment(startTime=start)
