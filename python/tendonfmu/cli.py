@@ -104,11 +104,11 @@ def run(
     ] = 1,
 ) -> None:
     """Run the FMU over a recording: time and all outputs, one row per sample, each at its own sample's time."""
-    from tendonfmu.recording import FORMATS, read_recording, write_table
+    from tendonfmu.recording import read_recording
     from tendonfmu.running import run_model
+    from tendonfmu.tables import check_format, write_table
 
-    if output.suffix.lower() not in FORMATS:
-        raise InputError(f"{output}: unknown format {output.suffix!r}; expected .csv or .parquet")
+    check_format(output)
     samples = read_recording(recording)
     with _progress() as bar:
         task = bar.add_task("samples", total=len(samples))
@@ -130,7 +130,7 @@ def convert(
 ) -> None:
     """Turn a third-party recording into one of ours."""
     from tendonfmu.converters import converter
-    from tendonfmu.recording import write_table
+    from tendonfmu.tables import write_table
 
     table = converter(source)(file, radius)
     write_table(output, table)

@@ -18,8 +18,9 @@ from tendonfmu.errors import InputError
 from tendonfmu.figure_data import Interval, compensation_figure, intervals
 from tendonfmu.fmu import run_fmu
 from tendonfmu.packaging import build_fmu
-from tendonfmu.recording import Recording, read_recording, write_table
+from tendonfmu.recording import Recording, read_recording
 from tendonfmu.signals import NUMBERS
+from tendonfmu.tables import write_table
 from tendonfmu.whole_file import whole_file
 
 FINGER = "index_finger.json"
