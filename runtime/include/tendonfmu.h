@@ -51,10 +51,11 @@ const char* tendonfmu_version(void);
 
 /* --- Creation -------------------------------------------------------------------------------------------------- */
 
-/* Checks a model image: a flat, versioned, checksummed block of little-endian numbers (core/model_image.h).
+/* Checks header, checksum and shape of a model image: a flat, versioned block of little-endian numbers
+ * (core/model_image.h). Its values are checked by tendonfmu_place() and tendonfmu_create(), which have room for them.
  *   image         [image_size] bytes, any alignment, not modified
  *   message       [message_size] receives one line when the image is refused; may be NULL when message_size is 0
- * Returns TENDONFMU_OK or TENDONFMU_BAD_IMAGE / TENDONFMU_BAD_ARGUMENT. */
+ * Returns TENDONFMU_OK, TENDONFMU_BAD_IMAGE or TENDONFMU_BAD_ARGUMENT. */
 tendonfmu_status tendonfmu_check_image(const void* image, size_t image_size, char* message, size_t message_size);
 
 /* Bytes of memory that a finger of this image needs; 0 when the image is refused. */
@@ -62,7 +63,9 @@ size_t tendonfmu_memory_size(const void* image, size_t image_size);
 
 /* Places a finger into memory of the caller: no allocation, for microcontrollers and real-time start-up.
  *   memory        [memory_size >= tendonfmu_memory_size()] bytes, any alignment; must not be moved while in use
- * The image is copied and may be freed afterwards. Returns NULL when refused, with the reason in message. */
+ * The image is copied and may be freed afterwards. Creation, tendonfmu_reset(), restoring a state with other parameters
+ * and writing moment arms use up to 32 KiB of stack; every other call less than 8 KiB. Returns NULL when refused, with
+ * the reason in message. */
 tendonfmu_finger* tendonfmu_place(void* memory, size_t memory_size, const void* image, size_t image_size, char* message,
                                   size_t message_size);
 
