@@ -31,16 +31,29 @@ FingerFile = Annotated[Path, typer.Argument(metavar="FINGER.json", help="finger 
 def main() -> None:
     """Entry point: every refusal is one line on standard error and exit status 2."""
     try:
-        app()
-    except InputError as refused:
-        print(f"tendonfmu: {refused}", file=sys.stderr)
-        sys.exit(2)
-    except BrokenPipeError:
-        sys.stderr.close()
-        sys.exit(0)
-    except KeyboardInterrupt:
-        print("tendonfmu: interrupted; no file was left half written", file=sys.stderr)
+        status = app(standalone_mode=False)
+    except (InputError, OSError) as refused:
+        if isinstance(refused, BrokenPipeError):  # the reader of standard output has seen enough
+            sys.stderr.close()
+            sys.exit(0)
+        _refuse(str(refused))
+    except (KeyboardInterrupt, typer.Abort):
+        _say("tendonfmu: interrupted; no file was left half written")
         sys.exit(130)
+    except Exception as refused:  # bad usage; the class has moved between versions of typer
+        if not hasattr(refused, "format_message"):
+            raise
+        if type(refused).__name__ == "NoArgsIsHelpError":
+            _say(refused.format_message())
+            sys.exit(2)
+        _refuse(refused.format_message())
+    else:
+        sys.exit(status if isinstance(status, int) else 0)
+
+
+def _refuse(reason: str) -> None:
+    _say(f"tendonfmu: {' '.join(reason.split())}")
+    sys.exit(2)
 
 
 def _show_version(wanted: bool) -> None:
@@ -69,7 +82,7 @@ def check(finger: FingerFile) -> None:
         found = read_finger(finger)
     except InputError as refused:
         # the question was whether the description is sound; a file that cannot be read is bad input
-        print(f"tendonfmu: {refused}", file=sys.stderr)
+        _say(f"tendonfmu: {refused}")
         raise typer.Exit(1 if finger.is_file() else 2) from None
     for line in found.summary():
         print(line)
