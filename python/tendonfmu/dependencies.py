@@ -2,7 +2,8 @@
 
 They follow from the finger's structure: which friction exists, which tendon passes which joint (a moment arm of 0 in
 the description is a tendon that does not pass), which angles R⁺ takes from which tendon. They hold for all three
-kinematics sources and all values of the tunable parameters. Only numbers that structure cannot rule out count.
+kinematics sources and all values of the tunable parameters, with branch decisions frozen (contract section 5): that a
+contact elsewhere stops the bias of a joint makes no dependency.
 """
 
 from __future__ import annotations
@@ -118,43 +119,42 @@ def _torque(structure: Structure, j: int) -> Motion:
         if extension["joint"] == j + 1:
             motion.add(Motion({j}, set() if extension["effect"] in ANGLE_ONLY else {j}))
     for i in range(structure.tendons):
-        # losses act over this tendon's moment arm (eq. 10), and on the load on the joint's bearing (Σ f_B of eq. 8)
-        if structure.passes[i, j] or joint.get("load_friction") is not None:
-            motion.add(_along_tendon(structure, i, j))
+        if structure.passes[i, j]:  # losses up to this joint's pulley, over the moment arm (eq. 10)
+            motion.add(_along_tendon(structure, i, j, j))
+        if joint.get("load_friction") is not None:  # f_B before this joint's pulley, in Σ f_B
+            motion.add(_along_tendon(structure, i, j, j - 1))
     return motion
 
 
-def _along_tendon(structure: Structure, i: int, last: int) -> Motion:
-    """What the losses of tendon i up to its force before joint `last` follow from: edges 0..last, pulleys before it."""
+def _along_tendon(structure: Structure, i: int, last_edge: int, last_pulley: int) -> Motion:
+    """What the losses of tendon i at the edges and pulleys up to these joints follow from."""
     motion = Motion()
-    for before, beyond, depends_on_angle in _effects(structure, i):
-        if before > last:
+    for is_edge, j, varies_with_angle in _effects(structure, i):
+        if j > (last_edge if is_edge else last_pulley):
             continue
-        moving = {j for j in range(beyond, structure.joints) if structure.passes[i, j]}
+        # an edge moves with ẋ_j, a pulley with ẋ_{j+1}
+        moving = {k for k in range(j if is_edge else j + 1, structure.joints) if structure.passes[i, k]}
         if not moving:  # ẋ = 0 whatever the joints do: this effect never acts
             continue
         motion.velocities |= moving
-        if depends_on_angle:
-            motion.angles.add(before - 1)
+        if varies_with_angle:
+            motion.angles.add(j - 1)
     return motion
 
 
-def _effects(structure: Structure, i: int) -> Iterator[tuple[int, int, bool]]:
-    """(position, first joint of its ẋ, has working points) of each effect of a tendon.
-
-    A pulley moves with ẋ_{j+1} and counts from the joint behind it, where its loss is first felt.
-    """
+def _effects(structure: Structure, i: int) -> Iterator[tuple[bool, int, bool]]:
+    """(edge or pulley, its joint, whether it varies with the angle of the joint before) of each effect of a tendon."""
     tendon = structure.data["tendons"][i]
     for j, law in enumerate(tendon.get("pulley_friction") or []):
-        if law is not None and j + 1 < structure.joints:
-            yield j + 1, j + 1, False
+        if law is not None:
+            yield False, j, False
     for j, edge in enumerate(tendon.get("edge_friction") or []):
         if edge is not None:
-            yield j, j, j > 0 and len(edge.get("angles") or []) > 1
+            yield True, j, j > 0 and len(edge.get("angles") or []) > 1
 
 
 def _slack(structure: Structure, i: int) -> dict[str, list[int]]:
     """A cable loop is never slack; the others by their own force and all their losses."""
     if structure.data["tendons"][i].get("bidirectional"):
         return {}
-    return _inputs(structure, _along_tendon(structure, i, structure.joints - 1), {i})
+    return _inputs(structure, _along_tendon(structure, i, structure.joints, structure.joints), {i})

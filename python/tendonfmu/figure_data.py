@@ -38,6 +38,29 @@ class CompensationFigure:
     labelled: list[Interval] | None
 
 
+@dataclass(frozen=True)
+class ReferenceCurves:
+    """One recording against its reference sensor. time: [N] s; the rest: [N] N·m, of one joint."""
+
+    title: str
+    time: Array
+    measured: Array
+    compensated: Array
+    external: Array
+
+
+@dataclass(frozen=True)
+class ReferenceFigure:
+    """Recordings drawn, and the rms error (N·m) of all of them: names [r], with and without the friction model [r]."""
+
+    title: str
+    drawn: list[ReferenceCurves]
+    names: list[str]
+    error: Array
+    error_without: Array
+    limit: float
+
+
 def compensation_figure(
     description: FingerDescription, recording: Mapping[str, Array], outputs: Mapping[str, Array], most_joints: int = 2
 ) -> CompensationFigure:

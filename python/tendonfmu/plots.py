@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
 from tendonfmu.drawing import DrawnTendon, FingerDrawing
-from tendonfmu.figure_data import CompensationFigure, Interval, JointCurves
+from tendonfmu.figure_data import CompensationFigure, Interval, JointCurves, ReferenceCurves, ReferenceFigure
 from tendonfmu.whole_file import whole_file
 
 BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION = "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00"
@@ -201,3 +201,49 @@ def _draw_contacts(axes: Axes, data: CompensationFigure) -> None:
     axes.tick_params(axis="y", length=0)
     axes.set_ylabel("contact", fontsize=13)
     axes.spines[["top", "right", "left"]].set_visible(False)
+
+
+# --- compensated torque against a reference sensor -------------------------------------------------------------------
+
+
+def draw_reference(data: ReferenceFigure, target: Target) -> None:
+    """Compensated torque over the reference sensor's for some recordings, and the rms errors of all, as PNG."""
+    rows = len(data.drawn)
+    figure = Figure(figsize=(15.0, 2.9 * rows + 0.8), layout="constrained")
+    grid = figure.add_gridspec(rows, 2, width_ratios=[2.3, 1.0])
+    panels = [figure.add_subplot(grid[row, 0]) for row in range(rows)]
+    for axes, curves in zip(panels, data.drawn, strict=True):
+        _draw_against_sensor(axes, curves)
+    _legend(panels[0], 3)
+    panels[-1].set_xlabel("time (s)")
+    _draw_errors(figure.add_subplot(grid[:, 1]), data)
+    figure.suptitle(data.title, fontsize=15, color=DARK)
+    figure.align_ylabels(panels)
+    _save(figure, target, 100)
+
+
+def _draw_against_sensor(axes: Axes, curves: ReferenceCurves) -> None:
+    _clean(axes)
+    axes.plot(curves.time, curves.measured, color=GREY, linewidth=0.9, label="measured torque, friction included")
+    axes.plot(curves.time, curves.external, color=GREEN, linewidth=2.2, alpha=0.75, label="external torque (sensor)")
+    axes.plot(curves.time, curves.compensated, color=BLUE, linewidth=1.1, label="compensated torque")
+    axes.set_xlim(curves.time[0], curves.time[-1])
+    axes.set_ylabel("torque (N·m)")
+    axes.set_title(curves.title, loc="left", fontsize=12.5, fontweight="bold", color=DARK)
+
+
+def _draw_errors(axes: Axes, data: ReferenceFigure) -> None:
+    _clean(axes)
+    for errors, shift, colour, label in (
+        (data.error_without, -0.2, LIGHT, "without a friction model"),
+        (data.error, 0.2, BLUE, "compensated"),
+    ):
+        places = [row + shift for row in range(len(errors))]
+        axes.bar(places, errors, width=0.38, color=colour, label=label)
+        for place, error in zip(places, errors, strict=True):
+            axes.text(place, error, f"{1e3 * error:.0f}", ha="center", va="bottom", fontsize=8, color=DARK)
+    axes.axhline(data.limit, color=VERMILION, linestyle="--", linewidth=1.1, label=f"limit {data.limit:g} N·m")
+    axes.set_xticks(range(len(data.names)), data.names)
+    axes.set_xlabel("recording")
+    axes.set_ylabel("rms error (N·m; figures in mN·m)")
+    axes.legend(loc="upper left", frameon=False, fontsize=11)
