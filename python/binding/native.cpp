@@ -1,8 +1,8 @@
 // The C interface as the Python module _native: numpy arrays in and out, one call for a whole recording.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
-#include <nanobind/stl/string.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
@@ -24,8 +24,8 @@ nb::bytes image_from_json(const nb::bytes& json) {
   void* image = nullptr;
   std::size_t size = 0;
   char message[600] = "";
-  const tendonfmu_status status =
-      tendonfmu_image_from_json(static_cast<const char*>(json.data()), json.size(), &image, &size, message, sizeof message);
+  const tendonfmu_status status = tendonfmu_image_from_json(static_cast<const char*>(json.data()), json.size(), &image,
+                                                            &size, message, sizeof message);
   if (status != TENDONFMU_OK) throw nb::value_error(message);
   nb::bytes result(image, size);
   tendonfmu_free_image(image);
@@ -113,10 +113,9 @@ class Finger {
   nb::tuple run(const Times& time, const std::optional<Rows>& force, const std::optional<Rows>& position,
                 const std::optional<Rows>& angle, const std::optional<Rows>& velocity) {
     const std::size_t samples = time.shape(0), n = joints(), m = tendons();
-    const tendonfmu_inputs inputs = {rows(force, samples, m, "tendon_force"),
-                                     rows(position, samples, m, "tendon_position"),
-                                     rows(angle, samples, n, "joint_position"),
-                                     rows(velocity, samples, n, "joint_velocity")};
+    const tendonfmu_inputs inputs = {
+        rows(force, samples, m, "tendon_force"), rows(position, samples, m, "tendon_position"),
+        rows(angle, samples, n, "joint_position"), rows(velocity, samples, n, "joint_velocity")};
     OutputRows outputs(samples, n, m);
     const tendonfmu_outputs view = outputs.view();
     std::size_t done = 0;
@@ -125,7 +124,8 @@ class Finger {
       nb::gil_scoped_release released;
       status = tendonfmu_run(handle_, samples, time.data(), &inputs, &view, &done);
     }
-    if (status != TENDONFMU_OK) throw nb::value_error(("row " + std::to_string(done + 1) + ": " + tendonfmu_last_error(handle_)).c_str());
+    if (status != TENDONFMU_OK)
+      throw nb::value_error(("row " + std::to_string(done + 1) + ": " + tendonfmu_last_error(handle_)).c_str());
     nb::list arrays;
     for (auto& row : outputs.numbers) arrays.append(as_array(std::move(row), {samples, n}));
     arrays.append(as_array(std::move(outputs.flags[0]), {samples, n}));
@@ -165,9 +165,9 @@ class Finger {
                             const char* name) {
     if (!array) return nullptr;
     if (array->shape(0) != samples || array->shape(1) != columns) {
-      throw nb::value_error((std::string(name) + ": expected " + std::to_string(samples) + " x " +
-                             std::to_string(columns) + " numbers")
-                                .c_str());
+      throw nb::value_error(
+          (std::string(name) + ": expected " + std::to_string(samples) + " x " + std::to_string(columns) + " numbers")
+              .c_str());
     }
     return array->data();
   }
