@@ -141,8 +141,10 @@ def test_model_identifier(name: str, identifier: str) -> None:
     assert re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", identifier)
 
 
+@pytest.mark.filterwarnings("error")
 def test_names_of_any_text_survive(packed: Pack) -> None:
-    fmu = packed(TINY | {"name": "für <b>&\"';\ufffe"})
+    joint = TINY["joints"][0] | {"name": "$\\frac{$ 関節 <i>"}
+    fmu = packed(TINY | {"name": "für <b>&\"';\ufffe", "joints": [joint]})
     description = fmpy.read_model_description(str(fmu))
     assert description.modelName == "für <b>&\"';?"
     assert b"<title>f\xc3\xbcr &lt;b&gt;" in members(fmu)["documentation/index.html"]

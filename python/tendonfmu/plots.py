@@ -5,6 +5,7 @@ Colours are those of Okabe and Ito, which colour-blind readers tell apart.
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import IO
 
@@ -13,6 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
+from matplotlib.text import Text
 
 from tendonfmu.drawing import DrawnTendon, FingerDrawing
 from tendonfmu.figure_data import CompensationFigure, Interval, JointCurves, ReferenceCurves, ReferenceFigure
@@ -29,11 +31,15 @@ Target = Path | IO[bytes]
 def _save(figure: Figure, target: Target, dpi: int) -> None:
     """PNG without a date or version in it: the same drawing, the same bytes. A file appears whole or not at all."""
     FigureCanvasAgg(figure)
-    if isinstance(target, Path):
-        with whole_file(target) as partial:
-            figure.savefig(partial, format="png", dpi=dpi, facecolor="white", metadata={"Software": None})
-    else:
-        figure.savefig(target, format="png", dpi=dpi, facecolor="white", metadata={"Software": None})
+    for text in figure.findobj(Text):
+        text.set_parse_math(False)  # a name may hold a $
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph")  # letters that the font lacks are drawn as boxes
+        if isinstance(target, Path):
+            with whole_file(target) as partial:
+                figure.savefig(partial, format="png", dpi=dpi, facecolor="white", metadata={"Software": None})
+        else:
+            figure.savefig(target, format="png", dpi=dpi, facecolor="white", metadata={"Software": None})
 
 
 # --- routing of a finger ---------------------------------------------------------------------------------------------
@@ -214,8 +220,8 @@ def draw_reference(data: ReferenceFigure, target: Target) -> None:
     panels = [figure.add_subplot(grid[row, 0]) for row in range(rows)]
     for axes, curves in zip(panels, data.drawn, strict=True):
         _draw_against_sensor(axes, curves)
-    _legend(panels[0], 3)
     panels[-1].set_xlabel("time (s)")
+    figure.legend(handles=panels[0].get_lines(), loc="outside lower left", ncols=3, frameon=False, fontsize=11)
     _draw_errors(figure.add_subplot(grid[:, 1]), data)
     figure.suptitle(data.title, fontsize=15, color=DARK)
     figure.align_ylabels(panels)
