@@ -43,7 +43,7 @@ def fit(finger: dict[str, Any], recordings: list[dict[str, Array]]) -> Array:
 
     def errors(numbers: Array) -> Array:
         candidate = described(finger, numbers)
-        return np.concatenate([torque_error(run, run_recording(candidate, run)) for run in recordings])
+        return np.asarray(np.concatenate([torque_error(run, run_recording(candidate, run)) for run in recordings]))
 
     # The error is linear in the numbers, so any start will do; the step keeps clear of rounding.
     found = least_squares(errors, x0=[0.05, 0.1, 0.1, 0.0], bounds=(LOWER, UPPER), x_scale=0.1, diff_step=1e-3)

@@ -22,7 +22,10 @@ FAULT = {"07": 16.5}  # s; the instrument jams from 17.08 s on: not friction, le
 
 
 def data_folder() -> Path:
-    """Folder of the text files: $TENDONFMU_DATA, or ../shared/data beside the repository. Raises InputError if absent."""
+    """Folder of the text files, in $TENDONFMU_DATA or in ../shared/data beside the repository.
+
+    Raises InputError if it is absent.
+    """
     root = Path(__file__).resolve().parents[2]
     data = Path(os.environ.get("TENDONFMU_DATA") or root.parent / "shared" / "data")
     folder = data / "davinci_tool" / "Tool_4_Maryland_L_4"
