@@ -94,6 +94,7 @@ def test_plots_computes_nothing() -> None:
         "io",
         "dataclasses",
         "math",
+        "warnings",
     }
     names = set(imports_of(ast.parse((PACKAGE / "plots.py").read_text(encoding="utf-8"))))
     assert {name.split(".")[0] for name in names} <= allowed
