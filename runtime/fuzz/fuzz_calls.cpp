@@ -65,8 +65,8 @@ class Session {
   }
 
   double number() {
-    const double odd[] = {0.0,   -0.0, 5e-324, -1e-300, 1.0,      1e9,       1e12,
-                          -1e12, 1e13, 1e15,   1e300,   HUGE_VAL, -HUGE_VAL, NAN};
+    const double odd[] = {0.0,  -0.0, 5e-324, -1e-300, 1.0,    1e9,      1e12,      -1e12,
+                          1e13, 1e15, 1e300,  1e308,   -1e308, HUGE_VAL, -HUGE_VAL, NAN};
     switch (data_.ConsumeIntegralInRange(0, 7)) {
       case 0: return data_.PickValueInArray(odd);
       case 1: return data_.ConsumeFloatingPoint<double>();
@@ -152,7 +152,8 @@ class Session {
       if (data_.ConsumeBool()) {
         bytes[data_.ConsumeIntegralInRange<std::size_t>(0, bytes.size() - 1)] = data_.ConsumeIntegral<unsigned char>();
       } else {
-        store_f64(&bytes[8 * data_.ConsumeIntegralInRange<std::size_t>(5, bytes.size() / 8 - 1)], number());
+        store_f64(&bytes[8 * data_.ConsumeIntegralInRange<std::size_t>(5, bytes.size() / 8 - 1)],
+                  data_.ConsumeBool() ? number() : data_.PickValueInArray({1e308, -1e308, 5e-324}));
       }
     }
     if (data_.ConsumeBool()) {

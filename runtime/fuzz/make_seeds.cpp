@@ -1,10 +1,12 @@
-// make_seeds FOLDER FINGER.json...: writes what the fuzzers begin with, corpus/fuzz_json, corpus/fuzz_image and
-// keys.dict. Besides the given fingers it takes the one of the tests and a least one.
+// make_seeds FOLDER FINGER.json...: writes what the fuzzers begin with: corpus/fuzz_json, corpus/fuzz_image and
+// keys.dict from the given fingers, the one of the tests and a least one; corpus/fuzz_calls, where any bytes are a
+// sequence of calls.
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <set>
 #include <string>
 #include <vector>
@@ -46,6 +48,13 @@ std::string quoted(const std::string& word) {
   return text + "\"\n";
 }
 
+std::string any_bytes(unsigned seed, std::size_t size) {
+  std::mt19937 random(seed);
+  std::string bytes(size, 0);
+  for (char& c : bytes) c = static_cast<char>(random());
+  return bytes;
+}
+
 }  // namespace
 
 int main(int count, char** arguments) {
@@ -61,6 +70,10 @@ int main(int count, char** arguments) {
   const std::filesystem::path folder = arguments[1];
   std::filesystem::create_directories(folder / "corpus" / "fuzz_json");
   std::filesystem::create_directories(folder / "corpus" / "fuzz_image");
+  std::filesystem::create_directories(folder / "corpus" / "fuzz_calls");
+  for (unsigned seed = 0; seed < 40; ++seed) {
+    write(folder / "corpus" / "fuzz_calls" / ("calls" + std::to_string(seed)), any_bytes(seed, 100 * (seed + 1)));
+  }
   std::set<std::string> words = {"null", "true", "\"positive\":", "\"negative\":", "\"noise_time\":", "1e999"};
   for (std::size_t i = 0; i < fingers.size(); ++i) {
     const std::string name = "finger" + std::to_string(i);

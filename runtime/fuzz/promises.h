@@ -72,10 +72,10 @@ inline void failure_has_a_reason(const tendonfmu_finger* finger) {
   PROMISE(std::strchr(reason, '\n') == nullptr);
 }
 
-// Every parameter is in its range and found under its path.
+// Parameters, some from all over the list, are in their ranges and found under their paths.
 inline void parameters_are_sound(const tendonfmu_finger* finger) {
   const std::size_t count = tendonfmu_parameter_count(finger);
-  for (std::size_t i = 0; i < count; i += 1 + count / 50) {
+  for (std::size_t i = 0; i < count; i += 1 + count / 6) {
     char path[80];
     tendonfmu_parameter_info info;
     double value = NAN;
