@@ -97,21 +97,21 @@ static int life_is_sound(const unsigned char* from) {
 
 /* inputs and parameters within their ranges */
 static int values_are_sound(const component* c, const unsigned char* from) {
-  log_text nowhere = {.length = 0};
   size_t at = LIFE_COUNT;
   for (int g = 0; g < GROUP_COUNT; ++g) {
     const variable_group* group = &variable_groups[g];
     const size_t count = group->causality == CAUSALITY_INPUT ? variables_group_count(&c->values, group) : 0;
     for (size_t i = 0; i < count; ++i) {
       const variable input = {group, (variable_group_id)g, i};
-      if (variables_check_real(&nowhere, c->finger, &input, get_number(from, at++))) {
+      if (!variables_accept(c->finger, &input, get_number(from, at++))) {
         return 0;
       }
     }
   }
   for (size_t i = 0; i < c->values.parameter_count; ++i) {
     const variable parameter = {NULL, GROUP_COUNT, i};
-    if (variables_check_real(&nowhere, c->finger, &parameter, get_number(from, at++))) {
+    const double value = get_number(from, at++);
+    if (value != c->values.parameters[i] && !variables_accept(c->finger, &parameter, value)) {
       return 0;
     }
   }

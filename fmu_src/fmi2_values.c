@@ -145,15 +145,16 @@ static int check_writable(component* c, fmu_function function, const variable* f
 }
 
 static int check_real(component* c, fmi2ValueReference reference, double value, variable* found) {
-  log_text text = log_start("fmi2SetReal", "");
   if (find_of_type(c, CALL_SET_REAL, VARIABLE_REAL, reference, found) || check_writable(c, CALL_SET_REAL, found)) {
     return -1;
   }
-  if (variables_check_real(&text, c->finger, found, value)) {
-    component_fail(c, &text);
-    return -1;
+  if (variables_accept(c->finger, found, value)) {
+    return 0;
   }
-  return 0;
+  log_text text = log_start("fmi2SetReal", "");
+  variables_append_refusal(&text, c->finger, found, value);
+  component_fail(c, &text);
+  return -1;
 }
 
 fmi2Status fmi2SetReal(fmi2Component instance, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[]) {

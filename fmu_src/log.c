@@ -46,7 +46,8 @@ void log_append_count(log_text* text, size_t value) {
 }
 
 log_text log_start(const char* function, const char* reason) {
-  log_text text = {.length = 0};
+  log_text text;
+  text.length = 0;
   log_append(&text, function);
   log_append(&text, ": ");
   log_append(&text, reason);

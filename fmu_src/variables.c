@@ -124,11 +124,16 @@ static tendonfmu_parameter_info range_of(const tendonfmu_finger* finger, const v
   return info;
 }
 
-int variables_check_real(log_text* text, const tendonfmu_finger* finger, const variable* found, double value) {
-  const tendonfmu_parameter_info range = range_of(finger, found);
-  if (value <= range.maximum && (range.above_minimum ? value > range.minimum : value >= range.minimum)) {
-    return 0; /* what is not a number compares false */
+int variables_accept(const tendonfmu_finger* finger, const variable* found, double value) {
+  if (found->group) {
+    return value >= found->group->minimum && value <= found->group->maximum; /* what is not a number compares false */
   }
+  const tendonfmu_parameter_info range = range_of(finger, found);
+  return value <= range.maximum && (range.above_minimum ? value > range.minimum : value >= range.minimum);
+}
+
+void variables_append_refusal(log_text* text, const tendonfmu_finger* finger, const variable* found, double value) {
+  const tendonfmu_parameter_info range = range_of(finger, found);
   variables_append_name(text, finger, found);
   log_append(text, " = ");
   log_append_number(text, value);
@@ -138,7 +143,6 @@ int variables_check_real(log_text* text, const tendonfmu_finger* finger, const v
   log_append_number(text, range.maximum);
   log_append(text, " ");
   log_append(text, range.unit);
-  return -1;
 }
 
 tendonfmu_inputs variables_inputs(const variables* v) {

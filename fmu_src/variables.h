@@ -45,8 +45,11 @@ variable_causality variable_causality_of(const variable* found);
 /* Where the Real value lives. Only for variables of type Real. */
 double* variables_real(const variables* v, const variable* found);
 
-/* 0 when the variable may have the value, whatever the others have; otherwise appends what was expected. */
-int variables_check_real(log_text* text, const tendonfmu_finger* finger, const variable* found, double value);
+/* 1 when the Real variable may have the value, whatever the others have. */
+int variables_accept(const tendonfmu_finger* finger, const variable* found, double value);
+
+/* Appends "<name> = <value>: expected <range> <unit>". */
+void variables_append_refusal(log_text* text, const tendonfmu_finger* finger, const variable* found, double value);
 
 /* Views of the blocks for tendonfmu.h. */
 tendonfmu_inputs variables_inputs(const variables* v);
