@@ -95,6 +95,9 @@ static int hand_over_parameters(component* c) {
       c->changed_values[changed++] = c->values.parameters[i];
     }
   }
+  if (!changed) {
+    return 0;
+  }
   return tendonfmu_set_parameters(c->finger, changed, c->changed_indices, c->changed_values) == TENDONFMU_OK ? 0 : -1;
 }
 

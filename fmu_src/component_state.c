@@ -9,7 +9,7 @@ enum { MAGIC = 0, VERSION = 8, SIZE = 16, CHECKSUM = 24, SALT = 32, NUMBERS = 40
 enum { STATE_VERSION = 1 };
 
 /* numbers before the inputs and parameters */
-enum { AT_PHASE, AT_PENDING, AT_STOP_DEFINED, AT_START, AT_STOP, AT_END, LIFE_COUNT };
+enum { AT_PHASE, AT_STOP_DEFINED, AT_START, AT_STOP, AT_END, LIFE_COUNT };
 
 static const unsigned char magic[8] = {'T', 'F', 'M', 'U', 'F', 'M', 'I', '2'};
 
@@ -62,7 +62,6 @@ void component_save(const component* c, void* bytes) {
   const variables* v = &c->values;
   const size_t size = component_state_size(c);
   const double life[LIFE_COUNT] = {[AT_PHASE] = (double)c->phase,
-                                   [AT_PENDING] = c->parameters_pending,
                                    [AT_STOP_DEFINED] = c->stop_time_defined,
                                    [AT_START] = c->start_time,
                                    [AT_STOP] = c->stop_time,
@@ -90,9 +89,9 @@ static int is_flag(double x) {
 
 static int life_is_sound(const unsigned char* from) {
   const double phase = get_number(from, AT_PHASE);
-  return phase >= 0.0 && phase < PHASE_COUNT && phase == floor(phase) && is_flag(get_number(from, AT_PENDING)) &&
-         is_flag(get_number(from, AT_STOP_DEFINED)) && isfinite(get_number(from, AT_START)) &&
-         !isnan(get_number(from, AT_STOP)) && isfinite(get_number(from, AT_END));
+  return phase >= 0.0 && phase < PHASE_COUNT && phase == floor(phase) && is_flag(get_number(from, AT_STOP_DEFINED)) &&
+         isfinite(get_number(from, AT_START)) && !isnan(get_number(from, AT_STOP)) &&
+         isfinite(get_number(from, AT_END));
 }
 
 /* inputs and parameters within their ranges */
@@ -172,7 +171,7 @@ const char* component_restore(component* c, const void* bytes) {
   }
   c->failed = 0;
   c->phase = (fmu_phase)get_number(from, AT_PHASE);
-  c->parameters_pending = get_number(from, AT_PENDING) != 0.0;
+  c->parameters_pending = 1; /* whether they differ from the finger's is found when they are handed over */
   c->stop_time_defined = get_number(from, AT_STOP_DEFINED) != 0.0;
   c->start_time = get_number(from, AT_START);
   c->stop_time = get_number(from, AT_STOP);
