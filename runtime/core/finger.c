@@ -303,7 +303,7 @@ tendonfmu_status tendonfmu_get_parameter_path(const tendonfmu_finger* finger, si
 }
 
 size_t tendonfmu_find_parameter(const tendonfmu_finger* finger, const char* path) {
-  return finger && path ? parameter_find(&finger->shape, path) : 0;
+  return finger && path ? parameter_find(&finger->shape, path) : tendonfmu_parameter_count(finger);
 }
 
 tendonfmu_status tendonfmu_get_parameter_info(const tendonfmu_finger* finger, size_t index,

@@ -160,6 +160,9 @@ static int read_counts(const void* image, size_t image_size, model_shape* shape,
   if (load_u32(bytes + 8) != MODEL_VERSION) {
     return refuse_value(message, "model image of version", load_u32(bytes + 8), "1");
   }
+  if (load_u32(bytes + 12) != 0) {
+    return refuse(message, "damaged model image: its reserved bytes are not zero");
+  }
   if (load_u64(bytes + 16) != image_size) {
     return refuse(message, "model image cut off: its size is not the one in its header");
   }
@@ -285,6 +288,12 @@ static int check_extensions(const unsigned char* image, model_shape* shape, mess
     const effect_type* effect = effect_by_id(load_u32(row));
     double parameters[EFFECT_MAX_PARAMETERS];
     load_doubles(parameters, values, effect->parameter_count);
+    for (uint32_t k = 0; k < effect->parameter_count; ++k) {
+      /* before the effect sizes its memory by them */
+      if (!(parameters[k] >= effect->parameters[k].minimum && parameters[k] <= effect->parameters[k].maximum)) {
+        return refuse_value(message, "model image: parameter out of range in extension", i + 1, "a sound one");
+      }
+    }
     values += 8u * (size_t)effect->parameter_count;
     shape->extension_memory += effect->state_count(parameters);
   }

@@ -166,7 +166,7 @@ size_t tendonfmu_parameter_count(const tendonfmu_finger* finger);
 tendonfmu_status tendonfmu_get_parameter_path(const tendonfmu_finger* finger, size_t index, char* path,
                                               size_t path_size);
 
-/* Index of a path; p when there is none. */
+/* Index of a path; p when there is none or path is NULL, 0 without a finger. */
 size_t tendonfmu_find_parameter(const tendonfmu_finger* finger, const char* path);
 
 tendonfmu_status tendonfmu_get_parameter_info(const tendonfmu_finger* finger, size_t index,
