@@ -22,7 +22,7 @@ struct Recording {
 // All joints move at once with different velocities; about one transition of fig. 5 in a hundred samples.
 Recording motion(int joints, int tendons, std::size_t samples);
 
-// Every joint reverses at every sample: the most work a step can have.
+// Joint positions jump back and forth every other sample: sides, rests and working points change all the time.
 Recording shaking(int joints, int tendons, std::size_t samples);
 
 }  // namespace bench_finger

@@ -66,7 +66,7 @@ void steps(benchmark::State& state, const char* kernel, int joints, int tendons,
                                                   benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 
-// name, kernel, joints, tendons, points, every sample reverses
+// name, kernel, joints, tendons, points, shaking
 const auto* const registered = [] {
   const auto add = [](const char* name, const char* kernel, int joints, int tendons, int points, bool shaking) {
     return benchmark::RegisterBenchmark(
@@ -76,7 +76,7 @@ const auto* const registered = [] {
   add("step/avx2/4x8x5", "avx2", 4, 8, 5, false);
   add("step/sse2/4x8x5", "sse2", 4, 8, 5, false);
   add("step/plain/4x8x5", "plain", 4, 8, 5, false);
-  add("step/avx2/4x8x5/every_sample_reverses", "avx2", 4, 8, 5, true);
+  add("step/avx2/4x8x5/shaking", "avx2", 4, 8, 5, true);
   add("step/avx2/1x2x1", "avx2", 1, 2, 1, false);
   return add("step/avx2/16x64x5", "avx2", 16, 64, 5, false);
 }();

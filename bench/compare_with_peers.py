@@ -3,10 +3,10 @@
     .venv/bin/pip install --require-hashes -r requirements-peers.lock
     .venv/bin/python bench/compare_with_peers.py
 
-1. the C interface, one call for the whole recording; 2. the product's FMU through fmpy; 3. the naive numpy model of the
-tests; 4. an FMU that PythonFMU makes of that numpy model, through fmpy with the same loop as 2. All four must agree before
-their times are worth anything. Each time is the median of `ROUNDS` rounds in which the four take turns; the slow ones take
-fewer samples of the same recording.
+1. the C interface, one call for the whole recording; 2. the product's FMU through fmpy; 3. the naive numpy model of
+the tests; 4. an FMU that PythonFMU makes of that numpy model, through fmpy with the same loop as 2. All four must agree
+before their times are worth anything. Each time is the median of `ROUNDS` rounds in which the four take turns; the slow
+ones take fewer samples of the same recording.
 """
 
 from __future__ import annotations
@@ -44,13 +44,12 @@ import numpy as np
 import oracle
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real
 
-HERE = os.path.dirname(__file__)
 
 
 class NumpyFinger(Fmi2Slave):
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
-        with open(os.path.join(HERE, "index_finger.json"), encoding="utf-8") as file:
+        with open(os.path.join(self.resources, "index_finger.json"), encoding="utf-8") as file:
             self.finger = oracle.FingerOracle(json.load(file), 1)
         n, m = self.finger.n, self.finger.m
         self.kinematics_source = 1
