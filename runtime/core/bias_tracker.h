@@ -174,7 +174,6 @@ HOT_INLINE void track_bias(tendonfmu_finger* f, double step, double noise) {
     const quad correction = quad_mul(gain, quad_sub(quad_load(s->torque + j), quad_load(s->friction + j)));
     quad_store(s->bias + j, quad_add(quad_load(s->bias + j), correction));
     quad_store(s->friction + j, quad_add(quad_load(s->friction + j), correction));
-    quad_store(s->predicted_variance + j, predicted);
     quad_store(s->variance + j, quad_mul(quad_sub(one, gain), predicted));
     quad_store(s->gain + j, gain);
   }

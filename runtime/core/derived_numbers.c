@@ -16,6 +16,11 @@ typedef struct derivation {
   uint32_t points;      /* working points of the edge being read */
 } derivation;
 
+/* 1/x of x > 0, bounded, so that 0·(1/x) is 0 for the smallest x that a double can hold */
+static double bounded_inverse(double x) {
+  return 1.0 / x < 1e300 ? 1.0 / x : 1e300;
+}
+
 /* numbers of a law in the description to the packed law; both sides of a symmetric law are equal */
 static void pack_law(double* law, const double* numbers, law_kind kind) {
   const double* negative = numbers + (kind == LAW_ASYMMETRIC ? 4 : 0);
@@ -36,7 +41,7 @@ static void begin_grid(derivation* d, const model_item* item) {
   for (uint32_t k = 0; k < item->count; ++k) {
     column[k * lanes] = angles[k];
     segment[2 * (k + 1)] = angles[k];
-    segment[2 * (k + 1) + 1] = k + 1 < item->count ? 1.0 / (angles[k + 1] - angles[k]) : 0.0;
+    segment[2 * (k + 1) + 1] = k + 1 < item->count ? bounded_inverse(angles[k + 1] - angles[k]) : 0.0;
   }
 }
 
@@ -64,7 +69,7 @@ static void derive_tendon(derivation* d, const model_item* item) {
   const size_t lanes = d->finger->tendon_lanes;
   const double* values = d->values + item->first;
   switch (item->kind) {
-    case ITEM_STIFFNESS: to->inverse_stiffness[item->tendon] = 1.0 / values[0]; break;
+    case ITEM_STIFFNESS: to->inverse_stiffness[item->tendon] = bounded_inverse(values[0]); break;
     case ITEM_MOMENT_ARMS:
       for (uint32_t j = 0; j < item->count; ++j) {
         to->moment_arm[j * lanes + item->tendon] = values[j];

@@ -36,6 +36,12 @@ static tendonfmu_status fail(const tendonfmu_finger* finger, tendonfmu_status st
   return status;
 }
 
+/* the finger itself, or another argument, is NULL */
+static tendonfmu_status missing(const tendonfmu_finger* finger) {
+  return finger ? fail(finger, TENDONFMU_BAD_ARGUMENT, "an argument is missing: NULL or of size 0")
+                : TENDONFMU_BAD_ARGUMENT;
+}
+
 const char* tendonfmu_last_error(const tendonfmu_finger* finger) {
   return finger ? finger->error : "no finger: NULL";
 }
@@ -205,7 +211,7 @@ static tendonfmu_status take(tendonfmu_finger* finger, double time, const tendon
 
 tendonfmu_status tendonfmu_initialise(tendonfmu_finger* finger, double time, const tendonfmu_inputs* inputs) {
   if (!finger || !inputs) {
-    return TENDONFMU_BAD_ARGUMENT;
+    return missing(finger);
   }
   if (tendonfmu_is_initialised(finger)) {
     return fail(finger, TENDONFMU_WRONG_ORDER,
@@ -216,7 +222,7 @@ tendonfmu_status tendonfmu_initialise(tendonfmu_finger* finger, double time, con
 
 tendonfmu_status tendonfmu_step(tendonfmu_finger* finger, double time, const tendonfmu_inputs* inputs) {
   if (!finger || !inputs) {
-    return TENDONFMU_BAD_ARGUMENT;
+    return missing(finger);
   }
   if (!tendonfmu_is_initialised(finger)) {
     return fail(finger, TENDONFMU_WRONG_ORDER, "a step before the first sample: expected tendonfmu_initialise()");
@@ -230,7 +236,7 @@ tendonfmu_status tendonfmu_run(tendonfmu_finger* finger, size_t samples, const d
     *done = 0;
   }
   if (!finger || !inputs || !outputs || (!time && samples)) {
-    return TENDONFMU_BAD_ARGUMENT;
+    return missing(finger);
   }
   for (size_t row = 0; row < samples; ++row) {
     const tendonfmu_inputs sample = samples_row(finger, inputs, row);
@@ -248,7 +254,7 @@ tendonfmu_status tendonfmu_run(tendonfmu_finger* finger, size_t samples, const d
 
 tendonfmu_status tendonfmu_get_outputs(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs) {
   if (!finger || !outputs) {
-    return TENDONFMU_BAD_ARGUMENT;
+    return missing(finger);
   }
   if (!tendonfmu_is_initialised(finger)) {
     return fail(finger, TENDONFMU_WRONG_ORDER, "no outputs before the first sample");
@@ -260,7 +266,7 @@ tendonfmu_status tendonfmu_get_outputs(const tendonfmu_finger* finger, const ten
 tendonfmu_status tendonfmu_get_directional_derivative(tendonfmu_finger* finger, const tendonfmu_inputs* direction,
                                                       const tendonfmu_outputs* derivative) {
   if (!finger || !direction || !derivative) {
-    return TENDONFMU_BAD_ARGUMENT;
+    return missing(finger);
   }
   if (!tendonfmu_is_initialised(finger)) {
     return fail(finger, TENDONFMU_WRONG_ORDER, "no derivative before the first sample");
@@ -289,7 +295,10 @@ static int has_parameter(const tendonfmu_finger* finger, size_t index) {
 
 tendonfmu_status tendonfmu_get_parameter_path(const tendonfmu_finger* finger, size_t index, char* path,
                                               size_t path_size) {
-  if (!finger || !path || !path_size || !has_parameter(finger, index)) {
+  if (!finger || !path || !path_size) {
+    return missing(finger);
+  }
+  if (!has_parameter(finger, index)) {
     return TENDONFMU_BAD_ARGUMENT;
   }
   char whole[PARAMETER_PATH_BYTES];
@@ -308,7 +317,10 @@ size_t tendonfmu_find_parameter(const tendonfmu_finger* finger, const char* path
 
 tendonfmu_status tendonfmu_get_parameter_info(const tendonfmu_finger* finger, size_t index,
                                               tendonfmu_parameter_info* info) {
-  if (!finger || !info || !has_parameter(finger, index)) {
+  if (!finger || !info) {
+    return missing(finger);
+  }
+  if (!has_parameter(finger, index)) {
     return TENDONFMU_BAD_ARGUMENT;
   }
   const model_item item = parameter_item(&finger->shape, (uint32_t)index);
@@ -325,7 +337,7 @@ tendonfmu_status tendonfmu_get_parameter_info(const tendonfmu_finger* finger, si
 tendonfmu_status tendonfmu_get_parameters(const tendonfmu_finger* finger, size_t count, const size_t* indices,
                                           double* values) {
   if (!finger || (count && !values)) {
-    return TENDONFMU_BAD_ARGUMENT;
+    return missing(finger);
   }
   for (size_t i = 0; i < count; ++i) {
     if (!has_parameter(finger, indices ? indices[i] : i)) {
@@ -362,7 +374,7 @@ static tendonfmu_status check_candidate(tendonfmu_finger* finger, size_t index, 
 tendonfmu_status tendonfmu_set_parameters(tendonfmu_finger* finger, size_t count, const size_t* indices,
                                           const double* values) {
   if (!finger || (count && !values)) {
-    return TENDONFMU_BAD_ARGUMENT;
+    return missing(finger);
   }
   const size_t bytes = finger->shape.parameter_count * sizeof(double);
   int routing = 0;
@@ -395,7 +407,10 @@ static int find_or_fail(const tendonfmu_finger* finger, const char* path, size_t
 
 tendonfmu_status tendonfmu_get_parameter(const tendonfmu_finger* finger, const char* path, double* value) {
   size_t index;
-  if (!finger || !path || !value || find_or_fail(finger, path, &index)) {
+  if (!finger || !path || !value) {
+    return missing(finger);
+  }
+  if (find_or_fail(finger, path, &index)) {
     return TENDONFMU_BAD_ARGUMENT;
   }
   *value = finger->parameters[index];
@@ -404,7 +419,10 @@ tendonfmu_status tendonfmu_get_parameter(const tendonfmu_finger* finger, const c
 
 tendonfmu_status tendonfmu_set_parameter(tendonfmu_finger* finger, const char* path, double value) {
   size_t index;
-  if (!finger || !path || find_or_fail(finger, path, &index)) {
+  if (!finger || !path) {
+    return missing(finger);
+  }
+  if (find_or_fail(finger, path, &index)) {
     return TENDONFMU_BAD_ARGUMENT;
   }
   return tendonfmu_set_parameters(finger, 1, &index, &value);
@@ -419,7 +437,7 @@ size_t tendonfmu_state_size(const tendonfmu_finger* finger) {
 
 tendonfmu_status tendonfmu_save_state(const tendonfmu_finger* finger, void* bytes, size_t size) {
   if (!finger || !bytes) {
-    return TENDONFMU_BAD_ARGUMENT;
+    return missing(finger);
   }
   if (size != saved_state_size(finger)) {
     return fail(finger, TENDONFMU_BAD_ARGUMENT, "size: expected that of tendonfmu_state_size()");
@@ -430,7 +448,7 @@ tendonfmu_status tendonfmu_save_state(const tendonfmu_finger* finger, void* byte
 
 tendonfmu_status tendonfmu_restore_state(tendonfmu_finger* finger, const void* bytes, size_t size) {
   if (!finger || !bytes) {
-    return TENDONFMU_BAD_ARGUMENT;
+    return missing(finger);
   }
   if (size != saved_state_size(finger)) {
     return fail(finger, TENDONFMU_BAD_STATE,
@@ -457,7 +475,7 @@ const char* tendonfmu_get_kernel(const tendonfmu_finger* finger) {
 
 tendonfmu_status tendonfmu_set_kernel(tendonfmu_finger* finger, const char* name) {
   if (!finger || !name) {
-    return TENDONFMU_BAD_ARGUMENT;
+    return missing(finger);
   }
   const step_kernel* kernel = kernel_choose(name);
   if (!kernel) {

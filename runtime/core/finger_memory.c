@@ -4,7 +4,8 @@
 
 #include <string.h>
 
-/* Rows of doubles begin at multiples of 64 bytes: aligned loads in every kernel, no row split over cache lines. */
+/* Every array begins at a multiple of 64 bytes, a cache line. The rows of the state follow each other without gaps,
+ * each a multiple of 32 bytes: aligned loads in every kernel. */
 enum { ROW_BYTES = 64 };
 
 typedef struct cursor {
@@ -66,12 +67,12 @@ static void lay_out_derived(tendonfmu_finger* f, cursor* c) {
 static void lay_out_state(tendonfmu_finger* f, cursor* c) {
   finger_state* s = &f->remembered;
   const size_t joints = f->joint_lanes, tendons = f->tendon_lanes, slots = f->slots;
-  f->state_count = STATE_SCALARS + 10 * joints + 2 * tendons + 6 * slots + f->shape.extension_memory;
+  f->state_count = STATE_SCALARS + 9 * joints + 2 * tendons + 6 * slots + f->shape.extension_memory;
   f->state = take_numbers(c, f->state_count);
   double* run = f->state;
   s->scalar = part(&run, STATE_SCALARS);
-  double** const joint_rows[] = {&s->angle, &s->speed,         &s->torque,   &s->friction,           &s->compensated,
-                                 &s->bias,  &s->joint_contact, &s->variance, &s->predicted_variance, &s->gain};
+  double** const joint_rows[] = {&s->angle, &s->speed,         &s->torque,   &s->friction, &s->compensated,
+                                 &s->bias,  &s->joint_contact, &s->variance, &s->gain};
   for (size_t i = 0; i < sizeof joint_rows / sizeof joint_rows[0]; ++i) {
     *joint_rows[i] = part(&run, joints);
   }
@@ -88,9 +89,8 @@ static void lay_out_scratch(tendonfmu_finger* f, cursor* c) {
   finger_scratch* s = &f->scratch;
   const size_t matrix = f->joints * f->tendon_lanes;
   double** const tendon_rows[] = {&s->force, &s->position, &s->slack};
-  double** const joint_rows[] = {&s->angle,         &s->raw_angle,  &s->torque,           &s->friction,
-                                 &s->bias_step,     &s->load,       &s->extension_torque, &s->joint_friction,
-                                 &s->load_friction, &s->joint_bias, &s->load_bias};
+  double** const joint_rows[] = {&s->angle,          &s->torque,        &s->friction,   &s->bias_step, &s->load,
+                                 &s->joint_friction, &s->load_friction, &s->joint_bias, &s->load_bias};
   double** const matrices[] = {&s->edge, &s->pulley, &s->edge_bias, &s->pulley_bias, &s->force_at, &s->force_between};
   for (size_t i = 0; i < sizeof tendon_rows / sizeof tendon_rows[0]; ++i) {
     *tendon_rows[i] = take_numbers(c, f->tendon_lanes);

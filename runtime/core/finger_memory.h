@@ -1,9 +1,10 @@
 /* Everything a finger consists of, laid out in one block of memory.
  *
  * Lanes: tendons lie side by side in rows of M = 4·⌈m/4⌉, joints in rows of N = 4·⌈n/4⌉; lanes without a tendon or
- * joint hold zeros and stay zero. Slots: every relative velocity has one slot, n rows of tendon lanes (ẋ_ij, eq. 5) and
- * then a row of joint lanes (q̇_j). The friction effects that share a velocity (F_B before joint j and F_A of pulley
- * j−1; T_jv0 and T_jvf) move and stick together, so what fig. 5 remembers of an effect is kept once per slot. */
+ * joint have forces, moment arms, velocities and residuals of zero, so nothing of them reaches an output. Slots: every
+ * relative velocity has one slot, n rows of tendon lanes (ẋ_ij, eq. 5) and then a row of joint lanes (q̇_j). The
+ * friction effects that share a velocity (F_B before joint j and F_A of pulley j−1; T_jv0 and T_jvf) move and stick
+ * together, so what fig. 5 remembers of an effect is kept once per slot. */
 #ifndef TENDONFMU_FINGER_MEMORY_H
 #define TENDONFMU_FINGER_MEMORY_H
 
@@ -51,19 +52,16 @@ enum {
   STATE_TIME,          /* s */
   STATE_FIRST_SAMPLE,  /* 1 while the last sample is the first */
   STATE_VELOCITY_GAIN, /* ∂v_k/∂q_k of the last sample, 1/s */
-  STATE_NOISE_SCALE,   /* factor on the noise variance of the last sample */
   STATE_CONTACT,       /* 0 or 1 */
-  STATE_SPARE,         /* 0; keeps the rows aligned */
-  STATE_SCALARS
+  STATE_SCALARS = 8    /* the rest is 0 and keeps the rows aligned */
 };
 
 typedef struct finger_state {
   double* scalar; /* [STATE_SCALARS] */
   /* [N] per joint */
   double *angle, *speed, *torque, *friction, *compensated, *bias, *joint_contact;
-  double* variance;           /* P after the sample, (N·m)² */
-  double* predicted_variance; /* P before its update */
-  double* gain;               /* K; 0 in contact */
+  double* variance; /* P, (N·m)² */
+  double* gain;     /* K; 0 in contact */
   /* [M] per tendon */
   double *force, *slack;
   /* [n × M + N] per slot, fig. 5 */
@@ -93,13 +91,13 @@ typedef struct finger_scratch {
   double *force, *position;        /* [M] inputs, padded */
   double* velocity;                /* [n × M + N] */
   slot_view* view;                 /* [(n × M + N) / 4] */
-  double *angle, *raw_angle;       /* [N] */
+  double* angle;                   /* [N] */
   double *edge, *pulley;           /* [n × M] F_B, F_A; pulley in the row of its slot */
   double *edge_bias, *pulley_bias; /* [n × M] b of the same */
   double *force_at,
       *force_between; /* [n × M] f_A before each joint and f_B, as they multiply an F: |f| if bidirectional */
   double* slack;      /* [M] */
-  double *torque, *friction, *bias_step, *load, *extension_torque; /* [N] τ, T, Δb, Σ f_B */
+  double *torque, *friction, *bias_step, *load;                    /* [N] τ, T, Δb, Σ f_B */
   double *joint_friction, *load_friction, *joint_bias, *load_bias; /* [N] T_jv0, T_jvf and their b */
 } finger_scratch;
 
@@ -118,8 +116,7 @@ struct tendonfmu_finger {
   derived_numbers derived;
   finger_state remembered;
   finger_scratch scratch;
-  int owns_memory;
-  void* allocation;
+  void* allocation; /* of tendonfmu_create(), NULL in the caller's memory */
   char error[ERROR_BYTES];
 };
 

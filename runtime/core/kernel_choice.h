@@ -4,6 +4,9 @@
 
 #include "finger_memory.h"
 
+/* Beyond this, in magnitude, no input is a measurement; below it no product in a step overflows for sane parameters. */
+#define LARGEST_INPUT 1e12
+
 typedef enum sample_result { SAMPLE_TAKEN, SAMPLE_OUT_OF_RANGE, SAMPLE_OVERFLOWS } sample_result;
 
 struct step_kernel {

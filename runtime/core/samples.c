@@ -5,8 +5,9 @@
 #include <math.h>
 #include <string.h>
 
-/* Beyond these nothing is a measurement; below them no product in a step overflows for sane parameters. */
-static const double largest_input = 1e12, largest_time = 1e15;
+#include "kernel_choice.h"
+
+static const double largest_time = 1e15; /* s */
 
 typedef struct input_row {
   const char* name;
@@ -72,7 +73,7 @@ void samples_name_bad_input(const tendonfmu_finger* finger, double time, const t
   for (size_t k = 0; k < count; ++k) {
     for (size_t i = 0; i < rows[k].count; ++i) {
       const double value = rows[k].values[i];
-      if (!(fabs(value) <= largest_input)) {
+      if (!(fabs(value) <= LARGEST_INPUT)) {
         message_element(message, rows[k].name, i + 1);
         message_text(message, " = ");
         message_number(message, value);

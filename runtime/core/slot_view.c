@@ -8,7 +8,8 @@ size_t slot_segment(const tendonfmu_finger* finger, size_t joint, size_t tendon,
   const double* point = finger->derived.edge_angle + finger->derived.edge_angle_row[joint] + tendon;
   size_t passed = 0;
   for (size_t k = 0; k < finger->shape.most_points[joint]; ++k) {
-    passed += angle >= point[k * finger->tendon_lanes];
+    const double at = point[k * finger->tendon_lanes];
+    passed += angle >= at && at < INFINITY; /* an angle of an overflowing sample may be infinite, too */
   }
   return passed;
 }

@@ -14,9 +14,7 @@ HOT_INLINE int is_first(const tendonfmu_finger* f) {
   return f->remembered.scalar[STATE_INITIALISED] == 0.0;
 }
 
-/* Beyond this nothing is a measurement; NaN is refused with it. */
-#define LARGEST_INPUT 1e12
-
+/* NaN is out of range */
 HOT_INLINE int row_in_range(const double* row, size_t lanes) {
   int inside = 15;
   for (size_t i = 0; i < lanes; i += 4) {
@@ -56,7 +54,7 @@ HOT_INLINE double find_kinematics(tendonfmu_finger* f, double step) {
     } else {
       const double share = filter_share(f->derived.settings.cutoff_rate, step);
       filter_velocities(f, s->angle, step, share, joint_velocity);
-      gain = share / step;
+      gain = share / step < 1e300 ? share / step : 1e300; /* finite, however short the step */
     }
   }
   relative_velocities(f, s->velocity);
@@ -136,7 +134,7 @@ HOT_INLINE void begin_tracking(tendonfmu_finger* f, double time, double mean_for
   }
   for (size_t j = 0; j < f->joints; ++j) {
     s->bias[j] = settings->has_initial_torque ? f->derived.initial_torque[j] : s->torque[j] - f->scratch.friction[j];
-    s->variance[j] = s->predicted_variance[j] = variance;
+    s->variance[j] = variance;
     s->gain[j] = s->joint_contact[j] = 0.0;
   }
   effective_friction(f);
@@ -145,7 +143,6 @@ HOT_INLINE void begin_tracking(tendonfmu_finger* f, double time, double mean_for
   }
   s->scalar[STATE_INITIALISED] = 1.0;
   s->scalar[STATE_FIRST_SAMPLE] = 1.0;
-  s->scalar[STATE_NOISE_SCALE] = 1.0;
   s->scalar[STATE_CONTACT] = 0.0;
 }
 
@@ -169,7 +166,6 @@ HOT_INLINE void track_sample(tendonfmu_finger* f, double time, double step, doub
     track_bias(f, step, noise_variance(settings, mean_force, scale));
   }
   s->scalar[STATE_FIRST_SAMPLE] = 0.0;
-  s->scalar[STATE_NOISE_SCALE] = scale;
   s->scalar[STATE_CONTACT] = contact ? 1.0 : 0.0;
 }
 

@@ -232,6 +232,41 @@ TEST(Finger, SameTimeAgainChangesNothing) {
   EXPECT_EQ(finger.saved(), before);
 }
 
+// Without a filter ∂v/∂q is 1/Δt, which overflows; the state must stay one that can be restored.
+TEST(Finger, ShortestStepAtRestLeavesAStateThatRestores) {
+  Finger finger;
+  ASSERT_EQ(tendonfmu_set_parameter(finger, "velocity_filter_cutoff", 0.0), TENDONFMU_OK);
+  const tendonfmu_inputs inputs = motion().row(0);
+  ASSERT_EQ(tendonfmu_initialise(finger, 0.0, &inputs), TENDONFMU_OK);
+  ASSERT_EQ(tendonfmu_step(finger, std::numeric_limits<double>::denorm_min(), &inputs), TENDONFMU_OK);
+  const auto bytes = finger.saved();
+  EXPECT_EQ(tendonfmu_restore_state(finger, bytes.data(), bytes.size()), TENDONFMU_OK) << tendonfmu_last_error(finger);
+  double speed[joints];
+  const double still[tendons] = {};
+  const tendonfmu_inputs direction = {still, still, nullptr, nullptr};
+  tendonfmu_outputs view = {};
+  view.joint_speed = speed;
+  ASSERT_EQ(tendonfmu_get_directional_derivative(finger, &direction, &view), TENDONFMU_OK);
+  EXPECT_EQ(speed[0], 0.0);
+}
+
+TEST(Finger, SoftestSpringDoesNotPoisonTheAngles) {
+  std::string text = test_finger::json;
+  text.replace(text.find("\"stiffness\": 5000"), 17, "\"stiffness\": 1e-320");
+  Finger finger(test_finger::image(text));
+  const double force[tendons] = {5.0, 5.0, 0.0}, position[tendons] = {};
+  const tendonfmu_inputs inputs = {force, position, nullptr, nullptr};
+  EXPECT_EQ(tendonfmu_initialise(finger, 0.0, &inputs), TENDONFMU_OK) << tendonfmu_last_error(finger);
+}
+
+TEST(Finger, MissingArgumentIsRefusedInWords) {
+  Finger finger;
+  EXPECT_EQ(tendonfmu_initialise(finger, 0.0, nullptr), TENDONFMU_BAD_ARGUMENT);
+  EXPECT_NE(std::string(tendonfmu_last_error(finger)).find("missing"), std::string::npos);
+  EXPECT_EQ(tendonfmu_set_parameter(finger, nullptr, 1.0), TENDONFMU_BAD_ARGUMENT);
+  EXPECT_EQ(tendonfmu_step(nullptr, 0.0, nullptr), TENDONFMU_BAD_ARGUMENT);
+}
+
 TEST(Finger, OrderOfCallsIsHeld) {
   Finger finger;
   const tendonfmu_inputs inputs = motion().row(0);
