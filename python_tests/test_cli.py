@@ -193,6 +193,22 @@ def test_build_refuses_and_writes_nothing(call: Call, tmp_path: Path) -> None:
     assert sorted(file.name for file in tmp_path.iterdir()) == ["bad.json", "old.fmu"]
 
 
+def test_no_result_takes_the_place_of_what_it_is_made_from(
+    call: Call, finger: tuple[Path, Path, dict[str, Any], dict[str, Any]], tmp_path: Path
+) -> None:
+    path, recording_path, *_ = finger
+    (tmp_path / "link.csv").symlink_to(recording_path)
+    before = {file: file.read_bytes() for file in tmp_path.iterdir()}
+    for arguments in (
+        ("build", path, "-o", path),
+        ("run", path, recording_path, "-o", recording_path),
+        ("run", path, recording_path, "-o", "link.csv"),
+        ("convert", "davinci", recording_path, "-o", f"./{recording_path.name}"),
+    ):
+        assert "the same file as the input" in refused(call(*arguments))
+    assert {file: file.read_bytes() for file in tmp_path.iterdir()} == before
+
+
 # --- run --------------------------------------------------------------------------------------------------------------
 
 
@@ -301,6 +317,8 @@ def test_run_refuses_by_name_and_writes_nothing(
         ("not.fmu", recording_path, "out.csv", "not.fmu"),
         ("empty.fmu", recording_path, "out.csv", "empty.fmu"),
         ("note.txt", recording_path, "out.csv", "note.txt"),
+        (recording_path, path, "out.csv", "expected FINGER.json or FINGER.fmu here"),
+        ("empty.fmu", recording_path, "out.csv", "no modelDescription.xml"),
         (path, "absent.csv", "out.csv", "absent.csv"),
         (path, "note.txt", "out.csv", "note.txt"),
         (path, recording_path, "out.mat", "out.mat"),
@@ -309,6 +327,28 @@ def test_run_refuses_by_name_and_writes_nothing(
     ):
         assert word in refused(call("run", model, recording, "-o", output))
     assert sorted(file.name for file in tmp_path.iterdir()) == before
+
+
+def test_a_value_that_the_fmu_refuses_is_named_by_its_row(
+    call: Call, finger: tuple[Path, Path, dict[str, Any], dict[str, Any]], tmp_path: Path
+) -> None:
+    path, _, _, recording = finger
+    huge = {name: array.copy() for name, array in recording.items()}
+    huge["tendon_force"][50, 0] = 1e30
+    line = refused(call("run", path, recorded(tmp_path, huge, "huge.csv"), "-o", "out.csv"))
+    for word in ("huge.csv", "row 51", "tendon_force[1] = 1e+30", "expected"):
+        assert word in line
+
+
+def test_run_says_how_long_and_how_far(
+    call: Call, finger: tuple[Path, Path, dict[str, Any], dict[str, Any]], tmp_path: Path
+) -> None:
+    path, recording_path, _, recording = finger
+    said = call("run", path, recording_path, "-o", "out.csv").err
+    angles = outputs_of(tmp_path / "out.csv")["joint_angle"]
+    time = recording["time"]
+    assert f"{len(time)} samples in {time[-1] - time[0]:.6g} s" in said
+    assert f"{angles.min():.3g} to {angles.max():.3g} rad" in said
 
 
 def test_a_negative_time_and_a_late_start(

@@ -278,6 +278,8 @@ def test_unknown_formats(tmp_path: Path, name: str) -> None:
 
 def test_missing_files_and_folders(tmp_path: Path) -> None:
     assert "no such file" in refusal(tmp_path / "absent.csv")
+    (tmp_path / "german.csv").write_text("time;tendon_force[1];tendon_position[1]\n0,1;2,0;0,0\n")
+    assert "expected commas" in refusal(tmp_path / "german.csv")
     (tmp_path / "folder.csv").mkdir()
     refusal(tmp_path / "folder.csv")
 

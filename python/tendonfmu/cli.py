@@ -46,7 +46,8 @@ def main() -> None:
         if type(refused).__name__ == "NoArgsIsHelpError":
             _say(refused.format_message())
             sys.exit(2)
-        _refuse(refused.format_message())
+        page = getattr(getattr(refused, "ctx", None), "command_path", "tendonfmu")
+        _refuse(f"{refused.format_message().rstrip('.')}; see {page} --help")
     else:
         sys.exit(status if isinstance(status, int) else 0)
 
@@ -99,7 +100,9 @@ def build(
 ) -> None:
     """Pack an FMI 2.0 co-simulation FMU. Needs no compiler; the same input gives the same bytes."""
     from tendonfmu.packaging import build_fmu
+    from tendonfmu.whole_file import check_output
 
+    check_output(output, finger)
     build_fmu(finger, output, binaries=binaries)
     _say(f"{output}: {output.stat().st_size / 1024:.0f} KiB")
 
@@ -118,10 +121,13 @@ def run(
 ) -> None:
     """Run the FMU over a recording: time and all outputs, one row per sample, each at its own sample's time."""
     from tendonfmu.recording import read_recording
-    from tendonfmu.running import run_model
+    from tendonfmu.running import check_model, run_model, summary
     from tendonfmu.tables import check_format, write_table
+    from tendonfmu.whole_file import check_output
 
+    check_model(model)
     check_format(output)
+    check_output(output, model, recording)
     samples = read_recording(recording)
     with _progress() as bar:
         task = bar.add_task("samples", total=len(samples))
@@ -129,7 +135,7 @@ def run(
             model, samples, kinematics_source=kinematics, progress=lambda done: bar.update(task, completed=done)
         )
     write_table(output, table)
-    _say(f"{output}: {len(samples)} samples, {int(table['contact'].sum())} of them in contact")
+    _say(f"{output}: {summary(table)}")
 
 
 @app.command()
@@ -143,8 +149,11 @@ def convert(
 ) -> None:
     """Turn a third-party recording into one of ours."""
     from tendonfmu.converters import converter
-    from tendonfmu.tables import write_table
+    from tendonfmu.tables import check_format, write_table
+    from tendonfmu.whole_file import check_output
 
+    check_format(output)
+    check_output(output, file)
     table = converter(source)(file, radius)
     write_table(output, table)
     _say(f"{output}: {len(table['time'])} samples, {table['time'][-1] - table['time'][0]:.3f} s")
@@ -173,8 +182,10 @@ def _print_demo(result: Any) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(title=f"{result.finger}: {result.seconds:.0f} s of motion, {result.pushes} pushes")
-    for heading in ("joint", "measured torque, rms", "left after compensation, rms, free", "in contact, rms"):
+    table = Table(
+        title=f"{result.finger}: {result.seconds:.0f} s of motion, {result.pushes} pushes; joint torques, rms"
+    )
+    for heading in ("joint", "measured", "compensated, free", "compensated, contact"):
         table.add_column(heading, justify="left" if heading == "joint" else "right")
     for joint in result.joints:
         table.add_row(

@@ -6,7 +6,7 @@ What a description may hold is decided by the native reader alone; `schema/finge
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -57,6 +57,7 @@ class FingerDescription:
 class Counts:
     """What a finger is, in numbers.
 
+    moment_arms, stiffness: least and largest magnitude in m and N/m, moment arms of 0 left out.
     laws: by kind, each working point counted; an asymmetric law counts once. parameters: all numbers of the FMU.
     estimated_numbers: those that a fit estimates, the biases included (see `estimated_numbers()`).
     """
@@ -65,6 +66,8 @@ class Counts:
     joint_names: list[str]
     tendon_names: list[str]
     bidirectional_tendons: int
+    moment_arms: tuple[float, float]
+    stiffness: tuple[float, float]
     pulleys: int
     edges: int
     working_points: int
@@ -91,6 +94,8 @@ def read_finger(path: Path) -> FingerDescription:
         text = path.read_bytes()
     except OSError as failed:
         raise InputError(f"{path}: {failed.strerror}; expected a finger description (JSON)") from None
+    if text.startswith(b"PK\x03\x04"):
+        raise InputError(f"{path}: an archive, such as an FMU; expected a finger description (JSON)")
     try:
         image = native.image_from_json(text)
     except native.NativeError as refused:
@@ -146,6 +151,11 @@ def _entries(data: Mapping[str, Any], key: str) -> list[Any]:
     return [entry for tendon in data["tendons"] for entry in tendon.get(key) or [] if entry is not None]
 
 
+def _range(values: Iterable[float]) -> tuple[float, float]:
+    found = list(values)
+    return min(found), max(found)
+
+
 def count(description: FingerDescription) -> Counts:
     """Counts what a description holds."""
     data = description.data
@@ -158,6 +168,8 @@ def count(description: FingerDescription) -> Counts:
         joint_names=description.joint_names,
         tendon_names=description.tendon_names,
         bidirectional_tendons=sum(1 for tendon in data["tendons"] if tendon.get("bidirectional")),
+        moment_arms=_range(abs(arm) for row in description.moment_arms for arm in row if arm),
+        stiffness=_range(float(tendon["stiffness"]) for tendon in data["tendons"]),
         pulleys=len(_entries(data, "pulley_friction")),
         edges=len(edges),
         working_points=sum(len(edge.get("angles") or []) for edge in edges),
@@ -180,6 +192,8 @@ def _summary_lines(counts: Counts) -> list[str]:
         f"{counts.name}: a valid finger description",
         f"joints             {counts.joints}: {', '.join(counts.joint_names)}",
         f"tendons            {counts.tendons}: {', '.join(counts.tendon_names)}{loops}",
+        f"moment arms        {1e3 * counts.moment_arms[0]:.4g} to {1e3 * counts.moment_arms[1]:.4g} mm",
+        f"stiffness          {counts.stiffness[0]:.4g} to {counts.stiffness[1]:.4g} N/m",
         f"pulleys, edges     {counts.pulleys}, {counts.edges} with {counts.working_points} working points",
         f"friction laws      {sum(counts.laws.values())}: {laws}{asymmetric}",
         f"covers             {counts.covers}",

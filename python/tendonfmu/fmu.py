@@ -73,6 +73,8 @@ def _unpacked(path: Path) -> Iterator[Path]:
     folder = Path(tempfile.mkdtemp(prefix="tendonfmu-"))
     try:
         extract(str(path), unzipdir=str(folder))
+        if not (folder / "modelDescription.xml").is_file():
+            raise InputError(f"{path}: no modelDescription.xml in it; expected an FMU of `tendonfmu build`")
         yield folder
     except (OSError, ValueError) as error:
         if isinstance(error, InputError):
@@ -94,6 +96,7 @@ class _Run:
         from fmpy.fmi2 import FMU2Slave
 
         self.path = path
+        self._at = str(path)  # what a refusal is about: the FMU, then the recording's row
         self._parameters = parameters
         self._messages: list[str] = []
         description = read_model_description(str(folder), validate=False)
@@ -129,7 +132,7 @@ class _Run:
             raise
         except Exception as error:  # fmpy raises bare exceptions
             reason = self._messages[-1] if self._messages else str(error)
-            raise InputError(f"{self.path}: {reason}") from None
+            raise InputError(f"{self._at}: {reason}") from None
 
     def _instantiate(self) -> None:
         from fmpy import calloc, free
@@ -185,9 +188,11 @@ class _Run:
         steps = np.diff(recording.time).tolist()
         steps.append(steps[-1] if steps else 1e-3)
 
+        self._at = f"{recording.path}: row 1"
         slave.fmi2SetReal(component, set_vr, len(set_vr), _row(samples, 0))
         slave.exitInitializationMode()
         for k, (time, step) in enumerate(zip(times, steps, strict=True)):
+            self._at = f"{recording.path}: row {k + 1}"
             slave.fmi2SetReal(component, set_vr, len(set_vr), _row(samples, k))
             slave.fmi2DoStep(component, time, step, 1)
             slave.fmi2GetReal(component, get_vr, len(get_vr), _row(numbers, k))

@@ -96,6 +96,9 @@ def _grouped(table: Mapping[str, NDArray[np.float64]]) -> dict[str, list[NDArray
 
 def _check_columns(file: Path, names: list[str]) -> None:
     """Every column known, none missing, no gap in a group."""
+    for separator in ";\t":
+        if len(names) == 1 and separator in names[0]:
+            raise InputError(f"{file}: columns separated by {separator!r}; expected commas, and points in numbers")
     if "time" not in names:
         raise InputError(f"{file}: no column time; expected the time of every sample in s")
     counts: dict[str, set[int]] = {name: set() for name in GROUPS}

@@ -39,7 +39,7 @@ def read_table(path: str | os.PathLike[str], check_names: CheckNames, flags: Col
     file = Path(path)
     check_format(file)
     if not file.is_file():
-        raise InputError(f"{file}: no such file")
+        raise InputError(f"{file}: no such file; expected a recording, .csv or .parquet")
     try:
         table = (_read_csv if file.suffix.lower() == ".csv" else _read_parquet)(file, check_names, flags)
     except OSError as error:

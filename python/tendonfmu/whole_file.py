@@ -11,11 +11,25 @@ from pathlib import Path
 from tendonfmu.errors import InputError
 
 
+def check_output(output: Path, *inputs: Path) -> None:
+    """Raises InputError where no file can be, and where a result would take the place of what it is made from."""
+    _check_place(output)
+    for file in inputs:
+        if output.exists() and file.exists() and output.samefile(file):
+            raise InputError(f"{output}: the same file as the input {file}; expected another name for the output")
+
+
+def _check_place(file: Path) -> None:
+    if not file.parent.is_dir():
+        raise InputError(f"{file}: no folder {file.parent}; expected one that exists")
+    if file.is_dir():
+        raise InputError(f"{file}: a folder; expected the name of a file to write")
+
+
 @contextmanager
 def whole_file(file: Path) -> Iterator[Path]:
     """A temporary file beside `file` that takes its place at the end, or vanishes when an error ends it."""
-    if not file.parent.is_dir():
-        raise InputError(f"{file}: no folder {file.parent}")
+    _check_place(file)
     try:
         handle, name = tempfile.mkstemp(dir=file.parent, prefix=f".{file.name}-", suffix=file.suffix)
     except OSError as error:

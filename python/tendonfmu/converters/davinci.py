@@ -51,9 +51,9 @@ def _read(file: Path) -> NDArray[np.float64]:
     try:
         lines = file.read_text(encoding="ascii").splitlines()
     except OSError as error:
-        raise InputError(f"{file}: {error.strerror or error}") from None
+        raise InputError(f"{file}: {error.strerror or error}; expected a text file of the da Vinci data") from None
     except UnicodeDecodeError:
-        raise InputError(f"{file}: not a text file of the da Vinci data") from None
+        raise InputError(f"{file}: not plain ASCII; expected a text file of the da Vinci data") from None
     numbered = [(i, line) for i, line in enumerate(lines, start=1) if line.strip() and not line.startswith("%")]
     if not numbered or not lines[0].startswith("%"):
         raise InputError(f"{file}: no da Vinci recording; expected lines of {COLUMNS} numbers below lines with %")
