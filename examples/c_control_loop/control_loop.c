@@ -6,6 +6,7 @@
  * except to wait for the next tick. */
 #define _POSIX_C_SOURCE 200809L
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <tendonfmu_description.h>
@@ -72,6 +73,15 @@ static void wait_for(struct timespec* tick) {
   }
 }
 
+/* index from 0 of the largest magnitude */
+static size_t most_loaded(const double* torque, size_t joints) {
+  size_t most = 0;
+  for (size_t j = 1; j < joints; ++j) {
+    most = fabs(torque[j]) > fabs(torque[most]) ? j : most;
+  }
+  return most;
+}
+
 /* the loop; returns how many times contact began, or −1 */
 static int control(tendonfmu_finger* finger, const sensors* hand, double seconds, double* worst_step) {
   double force[64], position[64], torque[16];
@@ -101,7 +111,8 @@ static int control(tendonfmu_finger* finger, const sensors* hand, double seconds
     /* here your controller would use torque[] and contact */
     tendonfmu_get_outputs(finger, &outputs);
     if (contact && !before) {
-      printf("%8.3f s  contact, compensated torque of joint 1: %+.4f N.m\n", time, torque[0]);
+      const size_t j = most_loaded(torque, tendonfmu_joint_count(finger));
+      printf("%8.3f s  contact, compensated torque of joint %zu: %+.4f N.m\n", time, j + 1, torque[j]);
       ++touches;
     } else if (before && !contact) {
       printf("%8.3f s  free again\n", time);
