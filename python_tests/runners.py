@@ -7,9 +7,11 @@ of all outputs of contract section 4 ([N, n], [N, m]; `contact` [N]).
 
 from __future__ import annotations
 
+import atexit
 import functools
 import importlib
 import json
+import shutil
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -94,6 +96,7 @@ def run_single_steps(
 def packed(text: str) -> Path:
     """An FMU of a description's text, kept while the tests run."""
     folder = Path(tempfile.mkdtemp(prefix="tendonfmu-tests-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
     (folder / "finger.json").write_text(text, encoding="utf-8")
     fmu: Path = product("packaging").build_fmu(folder / "finger.json", folder / "finger.fmu")
     return fmu
