@@ -113,6 +113,9 @@ static int advance(component* c, double time) {
 }
 
 int component_take_sample(component* c, double time) {
+  if (tendonfmu_is_initialised(c->finger) && time == tendonfmu_get_time(c->finger)) {
+    return 0; /* taken already: nothing changes, and parameters wait for the next sample */
+  }
   if (c->parameters_pending) {
     tendonfmu_save_state(c->finger, c->scratch, c->state_size);
   }

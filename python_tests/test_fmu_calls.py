@@ -246,6 +246,24 @@ def test_parameters_take_effect_with_the_next_sample(small_fmu: UnpackedFmu) -> 
         assert tuned.get_integers(["joint_contact[1]"], "Boolean") == [1]
 
 
+def test_a_step_at_the_same_time_leaves_parameters_to_the_next_sample(small_fmu: UnpackedFmu) -> None:
+    """The derivatives too stay those of the sample taken."""
+    viscous = "joints[1].friction.viscous"
+    with Instance(small_fmu) as instance:
+        assert instance.set_integer(SOURCE, 3) == OK
+        instance.initialise({**motion(small_fmu, 0.0), "joint_velocity[1]": 1.0})
+        assert instance.set_real({**motion(small_fmu, 0.005), "joint_velocity[1]": 1.0}) == OK
+        assert instance.step(0.005) == OK
+
+        def slope() -> float:
+            return float(derivative(instance, ["friction_torque[1]"], {"joint_velocity[1]": 1.0})[0])
+
+        before = slope()
+        assert instance.set_real({viscous: 5.0}) == OK
+        assert instance.step(0.005) == OK and slope() == before
+        assert instance.step(0.006) == OK and slope() != before
+
+
 def test_fixed_parameters_can_be_written_before_the_first_sample(small_fmu: UnpackedFmu) -> None:
     with Instance(small_fmu) as instance:
         assert instance.set_real({ARM: 0.02}) == OK and instance.set_integer(SOURCE, 2) == OK
