@@ -1,5 +1,5 @@
-/* Included first by every source: no contraction of a*b + c into one rounding, whatever flags an importer compiles
- * with, so that all machines give the same bits. */
+/* Included first by every source that computes: no contraction of a*b + c into one rounding, whatever flags an importer
+ * compiles with, so that all machines give the same bits. */
 #ifndef TENDONFMU_FLOATING_POINT_H
 #define TENDONFMU_FLOATING_POINT_H
 
