@@ -140,7 +140,8 @@ double tendonfmu_get_time(const tendonfmu_finger* finger);
 int tendonfmu_is_initialised(const tendonfmu_finger* finger);
 
 /* Directional derivative of the outputs of the last sample by the inputs of that sample, along `direction`; all that is
- * remembered is held fixed, branch decisions are frozen. Parameters are those in force: ask before writing others.
+ * remembered is held fixed, branch decisions are frozen. The parameters are those in force: take it before you write
+ * others.
  *   direction     derivatives of the inputs: [m], [m], [n], [n]; a NULL array stands for zeros
  *   derivative    receives derivatives of the six real outputs, each [n] or NULL; the flags are left alone
  * TENDONFMU_WRONG_ORDER before the initialisation. */
