@@ -6,6 +6,7 @@
 #   tendonfmu_fmi_headers          the same as an INTERFACE target
 #   GTest::gtest_main              with TENDONFMU_BUILD_TESTS
 #   benchmark::benchmark_main      with TENDONFMU_BUILD_BENCH
+#   TENDONFMU_HAS_PLANT            the simulated finger can be built: then also the targets tendonfmu_sundials and Eigen3::Eigen
 
 find_package(nlohmann_json 3.9 QUIET)
 if(NOT nlohmann_json_FOUND)
@@ -52,3 +53,28 @@ if(TENDONFMU_BUILD_BENCH)
     message(FATAL_ERROR "Google Benchmark not found: install libbenchmark-dev (Debian, Ubuntu) or google-benchmark (Homebrew)")
   endif()
 endif()
+
+# Nothing but the simulated finger needs these: the rest is built without them.
+set(TENDONFMU_HAS_PLANT OFF)
+set(plant_missing "")
+if(NOT TENDONFMU_PLANT)
+  set(plant_missing "it is switched off (TENDONFMU_PLANT)")
+else()
+  # Compared here: Eigen 5 does not call itself compatible with 3.4, and is.
+  find_package(Eigen3 QUIET NO_MODULE)
+  if(NOT TARGET Eigen3::Eigen OR Eigen3_VERSION VERSION_LESS 3.4)
+    set(plant_missing "Eigen >= 3.4 not found: install libeigen3-dev (Debian, Ubuntu) or eigen (Homebrew)")
+  else()
+    include(Sundials)
+    if(TARGET tendonfmu_sundials)
+      set(TENDONFMU_HAS_PLANT ON)
+    else()
+      set(plant_missing "${TENDONFMU_SUNDIALS_MISSING}")
+    endif()
+  endif()
+endif()
+if(NOT TENDONFMU_HAS_PLANT)
+  message(NOTICE "The simulated finger is not built: ${plant_missing}")
+endif()
+# Where the output of CMake is not shown, tools/setup.sh says it from here.
+file(WRITE "${PROJECT_BINARY_DIR}/simulated_finger_missing.txt" "${plant_missing}")
