@@ -1,0 +1,242 @@
+// The simulated finger (tendonfmu_plant.h) as the Python module _plant: numpy arrays in and out, many samples in a
+// call.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tendonfmu_plant.h"
+
+namespace nb = nanobind;
+
+namespace {
+
+using Vector = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Signals = tendonfmu_plant_signals;
+
+enum class Size { one, three, six, joints, tendons };
+
+struct Number {
+  const char* name;
+  double* Signals::*place;
+  Size size;
+};
+constexpr Number numbers[] = {
+    {"measured_tendon_force", &Signals::measured_tendon_force, Size::tendons},
+    {"measured_tendon_position", &Signals::measured_tendon_position, Size::tendons},
+    {"measured_joint_position", &Signals::measured_joint_position, Size::joints},
+    {"measured_joint_velocity", &Signals::measured_joint_velocity, Size::joints},
+    {"measured_external_torque", &Signals::measured_external_torque, Size::joints},
+    {"tendon_force", &Signals::tendon_force, Size::tendons},
+    {"tendon_position", &Signals::tendon_position, Size::tendons},
+    {"joint_position", &Signals::joint_position, Size::joints},
+    {"joint_velocity", &Signals::joint_velocity, Size::joints},
+    {"joint_torque", &Signals::joint_torque, Size::joints},
+    {"friction_torque", &Signals::friction_torque, Size::joints},
+    {"external_torque", &Signals::external_torque, Size::joints},
+    {"inertial_torque", &Signals::inertial_torque, Size::joints},
+    {"stop_torque", &Signals::stop_torque, Size::joints},
+    {"contact_force", &Signals::contact_force, Size::three},
+    {"contact_point", &Signals::contact_point, Size::three},
+    {"tip_position", &Signals::tip_position, Size::three},
+    {"friction_level", &Signals::friction_level, Size::one},
+    {"energy", &Signals::energy, Size::six},
+};
+
+struct Flag {
+  const char* name;
+  unsigned char* Signals::*place;
+  Size size;
+};
+constexpr Flag flags[] = {
+    {"contact", &Signals::contact, Size::one},
+    {"slack", &Signals::slack, Size::tendons},
+};
+
+template <typename Entry, std::size_t count>
+const Entry* find(const Entry (&entries)[count], const std::string& name) {
+  for (const Entry& entry : entries) {
+    if (name == entry.name) return &entry;
+  }
+  return nullptr;
+}
+
+// A numpy array that owns its values, and the values.
+template <typename Value>
+std::pair<nb::object, Value*> new_array(std::size_t rows, std::size_t columns) {
+  auto* kept = new std::vector<Value>(rows * columns);
+  nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<Value>*>(p); });
+  const std::size_t shape[] = {rows, columns};
+  return {nb::cast(nb::ndarray<nb::numpy, Value>(kept->data(), 2, shape, owner)), kept->data()};
+}
+
+class Plant {
+ public:
+  explicit Plant(const nb::bytes& json) {
+    char message[600] = "";
+    handle_ = tendonfmu_plant_create(static_cast<const char*>(json.data()), json.size(), message, sizeof message);
+    if (handle_ == nullptr) throw nb::value_error(message);
+  }
+  ~Plant() { tendonfmu_plant_destroy(handle_); }
+  Plant(const Plant&) = delete;
+  Plant& operator=(const Plant&) = delete;
+
+  std::size_t joints() const { return tendonfmu_plant_joint_count(handle_); }
+  std::size_t tendons() const { return tendonfmu_plant_tendon_count(handle_); }
+  std::size_t order() const { return tendonfmu_plant_order(handle_); }
+  double time() const { return tendonfmu_plant_get_time(handle_); }
+  bool initialised() const { return tendonfmu_plant_is_initialised(handle_) != 0; }
+
+  nb::tuple settings() const {
+    tendonfmu_plant_settings s;
+    check(tendonfmu_plant_get_settings(handle_, &s));
+    return nb::make_tuple(s.integrator, s.relative_tolerance, s.step, s.scheduled_motion != 0, s.scheduled_pushes != 0,
+                          s.sensors != 0, s.seed,
+                          std::array<double, 3>{s.push_point[0], s.push_point[1], s.push_point[2]}, s.push_link);
+  }
+  void set_settings(int integrator, double tolerance, double step, bool motion, bool pushes, bool sensors,
+                    std::uint64_t seed, const std::array<double, 3>& point, int link) {
+    const tendonfmu_plant_settings s = {
+        integrator, tolerance, step, motion, pushes, sensors, seed, {point[0], point[1], point[2]}, link};
+    check(tendonfmu_plant_set_settings(handle_, &s));
+  }
+  void set_inputs(const std::optional<std::vector<double>>& command, double pretension,
+                  const std::array<double, 3>& push) {
+    if (command && command->size() != tendons()) throw nb::value_error("set_inputs: expected one command per tendon");
+    const tendonfmu_plant_inputs inputs = {
+        command ? command->data() : nullptr, pretension, {push[0], push[1], push[2]}};
+    check(tendonfmu_plant_set_inputs(handle_, &inputs));
+  }
+
+  void initialise() {
+    check(released([this] { return tendonfmu_plant_initialise(handle_); }));
+  }
+  void advance(double time) {
+    check(released([this, time] { return tendonfmu_plant_advance(handle_, time); }));
+  }
+  void reset() { check(tendonfmu_plant_reset(handle_)); }
+  std::vector<double> hold_command() const {
+    std::vector<double> command(tendons());
+    check(tendonfmu_plant_hold_command(handle_, command.data()));
+    return command;
+  }
+
+  // The signals named, each an array of [samples, size].
+  nb::dict run(const Vector& time, const std::vector<std::string>& names) {
+    const std::size_t samples = time.shape(0);
+    Signals signals = {};
+    nb::dict found;
+    for (const std::string& name : names) {
+      if (const Number* number = find(numbers, name)) {
+        auto [array, values] = new_array<double>(samples, size_of(number->size));
+        signals.*(number->place) = values;
+        found[name.c_str()] = array;
+      } else if (const Flag* flag = find(flags, name)) {
+        auto [array, values] = new_array<unsigned char>(samples, size_of(flag->size));
+        signals.*(flag->place) = values;
+        found[name.c_str()] = array;
+      } else {
+        throw nb::value_error(("no signal " + name).c_str());
+      }
+    }
+    check(released([&] { return tendonfmu_plant_run(handle_, samples, time.data(), &signals, nullptr); }));
+    return found;
+  }
+
+  nb::bytes save_state() const {
+    std::vector<unsigned char> bytes(tendonfmu_plant_state_size(handle_));
+    check(tendonfmu_plant_save_state(handle_, bytes.data(), bytes.size()));
+    return nb::bytes(bytes.data(), bytes.size());
+  }
+  void restore_state(const nb::bytes& bytes) {
+    check(tendonfmu_plant_restore_state(handle_, bytes.data(), bytes.size()));
+  }
+  nb::tuple statistics() const {
+    tendonfmu_plant_statistics s;
+    check(tendonfmu_plant_get_statistics(handle_, &s));
+    return nb::make_tuple(s.steps, s.right_hand_sides, s.jacobians, s.roots, s.restarts);
+  }
+
+  nb::object continuous_state() const {
+    auto [array, values] = new_array<double>(1, order());
+    check(tendonfmu_plant_get_continuous_state(handle_, values));
+    return array;
+  }
+  // [1, order] and, when wanted, [order, order]
+  nb::tuple derivative(double time, const Vector& state, bool with_jacobian) const {
+    const std::size_t size = order();
+    if (state.shape(0) != size) {
+      throw nb::value_error(("derivative: expected a state of " + std::to_string(size) + " numbers").c_str());
+    }
+    auto [slope, slope_values] = new_array<double>(1, size);
+    auto [jacobian, jacobian_values] = new_array<double>(with_jacobian ? size : 0, size);
+    check(tendonfmu_plant_derivative(handle_, time, state.data(), slope_values,
+                                     with_jacobian ? jacobian_values : nullptr));
+    return nb::make_tuple(slope, jacobian);
+  }
+
+ private:
+  tendonfmu_plant* handle_ = nullptr;
+
+  // Other Python threads go on while the plant integrates.
+  template <typename Call>
+  static tendonfmu_plant_status released(const Call& call) {
+    nb::gil_scoped_release release;
+    return call();
+  }
+
+  // ValueError for what was asked, RuntimeError for what the integrator could not do.
+  void check(tendonfmu_plant_status status) const {
+    if (status == TENDONFMU_PLANT_OK) return;
+    std::string reason = tendonfmu_plant_last_error(handle_);
+    if (reason.empty()) reason = "bad argument";
+    if (status == TENDONFMU_PLANT_SOLVER) throw std::runtime_error(reason);
+    throw nb::value_error(reason.c_str());
+  }
+
+  std::size_t size_of(Size size) const {
+    switch (size) {
+      case Size::one: return 1;
+      case Size::three: return 3;
+      case Size::six: return 6;
+      case Size::joints: return joints();
+      case Size::tendons: return tendons();
+    }
+    return 0;
+  }
+};
+
+}  // namespace
+
+NB_MODULE(_plant, m) {
+  nb::class_<Plant>(m, "Plant")
+      .def(nb::init<const nb::bytes&>())
+      .def_prop_ro("joints", &Plant::joints)
+      .def_prop_ro("tendons", &Plant::tendons)
+      .def_prop_ro("order", &Plant::order)
+      .def_prop_ro("time", &Plant::time)
+      .def_prop_ro("initialised", &Plant::initialised)
+      .def("settings", &Plant::settings)
+      .def("set_settings", &Plant::set_settings)
+      .def("set_inputs", &Plant::set_inputs, nb::arg("command").none(), nb::arg("pretension"), nb::arg("push_force"))
+      .def("initialise", &Plant::initialise)
+      .def("advance", &Plant::advance)
+      .def("reset", &Plant::reset)
+      .def("hold_command", &Plant::hold_command)
+      .def("run", &Plant::run)
+      .def("save_state", &Plant::save_state)
+      .def("restore_state", &Plant::restore_state)
+      .def("statistics", &Plant::statistics)
+      .def("continuous_state", &Plant::continuous_state)
+      .def("derivative", &Plant::derivative);
+}

@@ -1,0 +1,34 @@
+"""Random draws that stay the same: the streams of PCG64, whose raw numbers numpy does not change between versions."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+LARGEST_SEED = 2**53
+
+
+class Draws:
+    """A stream of random numbers of its own for every (seed, names)."""
+
+    def __init__(self, seed: int, *stream: int) -> None:
+        self._generator = np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, *stream])))
+
+    def share(self) -> float:
+        """Uniform in [0, 1)."""
+        return float(self._generator.random())
+
+    def between(self, low: float, high: float) -> float:
+        """Uniform in [low, high)."""
+        return low + (high - low) * self.share()
+
+    def sign(self) -> float:
+        return 1.0 if self.share() < 0.5 else -1.0
+
+    def direction(self) -> list[float]:
+        """[3] unit vector, uniform on the sphere (Archimedes: the height is uniform)."""
+        height = self.between(-1.0, 1.0)
+        angle = self.between(0.0, 2.0 * math.pi)
+        radius = math.sqrt(max(0.0, 1.0 - height * height))
+        return [radius * math.cos(angle), radius * math.sin(angle), height]

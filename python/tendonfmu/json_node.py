@@ -1,0 +1,173 @@
+"""JSON files read with care, and their values with their paths: whoever finds fault can say where.
+
+The same lines of refusal as the native reader's: `motion.speed[1] = -1: expected ...`; lists count from 1.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Collection
+from pathlib import Path
+from typing import Any, NoReturn
+
+from tendonfmu.errors import InputError
+
+LARGEST_FILE = 64 << 20  # bytes, as the native reader's
+
+
+class Refusal(ValueError):
+    """What a JSON text or value is refused for, without the file."""
+
+
+def read_json(path: Path, what: str) -> Any:
+    """The content of a JSON file. Raises InputError: syntax with line and column, a key given twice, NaN, infinity.
+
+    what: what the file should have been, for messages.
+    """
+    try:
+        size = path.stat().st_size
+        text = path.read_bytes() if size <= LARGEST_FILE else b""
+    except OSError as failed:
+        raise InputError(f"{path}: {failed.strerror}; expected {what} (JSON)") from None
+    if size > LARGEST_FILE:
+        raise InputError(f"{path}: {size} bytes; expected {what} (JSON) of at most {LARGEST_FILE}")
+    try:
+        return json.loads(
+            text.decode("utf-8"),
+            object_pairs_hook=_object,
+            parse_constant=_refuse_number,
+            parse_float=_finite,
+            parse_int=_integer,
+        )
+    except Refusal as refused:
+        raise InputError(f"{path}: {refused}") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not a text file in UTF-8; expected {what} (JSON)") from None
+    except json.JSONDecodeError as failed:
+        place = f"line {failed.lineno}, column {failed.colno}"
+        raise InputError(f"{path}: {place}: {failed.msg}; expected {what} (JSON)") from None
+    except RecursionError:
+        raise InputError(f"{path}: nested too deeply; expected {what} (JSON)") from None
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in found:
+            raise Refusal(f"key {shown(key)} is there twice in one object; expected once")
+        found[key] = value
+    return found
+
+
+def _refuse_number(text: str) -> NoReturn:
+    raise Refusal(f"{text}: not a number in JSON; expected a finite number")
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise Refusal(f"{text[:60]}: beyond the range of a double; expected a finite number")
+    return value
+
+
+def _integer(text: str) -> int:
+    _finite(text)
+    return int(text)
+
+
+def shown(value: Any) -> str:
+    """A value as it may stand in a message: JSON on one line, at most 60 characters."""
+    text = json.dumps(value, ensure_ascii=True)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+class Node:
+    """A value of a JSON document together with its path. null counts as absent."""
+
+    def __init__(self, value: Any, path: str = "") -> None:
+        self.value = value
+        self.path = path
+
+    @property
+    def absent(self) -> bool:
+        return self.value is None
+
+    def refuse(self, expectation: str) -> NoReturn:
+        """Raises Refusal: "<path> = <value>: expected ...", or "<path>: missing; expected ..."."""
+        place = self.path or "the document"
+        if self.absent:
+            raise Refusal(f"{place}: missing; expected {expectation}")
+        raise Refusal(f"{place} = {shown(self.value)}: expected {expectation}")
+
+    def member(self, key: str) -> Node:
+        """Value of a key; absent where there is none."""
+        inner = self.value.get(key) if isinstance(self.value, dict) else None
+        return Node(inner, f"{self.path}.{key}" if self.path else key)
+
+    def elements(self) -> list[Node]:
+        items = self.value if isinstance(self.value, list) else []
+        return [Node(item, f"{self.path}[{k}]") for k, item in enumerate(items, start=1)]
+
+    def keys(self, known: Collection[str]) -> Node:
+        """Refuses what is no object, and the first key that is not known."""
+        if not isinstance(self.value, dict):
+            self.refuse("an object")
+        for key, value in self.value.items():
+            if key not in known:
+                where = f"{self.path}.{key}" if self.path else key
+                raise Refusal(f"{where} = {shown(value)}: unknown key; expected one of {', '.join(known)}")
+        return self
+
+    def text(self, expectation: str) -> str:
+        """A string of at least one character, none of them a control character."""
+        if not isinstance(self.value, str) or not self.value or any(ord(letter) < 32 for letter in self.value):
+            self.refuse(expectation)
+        return self.value
+
+    def choice(self, *choices: str) -> str:
+        if self.value not in choices or not isinstance(self.value, str):
+            self.refuse(" or ".join(f'"{choice}"' for choice in choices))
+        return self.value
+
+    def _numeric(self, kinds: type | tuple[type, ...]) -> bool:
+        return isinstance(self.value, kinds) and not isinstance(self.value, bool)
+
+    def integer(self, least: int, most: int, default: int | None = None) -> int:
+        """A whole number from least to most; 3.0 is one."""
+        if self.absent and default is not None:
+            return default
+        whole = self._numeric((int, float)) and float(self.value) == math.floor(self.value)
+        if not whole or not least <= self.value <= most:
+            self.refuse(f"an integer from {least} to {most}")
+        return int(self.value)
+
+    def number(self, least: float, most: float, unit: str, default: float | None = None, above: bool = False) -> float:
+        """A number from least (above: not least itself) to most."""
+        if self.absent and default is not None:
+            return default
+        inside = self._numeric((int, float)) and (least < self.value <= most if above else least <= self.value <= most)
+        if not inside:
+            of = f" in {unit}" if unit else ""
+            self.refuse(f"a number{of}, {'above' if above else 'at least'} {least:g} and at most {most:g}")
+        return float(self.value)
+
+    def list_of(self, count: int | None, meaning: str, read: Callable[[Node], float]) -> list[float]:
+        """A list of numbers, each read by `read`; count None: any length from 1 on."""
+        wrong = not isinstance(self.value, list) or not self.value
+        if wrong or (count is not None and len(self.value) != count):
+            self.refuse(f"a list of {count if count is not None else 'numbers'}, {meaning}")
+        return [read(element) for element in self.elements()]
+
+    def span(
+        self, least: float, most: float, unit: str, default: tuple[float, float] | None = None, above: bool = False
+    ) -> tuple[float, float]:
+        """Two numbers [lowest, highest], not falling."""
+        if self.absent and default is not None:
+            return default
+        low, high = self.list_of(
+            2, f"[lowest, highest] in {unit}", lambda node: node.number(least, most, unit, above=above)
+        )
+        if high < low:
+            self.refuse(f"[lowest, highest] in {unit}, the second not below the first")
+        return low, high
