@@ -9,23 +9,17 @@ static char* copy_text(const char* text) {
   return copy ? memcpy(copy, text, bytes) : NULL;
 }
 
-component* component_create(const log_target* log, tendonfmu_finger* finger) {
+component* component_create(const log_target* log, model* m) {
   component* c = calloc(1, sizeof *c);
   if (!c) {
-    tendonfmu_destroy(finger);
+    model_destroy(m);
     return NULL;
   }
-  c->finger = finger;
+  c->model = m;
   c->log = *log;
   c->instance_name = copy_text(log->instance_name);
   c->log.instance_name = c->instance_name;
-  c->state_size = tendonfmu_state_size(finger);
-  c->scratch = malloc(c->state_size);
-  const int failed = variables_create(&c->values, finger);
-  c->changed_indices = malloc((c->values.parameter_count + 1) * sizeof *c->changed_indices);
-  c->changed_values = malloc((c->values.parameter_count + 1) * sizeof *c->changed_values);
-  c->derivatives = calloc(c->values.input_count + c->values.output_count, sizeof *c->derivatives);
-  if (failed || !c->instance_name || !c->scratch || !c->changed_indices || !c->changed_values || !c->derivatives) {
+  if (variables_create(&c->values, m) || !c->instance_name) {
     component_destroy(c);
     return NULL;
   }
@@ -33,21 +27,17 @@ component* component_create(const log_target* log, tendonfmu_finger* finger) {
 }
 
 void component_destroy(component* c) {
-  tendonfmu_destroy(c->finger);
+  model_destroy(c->model);
   variables_destroy(&c->values);
   free(c->instance_name);
-  free(c->scratch);
-  free(c->changed_indices);
-  free(c->changed_values);
-  free(c->derivatives);
   free(c);
 }
 
 void component_reset(component* c) {
-  tendonfmu_reset(c->finger);
-  variables_start(&c->values, c->finger);
+  model_reset(c->model);
+  variables_start(&c->values, c->model);
   c->phase = PHASE_INSTANTIATED;
-  c->failed = c->parameters_pending = c->outputs_pending = c->stop_time_defined = 0;
+  c->failed = c->outputs_pending = c->stop_time_defined = 0;
   c->start_time = c->stop_time = c->end_of_step = 0.0;
 }
 
@@ -84,66 +74,15 @@ fmi2Status component_fail_because(component* c, const char* function, const char
   return component_fail(c, &text);
 }
 
-/* Hands the finger, in one batch, the parameters that differ from its own: relations between them (static >= coulomb)
- * then hold or not for all together, whatever order they were written in. */
-static int hand_over_parameters(component* c) {
-  size_t changed = 0;
-  tendonfmu_get_parameters(c->finger, c->values.parameter_count, NULL, c->changed_values);
-  for (size_t i = 0; i < c->values.parameter_count; ++i) {
-    if (c->values.parameters[i] != c->changed_values[i]) {
-      c->changed_indices[changed] = i;
-      c->changed_values[changed++] = c->values.parameters[i];
-    }
-  }
-  if (!changed) {
+int component_update_outputs(component* c) {
+  if (!c->outputs_pending || c->failed || c->phase != PHASE_INITIALISATION) {
     return 0;
   }
-  return tendonfmu_set_parameters(c->finger, changed, c->changed_indices, c->changed_values) == TENDONFMU_OK ? 0 : -1;
-}
-
-static int advance(component* c, double time) {
-  const tendonfmu_inputs inputs = variables_inputs(&c->values);
-  if (c->parameters_pending && hand_over_parameters(c)) {
+  if (model_begin_trial(c->model, &c->values, c->start_time)) {
     return -1;
   }
-  return (tendonfmu_is_initialised(c->finger) ? tendonfmu_step(c->finger, time, &inputs)
-                                              : tendonfmu_initialise(c->finger, time, &inputs)) == TENDONFMU_OK
-             ? 0
-             : -1;
-}
-
-int component_take_sample(component* c, double time) {
-  if (tendonfmu_is_initialised(c->finger) && time == tendonfmu_get_time(c->finger)) {
-    return 0; /* taken already: nothing changes, and parameters wait for the next sample */
-  }
-  if (c->parameters_pending) {
-    tendonfmu_save_state(c->finger, c->scratch, c->state_size);
-  }
-  if (advance(c, time)) {
-    if (c->parameters_pending) { /* they are not to stay with a finger that refused the sample */
-      tendonfmu_restore_state(c->finger, c->scratch, c->state_size);
-    }
-    return -1;
-  }
-  c->parameters_pending = c->outputs_pending = 0;
-  component_fetch_outputs(c);
+  model_fetch_outputs(c->model, &c->values);
+  model_end_trial(c->model);
+  c->outputs_pending = 0;
   return 0;
-}
-
-int component_begin_trial(component* c) {
-  tendonfmu_save_state(c->finger, c->scratch, c->state_size);
-  if (advance(c, c->start_time)) {
-    component_end_trial(c);
-    return -1;
-  }
-  return 0;
-}
-
-void component_end_trial(component* c) {
-  tendonfmu_restore_state(c->finger, c->scratch, c->state_size);
-}
-
-void component_fetch_outputs(component* c) {
-  const tendonfmu_outputs outputs = variables_outputs(&c->values);
-  tendonfmu_get_outputs(c->finger, &outputs);
 }

@@ -49,12 +49,12 @@ static uint64_t checksum(const unsigned char* bytes, size_t size) {
   return hash;
 }
 
-static size_t finger_offset(const component* c) {
+static size_t model_offset(const component* c) {
   return NUMBERS + 8 * (LIFE_COUNT + c->values.input_count + c->values.parameter_count);
 }
 
 size_t component_state_size(const component* c) {
-  return finger_offset(c) + c->state_size;
+  return model_offset(c) + model_state_size(c->model);
 }
 
 void component_save(const component* c, void* bytes) {
@@ -79,7 +79,7 @@ void component_save(const component* c, void* bytes) {
   for (size_t i = 0; i < v->parameter_count; ++i) {
     put_number(to, LIFE_COUNT + v->input_count + i, v->parameters[i]);
   }
-  tendonfmu_save_state(c->finger, to + finger_offset(c), c->state_size);
+  model_save(c->model, to + model_offset(c));
   put_u64(to + CHECKSUM, checksum(to, size));
 }
 
@@ -102,7 +102,7 @@ static int values_are_sound(const component* c, const unsigned char* from) {
     const size_t count = group->causality == CAUSALITY_INPUT ? variables_group_count(&c->values, group) : 0;
     for (size_t i = 0; i < count; ++i) {
       const variable input = {group, (variable_group_id)g, i};
-      if (!variables_accept(c->finger, &input, get_number(from, at++))) {
+      if (!variables_accept(c->model, &input, get_number(from, at++))) {
         return 0;
       }
     }
@@ -110,26 +110,11 @@ static int values_are_sound(const component* c, const unsigned char* from) {
   for (size_t i = 0; i < c->values.parameter_count; ++i) {
     const variable parameter = {NULL, GROUP_COUNT, i};
     const double value = get_number(from, at++);
-    if (value != c->values.parameters[i] && !variables_accept(c->finger, &parameter, value)) {
+    if (value != c->values.parameters[i] && !variables_accept(c->model, &parameter, value)) {
       return 0;
     }
   }
   return 1;
-}
-
-/* the finger's part, and whether it has samples exactly when the phase says so; puts the finger back afterwards */
-static const char* check_finger(component* c, const unsigned char* from) {
-  const double phase = get_number(from, AT_PHASE);
-  const char* reason = NULL;
-  tendonfmu_save_state(c->finger, c->scratch, c->state_size);
-  if (tendonfmu_restore_state(c->finger, from + finger_offset(c), c->state_size) != TENDONFMU_OK) {
-    return tendonfmu_last_error(c->finger);
-  }
-  if (tendonfmu_is_initialised(c->finger) != (phase >= PHASE_STEP_COMPLETE)) {
-    reason = "damaged state: its phase does not fit its finger";
-  }
-  tendonfmu_restore_state(c->finger, c->scratch, c->state_size);
-  return reason;
 }
 
 static const char* check_header(const component* c, const unsigned char* from) {
@@ -156,7 +141,8 @@ const char* component_check_state(component* c, const void* bytes, size_t size) 
   if (!life_is_sound(bytes) || !values_are_sound(c, bytes)) {
     return "damaged state: a number in it cannot be";
   }
-  return check_finger(c, bytes);
+  const unsigned char* of_model = (const unsigned char*)bytes + model_offset(c);
+  return model_check_state(c->model, of_model, get_number(bytes, AT_PHASE) >= PHASE_STEP_COMPLETE);
 }
 
 const char* component_restore(component* c, const void* bytes) {
@@ -166,12 +152,13 @@ const char* component_restore(component* c, const void* bytes) {
   if (reason) {
     return reason;
   }
-  if (tendonfmu_restore_state(c->finger, from + finger_offset(c), c->state_size) != TENDONFMU_OK) {
-    return tendonfmu_last_error(c->finger);
+  if (model_restore(c->model, from + model_offset(c))) {
+    return model_last_error(c->model);
   }
+  variables_fetch_settings(v, c->model);
   c->failed = 0;
   c->phase = (fmu_phase)get_number(from, AT_PHASE);
-  c->parameters_pending = 1; /* whether they differ from the finger's is found when they are handed over */
+  v->parameters_pending = 1; /* whether they differ from the model's is found when they are handed over */
   c->stop_time_defined = get_number(from, AT_STOP_DEFINED) != 0.0;
   c->start_time = get_number(from, AT_START);
   c->stop_time = get_number(from, AT_STOP);
@@ -183,8 +170,8 @@ const char* component_restore(component* c, const void* bytes) {
     v->parameters[i] = get_number(from, LIFE_COUNT + v->input_count + i);
   }
   c->outputs_pending = c->phase == PHASE_INITIALISATION;
-  if (tendonfmu_is_initialised(c->finger)) {
-    component_fetch_outputs(c);
+  if (model_is_initialised(c->model)) {
+    model_fetch_outputs(c->model, v);
   }
   return NULL;
 }

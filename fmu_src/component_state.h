@@ -1,4 +1,4 @@
-/* The whole state of an instance as bytes: life cycle, inputs, parameters, and the finger's own saved state.
+/* The whole state of an instance as bytes: life cycle, inputs, parameters, and the model's own saved state.
  * Little-endian, checksummed, without pointers: the same bytes serve in the process and outside. */
 #ifndef TENDONFMU_COMPONENT_STATE_H
 #define TENDONFMU_COMPONENT_STATE_H

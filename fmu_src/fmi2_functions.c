@@ -58,19 +58,29 @@ static fmi2Component refuse_instance(const log_target* log, const char* reason, 
   return NULL;
 }
 
-/* the finger of the image, after a check that image and variable table are those of the modelDescription.xml */
-static tendonfmu_finger* create_finger(const log_target* log, const void* image, size_t size, const char* guid) {
+static fmi2Component refuse_resource(const log_target* log, const char* reason) {
+  log_text text = log_start("fmi2Instantiate", model_text.resource);
+  log_append(&text, ": ");
+  log_append(&text, reason);
+  log_send(log, fmi2Error, LOG_STATUS_ERROR, &text);
+  return NULL;
+}
+
+/* the model of the resource, after a check that resource and variable table are those of the modelDescription.xml */
+static model* create_model(const log_target* log, const void* resource, size_t size, const char* guid) {
   char expected[39] = "", message[256] = "";
-  tendonfmu_finger* finger = tendonfmu_create(image, size, message, sizeof message);
-  if (!finger) {
-    return refuse_instance(log, "model.image: ", message);
+  model* m = model_create(resource, size, message, sizeof message);
+  if (!m) {
+    refuse_resource(log, message);
+    return NULL;
   }
-  tendonfmu_image_guid(image, size, VARIABLE_TABLE_SALT, expected);
+  model_guid(resource, size, expected);
   if (!guid || strcmp(guid, expected) != 0) {
-    tendonfmu_destroy(finger);
-    return refuse_instance(log, "fmuGUID is not that of this FMU: expected ", expected);
+    model_destroy(m);
+    refuse_instance(log, "fmuGUID is not that of this FMU: expected ", expected);
+    return NULL;
   }
-  return finger;
+  return m;
 }
 
 static fmi2Component instantiate(const log_target* log, fmi2Type type, const char* guid, const char* location) {
@@ -79,16 +89,16 @@ static fmi2Component instantiate(const log_target* log, fmi2Type type, const cha
   if (type != fmi2CoSimulation) {
     return refuse_instance(log, "fmuType: expected fmi2CoSimulation", "");
   }
-  void* image = resource_read(location, "model.image", &size, &reason);
-  if (!image) {
-    return refuse_instance(log, "model.image: ", reason);
+  void* resource = resource_read(location, model_text.resource, &size, &reason);
+  if (!resource) {
+    return refuse_resource(log, reason);
   }
-  tendonfmu_finger* finger = create_finger(log, image, size, guid);
-  free(image);
-  if (!finger) {
+  model* m = create_model(log, resource, size, guid);
+  free(resource);
+  if (!m) {
     return NULL;
   }
-  component* c = component_create(log, finger);
+  component* c = component_create(log, m);
   return c ? c : refuse_instance(log, "out of memory", "");
 }
 
@@ -116,7 +126,7 @@ void fmi2FreeInstance(fmi2Component instance) {
 
 /* --- life cycle --------------------------------------------------------------------------------------------------- */
 
-/* a time that the finger takes; says so otherwise */
+/* a time that any model takes; says so otherwise */
 static int time_is_sound(component* c, const char* function, const char* name, double time) {
   if (fabs(time) <= 1e15) {
     return 1;
@@ -132,8 +142,6 @@ static int time_is_sound(component* c, const char* function, const char* name, d
 fmi2Status fmi2SetupExperiment(fmi2Component instance, fmi2Boolean toleranceDefined, fmi2Real tolerance,
                                fmi2Real startTime, fmi2Boolean stopTimeDefined, fmi2Real stopTime) {
   component* c = instance;
-  (void)toleranceDefined; /* nothing is iterated */
-  (void)tolerance;
   if (!component_may_call(c, CALL_SETUP_EXPERIMENT) ||
       !time_is_sound(c, "fmi2SetupExperiment", "startTime", startTime)) {
     return fmi2Error;
@@ -146,6 +154,15 @@ fmi2Status fmi2SetupExperiment(fmi2Component instance, fmi2Boolean toleranceDefi
     log_append(&text, " s");
     return component_fail(c, &text);
   }
+  const char* expected = toleranceDefined ? model_set_tolerance(c->model, tolerance) : NULL;
+  if (expected) {
+    log_text text = log_start("fmi2SetupExperiment", "tolerance = ");
+    log_append_number(&text, tolerance);
+    log_append(&text, ": expected ");
+    log_append(&text, expected);
+    return component_fail(c, &text);
+  }
+  variables_fetch_settings(&c->values, c->model);
   c->start_time = c->end_of_step = startTime;
   c->stop_time_defined = stopTimeDefined != fmi2False;
   c->stop_time = stopTimeDefined ? stopTime : 0.0;
@@ -167,11 +184,13 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component instance) {
   if (!component_may_call(c, CALL_EXIT_INITIALIZATION_MODE)) {
     return fmi2Error;
   }
-  if (component_take_sample(c, c->start_time)) {
-    return component_fail_because(c, "fmi2ExitInitializationMode", tendonfmu_last_error(c->finger));
+  if (model_initialise(c->model, &c->values, c->start_time)) {
+    return component_fail_because(c, "fmi2ExitInitializationMode", model_last_error(c->model));
   }
+  model_fetch_outputs(c->model, &c->values);
   c->phase = PHASE_STEP_COMPLETE;
-  log_event(c, "fmi2ExitInitializationMode", "the first sample is taken");
+  c->outputs_pending = 0;
+  log_event(c, "fmi2ExitInitializationMode", model_text.initialised);
   return fmi2OK;
 }
 
@@ -197,19 +216,16 @@ fmi2Status fmi2Reset(fmi2Component instance) {
 
 /* --- steps -------------------------------------------------------------------------------------------------------- */
 
-/* Why there is no step from `time` over `step`; NULL when there is one. A step past the stop time by rounding is one:
- * the sample belongs to its beginning. */
+/* Why there is no step from `time` over `step`; NULL when there is one. A step past the stop time by rounding is one.
+ */
 static const char* refuse_step(const component* c, double time, double step) {
   if (!isfinite(step) || !(step > 0.0)) {
     return "expected a finite communicationStepSize above 0 s";
   }
-  if (time < tendonfmu_get_time(c->finger)) {
-    return "expected a currentCommunicationPoint not before the sample already taken";
-  }
   if (c->stop_time_defined && time > c->stop_time + 0.5 * step) {
     return "expected a currentCommunicationPoint not past the stop time";
   }
-  return NULL;
+  return model_refuse_step(c->model, time, step, c->end_of_step);
 }
 
 fmi2Status fmi2DoStep(fmi2Component instance, fmi2Real currentCommunicationPoint, fmi2Real communicationStepSize,
@@ -228,13 +244,14 @@ fmi2Status fmi2DoStep(fmi2Component instance, fmi2Real currentCommunicationPoint
     log_append(&text, " s and step ");
     log_append_number(&text, communicationStepSize);
     log_append(&text, " s, after the sample at ");
-    log_append_number(&text, tendonfmu_get_time(c->finger));
+    log_append_number(&text, model_get_time(c->model));
     log_append(&text, " s");
     return component_fail(c, &text);
   }
-  if (component_take_sample(c, currentCommunicationPoint)) {
-    return component_fail_because(c, "fmi2DoStep", tendonfmu_last_error(c->finger));
+  if (model_step(c->model, &c->values, currentCommunicationPoint, communicationStepSize)) {
+    return component_fail_because(c, "fmi2DoStep", model_last_error(c->model));
   }
+  model_fetch_outputs(c->model, &c->values);
   c->end_of_step = currentCommunicationPoint + communicationStepSize;
   return fmi2OK;
 }
@@ -286,7 +303,7 @@ fmi2Status fmi2GetIntegerStatus(fmi2Component instance, const fmi2StatusKind kin
 fmi2Status fmi2GetBooleanStatus(fmi2Component instance, const fmi2StatusKind kind, fmi2Boolean* value) {
   const fmi2Status status = begin_status(instance, CALL_GET_BOOLEAN_STATUS, value, kind == fmi2Terminated);
   if (status == fmi2OK) {
-    *value = fmi2False; /* the finger never ends a simulation by itself */
+    *value = fmi2False; /* no model ends a simulation by itself */
   }
   return status;
 }

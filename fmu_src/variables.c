@@ -7,26 +7,32 @@ size_t variables_group_count(const variables* v, const variable_group* group) {
   switch (group->size) {
     case SIZE_JOINTS: return v->joints;
     case SIZE_TENDONS: return v->tendons;
+    case SIZE_VECTOR: return 3;
     default: return 1;
   }
 }
 
-/* Numbers of all Real groups of one causality. */
-static size_t real_count(const variables* v, variable_causality causality) {
+/* Groups that live in the block of numbers: all but Boolean outputs. */
+static int has_numbers(const variable_group* group) {
+  return group->type == VARIABLE_REAL || group->causality == CAUSALITY_PARAMETER;
+}
+
+/* Numbers of all groups of one causality. */
+static size_t number_count(const variables* v, variable_causality causality) {
   size_t count = 0;
   for (int g = 0; g < GROUP_COUNT; ++g) {
-    if (variable_groups[g].type == VARIABLE_REAL && variable_groups[g].causality == causality) {
+    if (has_numbers(&variable_groups[g]) && variable_groups[g].causality == causality) {
       count += variables_group_count(v, &variable_groups[g]);
     }
   }
   return count;
 }
 
-/* Gives each Real group of one causality its part of the block; returns what is left of it. */
+/* Gives each group of one causality its part of the block; returns what is left of it. */
 static double* share_out(variables* v, variable_causality causality, double* block) {
   for (int g = 0; g < GROUP_COUNT; ++g) {
-    if (variable_groups[g].type == VARIABLE_REAL && variable_groups[g].causality == causality) {
-      v->real[g] = block;
+    if (has_numbers(&variable_groups[g]) && variable_groups[g].causality == causality) {
+      v->number[g] = block;
       block += variables_group_count(v, &variable_groups[g]);
     }
   }
@@ -36,7 +42,7 @@ static double* share_out(variables* v, variable_causality causality, double* blo
 static size_t share_out_flags(variables* v, unsigned char* block) {
   size_t used = 0;
   for (int g = 0; g < GROUP_COUNT; ++g) {
-    if (variable_groups[g].type == VARIABLE_BOOLEAN) {
+    if (!has_numbers(&variable_groups[g])) {
       v->flag[g] = block ? block + used : NULL;
       used += variables_group_count(v, &variable_groups[g]);
     }
@@ -44,21 +50,23 @@ static size_t share_out_flags(variables* v, unsigned char* block) {
   return used;
 }
 
-int variables_create(variables* v, const tendonfmu_finger* finger) {
+int variables_create(variables* v, const model* m) {
   memset(v, 0, sizeof *v);
-  v->joints = tendonfmu_joint_count(finger);
-  v->tendons = tendonfmu_tendon_count(finger);
-  v->parameter_count = tendonfmu_parameter_count(finger);
-  v->input_count = real_count(v, CAUSALITY_INPUT);
-  v->output_count = real_count(v, CAUSALITY_OUTPUT);
-  v->numbers = calloc(v->input_count + v->output_count + v->parameter_count, sizeof(double));
+  v->joints = model_joint_count(m);
+  v->tendons = model_tendon_count(m);
+  v->parameter_count = model_parameter_count(m);
+  v->input_count = number_count(v, CAUSALITY_INPUT);
+  v->output_count = number_count(v, CAUSALITY_OUTPUT);
+  const size_t settings = number_count(v, CAUSALITY_PARAMETER);
+  v->numbers = calloc(v->input_count + v->output_count + settings + v->parameter_count, sizeof(double));
   v->flags = calloc(share_out_flags(v, NULL), 1);
   if (!v->numbers || !v->flags) {
     return -1;
   }
   share_out_flags(v, v->flags);
-  v->parameters = share_out(v, CAUSALITY_OUTPUT, share_out(v, CAUSALITY_INPUT, v->numbers));
-  variables_start(v, finger);
+  double* outputs = share_out(v, CAUSALITY_INPUT, v->numbers);
+  v->parameters = share_out(v, CAUSALITY_PARAMETER, share_out(v, CAUSALITY_OUTPUT, outputs));
+  variables_start(v, m);
   return 0;
 }
 
@@ -67,10 +75,22 @@ void variables_destroy(variables* v) {
   free(v->flags);
 }
 
-void variables_start(variables* v, const tendonfmu_finger* finger) {
+void variables_start(variables* v, const model* m) {
   memset(v->numbers, 0, (v->input_count + v->output_count) * sizeof(double));
   memset(v->flags, 0, share_out_flags(v, v->flags));
-  tendonfmu_get_parameters(finger, v->parameter_count, NULL, v->parameters);
+  variables_fetch_settings(v, m);
+  model_get_parameters(m, v->parameters);
+  v->parameters_pending = 0;
+}
+
+void variables_fetch_settings(variables* v, const model* m) {
+  for (int g = 0; g < GROUP_COUNT; ++g) {
+    const variable_group* group = &variable_groups[g];
+    const size_t count = group->causality == CAUSALITY_PARAMETER ? variables_group_count(v, group) : 0;
+    for (size_t i = 0; i < count; ++i) {
+      v->number[g][i] = model_get_setting(m, (variable_group_id)g, i);
+    }
+  }
 }
 
 /* 1 when the reference lies in the group; then index is set */
@@ -107,67 +127,48 @@ variable_causality variable_causality_of(const variable* found) {
   return found->group ? found->group->causality : CAUSALITY_PARAMETER;
 }
 
-double* variables_real(const variables* v, const variable* found) {
-  return (found->group ? v->real[found->id] : v->parameters) + found->index;
+double* variables_number(const variables* v, const variable* found) {
+  return (found->group ? v->number[found->id] : v->parameters) + found->index;
 }
 
 /* unit, minimum, maximum of an input or parameter */
-static tendonfmu_parameter_info range_of(const tendonfmu_finger* finger, const variable* found) {
-  tendonfmu_parameter_info info = {0};
-  if (found->group) {
-    info.minimum = found->group->minimum;
-    info.maximum = found->group->maximum;
-    info.unit = found->group->unit;
-  } else {
-    tendonfmu_get_parameter_info(finger, found->index, &info);
+static model_range range_of(const model* m, const variable* found) {
+  if (!found->group) {
+    return model_parameter_range(m, found->index);
   }
-  return info;
+  if (found->group->causality == CAUSALITY_PARAMETER) {
+    return model_setting_range(m, found->id);
+  }
+  return (model_range){.unit = found->group->unit, .minimum = found->group->minimum, .maximum = found->group->maximum};
 }
 
-int variables_accept(const tendonfmu_finger* finger, const variable* found, double value) {
-  if (found->group) {
+int variables_accept(const model* m, const variable* found, double value) {
+  if (found->group && found->group->causality == CAUSALITY_INPUT) {
     return value >= found->group->minimum && value <= found->group->maximum; /* what is not a number compares false */
   }
-  const tendonfmu_parameter_info range = range_of(finger, found);
+  const model_range range = range_of(m, found);
   return value <= range.maximum && (range.above_minimum ? value > range.minimum : value >= range.minimum);
 }
 
-void variables_append_refusal(log_text* text, const tendonfmu_finger* finger, const variable* found, double value) {
-  const tendonfmu_parameter_info range = range_of(finger, found);
-  variables_append_name(text, finger, found);
+void variables_append_refusal(log_text* text, const model* m, const variable* found, double value) {
+  const model_range range = range_of(m, found);
+  variables_append_name(text, m, found);
   log_append(text, " = ");
   log_append_number(text, value);
   log_append(text, range.above_minimum ? ": expected above " : ": expected ");
   log_append_number(text, range.minimum);
   log_append(text, range.above_minimum ? " and at most " : " to ");
   log_append_number(text, range.maximum);
-  log_append(text, " ");
-  log_append(text, range.unit);
+  if (range.unit && *range.unit) {
+    log_append(text, " ");
+    log_append(text, range.unit);
+  }
 }
 
-tendonfmu_inputs variables_inputs(const variables* v) {
-  return (tendonfmu_inputs){.tendon_force = v->real[GROUP_TENDON_FORCE],
-                            .tendon_position = v->real[GROUP_TENDON_POSITION],
-                            .joint_position = v->real[GROUP_JOINT_POSITION],
-                            .joint_velocity = v->real[GROUP_JOINT_VELOCITY]};
-}
-
-tendonfmu_outputs variables_outputs(const variables* v) {
-  return (tendonfmu_outputs){.compensated_torque = v->real[GROUP_COMPENSATED_TORQUE],
-                             .joint_torque = v->real[GROUP_JOINT_TORQUE],
-                             .friction_torque = v->real[GROUP_FRICTION_TORQUE],
-                             .bias_torque = v->real[GROUP_BIAS_TORQUE],
-                             .joint_angle = v->real[GROUP_JOINT_ANGLE],
-                             .joint_speed = v->real[GROUP_JOINT_SPEED],
-                             .joint_contact = v->flag[GROUP_JOINT_CONTACT],
-                             .contact = v->flag[GROUP_CONTACT],
-                             .slack = v->flag[GROUP_SLACK]};
-}
-
-void variables_append_name(log_text* text, const tendonfmu_finger* finger, const variable* found) {
+void variables_append_name(log_text* text, const model* m, const variable* found) {
   char path[128];
   if (!found->group) {
-    if (tendonfmu_get_parameter_path(finger, found->index, path, sizeof path) == TENDONFMU_OK) {
+    if (model_parameter_path(m, found->index, path, sizeof path) == 0) {
       log_append(text, path);
     }
     return;

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 FMI_TYPES = ("Real", "Integer", "Boolean", "String")
-SIZES = ("scalar", "joints", "tendons")
+SIZES = ("scalar", "joints", "tendons", "vector")
 MAX_GROUP = 100  # value references that a group may take up
 
 HEADER = """\
@@ -33,7 +33,7 @@ typedef enum variable_group_id {{
 }} variable_group_id;
 
 typedef enum variable_type {{ VARIABLE_REAL, VARIABLE_INTEGER, VARIABLE_BOOLEAN, VARIABLE_STRING }} variable_type;
-typedef enum variable_size {{ SIZE_SCALAR, SIZE_JOINTS, SIZE_TENDONS }} variable_size;
+typedef enum variable_size {{ SIZE_SCALAR, SIZE_JOINTS, SIZE_TENDONS, SIZE_VECTOR }} variable_size;
 typedef enum variable_causality {{ CAUSALITY_INPUT, CAUSALITY_OUTPUT, CAUSALITY_PARAMETER }} variable_causality;
 
 typedef struct variable_group {{
@@ -97,7 +97,7 @@ def header(table: dict[str, Any]) -> str:
     return HEADER.format(
         salt=hex(salt(table)),
         parameter_base=table["parameters"]["base"],
-        ids="\n".join(f"  GROUP_{group['name'].upper()}," for group in table["groups"]),
+        ids="\n".join(f"  GROUP_{group['name'].upper().replace('.', '_')}," for group in table["groups"]),
         rows="\n".join(row(group) for group in table["groups"]),
         categories="\n".join(f"  {constant(name)}," for name in categories),
         category_names=", ".join(f'"{name}"' for name in categories),

@@ -1,0 +1,275 @@
+#include "finger_model.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "model.h"
+
+struct model {
+  tendonfmu_finger* finger;
+  void* scratch; /* [state_size] a state of the finger to go back to */
+  size_t state_size, parameter_count;
+  size_t* changed_indices; /* [p] parameters to hand over */
+  double* changed_values;  /* [p] */
+  double* derivatives;     /* [inputs + outputs] */
+};
+
+const model_texts model_text = {.resource = "model.image", .initialised = "the first sample is taken"};
+
+/* Copies as much as there is room for. */
+static void say(char* message, size_t size, const char* text) {
+  if (message && size) {
+    const size_t length = strlen(text) < size - 1 ? strlen(text) : size - 1;
+    memcpy(message, text, length);
+    message[length] = '\0';
+  }
+}
+
+model* model_create(const void* resource, size_t size, char* message, size_t message_size) {
+  model* m = calloc(1, sizeof *m);
+  if (!m) {
+    say(message, message_size, "out of memory");
+    return NULL;
+  }
+  m->finger = tendonfmu_create(resource, size, message, message_size);
+  if (!m->finger) {
+    free(m);
+    return NULL;
+  }
+  m->state_size = tendonfmu_state_size(m->finger);
+  m->parameter_count = tendonfmu_parameter_count(m->finger);
+  m->scratch = malloc(m->state_size);
+  m->changed_indices = malloc((m->parameter_count + 1) * sizeof *m->changed_indices);
+  m->changed_values = malloc((m->parameter_count + 1) * sizeof *m->changed_values);
+  m->derivatives = calloc(GROUP_COUNT * (model_joint_count(m) + model_tendon_count(m) + 1), sizeof *m->derivatives);
+  if (!m->scratch || !m->changed_indices || !m->changed_values || !m->derivatives) {
+    say(message, message_size, "out of memory");
+    model_destroy(m);
+    return NULL;
+  }
+  return m;
+}
+
+void model_destroy(model* m) {
+  tendonfmu_destroy(m->finger);
+  free(m->scratch);
+  free(m->changed_indices);
+  free(m->changed_values);
+  free(m->derivatives);
+  free(m);
+}
+
+void model_reset(model* m) {
+  tendonfmu_reset(m->finger);
+}
+
+void model_guid(const void* resource, size_t size, char guid[39]) {
+  tendonfmu_image_guid(resource, size, VARIABLE_TABLE_SALT, guid);
+}
+
+size_t model_joint_count(const model* m) {
+  return tendonfmu_joint_count(m->finger);
+}
+
+size_t model_tendon_count(const model* m) {
+  return tendonfmu_tendon_count(m->finger);
+}
+
+const char* model_last_error(const model* m) {
+  return tendonfmu_last_error(m->finger);
+}
+
+tendonfmu_finger* model_finger(const model* m) {
+  return m->finger;
+}
+
+double* model_derivatives(const model* m) {
+  return m->derivatives;
+}
+
+/* --- parameters ----------------------------------------------------------------------------------------------------
+ */
+
+/* kinematics_source is the only setting */
+
+double model_get_setting(const model* m, variable_group_id group, size_t index) {
+  (void)group, (void)index;
+  return tendonfmu_get_kinematics_source(m->finger);
+}
+
+void model_set_setting(model* m, variable_group_id group, size_t index, double value) {
+  (void)group, (void)index;
+  tendonfmu_set_kinematics_source(m->finger, (int)value);
+}
+
+model_range model_setting_range(const model* m, variable_group_id group) {
+  (void)m;
+  return (model_range){.unit = variable_groups[group].unit,
+                       .minimum = variable_groups[group].minimum,
+                       .maximum = variable_groups[group].maximum};
+}
+
+size_t model_parameter_count(const model* m) {
+  return m->parameter_count;
+}
+
+void model_get_parameters(const model* m, double* values) {
+  tendonfmu_get_parameters(m->finger, m->parameter_count, NULL, values);
+}
+
+model_range model_parameter_range(const model* m, size_t index) {
+  tendonfmu_parameter_info info = {0};
+  tendonfmu_get_parameter_info(m->finger, index, &info);
+  return (model_range){info.unit, info.minimum, info.maximum, info.above_minimum, info.tunable};
+}
+
+int model_parameter_path(const model* m, size_t index, char* path, size_t size) {
+  return tendonfmu_get_parameter_path(m->finger, index, path, size) == TENDONFMU_OK ? 0 : -1;
+}
+
+const char* model_set_tolerance(model* m, double tolerance) {
+  (void)m, (void)tolerance; /* nothing is iterated */
+  return NULL;
+}
+
+/* --- inputs and outputs --------------------------------------------------------------------------------------------
+ */
+
+tendonfmu_inputs variables_inputs(const variables* v) {
+  return (tendonfmu_inputs){.tendon_force = v->number[GROUP_TENDON_FORCE],
+                            .tendon_position = v->number[GROUP_TENDON_POSITION],
+                            .joint_position = v->number[GROUP_JOINT_POSITION],
+                            .joint_velocity = v->number[GROUP_JOINT_VELOCITY]};
+}
+
+tendonfmu_outputs variables_outputs(const variables* v) {
+  return (tendonfmu_outputs){.compensated_torque = v->number[GROUP_COMPENSATED_TORQUE],
+                             .joint_torque = v->number[GROUP_JOINT_TORQUE],
+                             .friction_torque = v->number[GROUP_FRICTION_TORQUE],
+                             .bias_torque = v->number[GROUP_BIAS_TORQUE],
+                             .joint_angle = v->number[GROUP_JOINT_ANGLE],
+                             .joint_speed = v->number[GROUP_JOINT_SPEED],
+                             .joint_contact = v->flag[GROUP_JOINT_CONTACT],
+                             .contact = v->flag[GROUP_CONTACT],
+                             .slack = v->flag[GROUP_SLACK]};
+}
+
+void model_fetch_outputs(const model* m, variables* values) {
+  const tendonfmu_outputs outputs = variables_outputs(values);
+  tendonfmu_get_outputs(m->finger, &outputs);
+}
+
+/* --- samples -------------------------------------------------------------------------------------------------------
+ */
+
+int model_is_initialised(const model* m) {
+  return tendonfmu_is_initialised(m->finger);
+}
+
+double model_get_time(const model* m) {
+  return tendonfmu_get_time(m->finger);
+}
+
+/* Hands the finger, in one batch, the parameters that differ from its own: relations between them (static >= coulomb)
+ * then hold or not for all together, whatever order they were written in. */
+static int hand_over_parameters(model* m, const variables* values) {
+  size_t changed = 0;
+  tendonfmu_get_parameters(m->finger, m->parameter_count, NULL, m->changed_values);
+  for (size_t i = 0; i < m->parameter_count; ++i) {
+    if (values->parameters[i] != m->changed_values[i]) {
+      m->changed_indices[changed] = i;
+      m->changed_values[changed++] = values->parameters[i];
+    }
+  }
+  if (!changed) {
+    return 0;
+  }
+  return tendonfmu_set_parameters(m->finger, changed, m->changed_indices, m->changed_values) == TENDONFMU_OK ? 0 : -1;
+}
+
+static int advance(model* m, const variables* values, double time) {
+  const tendonfmu_inputs inputs = variables_inputs(values);
+  if (values->parameters_pending && hand_over_parameters(m, values)) {
+    return -1;
+  }
+  return (tendonfmu_is_initialised(m->finger) ? tendonfmu_step(m->finger, time, &inputs)
+                                              : tendonfmu_initialise(m->finger, time, &inputs)) == TENDONFMU_OK
+             ? 0
+             : -1;
+}
+
+/* Takes a sample of the present inputs; parameters that were written take effect in it. */
+static int take_sample(model* m, variables* values, double time) {
+  if (tendonfmu_is_initialised(m->finger) && time == tendonfmu_get_time(m->finger)) {
+    return 0; /* taken already: nothing changes, and parameters wait for the next sample */
+  }
+  if (values->parameters_pending) {
+    tendonfmu_save_state(m->finger, m->scratch, m->state_size);
+  }
+  if (advance(m, values, time)) {
+    if (values->parameters_pending) { /* they are not to stay with a finger that refused the sample */
+      tendonfmu_restore_state(m->finger, m->scratch, m->state_size);
+    }
+    return -1;
+  }
+  values->parameters_pending = 0;
+  return 0;
+}
+
+int model_initialise(model* m, variables* values, double start) {
+  return take_sample(m, values, start);
+}
+
+int model_begin_trial(model* m, variables* values, double start) {
+  tendonfmu_save_state(m->finger, m->scratch, m->state_size);
+  if (advance(m, values, start)) {
+    model_end_trial(m);
+    return -1;
+  }
+  return 0;
+}
+
+void model_end_trial(model* m) {
+  tendonfmu_restore_state(m->finger, m->scratch, m->state_size);
+}
+
+/* The sample belongs to the beginning of the step. */
+const char* model_refuse_step(const model* m, double time, double step, double end) {
+  (void)step, (void)end;
+  return time < tendonfmu_get_time(m->finger)
+             ? "expected a currentCommunicationPoint not before the sample already taken"
+             : NULL;
+}
+
+int model_step(model* m, variables* values, double time, double step) {
+  (void)step;
+  return take_sample(m, values, time);
+}
+
+/* --- saved states --------------------------------------------------------------------------------------------------
+ */
+
+size_t model_state_size(const model* m) {
+  return m->state_size;
+}
+
+void model_save(const model* m, void* bytes) {
+  tendonfmu_save_state(m->finger, bytes, m->state_size);
+}
+
+const char* model_check_state(model* m, const void* bytes, int initialised) {
+  const char* reason = NULL;
+  tendonfmu_save_state(m->finger, m->scratch, m->state_size);
+  if (tendonfmu_restore_state(m->finger, bytes, m->state_size) != TENDONFMU_OK) {
+    return tendonfmu_last_error(m->finger);
+  }
+  if (tendonfmu_is_initialised(m->finger) != initialised) {
+    reason = "damaged state: its phase does not fit its finger";
+  }
+  tendonfmu_restore_state(m->finger, m->scratch, m->state_size);
+  return reason;
+}
+
+int model_restore(model* m, const void* bytes) {
+  return tendonfmu_restore_state(m->finger, bytes, m->state_size) == TENDONFMU_OK ? 0 : -1;
+}

@@ -1,0 +1,16 @@
+/* The model of the friction FMU: a finger of tendonfmu.h. */
+#ifndef TENDONFMU_FINGER_MODEL_H
+#define TENDONFMU_FINGER_MODEL_H
+
+#include "tendonfmu.h"
+#include "variables.h"
+
+/* For what is not the same in every FMU: derivatives. */
+tendonfmu_finger* model_finger(const model* m);
+double* model_derivatives(const model* m); /* room for one number of each Real input and output */
+
+/* Views of the block of variables for tendonfmu.h. */
+tendonfmu_inputs variables_inputs(const variables* v);
+tendonfmu_outputs variables_outputs(const variables* v);
+
+#endif

@@ -1,0 +1,96 @@
+/* What an FMU simulates, as the rest of fmu_src sees it: the friction of a finger (finger_model.c), or the simulated
+ * finger (plant_fmu/plant_model.c). Each library has one of them and one table of variables; all else is the same. */
+#ifndef TENDONFMU_MODEL_H
+#define TENDONFMU_MODEL_H
+
+#include <stddef.h>
+
+#include "variable_table.h"
+
+typedef struct model model;
+struct variables;
+
+typedef struct model_texts {
+  const char* resource;    /* file in the folder resources that model_create() takes */
+  const char* initialised; /* what fmi2ExitInitializationMode logs */
+} model_texts;
+extern const model_texts model_text;
+
+/* Of the bytes of the resource. NULL when refused, with the reason in message. */
+model* model_create(const void* resource, size_t size, char* message, size_t message_size);
+void model_destroy(model* m);
+
+/* Back to what model_create() gave. */
+void model_reset(model* m);
+
+/* Identifier of the resource and of the table of variables. */
+void model_guid(const void* resource, size_t size, char guid[39]);
+
+size_t model_joint_count(const model* m);
+size_t model_tendon_count(const model* m);
+
+/* One line about the last call that failed. */
+const char* model_last_error(const model* m);
+
+/* --- parameters ----------------------------------------------------------------------------------------------------
+ */
+
+typedef struct model_range {
+  const char* unit;
+  double minimum, maximum;
+  int above_minimum; /* the minimum itself is refused */
+  int tunable;       /* may be written between steps */
+} model_range;
+
+/* Parameters of the table's groups: Real, Integer and Boolean alike as numbers. They take effect at once, or with the
+ * initialisation; written before it only. */
+double model_get_setting(const model* m, variable_group_id group, size_t index);
+void model_set_setting(model* m, variable_group_id group, size_t index, double value);
+/* The table's range, or what this model leaves of it. */
+model_range model_setting_range(const model* m, variable_group_id group);
+
+/* Parameters by path, beyond the table's groups; they take effect with the next sample, all together. */
+size_t model_parameter_count(const model* m);
+void model_get_parameters(const model* m, double* values);
+model_range model_parameter_range(const model* m, size_t index);
+/* 0, or -1 when the path is longer than size - 1. */
+int model_parameter_path(const model* m, size_t index, char* path, size_t size);
+
+/* The tolerance of fmi2SetupExperiment. NULL, or what was expected. */
+const char* model_set_tolerance(model* m, double tolerance);
+
+/* --- life ----------------------------------------------------------------------------------------------------------
+ */
+
+/* All that return int: 0, or -1 with everything as it was and the reason in model_last_error(). */
+
+int model_is_initialised(const model* m);
+int model_initialise(model* m, struct variables* values, double start);
+
+/* In initialisation mode, as if initialised with the present inputs; then back to before it. In between, outputs can be
+ * fetched. */
+int model_begin_trial(model* m, struct variables* values, double start);
+void model_end_trial(model* m);
+
+/* Why there is no step from `time` over `step` after one that ended at `end`; NULL when there is one. */
+const char* model_refuse_step(const model* m, double time, double step, double end);
+int model_step(model* m, struct variables* values, double time, double step);
+
+/* Time of the outputs. */
+double model_get_time(const model* m);
+
+/* Copies the outputs into the variables. */
+void model_fetch_outputs(const model* m, struct variables* values);
+
+/* --- saved states --------------------------------------------------------------------------------------------------
+ */
+
+/* Bytes of a state, settings included; the same for every instance of one FMU. */
+size_t model_state_size(const model* m);
+void model_save(const model* m, void* bytes);
+
+/* Why these bytes cannot be a state with (initialised 1) or without a sample; NULL when they can. Changes nothing. */
+const char* model_check_state(model* m, const void* bytes, int initialised);
+int model_restore(model* m, const void* bytes);
+
+#endif
