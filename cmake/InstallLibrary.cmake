@@ -12,7 +12,12 @@ set_target_properties(tendonfmu_description PROPERTIES EXPORT_NAME description)
 install(TARGETS tendonfmu_core tendonfmu_description EXPORT tendonfmuTargets
         ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}" INCLUDES DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
 install(DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}/runtime/include/" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}"
-        FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
+        FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp" PATTERN "tendonfmu_plant.h" EXCLUDE)
+# The simulated finger's interface, for those who link it inside a build that takes this project by add_subdirectory. Its
+# library is not exported: it needs SUNDIALS from where this build found it, a folder that an installation may not have.
+if(TARGET tendonfmu_plant)
+  install(FILES "${CMAKE_CURRENT_SOURCE_DIR}/runtime/include/tendonfmu_plant.h" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
+endif()
 
 set(config_folder "${CMAKE_INSTALL_LIBDIR}/cmake/tendonfmu")
 install(EXPORT tendonfmuTargets NAMESPACE tendonfmu:: DESTINATION "${config_folder}")

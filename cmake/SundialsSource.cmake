@@ -95,7 +95,11 @@ function(tendonfmu_compile_sundials folder result)
   foreach(package IN ITEMS ARKODE CVODES IDA IDAS KINSOL)
     list(APPEND options -DBUILD_${package}=OFF)
   endforeach()
-  foreach(name IN ITEMS CMAKE_C_COMPILER CMAKE_C_COMPILER_TARGET CMAKE_C_FLAGS CMAKE_TOOLCHAIN_FILE CMAKE_SYSTEM_NAME
+  if(NOT MSVC)
+    # As in CompileOptions.cmake.
+    list(APPEND options "-DCMAKE_C_FLAGS=${CMAKE_C_FLAGS} -ffp-contract=off")
+  endif()
+  foreach(name IN ITEMS CMAKE_C_COMPILER CMAKE_C_COMPILER_TARGET CMAKE_TOOLCHAIN_FILE CMAKE_SYSTEM_NAME
                         CMAKE_SYSTEM_PROCESSOR CMAKE_OSX_ARCHITECTURES CMAKE_OSX_DEPLOYMENT_TARGET CMAKE_MAKE_PROGRAM)
     # CMAKE_SYSTEM_NAME on the command line would make a native build a cross-compilation.
     if(DEFINED ${name} AND NOT "${${name}}" STREQUAL "" AND (CMAKE_CROSSCOMPILING OR NOT name MATCHES "^CMAKE_SYSTEM_"))

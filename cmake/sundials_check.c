@@ -55,4 +55,6 @@ int tendonfmu_sundials_check(void) {
   return SUNContext_Free(&context);
 }
 
-int main(void) { return tendonfmu_sundials_check(); }
+int main(void) {
+  return tendonfmu_sundials_check();
+}

@@ -2,6 +2,7 @@
 # shellcheck shell=bash
 #
 #   set_up_system FLAVOUR   compiler, headers and a Python >= 3.10; FLAVOUR `run`, or `test`: GoogleTest as well
+#   set_up_sundials         SUNDIALS for the simulated finger, unpacked into build/sundials; going on without it is possible
 #   set_up_python           .venv with the locked packages
 #   set_up_package          tendonfmu itself, rebuilt when a source changed
 #
@@ -101,28 +102,96 @@ apt_get_install() {
   "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@"
 }
 
-set_up_system() {
-  local flavour=$1 missing
-  if [ "$(uname)" = Darwin ]; then
-    missing=$(missing_packages brew "$flavour" | xargs)
-    [ -n "$missing" ] || return 0
-    command -v brew >/dev/null || die "missing: $missing - install them (for example with Homebrew), then call again"
-    # shellcheck disable=SC2086
-    quietly "installing with Homebrew: $missing" brew install --quiet $missing
-  else
-    missing=$(missing_packages apt "$flavour" | xargs)
-    [ -n "$missing" ] || return 0
-    command -v apt-get >/dev/null || die "missing (named as on Debian): $missing - install them, then call again"
-    if [ "$(id -u)" -ne 0 ]; then
-      command -v sudo >/dev/null || die "missing: $missing - as root: apt-get install --no-install-recommends $missing"
-      # Asks for the password here, where the terminal is still the user's.
-      sudo -v || die "missing: $missing - as root: apt-get install --no-install-recommends $missing"
-    fi
-    # shellcheck disable=SC2086
-    quietly "installing with apt: $missing" apt_install $missing
+# What only the simulated finger needs: everything else is built without it.
+missing_for_finger() {
+  if ! has_file_header eigen3/Eigen/Core; then
+    if [ "$1" = apt ]; then echo libeigen3-dev; else echo eigen; fi
   fi
-  missing=$(missing_packages apt "$flavour" | xargs)
-  [ -z "$missing" ] || die "still missing after the installation (named as on Debian): $missing"
+}
+
+# install_packages FAMILY PACKAGES...
+install_packages() {
+  local family=$1
+  shift
+  if [ "$family" = brew ]; then
+    command -v brew >/dev/null || die "missing: $* - install them (for example with Homebrew), then call again"
+    quietly "installing with Homebrew: $*" brew install --quiet "$@"
+  else
+    command -v apt-get >/dev/null || die "missing (named as on Debian): $* - install them, then call again"
+    if [ "$(id -u)" -ne 0 ]; then
+      command -v sudo >/dev/null || die "missing: $* - as root: apt-get install --no-install-recommends $*"
+      # Asks for the password here, where the terminal is still the user's.
+      sudo -v || die "missing: $* - as root: apt-get install --no-install-recommends $*"
+    fi
+    quietly "installing with apt: $*" apt_install "$@"
+  fi
+}
+
+set_up_system() {
+  local flavour=$1 family=apt missing for_finger
+  if [ "$(uname)" = Darwin ]; then family=brew; fi
+  missing=$(missing_packages "$family" "$flavour" | xargs)
+  for_finger=$(missing_for_finger "$family")
+  if [ -n "$missing" ]; then
+    # shellcheck disable=SC2086
+    install_packages "$family" $missing $for_finger
+    missing=$(missing_packages apt "$flavour" | xargs)
+    [ -z "$missing" ] || die "still missing after the installation (named as on Debian): $missing"
+  elif [ -n "$for_finger" ]; then
+    (install_packages "$family" "$for_finger") || say "going on without $for_finger: there will be no simulated finger"
+  fi
+}
+
+# --- SUNDIALS --------------------------------------------------------------------------------------------------------
+
+# Installing libsundials-dev brings 300 packages (MPI, Fortran, PETSc); unpacked alone it has all that CVODE needs: headers
+# and static libraries. cmake/Sundials.cmake finds it in build/sundials/package, judges it, and fetches a release of the
+# SUNDIALS project where it is unusable (Debian 13's and Homebrew's are bound to MPI) or where there is no apt.
+set_up_sundials() {
+  local folder=build/sundials stamp=build/sundials/.apt version
+  if ! command -v apt-get >/dev/null || ! command -v dpkg-deb >/dev/null || [ -n "$(installed_sundials)" ]; then return 0; fi
+  # A success is for good; what failed is tried again on another day, or when the stamp is removed.
+  if is_stamped "$stamp" unpacked && [ -e "$folder/package/usr/include/cvode/cvode.h" ]; then return 0; fi
+  if is_stamped "$stamp" "failed $(date +%F)"; then return 0; fi
+  version=$(apt_version libsundials-dev)
+  if [ -n "$version" ] && [ "${version%%.*}" -lt 6 ]; then return 0; fi
+  mkdir -p "$folder"
+  if (quietly "unpacking libsundials-dev $version" unpack_sundials "$folder"); then
+    printf 'unpacked\n' >"$stamp"
+  else
+    printf 'failed %s\n' "$(date +%F)" >"$stamp"
+    say "going on without the package libsundials-dev: CMake will look for SUNDIALS elsewhere"
+  fi
+}
+
+installed_sundials() {
+  find /usr/lib /usr/local/lib -maxdepth 2 -name libsundials_cvode.a 2>/dev/null | head -n 1
+}
+
+# Version that apt would install, without epoch; nothing if its lists do not have the package, or are not there.
+apt_version() {
+  apt-cache policy "$1" 2>/dev/null | sed -n 's/^ *Candidate: *\([0-9]*:\)\{0,1\}\([0-9][^ ]*\)$/\2/p'
+}
+
+# Needs no root unless the package lists are absent or stale.
+unpack_sundials() (
+  folder=$1 as_root=()
+  if [ "$(id -u)" -ne 0 ]; then as_root=(sudo -n); fi
+  rm -rf "$folder/package" "$folder"/libsundials-dev_*.deb
+  cd "$folder" || return 1
+  if [ -z "$(apt_version libsundials-dev)" ] || ! download_package libsundials-dev; then
+    "${as_root[@]}" apt-get update -qq && download_package libsundials-dev || return 1
+  fi
+  # Without the examples: two thirds of it.
+  mkdir package && dpkg-deb --fsys-tarfile libsundials-dev_*.deb |
+    tar -x -C package ./usr/include ./usr/lib ./usr/share/doc/libsundials-dev/copyright || return 1
+  rm -f libsundials-dev_*.deb
+)
+
+# As root, apt would hand the download to its user _apt, who may not be allowed into this folder.
+download_package() {
+  apt-get -qq -o APT::Sandbox::User=root -o Acquire::Retries=1 -o Acquire::http::Timeout=20 -o Acquire::https::Timeout=20 \
+    download "$1"
 }
 
 # --- Python packages -------------------------------------------------------------------------------------------------
@@ -154,17 +223,29 @@ install_locked() {
 
 # Everything that ends up in the installed package. CI checks that no other folder is read by its build.
 package_sources() {
-  find CMakeLists.txt pyproject.toml LICENSE cmake runtime fmu_src modelDescription python examples/fingers examples/demo_recording -type f \
-    ! -path '*/__pycache__/*' ! -path 'runtime/tests/*' -print0 2>/dev/null | LC_ALL=C sort -z
+  # Folders that are not there are no error.
+  { find CMakeLists.txt pyproject.toml LICENSE cmake runtime fmu_src modelDescription python \
+    examples/fingers examples/rigs examples/demo_recording -type f ! -path '*/__pycache__/*' ! -path 'runtime/tests/*' \
+    -print0 2>/dev/null || true; } | LC_ALL=C sort -z
 }
 
 # Installed as users install it, not in place: what the tests see is what the wheel holds.
 set_up_package() {
   local stamp=.venv/.tendonfmu-package wanted
-  wanted=$({ package_sources | xargs -0 cat && package_sources && cat .venv/.tendonfmu-requirements; } | digest)
+  wanted=$({ package_sources | xargs -0 cat && package_sources && cat .venv/.tendonfmu-requirements &&
+    { ls -d build/sundials/package 2>/dev/null || true; }; } | digest)
   if is_stamped "$stamp" "$wanted" && [ -x .venv/bin/tendonfmu ]; then return; fi
   quietly "building and installing tendonfmu" install_package
   printf '%s\n' "$wanted" >"$stamp"
+  say_what_is_missing
+}
+
+# pip hides what CMake says.
+say_what_is_missing() {
+  local reason
+  for reason in build/package-*/simulated_finger_missing.txt; do
+    if [ -s "$reason" ]; then say "built without the simulated finger: $(cat "$reason")"; fi
+  done
 }
 
 install_package() {
