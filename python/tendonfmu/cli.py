@@ -75,17 +75,25 @@ def options(
 
 
 @app.command()
-def check(finger: FingerFile) -> None:
-    """Validate a finger description and say what the finger is. Exit 1 when it is refused."""
+def check(
+    file: Annotated[Path, typer.Argument(metavar="FINGER.json|RIG.json", help="finger description, or rig")],
+) -> None:
+    """Validate a finger description or a rig and say what it is. Exit 1 when it is refused."""
     from tendonfmu.description import read_finger
+    from tendonfmu.plant import require_plant
+    from tendonfmu.rig import is_rig
+    from tendonfmu.rig_summary import describe_rig
 
+    rig = is_rig(file)
+    if rig:
+        require_plant()
     try:
-        found = read_finger(finger)
+        lines = describe_rig(file) if rig else read_finger(file).summary()
     except InputError as refused:
         # the question was whether the description is sound; a file that cannot be read is bad input
         _say(f"tendonfmu: {refused}")
-        raise typer.Exit(1 if finger.is_file() else 2) from None
-    for line in found.summary():
+        raise typer.Exit(1 if file.is_file() else 2) from None
+    for line in lines:
         print(line)
 
 
@@ -136,6 +144,49 @@ def run(
         )
     write_table(output, table)
     _say(f"{output}: {summary(table)}")
+
+
+@app.command()
+def simulate(
+    rig: Annotated[Path, typer.Argument(metavar="RIG.json", help="rig of a simulated finger")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="REC.parquet", help="recording, .csv or .parquet")],
+    truth: Annotated[
+        Path | None, typer.Option(metavar="TRUTH.parquet", help="true signals at the same times, .csv or .parquet")
+    ] = None,
+    integrator: Annotated[str | None, typer.Option(metavar="cvode|fixed_step", help="instead of the rig's own")] = None,
+    progress: Annotated[
+        bool | None, typer.Option("--progress/--no-progress", help="progress bar; by default on a terminal")
+    ] = None,
+) -> None:
+    """A recording of the simulated finger. The same rig gives the same numbers."""
+    from tendonfmu.plant import INTEGRATORS
+    from tendonfmu.rig import read_rig
+    from tendonfmu.simulation import simulate as simulate_rig
+    from tendonfmu.tables import check_format, write_table
+    from tendonfmu.whole_file import check_output
+
+    if integrator is not None and integrator not in INTEGRATORS:
+        raise InputError(f"--integrator {integrator}: expected {' or '.join(INTEGRATORS)}")
+    found = read_rig(rig)
+    outputs = [output] if truth is None else [output, truth]
+    for file in outputs:
+        check_format(file)
+        check_output(file, *found.files)
+    if truth is not None and truth.resolve() == output.resolve():
+        raise InputError(f"{truth}: the same file for recording and truth; expected two names")
+    with _progress(progress) as bar:
+        task = bar.add_task("samples", total=None)
+        result = simulate_rig(
+            found,
+            truth=truth is not None,
+            integrator=integrator,
+            progress=lambda done, total: bar.update(task, completed=done, total=total),
+        )
+    if truth is not None and result.truth is not None:
+        write_table(truth, result.truth)
+    write_table(output, result.recording)
+    for line in result.summary(found):
+        _say(f"{output}: {line}")
 
 
 @app.command()
@@ -201,8 +252,8 @@ def _print_demo(result: Any) -> None:
         console.print(f"  {path}  {what}", highlight=False, soft_wrap=True)
 
 
-def _progress() -> Progress:
-    """A progress bar on standard error, silent where that is not a terminal."""
+def _progress(wanted: bool | None = None) -> Progress:
+    """A progress bar on standard error; unless it is said, only where that is a terminal."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -213,7 +264,7 @@ def _progress() -> Progress:
         MofNCompleteColumn(),
         TimeRemainingColumn(),
         console=console,
-        disable=not console.is_terminal,
+        disable=not (console.is_terminal if wanted is None else wanted),
         transient=True,
     )
 

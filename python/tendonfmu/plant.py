@@ -101,6 +101,12 @@ def _refusals() -> Iterator[None]:
         raise SolverError(str(failed)) from None
 
 
+def require_plant() -> None:
+    """Raises InputError where this installation has no simulated finger."""
+    if not HAS_PLANT:
+        raise InputError(PLANT_MISSING)
+
+
 class Plant:
     """A simulated finger: created from the text of an expanded rig, initialised, then run forward in time.
 
@@ -109,8 +115,7 @@ class Plant:
     """
 
     def __init__(self, rig_json: str | bytes) -> None:
-        if not HAS_PLANT:
-            raise InputError(PLANT_MISSING)
+        require_plant()
         with _refusals():
             self._plant = _plant.Plant(rig_json.encode() if isinstance(rig_json, str) else rig_json)
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.plant import MEASURED, TRUE, Array, Plant, PlantError, Statistics
+from tendonfmu.plant import MEASURED, TRUE, Array, Plant, PlantError, Statistics, require_plant
 from tendonfmu.rig import Rig
 
 Table = dict[str, NDArray[np.float64]]
@@ -33,6 +33,15 @@ class Simulation:
     integrator: str
     work: Statistics
 
+    def summary(self, rig: Rig) -> list[str]:
+        """What was simulated, in lines of text."""
+        time = self.recording["time"]
+        pushes = len(rig.expanded["pushes"])
+        contact = f", {pushes} pushes, {self.contact_seconds:.2f} s in contact" if pushes else ""
+        return [
+            f"{len(time)} samples, {time[-1]:.3f} s of {rig.name}{contact}; {self.integrator}: {self.work.steps} steps"
+        ]
+
 
 def plant_of(rig: Rig) -> Plant:
     """The plant of a rig. Raises InputError with the rig's file and the key path."""
@@ -54,6 +63,7 @@ def simulate(
     truth: also give the truth. integrator: "cvode" or "fixed_step" instead of the rig's. progress: called with
     samples done and all samples. Raises InputError: a rig that is refused, or where the solver gave up, and why.
     """
+    require_plant()
     time = rig.times()
     plant = plant_of(rig)
     try:
