@@ -8,7 +8,7 @@
 #   1. the folder TENDONFMU_SUNDIALS_ROOT (an installation, or a libsundials-dev unpacked by `dpkg-deb -x`): if it is set,
 #      no other installation is looked at
 #   2. where find_package looks: CMAKE_PREFIX_PATH, SUNDIALS_ROOT, the system
-#   3. build/sundials/package, where tools/setup.sh unpacks Debian's libsundials-dev
+#   3. build/sundials/package, where tools/setup.sh unpacks Debian's libsundials-dev (TENDONFMU_SUNDIALS_FOLDER: build/sundials)
 #   4. with TENDONFMU_FETCH_SUNDIALS, a release of the SUNDIALS project, compiled here (SundialsSource.cmake)
 
 set(TENDONFMU_SUNDIALS_ROOT "" CACHE PATH "Folder of the SUNDIALS installation to use, and no other")
@@ -16,10 +16,11 @@ option(TENDONFMU_FETCH_SUNDIALS "Compile a release of SUNDIALS where no installe
 
 # Beside all build folders, so that each of them finds what one of them fetched; as a part of another project, inside ours.
 if(PROJECT_IS_TOP_LEVEL)
-  set(tendonfmu_sundials_folder "${PROJECT_SOURCE_DIR}/build/sundials")
+  set(default_folder "${PROJECT_SOURCE_DIR}/build/sundials")
 else()
-  set(tendonfmu_sundials_folder "${PROJECT_BINARY_DIR}/sundials")
+  set(default_folder "${PROJECT_BINARY_DIR}/sundials")
 endif()
+set(TENDONFMU_SUNDIALS_FOLDER "${default_folder}" CACHE PATH "Folder of the unpacked, or here compiled, SUNDIALS")
 
 # Links the check into a shared library that may leave nothing undefined. Sets `problem` in the caller: empty if usable.
 function(tendonfmu_check_sundials)
@@ -93,13 +94,13 @@ if(TENDONFMU_SUNDIALS_ROOT)
 else()
   tendonfmu_take_sundials("")
   if(NOT TARGET tendonfmu_sundials)
-    tendonfmu_take_sundials("${tendonfmu_sundials_folder}/package")
+    tendonfmu_take_sundials("${TENDONFMU_SUNDIALS_FOLDER}/package")
   endif()
 endif()
 
 if(NOT TARGET tendonfmu_sundials AND TENDONFMU_FETCH_SUNDIALS)
   include(SundialsSource)
-  tendonfmu_build_sundials("${tendonfmu_sundials_folder}" built_folder source_problem)
+  tendonfmu_build_sundials("${TENDONFMU_SUNDIALS_FOLDER}" built_folder source_problem)
   if(built_folder)
     tendonfmu_take_sundials("${built_folder}")
   else()

@@ -3,6 +3,8 @@
 
 # The release's archive of CVODE alone. Its hash is the one that FMPy's build (native/build_cvode.py) checks it against.
 set(tendonfmu_sundials_release 6.4.1)
+set(tendonfmu_sundials_url
+    "https://github.com/LLNL/sundials/releases/download/v${tendonfmu_sundials_release}/cvode-${tendonfmu_sundials_release}.tar.gz")
 set(tendonfmu_sundials_sha256 0a614e7d7d525d9ec88d5a30c887786d7c3681bd123bb6679fb9a4ec5f4609fe)
 
 set(TENDONFMU_SUNDIALS_SOURCE "" CACHE STRING
@@ -45,9 +47,8 @@ function(tendonfmu_unpack_sundials folder)
     file(COPY "${archive}/" DESTINATION "${folder}/unpacked")
     return()
   elseif(NOT archive)
-    set(name "cvode-${tendonfmu_sundials_release}.tar.gz")
-    set(archive "${folder}/${name}")
-    set(url "https://github.com/LLNL/sundials/releases/download/v${tendonfmu_sundials_release}/${name}")
+    set(url "${tendonfmu_sundials_url}")
+    set(archive "${folder}/cvode.tar.gz")
     message(STATUS "Downloading ${url}")
     # EXPECTED_HASH would end the configuration.
     file(DOWNLOAD "${url}" "${archive}" STATUS status INACTIVITY_TIMEOUT 15 TIMEOUT 600 TLS_VERIFY ON)

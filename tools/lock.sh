@@ -14,3 +14,4 @@ compile() {
 compile requirements.lock pyproject.toml --group build --group test
 compile requirements-portable.lock --group portable --constraints requirements.lock
 compile requirements-peers.lock --group peers --constraints requirements.lock
+compile requirements-coupling.lock --group coupling --constraints requirements.lock
