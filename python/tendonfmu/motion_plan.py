@@ -13,11 +13,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tendonfmu.draws import LARGEST_SEED, Draws
 from tendonfmu.errors import InputError
 from tendonfmu.json_node import Node
 from tendonfmu.tables import Table, read_table
+
+Array = NDArray[np.float64]
 
 LONGEST = 1e6  # s
 # A stroke between resting points is a quintic; its peak speed is this times its mean speed (minimum jerk: Flash, Hogan,
@@ -26,6 +29,15 @@ PEAK_OVER_MEAN = 1.875
 SHORTEST_STROKE = 0.4  # s: a short way is made slowly, not with high accelerations
 MARGIN = 0.05  # of a joint's range at either end that strokes leave out by default
 FASTEST = 100.0  # rad/s
+STRONGEST = 1e5  # N
+# What the columns of a motion file may hold: lowest, highest, unit.
+RANGES = {
+    "time": (0.0, 1e9, "s"),
+    "pretension": (1e-9, STRONGEST, "N"),
+    "position": (-100.0, 100.0, "rad"),
+    "velocity": (-1e4, 1e4, "rad/s"),
+    "acceleration": (-1e7, 1e7, "rad/s2"),
+}
 STILL = 1e-9  # rad/s, rad/s2: what counts as standing at the ends of a motion file
 
 
@@ -143,7 +155,7 @@ def _from_file(motion: Node, joints: Joints) -> Motion:
     motion.keys(("kind", "file", "pretension"))
     file = Path(motion.member("file").text("path of a table (.csv or .parquet), relative to the rig file"))
     table = read_table(file, lambda path, names: _check_columns(path, names, len(joints)))
-    _check_motion(file, table, len(joints))
+    _check_motion(file, table, joints)
     time = table["time"].tolist()
     kinds = ("position", "velocity", "acceleration")
     knots = [
@@ -200,7 +212,7 @@ def _range_of_strokes(motion: Node, joints: Joints) -> tuple[list[float], list[f
 
 
 def _pretension(motion: Node) -> dict[str, list[float]]:
-    force = motion.member("pretension").number(0.0, 1e6, "N, the mean tendon force")
+    force = motion.member("pretension").number(0.0, STRONGEST, "N, the mean tendon force", above=True)
     return {"time": [0.0], "value": [force]}
 
 
@@ -216,31 +228,38 @@ def _check_columns(file: Path, names: list[str], joints: int) -> None:
             raise InputError(f"{file}: unknown column {name!r}; expected {', '.join(wanted)} and at most pretension")
 
 
-def _check_motion(file: Path, table: Table, joints: int) -> None:
-    """Times increase; the joints stand at both ends, since they do before and after; the pretension pulls."""
+def _check_motion(file: Path, table: Table, joints: Joints) -> None:
+    """Numbers in their ranges, times that increase, a start within reach, joints that stand at both ends."""
+    for name, column in table.items():
+        low, high, unit = RANGES[name.split("[")[0].removeprefix("joint_")]
+        _check_column(file, name, column, (column >= low) & (column <= high), f"{low:g} to {high:g} {unit}")
     time = table["time"]
-    late = np.flatnonzero(np.diff(time) <= 0.0)
-    if late.size:
-        row = int(late[0]) + 2
-        raise InputError(
-            f"{file}: column time, row {row}: {time[row - 1]:g} s after {time[row - 2]:g} s; expected increasing times"
+    later = np.concatenate([[True], np.diff(time) > 0.0])
+    _check_column(file, "time", time, later, "a time after the row before, s")
+    for j, (lower, upper) in enumerate(zip(joints.lower, joints.upper, strict=True), start=1):
+        start = table[f"joint_position[{j}]"][:1]
+        reached = (start >= lower) & (start <= upper)
+        _check_column(
+            file,
+            f"joint_position[{j}]",
+            start,
+            reached,
+            f"a start within the joint's limits, {lower:g} to {upper:g} rad",
         )
-    for j in range(1, joints + 1):
-        for kind, unit in (("velocity", "rad/s"), ("acceleration", "rad/s2")):
+        for kind in ("velocity", "acceleration"):
             name = f"joint_{kind}[{j}]"
-            for row in (1, len(time)):
-                value = float(table[name][row - 1])
-                if abs(value) > STILL:
-                    raise InputError(
-                        f"{file}: column {name}, row {row}: {value:g} {unit}; "
-                        "expected 0 in the first and the last row, before and after which the joints stand"
-                    )
-    slack = np.flatnonzero(table["pretension"] < 0.0) if "pretension" in table else np.array([])
-    if slack.size:
-        row = int(slack[0]) + 1
-        raise InputError(
-            f"{file}: column pretension, row {row}: {table['pretension'][row - 1]:g} N; expected at least 0"
-        )
+            stands = np.abs(table[name]) <= STILL
+            stands[1:-1] = True
+            what = "0 in the first and the last row, before and after which the joints stand"
+            _check_column(file, name, table[name], stands, what)
+
+
+def _check_column(file: Path, name: str, column: Array, good: NDArray[np.bool_], expected: str) -> None:
+    """Refuses the first row that is not good."""
+    bad = np.flatnonzero(~good)
+    if bad.size:
+        row = int(bad[0]) + 1
+        raise InputError(f"{file}: column {name}, row {row}: {column[row - 1]:g}; expected {expected}")
 
 
 def _plateaus(table: Table) -> dict[str, list[float]]:

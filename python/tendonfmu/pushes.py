@@ -14,7 +14,7 @@ Vector = Sequence[float]
 
 LONGEST = 1e6  # s
 MOST = 100_000
-STRONGEST = 1e6  # N
+STRONGEST = 1e4  # N
 
 
 @dataclass(frozen=True)

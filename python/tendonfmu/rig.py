@@ -180,7 +180,7 @@ def _expand(path: Path, files: list[Path], data: dict[str, Any]) -> Rig:
     seed = root.member("seed").integer(0, LARGEST_SEED, default=0)
     finger = _finger(root.member("finger"), path, files)
     segments, limits = _links(root.member("physics"), len(finger.joint_names))
-    rate = root.member("sensors").member("rate").number(0.0, 1e5, "Hz", default=1000.0, above=True)
+    rate = root.member("sensors").member("rate").number(1.0, 1e5, "Hz", default=1000.0)
     duration, columns = _recording(root.member("recording"), rate)
     motion = expand_motion(root.member("motion"), limits, seed, duration)
     if motion.file is not None:
@@ -214,7 +214,7 @@ def _finger(node: Node, path: Path, files: list[Path]) -> FingerDescription:
 def _links(physics: Node, joints: int) -> tuple[list[Segment], Joints]:
     """What motion and pushes take from the links: their shape and the joints' limits. The plant checks the rest."""
     if not isinstance(physics.value, dict):
-        physics.refuse("an object with links and friction")
+        physics.refuse("an object with links")
     links = physics.member("links")
     if not isinstance(links.value, list) or len(links.value) != joints:
         links.refuse(f"a list of {joints}, one link per joint of the finger")
