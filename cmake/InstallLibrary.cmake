@@ -1,4 +1,4 @@
-# Installs the C library: header, static libraries, CMake config package and pkg-config file.
+# Installs the C libraries: headers, static libraries, CMake config package and pkg-config file.
 
 if(NOT TARGET tendonfmu_core OR NOT TARGET tendonfmu_description)
   return()
@@ -13,10 +13,16 @@ install(TARGETS tendonfmu_core tendonfmu_description EXPORT tendonfmuTargets
         ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}" INCLUDES DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
 install(DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}/runtime/include/" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}"
         FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp" PATTERN "tendonfmu_plant.h" EXCLUDE)
-# The simulated finger's interface, for those who link it inside a build that takes this project by add_subdirectory. Its
-# library is not exported: it needs SUNDIALS from where this build found it, a folder that an installation may not have.
+
+# The simulated finger, where it was built, with the archives of SUNDIALS that it was linked with.
 if(TARGET tendonfmu_plant)
-  install(FILES "${CMAKE_CURRENT_SOURCE_DIR}/runtime/include/tendonfmu_plant.h" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
+  set_target_properties(tendonfmu_plant PROPERTIES EXPORT_NAME plant)
+  set_target_properties(tendonfmu_sundials PROPERTIES EXPORT_NAME sundials)
+  install(TARGETS tendonfmu_plant tendonfmu_sundials EXPORT tendonfmuTargets
+          ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}" INCLUDES DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
+  install(FILES runtime/include/tendonfmu_plant.h DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
+  get_target_property(archives tendonfmu_sundials TENDONFMU_ARCHIVES)
+  install(FILES ${archives} DESTINATION "${CMAKE_INSTALL_LIBDIR}/tendonfmu")
 endif()
 
 set(config_folder "${CMAKE_INSTALL_LIBDIR}/cmake/tendonfmu")
@@ -35,7 +41,13 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "AppleClang")
 else()
   set(pc_cxx_runtime "-lstdc++")
 endif()
-foreach(name IN ITEMS tendonfmu tendonfmu-description)
+set(pc_names tendonfmu tendonfmu-description)
+if(TARGET tendonfmu_plant)
+  list(APPEND pc_names tendonfmu-plant)
+  list(TRANSFORM archives REPLACE ".*/" "\${libdir}/tendonfmu/" OUTPUT_VARIABLE pc_archives)
+  string(JOIN " " pc_archives ${pc_archives})
+endif()
+foreach(name IN LISTS pc_names)
   configure_file(cmake/${name}.pc.in ${name}.pc @ONLY)
   install(FILES "${CMAKE_CURRENT_BINARY_DIR}/${name}.pc" DESTINATION "${CMAKE_INSTALL_LIBDIR}/pkgconfig")
 endforeach()
@@ -46,4 +58,7 @@ if(NOT TARGET tendonfmu::tendonfmu)
 endif()
 if(NOT TARGET tendonfmu::description)
   add_library(tendonfmu::description ALIAS tendonfmu_description)
+endif()
+if(TARGET tendonfmu_plant AND NOT TARGET tendonfmu::plant)
+  add_library(tendonfmu::plant ALIAS tendonfmu_plant)
 endif()

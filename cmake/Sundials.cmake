@@ -22,6 +22,8 @@ else()
 endif()
 set(TENDONFMU_SUNDIALS_FOLDER "${default_folder}" CACHE PATH "Folder of the unpacked, or here compiled, SUNDIALS")
 
+include(CheckLinkerFlag)
+
 # Links the check into a shared library that may leave nothing undefined. Sets `problem` in the caller: empty if usable.
 function(tendonfmu_check_sundials)
   set(subject "${SUNDIALS_INCLUDE_DIR};${SUNDIALS_LIBRARIES};${SUNDIALS_VERSION};${CMAKE_C_COMPILER}")
@@ -46,6 +48,28 @@ function(tendonfmu_check_sundials)
     set(TENDONFMU_SUNDIALS_CHECKED "${subject}" CACHE INTERNAL "SUNDIALS that the check was linked with")
   endif()
   set(problem "" PARENT_SCOPE)
+endfunction()
+
+# The target for what FindSUNDIALS found. cmake/InstallLibrary.cmake puts copies of the archives beside an installed library.
+function(tendonfmu_add_sundials_target)
+  add_library(tendonfmu_sundials INTERFACE)
+  target_include_directories(tendonfmu_sundials SYSTEM INTERFACE "$<BUILD_INTERFACE:${SUNDIALS_INCLUDE_DIR}>")
+  set(names "")
+  foreach(library IN LISTS SUNDIALS_LIBRARIES)
+    get_filename_component(name "${library}" NAME)
+    list(APPEND names "${name}")
+    target_link_libraries(tendonfmu_sundials INTERFACE
+      "$<BUILD_INTERFACE:${library}>" "$<INSTALL_INTERFACE:$<INSTALL_PREFIX>/${CMAKE_INSTALL_LIBDIR}/tendonfmu/${name}>")
+  endforeach()
+  target_link_libraries(tendonfmu_sundials INTERFACE $<$<BOOL:${UNIX}>:m>)
+  set_target_properties(tendonfmu_sundials PROPERTIES TENDONFMU_ARCHIVES "${SUNDIALS_LIBRARIES}")
+
+  # A simulator with a SUNDIALS of its own would otherwise have our calls bound to that one, of whatever version.
+  string(JOIN ":" names ${names})
+  check_linker_flag(C "LINKER:--exclude-libs,${names}" TENDONFMU_LINKER_HIDES_LIBRARIES)
+  if(TENDONFMU_LINKER_HIDES_LIBRARIES)
+    target_link_options(tendonfmu_sundials INTERFACE "LINKER:--exclude-libs,${names}")
+  endif()
 endfunction()
 
 # Makes the target from what is in `folder`, or from what find_package finds if that is empty; notes in the caller's
@@ -81,9 +105,7 @@ function(tendonfmu_find_sundials folder)
     set(found_problem "SUNDIALS ${SUNDIALS_VERSION} in ${SUNDIALS_INCLUDE_DIR} ${problem}" PARENT_SCOPE)
     return()
   endif()
-  add_library(tendonfmu_sundials INTERFACE)
-  target_include_directories(tendonfmu_sundials SYSTEM INTERFACE "${SUNDIALS_INCLUDE_DIR}")
-  target_link_libraries(tendonfmu_sundials INTERFACE ${SUNDIALS_LIBRARIES} $<$<BOOL:${UNIX}>:m>)
+  tendonfmu_add_sundials_target()
   set(TENDONFMU_SUNDIALS_VERSION "${SUNDIALS_VERSION}" PARENT_SCOPE)
   message(STATUS "SUNDIALS ${SUNDIALS_VERSION}: ${SUNDIALS_INCLUDE_DIR}")
 endfunction()
