@@ -1,0 +1,113 @@
+/* The finger's differential equations and their Jacobian. */
+#ifndef TENDONFMU_PLANT_DYNAMICS_H
+#define TENDONFMU_PLANT_DYNAMICS_H
+
+#include <vector>
+
+#include "bristle.h"
+#include "contact_force.h"
+#include "rig.h"
+
+namespace tendonfmu::plant {
+
+/* Where things stand in the state. */
+struct state_layout {
+  std::size_t joints, tendons, bristles;
+
+  explicit state_layout(const rig& rig)
+      : joints(rig.joint_count()), tendons(rig.tendon_count()), bristles(rig.bristle_count()) {}
+  std::size_t angle() const { return 0; }
+  std::size_t speed() const { return joints; }
+  std::size_t motor() const { return 2 * joints; }
+  std::size_t motor_speed() const { return 2 * joints + tendons; }
+  std::size_t bristle() const { return 2 * joints + 2 * tendons; }
+  std::size_t heat() const { return bristle() + bristles; }
+  std::size_t motor_work() const { return heat() + 1; }
+  std::size_t friction_work() const { return heat() + 2; }
+  std::size_t damping_work() const { return heat() + 3; }
+  std::size_t push_work() const { return heat() + 4; }
+  std::size_t size() const { return heat() + 5; }
+};
+
+constexpr std::size_t max_roots = max_tendons + 2 * max_joints + 1;
+
+/* Which side of each kink the equations are on. An integrator with root finding switches it at the root, so that
+ * between switches the equations are smooth there. */
+struct contact_modes {
+  bool slack[max_tendons] = {};
+  bool below[max_joints] = {}, above[max_joints] = {}; /* beyond the lower, upper stop */
+  bool touching = false;                               /* the obstacle */
+};
+
+/* What comes from outside, held between communication points. */
+struct commands {
+  bool scheduled_motion = true, scheduled_pushes = true;
+  bool given = false;            /* a command was given: without scheduled motion it is absolute */
+  double command[max_tendons]{}; /* m */
+  double pretension = 0.0;       /* N, beyond the rig's own */
+  free_push push;
+};
+
+/* Intermediate values of one evaluation: what outputs and Jacobian are made of. */
+struct evaluation {
+  double time = 0.0;
+  chain_motion<double> motion;
+  double mass[max_joints * max_joints];
+  double acceleration[max_joints];
+  double rigid_torque[max_joints];               /* velocity terms and gravity: inverse dynamics at q̈ = 0 */
+  double stop_torque[max_joints], stop_loss = 0; /* torque on the finger, N·m; W */
+  contact_torque<double> contact;
+  std::vector<double> arm, arm_slope; /* [m × n] */
+  double elongation[max_tendons], elongation_speed[max_tendons];
+  double force[max_tendons], force_by_elongation[max_tendons], force_by_speed[max_tendons]; /* at the spring */
+  double spring_loss = 0; /* W, of the tendons' dampers */
+  double level = 1.0, level_by_heat = 0.0;
+  std::vector<double> velocity;                     /* [sites] of sliding */
+  std::vector<bristle_response> response;           /* [sites + joint sites] */
+  std::vector<double> tension;                      /* [sites] after the site */
+  std::vector<double> loss_by_share, loss_by_force; /* [sites] slopes of the tension after by λ and by the one before */
+  double load[max_joints];                          /* Σ f_B of eq. (8) */
+  double spring_torque[max_joints];                 /* Rᵀ f0 */
+  double passed_torque[max_joints];                 /* what tendons and joint friction leave of it */
+  double friction_power = 0, motor_power = 0;
+};
+
+class dynamics {
+ public:
+  /* The rig must outlive it. */
+  explicit dynamics(const rig& rig);
+
+  const rig& the_rig() const { return rig_; }
+  const state_layout& layout() const { return layout_; }
+
+  /* state, derivative: [layout().size()]. */
+  void evaluate(double time, const double* state, const contact_modes& modes, const commands& inputs,
+                double* derivative);
+  const evaluation& last() const { return values_; }
+
+  /* Where the motors shall be, [m] m. */
+  void command_motors(double time, const commands& inputs, double* command) const;
+
+  /* Modes that belong to a state by itself. */
+  contact_modes modes_at(const double* state) const;
+
+  /* Functions whose sign changes switch the modes: elongations [m], stops [2 n], obstacle [1 if present]. */
+  std::size_t root_count() const;
+  void roots(const double* state, double* root) const;
+  /* Modes after the roots with found[k] != 0 were crossed in that direction (> 0: rising). */
+  void switch_modes(const int* found, contact_modes* modes) const;
+
+ private:
+  void move_tendons(const double* state, const contact_modes& modes);
+  void rub_tendons(const double* state);
+  void rub_joints(const double* state);
+  void press_stops(const double* state, const contact_modes& modes);
+
+  const rig& rig_;
+  state_layout layout_;
+  evaluation values_;
+};
+
+}  // namespace tendonfmu::plant
+
+#endif

@@ -1,0 +1,31 @@
+/* What the motors are told: desired joint angles and pretension over time. */
+#ifndef TENDONFMU_PLANT_MOTION_H
+#define TENDONFMU_PLANT_MOTION_H
+
+#include "rig.h"
+
+namespace tendonfmu::plant {
+
+/* Quintic Hermite interpolation, constant outside: continuous with two derivatives. */
+double at_time(const knots& knots, double time);
+
+/* Path of a tendon for one joint, ∫ r dq from 0, its moment arm and the arm's slope by the angle. */
+double path_of(const moment_arm& arm, double angle);
+double arm_at(const moment_arm& arm, double angle);
+double arm_slope_at(const moment_arm& arm, double angle);
+
+/* Elongation (m) at which a tendon pulls with `force` (N), and back. */
+double elongation_of(const tendon& tendon, double force);
+
+/* Desired joint angles [n]; before time 0 the finger comes to the first posture from aside (rig key `settle`). */
+void desired_angles(const rig& rig, double time, double* angle);
+
+/* Motor positions [m] for the rig's own motion, with `extra` N of pretension beside its own. */
+void scheduled_command(const rig& rig, double time, double extra, double* command);
+
+/* Motor positions that hold the first posture with the first pretension, [m]. */
+void hold_command(const rig& rig, double* command);
+
+}  // namespace tendonfmu::plant
+
+#endif

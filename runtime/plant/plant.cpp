@@ -1,0 +1,381 @@
+#include "plant.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "cvode_integrator.h"
+#include "fixed_step_integrator.h"
+#include "motion.h"
+
+namespace tendonfmu::plant {
+namespace {
+
+constexpr double same_time = 1e-9;     // s: a sample this little beyond a communication point is taken at it
+constexpr double largest_input = 1e6;  // m, N: beyond it only a mistake
+constexpr std::uint64_t state_mark = 0x31746e616c704654;  // "TFplant1"
+
+void need(bool good, const char* line) {
+  if (!good) throw refusal(TENDONFMU_PLANT_BAD_ARGUMENT, line);
+}
+
+tendonfmu_plant_settings settings_of(const rig& rig) {
+  tendonfmu_plant_settings settings = {};
+  settings.integrator = rig.integration.method;
+  settings.relative_tolerance = rig.integration.relative_tolerance;
+  settings.step = rig.integration.step;
+  settings.scheduled_motion = settings.scheduled_pushes = settings.sensors = 1;
+  settings.seed = rig.seed;
+  std::copy(rig.tip.begin(), rig.tip.end(), settings.push_point);
+  settings.push_link = static_cast<int>(rig.joint_count());
+  return settings;
+}
+
+std::uint64_t digest(const std::vector<double>& numbers) {
+  std::uint64_t hash = 0xcbf29ce484222325;
+  for (const double number : numbers) {
+    std::uint64_t bits;
+    std::memcpy(&bits, &number, sizeof bits);
+    hash = (hash ^ bits) * 0x100000001b3;
+    hash ^= hash >> 29;
+  }
+  return hash;
+}
+
+}  // namespace
+
+plant::plant(rig numbers, std::uint64_t identity)
+    : rig_(std::move(numbers)), equations_(rig_), sensors_(rig_), identity_(identity), settings_(settings_of(rig_)) {
+  scratch_.resize(rig_.order());
+  reset();
+}
+
+void plant::set_settings(const tendonfmu_plant_settings& settings) {
+  if (initialised_) throw refusal(TENDONFMU_PLANT_WRONG_ORDER, "settings: expected before the initialisation only");
+  const auto within = [](double x, double low, double high) { return x >= low && x <= high; };
+  need(settings.integrator == TENDONFMU_PLANT_CVODE || settings.integrator == TENDONFMU_PLANT_FIXED_STEP,
+       "integrator: expected 1 (CVODE) or 2 (fixed step)");
+  need(within(settings.relative_tolerance, 1e-10, 1e-2), "relative_tolerance: expected a number from 1e-10 to 1e-2");
+  need(within(settings.step, 1e-6, 1e-2), "step: expected a number from 1e-6 to 1e-2 s");
+  need(settings.push_link >= 1 && settings.push_link <= static_cast<int>(rig_.joint_count()),
+       "push_link: expected the number of a link");
+  for (const double x : settings.push_point)
+    need(within(x, -10.0, 10.0), "push_point: expected numbers from -10 to 10 m");
+  settings_ = settings;
+  integrator_.reset();
+}
+
+void plant::set_inputs(const tendonfmu_plant_inputs& inputs) {
+  const auto sane = [](double x) { return std::fabs(x) <= largest_input; };
+  const std::size_t m = rig_.tendon_count();
+  if (inputs.tendon_position_command) {
+    for (std::size_t i = 0; i < m; ++i) {
+      need(sane(inputs.tendon_position_command[i]), "tendon_position_command: expected finite numbers within 1e6 m");
+    }
+  }
+  need(sane(inputs.pretension), "pretension: expected a finite number within 1e6 N");
+  for (const double x : inputs.push_force) need(sane(x), "push_force: expected finite numbers within 1e6 N");
+
+  commands next = inputs_;
+  if (inputs.tendon_position_command) {
+    next.given = true;
+    std::copy(inputs.tendon_position_command, inputs.tendon_position_command + m, next.command);
+  }
+  next.pretension = inputs.pretension;
+  std::copy(inputs.push_force, inputs.push_force + 3, next.push.force.begin());
+  const bool changed = next.given != inputs_.given || !std::equal(next.command, next.command + m, inputs_.command) ||
+                       next.pretension != inputs_.pretension || next.push.force != inputs_.push.force;
+  inputs_ = next;
+  if (changed && integrator_) integrator_->forget();
+}
+
+void plant::make_integrator() {
+  if (integrator_) return;
+  if (settings_.integrator == TENDONFMU_PLANT_CVODE) {
+    integrator_ = make_cvode_integrator(&equations_, settings_.relative_tolerance);
+  } else {
+    integrator_ = std::make_unique<fixed_step_integrator>(&equations_, settings_.step);
+  }
+  inputs_.scheduled_motion = settings_.scheduled_motion != 0;
+  inputs_.scheduled_pushes = settings_.scheduled_pushes != 0;
+  inputs_.push.link = static_cast<std::size_t>(settings_.push_link) - 1;
+  std::copy(settings_.push_point, settings_.push_point + 3, inputs_.push.point.begin());
+}
+
+void plant::reset() {
+  initialised_ = false;
+  integrator_.reset();
+  inputs_ = {};
+  sensors_.clear();
+  samples_ = 0.0;
+  now_.time = 0.0;
+  now_.state.assign(rig_.order(), 0.0);
+  now_.modes = {};
+}
+
+void plant::initialise() {
+  if (initialised_) throw refusal(TENDONFMU_PLANT_WRONG_ORDER, "initialise: expected once only");
+  make_integrator();
+  const state_layout& at = equations_.layout();
+  moment start;
+  start.time = -rig_.settle;
+  start.state.assign(at.size(), 0.0);
+  desired_angles(rig_, start.time, start.state.data());
+  equations_.command_motors(start.time, inputs_, start.state.data() + at.motor());
+  start.modes = equations_.modes_at(start.state.data());
+  integrator_->forget();
+  if (rig_.settle > 0.0) integrator_->advance(inputs_, 0.0, &start);
+  start.time = 0.0;
+  std::fill(start.state.begin() + static_cast<std::ptrdiff_t>(at.heat()), start.state.end(), 0.0);
+  integrator_->forget();
+  integrator_->clear_work();
+  now_ = start;
+  initialised_ = true;
+  if (settings_.sensors) sample(now_);
+}
+
+void plant::need_initialised() const {
+  if (!initialised_) throw refusal(TENDONFMU_PLANT_WRONG_ORDER, "expected after the initialisation only");
+}
+
+/* Through every sample of the sensors on the way. */
+void plant::move_on(double until, moment* now) {
+  while (settings_.sensors) {
+    const double next = samples_ / rig_.sensors.rate;
+    if (next > until + same_time) break;
+    integrator_->advance(inputs_, std::min(next, until), now);
+    sample(*now);
+  }
+  integrator_->advance(inputs_, until, now);
+}
+
+void plant::advance(double until) {
+  need_initialised();
+  need(std::isfinite(until) && until < 1e9, "time: expected a finite number of seconds below 1e9");
+  if (until < now_.time) throw refusal(TENDONFMU_PLANT_WRONG_ORDER, "time: expected not to go back");
+  if (until == now_.time) return;
+  moment ahead = now_;
+  const sensor_bank sensors_before = sensors_;
+  const double samples_before = samples_;
+  try {
+    move_on(until, &ahead);
+  } catch (const solver_error& failure) {
+    sensors_ = sensors_before;
+    samples_ = samples_before;
+    integrator_->forget();
+    throw refusal(TENDONFMU_PLANT_SOLVER, failure.what());
+  }
+  std::swap(now_, ahead);
+}
+
+// --- signals
+// ----------------------------------------------------------------------------------------------------------
+
+void plant::evaluate(const moment& now) const {
+  equations_.evaluate(now.time, now.state.data(), now.modes, inputs_, scratch_.data());
+}
+
+void plant::sample(const moment& now) {
+  evaluate(now);
+  const evaluation& e = equations_.last();
+  const state_layout& at = equations_.layout();
+  readings exact(at.joints, at.tendons);
+  for (std::size_t i = 0; i < at.tendons; ++i) {
+    exact.tendon_force[i] = e.force[i];
+    exact.tendon_position[i] = now.state[at.motor() + i];
+  }
+  for (std::size_t j = 0; j < at.joints; ++j) {
+    exact.joint_position[j] = now.state[at.angle() + j];
+    exact.joint_velocity[j] = now.state[at.speed() + j];
+    exact.external_torque[j] = -e.contact.torque[j];
+  }
+  sensors_.sample(static_cast<std::uint64_t>(samples_), settings_.seed, exact);
+  samples_ += 1.0;
+}
+
+namespace {
+
+double potential_energy(const rig& rig, const evaluation& e, const double* angle, const contact_modes& modes) {
+  double energy = gravity_energy(rig, e.motion);
+  for (std::size_t i = 0; i < rig.tendon_count(); ++i) {
+    const double x = e.elongation[i];
+    if (!modes.slack[i]) energy += x * x * (0.5 * rig.tendons[i].stiffness + rig.tendons[i].hardening * x / 3.0);
+  }
+  const std::size_t n = rig.joint_count();
+  for (std::size_t j = 0; j < n; ++j) {
+    const link& link = rig.links[j];
+    const double bent = angle[j] - link.cover_rest;
+    energy += bent * bent * (0.5 * link.cover_stiffness + 0.25 * link.cover_hardening * bent * bent);
+    const double beyond = modes.below[j] ? link.lower - angle[j] : modes.above[j] ? angle[j] - link.upper : 0.0;
+    energy += 0.5 * link.stop_stiffness * beyond * beyond;
+    if (j + 1 < n) {
+      const double apart = bent - (angle[j + 1] - rig.links[j + 1].cover_rest);
+      energy += 0.5 * rig.coupling[j] * apart * apart;
+    }
+  }
+  if (modes.touching) {
+    const double depth = penetrate(rig.obstacle, e.motion).depth;
+    energy += 0.5 * rig.obstacle.stiffness * depth * depth;
+  }
+  return energy;
+}
+
+void put(double* array, std::size_t row, const double* values, std::size_t count) {
+  if (array) std::copy(values, values + count, array + row * count);
+}
+
+void put(double* array, std::size_t row, const vector3<double>& v) {
+  const double values[3] = {v.x, v.y, v.z};
+  put(array, row, values, 3);
+}
+
+}  // namespace
+
+void plant::write_signals(const tendonfmu_plant_signals& s, std::size_t row) const {
+  need_initialised();
+  evaluate(now_);
+  const evaluation& e = equations_.last();
+  const state_layout& at = equations_.layout();
+  const std::size_t n = at.joints, m = at.tendons;
+  const double* state = now_.state.data();
+
+  // torques as the tendons see them
+  double external[max_joints], stop[max_joints], inertial[max_joints], friction[max_joints];
+  for (std::size_t j = 0; j < n; ++j) {
+    external[j] = -e.contact.torque[j];
+    stop[j] = -e.stop_torque[j];
+    inertial[j] = e.rigid_torque[j];
+    for (std::size_t k = 0; k < n; ++k) inertial[j] += e.mass[j * n + k] * e.acceleration[k];
+    friction[j] = e.spring_torque[j] - external[j] - stop[j] - inertial[j];
+  }
+  put(s.tendon_force, row, e.force, m);
+  put(s.tendon_position, row, state + at.motor(), m);
+  put(s.joint_position, row, state + at.angle(), n);
+  put(s.joint_velocity, row, state + at.speed(), n);
+  put(s.joint_torque, row, e.spring_torque, n);
+  put(s.friction_torque, row, friction, n);
+  put(s.external_torque, row, external, n);
+  put(s.inertial_torque, row, inertial, n);
+  put(s.stop_torque, row, stop, n);
+
+  // what the sensors show; without them the truth
+  const readings& shown = sensors_.newest();
+  const bool exact = settings_.sensors == 0;
+  put(s.measured_tendon_force, row, exact ? e.force : shown.tendon_force.data(), m);
+  put(s.measured_tendon_position, row, exact ? state + at.motor() : shown.tendon_position.data(), m);
+  put(s.measured_joint_position, row, exact ? state + at.angle() : shown.joint_position.data(), n);
+  put(s.measured_joint_velocity, row, exact ? state + at.speed() : shown.joint_velocity.data(), n);
+  put(s.measured_external_torque, row, exact ? external : shown.external_torque.data(), n);
+
+  const vector3<double> tip = move_point(e.motion.links[n - 1], rig_.tip).place;
+  put(s.contact_force, row, e.contact.force);
+  put(s.contact_point, row, e.contact.largest > 0.0 ? e.contact.place : tip);
+  put(s.tip_position, row, tip);
+  put(s.friction_level, row, &e.level, 1);
+  const double energy[6] = {kinetic_energy(rig_, e.motion), potential_energy(rig_, e, state, now_.modes),
+                            state[at.motor_work()],         state[at.friction_work()],
+                            state[at.damping_work()],       state[at.push_work()]};
+  put(s.energy, row, energy, 6);
+  if (s.contact) s.contact[row] = std::sqrt(dot(e.contact.force, e.contact.force)) > rig_.contact_force;
+  if (s.slack) std::copy(now_.modes.slack, now_.modes.slack + m, s.slack + row * m);
+}
+
+// --- saved states
+// -----------------------------------------------------------------------------------------------------
+
+/* Everything that is remembered, as numbers of a length that the rig fixes. */
+std::vector<double> plant::state_numbers() const {
+  const std::size_t n = rig_.joint_count(), m = rig_.tendon_count();
+  std::vector<double> numbers = {now_.time, samples_, integrator_ ? integrator_->last_step() : 0.0,
+                                 inputs_.given ? 1.0 : 0.0, inputs_.pretension};
+  numbers.insert(numbers.end(), inputs_.command, inputs_.command + m);
+  numbers.insert(numbers.end(), inputs_.push.force.begin(), inputs_.push.force.end());
+  numbers.insert(numbers.end(), now_.modes.slack, now_.modes.slack + m);
+  numbers.insert(numbers.end(), now_.modes.below, now_.modes.below + n);
+  numbers.insert(numbers.end(), now_.modes.above, now_.modes.above + n);
+  numbers.push_back(now_.modes.touching ? 1.0 : 0.0);
+  numbers.insert(numbers.end(), now_.state.begin(), now_.state.end());
+  sensors_.append_state(&numbers);
+  return numbers;
+}
+
+namespace {
+
+/* Before the numbers. Settings are compared: a state continues only as it began. */
+struct state_header {
+  std::uint64_t mark, identity, settings, count, digest;
+};
+
+std::uint64_t digest_of(const tendonfmu_plant_settings& s) {
+  return digest({static_cast<double>(s.integrator), s.relative_tolerance, s.step,
+                 static_cast<double>(s.scheduled_motion), static_cast<double>(s.scheduled_pushes),
+                 static_cast<double>(s.sensors), static_cast<double>(s.seed), s.push_point[0], s.push_point[1],
+                 s.push_point[2], static_cast<double>(s.push_link)});
+}
+
+}  // namespace
+
+std::size_t plant::state_bytes() const {
+  return sizeof(state_header) + sizeof(double) * state_numbers().size();
+}
+
+void plant::save(void* bytes, std::size_t size) const {
+  need_initialised();
+  const std::vector<double> numbers = state_numbers();
+  const state_header header = {state_mark, identity_, digest_of(settings_), numbers.size(), digest(numbers)};
+  need(size == sizeof header + sizeof(double) * numbers.size(), "state: expected as many bytes as a state has");
+  std::memcpy(bytes, &header, sizeof header);
+  std::memcpy(static_cast<char*>(bytes) + sizeof header, numbers.data(), sizeof(double) * numbers.size());
+}
+
+void plant::restore(const void* bytes, std::size_t size) {
+  const auto bad = [](const char* line) { throw refusal(TENDONFMU_PLANT_BAD_STATE, line); };
+  std::vector<double> numbers = state_numbers();
+  state_header header;
+  if (size != sizeof header + sizeof(double) * numbers.size()) bad("state: of another size");
+  std::memcpy(&header, bytes, sizeof header);
+  if (header.mark != state_mark) bad("state: not that of a simulated finger");
+  if (header.identity != identity_) bad("state: of another rig");
+  if (header.settings != digest_of(settings_)) bad("state: taken with other settings");
+  std::memcpy(numbers.data(), static_cast<const char*>(bytes) + sizeof header, sizeof(double) * numbers.size());
+  if (header.count != numbers.size() || header.digest != digest(numbers)) bad("state: damaged");
+
+  const std::size_t n = rig_.joint_count(), m = rig_.tendon_count();
+  make_integrator();
+  integrator_->forget();
+  const double* next = numbers.data();
+  now_.time = *next++;
+  samples_ = *next++;
+  ++next;  // the last step: told, not needed
+  inputs_.given = *next++ != 0.0;
+  inputs_.pretension = *next++;
+  const auto take = [&](auto* to, std::size_t count) {
+    for (std::size_t k = 0; k < count; ++k) to[k] = static_cast<std::decay_t<decltype(to[0])>>(*next++);
+  };
+  take(inputs_.command, m);
+  take(inputs_.push.force.data(), 3);
+  take(now_.modes.slack, m);
+  take(now_.modes.below, n);
+  take(now_.modes.above, n);
+  take(&now_.modes.touching, 1);
+  take(now_.state.data(), now_.state.size());
+  sensors_.restore_state(next);
+  initialised_ = true;
+}
+
+// --- for checks
+// -------------------------------------------------------------------------------------------------------
+
+void plant::derivative(double time, const double* state, double* result, double* jacobian) const {
+  commands inputs = inputs_;
+  inputs.scheduled_motion = settings_.scheduled_motion != 0;
+  inputs.scheduled_pushes = settings_.scheduled_pushes != 0;
+  const contact_modes modes = equations_.modes_at(state);
+  equations_.evaluate(time, state, modes, inputs, result);
+  if (!jacobian) return;
+  linearisation blocks(rig_);
+  blocks.take(equations_, state, modes, inputs, rigid_slopes::exact);
+  blocks.dense(jacobian);
+}
+
+}  // namespace tendonfmu::plant

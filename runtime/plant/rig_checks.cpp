@@ -1,0 +1,126 @@
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "description_error.h"
+#include "dynamics.h"
+#include "motion.h"
+#include "rig_parts.h"
+
+namespace tendonfmu::plant {
+namespace {
+
+constexpr double fastest_rate = 1e6;    // 1/s; a sample of 1 kHz sees nothing of it, an integrator all
+constexpr double most_friction = 0.95;  // share of the tension that friction along a tendon may take
+
+using matrix = Eigen::MatrixXd;
+
+matrix arms_at(const rig& rig, const double* angle) {
+  matrix arms(rig.tendon_count(), rig.joint_count());
+  for (std::size_t i = 0; i < rig.tendon_count(); ++i) {
+    for (std::size_t j = 0; j < rig.joint_count(); ++j) arms(i, j) = arm_at(rig.tendons[i].arms[j], angle[j]);
+  }
+  return arms;
+}
+
+/* Forces nearest to equal ones that turn no joint: the projection of ones on the null space of Rᵀ. */
+void find_null_vector(rig* rig) {
+  double angle[max_joints];
+  desired_angles(*rig, 0.0, angle);
+  const matrix arms = arms_at(*rig, angle);
+  const Eigen::VectorXd ones = Eigen::VectorXd::Ones(arms.rows());
+  const Eigen::ColPivHouseholderQR<matrix> split(arms);
+  if (split.rank() < arms.cols()) {
+    throw description_error(
+        "finger.tendons: expected moment_arms of full column rank (every joint moved by the tendons independently)");
+  }
+  const Eigen::VectorXd null = ones - arms * split.solve(ones);
+  const double mean = null.mean();
+  for (Eigen::Index i = 0; i < null.size(); ++i) {
+    if (mean > 1e-9 && null[i] > 1e-6 * mean) continue;
+    throw description_error(
+        "finger.tendons[" + std::to_string(i + 1) +
+        "].moment_arms: expected arms with a positive null vector of Rᵀ, forces > 0 of all tendons that turn "
+        "no joint: the finger cannot be pretensioned");
+  }
+  const Eigen::VectorXd scaled = null / mean;
+  rig->null_vector.assign(scaled.data(), scaled.data() + scaled.size());
+}
+
+void check_start(const json_node& motion, const rig& rig) {
+  for (std::size_t j = 0; j < rig.joint_count(); ++j) {
+    const double start = rig.motion[j].position.front();
+    if (start >= rig.links[j].lower && start <= rig.links[j].upper) continue;
+    char range[120];
+    std::snprintf(range, sizeof range, "a start within the joint's limits, %g to %g rad", rig.links[j].lower,
+                  rig.links[j].upper);
+    motion.member("joints").element(j).member("position").element(0).refuse(range);
+  }
+}
+
+void check_friction(const rig& rig) {
+  for (std::size_t i = 0; i < rig.tendon_count(); ++i) {
+    const tendon& tendon = rig.tendons[i];
+    double taken = 0.0;
+    for (std::size_t s = tendon.first_site; s < tendon.first_site + tendon.site_count; ++s) {
+      double most = 0.0;
+      for (const law& law : rig.sites[s].friction.laws) {
+        most = std::max({most, law.positive.break_away, law.negative.break_away});
+      }
+      taken += most;
+    }
+    if (rig.friction.loss == tension_loss::linear && taken > most_friction) {
+      char line[200];
+      std::snprintf(
+          line, sizeof line,
+          "finger.tendons[%zu]: static friction takes %.3g of the tension on its way; expected less than %.3g "
+          "(or tension_loss \"capstan\")",
+          i + 1, taken, most_friction);
+      throw description_error(line);
+    }
+  }
+}
+
+/* Square root of stiffness over inertia: of what holds a joint by its tendons, stops, cover and presliding. */
+void check_stiffness(const json_node& physics, const rig& rig) {
+  const std::size_t n = rig.joint_count();
+  double angle[max_joints], rest[max_joints] = {};
+  desired_angles(rig, 0.0, angle);
+  chain_motion<double> motion;
+  move_chain(rig, angle, rest, &motion);
+  double mass[max_joints * max_joints];
+  mass_matrix(rig, motion, mass);
+  const Eigen::MatrixXd inertia = Eigen::Map<Eigen::MatrixXd>(mass, n, n);
+  const Eigen::VectorXd least = inertia.inverse().diagonal();  // 1/inertia that a joint alone feels
+  if (!least.allFinite() || (least.array() <= 0.0).any()) {
+    physics.member("links").refuse("masses and inertias that give every joint a moment of inertia");
+  }
+  const matrix arms = arms_at(rig, angle);
+  for (std::size_t j = 0; j < n; ++j) {
+    double stiffness = rig.links[j].stop_stiffness + rig.links[j].cover_stiffness;
+    for (std::size_t i = 0; i < rig.tendon_count(); ++i) {
+      stiffness += rig.tendons[i].stiffness * arms(i, j) * arms(i, j);
+    }
+    const double rate = std::sqrt(stiffness * least[j]);
+    if (rate <= fastest_rate) continue;
+    char said[200];
+    std::snprintf(
+        said, sizeof said,
+        "a body that its springs (%.3g N·m/rad with tendons, cover and stops) swing at less than %g rad/s, not "
+        "%.3g: heavier, or less stiff",
+        stiffness, fastest_rate, rate);
+    physics.member("links").element(j).refuse(said);
+  }
+}
+
+}  // namespace
+
+void check_rig(const json_node& document, rig* rig) {
+  check_start(document.member("motion"), *rig);
+  find_null_vector(rig);
+  check_friction(*rig);
+  check_stiffness(document.member("physics"), *rig);
+}
+
+}  // namespace tendonfmu::plant

@@ -1,0 +1,16 @@
+/* From the text of an expanded rig (docs/rig.md) to its numbers. */
+#ifndef TENDONFMU_PLANT_RIG_READER_H
+#define TENDONFMU_PLANT_RIG_READER_H
+
+#include <cstddef>
+
+#include "rig.h"
+
+namespace tendonfmu::plant {
+
+/* Throws description_error: key path, value, expectation, unit. */
+rig read_rig(const char* text, std::size_t size);
+
+}  // namespace tendonfmu::plant
+
+#endif
