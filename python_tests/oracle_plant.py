@@ -120,8 +120,9 @@ class PlantTwin:
             for joint in self.motion["joints"]
         ]
         self.pretension = Spline(self.motion["pretension"]["time"], self.motion["pretension"]["value"])
-        # null vector of Rᵀ nearest to ones, mean 1
-        R = np.array([tendon.described for tendon in self.tendons])
+        # null vector of Rᵀ nearest to ones, mean 1, with the true arms in the first posture
+        posture = np.array([path(0.0) for path in self.desired])
+        R = np.array([tendon.arms(posture) for tendon in self.tendons])
         nearest = np.ones(self.m) - R @ np.linalg.lstsq(R, np.ones(self.m), rcond=None)[0]
         self.null_vector = nearest / nearest.mean()
 
@@ -201,7 +202,7 @@ class PlantTwin:
                 act = self.contacts[place].act(along["w"][place], v[j], 0.0, along["level"])
                 load = 1.0
                 if kind == "load_friction":
-                    passing = [not self.only_passing or np.any(each.described[j:] != 0.0) for each in self.tendons]
+                    passing = [not self.only_passing or each.turns(j) for each in self.tendons]
                     load = float(np.sum(along["between"][passing, j]))
                 torque[j] += act[0] * load
                 along["rate"][place] = act[1]

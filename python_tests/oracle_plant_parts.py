@@ -245,12 +245,15 @@ class Tendon:
         self.stiffness = float(described["stiffness"])
         self.hardening = float(given(physics, "hardening", 0.0))
         self.damping = float(given(physics, "damping", 0.0))
-        self.described = np.array(described["moment_arms"], dtype=float)
-        self.base = self.described * float(given(physics, "moment_arm_scale", 1.0))
+        self.base = np.array(described["moment_arms"], dtype=float) * float(given(physics, "moment_arm_scale", 1.0))
         self.slope, self.eccentricity, self.phase = map(per_joint, ("moment_arm_slope", "eccentricity", "phase"))
 
     def arms(self, q: Array) -> Array:
         return np.asarray(self.base + self.slope * q + self.eccentricity * np.sin(q + self.phase))
+
+    def turns(self, joint: int) -> bool:
+        """Has a moment arm at the joint or beyond."""
+        return bool(np.any(self.base[joint:]) or np.any(self.slope[joint:]) or np.any(self.eccentricity[joint:]))
 
     def path(self, q: Array) -> float:
         """∫ r dq from 0."""

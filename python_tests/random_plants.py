@@ -184,7 +184,7 @@ def random_motion(rng: np.random.Generator, n: int) -> Table:
     joints = []
     for _ in range(n):
         knots = int(rng.integers(1, 6))
-        time = np.cumsum(rng.uniform(0.1, 1.5, knots)) - 0.5
+        time = np.cumsum(rng.uniform(0.1, 1.5, knots)) - 0.1
         joints.append(
             {
                 "time": time.tolist(),
@@ -194,7 +194,7 @@ def random_motion(rng: np.random.Generator, n: int) -> Table:
             }
         )
     knots = int(rng.integers(1, 4))
-    time = np.cumsum(rng.uniform(0.2, 2.0, knots)) - 0.5
+    time = np.cumsum(rng.uniform(0.2, 2.0, knots)) - 0.2
     return {
         "joints": joints,
         "pretension": {"time": time.tolist(), "value": rng.uniform(1.0, 20.0, knots).tolist()},
@@ -244,7 +244,7 @@ def random_plant(seed: int) -> Table:
             "amplitude": rng.uniform(0.05, 0.5),
             "period": rng.uniform(2.0, 30.0),
             "arms": rng.uniform(-0.01, 0.01, m).tolist(),
-            "friction": random_law(rng, 0.03, TENDON_SPEED),
+            "friction": random_side(rng, 0.03, TENDON_SPEED),
         }
         if rng.random() < 0.5:
             physics["wrist"]["presliding"] = rng.uniform(1e-5, 6e-5)

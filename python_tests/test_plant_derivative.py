@@ -1,0 +1,141 @@
+"""The simulated finger's right-hand side against the numpy twin, and its Jacobian against differences."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from oracle_plant import PlantTwin
+from oracle_plant_parts import Multibody
+from plant_rigs import needs_plant
+from random_plants import random_plant, random_state
+from tendonfmu.plant import Plant
+
+Array = NDArray[Any]
+
+SEEDS = range(60)
+STATES = 4
+TOLERANCE = 1e-9  # of the block's largest value
+
+
+def blocks(twin: PlantTwin) -> dict[str, slice]:
+    sizes = {"q": twin.n, "v": twin.n, "x": twin.m, "x_rate": twin.m, "bristles": len(twin.places)}
+    sizes |= {"heat": 1, "motor work": 1, "friction work": 1, "damping work": 1, "push work": 1}
+    found, start = {}, 0
+    for name, size in sizes.items():
+        found[name] = slice(start, start + size)
+        start += size
+    return found
+
+
+def scales(twin: PlantTwin, t: float, y: Array, expected: Array) -> dict[str, float]:
+    """What rounding is relative to: a block's largest value, or the terms that cancel in it."""
+    found = {name: float(np.abs(expected[part]).max(initial=0.0)) for name, part in blocks(twin).items()}
+    parts = twin.parts(t, y)
+    torque = np.abs(parts["arms"]).T @ parts["tension"] + np.abs(parts["stop"]) + np.abs(parts["cover"])
+    found["v"] = max(found["v"], float((np.abs(np.linalg.inv(parts["mass"])) @ torque).max()))
+    tension, slid = parts["tension"], np.abs(parts["slid"][:, 0])
+    found["friction work"] = max(found["friction work"], float(tension @ slid))
+    stretch = slid + np.abs(twin.split(y)["x_rate"])
+    found["damping work"] = max(found["damping work"], float(tension @ stretch))
+    found["heat"] = max(found["heat"], found["friction work"])
+    found["x_rate"] = max(found["x_rate"], twin.servo_rate**2 * float(np.abs(twin.split(y)["x"]).max()))
+    return found
+
+
+@needs_plant
+@pytest.mark.parametrize("seed", SEEDS)
+def test_derivative_agrees_with_twin(seed: int) -> None:
+    rig = random_plant(seed)
+    twin, plant = PlantTwin(rig), Plant(json.dumps(rig))
+    assert plant.order == twin.order
+    rng = np.random.default_rng([seed, 5])
+    for _ in range(STATES):
+        t, y = rng.uniform(0.0, 4.0), random_state(rng, twin)
+        expected, got = twin.derivative(t, y), plant.derivative(t, y)
+        allowed = scales(twin, t, y, expected)
+        for name, part in blocks(twin).items():
+            difference = np.abs(got[part] - expected[part]).max(initial=0.0)
+            assert difference <= TOLERANCE * allowed[name], (
+                f"seed {seed}, {name}: expected {expected[part]}, got {got[part]}, {twin.places}"
+            )
+
+
+def differences(plant: Plant, t: float, y: Array, column: int, step: float) -> Array:
+    """Central difference of order 4."""
+
+    def at(k: int) -> Array:
+        moved = y.copy()
+        moved[column] += k * step
+        return plant.derivative(t, moved)
+
+    return np.asarray((8.0 * (at(1) - at(-1)) - (at(2) - at(-2))) / (12.0 * step))
+
+
+@needs_plant
+@pytest.mark.parametrize("seed", range(0, 60, 2))
+def test_jacobian_agrees_with_differences(seed: int) -> None:
+    """Random states lie farther from any kink than the steps taken here."""
+    rig = random_plant(seed)
+    twin, plant = PlantTwin(rig), Plant(json.dumps(rig))
+    rng = np.random.default_rng([seed, 6])
+    t, y = rng.uniform(0.0, 4.0), random_state(rng, twin)
+    jacobian = plant.jacobian(t, y)
+    assert jacobian.shape == (twin.order, twin.order)
+    steps = {"q": 1e-6, "v": 1e-6, "x": 1e-9, "x_rate": 1e-6}
+    rate = np.abs(plant.derivative(t, y))
+    for name, part in blocks(twin).items():
+        for column in range(part.start, part.stop):
+            step = steps.get(name, 1e-4)
+            expected = differences(plant, t, y, column, step)
+            for row in blocks(twin).values():
+                found = jacobian[row, column]
+                # rounding of the difference beside the relative error
+                floor = 1e-6 * np.abs(expected[row]).max(initial=0.0) + 1e-12 * rate[row].max(initial=0.0) / step
+                difference = np.abs(found - expected[row]).max(initial=0.0)
+                assert difference <= floor, f"seed {seed}, column {name} {column}: {found} against {expected[row]}"
+
+
+def test_twin_mass_matrix_and_energy() -> None:
+    """The twin against itself: M symmetric and positive, and its energy balance stands still along its own flow."""
+    for seed in range(10):
+        twin = PlantTwin(random_plant(seed))
+        rng = np.random.default_rng([seed, 7])
+        t, y = rng.uniform(0.0, 4.0), random_state(rng, twin)
+        found, rate = twin.parts(t, y), twin.derivative(t, y)
+        np.testing.assert_allclose(found["mass"], found["mass"].T, rtol=1e-13, atol=1e-20)
+        assert np.linalg.eigvalsh(found["mass"]).min() > 0.0
+        step = 1e-5 / np.abs(rate[: 2 * twin.n]).max()
+        drift = (twin.balance(t, y + step * rate) - twin.balance(t, y - step * rate)) / (2.0 * step)
+        powers = sum(abs(found[name]) for name in ("motor_power", "friction_power", "damping_power"))
+        assert abs(drift) < 1e-2 * powers, f"seed {seed}: {drift} W of {powers} W"
+
+
+def test_twin_pendulum_by_hand() -> None:
+    """One link turning about y, mass at 20 mm: M = I + m l², G = −m g l cos q (positive q lowers the tip)."""
+    link = {"axis": [0.0, 2.0, 0.0], "mass": 0.05, "centre_of_mass": [0.02, 0.0, 0.0], "inertia": [1e-6, 2e-6, 2e-6]}
+    body, q = Multibody({"links": [link]}), np.array([0.3])
+    assert body.mass_matrix(q)[0, 0] == pytest.approx(2e-6 + 0.05 * 0.02**2, rel=1e-12)
+    assert body.gravity_torque(q)[0] == pytest.approx(-0.05 * 9.81 * 0.02 * np.cos(0.3), rel=1e-12)
+
+
+def test_twin_double_pendulum_by_hand() -> None:
+    """Two point masses at the ends of links of lengths a, b in one plane: the textbook's mass matrix and C."""
+    a, b, first, second = 0.04, 0.03, 0.02, 0.05
+    point = {"axis": [0.0, 1.0, 0.0], "inertia": [1e-12, 1e-12, 1e-12]}
+    links = [
+        point | {"mass": first, "centre_of_mass": [a, 0.0, 0.0]},
+        point | {"mass": second, "centre_of_mass": [b, 0.0, 0.0], "offset": [a, 0.0, 0.0]},
+    ]
+    body, q, v = Multibody({"links": links}), np.array([0.2, 0.7]), np.array([1.3, -0.4])
+    cross = second * a * b * np.cos(q[1])
+    corner = second * (a * a + b * b) + 2.0 * cross + first * a * a
+    expected = [[corner, second * b * b + cross], [second * b * b + cross, second * b * b]]
+    np.testing.assert_allclose(body.mass_matrix(q), expected, rtol=1e-6)
+    h = second * a * b * np.sin(q[1])
+    terms = [-h * (2.0 * v[0] * v[1] + v[1] ** 2), h * v[0] ** 2]
+    np.testing.assert_allclose(body.velocity_terms(q, v), terms, rtol=1e-9)

@@ -1,0 +1,350 @@
+"""The simulated finger against physics done by hand: closed forms of LuGre, energy, balance, orders of convergence.
+
+Nothing here comes from the numpy twin but the comparison with scipy's Radau, which says so.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicHermiteSpline
+from scipy.optimize import brentq
+
+from oracle_plant import PlantTwin
+from plant_rigs import ANTAGONISTS, ARM, STIFFNESS, TWO_JOINTS, balance, dry, grid, make, needs_plant, run, small_rig
+from plant_rigs import strokes as legs_of
+from random_plants import random_plant
+
+Array = NDArray[Any]
+pytestmark = needs_plant
+
+# --- LuGre on one contact ---------------------------------------------------------------------------------------
+
+
+def one_contact(law: dict[str, float], distance: float, damping: float, legs: Any, **other: Any) -> dict[str, Any]:
+    """One joint, friction in the joint alone; the tendons pull hard enough to hold it to the wanted motion."""
+    friction = {"presliding": {"joint": distance}, "bristle_damping": damping}
+    rig = small_rig(motion=legs_of(legs, [0.0]), joints=[{"friction": law}], friction=friction, **other)
+    rig["physics"]["tendons"] = [{"damping": 20.0}] * 2  # calms the springs, and is no part of friction_torque
+    return rig
+
+
+def test_steady_sliding_force() -> None:
+    """Far beyond the presliding distance: λ = g(v) + viscous v, for both exponents and both directions."""
+    law, distance = dry(0.006, static=0.009, stribeck=0.1, viscous=0.002), 0.002
+    for exponent in (1, 2):
+        for speed in (0.05, -0.2):
+            rig = one_contact(law, distance, 0.003, [[0.8, speed]])
+            rig["physics"]["friction"]["stribeck_exponent"] = exponent
+            found = run(rig, grid(0.85, 1e-3))
+            v = found["joint_velocity"][-1, 0]
+            assert v == pytest.approx(speed, rel=0.01)
+            level = 0.006 + 0.003 * np.exp(-((abs(v) / 0.1) ** exponent))
+            expected = np.sign(v) * level + 0.002 * v
+            assert found["friction_torque"][-1, 0] == pytest.approx(expected, rel=1e-4)
+
+
+def test_presliding_stiffness_and_exponential_approach() -> None:
+    """With ĝ = 1: w(x) = 1 − (1 − w0) exp(−x/d), so the torque rises with slope level/d and reaches its level."""
+    level, distance = 0.008, 0.01
+    found = run(one_contact(dry(level), distance, 0.0, [[0.5, 0.12]]), grid(0.65, 5e-4))
+    travelled = found["joint_position"][:, 0] - found["joint_position"][0, 0]
+    first = found["friction_torque"][0, 0] / level
+    rising = found["joint_velocity"][:, 0] >= 0.0
+    assert np.all(np.diff(travelled) >= -1e-9) and travelled[-1] > 5.0 * distance and rising.mean() > 0.95
+    expected = level * (1.0 - (1.0 - first) * np.exp(-travelled / distance))
+    np.testing.assert_allclose(found["friction_torque"][:, 0], expected, atol=1e-5 * level)
+    early = (travelled > 0.0) & (travelled < 0.01 * distance)
+    slope = np.polyfit(travelled[early], found["friction_torque"][early, 0], 1)[0]
+    assert slope == pytest.approx(level / distance, rel=0.02)
+
+
+def test_break_away_level_and_distance() -> None:
+    """Driven far slower than the Stribeck velocity: the torque reaches `static`; 95 % of it after 3 d (ĝ -> 1)."""
+    law, distance = dry(0.006, static=0.009, stribeck=5.0), 0.005
+    found = run(one_contact(law, distance, 0.0, [[1.5, 0.03]]), grid(1.6, 1e-3))
+    torque = found["friction_torque"][:, 0]
+    travelled = found["joint_position"][:, 0] - found["joint_position"][0, 0]
+    assert torque.max() == pytest.approx(0.009, rel=0.005)
+    assert np.interp(3.0 * distance, travelled, torque) == pytest.approx(0.95 * 0.009, rel=0.01)
+
+
+def test_contact_against_scipy() -> None:
+    """The joint's own motion, with reversals, put through a LuGre equation written here and solved by Radau."""
+    static, coulomb, stribeck, viscous, distance, damping = 0.009, 0.006, 0.1, 0.002, 0.004, 0.003
+    law = dry(coulomb, static=static, stribeck=stribeck, viscous=viscous)
+    rig = one_contact(law, distance, damping, [[0.1, 0.4], [0.1, -0.3], [0.1, 0.02], [0.15, 0.0], [0.1, -0.5]])
+    rig["integration"]["relative_tolerance"] = 1e-9
+    time = grid(1.0, 2e-4)
+    found = run(rig, time)
+    q, v = found["joint_position"][:, 0], found["joint_velocity"][:, 0]
+    speed = CubicHermiteSpline(time, q, v).derivative()
+
+    def bend_rate(t: float, w: Array) -> Array:
+        u = float(speed(t))
+        ratio = (coulomb + (static - coulomb) * np.exp(-abs(u) / stribeck)) / static
+        return np.asarray(u / distance * (1.0 - np.sign(u) * w / ratio))
+
+    w0 = [found["friction_torque"][0, 0] / static]
+    w = solve_ivp(bend_rate, (0.0, 1.0), w0, "Radau", t_eval=time, rtol=1e-9, atol=1e-11, max_step=1e-3).y[0]
+    rate = np.array([bend_rate(t, np.array([w[k]]))[0] for k, t in enumerate(time)])
+    part = damping / (1.0 + np.abs(v) * damping / distance)
+    expected = static * (w + part * rate) + viscous * v
+    assert np.abs(w).max() > 0.7 and np.sign(w).min() < 0
+    np.testing.assert_allclose(found["friction_torque"][:, 0], expected, atol=2e-4 * static)
+
+
+# --- The whole finger -------------------------------------------------------------------------------------------
+
+
+def pendulum(**other: Any) -> dict[str, Any]:
+    """Two joints without friction or damping, swinging in gravity on four springs, motors at rest."""
+    covers = [{"cover": {"stiffness": 0.02, "rest_angle": 0.1}}, {"cover": {"stiffness": 0.01, "rest_angle": -0.2}}]
+    tendons = [{"stiffness": 3000.0}] * 4
+    hardening = [{"hardening": 1e6}] * 4
+    rig = small_rig(TWO_JOINTS, joints=covers, tendons=tendons, gravity=[0.0, 0.0, -9.81], **other)
+    rig["physics"]["tendons"] = hardening
+    rig["physics"]["joint_coupling"] = [0.02]
+    rig["physics"]["links"] = [link | {"cover_hardening": 0.05} for link in rig["physics"]["links"]]
+    kick = {"start": 0.0, "rise": 0.01, "hold": 0.01, "fall": 0.01, "force": 2.0, "direction": [0.0, 0.0, 1.0]}
+    rig["pushes"] = [kick]
+    return rig
+
+
+def test_energy_of_a_finger_without_friction() -> None:
+    time = grid(0.5, 1e-3)
+    drift = []
+    for tolerance in (1e-5, 1e-7, 1e-9):
+        found = run(pendulum(), time, relative_tolerance=tolerance)
+        energy = found["energy"]
+        after = time >= 0.0301  # the kick is over: nothing works on it
+        total = (energy[:, 0] + energy[:, 1])[after]
+        swing = energy[after, 0].max()
+        assert swing > 1e-4
+        assert np.ptp(energy[:, 2]) == pytest.approx(0.0, abs=1e-12 + 1e-6 * swing)  # motors rest
+        assert np.all(energy[:, 3:5] == energy[0, 3:5])  # no friction, no damping
+        drift.append(np.ptp(total) / swing)
+    # what CVODE loses stays within some hundred times its tolerance over some hundred swings
+    assert drift[0] < 3e-2 and drift[1] < 3e-4 and drift[2] < 3e-6, drift
+
+
+def test_static_balance_by_hand() -> None:
+    """One joint, two antagonists, gravity, a cover: Σ r f = cover − m g l cos q, tensions of springs held by motors."""
+    mass, lever, cover, rest, pretension, arm = 0.05, 0.02, 0.03, 0.3, 8.0, (0.01, -0.008)
+    rig = small_rig(
+        [[arm[0]], [arm[1]]],
+        motion={"joints": [{"time": [0.0], "position": [0.2], "velocity": [0.0], "acceleration": [0.0]}]},
+        pretension=pretension,
+        joints=[{"cover": {"stiffness": cover, "rest_angle": rest}}],
+        links=[{"mass": mass, "damping": 0.002}],
+        gravity=[0.0, 0.0, -9.81],
+    )
+    found = run(rig, np.array([0.0, 0.5]))
+    # null vector of Rᵀ with mean 1: forces in the inverse ratio of the arms
+    nu = np.array([-arm[1], arm[0]]) * 2.0 / (arm[0] - arm[1])
+    motor = np.array(arm) * 0.2 + pretension * nu / STIFFNESS
+
+    def torque(q: float) -> float:
+        tension = np.maximum(0.0, STIFFNESS * (motor - np.array(arm) * q))
+        return float(np.array(arm) @ tension + mass * 9.81 * lever * np.cos(q) - cover * (q - rest))
+
+    expected = brentq(torque, -1.0, 1.0, xtol=1e-14)
+    assert abs(expected - 0.2) > 1e-3
+    np.testing.assert_allclose(found["joint_position"][:, 0], expected, atol=1e-8)
+    np.testing.assert_allclose(found["tendon_position"][1], motor, atol=1e-12)
+    tension = STIFFNESS * (motor - np.array(arm) * expected)
+    np.testing.assert_allclose(found["tendon_force"][1], tension, rtol=1e-6)
+    np.testing.assert_allclose(found["inertial_torque"][1], -mass * 9.81 * lever * np.cos(expected), rtol=1e-6)
+
+
+def smooth(friction: bool) -> dict[str, Any]:
+    """A rig whose solution has no kink: no reversal, no slack."""
+    legs = [[0.3, 0.5, 0.3]]
+    joints = [{"friction": dry(0.004, 0.006, 0.1, 0.002)}] * 2 if friction else None
+    return small_rig(
+        TWO_JOINTS,
+        motion=legs_of(legs, [0.0, 0.0]),
+        joints=joints,
+        links=[{"damping": 0.002}] * 2,
+        gravity=[0.0, 0.0, -9.81] if not friction else [0.0, 0.0, 0.0],
+        friction={"presliding": {"joint": 0.02}, "bristle_damping": 0.0},
+    )
+
+
+@pytest.mark.parametrize("friction", [False, True])
+def test_order_of_the_fixed_step(friction: bool) -> None:
+    rig, end = smooth(friction), np.array([0.05, 0.35])
+    start = make(rig, relative_tolerance=1e-10)
+    reference = start.run(end)["joint_position"]
+    steps, errors = [2e-3, 1e-3, 5e-4, 2.5e-4], []
+    for step in steps:
+        found = run(rig, end, integrator="fixed_step", step=step)["joint_position"]
+        errors.append(float(np.abs(found - reference).max()))
+    order = np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    assert 1.8 < order < 2.2, (order, errors)
+
+
+def moving_finger(seed: int = 4) -> dict[str, Any]:
+    """A random rig with everything that its seed draws."""
+    rig = random_plant(seed)
+    rig["settle"] = 0.5
+    return rig
+
+
+def test_cvode_error_falls_with_its_tolerance() -> None:
+    rig, end = smooth(True), grid(0.5, 0.05)
+    tight = run(rig, end, relative_tolerance=1e-10)["joint_position"]
+    errors = []
+    for tolerance in (1e-4, 1e-5, 1e-6, 1e-7):
+        coarse = run(rig, end, relative_tolerance=tolerance)["joint_position"]
+        halved = run(rig, end, relative_tolerance=tolerance / 2.0)["joint_position"]
+        errors.append(float(np.abs(coarse - tight).max()))
+        assert np.abs(halved - tight).max() < 1.5 * errors[-1] + 1e-9
+        assert np.abs(coarse - halved).max() < 2.5 * errors[-1] + 1e-9
+    assert errors[0] < 1e-2 and errors[-1] < errors[0] / 30.0, errors
+
+
+def test_cvode_agrees_with_radau_on_the_twin() -> None:
+    """Over 60 ms of a two-joint finger in motion with friction everywhere: the twin's equations, scipy's solver."""
+    law = dry(0.02, 0.03, 0.005, 0.2)
+    rig = small_rig(
+        TWO_JOINTS,
+        motion=legs_of([[0.05, 0.8, -0.5]], [0.1, -0.1], soft=0.02),
+        joints=[{"friction": dry(0.004, 0.006, 0.1), "load_friction": dry(3e-5, 4e-5, 0.1)}] * 2,
+        tendons=[{"pulley_friction": [law], "edge_friction": [law, law]}] * 4,
+        gravity=[0.0, 0.0, -9.81],
+        friction={"bristle_damping": 0.002},
+    )
+    plant = make(rig, relative_tolerance=1e-10)
+    twin, start, time = PlantTwin(rig), plant.continuous_state(), np.array([0.02, 0.04, 0.06])
+    found = plant.run(time)
+    solved = solve_ivp(twin.derivative, (0.0, 0.06), start, "Radau", t_eval=time, rtol=1e-7, atol=1e-10)
+    assert solved.success
+    assert np.ptp(found["joint_position"][:, 0]) > 0.01
+    np.testing.assert_allclose(solved.y[:2].T, found["joint_position"], atol=2e-7)
+    tension = [[twin.parts(t, y)["tension"] for t, y in zip(time, solved.y.T, strict=True)]]
+    np.testing.assert_allclose(tension[0], found["tendon_force"], atol=2e-3)
+
+
+@pytest.mark.parametrize("pulley_torque", ["beyond_joint", "at_joint"])
+@pytest.mark.parametrize("loss", ["linear", "capstan"])
+def test_energy_balance_closes(pulley_torque: str, loss: str) -> None:
+    """Everything on: pushes, an obstacle, stops, friction, damping, hardening springs, gravity, a wrist."""
+    law = dry(0.02, 0.03, 0.005, 0.2)
+    rig = small_rig(
+        TWO_JOINTS,
+        motion=legs_of([[0.3, 1.0, 0.7], [0.4, -1.0, -0.9], [0.2, 0.5, 0.5]], [0.0, 0.1]),
+        joints=[
+            {"friction": dry(0.004, 0.006, 0.1), "load_friction": dry(3e-5), "cover": {"stiffness": 0.02}} for _ in "12"
+        ],
+        tendons=[{"pulley_friction": [law], "edge_friction": [law, law]}] * 4,
+        links=[{"damping": 0.001, "limits": {"lower": -0.2, "upper": 0.25}, "cover_hardening": 0.1}] * 2,
+        gravity=[0.0, 0.0, -9.81],
+        joint_coupling=[0.02],
+        friction={"bristle_damping": 0.002, "pulley_torque": pulley_torque, "tension_loss": loss, "preload": 0.5},
+        obstacle={"centre": [0.07, 0.0, -0.05], "radius": 0.04, "stiffness": 300.0, "damping": 2.0},
+        pushes=[
+            {"start": 0.3, "rise": 0.1, "hold": 0.2, "fall": 0.1, "force": 1.0, "direction": [0.0, 0.0, 1.0]},
+        ],
+        wrist={"amplitude": 0.2, "period": 2.0, "arms": [0.005, -0.005, 0.004, 0.003], "friction": law},
+    )
+    rig["physics"]["tendons"] = [{"hardening": 1e6, "damping": 2.0}] * 4
+    found = run(rig, grid(1.3, 2e-3), relative_tolerance=1e-7)
+    energy = found["energy"]
+    moved = np.ptp(energy, axis=0)
+    assert np.all(moved[2:] > 1e-5), moved  # every work takes part
+    assert found["contact"].any() and np.abs(found["stop_torque"]).max() > 0.01
+    assert np.ptp(balance(energy)) < 2e-5 * moved[2:].sum(), (np.ptp(balance(energy)), moved)
+
+
+# --- Contact ----------------------------------------------------------------------------------------------------
+
+
+def planar_jacobian(q: Array, along: float) -> Array:
+    """[3, 2] of a point of the second link, `along` from its joint; axis y: positive angles turn x towards −z."""
+    first, both = q[0], q[0] + q[1]
+    elbow = np.array([-0.04 * np.sin(first), 0.0, -0.04 * np.cos(first)])
+    hand = np.array([-along * np.sin(both), 0.0, -along * np.cos(both)])
+    return np.stack([elbow + hand, hand], axis=1)
+
+
+def test_push_appears_in_the_external_torque() -> None:
+    """τ_ext = −Jᵀ F for a push fixed in the base and one that turns with the link."""
+    shared = {"start": 0.0, "rise": 0.05, "hold": 0.5, "fall": 0.05, "force": 1.5, "direction": [0.6, 0.3, 0.8]}
+    for frame in ("base", "link"):
+        push = shared | {"frame": frame, "link": 2, "point": [0.03, 0.0, 0.0]}
+        rig = small_rig(TWO_JOINTS, motion=legs_of([[0.2, 0.8, -0.5]], [0.2, 0.3]), pushes=[push])
+        rig["physics"]["links"] = [link | {"damping": 0.002} for link in rig["physics"]["links"]]
+        found = run(rig, np.array([0.0, 0.2, 0.3]))
+        np.testing.assert_allclose(found["external_torque"][0], 0.0, atol=1e-15)
+        direction = np.array([0.6, 0.3, 0.8]) / np.linalg.norm([0.6, 0.3, 0.8])
+        for k in (1, 2):
+            q = found["joint_position"][k]
+            force = 1.5 * direction
+            if frame == "link":
+                turn, (x, y, z) = q.sum(), force
+                force = np.array([x * np.cos(turn) + z * np.sin(turn), y, -x * np.sin(turn) + z * np.cos(turn)])
+            np.testing.assert_allclose(found["contact_force"][k], force, rtol=1e-9)
+            expected = -planar_jacobian(q, 0.03).T @ force
+            np.testing.assert_allclose(found["external_torque"][k], expected, rtol=1e-9)
+            place = [0.04 * np.cos(q[0]) + 0.03 * np.cos(turn) for turn in [q.sum()]]
+            assert found["contact_point"][k, 0] == pytest.approx(place[0], rel=1e-9)
+            assert bool(found["contact"][k])
+
+
+def test_obstacle_appears_in_the_external_torque() -> None:
+    """The tip pressed into a sphere: F = k δ (1 + c δ') along the normal, τ_ext = −Jᵀ F."""
+    centre, radius, stiffness, damping = np.array([0.07, 0.0, -0.06]), 0.04, 400.0, 3.0
+    obstacle = {"centre": centre.tolist(), "radius": radius, "stiffness": stiffness, "damping": damping}
+    rig = small_rig(TWO_JOINTS, motion=legs_of([[0.5, 0.6, 0.6]], [0.0, 0.0]), obstacle=obstacle)
+    rig["physics"]["links"] = [link | {"damping": 0.002} for link in rig["physics"]["links"]]
+    found = run(rig, grid(0.6, 2e-3))
+    seen = 0
+    for k, (q, v) in enumerate(zip(found["joint_position"], found["joint_velocity"], strict=True)):
+        both = q.sum()
+        tip = 0.04 * np.array([np.cos(q[0]) + np.cos(both), 0.0, -np.sin(q[0]) - np.sin(both)])
+        np.testing.assert_allclose(found["tip_position"][k], tip, atol=1e-12)
+        away = tip - centre
+        depth, normal = radius - np.linalg.norm(away), away / np.linalg.norm(away)
+        jacobian = planar_jacobian(q, 0.04)
+        force = np.zeros(3)
+        if depth > 0.0:
+            seen += depth > 1e-4
+            force = max(0.0, stiffness * depth * (1.0 - damping * float(normal @ jacobian @ v))) * normal
+        np.testing.assert_allclose(found["contact_force"][k], force, atol=1e-9)
+        np.testing.assert_allclose(found["external_torque"][k], -jacobian.T @ force, atol=1e-11)
+        assert bool(found["contact"][k]) == (np.linalg.norm(force) > 0.05)
+    assert seen > 30
+
+
+def test_friction_never_drives() -> None:
+    """beyond_joint: over each closed cycle of a steady motion friction takes energy out."""
+    law = dry(0.03, 0.04, 0.005, 0.2)
+    there_and_back = [[0.15, 0.9, -0.7], [0.15, -0.9, 0.7]]
+    for loss in ("linear", "capstan"):
+        rig = small_rig(
+            TWO_JOINTS,
+            motion=legs_of(there_and_back * 3, [0.0, 0.0], soft=0.1),
+            pretension=15.0,
+            tendons=[{"pulley_friction": [law], "edge_friction": [law, law]}] * 4,
+            friction={"pulley_torque": "beyond_joint", "tension_loss": loss, "preload": 1.0},
+        )
+        period = 0.5
+        found = run(rig, np.array([0.1, 0.1 + period, 0.1 + 2.0 * period]))
+        np.testing.assert_allclose(found["joint_position"][1], found["joint_position"][2], atol=2e-4)
+        taken = np.diff(found["energy"][:, 3])
+        # 4 tendons of about 15 N, three contacts each: at least a fifth of Σ f λ |path| over the cycle
+        assert taken[1] > 0.2 * 4 * 15.0 * 0.03 * 4 * 0.01 * 0.2 * 0.2, taken
+
+
+def test_stiffness_of_the_finger_by_hand() -> None:
+    """A quasi-static push deflects the joint by torque / (Σ k r²)."""
+    push = {"start": 0.0, "rise": 0.3, "hold": 1.0, "fall": 0.1, "force": 0.5, "direction": [0.0, 0.0, -1.0]}
+    rig = small_rig(ANTAGONISTS, pushes=[push | {"frame": "link"}], links=[{"damping": 0.005}])
+    found = run(rig, np.array([0.0, 0.8]))
+    moved = found["joint_position"][1, 0] - found["joint_position"][0, 0]
+    assert moved == pytest.approx(0.5 * 0.04 / (2.0 * STIFFNESS * ARM**2), rel=1e-6)
