@@ -211,6 +211,81 @@ def convert(
 
 
 @app.command()
+def excite(
+    finger: Annotated[Path, typer.Argument(metavar="FINGER.json|RIG.json", help="finger description, or rig of one")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="MOTION.csv", help="motion, .csv or .parquet")],
+    duration: Annotated[
+        float, typer.Option(min=1.0, max=1e5, help="s; at each pretension, or of all with --alternate")
+    ] = 400.0,
+    max_speed: Annotated[float, typer.Option(min=1e-3, max=100.0, help="rad/s; of every joint")] = 1.0,
+    range_: Annotated[
+        list[str] | None,
+        typer.Option("--range", metavar="JOINT=LOW:HIGH", help="rad; joint by number or name; may be repeated"),
+    ] = None,
+    pretension: Annotated[
+        list[float] | None,
+        typer.Option(min=0.0, max=1e6, help="N; mean tendon force; may be repeated [default: 10]"),
+    ] = None,
+    alternate: Annotated[
+        float | None, typer.Option(min=1.0, metavar="SECONDS", help="change the pretension that often")
+    ] = None,
+    rate: Annotated[float, typer.Option(min=20.0, max=10000.0, help="rows per second")] = 100.0,
+    seed: Annotated[int, typer.Option(min=0, max=2**53, help="of the strokes")] = 0,
+    report: Annotated[
+        Path | None, typer.Option(metavar="R.json", help="everything that is known of the motion")
+    ] = None,
+) -> None:
+    """Plan a training motion, and say what it excites and which parameters it cannot identify."""
+    import json
+    import shlex
+
+    from tendonfmu import excite as exciting
+    from tendonfmu.excitation import Plan
+    from tendonfmu.tables import check_format, write_table
+    from tendonfmu.whole_file import check_output, whole_file
+
+    check_format(output)
+    for file in (output, *([report] if report is not None else [])):
+        check_output(file, finger)
+    subject = exciting.read_subject(finger)
+    ranges = exciting.find_ranges(subject, range_ or [])
+    for span in ranges:
+        if span.guessed:
+            _say(f"tendonfmu: warning: joint {span.name}: {span.source}; --range {span.name}=LOW:HIGH says better")
+    plan = Plan(exciting.as_array(ranges), max_speed, duration, pretension or [10.0], alternate, rate, seed)
+    with _progress() as bar:
+        task = bar.add_task("judging the motion", total=None)
+        result = exciting.excite(subject, ranges, plan, lambda done, all_: bar.update(task, completed=done, total=all_))
+    write_table(output, result.motion.columns())
+    if report is not None:
+        everything = exciting.report(result, shlex.join(["tendonfmu", *sys.argv[1:]]))
+        with whole_file(report) as temporary:
+            temporary.write_text(json.dumps(everything, indent=1) + "\n", encoding="utf-8")
+    _print_excitation(result)
+    _say(f"{output}: {len(result.motion.time)} rows, {result.motion.time[-1]:g} s")
+
+
+def _print_excitation(result: Any) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from tendonfmu.excite_text import lines, tables
+
+    console = Console()
+    if not console.is_terminal:  # nothing to fit into: no broken lines
+        console.width = 160
+    for title, headings, rows in tables(result):
+        table = Table(title=title, title_justify="left")
+        for k, heading in enumerate(headings):
+            table.add_column(heading, justify="right" if k > 0 and heading != "cannot be identified" else "left")
+        for row in rows:
+            table.add_row(*row)
+        console.print(table)
+    for line in lines(result):
+        console.print(line, highlight=False, soft_wrap=True)
+
+
+@app.command()
 def demo(
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder for the results")] = Path(
         "tendonfmu-demo"

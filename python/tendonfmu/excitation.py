@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,7 @@ REST = 0.2, 1.5  # s; of a joint between two strokes
 REST_SHARE = 0.1
 ONWARD_SHARE = 0.1  # strokes that go on in the direction of the one before
 SWEEP_EVERY = 6  # strokes; that one runs to an end of the range
+SLOW_EVERY, SLOW_RUN = 10, 3  # of so many strokes so many in a row are slow, so that they turn round slowly too
 HOME_SPEED = 0.5  # share of the greatest speed
 _GOLDEN = (0.7548776662466927, 0.5698402909980532)  # Roberts' R2 sequence: even in the plane
 
@@ -183,12 +185,14 @@ class _JointBlock:
     def _next(self, number: int, position: float, direction: int) -> tuple[float, float, int]:
         """Target, speed and direction of a stroke; turns round where there is no room."""
         first, second = (float((phase + number * step) % 1.0) for phase, step in zip(self._phase, _GOLDEN, strict=True))
-        speed = self._plan.max_speed * SLOWEST ** (first * first)  # the square: more fast strokes than slow ones
+        # evenly over the logarithm of the speed when slow; with the square when not, so that most are fast
+        slow = number % SLOW_EVERY < SLOW_RUN
+        speed = self._plan.max_speed * (SLOW * (SLOWEST / SLOW) ** first if slow else SLOWEST ** (first * first))
         time = SHORTEST * (LONGEST / SHORTEST) ** second
         room = self._high - position if direction > 0 else position - self._low
         if room < 0.02 * (self._high - self._low):
             direction, room = -direction, self._high - self._low - room
-        if number % SWEEP_EVERY == SWEEP_EVERY - 1:
+        if not slow and number % SWEEP_EVERY == SWEEP_EVERY - 1:
             speed, time = max(speed, HOME_SPEED * self._plan.max_speed), np.inf
         if time * speed >= room:
             return (self._high if direction > 0 else self._low), speed, direction
@@ -226,7 +230,7 @@ def _sample(
     curves = [evaluate(path, time) for path in knots]
     position, velocity, acceleration = (np.column_stack([curve[k] for curve in curves]) for k in range(3))
     level = np.array([[blocks[0][0], blocks[0][2], 0.0, 0.0]])
-    for (_, _, before), (begin, _, now) in zip(blocks, blocks[1:], strict=False):
+    for (_, _, before), (begin, _, now) in pairwise(blocks):
         change = round(PRETENSION_CHANGE * plan.rate)
         level = np.vstack([level, [begin, before, 0.0, 0.0], [begin + change, now, 0.0, 0.0]])
     level[:, 0] /= plan.rate

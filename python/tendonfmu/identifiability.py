@@ -29,8 +29,10 @@ _DEFAULTS = {"noise_std": 0.01, "noise_std_per_force": 0.0, "drift_variance": 1e
 
 @dataclass(frozen=True)
 class Unknown:
-    """A number to be estimated. path: as in the description. value: SI, the derivative's reference. effect: of which
-    it is, if any; point: which of its laws, from 0. with_path: moves by the same amount (static where it equals coulomb).
+    """A number to be estimated.
+
+    path: as in the description. value: SI. effect: of which it is, if any; point: which of its laws, from 0.
+    with_path: what moves by the same amount (static where it equals coulomb).
     """
 
     path: str

@@ -1,0 +1,125 @@
+"""What a motion visits: how long each friction effect slides to either side or sticks, how each joint moves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.effects import Effect, effects, sliding_velocity, velocity_threshold, working_point_weights
+from tendonfmu.excitation import SLOW, Excitation, Stroke
+
+Numbers = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Times:
+    """s; velocity above v_min, below −v_min, and between."""
+
+    positive: float
+    negative: float
+    stuck: float
+
+    @property
+    def total(self) -> float:
+        return self.positive + self.negative + self.stuck
+
+
+@dataclass(frozen=True)
+class EffectCoverage:
+    """Of one effect. points: [k] the same for each working point, weighted by its share of the interpolated value.
+
+    slowest, fastest: least and greatest |v| while it slides, m/s or rad/s, for (positive, negative) side; None where it
+    never does. threshold: v_min.
+    """
+
+    effect: Effect
+    threshold: float
+    times: Times
+    points: list[Times]
+    slowest: tuple[float | None, float | None]
+    fastest: tuple[float | None, float | None]
+
+
+@dataclass(frozen=True)
+class JointCoverage:
+    """Of one joint. lowest, highest: rad. fastest: rad/s. slow_reversals: between two strokes of at most `SLOW` of the
+    greatest speed. rests: between strokes, s in resting. moving: s.
+    """
+
+    lowest: float
+    highest: float
+    fastest: float
+    strokes: int
+    reversals: int
+    slow_reversals: int
+    rests: int
+    resting: float
+
+
+def durations(time: Numbers) -> Numbers:
+    """[N] s for which each sample stands, by the trapezoidal rule: together the whole motion."""
+    step = np.diff(time)
+    result = np.zeros(len(time))
+    result[:-1] += step / 2
+    result[1:] += step / 2
+    return result
+
+
+def effect_coverage(data: Mapping[str, Any], motion: Excitation) -> list[EffectCoverage]:
+    """Of every effect of a finger description."""
+    share = durations(motion.time)
+    return [_cover(data, effect, motion, share) for effect in effects(data)]
+
+
+def _cover(data: Mapping[str, Any], effect: Effect, motion: Excitation, share: Numbers) -> EffectCoverage:
+    velocity = sliding_velocity(data, effect, motion.joint_velocity)
+    threshold = velocity_threshold(data, effect)
+    sides = (velocity > threshold, velocity < -threshold)
+    masks = np.column_stack([*sides, ~(sides[0] | sides[1])]) * share[:, None]
+    points = working_point_weights(effect, motion.joint_position).T @ masks
+    speed = np.abs(velocity)
+    return EffectCoverage(
+        effect=effect,
+        threshold=threshold,
+        times=Times(*masks.sum(axis=0).tolist()),
+        points=[Times(*row) for row in points.tolist()],
+        slowest=_ends(speed, sides, np.min),
+        fastest=_ends(speed, sides, np.max),
+    )
+
+
+def _ends(speed: Numbers, sides: tuple[Any, Any], end: Any) -> tuple[float | None, float | None]:
+    positive, negative = (float(end(speed[side])) if side.any() else None for side in sides)
+    return positive, negative
+
+
+def joint_coverage(motion: Excitation, max_speed: float) -> list[JointCoverage]:
+    """Of every joint. max_speed: rad/s, of the plan."""
+    return [
+        _joint(strokes, motion.joint_position[:, j], motion.joint_velocity[:, j], max_speed)
+        for j, strokes in enumerate(motion.strokes)
+    ]
+
+
+def _joint(strokes: list[Stroke], position: Numbers, velocity: Numbers, max_speed: float) -> JointCoverage:
+    turns = [
+        (before, after)
+        for before, after in pairwise(strokes)
+        if (before.target - before.start) * (after.target - after.start) < 0
+    ]
+    rests = [after.begin - before.end for before, after in pairwise(strokes) if after.begin > before.end]
+    return JointCoverage(
+        lowest=float(position.min()),
+        highest=float(position.max()),
+        fastest=float(np.abs(velocity).max()),
+        strokes=len(strokes),
+        reversals=len(turns),
+        slow_reversals=sum(max(before.speed, after.speed) <= SLOW * max_speed for before, after in turns),
+        rests=len(rests),
+        resting=float(sum(rests)),
+    )
