@@ -18,7 +18,7 @@ Numbers = NDArray[np.float64]
 
 LEAST_SHARE = 0.05  # of the mean: every pulling tendon stays taut
 _SWEEPS = 20000
-_ITERATIONS = 4  # the friction is a few percent of the force, so each gains more than a digit
+_ITERATIONS = 8  # each gains the share of the force that friction takes, some percent
 _NEVER = 1e9  # N·m; no contact threshold is ever passed
 
 

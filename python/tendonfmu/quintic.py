@@ -30,5 +30,9 @@ def evaluate(knots: Numbers, time: Numbers) -> tuple[Numbers, Numbers, Numbers]:
     position = begin[1] + u * (v0 + u * (a0 + u * (c3 + u * (c4 + u * c5))))
     velocity = (v0 + u * (2 * a0 + u * (3 * c3 + u * (4 * c4 + u * 5 * c5)))) / h
     acceleration = (2 * a0 + u * (6 * c3 + u * (12 * c4 + u * 20 * c5))) / (h * h)
+    # the last knot exactly, not to rounding
+    position, velocity, acceleration = (
+        np.where(u < 1, inside, last) for inside, last in zip((position, velocity, acceleration), end[1:], strict=True)
+    )
     outside = (time < knots[0, 0]) | (time > knots[-1, 0])
     return position, np.where(outside, 0.0, velocity), np.where(outside, 0.0, acceleration)

@@ -1,0 +1,504 @@
+"""`tendonfmu excite`: the motion keeps its promises between rows too, and what it says of itself is true."""
+
+from __future__ import annotations
+
+import copy
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.interpolate import BPoly
+
+from tendonfmu import native
+from tendonfmu.balance import balanced_forces, moment_arms, pretension_vector
+from tendonfmu.coverage import effect_coverage, joint_coverage
+from tendonfmu.description import estimated_numbers
+from tendonfmu.effects import effects, working_point_weights
+from tendonfmu.errors import InputError
+from tendonfmu.excitation import ACCELERATION, Excitation, Plan, plan_excitation
+from tendonfmu.excite import as_array, excite, find_ranges, read_subject, report
+from tendonfmu.identifiability import information, noise_of, sensitivities, unknowns
+from tendonfmu.judgement import LIMIT
+from tendonfmu.quintic import evaluate
+from tendonfmu.tables import read_table
+
+ROOT = Path(__file__).resolve().parent.parent
+INDEX = ROOT / "examples" / "fingers" / "index_finger.json"
+INDEX_DATA: dict[str, Any] = json.loads(INDEX.read_text(encoding="utf-8"))
+INDEX_RANGES = np.array([[-0.35, 0.35], [-0.3, 1.4], [0.0, 1.6], [-0.15, 0.85]])
+
+
+def law(static: float, coulomb: float, stribeck: float, viscous: float = 0.0) -> dict[str, float]:
+    return {"static": static, "coulomb": coulomb, "stribeck_velocity": stribeck, "viscous": viscous}
+
+
+SMALL: dict[str, Any] = {
+    "format": "tendonfmu-finger-1",
+    "name": "two_joints",
+    "joints": [
+        {"name": "base", "cover": {"stiffness": 0.02, "rest_angle": 0.1}, "friction": law(0.02, 0.015, 0.1, 0.01)},
+        {"name": "tip", "load_friction": law(1e-3, 8e-4, 0.1)},
+    ],
+    "tendons": [
+        {
+            "name": "flexor",
+            "stiffness": 6000.0,
+            "moment_arms": [0.009, 0.006],
+            "pulley_friction": [law(0.03, 0.03, 0.006)],
+            "edge_friction": [
+                {"positive": law(0.06, 0.05, 0.004), "negative": law(0.05, 0.04, 0.004, 1.0)},
+                {
+                    "angles": [-0.5, 0.0, 0.6],
+                    "laws": [law(0.2, 0.15, 0.004), law(0.1, 0.06, 0.004), law(0.2, 0.2, 0.004)],
+                },
+            ],
+        },
+        {"name": "extensor", "stiffness": 6000.0, "moment_arms": [-0.006, -0.006]},
+        {"name": "base_extensor", "stiffness": 5000.0, "moment_arms": [-0.006, 0.0]},
+    ],
+    "contact": {"threshold": [0.03, 0.02]},
+}
+SMALL_RANGES = np.array([[-0.5, 0.6], [-0.4, 0.4]])
+
+
+@pytest.fixture(scope="module")
+def motion() -> Excitation:
+    """400 s of the index finger."""
+    return plan_excitation(INDEX_DATA, Plan(INDEX_RANGES, seed=3))
+
+
+@pytest.fixture
+def small_file(tmp_path: Path) -> Path:
+    path = tmp_path / "small.json"
+    path.write_text(json.dumps(SMALL))
+    return path
+
+
+def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "tendonfmu.cli", "excite", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+# --- the motion -------------------------------------------------------------------------------------------------------
+
+
+def test_quintic_agrees_with_scipy() -> None:
+    random = np.random.default_rng(1)
+    knots = np.column_stack([np.cumsum(random.uniform(0.1, 2, 9)), random.normal(size=(9, 3))])
+    time = random.uniform(knots[0, 0], knots[-1, 0], 500)
+    reference = BPoly.from_derivatives(knots[:, 0], knots[:, 1:])
+    for order, found in enumerate(evaluate(knots, time)):
+        np.testing.assert_allclose(found, reference.derivative(order)(time) if order else reference(time), atol=1e-9)
+
+
+def test_quintic_is_constant_outside() -> None:
+    knots = np.array([[1.0, 0.2, 0.0, 0.0], [2.0, 0.7, 0.0, 0.0]])
+    position, velocity, acceleration = evaluate(knots, np.array([0.0, 1.0, 2.0, 5.0]))
+    np.testing.assert_array_equal(position, [0.2, 0.2, 0.7, 0.7])
+    assert not velocity.any() and not acceleration.any()
+
+
+def test_limits_hold_between_rows(motion: Excitation) -> None:
+    time = np.linspace(0, 400, 400_000)
+    for knots, (low, high) in zip(motion.knots, INDEX_RANGES, strict=True):
+        position, velocity, acceleration = evaluate(knots, time)
+        assert position.min() >= low - 1e-12 and position.max() <= high + 1e-12
+        assert np.abs(velocity).max() <= 1.0 + 1e-9
+        assert np.abs(acceleration).max() <= ACCELERATION + 1e-9
+
+
+def test_is_twice_continuously_differentiable(motion: Excitation) -> None:
+    for knots in motion.knots:
+        before, after = evaluate(knots, knots[1:-1, 0] - 1e-9), evaluate(knots, knots[1:-1, 0] + 1e-9)
+        for a, b, tolerance in zip(before, after, (1e-8, 1e-7, 1e-5), strict=True):
+            np.testing.assert_allclose(a, b, atol=tolerance)
+
+
+def test_rows_reproduce_the_motion(motion: Excitation) -> None:
+    """Quintic interpolation between the rows of the file is the motion itself."""
+    time = np.random.default_rng(0).uniform(0, 400, 20_000)
+    for j, knots in enumerate(motion.knots):
+        rows = np.column_stack(
+            [motion.time, *(getattr(motion, f"joint_{of}")[:, j] for of in ("position", "velocity", "acceleration"))]
+        )
+        for found, expected, size in zip(evaluate(rows, time), evaluate(knots, time), (1, 100, 1e4), strict=True):
+            np.testing.assert_allclose(found, expected, atol=1e-13 * size)
+
+
+def test_covers_angles_speeds_and_directions(motion: Excitation) -> None:
+    np.testing.assert_allclose(motion.joint_position.min(axis=0), INDEX_RANGES[:, 0], atol=1e-12)
+    np.testing.assert_allclose(motion.joint_position.max(axis=0), INDEX_RANGES[:, 1], atol=1e-12)
+    assert (np.abs(motion.joint_velocity).max(axis=0) > 0.9).all()
+    for cover in effect_coverage(INDEX_DATA, motion):
+        assert min(cover.times.positive, cover.times.negative) > 100
+        for point in cover.points:
+            assert min(point.positive, point.negative) > 2
+
+
+def test_reversals_and_rests_are_counted(motion: Excitation) -> None:
+    for j, cover in enumerate(joint_coverage(motion, 1.0)):
+        velocity = motion.joint_velocity[:, j]
+        sides = np.sign(velocity[np.abs(velocity) > 1e-9])
+        assert cover.reversals == np.sum(sides[1:] != sides[:-1])
+        still = np.concatenate([[True], np.abs(velocity) < 1e-12, [True]])
+        ends = np.flatnonzero(np.diff(still.astype(int)))
+        assert cover.strokes >= cover.reversals > 250
+        assert cover.slow_reversals > 50 and cover.rests > 20
+        moved = sum(1 for begin, end in ends.reshape(-1, 2) if end - begin > 1)
+        assert moved >= cover.rests
+
+
+def test_joints_move_at_once_with_different_velocities(motion: Excitation) -> None:
+    moving = np.abs(motion.joint_velocity) > 0.01
+    assert np.mean(moving.sum(axis=1) >= 3) > 0.7
+    assert np.abs(np.corrcoef(motion.joint_velocity.T) - np.eye(4)).max() < 0.2
+
+
+def test_begins_and_ends_at_rest(motion: Excitation) -> None:
+    for rows in (motion.time <= 2.0, motion.time >= 399.0):
+        assert not motion.joint_velocity[rows].any() and not motion.joint_acceleration[rows].any()
+
+
+def test_seed_alone_decides() -> None:
+    plan = Plan(SMALL_RANGES, duration=30, seed=7)
+    first, again = plan_excitation(SMALL, plan), plan_excitation(SMALL, plan)
+    other = plan_excitation(SMALL, Plan(SMALL_RANGES, duration=30, seed=8))
+    for name, column in first.columns().items():
+        np.testing.assert_array_equal(column, again.columns()[name])
+    assert np.abs(first.joint_position - other.joint_position).max() > 0.1
+
+
+@pytest.mark.parametrize("rate", [30.0, 1000.0])
+def test_other_rates(rate: float) -> None:
+    motion = plan_excitation(SMALL, Plan(SMALL_RANGES, duration=40, rate=rate, max_speed=3.0))
+    assert len(motion.time) == 40 * rate + 1 and motion.time[-1] == 40.0
+    dense = np.linspace(0, 40, 50_000)
+    for knots, (low, high) in zip(motion.knots, SMALL_RANGES, strict=True):
+        position, velocity, acceleration = evaluate(knots, dense)
+        assert low - 1e-12 <= position.min() and position.max() <= high + 1e-12
+        assert np.abs(velocity).max() <= 3.0 + 1e-9 and np.abs(acceleration).max() <= ACCELERATION + 1e-9
+        np.testing.assert_allclose(knots[:, 0] * rate, np.round(knots[:, 0] * rate), atol=1e-6)
+
+
+# --- pretension -------------------------------------------------------------------------------------------------------
+
+
+def test_pretension_holds_itself() -> None:
+    shares = pretension_vector(INDEX_DATA)
+    np.testing.assert_allclose(moment_arms(INDEX_DATA).T @ shares, 0, atol=1e-12)
+    assert np.mean(shares) == pytest.approx(1)
+    documented = np.array([0.91, 0.87, 1.11, 1.09, 0.89, 1.08, 0.94, 1.04])  # examples/fingers/README.md
+    np.testing.assert_allclose(shares, documented / documented.mean(), atol=0.006)
+
+
+def test_pretension_keeps_every_tendon_taut() -> None:
+    """Where the even share would push, the nearest one that pulls is taken."""
+    data = copy.deepcopy(SMALL)
+    data["joints"] = [{"name": "only"}]
+    data["tendons"] = [
+        {"stiffness": 1000.0, "moment_arms": [arm]} for arm in (0.02, 0.001, -0.001, -0.001, -0.001, -0.001)
+    ]
+    shares = pretension_vector(data)
+    assert shares.min() > 0.04 and np.mean(shares) == pytest.approx(1)
+    assert abs(float(moment_arms(data)[:, 0] @ shares)) < 1e-9
+
+
+def test_pretension_without_balance_is_refused() -> None:
+    data = copy.deepcopy(SMALL)
+    data["tendons"] = data["tendons"][:2]
+    with pytest.raises(InputError, match="every tendon pulls"):
+        pretension_vector(data)
+
+
+def test_cable_loops_need_no_pretension() -> None:
+    data = copy.deepcopy(SMALL)
+    data["tendons"] = [{**tendon, "bidirectional": True} for tendon in data["tendons"][:2]]
+    np.testing.assert_array_equal(pretension_vector(data), 0)
+    motion = plan_excitation(data, Plan(SMALL_RANGES, duration=20))
+    np.testing.assert_allclose(motion.tendon_position, motion.joint_position @ moment_arms(data).T)
+
+
+def test_several_pretensions_in_turn() -> None:
+    motion = plan_excitation(SMALL, Plan(SMALL_RANGES, duration=30, pretensions=(10, 40)))
+    assert motion.time[-1] == 60
+    np.testing.assert_allclose(motion.joint_position[:3001], motion.joint_position[3000:], atol=1e-12)
+    assert set(np.unique(motion.pretension[[0, 3000, 3200, 6000]])) == {10, 40}
+    changing = np.flatnonzero(np.diff(motion.pretension))
+    assert len(changing) and not motion.joint_velocity[changing].any()
+    assert np.abs(np.diff(motion.pretension)).max() < 0.5
+    stretch = motion.tendon_position - motion.joint_position @ moment_arms(SMALL).T
+    force = stretch * [tendon["stiffness"] for tendon in SMALL["tendons"]]
+    np.testing.assert_allclose(force.mean(axis=1), motion.pretension)
+    np.testing.assert_allclose(force @ moment_arms(SMALL), 0, atol=1e-12)
+
+
+def test_alternating_pretensions() -> None:
+    plan = Plan(SMALL_RANGES, duration=60, pretensions=(10, 20, 40), alternate=10)
+    motion = plan_excitation(SMALL, plan)
+    assert motion.time[-1] == 60
+    assert [level for _, _, level in motion.blocks] == [10, 20, 40, 10, 20, 40]
+    assert np.abs(motion.joint_position[:1000] - motion.joint_position[3000:4000]).max() > 0.1
+
+
+def test_balanced_forces_carry_the_friction() -> None:
+    motion = plan_excitation(SMALL, Plan(SMALL_RANGES, duration=30))
+    samples = {name: getattr(motion, name) for name in ("time", "joint_position", "joint_velocity")}
+    force = balanced_forces(SMALL, samples, motion.pretension)
+    finger = native.Finger.from_description(SMALL, kinematics_source=3)
+    found = finger.run({**samples, "tendon_force": force})
+    torque = found["friction_torque"] - found["bias_torque"]
+    assert np.abs(force @ moment_arms(SMALL) - torque).max() < 1e-5
+    assert np.abs(torque).max() > 0.02
+
+
+# --- what it says -----------------------------------------------------------------------------------------------------
+
+
+def test_times_add_up_to_the_duration(motion: Excitation) -> None:
+    for cover in effect_coverage(INDEX_DATA, motion):
+        assert cover.times.total == pytest.approx(400, abs=1e-9)
+        for side in ("positive", "negative", "stuck"):
+            assert sum(getattr(point, side) for point in cover.points) == pytest.approx(getattr(cover.times, side))
+
+
+def test_numbers_are_those_of_the_description() -> None:
+    for data in (INDEX_DATA, SMALL):
+        expected = sum(estimated_numbers(data).values()) - len(data["joints"])
+        assert len(unknowns(data)) == expected
+    assert len(unknowns(INDEX_DATA)) == 468
+    paths = {parameter.path for parameter in native.Finger.from_description(INDEX_DATA).parameters()}
+    assert {number.path for number in unknowns(INDEX_DATA)} <= paths
+
+
+def small_samples(data: dict[str, Any], duration: float = 60.0) -> dict[str, np.ndarray]:
+    motion = plan_excitation(data, Plan(SMALL_RANGES, duration=duration, rate=50))
+    samples = {name: getattr(motion, name) for name in ("time", "joint_position", "joint_velocity")}
+    return samples | {"tendon_force": balanced_forces(data, samples, motion.pretension)}
+
+
+def innovations(data: dict[str, Any], samples: dict[str, np.ndarray], change: dict[str, float]) -> np.ndarray:
+    """[N, n] τ − T_eff before the bias step, by the core's own filter, in units of their standard deviation."""
+    free = {**data, "contact": {"threshold": [1e9] * 2}}
+    finger = native.Finger.from_description(free, kinematics_source=3)
+    finger.set({path: finger.get(path) + step for path, step in change.items()})
+    left = finger.run(samples)["compensated_torque"]
+    bias = data["bias"]
+    variance, noise = bias["initial_variance"], bias["noise_std"] ** 2 * bias["noise_time"]
+    result = np.zeros_like(left)
+    steps = np.diff(samples["time"])
+    for k, step in enumerate(steps, start=1):
+        variance += bias["drift_variance"] * step
+        total = variance + noise / step
+        result[k] = left[k] * total / (noise / step) / np.sqrt(total)  # left = (1 − K) innovation
+        variance *= 1 - variance / total
+    return result
+
+
+def test_information_is_that_of_the_cores_own_innovations() -> None:
+    """Bundled runs, shared out and filtered in numpy, against one run of the whole core per number."""
+    bias = {"drift_variance": 1e-4, "noise_std": 0.02, "noise_time": 0.01, "initial_variance": 1e-3, "forget_rate": 2.0}
+    data = {**SMALL, "bias": bias}
+    samples, numbers = small_samples(data), unknowns(SMALL)
+    force = np.abs(samples["tendon_force"]).mean(axis=1)
+    found = information(sensitivities(data, numbers, samples), samples["time"], force, noise_of(data, 0.02))
+    plain = innovations(data, samples, {})
+    slopes = []
+    for number in numbers:
+        step = (-1e-5 if number.key == "coulomb" and number.with_path is None else 1e-5) * number.reference
+        paths = [path for path in (number.path, number.with_path) if path]
+        slopes.append(
+            (innovations(data, samples, dict.fromkeys(paths, step)) - plain).ravel() / step * number.reference
+        )
+    expected = np.array(slopes) @ np.array(slopes).T
+    scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+    assert (np.diag(expected) > 0).all()
+    np.testing.assert_allclose(found / scale, expected / scale, atol=2e-3)
+
+
+def test_standard_errors_are_those_of_estimates() -> None:
+    """A fit of simulated recordings scatters as foretold: cover and base friction of the small finger."""
+    bias = {"drift_variance": 0.0, "noise_std": 0.02, "noise_time": 0.02, "initial_variance": 1e6, "forget_rate": 2.0}
+    data = {**SMALL, "bias": bias}
+    samples, numbers = small_samples(data), unknowns(SMALL)
+    chosen = [k for k, number in enumerate(numbers) if number.path.startswith("joints[1]")]
+    force = np.abs(samples["tendon_force"]).mean(axis=1)
+    changes = np.concatenate(list(sensitivities(data, numbers, samples)))[:, :, chosen]
+    known = information([changes.copy()], samples["time"], force, noise_of(data, 0.02))
+    columns = np.column_stack([changes[:, 0], np.ones(len(changes))])  # and a constant bias
+    random = np.random.default_rng(5)
+    estimates = [
+        np.linalg.lstsq(columns, columns[:, :-1].sum(axis=1) + random.normal(0, 0.02, len(columns)), rcond=None)[0][:-1]
+        for _ in range(400)
+    ]
+    np.testing.assert_allclose(np.std(estimates, axis=0), np.sqrt(np.diag(np.linalg.inv(known))), rtol=0.12)
+
+
+@pytest.fixture(scope="module")
+def index_report() -> dict[str, Any]:
+    subject = read_subject(INDEX)
+    ranges = find_ranges(subject, [])
+    return report(excite(subject, ranges, Plan(as_array(ranges))), "tendonfmu excite")
+
+
+def test_index_finger_counts(index_report: dict[str, Any]) -> None:
+    """Antagonists and effects in a row share their velocity, so most numbers show in combinations only."""
+    assert index_report["numbers"] == 468
+    assert index_report["identifiable"] >= 60
+    assert index_report["identifiable_alone"] >= 240
+    assert index_report["known_combinations"] >= 150
+    for entry in index_report["parameters"]:
+        assert entry["identifiable"] == (entry["relative_standard_error"] <= LIMIT) == (entry["reason"] is None)
+        assert entry["relative_standard_error_alone"] <= entry["relative_standard_error"] * (1 + 1e-6)
+        assert bool(entry["in_combination_with"]) == (entry["cause"] == "combination")
+
+
+def test_antagonists_are_named_together(index_report: dict[str, Any]) -> None:
+    entry = next(e for e in index_report["parameters"] if e["path"] == "tendons[5].pulley_friction[2].coulomb")
+    assert entry["cause"] == "combination"
+    assert any("tendons[6].pulley_friction[2]" in path for path in entry["in_combination_with"])
+    assert index_report["least_known_combinations"][0]["relative_standard_error"] > LIMIT
+
+
+def small_report(small_file: Path, *ranges: str, **plan: Any) -> dict[str, Any]:
+    subject = read_subject(small_file)
+    found = find_ranges(subject, ranges)
+    return report(excite(subject, found, Plan(as_array(found), **{"duration": 60, **plan})), "tendonfmu excite")
+
+
+def reasons(result: dict[str, Any], part: str) -> set[tuple[str | None, str | None]]:
+    return {(e["cause"], e["reason"]) for e in result["parameters"] if part in e["path"]}
+
+
+def test_an_angle_that_is_never_reached(small_file: Path) -> None:
+    result = small_report(small_file, "base=0.1:0.6", "tip=-0.4:0.4")
+    expected = ("working_point", "joint 1 never comes near working point 1 at -0.5 rad")
+    assert reasons(result, "edge_friction[2].laws[1]") == {expected}
+    assert expected not in reasons(result, "edge_friction[2].laws[2]")
+    points = next(e for e in result["effects"] if e["path"] == "tendons[1].edge_friction[2]")["working_points"]
+    assert points[0]["time"] == {"positive": 0, "negative": 0, "stuck": 0}
+
+
+def test_a_joint_that_never_moves(small_file: Path) -> None:
+    result = small_report(small_file, "1=0.2:0.2", "2=-0.4:0.4")
+    assert reasons(result, "joints[1].friction") == {("side", "never slides: always within v_min = 0.01")}
+    assert {cause for cause, _ in reasons(result, "joints[1].cover")} == {"noise"}
+    assert result["joints"][0]["strokes"] == 0 and result["joints"][1]["strokes"] > 10
+
+
+def test_slower_than_the_threshold_is_no_sliding(small_file: Path) -> None:
+    result = small_report(small_file, "base=-0.05:0.05", "tip=-0.01:0.01", max_speed=0.009)
+    assert {cause for cause, _ in reasons(result, "friction")} == {"side"}
+    assert result["identifiable"] == 0
+
+
+def test_more_noise_identifies_less(small_file: Path, tmp_path: Path) -> None:
+    counts = []
+    for noise in (0.001, 0.01, 0.1):
+        path = tmp_path / "noisy.json"
+        path.write_text(json.dumps({**SMALL, "bias": {"noise_std": noise}}))
+        counts.append(small_report(path, "tip=-0.4:0.4")["known_combinations"])
+    assert counts[0] > counts[1] > counts[2]
+
+
+def test_asymmetric_laws_have_numbers_for_each_side(small_file: Path) -> None:
+    paths = {e["path"] for e in small_report(small_file)["parameters"]}
+    assert {f"tendons[1].edge_friction[1].{side}.coulomb" for side in ("positive", "negative")} <= paths
+    assert "tendons[1].edge_friction[1].negative.viscous" in paths
+    assert "tendons[1].edge_friction[1].positive.viscous" not in paths
+
+
+def test_weights_are_the_cores_interpolation() -> None:
+    effect = next(e for e in effects(SMALL) if e.path == "tendons[1].edge_friction[2]")
+    angles = np.array([[-0.9, 0.0], [-0.5, 0.0], [-0.25, 0.0], [0.3, 0.0], [2.0, 0.0]])
+    expected = [[1, 0, 0], [1, 0, 0], [0.5, 0.5, 0], [0, 0.5, 0.5], [0, 0, 1]]
+    np.testing.assert_allclose(working_point_weights(effect, angles), expected, atol=1e-12)
+
+
+# --- ranges and rigs --------------------------------------------------------------------------------------------------
+
+
+def test_ranges_come_from_working_points() -> None:
+    ranges = find_ranges(read_subject(INDEX), [])
+    np.testing.assert_allclose(as_array(ranges), INDEX_RANGES)
+    assert [span.guessed for span in ranges] == [False, False, False, True]
+
+
+def write_rig(folder: Path, finger: Any, limits: list[Any]) -> Path:
+    path = folder / "rig.json"
+    links = [{"axis": [0, 1, 0], "mass": 0.01, "inertia": [1e-6] * 3, **limit} for limit in limits]
+    path.write_text(json.dumps({"format": "tendonfmu-rig-1", "finger": finger, "physics": {"links": links}}))
+    return path
+
+
+def test_a_rig_gives_limits(small_file: Path, tmp_path: Path) -> None:
+    limits = [{"limits": {"lower": -0.4, "upper": 0.5}}, {"limits": {"lower": -1.0, "upper": 1.0}}]
+    for finger in (SMALL, small_file.name):
+        ranges = find_ranges(read_subject(write_rig(tmp_path, finger, limits)), [])
+        np.testing.assert_allclose(as_array(ranges), [[-0.4, 0.5], [-0.9, 0.9]])
+    with pytest.raises(InputError, match=r"--range tip=-2:0: beyond the joint.*-1 to 1 rad"):
+        find_ranges(read_subject(write_rig(tmp_path, SMALL, limits)), ["tip=-2:0"])
+
+
+def test_bad_rigs_are_refused(tmp_path: Path) -> None:
+    limit = {"limits": {"lower": 0.4, "upper": -0.5}}
+    with pytest.raises(InputError, match=r"links\[1\]\.limits: 0.4 to -0.5 rad"):
+        read_subject(write_rig(tmp_path, SMALL, [limit, limit]))
+    with pytest.raises(InputError, match="1 links; expected one per joint, 2"):
+        read_subject(write_rig(tmp_path, SMALL, [limit]))
+    with pytest.raises(InputError, match=r"finger: .*format"):
+        read_subject(write_rig(tmp_path, {}, [limit]))
+
+
+# --- the command ------------------------------------------------------------------------------------------------------
+
+
+def test_command(small_file: Path, tmp_path: Path) -> None:
+    out, found = tmp_path / "motion.csv", tmp_path / "report.json"
+    done = run(small_file, "-o", out, "--duration", 30, "--report", found, "--seed", 4, "--pretension", 12)
+    assert done.returncode == 0, done.stderr
+    table = read_table(out, lambda file, names: None)
+    motion = plan_excitation(SMALL, Plan(np.array([[-0.5, 0.6], [-0.5, 0.5]]), duration=30, seed=4, pretensions=(12,)))
+    assert list(table) == list(motion.columns())
+    for name, column in motion.columns().items():
+        np.testing.assert_array_equal(table[name], column)
+    written = json.loads(found.read_text())
+    assert written["format"] == "tendonfmu-excitation-1" and written["seed"] == 4 and "--seed 4" in written["command"]
+    assert "warning: joint tip: nothing is known: 0.5 rad either side" in done.stderr
+    assert "tendons[1].edge_friction[2]" in done.stdout and "numbers can be identified" in done.stdout
+    assert f"{written['identifiable']} of {written['numbers']} numbers" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--range", "thumb=0:1"], "no joint 'thumb'; expected 1 to 2 or one of base, tip"),
+        (["--range", "3=0:1"], "no joint '3'"),
+        (["--range", "base=1:0"], "expected JOINT=LOW:HIGH in rad, LOW <= HIGH"),
+        (["--range", "base"], "expected JOINT=LOW:HIGH"),
+        (["--range", "base=nan:1"], "expected JOINT=LOW:HIGH"),
+        (["--duration", "4"], "--duration: 4 s at a pretension; expected at least"),
+        (["--pretension", "5", "--pretension", "9", "--alternate", "2"], "--alternate: 2 s at a pretension"),
+        (["--max-speed", "0"], "max-speed"),
+        (["--pretension", "-3"], "pretension"),
+        (["--report", "nowhere/report.json"], "no folder nowhere"),
+    ],
+)
+def test_command_refuses(small_file: Path, tmp_path: Path, arguments: list[str], message: str) -> None:
+    done = run(small_file, "-o", tmp_path / "motion.csv", *arguments)
+    assert done.returncode == 2
+    assert message in done.stderr.splitlines()[-1]
+    assert not (tmp_path / "motion.csv").exists()
+
+
+def test_command_refuses_files(small_file: Path, tmp_path: Path) -> None:
+    for finger, output, message in (
+        (tmp_path / "none.json", tmp_path / "m.csv", "No such file"),
+        (small_file, tmp_path / "m.txt", "expected .csv or .parquet"),
+    ):
+        done = run(finger, "-o", output)
+        assert done.returncode == 2 and message in done.stderr
+        assert len(done.stderr.splitlines()) == 1
