@@ -18,6 +18,10 @@ install(DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}/runtime/include/" DESTINATION "${
 if(TARGET tendonfmu_plant)
   set_target_properties(tendonfmu_plant PROPERTIES EXPORT_NAME plant)
   set_target_properties(tendonfmu_sundials PROPERTIES EXPORT_NAME sundials)
+  # Header-only: those who link the installed library do not need them.
+  get_target_property(needed tendonfmu_plant INTERFACE_LINK_LIBRARIES)
+  list(REMOVE_ITEM needed "$<LINK_ONLY:nlohmann_json::nlohmann_json>" "$<LINK_ONLY:Eigen3::Eigen>")
+  set_target_properties(tendonfmu_plant PROPERTIES INTERFACE_LINK_LIBRARIES "${needed}")
   install(TARGETS tendonfmu_plant tendonfmu_sundials EXPORT tendonfmuTargets
           ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}" INCLUDES DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
   install(FILES runtime/include/tendonfmu_plant.h DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")

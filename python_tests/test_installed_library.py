@@ -22,6 +22,11 @@ add_executable(version version.c)
 target_link_libraries(version PRIVATE tendonfmu::tendonfmu)
 add_executable(sizes sizes.cpp)
 target_link_libraries(sizes PRIVATE tendonfmu::description)
+if(TARGET tendonfmu::plant)
+  add_executable(plant plant.c)
+  target_link_libraries(plant PRIVATE tendonfmu::plant)
+  set_target_properties(plant PROPERTIES LINKER_LANGUAGE CXX)
+endif()
 """
 
 VERSION_C = """\
@@ -29,6 +34,22 @@ VERSION_C = """\
 #include <tendonfmu.h>
 
 int main(void) { return puts(tendonfmu_version()) < 0; }
+"""
+
+# Reads the rig, which takes the JSON readers, and would settle it, which takes SUNDIALS.
+PLANT_C = """\
+#include <stdio.h>
+#include <string.h>
+#include <tendonfmu_plant.h>
+
+int main(void) {
+  const char* rig = "{\\"format\\": \\"tendonfmu-rig-0\\"}";
+  char message[512] = "";
+  tendonfmu_plant* plant = tendonfmu_plant_create(rig, strlen(rig), message, sizeof message);
+  if (plant) tendonfmu_plant_initialise(plant);
+  tendonfmu_plant_destroy(plant);
+  return puts(message) < 0;
+}
 """
 
 SIZES_CPP = """\
@@ -86,12 +107,21 @@ def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return (folder / "made here").rename(folder / "moved")
 
 
+def has_plant(prefix: Path) -> bool:
+    """Whether the simulated finger was built: header and library are installed together, or not at all."""
+    there = (prefix / "lib" / "libtendonfmu_plant.a").exists()
+    assert (prefix / "include" / "tendonfmu_plant.h").exists() == there
+    assert (prefix / "lib" / "pkgconfig" / "tendonfmu-plant.pc").exists() == there
+    return there
+
+
 @pytest.fixture(scope="module")
 def consumer(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("consumer")
     (folder / "CMakeLists.txt").write_text(CONSUMER_CMAKE.format(version=project_version()), encoding="utf-8")
     (folder / "version.c").write_text(VERSION_C, encoding="utf-8")
     (folder / "sizes.cpp").write_text(SIZES_CPP, encoding="utf-8")
+    (folder / "plant.c").write_text(PLANT_C, encoding="utf-8")
     return folder
 
 
@@ -101,6 +131,9 @@ def test_find_package_gives_both_libraries(prefix: Path, consumer: Path) -> None
     call("cmake", "--build", build)
     assert call(build / "version") == project_version()
     assert call(build / "sizes", FINGER) == "4 8"
+    assert (build / "plant").exists() == has_plant(prefix)
+    if has_plant(prefix):
+        assert call(build / "plant").startswith("format: ")
 
 
 def test_find_package_refuses_a_newer_version(prefix: Path, consumer: Path, tmp_path: Path) -> None:
@@ -135,6 +168,17 @@ def test_pkg_config(
     flags = call("pkg-config", "--cflags", "--libs", module, env=search).split()
     call(compiler, consumer / source, "-o", tmp_path / "program", *flags)
     assert call(tmp_path / "program", *arguments) == expected
+
+
+def test_pkg_config_of_the_simulated_finger(prefix: Path, consumer: Path, tmp_path: Path) -> None:
+    if not has_plant(prefix):
+        pytest.skip("SKIPPED: built without the simulated finger")
+    if not shutil.which("pkg-config"):
+        pytest.skip("pkg-config is not installed")
+    search = {"PKG_CONFIG_PATH": str(prefix / "lib" / "pkgconfig")}
+    flags = call("pkg-config", "--cflags", "--libs", "tendonfmu-plant", env=search).split()
+    call("cc", consumer / "plant.c", "-o", tmp_path / "program", *flags)
+    assert call(tmp_path / "program").startswith("format: ")
 
 
 def test_installed_text_names_no_folder_of_the_build(prefix: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import importlib.util
 import os
 import re
 import shutil
@@ -184,3 +185,17 @@ def test_set_up_leaves_a_package_that_is_too_old(tmp_path: Path) -> None:
     said, called = call_set_up(tmp_path, "5.8.0+dfsg1-1", "works")
     assert said == "" and "download" not in called
     assert not (tmp_path / "build/sundials/package").exists()
+
+
+@pytest.mark.skipif(sys.platform != "linux" or shutil.which("readelf") is None, reason="SKIPPED: readelf is not there")
+def test_sundials_is_inside_the_extension_and_stays_there() -> None:
+    module = importlib.util.find_spec("tendonfmu._plant")
+    if module is None:
+        pytest.skip("SKIPPED: built without the simulated finger")
+    assert module.origin
+    read = ["readelf", "--wide", "--dynamic", "--dyn-syms", module.origin]
+    text = subprocess.run(read, capture_output=True, text=True, check=True).stdout
+    assert re.findall(r"NEEDED.*\[(.*(?:sundials|mpi).*)\]", text) == []
+    # A symbol that is exported could be bound to another SUNDIALS in the same process.
+    assert re.findall(r"\b(?:CVode|SUN|N_V)\w+", text) == []
+    assert "PyInit__plant" in text
