@@ -20,7 +20,7 @@ from tendonfmu.description import estimated_numbers
 from tendonfmu.effects import effects, working_point_weights
 from tendonfmu.errors import InputError
 from tendonfmu.excitation import ACCELERATION, Excitation, Plan, plan_excitation
-from tendonfmu.excite import as_array, excite, find_ranges, read_subject, report
+from tendonfmu.excite import as_array, excite, find_pretensions, find_ranges, read_subject, report
 from tendonfmu.identifiability import information, noise_of, sensitivities, unknowns
 from tendonfmu.judgement import LIMIT
 from tendonfmu.quintic import evaluate
@@ -220,6 +220,15 @@ def test_cable_loops_need_no_pretension() -> None:
     np.testing.assert_array_equal(pretension_vector(data), 0)
     motion = plan_excitation(data, Plan(SMALL_RANGES, duration=20))
     np.testing.assert_allclose(motion.tendon_position, motion.joint_position @ moment_arms(data).T)
+
+
+def test_cable_loops_refuse_a_pretension(tmp_path: Path) -> None:
+    path = tmp_path / "loops.json"
+    loops = [{**tendon, "bidirectional": True} for tendon in SMALL["tendons"][:2]]
+    path.write_text(json.dumps({**SMALL, "tendons": loops}))
+    assert find_pretensions(read_subject(path), []) == [0.0]
+    with pytest.raises(InputError, match="--pretension 10: a finger of cable loops alone"):
+        find_pretensions(read_subject(path), [10.0])
 
 
 def test_several_pretensions_in_turn() -> None:
@@ -438,7 +447,7 @@ def test_a_rig_gives_limits(small_file: Path, tmp_path: Path) -> None:
     limits = [{"limits": {"lower": -0.4, "upper": 0.5}}, {"limits": {"lower": -1.0, "upper": 1.0}}]
     for finger in (SMALL, small_file.name):
         ranges = find_ranges(read_subject(write_rig(tmp_path, finger, limits)), [])
-        np.testing.assert_allclose(as_array(ranges), [[-0.4, 0.5], [-0.9, 0.9]])
+        np.testing.assert_allclose(as_array(ranges), [[-0.355, 0.455], [-0.9, 0.9]])
     with pytest.raises(InputError, match=r"--range tip=-2:0: beyond the joint.*-1 to 1 rad"):
         find_ranges(read_subject(write_rig(tmp_path, SMALL, limits)), ["tip=-2:0"])
 

@@ -252,7 +252,8 @@ def excite(
     for span in ranges:
         if span.guessed:
             _say(f"tendonfmu: warning: joint {span.name}: {span.source}; --range {span.name}=LOW:HIGH says better")
-    plan = Plan(exciting.as_array(ranges), max_speed, duration, pretension or [10.0], alternate, rate, seed)
+    levels = exciting.find_pretensions(subject, pretension or [])
+    plan = Plan(exciting.as_array(ranges), max_speed, duration, levels, alternate, rate, seed)
     with _progress() as bar:
         task = bar.add_task("judging the motion", total=None)
         result = exciting.excite(subject, ranges, plan, lambda done, all_: bar.update(task, completed=done, total=all_))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu import native
-from tendonfmu.balance import balanced_forces
+from tendonfmu.balance import balanced_forces, pretension_vector
 from tendonfmu.coverage import EffectCoverage, JointCoverage, durations, effect_coverage, joint_coverage
 from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.errors import InputError
@@ -24,6 +24,7 @@ from tendonfmu.identifiability import Noise, Progress, information, noise_of, se
 from tendonfmu.judgement import Judgement, as_json, judge
 
 RIG_FORMAT = "tendonfmu-rig-1"
+DEFAULT_PRETENSION = 10.0  # N
 MARGIN = 0.05  # of a rig's range between limits, kept free at either end
 UNKNOWN_RANGE = 0.5  # rad, either side of the rest angle
 ANALYSIS_RATE = 25.0  # 1/s; 100 gives the same count for the index finger, and standard errors within 1 %
@@ -122,6 +123,15 @@ def find_ranges(subject: Subject, given: Sequence[str]) -> list[Range]:
     return ranges
 
 
+def find_pretensions(subject: Subject, given: Sequence[float]) -> list[float]:
+    """N; 10 where none is given, 0 where cable loops alone can hold none. Raises InputError."""
+    if pretension_vector(subject.finger.data).any():
+        return list(given) or [DEFAULT_PRETENSION]
+    if any(given):
+        raise InputError(f"--pretension {max(given):g}: a finger of cable loops alone that holds none; expected 0")
+    return [0.0] * max(len(given), 1)
+
+
 def as_array(ranges: Sequence[Range]) -> NDArray[np.float64]:
     """[n, 2] low and high, rad."""
     return np.array([[span.low, span.high] for span in ranges])
@@ -149,11 +159,10 @@ def _default_range(data: Mapping[str, Any], j: int, name: str, limits: tuple[flo
     if limits is not None:
         margin = MARGIN * (limits[1] - limits[0])
         inside = (limits[0] + margin, limits[1] - margin)
-        if angles:
-            low, high = max(min(angles), limits[0]), min(max(angles), limits[1])
-            if low < high:
-                return Range(name, low, high, "working points of the edges behind it, within the rig's limits")
-        return Range(name, *inside, f"limits of the rig less {MARGIN:.0%}")
+        low, high = max(min(angles, default=inside[0]), inside[0]), min(max(angles, default=inside[1]), inside[1])
+        if low < high:
+            return Range(name, low, high, f"limits of the rig less {MARGIN:.0%} at either end, and working points")
+        return Range(name, *inside, f"limits of the rig less {MARGIN:.0%} at either end")
     if len(set(angles)) > 1:
         return Range(name, min(angles), max(angles), "working points of the edges behind it")
     rest = float((data["joints"][j].get("cover") or {}).get("rest_angle") or 0.0)

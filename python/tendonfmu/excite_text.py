@@ -87,7 +87,7 @@ def lines(result: ExciteResult) -> Iterator[str]:
     known = sum(verdict.identifiable for verdict in verdicts)
     yield (
         f"{known} of {len(verdicts)} numbers can be identified one by one, "
-        f"{judgement.directions} independent combinations of them; the {len(result.joints)} biases are tracked"
+        f"{judgement.directions} independent combinations of them; each joint's bias is tracked besides"
     )
     for cause, count in causes(verdicts).items():
         yield f"  {count} not: {CAUSES[cause]}"
