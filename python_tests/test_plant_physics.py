@@ -49,7 +49,7 @@ def test_steady_sliding_force() -> None:
 
 
 def test_presliding_stiffness_and_exponential_approach() -> None:
-    """With ĝ = 1: w(x) = 1 − (1 − w0) exp(−x/d), so the torque rises with slope level/d and reaches its level."""
+    """With ĝ = 1: w(x) = 1 − (1 − w0) exp(−x/d): slope level/d where the bristle is straight, and level in the end."""
     level, distance = 0.008, 0.01
     found = run(one_contact(dry(level), distance, 0.0, [[0.5, 0.12]]), grid(0.65, 5e-4))
     travelled = found["joint_position"][:, 0] - found["joint_position"][0, 0]
@@ -58,19 +58,21 @@ def test_presliding_stiffness_and_exponential_approach() -> None:
     assert np.all(np.diff(travelled) >= -1e-9) and travelled[-1] > 5.0 * distance and rising.mean() > 0.95
     expected = level * (1.0 - (1.0 - first) * np.exp(-travelled / distance))
     np.testing.assert_allclose(found["friction_torque"][:, 0], expected, atol=1e-5 * level)
-    early = (travelled > 0.0) & (travelled < 0.01 * distance)
-    slope = np.polyfit(travelled[early], found["friction_torque"][early, 0], 1)[0]
+    straight = np.abs(found["friction_torque"][:, 0]) < 0.05 * level
+    assert straight.sum() > 3 and first < -0.9  # settling left it bent the other way
+    slope = np.polyfit(travelled[straight], found["friction_torque"][straight, 0], 1)[0]
     assert slope == pytest.approx(level / distance, rel=0.02)
 
 
 def test_break_away_level_and_distance() -> None:
-    """Driven far slower than the Stribeck velocity: the torque reaches `static`; 95 % of it after 3 d (ĝ -> 1)."""
+    """Driven far slower than the Stribeck velocity (ĝ -> 1): the torque reaches `static`, 95 % of the way after 3 d."""
     law, distance = dry(0.006, static=0.009, stribeck=5.0), 0.005
     found = run(one_contact(law, distance, 0.0, [[1.5, 0.03]]), grid(1.6, 1e-3))
     torque = found["friction_torque"][:, 0]
     travelled = found["joint_position"][:, 0] - found["joint_position"][0, 0]
     assert torque.max() == pytest.approx(0.009, rel=0.005)
-    assert np.interp(3.0 * distance, travelled, torque) == pytest.approx(0.95 * 0.009, rel=0.01)
+    reached = (np.interp(3.0 * distance, travelled, torque) - torque[0]) / (0.009 - torque[0])
+    assert reached == pytest.approx(1.0 - np.exp(-3.0), rel=0.005)
 
 
 def test_contact_against_scipy() -> None:
@@ -126,10 +128,10 @@ def test_energy_of_a_finger_without_friction() -> None:
         swing = energy[after, 0].max()
         assert swing > 1e-4
         assert np.ptp(energy[:, 2]) == pytest.approx(0.0, abs=1e-12 + 1e-6 * swing)  # motors rest
-        assert np.all(energy[:, 3:5] == energy[0, 3:5])  # no friction, no damping
+        np.testing.assert_allclose(energy[:, 3:5], 0.0, atol=1e-20)  # no friction, no damping
         drift.append(np.ptp(total) / swing)
-    # what CVODE loses stays within some hundred times its tolerance over some hundred swings
-    assert drift[0] < 3e-2 and drift[1] < 3e-4 and drift[2] < 3e-6, drift
+    # what CVODE loses stays within some hundred times its tolerance over forty swings
+    assert drift[0] < 3e-3 and drift[1] < 1e-4 and drift[2] < 3e-6, drift
 
 
 def test_static_balance_by_hand() -> None:
@@ -177,13 +179,12 @@ def smooth(friction: bool) -> dict[str, Any]:
 
 @pytest.mark.parametrize("friction", [False, True])
 def test_order_of_the_fixed_step(friction: bool) -> None:
-    rig, end = smooth(friction), np.array([0.05, 0.35])
-    start = make(rig, relative_tolerance=1e-10)
-    reference = start.run(end)["joint_position"]
-    steps, errors = [2e-3, 1e-3, 5e-4, 2.5e-4], []
+    rig, time = smooth(friction), grid(0.35, 0.01)
+    reference = run(rig, time, relative_tolerance=1e-10)
+    steps, errors = [1e-3, 5e-4, 2.5e-4, 1.25e-4], []
     for step in steps:
-        found = run(rig, end, integrator="fixed_step", step=step)["joint_position"]
-        errors.append(float(np.abs(found - reference).max()))
+        found = run(rig, time, integrator="fixed_step", step=step)
+        errors.append(float(np.abs(found["joint_position"] - reference["joint_position"]).max()))
     order = np.polyfit(np.log(steps), np.log(errors), 1)[0]
     assert 1.8 < order < 2.2, (order, errors)
 
@@ -209,25 +210,25 @@ def test_cvode_error_falls_with_its_tolerance() -> None:
 
 
 def test_cvode_agrees_with_radau_on_the_twin() -> None:
-    """Over 60 ms of a two-joint finger in motion with friction everywhere: the twin's equations, scipy's solver."""
+    """Over 40 ms of a two-joint finger in motion with friction everywhere: the twin's equations, scipy's solver."""
     law = dry(0.02, 0.03, 0.005, 0.2)
     rig = small_rig(
         TWO_JOINTS,
-        motion=legs_of([[0.05, 0.8, -0.5]], [0.1, -0.1], soft=0.02),
-        joints=[{"friction": dry(0.004, 0.006, 0.1), "load_friction": dry(3e-5, 4e-5, 0.1)}] * 2,
-        tendons=[{"pulley_friction": [law], "edge_friction": [law, law]}] * 4,
+        motion=legs_of([[0.05, 0.8, -0.5]], [0.1, -0.1], soft=0.01),
+        joints=[{"friction": dry(0.004, 0.006, 0.1)}, {"load_friction": dry(3e-5, 4e-5, 0.1)}],
+        tendons=[{"pulley_friction": [law]}, {"edge_friction": [law, law]}, {}, {}],
         gravity=[0.0, 0.0, -9.81],
         friction={"bristle_damping": 0.002},
     )
     plant = make(rig, relative_tolerance=1e-10)
-    twin, start, time = PlantTwin(rig), plant.continuous_state(), np.array([0.02, 0.04, 0.06])
+    twin, start, time = PlantTwin(rig), plant.continuous_state(), np.array([0.02, 0.03, 0.04])
     found = plant.run(time)
-    solved = solve_ivp(twin.derivative, (0.0, 0.06), start, "Radau", t_eval=time, rtol=1e-7, atol=1e-10)
+    solved = solve_ivp(twin.derivative, (0.0, 0.04), start, "Radau", t_eval=time, rtol=1e-7, atol=1e-10)
     assert solved.success
-    assert np.ptp(found["joint_position"][:, 0]) > 0.01
+    assert np.ptp(found["joint_position"][:, 0]) > 0.005
     np.testing.assert_allclose(solved.y[:2].T, found["joint_position"], atol=2e-7)
-    tension = [[twin.parts(t, y)["tension"] for t, y in zip(time, solved.y.T, strict=True)]]
-    np.testing.assert_allclose(tension[0], found["tendon_force"], atol=2e-3)
+    tension = [twin.parts(t, y)["tension"] for t, y in zip(time, solved.y.T, strict=True)]
+    np.testing.assert_allclose(tension, found["tendon_force"], atol=2e-3)
 
 
 @pytest.mark.parametrize("pulley_torque", ["beyond_joint", "at_joint"])

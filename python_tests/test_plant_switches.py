@@ -148,7 +148,7 @@ def test_eccentricity() -> None:
 
 def test_servo() -> None:
     """x'' = w² (command − x) − 2 ζ w x', the command being a rise of pretension from 10 N to 20 N in 0.1 s."""
-    rig = calm(small_rig(servo={"frequency": 6.0, "damping_ratio": 0.4}))
+    rig = calm(small_rig(servo={"frequency": 6.0, "damping_ratio": 0.4}, settle=4.0))
     rig["motion"]["pretension"] = {"time": [0.05, 0.15], "value": [10.0, 20.0]}
     time, w = grid(0.4, 5e-3), 2.0 * np.pi * 6.0
 
@@ -160,7 +160,7 @@ def test_servo() -> None:
     expected = solve_ivp(rates, (0.0, 0.4), [10.0 / STIFFNESS, 0.0], t_eval=time, rtol=1e-9, atol=1e-13, max_step=0.01)
     found = run(rig, time)
     np.testing.assert_allclose(found["tendon_position"][:, 0], expected.y[0], atol=1e-8)
-    assert found["tendon_position"][:, 0].max() > 22.0 / STIFFNESS  # overshoots
+    assert found["tendon_position"][:, 0].max() > 21.0 / STIFFNESS  # overshoots
 
 
 # --- Friction ---------------------------------------------------------------------------------------------------
@@ -168,7 +168,7 @@ def test_servo() -> None:
 
 def test_presliding_distances() -> None:
     """Each kind of contact bends by its own distance: f = level (1 − (1 − w0) exp(−x/d)) with ĝ = 1."""
-    cases = {"joint": 0.01, "edge": 2e-4, "pulley": 3e-4}
+    cases = {"joint": 0.01, "edge": 1e-4, "pulley": 8e-5}
     for kind, distance in cases.items():
         friction = {"presliding": {kind: distance}}
         law, motion = dry(0.01), legs_of([[0.15, 0.0, 0.3]], [0.0, 0.0], soft=0.05)
@@ -185,7 +185,7 @@ def test_presliding_distances() -> None:
             w = found["friction_torque"][:, 1] / (0.01 * ARM * found["tendon_force"].sum(axis=1))
             moved = ARM * moved
         expected = 1.0 - (1.0 - w[0]) * np.exp(-moved / distance)
-        assert expected.max() > 0.95 and expected[0] < 0.2, kind
+        assert expected.max() > 0.95 and expected.min() < 0.2, kind
         np.testing.assert_allclose(w, expected, atol=2e-3, err_msg=kind)
 
 
@@ -332,16 +332,16 @@ def test_drift() -> None:
 
 def test_heat() -> None:
     """Θ' = friction power − Θ/T and level 1 + coefficient Θ: Θ(t) is the convolution of the friction work."""
-    rig = sliding(joints=[{"friction": dry(0.02)}], friction={"heat": {"coefficient": 50.0, "time_constant": 0.3}})
+    rig = sliding(joints=[{"friction": dry(0.06)}], friction={"heat": {"coefficient": 10.0, "time_constant": 0.3}})
     time = grid(0.5, 1e-3)
     found = run(rig, time)
     work, middle = np.diff(found["energy"][:, 3]), (time[1:] + time[:-1]) / 2.0
-    start = (found["friction_level"][0] - 1.0) / 50.0
+    start = (found["friction_level"][0] - 1.0) / 10.0
     theta = [np.sum(work[:k] * np.exp(-(time[k] - middle[:k]) / 0.3)) for k in range(len(time))]
-    expected = 1.0 + 50.0 * (start * np.exp(-time / 0.3) + np.array(theta))
+    expected = 1.0 + 10.0 * (start * np.exp(-time / 0.3) + np.array(theta))
     np.testing.assert_allclose(found["friction_level"], expected, rtol=1e-5)
-    assert found["friction_level"][-1] > 1.05
-    assert last(found, "friction_torque")[0] == pytest.approx(0.02 * found["friction_level"][-1], rel=1e-4)
+    assert found["friction_level"][-1] > 1.03
+    assert last(found, "friction_torque")[0] == pytest.approx(0.06 * found["friction_level"][-1], rel=1e-4)
 
 
 def test_wrist() -> None:
