@@ -14,6 +14,8 @@ install(TARGETS tendonfmu_core tendonfmu_description EXPORT tendonfmuTargets
 install(DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}/runtime/include/" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}"
         FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp" PATTERN "tendonfmu_plant.h" EXCLUDE)
 
+install(FILES LICENSE THIRD_PARTY_LICENSES.txt DESTINATION "${CMAKE_INSTALL_DOCDIR}")
+
 # The simulated finger, where it was built, with the archives of SUNDIALS that it was linked with.
 if(TARGET tendonfmu_plant)
   set_target_properties(tendonfmu_plant PROPERTIES EXPORT_NAME plant)

@@ -224,7 +224,7 @@ install_locked() {
 # Everything that ends up in the installed package. CI checks that no other folder is read by its build.
 package_sources() {
   # Folders that are not there are no error.
-  { find CMakeLists.txt pyproject.toml LICENSE cmake runtime fmu_src modelDescription python \
+  { find CMakeLists.txt pyproject.toml LICENSE THIRD_PARTY_LICENSES.txt cmake runtime fmu_src modelDescription python \
     examples/fingers examples/rigs examples/demo_recording -type f ! -path '*/__pycache__/*' ! -path 'runtime/tests/*' \
     -print0 2>/dev/null || true; } | LC_ALL=C sort -z
 }
