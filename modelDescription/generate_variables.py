@@ -3,7 +3,7 @@
     python generate_variables.py variables.json variable_table.h
 
 The header holds one row per variable group (name, value references, type, causality, range), the value reference of
-the first parameter, the log categories and the salt of the GUID. See README.md for the rules.
+the first parameter by path, the log categories and the salt of the GUID. See README.md for the rules.
 """
 
 from __future__ import annotations

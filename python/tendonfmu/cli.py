@@ -99,19 +99,24 @@ def check(
 
 @app.command()
 def build(
-    finger: FingerFile,
+    file: Annotated[Path, typer.Argument(metavar="FINGER.json|RIG.json", help="finger description, or rig")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FINGER.fmu", help="FMU to write")],
     binaries: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="folder of binaries by FMI platform, instead of those of this installation"),
     ] = None,
 ) -> None:
-    """Pack an FMI 2.0 co-simulation FMU. Needs no compiler; the same input gives the same bytes."""
+    """Pack an FMI 2.0 co-simulation FMU: of a finger its friction, of a rig the simulated finger.
+
+    Needs no compiler; the same input gives the same bytes.
+    """
     from tendonfmu.packaging import build_fmu
+    from tendonfmu.plant_packaging import build_plant_fmu
+    from tendonfmu.rig import is_rig
     from tendonfmu.whole_file import check_output
 
-    check_output(output, finger)
-    build_fmu(finger, output, binaries=binaries)
+    check_output(output, file)
+    (build_plant_fmu if is_rig(file) else build_fmu)(file, output, binaries=binaries)
     _say(f"{output}: {output.stat().st_size / 1024:.0f} KiB")
 
 

@@ -36,27 +36,38 @@ def describe_model(description: FingerDescription, table: VariableTable) -> dict
     See modelDescription/README.md.
     """
     finger = native.Finger(description.image)
-    sizes = {"scalar": 1, "joints": finger.joints, "tendons": finger.tendons}
-    variables = [variable for group in table.data["groups"] for variable in _elements(group, sizes)]
+    sizes = group_sizes(finger.joints, finger.tendons)
+    variables = [variable for group in table.data["groups"] for variable in elements(group, sizes)]
     variables += _parameters(finger.parameters(), table)
     index = {variable["name"]: k for k, variable in enumerate(variables, start=1)}
     outputs = list(_outputs(table, sizes, index, dependencies(structure_of(description))))
-    used = {variable.get("unit") for variable in variables}
     return {
         "name": NOT_IN_XML.sub("?", description.name),
         "description": f"Friction compensation of the tendon-driven finger {NOT_IN_XML.sub('?', description.name)}: "
-        f"{_count(finger.joints, 'joint')}, {_count(finger.tendons, 'tendon')}",
-        "units": {unit: base for unit, base in table.data["units"].items() if unit in used},
+        f"{counted(finger.joints, 'joint')}, {counted(finger.tendons, 'tendon')}",
+        "units": units_of(variables, table),
         "log_categories": table.data["log_categories"],
         "variables": variables,
         "outputs": outputs,
         "initial_unknowns": [output["index"] for output in outputs],
+        "directional_derivative": True,
         "default_experiment": {"start": 0.0, "stop": 10.0, "step": 0.001},
     }
 
 
-def _count(number: int, noun: str) -> str:
+def counted(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def group_sizes(joints: int, tendons: int) -> dict[str, int]:
+    """Elements of a group by its `size` in the table."""
+    return {"scalar": 1, "joints": joints, "tendons": tendons, "vector": 3}
+
+
+def units_of(variables: list[dict[str, Any]], table: VariableTable) -> dict[str, Any]:
+    """The table's units that the variables use."""
+    used = {variable.get("unit") for variable in variables}
+    return {unit: base for unit, base in table.data["units"].items() if unit in used}
 
 
 def _names(group: Mapping[str, Any], sizes: Mapping[str, int]) -> list[str]:
@@ -64,9 +75,10 @@ def _names(group: Mapping[str, Any], sizes: Mapping[str, int]) -> list[str]:
     return [name] if group["size"] == "scalar" else [f"{name}[{i}]" for i in range(1, sizes[group["size"]] + 1)]
 
 
-def _elements(group: Mapping[str, Any], sizes: Mapping[str, int]) -> Iterator[dict[str, Any]]:
-    given = {key: group[key] for key in ("type", "causality", "variability", "initial")}
-    where = {key: group[key] for key in ("unit", "min", "max", "start") if key in group}
+def elements(group: Mapping[str, Any], sizes: Mapping[str, int]) -> Iterator[dict[str, Any]]:
+    """The variables of a group, as the template wants them."""
+    given = {key: group[key] for key in ("type", "causality", "variability")}
+    where = {key: group[key] for key in ("initial", "unit", "min", "max", "start") if key in group}
     for i, name in enumerate(_names(group, sizes)):
         text = group["description"].replace("{i}", str(i + 1))
         yield {**given, **where, "name": name, "vr": group["base"] + i, "description": text}

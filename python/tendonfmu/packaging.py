@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from importlib.abc import Traversable
 
 BINARY_SUFFIXES = (".so", ".dll", ".dylib")
-BINARY_STEM = "tendonfmu"
+BINARIES, BINARY_STEM = "binaries", "tendonfmu"
 
 # A model identifier names files and C functions: no words that a compiler or a file system keeps to itself.
 RESERVED = frozenset(
@@ -97,9 +97,9 @@ def model_identifier(name: str) -> str:
     return identifier
 
 
-def guid(image: bytes, table: VariableTable) -> str:
-    """Identifier that the binary expects: of the image and of the table that it was compiled with."""
-    return native.image_guid(image, _variable_generator().salt(table.data))
+def guid(resource: bytes, table: VariableTable) -> str:
+    """Identifier that the binary expects: of the model image, or rig, and of the table that it was compiled with."""
+    return native.image_guid(resource, variable_generator().salt(table.data))
 
 
 def members(description: FingerDescription, *, binaries: Path | None = None) -> dict[str, bytes]:
@@ -108,7 +108,7 @@ def members(description: FingerDescription, *, binaries: Path | None = None) -> 
     from tendonfmu.drawing import finger_drawing
     from tendonfmu.plots import draw_finger
 
-    table = read_table(_package_file("model_description/variables.json").read_text(encoding="utf-8"))
+    table = read_table(package_file("model_description/variables.json").read_text(encoding="utf-8"))
     identifier = model_identifier(description.name)
     sources = _sources()
     model = describe_model(description, table)
@@ -122,7 +122,7 @@ def members(description: FingerDescription, *, binaries: Path | None = None) -> 
     picture = io.BytesIO()
     draw_finger(finger_drawing(description), picture)
     content = {
-        "modelDescription.xml": _checked(_render_xml(context)),
+        "modelDescription.xml": model_description(context),
         "model.png": picture.getvalue(),
         "documentation/finger.png": picture.getvalue(),
         "documentation/index.html": documentation_page(description, context).encode(),
@@ -130,20 +130,21 @@ def members(description: FingerDescription, *, binaries: Path | None = None) -> 
         "resources/finger.json": description.text,
     }
     content |= {f"sources/{name}": data for name, data in sources.items()}
-    content |= {f"binaries/{path}": data for path, data in _binaries(binaries, identifier).items()}
+    libraries = find_binaries(binaries, BINARIES, BINARY_STEM, identifier)
+    content |= {f"binaries/{path}": data for path, data in libraries.items()}
     return content
 
 
 # --- parts -----------------------------------------------------------------------------------------------------------
 
 
-def _package_file(path: str) -> Traversable:
+def package_file(path: str) -> Traversable:
     return files("tendonfmu") / path
 
 
-def _variable_generator() -> ModuleType:
+def variable_generator() -> ModuleType:
     """generate_variables.py, which wrote the table's salt into the C header."""
-    path = Path(str(_package_file("model_description/generate_variables.py")))
+    path = Path(str(package_file("model_description/generate_variables.py")))
     spec = importlib.util.spec_from_file_location("tendonfmu_generate_variables", path)
     if spec is None or spec.loader is None:
         raise InputError(f"{path}: not found; expected in the installed package")
@@ -153,27 +154,35 @@ def _variable_generator() -> ModuleType:
 
 
 def _sources() -> dict[str, bytes]:
-    return {file.name: file.read_bytes() for file in _package_file("sources").iterdir() if file.is_file()}
+    return {file.name: file.read_bytes() for file in package_file("sources").iterdir() if file.is_file()}
 
 
-def _binaries(folder: Path | None, identifier: str) -> dict[str, bytes]:
-    """<platform>/<identifier>.<suffix> to content."""
-    root: Traversable = _package_file("binaries") if folder is None else folder
+def find_binaries(folder: Path | None, installed: str, stem: str, identifier: str) -> dict[str, bytes]:
+    """<platform>/<identifier>.<suffix> to content, from <platform>/<stem>.<suffix> of the folder.
+
+    installed: folder of the package that takes its place where it is None. Raises InputError where there is none.
+    """
+    root: Traversable = package_file(installed) if folder is None else folder
     found = {}
     for platform in root.iterdir() if root.is_dir() else []:
         for file in platform.iterdir() if platform.is_dir() else []:
             suffix = Path(file.name).suffix
-            if Path(file.name).stem == BINARY_STEM and suffix in BINARY_SUFFIXES:
+            if Path(file.name).stem == stem and suffix in BINARY_SUFFIXES:
                 found[f"{platform.name}/{identifier}{suffix}"] = file.read_bytes()
     if not found:
-        raise InputError(f"{root}: no binary; expected <FMI platform>/{BINARY_STEM}.so, .dll or .dylib in it")
+        raise InputError(f"{root}: no binary; expected <FMI platform>/{stem}.so, .dll or .dylib in it")
     return found
+
+
+def model_description(context: Mapping[str, Any]) -> bytes:
+    """The XML of a context (modelDescription/README.md), once FMI's schema accepts it."""
+    return _checked(_render_xml(context))
 
 
 def _render_xml(context: Mapping[str, Any]) -> bytes:
     import jinja2
 
-    template = _package_file("model_description/modelDescription.xml.jinja").read_text(encoding="utf-8")
+    template = package_file("model_description/modelDescription.xml.jinja").read_text(encoding="utf-8")
     environment = jinja2.Environment(undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
     return environment.from_string(template).render(context).encode()
 

@@ -1,0 +1,113 @@
+/* Saved states of the simulated finger: numbers as doubles in the order below, then the plant's own bytes. Before the
+ * initialisation the plant's bytes are zeros: what it settles to follows from settings and inputs. */
+#include <math.h>
+#include <string.h>
+
+#include "plant_model.h"
+
+/* inputs [input_count] follow */
+enum { AT_RUNNING, AT_START, AT_COMMANDED, AT_TOLERANCE_WRITTEN, AT_SETTINGS, AT_INPUTS = AT_SETTINGS + SETTING_COUNT };
+
+static size_t plant_offset(const model* m) {
+  return (AT_INPUTS + m->input_count) * sizeof(double);
+}
+
+static void put(void* bytes, size_t at, const double* values, size_t count) {
+  memcpy((char*)bytes + at * sizeof(double), values, count * sizeof(double));
+}
+
+static void get(const void* bytes, size_t at, double* values, size_t count) {
+  memcpy(values, (const char*)bytes + at * sizeof(double), count * sizeof(double));
+}
+
+static const void* plant_bytes(const model* m, const void* bytes) {
+  return (const char*)bytes + plant_offset(m);
+}
+
+size_t model_state_size(const model* m) {
+  return plant_offset(m) + m->plant_state_size;
+}
+
+void model_save(const model* m, void* bytes) {
+  const double life[] = {m->running, m->start, m->running && m->commanded, m->tolerance_written};
+  memset(bytes, 0, model_state_size(m));
+  put(bytes, AT_RUNNING, life, AT_SETTINGS);
+  put(bytes, AT_SETTINGS, m->wanted, SETTING_COUNT);
+  if (m->running) {
+    put(bytes, AT_INPUTS, m->inputs, m->input_count);
+    tendonfmu_plant_save_state(m->plant, (char*)bytes + plant_offset(m), m->plant_state_size);
+  }
+}
+
+static int is_flag(double x) {
+  return x == 0.0 || x == 1.0;
+}
+
+const char* model_check_state(model* m, const void* bytes, int initialised) {
+  double life[AT_SETTINGS], settings[SETTING_COUNT];
+  get(bytes, AT_RUNNING, life, AT_SETTINGS);
+  get(bytes, AT_SETTINGS, settings, SETTING_COUNT);
+  if (life[AT_RUNNING] != (double)initialised) {
+    return "damaged state: its phase does not fit its finger";
+  }
+  if (!isfinite(life[AT_START]) || !is_flag(life[AT_COMMANDED]) || !is_flag(life[AT_TOLERANCE_WRITTEN]) ||
+      !settings_are_sound(settings, m->joints)) {
+    return "damaged state: a number in it cannot be";
+  }
+  return NULL; /* the plant looks at its own bytes when it takes them */
+}
+
+/* A plant that has not settled with these settings is brought so far only when it asks for it. */
+static int restore_plant(model* m, const double* settings, const void* state) {
+  const size_t size = m->plant_state_size;
+  if (memcmp(m->used, settings, sizeof m->used) != 0 && plant_start_over(m, settings)) {
+    return -1;
+  }
+  tendonfmu_plant_status status = tendonfmu_plant_restore_state(m->plant, state, size);
+  if (status == TENDONFMU_PLANT_WRONG_ORDER && tendonfmu_plant_initialise(m->plant) == TENDONFMU_PLANT_OK) {
+    status = tendonfmu_plant_restore_state(m->plant, state, size);
+  }
+  return status == TENDONFMU_PLANT_OK ? 0 : plant_failed(m);
+}
+
+/* Takes over the plant of a state; when that is refused, the one of before. */
+static int take_plant(model* m, const double* settings, const void* state) {
+  char reason[PLANT_ERROR_BYTES];
+  double former[SETTING_COUNT];
+  const int commanded = m->commanded;
+  memcpy(former, m->used, sizeof former);
+  if (m->running) {
+    tendonfmu_plant_save_state(m->plant, m->scratch, m->plant_state_size);
+  }
+  if (restore_plant(m, settings, state) == 0) {
+    return 0;
+  }
+  memcpy(reason, m->error, sizeof reason);
+  if (!m->running || restore_plant(m, former, m->scratch)) {
+    tendonfmu_plant_reset(m->plant);
+  }
+  m->commanded = commanded;
+  memcpy(m->error, reason, sizeof reason);
+  return -1;
+}
+
+int model_restore(model* m, const void* bytes) {
+  double life[AT_SETTINGS], settings[SETTING_COUNT];
+  get(bytes, AT_RUNNING, life, AT_SETTINGS);
+  get(bytes, AT_SETTINGS, settings, SETTING_COUNT);
+  const int running = life[AT_RUNNING] != 0.0;
+  if (running && take_plant(m, settings, plant_bytes(m, bytes))) {
+    return -1;
+  }
+  if (running) {
+    get(bytes, AT_INPUTS, m->inputs, m->input_count);
+  } else {
+    tendonfmu_plant_reset(m->plant);
+  }
+  memcpy(m->wanted, settings, sizeof settings);
+  m->running = running;
+  m->start = life[AT_START];
+  m->commanded = life[AT_COMMANDED] != 0.0;
+  m->tolerance_written = life[AT_TOLERANCE_WRITTEN] != 0.0;
+  return 0;
+}
