@@ -176,7 +176,8 @@ class cvode_integrator : public integrator {
   static int right_hand_side(solver_number time, N_Vector state, N_Vector derivative, void* data) {
     auto* self = static_cast<cvode_integrator*>(data);
     double* result = N_VGetArrayPointer(derivative);
-    self->equations_.evaluate(time, N_VGetArrayPointer(state), self->modes_, *self->inputs_, result);
+    self->equations_.want_slopes(false);
+    self->equations_.evaluate(time, N_VGetArrayPointer(state), &self->modes_, *self->inputs_, result);
     const std::size_t n = self->equations_.layout().joints;
     // 1: recoverable, CVODE tries a smaller step
     return std::all_of(result, result + 2 * n, [](double x) { return std::fabs(x) < 1e9; }) ? 0 : 1;
@@ -192,8 +193,9 @@ class cvode_integrator : public integrator {
     auto* self = static_cast<cvode_integrator*>(data);
     if (!old_will_do) {
       const double* y = N_VGetArrayPointer(state);
-      self->equations_.evaluate(time, y, self->modes_, *self->inputs_, N_VGetArrayPointer(scratch));
-      self->linearisation_.take(self->equations_, y, self->modes_, *self->inputs_, rigid_slopes::exact);
+      self->equations_.want_slopes(true);
+      self->equations_.evaluate(time, y, &self->modes_, *self->inputs_, N_VGetArrayPointer(scratch));
+      self->linearisation_.take(self->equations_, y, *self->inputs_, rigid_slopes::exact);
       self->work_.jacobians += 1;
     }
     *taken = old_will_do ? SUNFALSE : SUNTRUE;

@@ -37,7 +37,7 @@ dynamics::dynamics(const rig& rig) : rig_(rig), layout_(rig) {
 }
 
 /* Moment arms, elongations and forces at the springs. */
-void dynamics::move_tendons(const double* state, const contact_modes& modes) {
+void dynamics::move_tendons(const double* state, bool own_modes) {
   const std::size_t n = layout_.joints;
   const double *q = state, *speed = state + layout_.speed();
   evaluation& e = values_;
@@ -58,17 +58,29 @@ void dynamics::move_tendons(const double* state, const contact_modes& modes) {
     const double stretch = state[layout_.motor() + i] - path, stretching = motor_speed - path_speed;
     e.elongation[i] = stretch;
     e.elongation_speed[i] = stretching;
+    if (own_modes) e.modes.slack[i] = !(stretch > 0.0);
+    const bool slack = e.modes.slack[i];
     const double elastic = stretch * (tendon.stiffness + tendon.hardening * stretch);
     const double total = elastic + tendon.damping * stretching;
     // a tendon cannot push: neither by its spring nor by its damper
-    const bool pulls = !modes.slack[i] && (tendon.damping == 0.0 || total > 0.0);
+    const bool pulls = !slack && (tendon.damping == 0.0 || total > 0.0);
     const double pulling = pulls ? 1.0 : 0.0;
     e.force[i] = pulls ? total : 0.0;
     e.force_by_elongation[i] = pulling * (tendon.stiffness + 2.0 * tendon.hardening * stretch);
     e.force_by_speed[i] = pulling * tendon.damping;
-    if (!modes.slack[i]) e.spring_loss += (e.force[i] - elastic) * stretching;
+    if (!slack) e.spring_loss += (e.force[i] - elastic) * stretching;
     e.motor_power += e.force[i] * motor_speed;
     for (std::size_t j = 0; j < n; ++j) e.spring_torque[j] += arm[j] * e.force[i];
+  }
+}
+
+inline void dynamics::respond_to(const law_values& law, double inverse_length, double w, double v,
+                                 bristle_response* r) {
+  const double damping = rig_.friction.bristle_damping;
+  if (span_ > 0.0) {
+    respond_after(law, values_.level, inverse_length, damping, w, v, span_, slopes_, r);
+  } else {
+    respond(law, values_.level, inverse_length, damping, w, v, slopes_, r);
   }
 }
 
@@ -80,10 +92,11 @@ void dynamics::rub_tendons(const double* state) {
   evaluation& e = values_;
   std::fill(e.passed_torque, e.passed_torque + n, 0.0);
   std::fill(e.load, e.load + n, 0.0);
-  // wrist: dα/dt
-  const double wrist_speed = rig_.wrist.arms.empty() ? 0.0
-                                                     : rig_.wrist.amplitude * (2.0 * pi / rig_.wrist.period) *
-                                                           cosine(2.0 * pi * std::max(e.time, 0.0) / rig_.wrist.period);
+  e.wrist_power = 0.0;
+  const double wrist_speed = e.wrist_speed = rig_.wrist.arms.empty()
+                                                 ? 0.0
+                                                 : rig_.wrist.amplitude * (2.0 * pi / rig_.wrist.period) *
+                                                       cosine(2.0 * pi * std::max(e.time, 0.0) / rig_.wrist.period);
   for (std::size_t i = 0; i < layout_.tendons; ++i) {
     const tendon& tendon = rig_.tendons[i];
     const double* arm = &e.arm[i * n];
@@ -99,8 +112,8 @@ void dynamics::rub_tendons(const double* state) {
       if (site.where == friction_site::place::wrist) v += rig_.wrist.arms[i] * wrist_speed;
       const double angle = site.bends ? q[site.angle_joint] : 0.0;
       const law_values law = site_law(site, angle, v, settings.stribeck_exponent);
-      bristle_response& r = e.response[s] =
-          respond(law, e.level, site.presliding, settings.bristle_damping, bristle[s], v);
+      bristle_response& r = e.response[s];
+      respond_to(law, site.inverse_length, bristle[s], v, &r);
       if (!site.bends) r.share_by_angle = r.rate_by_angle = 0.0;
       e.velocity[s] = v;
       const preload extra = preload_at(settings.preload, tension);
@@ -116,6 +129,9 @@ void dynamics::rub_tendons(const double* state) {
       }
       e.tension[s] = tension;
     }
+    // what moves the wrist works against the friction there, beside the finger
+    if (wrist_speed != 0.0)
+      e.wrist_power += rig_.wrist.arms[i] * wrist_speed * (e.force[i] - e.tension[tendon.first_site]);
     const auto after = [&](std::size_t passed) {
       return passed == 0 ? e.force[i] : e.tension[tendon.first_site + passed - 1];
     };
@@ -132,18 +148,23 @@ void dynamics::rub_joints(const double* state) {
   for (std::size_t s = 0; s < rig_.joint_sites.size(); ++s) {
     const joint_site& site = rig_.joint_sites[s];
     const double v = state[layout_.speed() + site.joint];
-    const bristle_response& r = values_.response[first + s] =
-        respond(values_of(site.friction, v, settings.stribeck_exponent), values_.level, site.presliding,
-                settings.bristle_damping, state[layout_.bristle() + first + s], v);
+    bristle_response& r = values_.response[first + s];
+    respond_to(values_of(site.friction, v, settings.stribeck_exponent), site.inverse_length,
+               state[layout_.bristle() + first + s], v, &r);
     values_.passed_torque[site.joint] -= (site.by_load ? values_.load[site.joint] : 1.0) * r.share;
   }
 }
 
-void dynamics::press_stops(const double* state, const contact_modes& modes) {
+void dynamics::press_stops(const double* state, bool own_modes) {
+  contact_modes& modes = values_.modes;
   values_.stop_loss = 0.0;
   for (std::size_t j = 0; j < layout_.joints; ++j) {
     const link& link = rig_.links[j];
     const double q = state[j], speed = state[layout_.speed() + j];
+    if (own_modes) {
+      modes.below[j] = q < link.lower;
+      modes.above[j] = q > link.upper;
+    }
     double torque = 0.0;
     if (modes.below[j] || modes.above[j]) {
       const double spring = link.stop_stiffness * ((modes.below[j] ? link.lower : link.upper) - q);
@@ -174,7 +195,7 @@ void dynamics::command_motors(double time, const commands& inputs, double* comma
   }
 }
 
-void dynamics::evaluate(double time, const double* state, const contact_modes& modes, const commands& inputs,
+void dynamics::evaluate(double time, const double* state, const contact_modes* modes, const commands& inputs,
                         double* derivative) {
   const std::size_t n = layout_.joints, m = layout_.tendons;
   const double *q = state, *speed = state + layout_.speed(), heat = state[layout_.heat()];
@@ -193,17 +214,19 @@ void dynamics::evaluate(double time, const double* state, const contact_modes& m
   mass_matrix(rig_, e.motion, e.mass);
   const double no_acceleration[max_joints] = {};
   inverse_dynamics(rig_, e.motion, speed, no_acceleration, e.rigid_torque);
-  e.contact = contact_torques(rig_, e.motion, time, inputs.scheduled_pushes, inputs.push, modes.touching);
+  if (modes) e.modes = *modes;
+  if (!modes) e.modes.touching = rig_.obstacle.present && penetrate(rig_.obstacle, e.motion).depth > 0.0;
+  e.contact = contact_torques(rig_, e.motion, time, inputs.scheduled_pushes, inputs.push, e.modes.touching);
 
   // tendons, friction, stops
-  move_tendons(state, modes);
+  move_tendons(state, !modes);
   rub_tendons(state);
   rub_joints(state);
-  press_stops(state, modes);
+  press_stops(state, !modes);
 
   // balance of torques
   double loss = e.spring_loss + e.stop_loss + e.contact.obstacle_loss;
-  e.friction_power = 0.0;
+  e.friction_power = e.wrist_power;
   Eigen::Matrix<double, Eigen::Dynamic, 1, 0, max_joints, 1> torque(n);
   for (std::size_t j = 0; j < n; ++j) {
     const link& link = rig_.links[j];
@@ -228,9 +251,10 @@ void dynamics::evaluate(double time, const double* state, const contact_modes& m
   std::copy(speed, speed + n, derivative);
   std::copy(e.acceleration, e.acceleration + n, derivative + layout_.speed());
   double command[max_tendons];
-  command_motors(time, inputs, command);
+  if (span_ == 0.0) command_motors(time, inputs, command);
   const double omega = 2.0 * pi * rig_.servo_frequency;
-  for (std::size_t i = 0; i < m; ++i) {
+  // evaluate_after(): the motors have been moved already
+  for (std::size_t i = 0; i < m && span_ == 0.0; ++i) {
     const double motor_speed = state[layout_.motor_speed() + i];
     derivative[layout_.motor() + i] = motor_speed;
     derivative[layout_.motor_speed() + i] =
@@ -238,14 +262,18 @@ void dynamics::evaluate(double time, const double* state, const contact_modes& m
   }
   for (std::size_t s = 0; s < layout_.bristles; ++s) derivative[layout_.bristle() + s] = e.response[s].rate;
   derivative[layout_.heat()] = e.friction_power - heat / friction.heat_time;
-  derivative[layout_.motor_work()] = e.motor_power;
+  derivative[layout_.motor_work()] = e.motor_power + e.wrist_power;
   derivative[layout_.friction_work()] = e.friction_power;
   derivative[layout_.damping_work()] = loss;
   derivative[layout_.push_work()] = e.contact.push_power;
 }
 
-// --- modes
-// ------------------------------------------------------------------------------------------------------------
+void dynamics::evaluate_after(double span, double time, const double* state, const commands& inputs,
+                              double* derivative) {
+  span_ = span;
+  evaluate(time, state, nullptr, inputs, derivative);
+  span_ = 0.0;
+}
 
 std::size_t dynamics::root_count() const {
   return layout_.tendons + 2 * layout_.joints + (rig_.obstacle.present ? 1 : 0);

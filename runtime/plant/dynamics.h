@@ -51,6 +51,7 @@ struct commands {
 /* Intermediate values of one evaluation: what outputs and Jacobian are made of. */
 struct evaluation {
   double time = 0.0;
+  contact_modes modes;
   chain_motion<double> motion;
   double mass[max_joints * max_joints];
   double acceleration[max_joints];
@@ -70,6 +71,7 @@ struct evaluation {
   double spring_torque[max_joints];                 /* Rᵀ f0 */
   double passed_torque[max_joints];                 /* what tendons and joint friction leave of it */
   double friction_power = 0, motor_power = 0;
+  double wrist_speed = 0, wrist_power = 0; /* dα/dt; W, of what moves the wrist against friction */
 };
 
 class dynamics {
@@ -80,13 +82,20 @@ class dynamics {
   const rig& the_rig() const { return rig_; }
   const state_layout& layout() const { return layout_; }
 
-  /* state, derivative: [layout().size()]. */
-  void evaluate(double time, const double* state, const contact_modes& modes, const commands& inputs,
+  /* state, derivative: [layout().size()]. modes: NULL for those that the state has by itself. */
+  void evaluate(double time, const double* state, const contact_modes* modes, const commands& inputs,
                 double* derivative);
+
+  /* The same with every bristle first moved on by `span` at the state's velocity (respond_after): the bristles' rates
+   * are then mean rates over `span`. The motors' derivatives are left out. */
+  void evaluate_after(double span, double time, const double* state, const commands& inputs, double* derivative);
   const evaluation& last() const { return values_; }
 
   /* Where the motors shall be, [m] m. */
   void command_motors(double time, const commands& inputs, double* command) const;
+
+  /* Whether evaluations prepare the slopes that `linearisation` takes; true at first. */
+  void want_slopes(bool wanted) { slopes_ = wanted; }
 
   /* Modes that belong to a state by itself. */
   contact_modes modes_at(const double* state) const;
@@ -98,14 +107,17 @@ class dynamics {
   void switch_modes(const int* found, contact_modes* modes) const;
 
  private:
-  void move_tendons(const double* state, const contact_modes& modes);
+  void move_tendons(const double* state, bool own_modes);
+  void respond_to(const law_values& law, double inverse_length, double w, double v, bristle_response* r);
   void rub_tendons(const double* state);
   void rub_joints(const double* state);
-  void press_stops(const double* state, const contact_modes& modes);
+  void press_stops(const double* state, bool own_modes);
 
   const rig& rig_;
   state_layout layout_;
   evaluation values_;
+  double span_ = 0.0; /* of evaluate_after() */
+  bool slopes_ = true;
 };
 
 }  // namespace tendonfmu::plant

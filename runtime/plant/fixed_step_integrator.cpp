@@ -7,47 +7,129 @@
 namespace tendonfmu::plant {
 namespace {
 
-const double gamma = 1.0 - std::sqrt(0.5);
-constexpr double beyond_reason = 1e6;  // rad, rad/s, m: the step was too long for what happened
+constexpr int most_iterations = 40;
+constexpr double good_progress = 0.25;  // per iteration, else the matrix is taken anew
+constexpr double close_enough = 1e-6;   // rad/s, of the speed in the middle of a step
+constexpr double longest_change = 2.0;  // rad/s per iteration
+constexpr double beyond_reason = 1e6;   // rad, rad/s, m
 
 }  // namespace
 
 fixed_step_integrator::fixed_step_integrator(dynamics* equations, double step)
     : equations_(*equations), linearisation_(equations->the_rig()), step_(step) {
-  for (std::vector<double>* one : {&state_, &stage_, &first_, &second_}) one->resize(equations->layout().size());
+  change_.resize(equations->layout().joints);
+  for (std::vector<double>* one : {&state_, &middle_, &rate_}) one->resize(equations->layout().size());
+  acceleration_.assign(equations->layout().joints, 0.0);
 }
 
-/*   (I − γhJ) k1 = f(t, y)
- *   (I − γhJ) k2 = f(t + h, y + h k1) − 2 k1
- *   y += h (3/2 k1 + 1/2 k2) */
-void fixed_step_integrator::step(const commands& inputs, double time, double size) {
-  const std::size_t order = state_.size();
-  const contact_modes modes = equations_.modes_at(state_.data());
-  equations_.evaluate(time, state_.data(), modes, inputs, first_.data());
-  linearisation_.take(equations_, state_.data(), modes, inputs, rigid_slopes::contact_only);
-  bool sound = linearisation_.factor(gamma * size);
-  if (sound) {
-    linearisation_.solve(first_.data());
-    for (std::size_t k = 0; k < order; ++k) stage_[k] = state_[k] + size * first_[k];
-    equations_.evaluate(time + size, stage_.data(), equations_.modes_at(stage_.data()), inputs, second_.data());
-    for (std::size_t k = 0; k < order; ++k) second_[k] -= 2.0 * first_[k];
-    linearisation_.solve(second_.data());
-    for (std::size_t k = 0; k < order; ++k) state_[k] += size * (1.5 * first_[k] + 0.5 * second_[k]);
-    const std::size_t moving = equations_.layout().bristle();
-    sound = std::all_of(state_.begin(), state_.begin() + static_cast<std::ptrdiff_t>(moving),
-                        [](double x) { return std::fabs(x) < beyond_reason; }) &&
-            std::isfinite(state_[equations_.layout().heat()]);
+void fixed_step_integrator::forget() {
+  std::fill(acceleration_.begin(), acceleration_.end(), 0.0);
+  factored_for_ = 0.0;
+}
+
+/* Motors in the middle of the step: they obey their servo alone, two linear equations each. */
+void fixed_step_integrator::move_motors(const commands& inputs, double middle, double half) {
+  const state_layout& at = equations_.layout();
+  const rig& rig = equations_.the_rig();
+  const double omega = 2.0 * pi * rig.servo_frequency, damping = 2.0 * rig.servo_damping * omega;
+  double command[max_tendons];
+  equations_.command_motors(middle, inputs, command);
+  for (std::size_t i = 0; i < at.tendons; ++i) {
+    const double x = state_[at.motor() + i], speed = state_[at.motor_speed() + i];
+    const double faster =
+        (speed + half * omega * omega * (command[i] - x)) / (1.0 + half * (damping + half * omega * omega));
+    middle_[at.motor() + i] = x + half * faster;
+    middle_[at.motor_speed() + i] = faster;
   }
-  work_.steps += 1;
-  work_.right_hand_sides += 2;
-  work_.jacobians += 1;
-  if (!sound) {
+}
+
+void fixed_step_integrator::place_middle(double half, const double* speed) {
+  const state_layout& at = equations_.layout();
+  for (std::size_t j = 0; j < at.joints; ++j) {
+    middle_[at.speed() + j] = speed[j];
+    middle_[at.angle() + j] = state_[at.angle() + j] + half * speed[j];
+  }
+}
+
+/* Newton's method for the speeds V in the middle: V = q̇ + half q̈(q + half V, V, bristles moved on by `half` at V). */
+bool fixed_step_integrator::find_middle(const commands& inputs, double middle, double half) {
+  const state_layout& at = equations_.layout();
+  const std::size_t n = at.joints;
+  double speed[max_joints];
+  for (std::size_t j = 0; j < n; ++j) speed[j] = state_[at.speed() + j] + half * acceleration_[j];
+  double before = 0.0;
+  for (int iteration = 0; iteration < most_iterations; ++iteration) {
+    place_middle(half, speed);
+    const auto evaluate = [&](bool slopes) {
+      equations_.want_slopes(slopes);
+      equations_.evaluate_after(half, middle, middle_.data(), inputs, rate_.data());
+      work_.right_hand_sides += 1;
+    };
+    bool fresh = factored_for_ != half;
+    evaluate(fresh);
+    // the matrix of an earlier step does while it still leads quickly to the end
+    double largest = 0.0;
+    if (!fresh) largest = change_of_speed(half, speed);
+    if (!fresh && iteration > 0 && largest > good_progress * before && largest > close_enough) {
+      fresh = true;
+      evaluate(true);
+    }
+    if (fresh) {
+      linearisation_.take(equations_, middle_.data(), inputs, rigid_slopes::contact_only);
+      work_.jacobians += 1;
+      factored_for_ = linearisation_.factor(half) ? half : 0.0;
+      if (factored_for_ == 0.0) return false;
+      largest = change_of_speed(half, speed);
+    }
+    if (!(largest < beyond_reason)) return false;
+    if (largest < close_enough) return true;
+    before = largest;
+    const double scale = std::min(1.0, longest_change / largest);
+    for (std::size_t j = 0; j < n; ++j) speed[j] += scale * change_[j];
+  }
+  return false;
+}
+
+/* Newton's correction of the speeds into change_; returns the largest. */
+double fixed_step_integrator::change_of_speed(double half, const double* speed) {
+  const state_layout& at = equations_.layout();
+  for (std::size_t j = 0; j < at.joints; ++j) {
+    change_[j] = state_[at.speed() + j] + half * rate_[at.speed() + j] - speed[j];
+  }
+  linearisation_.solve_speeds(change_.data());
+  double largest = 0.0;
+  for (std::size_t j = 0; j < at.joints; ++j) largest = std::max(largest, std::fabs(change_[j]));
+  return largest;
+}
+
+void fixed_step_integrator::step(const commands& inputs, double time, double size) {
+  const state_layout& at = equations_.layout();
+  const double half = 0.5 * size, middle = time + half;
+  middle_ = state_;
+  move_motors(inputs, middle, half);
+  if (!find_middle(inputs, middle, half)) {
     char line[160];
-    std::snprintf(line, sizeof line,
-                  "the fixed-step integrator diverged at t = %.6g s with step %.3g s: try a smaller step, or cvode",
-                  time, size);
+    std::snprintf(
+        line, sizeof line,
+        "the fixed-step integrator found no equilibrium at t = %.6g s with step %.3g s: try a smaller step, or "
+        "cvode",
+        time, size);
     throw solver_error(line);
   }
+  // from the middle to the end
+  for (std::size_t j = 0; j < at.joints; ++j) {
+    acceleration_[j] = rate_[at.speed() + j];
+    state_[at.angle() + j] += size * middle_[at.speed() + j];
+    state_[at.speed() + j] += size * acceleration_[j];
+  }
+  for (std::size_t i = at.motor(); i < at.bristle(); ++i) state_[i] += 2.0 * (middle_[i] - state_[i]);
+  // as much time again: the rest of the way shrinks by the same factor
+  for (std::size_t s = 0; s < at.bristles; ++s) {
+    const bristle_response& r = equations_.last().response[s];
+    state_[at.bristle() + s] += half * r.rate * (1.0 + r.kept);
+  }
+  for (std::size_t i = at.heat(); i < at.size(); ++i) state_[i] += size * rate_[i];
+  work_.steps += 1;
 }
 
 void fixed_step_integrator::advance(const commands& inputs, double until, moment* now) {

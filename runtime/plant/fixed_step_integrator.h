@@ -1,4 +1,5 @@
-/* Steps of one size, linearly implicit: for long series and for clients that change the inputs at every step. */
+/* Steps of one size, implicit: for long series, and for clients that change the inputs at every step, which makes
+ * CVODE begin anew each time. */
 #ifndef TENDONFMU_PLANT_FIXED_STEP_INTEGRATOR_H
 #define TENDONFMU_PLANT_FIXED_STEP_INTEGRATOR_H
 
@@ -7,25 +8,30 @@
 
 namespace tendonfmu::plant {
 
-/* ROS2 of J. G. Verwer, E. J. Spee, J. G. Blom, W. Hundsdorfer, "A second-order Rosenbrock method applied to
- * photochemical dispersion problems", SIAM J. Sci. Comput. 20(4), 1999, with γ = 1 − 1/√2 (L-stable). It keeps order 2
- * with any matrix in place of the Jacobian, so the slopes of the rigid bodies' velocity terms are left out of it. */
+/* The implicit midpoint rule of order 2, with the bristles' equations solved exactly for the velocity in the middle of
+ * the step: they never overshoot, however far a contact slides in one step. */
 class fixed_step_integrator : public integrator {
  public:
   /* step: s; an advance is divided into equal steps of at most that. */
   fixed_step_integrator(dynamics* equations, double step);
 
-  void forget() override {}
+  void forget() override;
   void advance(const commands& inputs, double until, moment* now) override;
   double last_step() const override { return last_step_; }
 
  private:
   void step(const commands& inputs, double time, double size);
+  void move_motors(const commands& inputs, double middle, double half);
+  bool find_middle(const commands& inputs, double middle, double half);
+  double change_of_speed(double half, const double* speed);
+  void place_middle(double half, const double* speed);
 
   dynamics& equations_;
   linearisation linearisation_;
   double step_, last_step_ = 0.0;
-  std::vector<double> state_, stage_, first_, second_;
+  double factored_for_ = 0.0; /* half a step, s; 0: no matrix */
+  std::vector<double> state_, middle_, rate_, change_;
+  std::vector<double> acceleration_; /* of the step before: where to look first */
 };
 
 }  // namespace tendonfmu::plant

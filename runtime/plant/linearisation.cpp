@@ -16,6 +16,8 @@ void linearisation::gradient::set_zero() {
   by_speed.setZero();
   by_motor.setZero();
   by_motor_speed.setZero();
+  by_bristle.setZero();
+  by_heat = 0.0;
 }
 
 linearisation::linearisation(const rig& rig)
@@ -43,11 +45,11 @@ linearisation::linearisation(const rig& rig)
     one->by_speed.resize(n_);
     one->by_motor.resize(m_);
     one->by_motor_speed.resize(m_);
+    one->by_bristle.resize(k_);
   }
 }
 
-void linearisation::take(const dynamics& equations, const double* state, const contact_modes& modes,
-                         const commands& inputs, rigid_slopes rigid) {
+void linearisation::take(const dynamics& equations, const double* state, const commands& inputs, rigid_slopes rigid) {
   const evaluation& e = equations.last();
   const double* speed = state + layout_.speed();
   mass_ = Eigen::Map<const matrix>(e.mass, n_, n_);
@@ -63,10 +65,10 @@ void linearisation::take(const dynamics& equations, const double* state, const c
   joint_slopes(e);
   power_row(e, speed);
   // the rest of the torque
-  diagonal_slopes(e, state, modes);
-  work_rows(e, state, modes);
-  if (rigid == rigid_slopes::exact || modes.touching)
-    body_slopes(e, state, modes, inputs, rigid == rigid_slopes::exact);
+  diagonal_slopes(e, state);
+  work_rows(e, state);
+  if (e.wrist_speed != 0.0) wrist_slopes(e, speed);
+  if (rigid == rigid_slopes::exact || e.modes.touching) body_slopes(e, state, inputs, rigid == rigid_slopes::exact);
 }
 
 /* Slopes of the passed torque by what one tendon does. Backward along the tendon: `weight` is the slope of the torque
@@ -163,13 +165,13 @@ void linearisation::power_row(const evaluation& e, const double* speed) {
 }
 
 /* Covers, couplings, dampers and stops. */
-void linearisation::diagonal_slopes(const evaluation& e, const double* state, const contact_modes& modes) {
+void linearisation::diagonal_slopes(const evaluation& e, const double* state) {
   for (std::size_t j = 0; j < n_; ++j) {
     const link& link = rig_.links[j];
     const double bent = state[j] - link.cover_rest;
     by_angle_(j, j) -= link.cover_stiffness + 3.0 * link.cover_hardening * bent * bent;
     by_speed_(j, j) -= link.damping;
-    if ((modes.below[j] || modes.above[j]) && e.stop_torque[j] != 0.0) {
+    if ((e.modes.below[j] || e.modes.above[j]) && e.stop_torque[j] != 0.0) {
       by_angle_(j, j) -= link.stop_stiffness;
       by_speed_(j, j) -= link.stop_damping;
     }
@@ -183,7 +185,7 @@ void linearisation::diagonal_slopes(const evaluation& e, const double* state, co
 }
 
 /* Power of the motors and of the dampers; the pushes' and the obstacle's come with the bodies. */
-void linearisation::work_rows(const evaluation& e, const double* state, const contact_modes& modes) {
+void linearisation::work_rows(const evaluation& e, const double* state) {
   for (gradient* one : {&motor_power_, &loss_, &push_power_}) one->set_zero();
   const double* speed = state + layout_.speed();
   for (std::size_t i = 0; i < m_; ++i) {
@@ -194,8 +196,8 @@ void linearisation::work_rows(const evaluation& e, const double* state, const co
     // (f − f_elastic) ė: by ė, and by the elongation only while the clipped damper has left the elastic part behind
     const double stretch = e.elongation[i], stretching = e.elongation_speed[i];
     const tendon& tendon = rig_.tendons[i];
-    const double elastic = modes.slack[i] ? 0.0 : stretch * (tendon.stiffness + tendon.hardening * stretch);
-    const double stiffness = modes.slack[i] ? 0.0 : tendon.stiffness + 2.0 * tendon.hardening * stretch;
+    const double elastic = e.modes.slack[i] ? 0.0 : stretch * (tendon.stiffness + tendon.hardening * stretch);
+    const double stiffness = e.modes.slack[i] ? 0.0 : tendon.stiffness + 2.0 * tendon.hardening * stretch;
     const double by_speed = e.force[i] - elastic + e.force_by_speed[i] * stretching;
     const double by_stretch = (e.force_by_elongation[i] - stiffness) * stretching;
     loss_.by_motor[i] = by_stretch;
@@ -211,8 +213,8 @@ void linearisation::work_rows(const evaluation& e, const double* state, const co
   for (std::size_t j = 0; j < n_; ++j) {
     const link& link = rig_.links[j];
     loss_.by_speed[j] += 2.0 * link.damping * speed[j];
-    if (!modes.below[j] && !modes.above[j]) continue;
-    const double spring = link.stop_stiffness * ((modes.below[j] ? link.lower : link.upper) - state[j]);
+    if (!e.modes.below[j] && !e.modes.above[j]) continue;
+    const double spring = link.stop_stiffness * ((e.modes.below[j] ? link.lower : link.upper) - state[j]);
     if (e.stop_torque[j] != 0.0) {
       loss_.by_speed[j] += 2.0 * link.stop_damping * speed[j];
     } else {
@@ -222,9 +224,34 @@ void linearisation::work_rows(const evaluation& e, const double* state, const co
   }
 }
 
+/* Power against friction in the wrist, arm α' (f0 − tension after it): a part of the friction power and of the work
+ * done on the finger from outside. */
+void linearisation::wrist_slopes(const evaluation& e, const double* speed) {
+  for (std::size_t i = 0; i < m_; ++i) {
+    const std::size_t s = rig_.tendons[i].first_site;
+    const bristle_response& r = e.response[s];
+    const double lever = rig_.wrist.arms[i] * e.wrist_speed;
+    const double by_force = lever * (1.0 - e.loss_by_force[s]), by_share = -lever * e.loss_by_share[s];
+    const double *arm = &e.arm[i * n_], *arm_slope = &e.arm_slope[i * n_];
+    const double by_path_speed = by_share * r.share_by_velocity - by_force * e.force_by_speed[i];
+    const auto add = [&](double& friction, double& outside, double slope) {
+      friction += slope;
+      outside += slope;
+    };
+    for (std::size_t k = 0; k < n_; ++k) {
+      add(by_speed_(n_, k), motor_power_.by_speed[k], by_path_speed * arm[k]);
+      add(by_angle_(n_, k), motor_power_.by_angle[k],
+          by_path_speed * arm_slope[k] * speed[k] - by_force * e.force_by_elongation[i] * arm[k]);
+    }
+    add(by_motor_(n_, i), motor_power_.by_motor[i], by_force * e.force_by_elongation[i]);
+    add(by_motor_speed_(n_, i), motor_power_.by_motor_speed[i], by_force * e.force_by_speed[i]);
+    add(by_bristle_(n_, s), motor_power_.by_bristle[s], by_share * r.share_by_bristle);
+    add(by_heat_[n_], motor_power_.by_heat, by_share * r.share_by_level * e.level_by_heat);
+  }
+}
+
 /* Rigid bodies, pushes and obstacle, differentiated along angles and speeds in groups of `lanes` directions. */
-void linearisation::body_slopes(const evaluation& e, const double* state, const contact_modes& modes,
-                                const commands& inputs, bool with_inertia) {
+void linearisation::body_slopes(const evaluation& e, const double* state, const commands& inputs, bool with_inertia) {
   const std::size_t directions = 2 * n_;
   for (std::size_t first = 0; first < directions; first += lanes) {
     slopes angle[max_joints], speed[max_joints], needed[max_joints];
@@ -237,7 +264,7 @@ void linearisation::body_slopes(const evaluation& e, const double* state, const 
     chain_motion<slopes> motion;
     move_chain(rig_, angle, speed, &motion);
     const contact_torque<slopes> contact =
-        contact_torques(rig_, motion, e.time, inputs.scheduled_pushes, inputs.push, modes.touching);
+        contact_torques(rig_, motion, e.time, inputs.scheduled_pushes, inputs.push, e.modes.touching);
     if (with_inertia) inverse_dynamics(rig_, motion, speed, e.acceleration, needed);
     for (std::size_t d = first; d < std::min(first + lanes, directions); ++d) {
       const bool is_angle = d < n_;
@@ -303,7 +330,7 @@ void linearisation::solve(double* b) const {
   angle += turned;
   const auto grown = [&](const gradient& one) {
     return g * (one.by_angle.dot(angle) + one.by_speed.dot(speed) + one.by_motor.dot(motor) +
-                one.by_motor_speed.dot(motor_speed));
+                one.by_motor_speed.dot(motor_speed) + one.by_bristle.dot(bristle) + one.by_heat * right[n_]);
   };
   b[layout_.motor_work()] += grown(motor_power_);
   b[layout_.friction_work()] +=
@@ -311,6 +338,14 @@ void linearisation::solve(double* b) const {
            by_motor_speed_.row(n_).dot(motor_speed) + by_bristle_.row(n_).dot(bristle) + by_heat_[n_] * right[n_]);
   b[layout_.damping_work()] += grown(loss_);
   b[layout_.push_work()] += grown(push_power_);
+}
+
+void linearisation::solve_speeds(double* b) const {
+  Eigen::Map<Eigen::VectorXd> speed(b, n_);
+  small_vector right(n_ + 1);
+  right.head(n_).noalias() = mass_ * speed;
+  right[n_] = 0.0;
+  speed = reduced_.solve(right).head(n_);
 }
 
 void linearisation::dense(double* jacobian) const {
@@ -349,6 +384,8 @@ void linearisation::dense(double* jacobian) const {
     j.block(row, n_, 1, n_) = one.by_speed.transpose();
     j.block(row, motor, 1, m_) = one.by_motor.transpose();
     j.block(row, motor_speed, 1, m_) = one.by_motor_speed.transpose();
+    j.block(row, bristle, 1, k_) = one.by_bristle.transpose();
+    j(row, layout_.heat()) = one.by_heat;
   };
   work(layout_.motor_work(), motor_power_);
   work(layout_.damping_work(), loss_);

@@ -23,14 +23,16 @@ class linearisation {
   explicit linearisation(const rig& rig);
 
   /* Takes the Jacobian at the state that `dynamics` evaluated last. */
-  void take(const dynamics& equations, const double* state, const contact_modes& modes, const commands& inputs,
-            rigid_slopes rigid);
+  void take(const dynamics& equations, const double* state, const commands& inputs, rigid_slopes rigid);
 
   /* Prepares I − γ J. False when it is singular. */
   bool factor(double gamma);
 
   /* Overwrites b [size] by x. */
   void solve(double* b) const;
+
+  /* The same where only the speeds' part of b, [n], is not zero, and only theirs of x is wanted. */
+  void solve_speeds(double* b) const;
 
   /* J, row-major [size × size]. */
   void dense(double* jacobian) const;
@@ -41,19 +43,20 @@ class linearisation {
   using small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, max_joints + 1, max_joints + 1>;
   using small_vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, max_joints + 1, 1>;
 
-  /* Slopes of one scalar by angles, speeds, motor positions and motor speeds. */
+  /* Slopes of one scalar by angles, speeds, motor positions and motor speeds, bristles and heat. */
   struct gradient {
-    vector by_angle, by_speed, by_motor, by_motor_speed;
+    vector by_angle, by_speed, by_motor, by_motor_speed, by_bristle;
+    double by_heat = 0.0;
     void set_zero();
   };
 
   void tendon_slopes(const evaluation& e, const double* speed, std::size_t tendon);
   void joint_slopes(const evaluation& e);
-  void diagonal_slopes(const evaluation& e, const double* state, const contact_modes& modes);
+  void diagonal_slopes(const evaluation& e, const double* state);
   void power_row(const evaluation& e, const double* speed);
-  void work_rows(const evaluation& e, const double* state, const contact_modes& modes);
-  void body_slopes(const evaluation& e, const double* state, const contact_modes& modes, const commands& inputs,
-                   bool with_inertia);
+  void wrist_slopes(const evaluation& e, const double* speed);
+  void work_rows(const evaluation& e, const double* state);
+  void body_slopes(const evaluation& e, const double* state, const commands& inputs, bool with_inertia);
 
   const rig& rig_;
   state_layout layout_;

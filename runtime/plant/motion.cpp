@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "elementary.h"
-
 namespace tendonfmu::plant {
 namespace {
 
@@ -32,24 +30,6 @@ double at_time(const knots& knots, double time) {
   const double c4 = -15.0 * dx + 7.0 * dv - da;
   const double c5 = 6.0 * dx - 3.0 * dv + 0.5 * da;
   return x0 + u * (v0 + u * (0.5 * a0 + u * (c3 + u * (c4 + u * c5))));
-}
-
-double path_of(const moment_arm& arm, double angle) {
-  double path = angle * (arm.mean + 0.5 * arm.slope * angle);
-  if (arm.eccentricity != 0.0) path += arm.eccentricity * (cosine(arm.phase) - cosine(angle + arm.phase));
-  return path;
-}
-
-double arm_at(const moment_arm& arm, double angle) {
-  double r = arm.mean + arm.slope * angle;
-  if (arm.eccentricity != 0.0) r += arm.eccentricity * sine(angle + arm.phase);
-  return r;
-}
-
-double arm_slope_at(const moment_arm& arm, double angle) {
-  double slope = arm.slope;
-  if (arm.eccentricity != 0.0) slope += arm.eccentricity * cosine(angle + arm.phase);
-  return slope;
 }
 
 double elongation_of(const tendon& tendon, double force) {

@@ -172,7 +172,7 @@ void plant::advance(double until) {
 // ----------------------------------------------------------------------------------------------------------
 
 void plant::evaluate(const moment& now) const {
-  equations_.evaluate(now.time, now.state.data(), now.modes, inputs_, scratch_.data());
+  equations_.evaluate(now.time, now.state.data(), &now.modes, inputs_, scratch_.data());
 }
 
 void plant::sample(const moment& now) {
@@ -370,11 +370,11 @@ void plant::derivative(double time, const double* state, double* result, double*
   commands inputs = inputs_;
   inputs.scheduled_motion = settings_.scheduled_motion != 0;
   inputs.scheduled_pushes = settings_.scheduled_pushes != 0;
-  const contact_modes modes = equations_.modes_at(state);
-  equations_.evaluate(time, state, modes, inputs, result);
+  equations_.want_slopes(true);
+  equations_.evaluate(time, state, nullptr, inputs, result);
   if (!jacobian) return;
   linearisation blocks(rig_);
-  blocks.take(equations_, state, modes, inputs, rigid_slopes::exact);
+  blocks.take(equations_, state, inputs, rigid_slopes::exact);
   blocks.dense(jacobian);
 }
 

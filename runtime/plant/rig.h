@@ -18,14 +18,15 @@ constexpr std::size_t max_joints = 16, max_tendons = 64;
 
 /* One side of a friction law, magnitudes: share of the tension (tendons), N·m or m (joints). */
 struct law_side {
-  double break_away = 0.0;        /* static */
-  double sliding = 0.0;           /* coulomb */
-  double stribeck_velocity = 1.0; /* m/s, rad/s */
+  double break_away = 0.0;    /* static */
+  double sliding = 0.0;       /* coulomb */
+  double stribeck_rate = 1.0; /* 1/stribeck_velocity, s/m or s/rad */
   double viscous = 0.0;
 };
 
 struct law {
   law_side positive, negative;
+  double break_away = 0.0; /* mean of both sides */
 };
 
 /* A law by the angle of the joint before: values interpolated linearly, constant outside. One law: no angles. */
@@ -39,6 +40,7 @@ struct diversion {
   enum class form { none, sine, capstan_share, capstan_exponent };
   form shape = form::none;
   double rest = 0.0, slope = 1.0, centre = 0.0;         /* θ = rest + slope (q − centre), rad */
+  double normal = 1.0;                                  /* coulomb level of the law that is scaled to the diversion's */
   double coefficient = 0.0, negative_coefficient = 0.0; /* for θ >= 0 and θ < 0 */
 };
 
@@ -52,7 +54,7 @@ struct friction_site {
   std::size_t angle_joint = 0;
   law_by_angle friction;
   diversion turn;
-  double presliding = 0.0; /* m */
+  double inverse_length = 0.0; /* 1/presliding, 1/m */
 };
 
 /* Joint friction T_jv0, or its part T_jvf that grows with the tensions. */
@@ -60,7 +62,7 @@ struct joint_site {
   std::size_t joint = 0;
   bool by_load = false;
   law friction;
-  double presliding = 0.0; /* rad */
+  double inverse_length = 0.0; /* 1/presliding, 1/rad */
 };
 
 enum class tension_loss { linear, capstan };

@@ -15,7 +15,7 @@ law_side read_side(const json_node& node, double factor) {
   law_side side;
   side.break_away = factor * number_in(node, "static", {0.0, 1e6, ""});
   side.sliding = factor * number_in(node, "coulomb", {0.0, 1e6, ""});
-  side.stribeck_velocity = number_in(node, "stribeck_velocity", {0.0, 1e6, "m/s or rad/s", true});
+  side.stribeck_rate = 1.0 / number_in(node, "stribeck_velocity", {0.0, 1e6, "m/s or rad/s", true});
   side.viscous = factor * number_in(node, "viscous", {0.0, 1e6, ""}, 0.0);
   if (side.break_away > 0.0 && side.sliding < 1e-6 * side.break_away) {
     node.member("coulomb").refuse("a positive number where `static` is one: bristles need sliding friction");
@@ -27,7 +27,9 @@ law read_law(const json_node& node, double asymmetry) {
   const bool two_sided = !node.member("positive").absent();
   const json_node positive = two_sided ? node.member("positive") : node;
   const json_node negative = two_sided ? node.member("negative") : node;
-  return {read_side(positive, 1.0 + asymmetry), read_side(negative, 1.0 - asymmetry)};
+  law found = {read_side(positive, 1.0 + asymmetry), read_side(negative, 1.0 - asymmetry), 0.0};
+  found.break_away = 0.5 * (found.positive.break_away + found.negative.break_away);
+  return found;
 }
 
 law_by_angle read_laws(const json_node& node, double asymmetry) {
@@ -56,7 +58,7 @@ presliding read_presliding(const json_node& friction) {
 }
 
 /* Edges that the rig gives another shape than working points. */
-void read_diversions(const json_node& friction, rig* rig) {
+void read_diversions(const json_node& friction, double asymmetry, rig* rig) {
   const json_node list = friction.member("edges");
   if (list.absent()) return;
   list.expect_list(0, max_joints * max_tendons, "edges");
@@ -81,7 +83,9 @@ void read_diversions(const json_node& friction, rig* rig) {
     turn.coefficient = number_in(node, "coefficient", {0.0, 10.0, ""});
     turn.negative_coefficient = number_in(node, "negative_coefficient", {0.0, 10.0, ""}, turn.coefficient);
     const law& shape = site->friction.laws.front();
-    if (shape.positive.sliding + shape.negative.sliding <= 0.0) {
+    // of the description's law, before the rig made it one-sided
+    turn.normal = 0.5 * (shape.positive.sliding / (1.0 + asymmetry) + shape.negative.sliding / (1.0 - asymmetry));
+    if (turn.normal <= 0.0) {
       node.refuse("an edge whose first law has coulomb friction, to which the shape is scaled");
     }
     site->turn = turn;
@@ -89,7 +93,7 @@ void read_diversions(const json_node& friction, rig* rig) {
 }
 
 /* Slowly moving wrist: every tendon rubs there before it reaches the finger. */
-void read_wrist(const json_node& physics, rig* rig) {
+void read_wrist(const json_node& physics, double asymmetry, rig* rig) {
   const json_node node = physics.member("wrist");
   if (node.absent()) return;
   node.expect_keys({"amplitude", "period", "arms", "friction", "presliding"});
@@ -99,8 +103,8 @@ void read_wrist(const json_node& physics, rig* rig) {
   node.member("friction").expect_keys({"static", "coulomb", "stribeck_velocity", "viscous"});
   friction_site site;
   site.where = friction_site::place::wrist;
-  site.friction.laws.push_back(read_law(node.member("friction"), 0.0));
-  site.presliding = number_in(node, "presliding", {0.0, 1.0, "m", true}, 40e-6);
+  site.friction.laws.push_back(read_law(node.member("friction"), asymmetry));
+  site.inverse_length = 1.0 / number_in(node, "presliding", {0.0, 1.0, "m", true}, 40e-6);
   for (std::size_t i = 0; i < rig->tendon_count(); ++i) {
     site.tendon = i;
     rig->sites.push_back(site);
@@ -132,7 +136,7 @@ void read_tendon_sites(const json_node& tendon_node, std::size_t i, const presli
                         j > 0 ? j - 1 : 0,
                         read_laws(edges.element(j), asymmetry),
                         {},
-                        distance.edge});
+                        1.0 / distance.edge});
     }
     const std::size_t after_edge = sites->size() - tendon.first_site;
     if (j + 1 < n && !pulleys.element(j).absent()) {
@@ -143,7 +147,7 @@ void read_tendon_sites(const json_node& tendon_node, std::size_t i, const presli
                         0,
                         read_laws(pulleys.element(j), asymmetry),
                         {},
-                        distance.pulley});
+                        1.0 / distance.pulley});
     }
     const std::size_t after_pulley = sites->size() - tendon.first_site;
     tendon.sites_before_torque.push_back(pulley_turns_joint ? after_pulley : after_edge);
@@ -157,7 +161,7 @@ void read_joint_sites(const json_node& joints, double distance, double asymmetry
   for (std::size_t j = 0; j < rig->joint_count(); ++j) {
     for (const bool by_load : {false, true}) {
       const json_node node = joints.element(j).member(by_load ? "load_friction" : "friction");
-      if (!node.absent()) rig->joint_sites.push_back({j, by_load, read_law(node, asymmetry), distance});
+      if (!node.absent()) rig->joint_sites.push_back({j, by_load, read_law(node, asymmetry), 1.0 / distance});
     }
   }
 }
@@ -189,14 +193,14 @@ void read_friction(const json_node& finger, const json_node& physics, rig* rig) 
   settings.heat_coefficient = number_in(heat, "coefficient", {-10.0, 10.0, "1/J"}, 0.0);
   settings.heat_time = number_in(heat, "time_constant", {0.0, 1e9, "s", true}, 100.0);
 
-  read_wrist(physics, rig);
+  read_wrist(physics, asymmetry, rig);
   std::vector<friction_site> sites;
   for (std::size_t i = 0; i < rig->tendon_count(); ++i) {
     read_tendon_sites(finger.member("tendons").element(i), i, distance, asymmetry, at_joint, all_load, rig, &sites);
   }
   rig->sites = sites;
   read_joint_sites(finger.member("joints"), distance.joint, asymmetry, rig);
-  read_diversions(node, rig);
+  read_diversions(node, asymmetry, rig);
 }
 
 }  // namespace tendonfmu::plant

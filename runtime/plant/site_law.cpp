@@ -1,7 +1,5 @@
 #include "site_law.h"
 
-#include <algorithm>
-
 namespace tendonfmu::plant {
 namespace {
 
@@ -15,11 +13,17 @@ law_values interpolated(const law_by_angle& points, double angle, double v, int 
   const std::vector<double>& angles = points.angles;
   if (angles.size() < 2 || angle <= angles.front()) return values_of(points.laws.front(), v, exponent);
   if (angle >= angles.back()) return values_of(points.laws.back(), v, exponent);
-  const std::size_t k =
-      static_cast<std::size_t>(std::upper_bound(angles.begin(), angles.end(), angle) - angles.begin());
+  std::size_t k = 1;
+  while (angles[k] <= angle) ++k;  // few points: a search would take longer
   const double width = angles[k] - angles[k - 1];
   const double u = (angle - angles[k - 1]) / width;
-  const law_values low = values_of(points.laws[k - 1], v, exponent), high = values_of(points.laws[k], v, exponent);
+  // neighbours mostly share the Stribeck velocity: one exponential does
+  const law_side &low_side = side_of(points.laws[k - 1], v), &high_side = side_of(points.laws[k], v);
+  const level_and_slope excess = stribeck_excess(low_side, std::fabs(v), exponent);
+  const law_values low = values_of(points.laws[k - 1], v, excess);
+  const law_values high = values_of(
+      points.laws[k], v,
+      low_side.stribeck_rate == high_side.stribeck_rate ? excess : stribeck_excess(high_side, std::fabs(v), exponent));
 
   law_values both;
   blend(u, width, low.break_away, high.break_away, &both.break_away, &both.break_away_by_angle);
@@ -53,7 +57,7 @@ law_values diverted(const friction_site& site, double angle, double v, int expon
   const law& shape = site.friction.laws.front();
   const double theta = site.turn.rest + site.turn.slope * (angle - site.turn.centre);
   const level_and_slope level = diversion_level(site.turn, theta);
-  const double normal = 0.5 * (shape.positive.sliding + shape.negative.sliding);
+  const double normal = site.turn.normal;
   const double scale = level.level / normal, scale_by_angle = site.turn.slope * level.slope / normal;
 
   const law_values one = values_of(shape, v, exponent);
