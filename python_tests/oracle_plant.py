@@ -5,7 +5,7 @@ from the Jacobians of the centres of mass, the velocity terms from Christoffel s
 steps, and every friction contact is one plain object. It favours reading over speed. Indices in this file start at 0.
 
 State: q[n], q'[n], motor x[m], motor x'[m], bristles, heat, motor work, friction work, damping work, push work.
-Bristles: wrist of tendon 1..m; along each tendon edge 1, pulley 1, edge 2, ...; per joint friction, load_friction.
+Bristles: along each tendon wrist, edge 1, pulley 1, edge 2, ...; then per joint friction, load_friction.
 """
 
 from __future__ import annotations
@@ -83,11 +83,10 @@ class PlantTwin:
         self.wrist = given(self.physics, "wrist", None)
         self.places: list[tuple[Any, ...]] = []
         self.contacts: dict[tuple[Any, ...], Contact] = {}
-        if self.wrist is not None:
-            length = float(given(self.wrist, "presliding", 40e-6))
-            for i in range(self.m):
-                self._add(("wrist", i), self.wrist["friction"], length, shared)
         for i, tendon in enumerate(self.finger["tendons"]):
+            if self.wrist is not None:
+                length = float(given(self.wrist, "presliding", 40e-6))
+                self._add(("wrist", i), self.wrist["friction"], length, shared)
             for j in range(self.n):
                 self._add(("edge", i, j), _entry(tendon.get("edge_friction"), j), self.lengths["edge"], shared)
                 if j < self.n - 1:

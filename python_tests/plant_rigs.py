@@ -22,6 +22,8 @@ ANTAGONISTS = [[ARM], [-ARM]]
 TWO_JOINTS = [[ARM, ARM], [-ARM, ARM], [ARM, -ARM], [-ARM, -ARM]]  # every column sums to 0: equal tensions hold it
 STIFF_ONLY = {"static": 0.0, "coulomb": 0.0, "stribeck_velocity": 1.0}
 
+CALM = {"damping": 20.0}  # N·s/m in the tendons: settles the springs, leaves friction_torque alone
+
 
 def dry(level: float, static: float | None = None, stribeck: float = 1.0, viscous: float = 0.0) -> Table:
     """A symmetric law; without `static` it has no Stribeck effect, so ĝ = 1."""
@@ -109,6 +111,13 @@ def small_rig(
         "recording": {"duration": 1.0},
     }
     return rig | {key: value for key, value in other.items() if key in own}
+
+
+def calm(rig: Table) -> Table:
+    """The rig with damped tendons."""
+    given = rig["physics"].get("tendons", [{}] * len(rig["finger"]["tendons"]))
+    rig["physics"]["tendons"] = [CALM | dict(each) for each in given]
+    return rig
 
 
 def make(rig: Mapping[str, Any], **settings: Any) -> binding.Plant:
