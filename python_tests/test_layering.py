@@ -40,6 +40,7 @@ BEYOND_C = {
 ONLY = {
     "fmpy": "fmu.py",
     "tendonfmu._native": "native.py",
+    "tendonfmu._plant": "plant.py",
     "matplotlib": "plots.py",
     "typer": "cli.py",
     "rich": "cli.py",

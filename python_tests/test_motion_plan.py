@@ -272,7 +272,7 @@ def test_pushes_keep_their_ranges_and_their_order() -> None:
 
 
 def test_directions_are_taken_in_turn() -> None:
-    found = pushes(direction=["pad", "side", "any"])
+    found = pushes(duration=1e3, count=120, direction=["pad", "side", "any"])
     for k, push in enumerate(found):
         along, side, pad = np.abs(push["direction"])
         if k % 3 == 0:
@@ -281,7 +281,8 @@ def test_directions_are_taken_in_turn() -> None:
             assert (along, side, pad) == (0.0, 1.0, 0.0)
         else:
             assert 0.0 < max(along, side, pad) < 1.0
-    assert {np.sign(push["direction"][2]) for push in found[::3]} == {-1.0, 1.0}
+    # as often from the pad as from the nail, within 4 standard deviations of 40 draws
+    assert abs(sum(push["direction"][2] for push in found[::3])) < 4 * np.sqrt(40)
 
 
 def test_anywhere_is_along_all_links_by_their_length() -> None:

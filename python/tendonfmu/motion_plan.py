@@ -89,7 +89,7 @@ def expand_motion(motion: Node, joints: Joints, seed: int, duration: float | Non
 
 def _still(motion: Node, joints: Joints) -> Motion:
     motion.keys(("kind", "duration", "position", "pretension"))
-    motion.member("duration").number(0.0, LONGEST, "s", default=0.0)
+    motion.member("duration").number(0.0, LONGEST, "s", default=LONGEST, above=True)
     position = _posture(motion.member("position"), joints.lower, joints.upper)
     return Motion([_standing(angle) for angle in position], _pretension(motion), "still")
 

@@ -1,0 +1,384 @@
+"""`tendonfmu simulate` and what stands behind it: recording, truth, reproducibility, failure without a trace."""
+
+from __future__ import annotations
+
+import json
+import sys
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from plant_rigs import needs_plant
+from random_rigs import random_rig
+from rig_cases import RIGS, changed, index_rig, with_everything, written
+from tendonfmu import plant as binding
+from tendonfmu.cli import main
+from tendonfmu.errors import InputError
+from tendonfmu.plant import Plant, PlantError, SolverError
+from tendonfmu.recording import read_recording
+from tendonfmu.rig import read_rig
+from tendonfmu.simulation import CHUNK, ENERGIES, Simulation, simulate
+from tendonfmu.tables import write_table
+
+pytestmark = needs_plant
+
+
+@dataclass(frozen=True)
+class Answer:
+    status: int
+    out: str
+    err: str
+
+
+Call = Callable[..., Answer]
+
+
+@pytest.fixture
+def call(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> Call:
+    """Runs `tendonfmu ARGUMENTS` in an empty folder and gives its exit status and both streams."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: str | Path) -> Answer:
+        monkeypatch.setattr(sys, "argv", ["tendonfmu", *map(str, arguments)])
+        capfd.readouterr()
+        with pytest.raises(SystemExit) as ended:
+            main()
+        out, err = capfd.readouterr()
+        assert isinstance(ended.value.code, int)
+        return Answer(ended.value.code, out, err)
+
+    return run
+
+
+def short_rig(**changes: Any) -> dict[str, Any]:
+    """Two seconds of the index finger with a push, all columns."""
+    data = index_rig()
+    data["motion"] |= {"duration": 2.0, "still": 0.1}
+    data["recording"] = {
+        "duration": 2.0,
+        "columns": ["joint_position", "joint_velocity", "external_torque", "contact"],
+    }
+    data["pushes"] = [{"start": 0.5, "rise": 0.1, "hold": 0.3, "fall": 0.1, "force": 1.5, "direction": [0.0, 0.0, 1.0]}]
+    data["settle"] = 1.0
+    return data | changes
+
+
+def solver_failure() -> dict[str, Any]:
+    """Steps of 10 ms at 40 N of pretension: far beyond what the end joint's swing allows."""
+    data = short_rig(integration={"method": "fixed_step", "step": 1e-2})
+    data["motion"]["pretension"] = 40.0
+    return data
+
+
+def simulated(folder: Path, data: dict[str, Any], **options: Any) -> Simulation:
+    return simulate(read_rig(written(folder, data)), **options)
+
+
+def group(table: dict[str, Any], name: str) -> np.ndarray:
+    columns = [key for key in table if key.startswith(f"{name}[")]
+    assert columns == [f"{name}[{k + 1}]" for k in range(len(columns))] and columns
+    return np.column_stack([table[key] for key in columns])
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> Simulation:
+    return simulated(tmp_path_factory.mktemp("short"), short_rig(), truth=True)
+
+
+# --- the recording ----------------------------------------------------------------------------------------------------
+
+
+def test_the_recording_is_one_of_the_contract(call: Call, tmp_path: Path) -> None:
+    answer = call("simulate", written(tmp_path, short_rig()), "-o", "rec.parquet")
+    assert (answer.status, answer.out) == (0, "")
+    assert answer.err.startswith("rec.parquet: 1000 samples, 1.998 s of index_finger, 1 pushes, 0.4")
+    recording = read_recording("rec.parquet")
+    recording.require(4, 8, ("joint_position", "joint_velocity", "external_torque"))
+    assert np.array_equal(recording.time, np.arange(1000) / 500)
+    assert recording.contact is not None and 200 < recording.contact.sum() < 250
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["rec.parquet", "rig.json"]
+
+
+def test_columns_are_those_asked_for(tmp_path: Path) -> None:
+    data = short_rig(recording={"duration": 0.1})
+    assert set(simulated(tmp_path, data).recording) == {
+        "time",
+        *(f"{name}[{i}]" for name in ("tendon_force", "tendon_position") for i in range(1, 9)),
+    }
+    data["recording"]["columns"] = ["contact", "joint_position"]
+    wanted = [*(f"joint_position[{j}]" for j in range(1, 5)), "contact"]
+    assert list(simulated(tmp_path, data).recording)[17:] == wanted
+
+
+def test_csv_and_parquet_hold_the_same(call: Call, tmp_path: Path) -> None:
+    rig = written(tmp_path, short_rig(recording={"duration": 0.1, "columns": ["contact"]}))
+    assert call("simulate", rig, "-o", "a.csv").status == call("simulate", rig, "-o", "a.parquet").status == 0
+    a, b = read_recording("a.csv"), read_recording("a.parquet")
+    for name, array in a.arrays().items():
+        assert np.array_equal(array, b.arrays()[name]), name
+
+
+def test_sensors_stand_between_truth_and_recording(result: Simulation) -> None:
+    """Noise and steps as the rig has them, at the sample's own time: nothing is late."""
+    assert result.truth is not None
+    for name, noise, step in (
+        ("tendon_force", 3e-3, 2e-3),
+        ("tendon_position", 0.0, 2e-6),
+        ("joint_position", 2e-4, 2e-4),
+    ):
+        measured = group(result.recording, name)
+        error = measured - group(result.truth, name)
+        expected = np.hypot(noise, step / np.sqrt(12.0))
+        assert np.abs(error.std() / expected - 1.0) < 0.05, name
+        assert np.abs(error.mean()) < 5 * expected / np.sqrt(error.size), name
+        assert np.allclose(measured / step, np.round(measured / step), atol=1e-6), name
+    assert np.array_equal(group(result.recording, "joint_velocity"), group(result.truth, "joint_velocity"))
+
+
+def test_the_truth_is_whole_and_consistent(result: Simulation) -> None:
+    truth = result.truth
+    assert truth is not None
+    assert next(iter(truth)) == "time" and set(ENERGIES) < set(truth)
+    assert {len(column) for column in truth.values()} == {1000}
+    arms = np.array([tendon["moment_arms"] for tendon in index_rig()["finger"]["tendons"]])
+    torque = group(truth, "joint_torque")
+    assert np.allclose(torque, group(truth, "tendon_force") @ arms, atol=1e-12)
+    parts = [group(truth, f"{name}_torque") for name in ("external", "inertial", "stop", "friction")]
+    assert np.allclose(torque, sum(parts), atol=1e-12)
+    force = np.linalg.norm(group(truth, "contact_force"), axis=1)
+    assert np.array_equal(truth["contact"], force > 0.05) and abs(force.max() - 1.5) < 1e-9
+    assert np.abs(group(truth, "external_torque")[~truth["contact"]]).max() < 0.05 * 0.1
+    balance = truth["kinetic_energy"] + truth["potential_energy"] + truth["friction_work"] + truth["damping_work"]
+    balance = balance - truth["motor_work"] - truth["push_work"]
+    assert np.ptp(balance) < 1e-4 * np.ptp(truth["friction_work"])
+
+
+def test_the_truth_does_not_change_the_recording(tmp_path: Path, result: Simulation) -> None:
+    plain = simulated(tmp_path, short_rig())
+    assert plain.truth is None
+    for name, column in plain.recording.items():
+        assert np.array_equal(column, result.recording[name]), name
+
+
+def test_progress_is_told_to_the_end(tmp_path: Path) -> None:
+    told: list[tuple[int, int]] = []
+    simulated(tmp_path, short_rig(), progress=lambda done, total: told.append((done, total)))
+    assert told[0] == (0, 1000) and told[-1] == (1000, 1000)
+    assert len(told) == 1000 // CHUNK + 1 and [done for done, _ in told] == sorted(done for done, _ in told)
+
+
+# --- reproducibility --------------------------------------------------------------------------------------------------
+
+
+def test_the_same_seed_gives_the_same_bytes(call: Call, tmp_path: Path) -> None:
+    rig = written(tmp_path, with_everything() | {"recording": {"duration": 1.0, "columns": ["contact"]}})
+    for name in ("a", "b"):
+        assert call("simulate", rig, "-o", f"{name}.parquet", "--truth", f"{name}_truth.parquet").status == 0
+    assert (tmp_path / "a.parquet").read_bytes() == (tmp_path / "b.parquet").read_bytes()
+    assert (tmp_path / "a_truth.parquet").read_bytes() == (tmp_path / "b_truth.parquet").read_bytes()
+
+
+def test_another_seed_changes_the_noise_alone(tmp_path: Path, result: Simulation) -> None:
+    other = simulated(tmp_path, short_rig(seed=99), truth=True)
+    assert result.truth is not None and other.truth is not None
+    assert np.array_equal(group(other.truth, "tendon_force"), group(result.truth, "tendon_force"))
+    assert not np.array_equal(group(other.recording, "tendon_force"), group(result.recording, "tendon_force"))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_rigs_run_and_keep_their_energy(tmp_path: Path, seed: int) -> None:
+    truth = simulated(tmp_path, random_rig(seed, duration=8.0), truth=True).truth
+    assert truth is not None
+    balance = truth["kinetic_energy"] + truth["potential_energy"] + truth["friction_work"] + truth["damping_work"]
+    balance = balance - truth["motor_work"] - truth["push_work"]
+    assert np.ptp(balance) < 1e-4 * np.ptp(truth["friction_work"])
+    moved = np.ptp(group(truth, "joint_position"), axis=0)
+    assert moved.min() > 0.05 and not group(truth, "slack").any()
+
+
+def test_the_index_rigs_begin_alike_and_differ_by_pretension(tmp_path: Path) -> None:
+    """The same motion at 10 and 40 N; joints lag more where friction is four times as strong."""
+    found = []
+    for name in ("index_finger.json", "index_finger_x4.json"):
+        data = {"format": "tendonfmu-rig-1", "base": str(RIGS / name), "recording": {"duration": 6.0}}
+        found.append(simulated(tmp_path, data, truth=True).truth)
+    low, high = found
+    assert low is not None and high is not None
+    ratio = group(high, "tendon_force").mean() / group(low, "tendon_force").mean()
+    assert abs(ratio - 4.0) < 0.05
+    # the motors do the same but for the springs' stretch
+    stretch = group(high, "tendon_position") - group(low, "tendon_position")
+    assert np.ptp(stretch, axis=0).max() < 1e-9 * 6
+    friction = [np.sqrt((group(truth, "friction_torque") ** 2).mean(axis=0)) for truth in (low, high)]
+    assert np.all(friction[1] > 2.0 * friction[0])
+
+
+# --- failure ----------------------------------------------------------------------------------------------------------
+
+
+def test_a_solver_failure_leaves_no_file(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "rec.parquet").write_text("what was there before")
+    rig = written(tmp_path, solver_failure())
+    answer = call("simulate", rig, "-o", "rec.parquet", "--truth", "truth.parquet")
+    assert (answer.status, answer.out) == (2, "")
+    assert len(answer.err.splitlines()) == 1
+    assert answer.err.startswith(f"tendonfmu: {rig}: ") and "t = " in answer.err and "try" in answer.err
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["rec.parquet", "rig.json"]
+    assert (tmp_path / "rec.parquet").read_text() == "what was there before"
+
+
+def test_the_binding_tells_solver_failures_from_bad_calls(tmp_path: Path) -> None:
+    plant = Plant(read_rig(written(tmp_path, solver_failure())).json())
+    with pytest.raises(SolverError, match="try"):
+        plant.initialise()
+    fresh = Plant(read_rig(written(tmp_path, short_rig())).json())
+    with pytest.raises(PlantError) as early:
+        fresh.advance(1.0)
+    assert not isinstance(early.value, SolverError)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (("-o", "rec.txt"), "rec.txt: unknown format '.txt'; expected .csv or .parquet"),
+        (("-o", "none/rec.csv"), "none/rec.csv: no folder none; expected one that exists"),
+        (("-o", "rec.csv", "--truth", "rec.csv"), "rec.csv: the same file for recording and truth; expected two names"),
+        (("-o", "rec.csv", "--integrator", "euler"), "--integrator euler: expected cvode or fixed_step"),
+    ],
+)
+def test_bad_usage_is_refused_before_anything_runs(call: Call, tmp_path: Path, arguments: Any, line: str) -> None:
+    answer = call("simulate", written(tmp_path, short_rig()), *arguments)
+    assert (answer.status, answer.err) == (2, f"tendonfmu: {line}\n")
+    assert [file.name for file in tmp_path.iterdir()] == ["rig.json"]
+
+
+def test_no_file_of_the_rig_is_overwritten(call: Call, tmp_path: Path) -> None:
+    table = {"time": [0.0, 1.0]} | {
+        f"joint_{kind}[{j}]": [0.3, 0.3] if kind == "position" else [0.0, 0.0]
+        for j in range(1, 5)
+        for kind in ("position", "velocity", "acceleration")
+    }
+    write_table("motion.csv", {name: np.array(column) for name, column in table.items()})
+    data = short_rig(motion={"kind": "file", "file": "motion.csv", "pretension": 10.0})
+    answer = call("simulate", written(tmp_path, data), "-o", "motion.csv")
+    assert answer.status == 2 and "motion.csv: the same file as the input" in answer.err
+
+
+def test_bad_rigs_end_with_status_2(call: Call, tmp_path: Path) -> None:
+    rig = written(tmp_path, changed(short_rig(), ("physics", "links", 0, "mass"), -1.0))
+    answer = call("simulate", rig, "-o", "rec.csv")
+    assert answer.status == 2 and answer.err.startswith(f"tendonfmu: {rig}: physics.links[1].mass = -1.0: expected")
+
+
+def test_without_a_plant_simulate_says_so(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(binding, "HAS_PLANT", False)
+    answer = call("simulate", written(tmp_path, short_rig()), "-o", "rec.csv")
+    assert (answer.status, answer.err) == (2, f"tendonfmu: {binding.PLANT_MISSING}\n")
+
+
+# --- the binding ------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def plant(tmp_path: Path) -> Plant:
+    return Plant(read_rig(written(tmp_path, short_rig())).json())
+
+
+def test_settings_read_back_and_are_checked(plant: Plant) -> None:
+    before = plant.settings
+    assert (before.integrator, before.relative_tolerance, before.seed, before.push_link) == ("cvode", 1e-6, 1, 4)
+    plant.configure(integrator="fixed_step", step=1e-4, seed=2**53, push_point=(0.0, 0.0, 0.01), push_link=2)
+    after = plant.settings
+    assert (after.integrator, after.step, after.seed) == ("fixed_step", 1e-4, 2**53)
+    assert (after.push_point, after.push_link) == ((0.0, 0.0, 0.01), 2)
+    with pytest.raises(PlantError, match="integrator = 'euler': expected cvode or fixed_step"):
+        plant.configure(integrator="euler")
+    with pytest.raises(PlantError):
+        plant.configure(push_link=9)
+    plant.initialise()
+    with pytest.raises(PlantError):
+        plant.configure(step=1e-3)
+
+
+def test_signals_have_their_shapes(plant: Plant) -> None:
+    plant.initialise()
+    assert (plant.time, plant.initialised) == (0.0, True)
+    found = plant.run(np.array([0.0, 0.01, 0.02]))
+    assert set(found) == set(binding.SIGNALS)
+    assert found["tendon_force"].shape == (3, 8) and found["joint_position"].shape == (3, 4)
+    assert found["contact_point"].shape == (3, 3) and found["energy"].shape == (3, 6)
+    assert found["contact"].shape == found["friction_level"].shape == (3,)
+    assert found["contact"].dtype == found["slack"].dtype == bool
+    assert plant.time == 0.02 and plant.statistics.steps > 0
+    with pytest.raises(PlantError, match="no signal torque"):
+        plant.run(np.array([0.03]), ["torque"])
+    with pytest.raises(PlantError):
+        plant.run(np.array([0.01]))
+
+
+def test_the_right_hand_side_and_its_derivative_are_reached(plant: Plant) -> None:
+    plant.initialise()
+    state = plant.continuous_state()
+    assert state.shape == (plant.order,)
+    slope, jacobian = plant.derivative(0.0, state), plant.jacobian(0.0, state)
+    assert slope.shape == (plant.order,) and jacobian.shape == (plant.order, plant.order)
+    assert np.array_equal(slope[:4], state[4:8])  # q' is the joints' velocity
+    assert np.array_equal(jacobian[:4, 4:8], np.eye(4))
+    with pytest.raises(PlantError, match=f"expected a state of {plant.order} numbers"):
+        plant.derivative(0.0, state[1:])
+
+
+def test_inputs_act_and_states_come_back(plant: Plant) -> None:
+    plant.configure(scheduled_motion=False, scheduled_pushes=False, sensors=False)
+    plant.initialise()
+    hold = plant.hold_command()
+    assert hold.shape == (8,)
+    plant.set_inputs(hold)
+    still = plant.run(np.array([0.2]))["joint_position"][0]
+    state = plant.save_state()
+    plant.set_inputs(hold, push_force=(0.0, 0.0, 1.0))
+    pushed = plant.run(np.array([0.4]))
+    assert np.abs(pushed["joint_position"][0] - still).max() > 1e-3 and pushed["contact"][0]
+    plant.restore_state(state)
+    assert plant.time == 0.2
+    assert np.array_equal(plant.run(np.array([0.2]))["joint_position"][0], still)
+    with pytest.raises(PlantError):
+        plant.restore_state(state[:-1])
+    with pytest.raises(PlantError, match="one command per tendon"):
+        plant.set_inputs([0.0])
+    plant.reset()
+    assert not plant.initialised
+
+
+def test_other_threads_run_while_the_plant_does(plant: Plant) -> None:
+    """run() and initialise() release the interpreter."""
+    ticks: list[int] = []
+    done = threading.Event()
+
+    def tick() -> None:
+        while not done.wait(0.001):
+            ticks.append(len(ticks))
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    try:
+        plant.initialise()
+        before = len(ticks)
+        plant.run(np.arange(5000) / 500.0)
+        during = len(ticks) - before
+    finally:
+        done.set()
+        thread.join()
+    assert during > 3
+
+
+def test_a_bad_rig_text_is_refused() -> None:
+    with pytest.raises(InputError):
+        Plant("{}")
+    with pytest.raises(InputError):
+        Plant(json.dumps({"format": "tendonfmu-rig-1"}).encode())
