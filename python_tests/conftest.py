@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from fmu_binary import FINGER, UnpackedFmu, unpack
+from plant_fmu_rig import fmu_rig
 
 
 @pytest.fixture(scope="session")
@@ -25,3 +26,19 @@ def small_fmu_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def small_fmu(small_fmu_path: Path) -> UnpackedFmu:
     """The same, unpacked and loaded."""
     return unpack(small_fmu_path, small_fmu_path.parent / "unpacked")
+
+
+@pytest.fixture(scope="session")
+def plant_fmu_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The simulated finger of plant_fmu_rig.fmu_rig(), its rig.json beside it."""
+    from tendonfmu.plant_packaging import build_plant_fmu
+
+    folder = tmp_path_factory.mktemp("plant_fmu")
+    (folder / "rig.json").write_text(json.dumps(fmu_rig()))
+    return build_plant_fmu(folder / "rig.json", folder / "small.fmu")
+
+
+@pytest.fixture(scope="session")
+def plant_fmu(plant_fmu_path: Path) -> UnpackedFmu:
+    """The same, unpacked and loaded."""
+    return unpack(plant_fmu_path, plant_fmu_path.parent / "unpacked")

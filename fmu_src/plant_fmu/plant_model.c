@@ -283,20 +283,38 @@ static double plant_time(double start, double time) {
   return fabs(plain - rounded) <= lost ? rounded : plain;
 }
 
+/* Gives the plant the importer's inputs, if they are others, and keeps what it had. */
+static int change_inputs(model* m, const double* inputs) {
+  memcpy(m->before, m->inputs, m->input_count * sizeof *m->inputs);
+  m->first_command = !m->commanded && is_command(m, inputs);
+  if (m->first_command) {
+    tendonfmu_plant_save_state(m->plant, m->scratch, m->plant_state_size);
+  }
+  return plant_take_inputs(m, inputs);
+}
+
+/* Inputs are part of the plant's state: after a step that failed it has those of before. That no command had come yet,
+ * only a whole state can say. */
+static void change_inputs_back(model* m) {
+  if (m->first_command) {
+    tendonfmu_plant_restore_state(m->plant, m->scratch, m->plant_state_size);
+    memcpy(m->inputs, m->before, m->input_count * sizeof *m->inputs);
+    m->commanded = 0;
+  } else {
+    plant_take_inputs(m, m->before);
+  }
+}
+
 int model_step(model* m, variables* values, double time, double step) {
   const double end = plant_time(m->start, time + step);
-  const int differ = inputs_differ(m, values), commanded = m->commanded;
-  if (differ) {
-    memcpy(m->before, m->inputs, m->input_count * sizeof *m->inputs);
-    if (plant_take_inputs(m, inputs_of(values))) {
-      return -1;
-    }
+  const int differ = inputs_differ(m, values);
+  if (differ && change_inputs(m, inputs_of(values))) {
+    return -1;
   }
   if (end > tendonfmu_plant_get_time(m->plant) && tendonfmu_plant_advance(m->plant, end) != TENDONFMU_PLANT_OK) {
     plant_failed(m);
-    if (differ) { /* inputs are part of the plant's state */
-      plant_take_inputs(m, m->before);
-      m->commanded = commanded;
+    if (differ) {
+      change_inputs_back(m);
     }
     return -1;
   }
