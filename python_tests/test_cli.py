@@ -24,7 +24,7 @@ from tendonfmu.tables import read_table, write_table
 
 ROOT = Path(__file__).resolve().parent.parent
 INDEX_FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
-COMMANDS = ("check", "build", "run", "convert", "demo")
+COMMANDS = ("check", "build", "run", "simulate", "convert", "demo")
 
 
 @dataclass(frozen=True)

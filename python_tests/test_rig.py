@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shutil
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -328,3 +330,21 @@ def test_without_a_plant_check_says_so(
     status, out, err = run_check(written(tmp_path, index_rig()), monkeypatch, capfd)
     assert (status, out, err) == (2, "", f"tendonfmu: {plant.PLANT_MISSING}\n")
     assert read_rig(tmp_path / "rig.json").rate == 500.0  # the file itself can still be read
+
+
+def test_an_installation_without_the_module_does_everything_else(tmp_path: Path) -> None:
+    """The package as it is where SUNDIALS was not found, in an interpreter of its own."""
+    installed = Path(plant.__file__).parent
+    without = shutil.ignore_patterns("_plant*.so", "_plant*.pyd", "binaries", "sources", "__pycache__")
+    shutil.copytree(installed, tmp_path / "tendonfmu", ignore=without)
+
+    def run(*arguments: str | Path) -> tuple[int, str, str]:
+        command = [sys.executable, "-m", "tendonfmu.cli", *map(str, arguments)]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
+        return done.returncode, done.stdout, done.stderr
+
+    missing = (2, "", f"tendonfmu: {plant.PLANT_MISSING}\n")
+    assert run("check", RIGS / "index_finger.json") == missing
+    assert run("simulate", RIGS / "index_finger.json", "-o", "rec.parquet") == missing
+    status, out, err = run("check", EXAMPLES / "fingers" / "index_finger.json")
+    assert (status, err) == (0, "") and out.startswith("index_finger: a valid finger description")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import signal
+import subprocess
 import sys
 import threading
 from collections.abc import Callable
@@ -69,10 +71,9 @@ def short_rig(**changes: Any) -> dict[str, Any]:
 
 
 def solver_failure() -> dict[str, Any]:
-    """Steps of 10 ms at 40 N of pretension: far beyond what the end joint's swing allows."""
-    data = short_rig(integration={"method": "fixed_step", "step": 1e-2})
-    data["motion"]["pretension"] = 40.0
-    return data
+    """10 kN on a fingertip of 4 g, within one step of 10 ms: the fixed-step integrator finds no end of it."""
+    push = {"start": 0.5, "rise": 0.01, "hold": 0.3, "fall": 0.1, "force": 1e4, "direction": [0.0, 0.0, 1.0]}
+    return short_rig(integration={"method": "fixed_step", "step": 1e-2}, pushes=[push])
 
 
 def simulated(folder: Path, data: dict[str, Any], **options: Any) -> Simulation:
@@ -211,9 +212,9 @@ def test_the_index_rigs_begin_alike_and_differ_by_pretension(tmp_path: Path) -> 
     assert low is not None and high is not None
     ratio = group(high, "tendon_force").mean() / group(low, "tendon_force").mean()
     assert abs(ratio - 4.0) < 0.05
-    # the motors do the same but for the springs' stretch
+    # the motors do the same but for the springs' stretch, within ten times the relative tolerance of 10 mm
     stretch = group(high, "tendon_position") - group(low, "tendon_position")
-    assert np.ptp(stretch, axis=0).max() < 1e-9 * 6
+    assert np.ptp(stretch, axis=0).max() < 1e-7
     friction = [np.sqrt((group(truth, "friction_torque") ** 2).mean(axis=0)) for truth in (low, high)]
     assert np.all(friction[1] > 2.0 * friction[0])
 
@@ -234,12 +235,29 @@ def test_a_solver_failure_leaves_no_file(call: Call, tmp_path: Path) -> None:
 
 def test_the_binding_tells_solver_failures_from_bad_calls(tmp_path: Path) -> None:
     plant = Plant(read_rig(written(tmp_path, solver_failure())).json())
-    with pytest.raises(SolverError, match="try"):
-        plant.initialise()
+    plant.initialise()
+    with pytest.raises(SolverError, match=r"at t = 0\.5\d* s .*try"):
+        plant.advance(2.0)
+    assert plant.time == 0.0  # where it stood
     fresh = Plant(read_rig(written(tmp_path, short_rig())).json())
     with pytest.raises(PlantError) as early:
         fresh.advance(1.0)
     assert not isinstance(early.value, SolverError)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT for one process on Windows")
+def test_ctrl_c_ends_a_long_simulation_at_once(tmp_path: Path) -> None:
+    data = short_rig(recording={"duration": 20000.0})
+    data["motion"]["duration"] = 20000.0
+    command = [sys.executable, "-m", "tendonfmu.cli", "simulate", str(written(tmp_path, data)), "-o", "rec.csv"]
+    with subprocess.Popen([*command, "--progress"], cwd=tmp_path, stderr=subprocess.PIPE) as process:
+        assert process.stderr is not None
+        process.stderr.read(1)  # the bar is drawn: it runs
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert err.decode().splitlines()[-1].endswith("tendonfmu: interrupted; no file was left half written")
+    assert [file.name for file in tmp_path.iterdir()] == ["rig.json"]
 
 
 @pytest.mark.parametrize(

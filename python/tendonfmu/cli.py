@@ -25,6 +25,8 @@ app = typer.Typer(
     help="Friction of tendon-driven robot fingers: what the finger feels, without a tactile sensor.",
 )
 
+INTERRUPTED = 130
+
 FingerFile = Annotated[Path, typer.Argument(metavar="FINGER.json", help="finger description")]
 
 
@@ -39,7 +41,7 @@ def main() -> None:
         _refuse(str(refused))
     except (KeyboardInterrupt, typer.Abort):
         _say("tendonfmu: interrupted; no file was left half written")
-        sys.exit(130)
+        sys.exit(INTERRUPTED)
     except Exception as refused:  # bad usage; the class has moved between versions of typer
         if not hasattr(refused, "format_message"):
             raise
@@ -49,6 +51,8 @@ def main() -> None:
         page = getattr(getattr(refused, "ctx", None), "command_path", "tendonfmu")
         _refuse(f"{refused.format_message().rstrip('.')}; see {page} --help")
     else:
+        if status == INTERRUPTED:  # newer versions of typer turn Ctrl-C into a status
+            _say("tendonfmu: interrupted; no file was left half written")
         sys.exit(status if isinstance(status, int) else 0)
 
 
@@ -338,7 +342,7 @@ def _progress(wanted: bool | None = None) -> Progress:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    console = Console(stderr=True)
+    console = Console(stderr=True, force_terminal=wanted or None)
     return Progress(
         TextColumn("{task.description}"),
         BarColumn(),

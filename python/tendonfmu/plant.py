@@ -9,19 +9,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-try:
-    from tendonfmu import _plant
-except ModuleNotFoundError:
-    HAS_PLANT = False
-else:
-    HAS_PLANT = True
-
 from tendonfmu.errors import InputError
+
+# a module that is there and does not load is a fault to be seen, not a missing one
+HAS_PLANT = find_spec("tendonfmu._plant") is not None
+if HAS_PLANT:
+    from tendonfmu import _plant
 
 Array = NDArray[Any]
 
