@@ -7,6 +7,7 @@ import subprocess
 import sys
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -235,7 +236,7 @@ def test_the_motors_hold_until_they_are_commanded(plant_fmu: UnpackedFmu) -> Non
         for k in range(100):
             assert instance.step(k * 0.001) == OK
         np.testing.assert_allclose(instance.get_real(motors), first, rtol=0, atol=1e-9)
-        goal = first + [2e-4, 0.0, 0.0, -1e-4]
+        goal = np.add(first, [2e-4, 0.0, 0.0, -1e-4])
         assert instance.set_real({f"tendon_position_command[{i + 1}]": x for i, x in enumerate(goal)}) == OK
         for k in range(100, 600):
             assert instance.step(k * 0.001) == OK
@@ -288,7 +289,7 @@ def test_steps_of_any_length_agree_within_the_tolerance(plant_fmu: UnpackedFmu) 
     for times in (np.arange(601) * 1e-3, np.arange(61) * 1e-2, np.arange(37) / 60, uneven, [0.0, 0.6]):
         with Instance(plant_fmu) as instance:
             instance.initialise()
-            for now, then in zip(times[:-1], times[1:], strict=True):
+            for now, then in pairwise(times):
                 assert instance.step(now, then - now) == OK, instance.last_message
             ends.append(instance.get_real(truth))
     for end in ends[1:]:

@@ -1,6 +1,7 @@
 """An SSP package that couples a simulated finger with the friction FMU of the same finger (SSP 1.0).
 
 Plain: one system without connectors of its own, two components, connections between them; masters ask for no more.
+For masters that hand nothing over before the first step, the package holds what the friction FMU's inputs then are.
 """
 
 from __future__ import annotations
@@ -9,8 +10,11 @@ from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
+import numpy as np
+
 from tendonfmu.model_variables import NOT_IN_XML
 from tendonfmu.packaging import members, pack
+from tendonfmu.plant import Plant
 from tendonfmu.plant_packaging import plant_members
 from tendonfmu.rig import Rig, read_rig
 from tendonfmu.signals import INPUTS
@@ -18,6 +22,7 @@ from tendonfmu.whole_file import whole_file
 
 PLANT, FRICTION = "plant", "friction"
 PLANT_FMU, FRICTION_FMU = "TendonFinger.fmu", "friction.fmu"
+START_VALUES = "resources/start_values.ssv"
 DURATION = 10.0  # s, of the default experiment where the rig records nothing
 
 # beside the connected ones, to look at; fmpy knows no inputs that are left unconnected
@@ -43,6 +48,7 @@ def ssp_members(rig: Rig) -> dict[str, bytes]:
         "SystemStructure.ssd": system_structure(rig).encode(),
         f"resources/{PLANT_FMU}": pack(plant_members(rig)),
         f"resources/{FRICTION_FMU}": pack(members(rig.finger)),
+        START_VALUES: start_values(rig).encode(),
     }
 
 
@@ -76,6 +82,31 @@ def system_structure(rig: Rig) -> str:
         "  </ssd:System>",
         f'  <ssd:DefaultExperiment startTime="0.0" stopTime="{DURATION if rig.duration is None else rig.duration}"/>',
         "</ssd:SystemStructureDescription>",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def start_values(rig: Rig) -> str:
+    """An SSV parameter set: the friction FMU's inputs at time 0, as the settled finger's sensors give them."""
+    plant = Plant(rig.json())
+    plant.initialise()
+    signals = plant.run(np.zeros(1), [f"measured_{group}" for group in INPUTS])
+    values = {
+        f"{FRICTION}.{group}[{i}]": float(value)
+        for group in INPUTS
+        for i, value in enumerate(signals[f"measured_{group}"][0], start=1)
+    }
+    lines = [
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        '<ssv:ParameterSet xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues" version="1.0"',
+        '    name="start_values">',
+        "  <ssv:Parameters>",
+        *(
+            f'    <ssv:Parameter name="{name}"><ssv:Real value="{value!r}"/></ssv:Parameter>'
+            for name, value in values.items()
+        ),
+        "  </ssv:Parameters>",
+        "</ssv:ParameterSet>",
     ]
     return "\n".join(lines) + "\n"
 
