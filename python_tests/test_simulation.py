@@ -97,7 +97,7 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> Simulation:
 def test_the_recording_is_one_of_the_contract(call: Call, tmp_path: Path) -> None:
     answer = call("simulate", written(tmp_path, short_rig()), "-o", "rec.parquet")
     assert (answer.status, answer.out) == (0, "")
-    assert answer.err.startswith("rec.parquet: 1000 samples, 1.998 s of index_finger, 1 pushes, 0.4")
+    assert answer.err.startswith("rec.parquet: 1000 samples, 1.998 s of index_finger, 1 push, 0.4")
     recording = read_recording("rec.parquet")
     recording.require(4, 8, ("joint_position", "joint_velocity", "external_torque"))
     assert np.array_equal(recording.time, np.arange(1000) / 500)

@@ -37,7 +37,8 @@ class Simulation:
         """What was simulated, in lines of text."""
         time = self.recording["time"]
         pushes = len(rig.expanded["pushes"])
-        contact = f", {pushes} pushes, {self.contact_seconds:.2f} s in contact" if pushes else ""
+        counted = "1 push" if pushes == 1 else f"{pushes} pushes"
+        contact = f", {counted}, {self.contact_seconds:.2f} s in contact" if pushes else ""
         return [
             f"{len(time)} samples, {time[-1]:.3f} s of {rig.name}{contact}; {self.integrator}: {self.work.steps} steps"
         ]
