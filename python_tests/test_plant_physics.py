@@ -328,6 +328,36 @@ def test_obstacle_appears_in_the_external_torque() -> None:
     assert seen > 30
 
 
+def test_push_of_the_inputs() -> None:
+    """A force given from outside acts in the base frame at push_point, beside the rig's own motion."""
+    rig = small_rig(TWO_JOINTS, motion=legs_of([[0.2, 0.8, -0.5]], [0.2, 0.3]), links=[{"damping": 0.002}] * 2)
+    plant = make(rig, push_point=(0.01, 0.0, 0.0), push_link=2)
+    force = np.array([0.5, -0.2, 0.7])
+    plant.set_inputs(push_force=force.tolist())
+    found = plant.run(np.array([0.1, 0.2]))
+    for q, torque in zip(found["joint_position"], found["external_torque"], strict=True):
+        np.testing.assert_allclose(torque, -planar_jacobian(q, 0.01).T @ force, rtol=1e-9)
+    np.testing.assert_allclose(found["contact_force"], [force, force], rtol=1e-12)
+    plant.set_inputs()
+    assert np.all(plant.run(np.array([0.21]))["external_torque"] == 0.0)
+
+
+def test_commands_and_pretension_of_the_inputs() -> None:
+    """With the rig's motion inputs are added to it; without it the command is the motors' absolute position."""
+    rig = small_rig(links=[{"damping": 0.005}])
+    shift = np.array([ARM, -ARM]) * 0.1  # turns the joint by 0.1 rad
+    added = make(rig)
+    added.set_inputs(shift.tolist(), pretension=5.0)
+    alone = make(rig, scheduled_motion=False)
+    hold = alone.hold_command()
+    np.testing.assert_allclose(hold, 10.0 / STIFFNESS, rtol=1e-12)
+    alone.set_inputs((hold + shift).tolist(), pretension=5.0)
+    for plant in (added, alone):
+        found = plant.run(np.array([1.5]))
+        np.testing.assert_allclose(found["joint_position"], 0.1, rtol=1e-6)
+        np.testing.assert_allclose(found["tendon_force"], 15.0, rtol=1e-6)
+
+
 def test_friction_never_drives() -> None:
     """beyond_joint: over each closed cycle of a steady motion friction takes energy out."""
     law = dry(0.03, 0.04, 0.005, 0.2)
