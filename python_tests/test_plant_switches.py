@@ -326,6 +326,15 @@ def test_edges_capstan(posture: float, loss: str) -> None:
     assert edge_loss("capstan", posture, tension_loss=loss) == pytest.approx(expected, rel=3e-3)
 
 
+def test_contacts_without_dry_friction() -> None:
+    """A law that is only viscous, or nothing at all, needs no bristle level to divide by."""
+    for viscous in (0.003, 0.0):
+        rig = sliding(joints=[{"friction": dry(0.0, viscous=viscous)}], friction={"bristle_damping": 0.003})
+        found = run(rig, SLIDE)
+        np.testing.assert_allclose(found["friction_torque"], viscous * found["joint_velocity"], atol=1e-10)
+        assert last(found, "joint_velocity")[0] == pytest.approx(SPEED, rel=1e-3)
+
+
 def test_drift() -> None:
     """Level 1 + A (1 − exp(−t/T)); it does not touch the viscous part."""
     law = dry(0.006, viscous=0.002)
