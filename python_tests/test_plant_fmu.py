@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 import zipfile
@@ -359,3 +360,36 @@ def test_fmpy_simulates(plant_fmu_path: Path) -> None:
     result = fmpy.simulate_fmu(str(plant_fmu_path), stop_time=0.1, start_values={"pretension": 2.0, "sensors": False})
     assert len(result) > 50 and np.all(np.isfinite(result["truth.joint_torque[1]"]))
     assert np.array_equal(result["tendon_force[1]"], result["truth.tendon_force[1]"])
+
+
+# --- its page ---------------------------------------------------------------------------------------------------------
+
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "simulated_finger_fmu.md"
+
+
+def test_the_page_names_every_variable_and_the_floor(plant_fmu: UnpackedFmu) -> None:
+    page = PAGE.read_text(encoding="utf-8")
+    groups = {name.partition("[")[0] for name in plant_fmu.variables}
+    sizes = {"tendon": "[1..m]", "joint": "[1..n]"}
+    for group in groups:
+        count = sum(name.partition("[")[0] == group for name in plant_fmu.variables)
+        shown = {1: "", 2: sizes["joint"], 3: "[1..3]", 4: sizes["tendon"]}[count]
+        assert f"`{group}{shown}`" in page, group
+    contents = read_contents(plant_binary(plant_fmu.folder).read_bytes())
+    if contents.format == "ELF":
+        named = re.search(r"\*\*GLIBC ([\d.]+)\*\*", page)
+        assert named and contents.glibc_floor <= tuple(map(int, named[1].split(".")))
+
+
+def test_the_snippets_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "rig.json").write_text(json.dumps(fmu_rig()))
+    monkeypatch.chdir(tmp_path)
+    page = PAGE.read_text(encoding="utf-8")
+    shell, code = (re.findall(rf"```{language}\n(.*?)```", page, re.DOTALL) for language in ("sh", "python"))
+    command = [sys.executable, "-m", "tendonfmu.cli", *shell[0].split()[1:]]
+    subprocess.run(command, check=True, capture_output=True)
+    names: dict[str, Any] = {}
+    exec(compile(code[0], PAGE.name, "exec"), names)
+    result = names["result"]
+    assert len(result) == 2001
+    assert result["truth.external_torque[1]"][0] == pytest.approx(0.04, rel=0.05)  # 0.5 N at 0.08 m
