@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import math
 import pickle
+import re
 import struct
 import subprocess
 import sys
@@ -192,12 +193,17 @@ def test_status_inquiries(plant_fmu: UnpackedFmu) -> None:
 TOO_HARD = {FORCE: -1e4, COMMAND: 10.0, "tendon_position_command[2]": -10.0, "pretension": 1e4}
 
 
-def test_a_solver_failure_leaves_the_finger_where_it_was(plant_fmu: UnpackedFmu) -> None:
-    with running(plant_fmu) as instance, running(plant_fmu) as untouched:
+@pytest.mark.parametrize("integrator", [1, 2])
+def test_a_solver_failure_leaves_the_finger_where_it_was(plant_fmu: UnpackedFmu, integrator: int) -> None:
+    with Instance(plant_fmu) as instance, Instance(plant_fmu) as untouched:
+        for each in (instance, untouched):
+            assert each.set_integer("integrator", integrator) == OK
+            each.initialise()
+            play(each, 5)
         before, shown = instance.save(), instance.outputs()
         assert instance.set_real(TOO_HARD) == OK
         assert instance.step(0.005, 1.0) == ERROR
-        assert "fmi2DoStep: " in instance.last_message and " at t = 0.00" in instance.last_message
+        assert re.match(r"fmi2DoStep: .* at t = 0.*: try .*", instance.last_message), instance.last_message
         assert instance.outputs() == shown
         assert instance.step(0.005) == ERROR and "not allowed in state error" in instance.last_message
         for each in (instance, untouched):
@@ -207,10 +213,10 @@ def test_a_solver_failure_leaves_the_finger_where_it_was(plant_fmu: UnpackedFmu)
 
 def test_an_initialisation_that_fails_can_be_mended(plant_fmu: UnpackedFmu) -> None:
     with Instance(plant_fmu) as instance, Instance(plant_fmu) as plain:
-        assert instance.set_integer("integrator", 2) == OK and instance.set_real({"step": 0.01}) == OK
+        assert instance.set_integer("integrator", 2) == OK and instance.set_real(TOO_HARD) == OK
         assert instance.setup() == OK and instance.call("EnterInitializationMode") == OK
         assert instance.call("ExitInitializationMode") == ERROR
-        assert "fixed-step integrator diverged" in instance.last_message and "step 0.01 s" in instance.last_message
+        assert re.match(r"fmi2ExitInitializationMode: .* at t = -0\.3", instance.last_message), instance.last_message
         assert instance.call("Reset") == OK
         for each in (instance, plain):
             each.initialise()
