@@ -7,7 +7,6 @@ import json
 import math
 import os
 import random
-import re
 import shutil
 import subprocess
 import sys
@@ -68,15 +67,13 @@ from pathlib import Path
 sys.path.insert(0, sys.argv[1])
 from fmu_binary import ERROR, OK, Instance, UnpackedFmu
 from plant_fmu_rig import play
-from test_plant_fmu_states import TOO_HARD
 locale.setlocale(locale.LC_ALL, sys.argv[3])
 assert locale.localeconv()["decimal_point"] == ","
 with Instance(UnpackedFmu(Path(sys.argv[2]))) as instance:
     instance.initialise()
     print(json.dumps(play(instance, 100)[-1]))
     assert instance.call("Reset") == OK
-    assert instance.set_integer("integrator", 2) == OK and instance.set_real(TOO_HARD) == OK
-    assert instance.call("EnterInitializationMode") == OK and instance.call("ExitInitializationMode") == ERROR
+    assert instance.set_real({"step": 0.25}) == ERROR
     print(instance.last_message)
 """
 
@@ -99,7 +96,7 @@ def test_decimal_comma(plant_fmu: UnpackedFmu, comma_locale: tuple[str, dict[str
     with Instance(plant_fmu) as instance:
         instance.initialise()
         assert json.loads(outputs) == play(instance, 100)[-1]
-    assert re.search(r" at t = -0\.\d+ s with step 0\.\d+ s: ", message), message
+    assert message == "fmi2SetReal: step = 0.25: expected 1e-06 to 0.01 s"
 
 
 def test_the_hosts_floating_point_stays(plant_fmu: UnpackedFmu) -> None:
