@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "motion.h"
 #include "site_law.h"
@@ -25,15 +26,18 @@ preload preload_at(double preload_force, double tension) {
 
 }  // namespace
 
-dynamics::dynamics(const rig& rig) : rig_(rig), layout_(rig) {
+dynamics::dynamics(const rig& rig) : rig_(rig), layout_(rig), values_(rig.bristle_count()) {
   const std::size_t arms = rig.tendon_count() * rig.joint_count();
   values_.arm.resize(arms);
   values_.arm_slope.resize(arms);
-  values_.velocity.resize(rig.sites.size());
-  values_.response.resize(rig.bristle_count());
+  values_.passed.resize(padded(rig.sites.size()));
   values_.tension.resize(rig.sites.size());
   values_.loss_by_share.resize(rig.sites.size());
   values_.loss_by_force.resize(rig.sites.size());
+  for (std::size_t s = 0; s < rig.sites.size(); ++s) values_.laws.inverse_length[s] = rig.sites[s].inverse_length;
+  for (std::size_t s = 0; s < rig.joint_sites.size(); ++s) {
+    values_.laws.inverse_length[rig.sites.size() + s] = rig.joint_sites[s].inverse_length;
+  }
 }
 
 /* Moment arms, elongations and forces at the springs. */
@@ -74,29 +78,17 @@ void dynamics::move_tendons(const double* state, bool own_modes) {
   }
 }
 
-inline void dynamics::respond_to(const law_values& law, double inverse_length, double w, double v,
-                                 bristle_response* r) {
-  const double damping = rig_.friction.bristle_damping;
-  if (span_ > 0.0) {
-    respond_after(law, values_.level, inverse_length, damping, w, v, span_, slopes_, r);
-  } else {
-    respond(law, values_.level, inverse_length, damping, w, v, slopes_, r);
-  }
-}
-
-/* Friction along every tendon, and what it leaves for the joints. */
-void dynamics::rub_tendons(const double* state) {
+/* Sliding velocities and laws of all sites, then what all bristles do. */
+void dynamics::bend_bristles(const double* state) {
   const std::size_t n = layout_.joints;
-  const double *q = state, *speed = state + layout_.speed(), *bristle = state + layout_.bristle();
+  const double *q = state, *speed = state + layout_.speed();
   const friction_settings& settings = rig_.friction;
   evaluation& e = values_;
-  std::fill(e.passed_torque, e.passed_torque + n, 0.0);
-  std::fill(e.load, e.load + n, 0.0);
-  e.wrist_power = 0.0;
-  const double wrist_speed = e.wrist_speed = rig_.wrist.arms.empty()
-                                                 ? 0.0
-                                                 : rig_.wrist.amplitude * (2.0 * pi / rig_.wrist.period) *
-                                                       cosine(2.0 * pi * std::max(e.time, 0.0) / rig_.wrist.period);
+  e.wrist_speed = 0.0;
+  if (!rig_.wrist.arms.empty()) {
+    const double omega = 2.0 * pi / rig_.wrist.period;
+    e.wrist_speed = rig_.wrist.amplitude * omega * cosine(omega * std::max(e.time, 0.0));
+  }
   for (std::size_t i = 0; i < layout_.tendons; ++i) {
     const tendon& tendon = rig_.tendons[i];
     const double* arm = &e.arm[i * n];
@@ -104,54 +96,69 @@ void dynamics::rub_tendons(const double* state) {
     double sliding[max_joints + 1];
     sliding[n] = 0.0;
     for (std::size_t j = n; j-- > 0;) sliding[j] = sliding[j + 1] + arm[j] * speed[j];
-
-    double tension = e.force[i];
     for (std::size_t s = tendon.first_site; s < tendon.first_site + tendon.site_count; ++s) {
       const friction_site& site = rig_.sites[s];
       double v = sliding[site.first_mover];
-      if (site.where == friction_site::place::wrist) v += rig_.wrist.arms[i] * wrist_speed;
-      const double angle = site.bends ? q[site.angle_joint] : 0.0;
-      const law_values law = site_law(site, angle, v, settings.stribeck_exponent);
-      bristle_response& r = e.response[s];
-      respond_to(law, site.inverse_length, bristle[s], v, &r);
-      if (!site.bends) r.share_by_angle = r.rate_by_angle = 0.0;
-      e.velocity[s] = v;
+      if (site.where == friction_site::place::wrist) v += rig_.wrist.arms[i] * e.wrist_speed;
+      set_site_law(site, site.bends ? q[site.angle_joint] : 0.0, v, settings.stribeck_exponent, s, &e.laws);
+    }
+  }
+  const std::size_t first = rig_.sites.size();
+  for (std::size_t s = 0; s < rig_.joint_sites.size(); ++s) {
+    const joint_site& site = rig_.joint_sites[s];
+    set_law(site.friction, speed[site.joint], settings.stribeck_exponent, first + s, &e.laws);
+  }
+  std::copy(state + layout_.bristle(), state + layout_.heat(), e.bristles.begin());
+  respond(e.laws, {e.level, settings.bristle_damping, span_, slopes_}, e.bristles.data(), &e.responses);
+  for (std::size_t s = 0; slopes_ && s < first; ++s) {
+    if (!rig_.sites[s].bends) e.responses.share_by_angle[s] = e.responses.rate_by_angle[s] = 0.0;
+  }
+}
+
+/* Tension along every tendon, and what it leaves for the joints. */
+void dynamics::rub_tendons() {
+  const std::size_t n = layout_.joints;
+  const friction_settings& settings = rig_.friction;
+  evaluation& e = values_;
+  const double* share = e.responses.share.data();
+  const bool capstan = settings.loss == tension_loss::capstan;
+  for (std::size_t s = 0; capstan && s < rig_.sites.size(); s += pair_size) {
+    pair two;
+    std::memcpy(&two, share + s, sizeof two);
+    two = exponential(-two);
+    std::memcpy(&e.passed[s], &two, sizeof two);
+  }
+
+  std::fill(e.passed_torque, e.passed_torque + n, 0.0);
+  std::fill(e.load, e.load + n, 0.0);
+  e.wrist_power = 0.0;
+  for (std::size_t i = 0; i < layout_.tendons; ++i) {
+    const tendon& tendon = rig_.tendons[i];
+    const double* arm = &e.arm[i * n];
+    double tension = e.force[i];
+    for (std::size_t s = tendon.first_site; s < tendon.first_site + tendon.site_count; ++s) {
       const preload extra = preload_at(settings.preload, tension);
-      if (settings.loss == tension_loss::linear) {
-        e.loss_by_share[s] = -(tension + extra.force);
-        e.loss_by_force[s] = 1.0 - (1.0 + extra.by_force) * r.share;
-        tension -= (tension + extra.force) * r.share;
-      } else {
-        const double rest = exponential(-r.share);
-        e.loss_by_share[s] = -tension * rest - extra.force;
-        e.loss_by_force[s] = rest - extra.by_force * r.share;
-        tension = tension * rest - extra.force * r.share;
-      }
+      const double passed = capstan ? e.passed[s] : 1.0 - share[s];
+      e.loss_by_share[s] = -(capstan ? tension * passed : tension) - extra.force;
+      e.loss_by_force[s] = passed - extra.by_force * share[s];
+      tension = tension * passed - extra.force * share[s];
       e.tension[s] = tension;
     }
     // what moves the wrist works against the friction there, beside the finger
-    if (wrist_speed != 0.0)
-      e.wrist_power += rig_.wrist.arms[i] * wrist_speed * (e.force[i] - e.tension[tendon.first_site]);
-    const auto after = [&](std::size_t passed) {
-      return passed == 0 ? e.force[i] : e.tension[tendon.first_site + passed - 1];
+    if (e.wrist_speed != 0.0) {
+      e.wrist_power += rig_.wrist.arms[i] * e.wrist_speed * (e.force[i] - e.tension[tendon.first_site]);
+    }
+    const auto after = [&](std::size_t count) {
+      return count == 0 ? e.force[i] : e.tension[tendon.first_site + count - 1];
     };
     for (std::size_t j = 0; j < n; ++j) {
       e.passed_torque[j] += arm[j] * after(tendon.sites_before_torque[j]);
       if (tendon.loads[j]) e.load[j] += after(tendon.sites_before_load[j]);
     }
   }
-}
-
-void dynamics::rub_joints(const double* state) {
-  const std::size_t first = rig_.sites.size();
-  const friction_settings& settings = rig_.friction;
   for (std::size_t s = 0; s < rig_.joint_sites.size(); ++s) {
     const joint_site& site = rig_.joint_sites[s];
-    const double v = state[layout_.speed() + site.joint];
-    bristle_response& r = values_.response[first + s];
-    respond_to(values_of(site.friction, v, settings.stribeck_exponent), site.inverse_length,
-               state[layout_.bristle() + first + s], v, &r);
-    values_.passed_torque[site.joint] -= (site.by_load ? values_.load[site.joint] : 1.0) * r.share;
+    e.passed_torque[site.joint] -= (site.by_load ? e.load[site.joint] : 1.0) * share[rig_.sites.size() + s];
   }
 }
 
@@ -220,8 +227,8 @@ void dynamics::evaluate(double time, const double* state, const contact_modes* m
 
   // tendons, friction, stops
   move_tendons(state, !modes);
-  rub_tendons(state);
-  rub_joints(state);
+  bend_bristles(state);
+  rub_tendons();
   press_stops(state, !modes);
 
   // balance of torques
@@ -260,7 +267,7 @@ void dynamics::evaluate(double time, const double* state, const contact_modes* m
     derivative[layout_.motor_speed() + i] =
         omega * (omega * (command[i] - state[layout_.motor() + i]) - 2.0 * rig_.servo_damping * motor_speed);
   }
-  for (std::size_t s = 0; s < layout_.bristles; ++s) derivative[layout_.bristle() + s] = e.response[s].rate;
+  for (std::size_t s = 0; s < layout_.bristles; ++s) derivative[layout_.bristle() + s] = e.responses.rate[s];
   derivative[layout_.heat()] = e.friction_power - heat / friction.heat_time;
   derivative[layout_.motor_work()] = e.motor_power + e.wrist_power;
   derivative[layout_.friction_work()] = e.friction_power;

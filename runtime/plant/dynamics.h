@@ -63,15 +63,18 @@ struct evaluation {
   double force[max_tendons], force_by_elongation[max_tendons], force_by_speed[max_tendons]; /* at the spring */
   double spring_loss = 0; /* W, of the tendons' dampers */
   double level = 1.0, level_by_heat = 0.0;
-  std::vector<double> velocity;                     /* [sites] of sliding */
-  std::vector<bristle_response> response;           /* [sites + joint sites] */
-  std::vector<double> tension;                      /* [sites] after the site */
+  law_columns laws;             /* of sites and joint sites */
+  std::vector<double> bristles; /* [padded] */
+  response_columns responses;
+  std::vector<double> passed, tension;              /* [sites] e^(−λ) of a capstan; N after the site */
   std::vector<double> loss_by_share, loss_by_force; /* [sites] slopes of the tension after by λ and by the one before */
   double load[max_joints];                          /* Σ f_B of eq. (8) */
   double spring_torque[max_joints];                 /* Rᵀ f0 */
   double passed_torque[max_joints];                 /* what tendons and joint friction leave of it */
   double friction_power = 0, motor_power = 0;
   double wrist_speed = 0, wrist_power = 0; /* dα/dt; W, of what moves the wrist against friction */
+
+  explicit evaluation(std::size_t count) : laws(count), bristles(padded(count)), responses(count) {}
 };
 
 class dynamics {
@@ -108,9 +111,8 @@ class dynamics {
 
  private:
   void move_tendons(const double* state, bool own_modes);
-  void respond_to(const law_values& law, double inverse_length, double w, double v, bristle_response* r);
-  void rub_tendons(const double* state);
-  void rub_joints(const double* state);
+  void bend_bristles(const double* state);
+  void rub_tendons();
   void press_stops(const double* state, bool own_modes);
 
   const rig& rig_;

@@ -4,6 +4,7 @@
 #define TENDONFMU_PLANT_ELEMENTARY_H
 
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 
@@ -11,33 +12,54 @@ namespace tendonfmu::plant {
 
 constexpr double pi = 3.14159265358979323846;
 
-inline double power_of_two(int exponent) {
-  const std::uint64_t bits = static_cast<std::uint64_t>(exponent + 1023) << 52;
-  double value;
-  std::memcpy(&value, &bits, sizeof value);
-  return value;
-}
-
 /* Nearest integer of |x| < 2^51, exact, without a library call. */
 inline double nearest(double x) {
   constexpr double shift = 6755399441055744.0;  // 1.5 · 2^52
   return (x + shift) - shift;
 }
 
-/* e^x; 0 below -708 and e^708 above 708. */
-inline double exponential(double x) {
-  if (x < -708.0) return 0.0;
-  if (x > 708.0) x = 708.0;
+/* Two numbers at once, in one register of every 64-bit machine, with the same bits as one at a time. */
+using pair = double __attribute__((vector_size(16)));
+using pair_bits = std::uint64_t __attribute__((vector_size(16)));
+constexpr std::size_t pair_size = 2;
+
+inline std::uint64_t bits_of(double x) {
+  std::uint64_t bits;
+  std::memcpy(&bits, &x, sizeof bits);
+  return bits;
+}
+inline double from_bits(std::uint64_t bits) {
+  double x;
+  std::memcpy(&x, &bits, sizeof x);
+  return x;
+}
+inline __attribute__((always_inline)) pair_bits bits_of(const pair& x) {
+  return (pair_bits)x;
+}
+inline __attribute__((always_inline)) pair from_bits(const pair_bits& bits) {
+  return (pair)bits;
+}
+
+/* e^x of |x| <= 708, beyond that e^±708. T: double or pair. */
+template <class T>
+inline __attribute__((always_inline)) T exponential(const T& argument) {
   constexpr double ln2_high = 6.93147180369123816490e-01, ln2_low = 1.90821492927058770002e-10;
-  const double k = nearest(x * 1.44269504088896338700);
-  const double r = (x - k * ln2_high) - k * ln2_low;
+  constexpr double shift = 6755399441055744.0;  // 1.5 · 2^52: the sum's last bits are the nearest integer
+  const T low = T{} - 708.0, high = T{} + 708.0;
+  T x = argument < low ? low : argument;
+  x = x > high ? high : x;
+  const T shifted = x * 1.44269504088896338700 + shift;
+  const T k = shifted - shift;
+  const T r = (x - k * ln2_high) - k * ln2_low;
   // Taylor's series to degree 13: |r| <= ln2/2 leaves less than 1e-17
-  const double r2 = r * r;
-  const double even =
-      1.0 / 2 + r2 * (1.0 / 24 + r2 * (1.0 / 720 + r2 * (1.0 / 40320 + r2 * (1.0 / 3628800 + r2 / 479001600))));
-  const double odd =
-      1.0 / 6 + r2 * (1.0 / 120 + r2 * (1.0 / 5040 + r2 * (1.0 / 362880 + r2 * (1.0 / 39916800 + r2 / 6227020800.0))));
-  return (1.0 + (r + r2 * (even + r * odd))) * power_of_two(static_cast<int>(k));
+  const T r2 = r * r;
+  const T even =
+      1.0 / 2 + r2 * (1.0 / 24 + r2 * (1.0 / 720 + r2 * (1.0 / 40320 + r2 * (1.0 / 3628800 + r2 * (1.0 / 479001600)))));
+  const T odd =
+      1.0 / 6 +
+      r2 * (1.0 / 120 + r2 * (1.0 / 5040 + r2 * (1.0 / 362880 + r2 * (1.0 / 39916800 + r2 * (1.0 / 6227020800.0)))));
+  // 2^k: k stands in the last bits of `shifted`, the rest leaves at the top
+  return (1.0 + (r + r2 * (even + r * odd))) * from_bits((bits_of(shifted) + 1023) << 52);
 }
 
 /* ln x of a normal x > 0: 2 artanh((m − 1)/(m + 1)) of the mantissa. */

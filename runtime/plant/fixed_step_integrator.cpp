@@ -7,7 +7,8 @@
 namespace tendonfmu::plant {
 namespace {
 
-constexpr int most_iterations = 40;
+constexpr int most_iterations = 20;
+constexpr int most_divisions = 6;       /* of a step in two */
 constexpr double good_progress = 0.25;  // per iteration, else the matrix is taken anew
 constexpr double close_enough = 1e-6;   // rad/s, of the speed in the middle of a step
 constexpr double longest_change = 2.0;  // rad/s per iteration
@@ -102,12 +103,19 @@ double fixed_step_integrator::change_of_speed(double half, const double* speed) 
   return largest;
 }
 
-void fixed_step_integrator::step(const commands& inputs, double time, double size) {
+void fixed_step_integrator::step(const commands& inputs, double time, double size, int divisions) {
   const state_layout& at = equations_.layout();
   const double half = 0.5 * size, middle = time + half;
   middle_ = state_;
   move_motors(inputs, middle, half);
   if (!find_middle(inputs, middle, half)) {
+    // at a stop Newton's method may go to and fro across the kink: two shorter steps instead
+    forget();
+    if (divisions < most_divisions) {
+      step(inputs, time, half, divisions + 1);
+      step(inputs, middle, half, divisions + 1);
+      return;
+    }
     char line[160];
     std::snprintf(
         line, sizeof line,
@@ -124,9 +132,9 @@ void fixed_step_integrator::step(const commands& inputs, double time, double siz
   }
   for (std::size_t i = at.motor(); i < at.bristle(); ++i) state_[i] += 2.0 * (middle_[i] - state_[i]);
   // as much time again: the rest of the way shrinks by the same factor
+  const response_columns& bent = equations_.last().responses;
   for (std::size_t s = 0; s < at.bristles; ++s) {
-    const bristle_response& r = equations_.last().response[s];
-    state_[at.bristle() + s] += half * r.rate * (1.0 + r.kept);
+    state_[at.bristle() + s] += half * bent.rate[s] * (1.0 + bent.kept[s]);
   }
   for (std::size_t i = at.heat(); i < at.size(); ++i) state_[i] += size * rate_[i];
   work_.steps += 1;
@@ -138,7 +146,7 @@ void fixed_step_integrator::advance(const commands& inputs, double until, moment
   const double count = std::max(1.0, std::ceil(span / step_ - 1e-9));
   const double size = span / count;
   state_ = now->state;
-  for (double k = 0.0; k < count; ++k) step(inputs, now->time + k * size, size);
+  for (double k = 0.0; k < count; ++k) step(inputs, now->time + k * size, size, 0);
   last_step_ = size;
   now->state = state_;
   now->time = until;

@@ -12,7 +12,7 @@ namespace tendonfmu::plant {
  * the step: they never overshoot, however far a contact slides in one step. */
 class fixed_step_integrator : public integrator {
  public:
-  /* step: s; an advance is divided into equal steps of at most that. */
+  /* step: s; an advance is divided into equal steps of at most that. A step whose equation resists is halved. */
   fixed_step_integrator(dynamics* equations, double step);
 
   void forget() override;
@@ -20,7 +20,7 @@ class fixed_step_integrator : public integrator {
   double last_step() const override { return last_step_; }
 
  private:
-  void step(const commands& inputs, double time, double size);
+  void step(const commands& inputs, double time, double size, int divisions);
   void move_motors(const commands& inputs, double middle, double half);
   bool find_middle(const commands& inputs, double middle, double half);
   double change_of_speed(double half, const double* speed);

@@ -80,7 +80,7 @@ void linearisation::tendon_slopes(const evaluation& e, const double* speed, std:
   double by_load[max_joints] = {};
   for (std::size_t s = 0; s < rig_.joint_sites.size(); ++s) {
     const joint_site& site = rig_.joint_sites[s];
-    if (site.by_load && tendon.loads[site.joint]) by_load[site.joint] = e.response[rig_.sites.size() + s].share;
+    if (site.by_load && tendon.loads[site.joint]) by_load[site.joint] = e.responses.share[rig_.sites.size() + s];
   }
   for (std::size_t j = 0; j < n_; ++j) {
     double by_velocity[max_joints] = {};  // by the sliding velocity in link k, sites that start to slide there
@@ -93,11 +93,10 @@ void linearisation::tendon_slopes(const evaluation& e, const double* speed, std:
       const std::size_t s = tendon.first_site + passed - 1;
       const friction_site& site = rig_.sites[s];
       const double by_share = weight * e.loss_by_share[s];
-      const bristle_response& r = e.response[s];
-      by_bristle_(j, s) += by_share * r.share_by_bristle;
-      by_heat_[j] += by_share * r.share_by_level * e.level_by_heat;
-      by_angle_(j, site.angle_joint) += by_share * r.share_by_angle;
-      by_velocity[site.first_mover] += by_share * r.share_by_velocity;
+      by_bristle_(j, s) += by_share * e.responses.share_by_bristle[s];
+      by_heat_[j] += by_share * e.responses.share_by_level[s] * e.level_by_heat;
+      by_angle_(j, site.angle_joint) += by_share * e.responses.share_by_angle[s];
+      by_velocity[site.first_mover] += by_share * e.responses.share_by_velocity[s];
       weight *= e.loss_by_force[s];
     }
     // eq. (5) turned round: joint k moves every site whose first mover is not beyond it
@@ -116,13 +115,12 @@ void linearisation::tendon_slopes(const evaluation& e, const double* speed, std:
   }
   for (std::size_t s = tendon.first_site; s < tendon.first_site + tendon.site_count; ++s) {
     const friction_site& site = rig_.sites[s];
-    const bristle_response& r = e.response[s];
-    bristle_own_[s] = r.rate_by_bristle;
+    bristle_own_[s] = e.responses.rate_by_bristle[s];
     for (std::size_t k = site.first_mover; k < n_; ++k) {
-      bristle_by_speed_(s, k) = r.rate_by_velocity * arm[k];
-      bristle_by_angle_(s, k) = r.rate_by_velocity * arm_slope[k] * speed[k];
+      bristle_by_speed_(s, k) = e.responses.rate_by_velocity[s] * arm[k];
+      bristle_by_angle_(s, k) = e.responses.rate_by_velocity[s] * arm_slope[k] * speed[k];
     }
-    bristle_by_angle_(s, site.angle_joint) += r.rate_by_angle;
+    bristle_by_angle_(s, site.angle_joint) += e.responses.rate_by_angle[s];
   }
 }
 
@@ -130,13 +128,12 @@ void linearisation::joint_slopes(const evaluation& e) {
   for (std::size_t s = 0; s < rig_.joint_sites.size(); ++s) {
     const joint_site& site = rig_.joint_sites[s];
     const std::size_t j = site.joint, b = rig_.sites.size() + s;
-    const bristle_response& r = e.response[b];
     const double load = site.by_load ? e.load[j] : 1.0;
-    by_bristle_(j, b) -= load * r.share_by_bristle;
-    by_speed_(j, j) -= load * r.share_by_velocity;
-    by_heat_[j] -= load * r.share_by_level * e.level_by_heat;
-    bristle_own_[b] = r.rate_by_bristle;
-    bristle_by_speed_(b, j) = r.rate_by_velocity;
+    by_bristle_(j, b) -= load * e.responses.share_by_bristle[b];
+    by_speed_(j, j) -= load * e.responses.share_by_velocity[b];
+    by_heat_[j] -= load * e.responses.share_by_level[b] * e.level_by_heat;
+    bristle_own_[b] = e.responses.rate_by_bristle[b];
+    bristle_by_speed_(b, j) = e.responses.rate_by_velocity[b];
   }
 }
 
@@ -229,11 +226,10 @@ void linearisation::work_rows(const evaluation& e, const double* state) {
 void linearisation::wrist_slopes(const evaluation& e, const double* speed) {
   for (std::size_t i = 0; i < m_; ++i) {
     const std::size_t s = rig_.tendons[i].first_site;
-    const bristle_response& r = e.response[s];
     const double lever = rig_.wrist.arms[i] * e.wrist_speed;
     const double by_force = lever * (1.0 - e.loss_by_force[s]), by_share = -lever * e.loss_by_share[s];
     const double *arm = &e.arm[i * n_], *arm_slope = &e.arm_slope[i * n_];
-    const double by_path_speed = by_share * r.share_by_velocity - by_force * e.force_by_speed[i];
+    const double by_path_speed = by_share * e.responses.share_by_velocity[s] - by_force * e.force_by_speed[i];
     const auto add = [&](double& friction, double& outside, double slope) {
       friction += slope;
       outside += slope;
@@ -245,8 +241,8 @@ void linearisation::wrist_slopes(const evaluation& e, const double* speed) {
     }
     add(by_motor_(n_, i), motor_power_.by_motor[i], by_force * e.force_by_elongation[i]);
     add(by_motor_speed_(n_, i), motor_power_.by_motor_speed[i], by_force * e.force_by_speed[i]);
-    add(by_bristle_(n_, s), motor_power_.by_bristle[s], by_share * r.share_by_bristle);
-    add(by_heat_[n_], motor_power_.by_heat, by_share * r.share_by_level * e.level_by_heat);
+    add(by_bristle_(n_, s), motor_power_.by_bristle[s], by_share * e.responses.share_by_bristle[s]);
+    add(by_heat_[n_], motor_power_.by_heat, by_share * e.responses.share_by_level[s] * e.level_by_heat);
   }
 }
 

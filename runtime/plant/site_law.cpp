@@ -1,42 +1,71 @@
 #include "site_law.h"
 
+#include <cmath>
+
+#include "elementary.h"
+
 namespace tendonfmu::plant {
 namespace {
 
-/* (1 − u) x + u y, whose slope by the angle is (y − x)/width. */
-void blend(double u, double width, double x, double y, double* value, double* slope) {
-  *value = x + u * (y - x);
-  *slope = (y - x) / width;
+const law_side& side_of(const law& one, double v) {
+  return v < 0.0 ? one.negative : one.positive;
 }
 
-law_values interpolated(const law_by_angle& points, double angle, double v, int exponent) {
+/* A number of neighbouring laws in between, and its slope by the angle. */
+struct blend {
+  double share, per_angle; /* of the upper law; 1/width */
+
+  void put(double low, double high, double* value, double* slope) const {
+    *value = low + share * (high - low);
+    *slope = (high - low) * per_angle;
+  }
+};
+
+/* Values are interpolated, not numbers of laws: where neighbours share the Stribeck velocity that is the same; where
+ * they do not, both values are taken here and the row keeps nothing to add. */
+void set_between(const law& low, const law& high, const blend& at, double v, int exponent, std::size_t k,
+                 law_columns* laws) {
+  set_law(low, v, exponent, k, laws);
+  const law_side &a = side_of(low, v), &b = side_of(high, v);
+  at.put(low.break_away, high.break_away, &laws->break_away[k], &laws->break_away_by_angle[k]);
+  at.put(a.viscous, b.viscous, &laws->viscous[k], &laws->viscous_by_angle[k]);
+  if (a.stribeck_rate == b.stribeck_rate) {
+    at.put(a.sliding, b.sliding, &laws->sliding[k], &laws->sliding_by_angle[k]);
+    at.put(a.break_away - a.sliding, b.break_away - b.sliding, &laws->excess[k], &laws->excess_by_angle[k]);
+    return;
+  }
+  const double left_of_a = exponential(-laws->argument[k]), rate_of_a = laws->argument_by_speed[k];
+  const double x = std::fabs(v) * b.stribeck_rate;
+  const double left_of_b = exponential(exponent == 1 ? -x : -x * x);
+  const double rate_of_b = (exponent == 1 ? 1.0 : 2.0 * x) * b.stribeck_rate;
+  const double excess_of_a = (a.break_away - a.sliding) * left_of_a,
+               excess_of_b = (b.break_away - b.sliding) * left_of_b;
+  at.put(a.sliding + excess_of_a, b.sliding + excess_of_b, &laws->sliding[k], &laws->sliding_by_angle[k]);
+  double unused;
+  at.put(-excess_of_a * rate_of_a, -excess_of_b * rate_of_b, &laws->sliding_by_speed[k], &unused);
+  laws->excess[k] = 0.0;
+}
+
+void set_interpolated(const law_by_angle& points, double angle, double v, int exponent, std::size_t k,
+                      law_columns* laws) {
   const std::vector<double>& angles = points.angles;
-  if (angles.size() < 2 || angle <= angles.front()) return values_of(points.laws.front(), v, exponent);
-  if (angle >= angles.back()) return values_of(points.laws.back(), v, exponent);
-  std::size_t k = 1;
-  while (angles[k] <= angle) ++k;  // few points: a search would take longer
-  const double width = angles[k] - angles[k - 1];
-  const double u = (angle - angles[k - 1]) / width;
-  // neighbours mostly share the Stribeck velocity: one exponential does
-  const law_side &low_side = side_of(points.laws[k - 1], v), &high_side = side_of(points.laws[k], v);
-  const level_and_slope excess = stribeck_excess(low_side, std::fabs(v), exponent);
-  const law_values low = values_of(points.laws[k - 1], v, excess);
-  const law_values high = values_of(
-      points.laws[k], v,
-      low_side.stribeck_rate == high_side.stribeck_rate ? excess : stribeck_excess(high_side, std::fabs(v), exponent));
-
-  law_values both;
-  blend(u, width, low.break_away, high.break_away, &both.break_away, &both.break_away_by_angle);
-  blend(u, width, low.sliding, high.sliding, &both.sliding, &both.sliding_by_angle);
-  blend(u, width, low.viscous, high.viscous, &both.viscous, &both.viscous_by_angle);
-  both.sliding_by_velocity = low.sliding_by_velocity + u * (high.sliding_by_velocity - low.sliding_by_velocity);
-  return both;
+  if (angles.size() < 2 || angle <= angles.front()) return set_law(points.laws.front(), v, exponent, k, laws);
+  if (angle >= angles.back()) return set_law(points.laws.back(), v, exponent, k, laws);
+  std::size_t upper = 1;
+  while (angles[upper] <= angle) ++upper;  // few points: a search would take longer
+  const double per_angle = 1.0 / (angles[upper] - angles[upper - 1]);
+  const blend at = {(angle - angles[upper - 1]) * per_angle, per_angle};
+  set_between(points.laws[upper - 1], points.laws[upper], at, v, exponent, k, laws);
 }
+
+struct scale_and_slope {
+  double level, slope;
+};
 
 /* Level of the sliding friction by the angle of diversion θ, and its slope by θ. The sine with its own coefficient for
  * each sign of θ is the form of Ludovico et al. (reference [4] of the paper); 1 − e^(−μ|θ|) and, where the tension
  * falls exponentially anyway, μ|θ| are the capstan's (L. Euler, 1769). */
-level_and_slope diversion_level(const diversion& turn, double theta) {
+scale_and_slope diversion_level(const diversion& turn, double theta) {
   const double sign = theta < 0.0 ? -1.0 : 1.0;
   const double coefficient = theta < 0.0 ? turn.negative_coefficient : turn.coefficient;
   switch (turn.shape) {
@@ -53,30 +82,30 @@ level_and_slope diversion_level(const diversion& turn, double theta) {
   }
 }
 
-law_values diverted(const friction_site& site, double angle, double v, int exponent) {
-  const law& shape = site.friction.laws.front();
+void set_diverted(const friction_site& site, double angle, double v, int exponent, std::size_t k, law_columns* laws) {
   const double theta = site.turn.rest + site.turn.slope * (angle - site.turn.centre);
-  const level_and_slope level = diversion_level(site.turn, theta);
-  const double normal = site.turn.normal;
-  const double scale = level.level / normal, scale_by_angle = site.turn.slope * level.slope / normal;
-
-  const law_values one = values_of(shape, v, exponent);
-  law_values values;
-  values.break_away = scale * one.break_away;
-  values.break_away_by_angle = scale_by_angle * one.break_away;
-  values.sliding = scale * one.sliding;
-  values.sliding_by_angle = scale_by_angle * one.sliding;
-  values.sliding_by_velocity = scale * one.sliding_by_velocity;
-  values.viscous = scale * one.viscous;
-  values.viscous_by_angle = scale_by_angle * one.viscous;
-  return values;
+  const scale_and_slope level = diversion_level(site.turn, theta);
+  const double scale = level.level / site.turn.normal, by_angle = site.turn.slope * level.slope / site.turn.normal;
+  set_law(site.friction.laws.front(), v, exponent, k, laws);
+  const auto multiply = [&](std::vector<double>& value, std::vector<double>& slope) {
+    slope[k] = by_angle * value[k];
+    value[k] *= scale;
+  };
+  multiply(laws->break_away, laws->break_away_by_angle);
+  multiply(laws->sliding, laws->sliding_by_angle);
+  multiply(laws->excess, laws->excess_by_angle);
+  multiply(laws->viscous, laws->viscous_by_angle);
 }
 
 }  // namespace
 
-law_values site_law(const friction_site& site, double angle, double v, int stribeck_exponent) {
-  return site.turn.shape == diversion::form::none ? interpolated(site.friction, angle, v, stribeck_exponent)
-                                                  : diverted(site, angle, v, stribeck_exponent);
+void set_site_law(const friction_site& site, double angle, double v, int stribeck_exponent, std::size_t k,
+                  law_columns* laws) {
+  if (site.turn.shape == diversion::form::none) {
+    set_interpolated(site.friction, angle, v, stribeck_exponent, k, laws);
+  } else {
+    set_diverted(site, angle, v, stribeck_exponent, k, laws);
+  }
 }
 
 }  // namespace tendonfmu::plant

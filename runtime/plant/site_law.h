@@ -7,8 +7,9 @@
 
 namespace tendonfmu::plant {
 
-/* angle: rad, of the joint before; v: m/s. */
-law_values site_law(const friction_site& site, double angle, double v, int stribeck_exponent);
+/* Puts the law of `site` into row k. angle: rad, of the joint before; v: m/s. */
+void set_site_law(const friction_site& site, double angle, double v, int stribeck_exponent, std::size_t k,
+                  law_columns* laws);
 
 }  // namespace tendonfmu::plant
 
