@@ -8,7 +8,7 @@ namespace tendonfmu::plant {
 namespace {
 
 constexpr int most_iterations = 20;
-constexpr int most_divisions = 6;       /* of a step in two */
+constexpr int most_divisions = 10;       /* of a step in two */
 constexpr double good_progress = 0.25;  // per iteration, else the matrix is taken anew
 constexpr double close_enough = 1e-6;   // rad/s, of the speed in the middle of a step
 constexpr double longest_change = 2.0;  // rad/s per iteration

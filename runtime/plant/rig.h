@@ -144,7 +144,7 @@ struct sensors {
 
 struct integration {
   int method = 1; /* tendonfmu_plant_integrator */
-  double relative_tolerance = 1e-6, step = 5e-4;
+  double relative_tolerance = 1e-6, step = 1e-3;
 };
 
 struct rig {
