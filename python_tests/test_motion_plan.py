@@ -196,6 +196,12 @@ def test_a_motion_file_becomes_knots(tmp_path: Path) -> None:
     assert motion.file == tmp_path / "motion.csv"
 
 
+def test_motor_positions_in_a_motion_file_are_for_robots(tmp_path: Path) -> None:
+    """`tendonfmu excite` writes them; the rig commands its own motors."""
+    with_motors = motion_table() | {"tendon_position[1]": np.full(5, 1e3), "tendon_position[2]": np.zeros(5)}
+    assert from_file(tmp_path, with_motors).joints == from_file(tmp_path, motion_table()).joints
+
+
 def test_the_pretension_of_a_file_keeps_its_steps(tmp_path: Path) -> None:
     table = motion_table(7) | {"pretension": np.array([10.0, 10.0, 10.0, 20.0, 20.0, 20.0, 20.0])}
     motion = from_file(tmp_path, table, pretension=None)
