@@ -1,0 +1,31 @@
+"""Make the figures of docs/simulated_finger.md from index_finger.json.
+
+Usage: python make_figures.py [-o ../../docs/figures]      (needs tendonfmu installed, with the simulated finger)
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from tendonfmu.plant_figures import loop_figure, presliding_figure
+from tendonfmu.plots import draw_loops, draw_presliding, draw_rig
+from tendonfmu.rig import read_rig
+from tendonfmu.rig_drawing import rig_drawing
+
+HERE = Path(__file__).parent
+JOINT, TENDON = 1, 4  # mcp_flexion; the flexor of the middle joint, which passes it (from 0)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("-o", "--output", type=Path, default=HERE.parents[1] / "docs" / "figures", help="folder")
+    folder = parser.parse_args().output
+    rig = read_rig(HERE / "index_finger.json")
+    draw_rig(rig_drawing(rig.expanded), folder / "simulated_finger.png")
+    draw_loops(loop_figure(rig, JOINT), folder / "friction_loop.png")
+    draw_presliding(presliding_figure(rig, JOINT, TENDON), folder / "presliding.png")
+
+
+if __name__ == "__main__":
+    main()
