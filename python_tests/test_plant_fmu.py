@@ -35,7 +35,7 @@ pytestmark = needs_plant
 INDEX_FINGER = Path(__file__).resolve().parent.parent / "examples" / "rigs" / "index_finger.json"
 BUILD = "import sys, pathlib, tendonfmu.plant_packaging as p; p.build_plant_fmu(*map(pathlib.Path, sys.argv[1:]))"
 LARGEST_BINARY = 2_000_000  # bytes
-SYSTEM_LIBRARIES = {"libc.so.6", "libm.so.6", "ld-linux-x86-64.so.2", "ld-linux-aarch64.so.1"}
+SYSTEM_LIBRARIES = {"libc.so.6", "libm.so.6", "libgcc_s.so.1", "ld-linux-x86-64.so.2", "ld-linux-aarch64.so.1"}
 
 
 def pack(folder: Path, rig: dict[str, Any], name: str = "finger.fmu") -> Path:

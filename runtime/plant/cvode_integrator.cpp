@@ -5,12 +5,12 @@
 #include <nvector/nvector_serial.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <new>
 #include <string>
 
 #include "linearisation.h"
 #include "newton_solver.h"
+#include "sentence.h"
 #include "sundials_version.h"
 
 namespace tendonfmu::plant {
@@ -48,7 +48,6 @@ class cvode_integrator : public integrator {
   cvode_integrator& operator=(const cvode_integrator&) = delete;
 
   void forget() override { fresh_ = true; }
-  double last_step() const override { return last_step_; }
 
   void advance(const commands& inputs, double until, moment* now) override {
     if (until <= now->time) return;
@@ -157,9 +156,7 @@ class cvode_integrator : public integrator {
     } else if (flag == CV_RHSFUNC_FAIL || flag == CV_FIRST_RHSFUNC_ERR || flag == CV_REPTD_RHSFUNC_ERR) {
       cause = "the motion left all bounds";
     }
-    char line[320];
-    std::snprintf(line, sizeof line, "%s at t = %.6g s (CVODE flag %d): %s", cause, time, flag, remedy);
-    throw solver_error(line);
+    throw solver_error(sentence(cause, " at t = ", time, " s (CVODE flag ", flag, "): ", remedy));
   }
 
   void release() {
@@ -213,7 +210,6 @@ class cvode_integrator : public integrator {
   bool created_ = false, fresh_ = true;
   const commands* inputs_ = nullptr;
   contact_modes modes_;
-  double last_step_ = 0.0;
   statistics counted_;
 };
 

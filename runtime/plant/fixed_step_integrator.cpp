@@ -2,13 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+
+#include "sentence.h"
 
 namespace tendonfmu::plant {
 namespace {
 
 constexpr int most_iterations = 20;
-constexpr int most_divisions = 10;       /* of a step in two */
+constexpr int most_divisions = 10;      /* of a step in two */
 constexpr double good_progress = 0.25;  // per iteration, else the matrix is taken anew
 constexpr double close_enough = 1e-6;   // rad/s, of the speed in the middle of a step
 constexpr double longest_change = 2.0;  // rad/s per iteration
@@ -116,13 +117,8 @@ void fixed_step_integrator::step(const commands& inputs, double time, double siz
       step(inputs, middle, half, divisions + 1);
       return;
     }
-    char line[160];
-    std::snprintf(
-        line, sizeof line,
-        "the fixed-step integrator found no equilibrium at t = %.6g s with step %.3g s: try a smaller step, or "
-        "cvode",
-        time, size);
-    throw solver_error(line);
+    throw solver_error(sentence("the fixed-step integrator found no equilibrium at t = ", time, " s with a step of ",
+                                size, " s: try a smaller step, or cvode"));
   }
   // from the middle to the end
   for (std::size_t j = 0; j < at.joints; ++j) {

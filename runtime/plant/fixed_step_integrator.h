@@ -17,7 +17,6 @@ class fixed_step_integrator : public integrator {
 
   void forget() override;
   void advance(const commands& inputs, double until, moment* now) override;
-  double last_step() const override { return last_step_; }
 
  private:
   void step(const commands& inputs, double time, double size, int divisions);
@@ -28,7 +27,7 @@ class fixed_step_integrator : public integrator {
 
   dynamics& equations_;
   linearisation linearisation_;
-  double step_, last_step_ = 0.0;
+  double step_;
   double factored_for_ = 0.0; /* half a step, s; 0: no matrix */
   std::vector<double> state_, middle_, rate_, change_;
   std::vector<double> acceleration_; /* of the step before: where to look first */

@@ -32,16 +32,23 @@ class integrator {
   /* What it remembers no longer holds: the state, its modes or the inputs have changed from outside. */
   virtual void forget() = 0;
 
+  /* Goes on from a saved state whose last step was this, s. */
+  void resume(double last_step) {
+    forget();
+    last_step_ = last_step;
+  }
+
   /* Moves `now` on to time `until`. Throws solver_error and leaves `now` as it was. */
   virtual void advance(const commands& inputs, double until, moment* now) = 0;
 
   /* s; 0: none taken yet. */
-  virtual double last_step() const = 0;
+  double last_step() const { return last_step_; }
   const statistics& work() const { return work_; }
   void clear_work() { work_ = {}; }
 
  protected:
   statistics work_;
+  double last_step_ = 0.0;
 };
 
 }  // namespace tendonfmu::plant

@@ -156,13 +156,13 @@ void plant::advance(double until) {
   if (until == now_.time) return;
   moment ahead = now_;
   const sensor_bank sensors_before = sensors_;
-  const double samples_before = samples_;
+  const double samples_before = samples_, last_step_before = integrator_->last_step();
   try {
     move_on(until, &ahead);
   } catch (const solver_error& failure) {
     sensors_ = sensors_before;
     samples_ = samples_before;
-    integrator_->forget();
+    integrator_->resume(last_step_before);
     throw refusal(TENDONFMU_PLANT_SOLVER, failure.what());
   }
   std::swap(now_, ahead);
@@ -342,11 +342,10 @@ void plant::restore(const void* bytes, std::size_t size) {
 
   const std::size_t n = rig_.joint_count(), m = rig_.tendon_count();
   make_integrator();
-  integrator_->forget();
   const double* next = numbers.data();
   now_.time = *next++;
   samples_ = *next++;
-  ++next;  // the last step: told, not needed
+  integrator_->resume(*next++);
   inputs_.given = *next++ != 0.0;
   inputs_.pretension = *next++;
   const auto take = [&](auto* to, std::size_t count) {

@@ -1,12 +1,12 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "description_error.h"
 #include "dynamics.h"
 #include "motion.h"
 #include "rig_parts.h"
+#include "sentence.h"
 
 namespace tendonfmu::plant {
 namespace {
@@ -52,9 +52,8 @@ void check_start(const json_node& motion, const rig& rig) {
   for (std::size_t j = 0; j < rig.joint_count(); ++j) {
     const double start = rig.motion[j].position.front();
     if (start >= rig.links[j].lower && start <= rig.links[j].upper) continue;
-    char range[120];
-    std::snprintf(range, sizeof range, "a start within the joint's limits, %g to %g rad", rig.links[j].lower,
-                  rig.links[j].upper);
+    const std::string range =
+        sentence("a start within the joint's limits, ", rig.links[j].lower, " to ", rig.links[j].upper, " rad");
     motion.member("joints").element(j).member("position").element(0).refuse(range);
   }
 }
@@ -71,13 +70,9 @@ void check_friction(const rig& rig) {
       taken += most;
     }
     if (rig.friction.loss == tension_loss::linear && taken > most_friction) {
-      char line[200];
-      std::snprintf(
-          line, sizeof line,
-          "finger.tendons[%zu]: static friction takes %.3g of the tension on its way; expected less than %.3g "
-          "(or tension_loss \"capstan\")",
-          i + 1, taken, most_friction);
-      throw description_error(line);
+      throw description_error(sentence("finger.tendons[", i + 1, "]: static friction takes ", taken,
+                                       " of the tension on its way; expected less than ", most_friction,
+                                       " (or tension_loss \"capstan\")"));
     }
   }
 }
@@ -104,12 +99,9 @@ void check_stiffness(const json_node& physics, const rig& rig) {
     }
     const double rate = std::sqrt(stiffness * least[j]);
     if (rate <= fastest_rate) continue;
-    char said[200];
-    std::snprintf(
-        said, sizeof said,
-        "a body that its springs (%.3g N·m/rad with tendons, cover and stops) swing at less than %g rad/s, not "
-        "%.3g: heavier, or less stiff",
-        stiffness, fastest_rate, rate);
+    const std::string said =
+        sentence("a body that its springs (", stiffness, " N·m/rad with tendons, cover and stops) swing at less than ",
+                 fastest_rate, " rad/s, not ", rate, ": heavier, or less stiff");
     physics.member("links").element(j).refuse(said);
   }
 }

@@ -1,16 +1,15 @@
 #include "rig_values.h"
 
 #include <cmath>
-#include <cstdio>
+
+#include "sentence.h"
 
 namespace tendonfmu::plant {
 namespace {
 
 std::string said(const range& allowed) {
-  char text[120];
-  std::snprintf(text, sizeof text, "a number %s %g and <= %g%s%s", allowed.open ? ">" : ">=", allowed.low, allowed.high,
-                *allowed.unit ? " " : "", allowed.unit);
-  return text;
+  return sentence("a number ", allowed.open ? ">" : ">=", " ", allowed.low, " and <= ", allowed.high,
+                  *allowed.unit ? " " : "", allowed.unit);
 }
 
 }  // namespace

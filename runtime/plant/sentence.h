@@ -1,0 +1,22 @@
+/* A line of a message, put together with numbers that no locale changes. */
+#ifndef TENDONFMU_PLANT_SENTENCE_H
+#define TENDONFMU_PLANT_SENTENCE_H
+
+#include <locale>
+#include <sstream>
+#include <string>
+
+namespace tendonfmu::plant {
+
+/* Numbers appear with six digits. */
+template <class... Parts>
+std::string sentence(const Parts&... parts) {
+  std::ostringstream line;
+  line.imbue(std::locale::classic());
+  (line << ... << parts);
+  return line.str();
+}
+
+}  // namespace tendonfmu::plant
+
+#endif
