@@ -32,7 +32,7 @@ from tendonfmu.recording import Recording, read_recording
 ROOT = Path(__file__).resolve().parent.parent
 TESTS = ROOT / "python_tests"
 FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
-RECORDING = ROOT / "examples" / "demo_recording" / "index_finger_demo.parquet"
+RECORDING = ROOT / "examples" / "demo_recording" / "index_finger_pushes.parquet"
 ROUNDS = 5
 FEW = 300  # samples for the slow ones
 

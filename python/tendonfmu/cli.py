@@ -301,7 +301,7 @@ def demo(
         "tendonfmu-demo"
     ),
 ) -> None:
-    """The whole story on built-in data: build an FMU, run it over a recording, show what it feels."""
+    """The whole story on built-in data: build an FMU, run it over three recordings, show what it feels."""
     from tendonfmu.demo import run_demo
 
     with _progress() as bar:
@@ -318,23 +318,33 @@ def _print_demo(result: Any) -> None:
     from rich.console import Console
     from rich.table import Table
 
+    free, more, pushed = result.recordings
     table = Table(
-        title=f"{result.finger}: {result.seconds:.0f} s of motion, {result.pushes} pushes; joint torques, rms"
+        title=f"{result.finger}: torque, rms in mN·m",
+        caption="measured → left over; in contact: external torque → error",
     )
-    for heading in ("joint", "measured", "compensated, free", "compensated, contact"):
-        table.add_column(heading, justify="left" if heading == "joint" else "right")
-    for joint in result.joints:
-        table.add_row(
-            joint.name,
-            f"{1e3 * joint.torque_rms:.1f} mN·m",
-            f"{1e3 * joint.free_rms:.1f} mN·m",
-            f"{1e3 * joint.contact_rms:.1f} mN·m",
-        )
+    table.add_column("joint")
+    for recording, motion in ((free, "free motion"), (more, "the same"), (pushed, "with pushes, free")):
+        table.add_column(f"{motion}\n{recording.mean_force:.0f} N", justify="right")
+    table.add_column("in contact", justify="right")
+    for joints in zip(*(recording.joints for recording in result.recordings), strict=True):
+        cells = [f"{1e3 * joint.measured:.1f} → {1e3 * joint.left:.1f}" for joint in joints]
+        table.add_row(joints[0].name, *cells, f"{1e3 * joints[2].load:.1f} → {1e3 * joints[2].error:.1f}")
     console = Console()
     console.print(table)
-    console.print(f"{result.found} of {result.pushes} pushes found, {result.false_alarms} false alarms")
+    console.print(f"pushes: {pushed.score.found} of {pushed.score.pushes} pushes found")
+    for recording in result.recordings:
+        console.print(f"alarms without a push, {recording.name}: {_alarms(recording.score)}", highlight=False)
     for path, what in result.files.items():
         console.print(f"  {path}  {what}", highlight=False, soft_wrap=True)
+
+
+def _alarms(score: Any) -> str:
+    if not score.outside:
+        return "none"
+    begin, end = max(score.outside, key=lambda alarm: alarm[1] - alarm[0])
+    many = f"{len(score.outside)}, {100 * score.outside_share:.1f} % of the time"
+    return f"{many}, the longest for {end - begin:.1f} s from {begin:.1f} s on"
 
 
 def _progress(wanted: bool | None = None) -> Progress:

@@ -1,8 +1,8 @@
-"""What the figure of a compensated recording shows, computed for `plots.py`: joint torques, thresholds, contacts."""
+"""What the figures of compensated recordings show, computed for `plots.py`: joint torques, thresholds, contacts."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,13 +29,25 @@ class JointCurves:
 
 @dataclass(frozen=True)
 class CompensationFigure:
-    """time: [N] s. found, labelled: contact intervals (begin, end) in s; labelled is None without labels."""
+    """One recording. time: [N] s. Intervals (begin, end) in s: contact found where a label says so, contact found
+    where none does, and contact as labelled, which is None without labels.
+    """
 
     title: str
     time: Array
     joints: list[JointCurves]
     found: list[Interval]
+    unlabelled: list[Interval]
     labelled: list[Interval] | None
+
+
+@dataclass(frozen=True)
+class StoryFigure:
+    """free: recordings of free motion, one joint each, side by side. pushed: one with contact, below them."""
+
+    title: str
+    free: list[CompensationFigure]
+    pushed: CompensationFigure
 
 
 @dataclass(frozen=True)
@@ -62,19 +74,25 @@ class ReferenceFigure:
 
 
 def compensation_figure(
-    description: FingerDescription, recording: Mapping[str, Array], outputs: Mapping[str, Array], most_joints: int = 2
+    description: FingerDescription,
+    recording: Mapping[str, Array],
+    outputs: Mapping[str, Array],
+    *,
+    title: str,
+    joints: Sequence[int],
 ) -> CompensationFigure:
-    """Curves of the joints with the largest compensated torque, base first.
+    """Curves of some joints (indices from 0) of one recording.
 
     recording: `time` [N], `tendon_force` [N, m], maybe `external_torque` [N, n] and `contact` [N].
     outputs: those of `native.Finger.run`, [N, n] and [N].
     """
-    largest = np.argsort(-np.abs(outputs["compensated_torque"]).max(axis=0), kind="stable")[:most_joints].tolist()
     thresholds = contact_thresholds(description, recording["tendon_force"])
     time = recording["time"]
     labels, external = recording.get("contact"), recording.get("external_torque")
+    found = outputs["contact"].ravel().astype(bool)
+    pushed = np.zeros_like(found) if labels is None else labels.astype(bool)
     return CompensationFigure(
-        title=description.name,
+        title=title,
         time=time,
         joints=[
             JointCurves(
@@ -85,9 +103,10 @@ def compensation_figure(
                 threshold=thresholds[:, j],
                 external=None if external is None else external[:, j],
             )
-            for j in sorted(largest)
+            for j in joints
         ],
-        found=intervals(time, outputs["contact"]),
+        found=intervals(time, found & pushed),
+        unlabelled=intervals(time, found & ~pushed),
         labelled=None if labels is None else intervals(time, labels),
     )
 

@@ -13,11 +13,11 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle, FancyBboxPatch
+from matplotlib.patches import Circle, FancyBboxPatch, Patch
 from matplotlib.text import Text
 
 from tendonfmu.drawing import DrawnTendon, FingerDrawing, Points
-from tendonfmu.figure_data import CompensationFigure, Interval, JointCurves, ReferenceCurves, ReferenceFigure
+from tendonfmu.figure_data import CompensationFigure, JointCurves, ReferenceCurves, ReferenceFigure, StoryFigure
 from tendonfmu.plant_figures import LoopFigure, PreslidingFigure
 from tendonfmu.rig_drawing import DrawnBody, DrawnRoute, RigDrawing, View
 from tendonfmu.whole_file import whole_file
@@ -136,26 +136,50 @@ def _draw_finger_legend(axes: Axes, drawing: FingerDrawing, size: float) -> None
     )
 
 
-# --- a compensated recording -----------------------------------------------------------------------------------------
+# --- compensated recordings ------------------------------------------------------------------------------------------
 
 
-def draw_compensation(data: CompensationFigure, target: Target) -> None:
-    """Torques measured, predicted and compensated, and contacts found, as PNG (the paper's figs. 6 and 8)."""
-    rows = 2 * len(data.joints)
-    figure = Figure(figsize=(16.0, 2.6 * rows + 1.6), layout="constrained")
-    grid = figure.subplots(
-        rows + 1, 1, sharex=True, squeeze=False, height_ratios=[1.0, 0.9] * len(data.joints) + [0.36]
-    )
-    panels = [row[0] for row in grid]
-    for k, joint in enumerate(data.joints):
-        _draw_torques(panels[2 * k], data, joint)
-        _draw_compensated(panels[2 * k + 1], data, joint)
-    _draw_contacts(panels[-1], data)
-    figure.suptitle(f"{data.title}: friction compensation", fontsize=17, color=DARK)
-    panels[-1].set_xlabel("time (s)", fontsize=13)
-    panels[-1].set_xlim(data.time[0], data.time[-1])
+def draw_story(data: StoryFigure, target: Target) -> None:
+    """Free motions side by side, below them a recording with pushes, as PNG (the paper's figs. 6 to 8)."""
+    pushed = data.pushed
+    figure = Figure(figsize=(15.0, 6.4 + 4.4 * len(pushed.joints)), layout="constrained")
+    heights = [1.0, 0.8] + [1.0, 0.9] * len(pushed.joints) + [0.42]
+    grid = figure.add_gridspec(len(heights), len(data.free), height_ratios=heights)
+    for k, free in enumerate(data.free):
+        above = figure.add_subplot(grid[0, k])
+        below = figure.add_subplot(grid[1, k], sharex=above)
+        _draw_torques(above, free, free.joints[0])
+        _draw_compensated(below, free, free.joints[0])
+        below.set_xlabel("time (s)", fontsize=12)
+    panels = [figure.add_subplot(grid[2, :])]
+    panels += [figure.add_subplot(grid[row, :], sharex=panels[0]) for row in range(3, len(heights))]
+    for k, joint in enumerate(pushed.joints):
+        _draw_torques(panels[2 * k], pushed, joint)
+        _draw_compensated(panels[2 * k + 1], pushed, joint)
+    for axes in panels[:-1]:
+        axes.tick_params(labelbottom=False)
+    _draw_contacts(panels[-1], pushed)
+    panels[-1].set_xlabel("time (s)", fontsize=12)
+    _draw_story_legend(figure, data.title)
     figure.align_ylabels(panels)
     _save(figure, target, 100)
+
+
+def _draw_story_legend(figure: Figure, title: str) -> None:
+    handles = [
+        Line2D([], [], color=DARK, linewidth=1.4, label="measured joint torque"),
+        Line2D([], [], color=SKY, linewidth=1.8, label="predicted friction and bias"),
+        Line2D([], [], color=BLUE, linewidth=1.4, label="compensated torque"),
+        Line2D([], [], color=GREEN, linewidth=3.4, alpha=0.55, label="external torque (sensor)"),
+        Line2D([], [], color=VERMILION, linewidth=1.4, linestyle="--", label="contact threshold"),
+        Patch(color=ORANGE, label="contact found"),
+        Patch(color=PURPLE, label="found without a push"),
+        Patch(color=GREY, label="contact labelled"),
+    ]
+    legend = figure.legend(
+        handles=handles, loc="outside upper center", ncols=4, frameon=False, fontsize=13, title=title
+    )
+    legend.get_title().set(fontsize=17, color=DARK)
 
 
 def _clean(axes: Axes) -> None:
@@ -165,49 +189,45 @@ def _clean(axes: Axes) -> None:
     axes.tick_params(labelsize=12)
 
 
-def _legend(axes: Axes, entries: int) -> None:
-    axes.legend(
-        loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=entries, frameon=False, fontsize=13, borderaxespad=0.0
-    )
-
-
-def _shade(axes: Axes, found: list[Interval]) -> None:
-    for begin, end in found:
-        axes.axvspan(begin, end, color=ORANGE, alpha=0.18, linewidth=0)
+def _shade(axes: Axes, data: CompensationFigure) -> None:
+    for found, colour in ((data.found, ORANGE), (data.unlabelled, PURPLE)):
+        for begin, end in found:
+            axes.axvspan(begin, end, color=colour, alpha=0.2, linewidth=0)
 
 
 def _draw_torques(axes: Axes, data: CompensationFigure, joint: JointCurves) -> None:
     _clean(axes)
-    axes.plot(data.time, joint.measured, color=DARK, linewidth=1.1, label="measured joint torque")
-    axes.plot(data.time, joint.predicted, color=SKY, linewidth=1.4, label="predicted friction and bias")
-    axes.set_ylabel("torque (N·m)", fontsize=13)
-    axes.set_title(joint.name, loc="left", fontsize=14, fontweight="bold", color=DARK)
-    _legend(axes, 2)
+    axes.plot(data.time, joint.measured, color=DARK, linewidth=1.1)
+    axes.plot(data.time, joint.predicted, color=SKY, linewidth=1.4)
+    axes.set_xlim(data.time[0], data.time[-1])
+    axes.tick_params(labelbottom=False)
+    axes.set_ylabel("N·m", fontsize=12)
+    axes.set_title(f"{data.title}: {joint.name}", loc="left", fontsize=14, fontweight="bold", color=DARK)
 
 
 def _draw_compensated(axes: Axes, data: CompensationFigure, joint: JointCurves) -> None:
     _clean(axes)
-    _shade(axes, data.found)
+    _shade(axes, data)
     if joint.external is not None:
-        axes.plot(data.time, joint.external, color=GREEN, linewidth=3.4, alpha=0.55, label="external torque (sensor)")
-    axes.plot(data.time, joint.compensated, color=BLUE, linewidth=1.1, label="compensated torque")
-    axes.plot(data.time, joint.threshold, color=VERMILION, linewidth=1.1, linestyle="--", label="contact threshold")
+        axes.plot(data.time, joint.external, color=GREEN, linewidth=3.4, alpha=0.55)
+    axes.plot(data.time, joint.compensated, color=BLUE, linewidth=1.1)
+    axes.plot(data.time, joint.threshold, color=VERMILION, linewidth=1.1, linestyle="--")
     axes.plot(data.time, -joint.threshold, color=VERMILION, linewidth=1.1, linestyle="--")
-    axes.set_ylabel("torque (N·m)", fontsize=13)
-    _legend(axes, 3)
+    axes.set_ylabel("N·m", fontsize=12)
 
 
 def _draw_contacts(axes: Axes, data: CompensationFigure) -> None:
-    rows = [("found", data.found, ORANGE)]
+    rows = [("found", [(data.found, ORANGE), (data.unlabelled, PURPLE)])]
     if data.labelled is not None:
-        rows.append(("labelled", data.labelled, "#5A5A5A"))
-    for row, (_, found, colour) in enumerate(rows):
-        axes.broken_barh([(begin, end - begin) for begin, end in found], (-row - 0.36, 0.72), color=colour, linewidth=0)
+        rows.append(("labelled", [(data.labelled, GREY)]))
+    for row, (_, bars) in enumerate(rows):
+        for found, colour in bars:
+            spans = [(begin, end - begin) for begin, end in found]
+            axes.broken_barh(spans, (-row - 0.36, 0.72), color=colour, linewidth=0)
     axes.set_ylim(-len(rows) + 0.4, 0.6)
-    axes.set_yticks([-row for row in range(len(rows))], [f"{name}  " for name, _, _ in rows])
+    axes.set_yticks([-row for row in range(len(rows))], [f"{name}  " for name, _ in rows])
     axes.tick_params(labelsize=12)
     axes.tick_params(axis="y", length=0)
-    axes.set_ylabel("contact", fontsize=13)
     axes.spines[["top", "right", "left"]].set_visible(False)
 
 
