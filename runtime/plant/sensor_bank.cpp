@@ -18,7 +18,7 @@ sensor_bank::sensor_bank(const rig& rig) : rate_(rig.sensors.rate), newest_(rig.
   const std::size_t n = rig.joint_count(), m = rig.tendon_count();
   std::uint32_t kind = 0;
   const auto add = [&](const sensor& with, std::size_t channels) {
-    const auto depth = static_cast<std::size_t>(std::ceil(with.delay * rate_)) + 2;
+    const std::size_t depth = with.delay > 0.0 ? static_cast<std::size_t>(std::ceil(with.delay * rate_)) + 2 : 0;
     lines_.push_back({&with, 256 * kind++, channels, depth, std::vector<double>(depth * channels, 0.0),
                       std::vector<double>(channels, 0.0), 0.0});
   };
@@ -52,7 +52,9 @@ double sensor_bank::delayed(const line& line, std::size_t channel) const {
 void sensor_bank::take(line* line, std::uint64_t number, std::uint64_t seed, const std::vector<double>& exact,
                        std::vector<double>* shown) {
   const sensor& with = *line->with;
-  const auto row = static_cast<std::size_t>(std::fmod(line->taken, static_cast<double>(line->depth)));
+  const bool late = line->depth > 0;
+  const std::size_t row =
+      late ? static_cast<std::size_t>(std::fmod(line->taken, static_cast<double>(line->depth))) * line->channels : 0;
   for (std::size_t c = 0; c < line->channels; ++c) {
     double x = exact[c];
     // play: the far end follows once the gap is taken up; it starts in the middle of the gap
@@ -61,11 +63,12 @@ void sensor_bank::take(line* line, std::uint64_t number, std::uint64_t seed, con
       line->play[c] = line->taken == 0.0 ? x : std::clamp(line->play[c], x - half, x + half);
       x = line->play[c];
     }
-    line->past[row * line->channels + c] = x;
+    (*shown)[c] = x;
+    if (late) line->past[row + c] = x;
   }
   line->taken += 1.0;
   for (std::size_t c = 0; c < line->channels; ++c) {
-    double x = with.gain[c] * delayed(*line, c) + with.offset[c];
+    double x = with.gain[c] * (late ? delayed(*line, c) : (*shown)[c]) + with.offset[c];
     if (with.noise > 0.0) {
       x += with.noise * normal_number(seed, line->first_channel + static_cast<std::uint32_t>(c), number);
     }

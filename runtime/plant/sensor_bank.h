@@ -40,7 +40,7 @@ class sensor_bank {
     const sensor* with;
     std::uint32_t first_channel;
     std::size_t channels, depth;
-    std::vector<double> past; /* [depth × channels], a ring */
+    std::vector<double> past; /* [depth × channels], a ring; none without a delay */
     std::vector<double> play; /* [channels] what the far end of a play shows */
     double taken = 0.0;       /* samples so far */
   };
