@@ -1,211 +1,240 @@
-"""The demo recording: what the contract asks of a recording, and the physics that made it."""
+"""The demo's recordings: what the contract asks of a recording, what their rigs give, and the story they tell."""
 
 from __future__ import annotations
 
-import ast
-import importlib
+import copy
 import json
-import sys
-from collections.abc import Iterator
+import re
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
+from numpy.typing import NDArray
 
-import oracle
+pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
-EXAMPLES = Path(__file__).parents[1] / "examples"
+from plant_rigs import needs_plant
+from tendonfmu.contact_score import score_contacts
+from tendonfmu.native import Finger
+from tendonfmu.recording import Recording, read_recording
+from tendonfmu.rig import read_rig
+from tendonfmu.simulation import Table, simulate
+
+EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 FOLDER = EXAMPLES / "demo_recording"
-PARQUET = FOLDER / "index_finger_demo.parquet"
+# recording -> rig
+RIGS = {
+    "index_finger_free": "index_finger.json",
+    "index_finger_free_x4": "index_finger_x4.json",
+    "index_finger_pushes": "index_finger_pushes.json",
+}
 SIZES = {"tendon_force": 8, "tendon_position": 8, "joint_position": 4, "external_torque": 4}
-STEP = 0.001  # s
+STEPS = {"tendon_force": 0.002, "tendon_position": 2e-6, "joint_position": 2e-4, "external_torque": 2e-4}
+JOINTS = ("mcp_abduction", "mcp_flexion", "pip_flexion", "dip_flexion")
+
+Array = NDArray[Any]
 
 
 @pytest.fixture(scope="module")
-def recording() -> dict[str, np.ndarray]:
-    table = pq.read_table(PARQUET)
-    columns = {"time": table["time"].to_numpy(), "contact": table["contact"].to_numpy()}
-    for name, size in SIZES.items():
-        columns[name] = np.column_stack([table[f"{name}[{k + 1}]"].to_numpy() for k in range(size)])
-    assert table.num_columns == 2 + sum(SIZES.values())
-    return columns
+def description() -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((EXAMPLES / "fingers" / "index_finger.json").read_text(encoding="utf-8"))
+    return found
 
 
 @pytest.fixture(scope="module")
-def finger() -> dict[str, np.ndarray]:
-    description: dict[str, Any] = json.loads((EXAMPLES / "fingers" / "index_finger.json").read_text(encoding="utf-8"))
-    return {
-        "arms": np.array([tendon["moment_arms"] for tendon in description["tendons"]]),
-        "stiffness": np.array([tendon["stiffness"] for tendon in description["tendons"]]),
+def recordings() -> dict[str, Recording]:
+    return {name: read_recording(FOLDER / f"{name}.parquet") for name in RIGS}
+
+
+@pytest.fixture(scope="module")
+def outputs(description: dict[str, Any], recordings: dict[str, Recording]) -> dict[str, dict[str, Array]]:
+    return {name: Finger.from_description(description).run(each.arrays()) for name, each in recordings.items()}
+
+
+def label_of(recording: Recording) -> Array:
+    return np.zeros(len(recording), bool) if recording.contact is None else recording.contact
+
+
+def rms(values: Array) -> Array:
+    return np.asarray(np.sqrt(np.mean(values**2, axis=0)))
+
+
+# --- what they are ----------------------------------------------------------------------------------------------------
+
+
+def test_nothing_else_is_there_and_together_they_are_small() -> None:
+    assert {file.name for file in FOLDER.glob("*.parquet")} == {f"{name}.parquet" for name in RIGS}
+    assert sum(file.stat().st_size for file in FOLDER.iterdir()) < 10e6
+
+
+@pytest.mark.parametrize("name", list(RIGS))
+def test_columns_samples_and_steps_of_the_sensors(recordings: dict[str, Recording], name: str) -> None:
+    recording = recordings[name]
+    wanted = set(SIZES) if name == "index_finger_pushes" else set(SIZES) - {"external_torque"}
+    assert {group: array.shape[1] for group, array in recording.groups.items()} == {
+        each: SIZES[each] for each in wanted
     }
+    assert (recording.contact is not None) == (name == "index_finger_pushes")
+    assert np.allclose(recording.time, np.arange(30000) / 500.0, rtol=0.0, atol=1e-12)
+    for group, array in recording.groups.items():
+        steps = array / STEPS[group]
+        assert np.abs(steps - np.round(steps)).max() < 1e-6, group
+    assert recording.groups["tendon_force"].min() > 0
 
 
-@pytest.fixture(scope="module")
-def modules() -> Iterator[dict[str, ModuleType]]:
-    """The generator's modules, imported as its script does."""
-    sys.path.insert(0, str(FOLDER))
-    names = ("contacts", "finger_plant", "motion")
-    yield {name: importlib.import_module(name) for name in names}
-    sys.path.remove(str(FOLDER))
-    for name in names:
-        del sys.modules[name]
+@pytest.mark.parametrize("name", list(RIGS))
+def test_they_start_at_rest_without_contact(recordings: dict[str, Recording], name: str) -> None:
+    recording = recordings[name]
+    start = recording.time < 0.9
+    assert not label_of(recording)[start].any()
+    # noise: five standard deviations to either side and a step, 12 steps in all
+    assert np.ptp(recording.groups["joint_position"][start], axis=0).max() < 12 * STEPS["joint_position"]
+    assert np.ptp(recording.groups["tendon_position"][start], axis=0).max() <= STEPS["tendon_position"] * 1.001
 
 
-def test_it_is_a_recording_of_the_contract(recording: dict[str, np.ndarray]) -> None:
-    assert PARQUET.stat().st_size < 1_500_000
-    assert len(recording["time"]) == 30000
-    assert np.diff(recording["time"]).min() > 0
-    for values in recording.values():
-        assert np.all(np.isfinite(values))
-    assert set(np.unique(recording["contact"])) == {0, 1}
-    assert recording["tendon_force"].min() > 0
-
-
-def test_it_starts_and_ends_at_rest_without_contact(recording: dict[str, np.ndarray]) -> None:
-    time = recording["time"]
-    for part in (time < 0.9, time > time[-1] - 0.5):
-        assert not recording["contact"][part].any()
-        assert np.ptp(recording["tendon_position"][part], axis=0).max() <= 2e-6
-        # four steps of the sensor and five standard deviations of its noise
-        assert np.ptp(recording["joint_position"][part], axis=0).max() < 2.5e-3
-
-
+@pytest.mark.parametrize("name", list(RIGS))
 def test_forces_positions_and_angles_belong_together(
-    recording: dict[str, np.ndarray], finger: dict[str, np.ndarray]
+    recordings: dict[str, Recording], description: dict[str, Any], name: str
 ) -> None:
-    joint_side = recording["tendon_position"] - recording["tendon_force"] / finger["stiffness"]
-    gap = joint_side - recording["joint_position"] @ finger["arms"].T
-    # sensor noise: 0.2 mrad and its rounding on up to 10 mm, 3 mN on 5500 N/m, 2 um steps
+    """x1 = x0 − f0/k = R q, eqs. (2) and (4)."""
+    groups = recordings[name].groups
+    arms = np.array([tendon["moment_arms"] for tendon in description["tendons"]])
+    stiffness = np.array([tendon["stiffness"] for tendon in description["tendons"]])
+    gap = groups["tendon_position"] - groups["tendon_force"] / stiffness - groups["joint_position"] @ arms.T
+    # sensor noise: 0.2 mrad and its rounding on up to 13 mm, 3 mN on 5500 N/m, 2 µm steps
     assert np.abs(gap.mean(axis=0)).max() < 1e-7
     assert gap.std(axis=0).max() < 4e-6
 
 
-def test_load_only_where_the_label_says_contact(recording: dict[str, np.ndarray]) -> None:
-    free = recording["contact"] == 0
+def test_load_only_where_the_label_says_contact(recordings: dict[str, Recording]) -> None:
+    pushes = recordings["index_finger_pushes"]
+    free = ~label_of(pushes)
     # six standard deviations of the sensor; the label begins at 0.05 N on up to 95 mm
-    assert np.abs(recording["external_torque"][free]).max() < 0.0018 + 0.005
-    begins = np.flatnonzero(np.diff(recording["contact"].astype(int)) == 1)
-    assert len(begins) == 11
-    assert np.abs(recording["external_torque"]).max() > 0.1
+    assert np.abs(pushes.groups["external_torque"][free]).max() < 0.0018 + 0.005
+    assert (np.diff(label_of(pushes).astype(int)) == 1).sum() == 11
+    assert np.abs(pushes.groups["external_torque"]).max() > 0.1
 
 
-def test_joints_move_at_the_same_time_reverse_and_rest(recording: dict[str, np.ndarray]) -> None:
-    smooth = np.cumsum(recording["joint_position"], axis=0)
-    smooth = (smooth[50:] - smooth[:-50]) / 50
-    speed = (smooth[50:] - smooth[:-50]) / 0.1
-    moving = np.abs(speed) > 0.02
-    assert (moving.sum(axis=1) >= 2).mean() > 0.6
-    assert np.all((~moving).mean(axis=0) > 0.1)
-    for j in range(4):
-        direction = np.sign(speed[moving[:, j], j])
-        assert (np.diff(direction) != 0).sum() >= 8
+def test_joints_move_at_the_same_time_reverse_and_rest(recordings: dict[str, Recording]) -> None:
+    for recording in recordings.values():
+        smooth = np.cumsum(recording.groups["joint_position"], axis=0)
+        smooth = (smooth[50:] - smooth[:-50]) / 50
+        speed = (smooth[50:] - smooth[:-50]) / 0.1
+        moving = np.abs(speed) > 0.02
+        assert (moving.sum(axis=1) >= 2).mean() > 0.6
+        assert np.all((~moving).mean(axis=0) > 0.1)
+        for j in range(4):
+            direction = np.sign(speed[moving[:, j], j])
+            assert (np.diff(direction) != 0).sum() >= 8
 
 
-def test_the_generator_shares_nothing_with_the_runtime() -> None:
-    allowed = {"numpy", "pyarrow", "contacts", "finger_plant", "motion"} | set(sys.stdlib_module_names)
-    for source in FOLDER.glob("*.py"):
-        for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Import):
-                assert {alias.name.split(".")[0] for alias in node.names} <= allowed
-            elif isinstance(node, ast.ImportFrom):
-                assert (node.module or "").split(".")[0] in allowed
+def test_the_second_has_the_same_motor_motion_at_four_times_the_pretension(recordings: dict[str, Recording]) -> None:
+    free, more = recordings["index_finger_free"].groups, recordings["index_finger_free_x4"].groups
+    assert more["tendon_force"].mean() / free["tendon_force"].mean() == pytest.approx(4.0, rel=0.02)
+    # the springs longer by what 30 N more take, all the time
+    apart = more["tendon_position"] - free["tendon_position"]
+    assert np.ptp(apart, axis=0).max() < 2.5 * STEPS["tendon_position"]
+    assert apart.mean(axis=0).min() > 25.0 / 8000.0
 
 
-def drive(plant: Any, finger: dict[str, np.ndarray], joint: int, speed: float, seconds: float) -> np.ndarray:
-    """Moves the motors as for one joint at constant speed; returns the joint torques (steps, 4)."""
-    start = plant.angle.copy()
-    torques = []
-    for k in range(int(seconds / STEP)):
-        angle = start + speed * k * STEP * np.eye(4)[joint]
-        motors = finger["arms"] @ angle + 10.0 / finger["stiffness"]
-        plant.advance(motors, np.zeros(4), STEP)
-        torques.append(finger["arms"].T @ plant.tendon_force(motors))
-    return np.array(torques)
+# --- where they come from ---------------------------------------------------------------------------------------------
 
 
-def test_plant_friction_opposes_the_motion(modules: dict[str, ModuleType], finger: dict[str, np.ndarray]) -> None:
-    for joint in range(4):
-        levels = []
-        for speed in (0.3, -0.3):
-            plant = modules["finger_plant"].FingerPlant(finger["arms"], finger["stiffness"], np.random.default_rng(0))
-            levels.append(drive(plant, finger, joint, speed, 0.8)[-1, joint])
-        # the motors pull against friction: more torque forth than back
-        assert levels[0] - levels[1] > 0.008
+def differs(recording: Recording, fresh: Table) -> dict[str, tuple[float, float]]:
+    """Group -> share of samples more than one step of the sensor apart, and rms of the difference in steps."""
+    result = {}
+    for group, array in recording.groups.items():
+        now = np.column_stack([fresh[f"{group}[{k + 1}]"] for k in range(array.shape[1])])
+        steps = np.abs(now - array) / STEPS[group]
+        result[group] = (float((steps > 1.5).mean()), float(np.sqrt(np.mean(steps**2))))
+    return result
 
 
-def test_plant_friction_grows_with_the_speed_only_a_little(
-    modules: dict[str, ModuleType], finger: dict[str, np.ndarray]
+def is_same(name: str, recording: Recording, fresh: Table) -> bool:
+    """Equal up to what another compiler or C library makes of the last digits, about as another solver tolerance does.
+
+    Measured with tolerances of 3e-7 to 1e-8: (0, 0.07), and (0.1, 1.3) at 40 N, where some strokes stick and slip, and
+    a rounding grows into a slip a little earlier or later.
+    """
+    far, apart = (0.15, 2.0) if name == "index_finger_free_x4" else (0.001, 0.2)
+    return all(found[0] < far and found[1] < apart for found in differs(recording, fresh).values())
+
+
+@needs_plant
+@pytest.mark.parametrize("name", list(RIGS))
+def test_they_are_what_their_rigs_give(recordings: dict[str, Recording], name: str) -> None:
+    fresh = simulate(read_rig(EXAMPLES / "rigs" / RIGS[name])).recording
+    recording = recordings[name]
+    assert list(fresh) == columns_of(recording)
+    np.testing.assert_array_equal(fresh["time"], recording.time)
+    assert is_same(name, recording, fresh), differs(recording, fresh)
+    if recording.contact is not None:
+        assert (fresh["contact"].astype(bool) != recording.contact).sum() <= 22
+
+
+@needs_plant
+@pytest.mark.parametrize("name", ["index_finger_free", "index_finger_free_x4"])
+def test_one_percent_of_other_friction_at_the_joints_shows(
+    recordings: dict[str, Recording], description: dict[str, Any], tmp_path: Path, name: str
 ) -> None:
-    """Dry friction: ten times the speed is far from ten times the torque."""
-    widths = []
-    for speed, seconds in ((0.1, 1.5), (1.0, 0.15)):
-        ends = []
-        for direction in (1.0, -1.0):
-            plant = modules["finger_plant"].FingerPlant(finger["arms"], finger["stiffness"], np.random.default_rng(0))
-            ends.append(drive(plant, finger, 1, direction * speed, seconds)[-1, 1])
-        widths.append(ends[0] - ends[1])
-    assert 0.5 < widths[1] / widths[0] < 2.0
+    finger = copy.deepcopy(description)
+    for joint in finger["joints"]:
+        joint["friction"] |= {key: 1.01 * joint["friction"][key] for key in ("static", "coulomb")}
+    base = str(EXAMPLES / "rigs" / RIGS[name])
+    changed = {"format": "tendonfmu-rig-1", "base": base, "name": "changed", "finger": finger}
+    (tmp_path / "changed.json").write_text(json.dumps(changed), encoding="utf-8")
+    fresh = simulate(read_rig(tmp_path / "changed.json")).recording
+    assert not is_same(name, recordings[name], fresh), differs(recordings[name], fresh)
 
 
-def test_plant_holds_a_load_with_its_tendons_and_friction(
-    modules: dict[str, ModuleType], finger: dict[str, np.ndarray]
+def columns_of(recording: Recording) -> list[str]:
+    names = ["time"] + [f"{group}[{k + 1}]" for group, array in recording.groups.items() for k in range(array.shape[1])]
+    return names if recording.contact is None else [*names, "contact"]
+
+
+# --- the story --------------------------------------------------------------------------------------------------------
+
+
+def test_what_is_left_of_free_motion(
+    recordings: dict[str, Recording], outputs: dict[str, dict[str, Array]], description: dict[str, Any]
 ) -> None:
-    """At rest the tendons' torque changes by the load, up to what friction takes of it."""
-    plant = modules["finger_plant"].FingerPlant(finger["arms"], finger["stiffness"], np.random.default_rng(0))
-    motors = finger["arms"] @ plant.angle + 10.0 / finger["stiffness"]
-    for _ in range(500):
-        plant.advance(motors, np.zeros(4), STEP)
-    before = finger["arms"].T @ plant.tendon_force(motors)
-    load = np.array([0.0, 0.1, 0.0, 0.0])
-    for k in range(1000):
-        plant.advance(motors, min(1.0, k / 200) * load, STEP)
-    change = finger["arms"].T @ plant.tendon_force(motors) - before
-    assert 0.03 < change[1] < 0.1
-    assert np.abs(plant.velocity).max() < 1e-3
+    """A third at the pretension of the training, half at four times that; no false alarm in the first."""
+    for name, most in (("index_finger_free", 1 / 3), ("index_finger_free_x4", 1 / 2)):
+        left = rms(outputs[name]["compensated_torque"]) / rms(outputs[name]["joint_torque"])
+        assert np.all(left < most), (name, left)
+    assert not outputs["index_finger_free"]["contact"].any()
+    more = recordings["index_finger_free_x4"]
+    score = score_contacts(more.time, label_of(more), outputs["index_finger_free_x4"]["contact"])
+    assert score.outside_share < 0.03
 
 
-def test_load_of_a_push_is_minus_its_virtual_work(modules: dict[str, ModuleType]) -> None:
-    """Against the gradient of the tip's position along the force, by central differences."""
-    lengths = modules["contacts"].LINK_LENGTH
-
-    def tip(angle: np.ndarray) -> np.ndarray:
-        heading = np.cumsum(angle[1:])
-        reach, drop = np.dot(lengths, np.cos(heading)), np.dot(lengths, np.sin(heading))
-        return np.array([reach * np.cos(angle[0]), reach * np.sin(angle[0]), -drop])
-
-    rng = np.random.default_rng(3)
-    for _ in range(20):
-        angle, force = rng.uniform(-0.3, 1.2, 4), rng.standard_normal(3)
-        # the tip's axes in space: along, sideways, from pad to nail
-        turn, pitch = angle[0], angle[1:].sum()
-        ahead = np.array([np.cos(turn), np.sin(turn), 0.0])
-        along = np.cos(pitch) * ahead + [0.0, 0.0, -np.sin(pitch)]
-        sideways = np.array([-np.sin(turn), np.cos(turn), 0.0])
-        on_pad = np.sin(pitch) * ahead + [0.0, 0.0, np.cos(pitch)]
-        spatial = force @ np.array([along, sideways, on_pad])
-        work = [(tip(angle + d) - tip(angle - d)) @ spatial / 2e-6 for d in 1e-6 * np.eye(4)]
-        # differences of 1e-6 rad on 0.1 m: relative error about 1e-9
-        assert modules["motion"].load_of_push(angle, force) == pytest.approx(-np.array(work), abs=1e-8)
+def test_most_pushes_are_found_and_felt_in_size(
+    recordings: dict[str, Recording], outputs: dict[str, dict[str, Array]]
+) -> None:
+    recording, given = recordings["index_finger_pushes"], outputs["index_finger_pushes"]
+    label = label_of(recording)
+    score = score_contacts(recording.time, label, given["contact"])
+    assert (score.pushes, score.found) == (11, 8)
+    # one latch-up, 4.4 s from the first stroke on: the bias is frozen while in contact
+    assert score.outside_share < 0.12
+    load = recording.groups["external_torque"][label]
+    assert np.all(rms(given["compensated_torque"][label] - load) < 0.4 * rms(load))
 
 
-@pytest.mark.slow
-def test_the_description_explains_it_without_being_fitted(recording: dict[str, np.ndarray]) -> None:
-    """The first 14 s through the oracle: the README's figures for the whole are 0.12 to 0.26 of the torque."""
-    description = json.loads((EXAMPLES / "fingers" / "index_finger.json").read_text(encoding="utf-8"))
-    part = slice(0, 7000)
-    inputs = {name: recording[name][part] for name in ("time", "tendon_force", "tendon_position")}
-    outputs = oracle.run(description, inputs).outputs
-    contact = recording["contact"][part] == 1
-
-    left = np.sqrt(np.mean(outputs["compensated_torque"][~contact] ** 2, axis=0))
-    torque = np.sqrt(np.mean(outputs["joint_torque"][~contact] ** 2, axis=0))
-    assert np.all(left < 0.4 * torque)
-    alarm = outputs["contact"].ravel().astype(bool)
-    assert not alarm[~contact].any()
-    assert alarm[contact].mean() > 0.7
-    error = outputs["compensated_torque"] - recording["external_torque"][part]
-    assert np.sqrt(np.mean(error[contact] ** 2, axis=0)).max() < 0.012
-    assert not outputs["slack"].any()
+def test_the_readme_says_what_comes_out(recordings: dict[str, Recording], outputs: dict[str, dict[str, Array]]) -> None:
+    page = (FOLDER / "README.md").read_text(encoding="utf-8")
+    rows = [[cell.strip() for cell in line.strip("| ").split("|")] for line in page.splitlines() if "→" in line]
+    assert len(rows) == 4
+    for (name, where), (_, *cells) in zip(
+        (*((name, False) for name in RIGS), ("index_finger_pushes", True)), rows, strict=True
+    ):
+        part = label_of(recordings[name]) == where
+        left = outputs[name]["compensated_torque"][part]
+        before = outputs[name]["joint_torque"][part]
+        if where:
+            before = recordings[name].groups["external_torque"][part]
+            left = left - before
+        said = np.array([[float(number) for number in re.findall(r"[\d.]+", cell)] for cell in cells])
+        # another machine may simulate a slip otherwise
+        np.testing.assert_allclose(said, 1e3 * np.column_stack([rms(before), rms(left)]), rtol=0.02, atol=0.1)

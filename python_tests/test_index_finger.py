@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -136,3 +137,35 @@ def test_every_tendon_keeps_some_of_its_force(finger: dict[str, Any]) -> None:
         worst = [max(law["static"] for law in edge.get("laws", [edge])) for edge in tendon["edge_friction"] if edge]
         worst += [law["static"] for law in tendon["pulley_friction"] if law]
         assert np.prod([1.0 - share for share in worst]) > 0.6
+
+
+def wrap_angles() -> dict[tuple[int, int], tuple[float, float, float]]:
+    """(tendon, joint), from 1 -> rest, growth, centre of the README's table."""
+    rows = re.findall(
+        r"^\| ([1-8]) `\w+` \| (0\.\d+) \| ([^|]*/[^|]*) \|([^|]*)\|([^|]*)\|$", README.read_text("utf-8"), re.M
+    )
+    found = {}
+    for tendon, *edges in rows:
+        for joint, cell in enumerate(edges, start=1):
+            numbers = [float(each.replace("−", "-")) for each in cell.split("/") if each.strip()]
+            if numbers:
+                rest, growth, centre = (*numbers, 0.0, 0.0)[:3]
+                found[int(tendon), joint] = (rest, growth, centre)
+    return found
+
+
+def test_working_points_are_those_of_the_readmes_wrap_angles(finger: dict[str, Any]) -> None:
+    """Sliding friction is 0.10 times the wrap angle, rounded to four decimals."""
+    wraps = wrap_angles()
+    half_range = {1: 1.0, 2: 0.35, 3: 0.85, 4: 0.8}
+    described = 0
+    for i, tendon in enumerate(finger["tendons"], start=1):
+        for j, edge in enumerate(tendon["edge_friction"], start=1):
+            if edge is None:
+                continue
+            rest, growth, centre = wraps[i, j]
+            for angle, law in zip(edge.get("angles", [0.0]), edge.get("laws", [edge]), strict=True):
+                expected = 0.10 * (rest + growth * ((angle - centre) / half_range[j]) ** 2)
+                assert law["coulomb"] == pytest.approx(expected, abs=0.51e-4), (i, j, angle)
+            described += 1
+    assert described == len(wraps) == 22
