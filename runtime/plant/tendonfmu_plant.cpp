@@ -28,23 +28,33 @@ std::uint64_t identity_of(const char* text, std::size_t size) {
   return hash;
 }
 
+/* Without memory for the line there is none. */
+void note(const tendonfmu_plant* plant, const char* line) noexcept {
+  try {
+    plant->last_error = line;
+  } catch (...) {
+    plant->last_error.clear();
+  }
+}
+
 /* Runs a call and turns what it throws into a status and a line. */
 template <class Call>
-tendonfmu_plant_status guarded(const tendonfmu_plant* plant, Call call) {
+tendonfmu_plant_status guarded(const tendonfmu_plant* plant, Call call) noexcept {
   if (!plant) return TENDONFMU_PLANT_BAD_ARGUMENT;
   try {
     call();
     return TENDONFMU_PLANT_OK;
   } catch (const refusal& refused) {
-    plant->last_error = refused.what();
+    note(plant, refused.what());
     return refused.status;
-  } catch (const tendonfmu::plant::solver_error& failed) {
-    plant->last_error = failed.what();
-    return TENDONFMU_PLANT_SOLVER;
   } catch (const std::bad_alloc&) {
-    plant->last_error = "out of memory";
-    return TENDONFMU_PLANT_SOLVER;
+    note(plant, "out of memory");
+  } catch (const std::exception& failed) {  // solver_error, and what nobody has thought of
+    note(plant, failed.what());
+  } catch (...) {
+    note(plant, "failed for a reason it did not tell");
   }
+  return TENDONFMU_PLANT_SOLVER;
 }
 
 void need_pointer(const void* pointer, const char* name) {
@@ -54,6 +64,7 @@ void need_pointer(const void* pointer, const char* name) {
 }  // namespace
 
 tendonfmu_plant* tendonfmu_plant_create(const char* rig_json, size_t size, char* message, size_t message_size) {
+  if (!message) message_size = 0;
   try {
     if (!rig_json) throw tendonfmu::description_error("rig: expected a text, not NULL");
     return new tendonfmu_plant(tendonfmu::plant::read_rig(rig_json, size), identity_of(rig_json, size));
@@ -61,6 +72,8 @@ tendonfmu_plant* tendonfmu_plant_create(const char* rig_json, size_t size, char*
     tendonfmu::copy_line("rig: out of memory", message, message_size);
   } catch (const std::exception& refused) {
     tendonfmu::copy_line(refused.what(), message, message_size);
+  } catch (...) {
+    tendonfmu::copy_line("rig: cannot be read", message, message_size);
   }
   return nullptr;
 }
@@ -149,7 +162,9 @@ tendonfmu_plant_status tendonfmu_plant_run(tendonfmu_plant* plant, size_t sample
 }
 
 size_t tendonfmu_plant_state_size(const tendonfmu_plant* plant) {
-  return plant ? plant->finger.state_bytes() : 0;
+  std::size_t size = 0;
+  guarded(plant, [&] { size = plant->finger.state_bytes(); });
+  return size;
 }
 
 tendonfmu_plant_status tendonfmu_plant_save_state(const tendonfmu_plant* plant, void* bytes, size_t size) {
