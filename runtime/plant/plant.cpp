@@ -155,15 +155,15 @@ void plant::advance(double until) {
   if (until < now_.time) throw refusal(TENDONFMU_PLANT_WRONG_ORDER, "time: expected not to go back");
   if (until == now_.time) return;
   moment ahead = now_;
-  const sensor_bank sensors_before = sensors_;
+  sensor_bank sensors_before = sensors_;
   const double samples_before = samples_, last_step_before = integrator_->last_step();
   try {
     move_on(until, &ahead);
-  } catch (const solver_error& failure) {
-    sensors_ = sensors_before;
+  } catch (...) {
+    sensors_ = std::move(sensors_before);
     samples_ = samples_before;
     integrator_->resume(last_step_before);
-    throw refusal(TENDONFMU_PLANT_SOLVER, failure.what());
+    throw;
   }
   std::swap(now_, ahead);
 }
@@ -309,8 +309,9 @@ struct state_header {
 std::uint64_t digest_of(const tendonfmu_plant_settings& s) {
   return digest({static_cast<double>(s.integrator), s.relative_tolerance, s.step,
                  static_cast<double>(s.scheduled_motion), static_cast<double>(s.scheduled_pushes),
-                 static_cast<double>(s.sensors), static_cast<double>(s.seed), s.push_point[0], s.push_point[1],
-                 s.push_point[2], static_cast<double>(s.push_link)});
+                 static_cast<double>(s.sensors), static_cast<double>(s.seed >> 32),
+                 static_cast<double>(s.seed & 0xffffffffu), s.push_point[0], s.push_point[1], s.push_point[2],
+                 static_cast<double>(s.push_link)});
 }
 
 }  // namespace
@@ -369,6 +370,9 @@ void plant::derivative(double time, const double* state, double* result, double*
   commands inputs = inputs_;
   inputs.scheduled_motion = settings_.scheduled_motion != 0;
   inputs.scheduled_pushes = settings_.scheduled_pushes != 0;
+  // laws and motions are looked up by them: what is no number has no place there
+  need(std::isfinite(time), "time: expected a finite number");
+  for (std::size_t k = 0; k < rig_.order(); ++k) need(std::isfinite(state[k]), "state: expected finite numbers");
   equations_.want_slopes(true);
   equations_.evaluate(time, state, nullptr, inputs, result);
   if (!jacobian) return;
