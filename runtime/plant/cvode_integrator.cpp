@@ -5,8 +5,10 @@
 #include <nvector/nvector_serial.h>
 
 #include <algorithm>
+#include <exception>
 #include <new>
 #include <string>
+#include <utility>
 
 #include "linearisation.h"
 #include "newton_solver.h"
@@ -17,7 +19,7 @@ namespace tendonfmu::plant {
 namespace {
 
 constexpr double longest_step = 0.02;     // s: a push of the schedule is never stepped over
-constexpr long most_steps = 200000;       // for one advance
+constexpr double most_steps = 200000;     // for one advance, and for each of its seconds where it is longer
 constexpr int most_roots_at_once = 10000; /* for one advance: chattering */
 
 /* Absolute tolerances: the relative one times what is small for the quantity. */
@@ -40,6 +42,7 @@ class cvode_integrator : public integrator {
       release();
       throw std::bad_alloc();
     }
+    silence();
     set_tolerances();
   }
 
@@ -54,13 +57,25 @@ class cvode_integrator : public integrator {
     inputs_ = &inputs;
     modes_ = now->modes;
     if (fresh_) {
+      if (same_moment(now->time, until)) {  // where CVODE refuses to start
+        now->time = until;
+        return;
+      }
       std::copy(now->state.begin(), now->state.end(), data());
       start(now->time);
     }
     double reached = now->time;
+    double left = most_steps * std::max(1.0, until - now->time);
     for (int found = 0;; ++found) {
+      CVodeSetMaxNumSteps(cvode_, static_cast<long>(std::clamp(left, 1.0, 2e9)));
+      const unsigned long long steps_before = work_.steps;
       const int flag = CVode(cvode_, until, state_, &reached, CV_NORMAL);
       count();
+      left -= static_cast<double>(work_.steps - steps_before);
+      if (thrown_) {
+        fresh_ = true;
+        std::rethrow_exception(std::exchange(thrown_, nullptr));
+      }
       if (flag == CV_SUCCESS || flag == CV_TSTOP_RETURN) break;
       if (flag != CV_ROOT_RETURN) fail(flag, reached);
       if (found == most_roots_at_once) fail(CV_TOO_MUCH_WORK, reached);
@@ -69,7 +84,7 @@ class cvode_integrator : public integrator {
       equations_.switch_modes(signs, &modes_);
       work_.roots += 1;
       start(reached);
-      if (reached >= until) break;
+      if (same_moment(reached, until)) break;
     }
     std::copy(data(), data() + now->state.size(), now->state.begin());
     now->modes = modes_;
@@ -103,11 +118,9 @@ class cvode_integrator : public integrator {
       good = good && CVodeSetLinearSolver(cvode_, solver_, matrix_) == CV_SUCCESS;
       good = good && CVodeSetLinSysFn(cvode_, prepare) == CV_SUCCESS;
       good = good && CVodeRootInit(cvode_, static_cast<int>(equations_.root_count()), root_functions) == CV_SUCCESS;
-      good = good && CVodeSetMaxNumSteps(cvode_, most_steps) == CV_SUCCESS;
       good = good && CVodeSetMaxStep(cvode_, longest_step) == CV_SUCCESS;
       good = good && CVodeSetMaxErrTestFails(cvode_, 15) == CV_SUCCESS;
       CVodeSetNoInactiveRootWarn(cvode_);
-      silence();
       if (!good) throw std::bad_alloc();
       created_ = true;
     } else {
@@ -168,35 +181,69 @@ class cvode_integrator : public integrator {
     if (context_) SUNContext_Free(&context_);
   }
 
-  // --- what CVODE calls ---
+  // --- what CVODE calls: C, which no exception may pass ---
+
+  template <class Call>
+  int kept(Call call) noexcept {
+    try {
+      return call();
+    } catch (...) {
+      thrown_ = std::current_exception();
+      return -1;  // CVODE gives up
+    }
+  }
 
   static int right_hand_side(solver_number time, N_Vector state, N_Vector derivative, void* data) {
     auto* self = static_cast<cvode_integrator*>(data);
-    double* result = N_VGetArrayPointer(derivative);
-    self->equations_.want_slopes(false);
-    self->equations_.evaluate(time, N_VGetArrayPointer(state), &self->modes_, *self->inputs_, result);
-    const std::size_t n = self->equations_.layout().joints;
-    // 1: recoverable, CVODE tries a smaller step
-    return std::all_of(result, result + 2 * n, [](double x) { return std::fabs(x) < 1e9; }) ? 0 : 1;
+    return self->kept([&] {
+      double* result = N_VGetArrayPointer(derivative);
+      self->equations_.want_slopes(false);
+      self->equations_.evaluate(time, N_VGetArrayPointer(state), &self->modes_, *self->inputs_, result);
+      const std::size_t n = self->equations_.layout().joints;
+      // 1: recoverable, CVODE tries a smaller step
+      return std::all_of(result, result + 2 * n, [](double x) { return std::fabs(x) < 1e9; }) ? 0 : 1;
+    });
   }
 
   static int root_functions(solver_number, N_Vector state, solver_number* root, void* data) {
-    static_cast<cvode_integrator*>(data)->equations_.roots(N_VGetArrayPointer(state), root);
-    return 0;
+    auto* self = static_cast<cvode_integrator*>(data);
+    return self->kept([&] {
+      self->equations_.roots(N_VGetArrayPointer(state), root);
+      self->avoid_zeros(root);
+      return 0;
+    });
+  }
+
+  /* CVODE overlooks a function that is 0 where it starts: a joint at rest on its stop would pass through it. There, 0
+   * stands for the side that holds. */
+  void avoid_zeros(double* root) const {
+    const auto hold = [&root](bool positive) {
+      if (*root == 0.0) *root = positive ? 1e-100 : -1e-100;
+      ++root;
+    };
+    const state_layout& at = equations_.layout();
+    for (std::size_t i = 0; i < at.tendons; ++i) hold(!modes_.slack[i]);
+    for (std::size_t j = 0; j < at.joints; ++j) {
+      hold(modes_.below[j]);
+      hold(modes_.above[j]);
+    }
+    if (equations_.the_rig().obstacle.present) hold(modes_.touching);
   }
 
   static int prepare(solver_number time, N_Vector state, N_Vector, SUNMatrix, solver_flag old_will_do,
                      solver_flag* taken, solver_number gamma, void* data, N_Vector scratch, N_Vector, N_Vector) {
     auto* self = static_cast<cvode_integrator*>(data);
-    if (!old_will_do) {
-      const double* y = N_VGetArrayPointer(state);
-      self->equations_.want_slopes(true);
-      self->equations_.evaluate(time, y, &self->modes_, *self->inputs_, N_VGetArrayPointer(scratch));
-      self->linearisation_.take(self->equations_, y, *self->inputs_, rigid_slopes::exact);
-      self->work_.jacobians += 1;
-    }
-    *taken = old_will_do ? SUNFALSE : SUNTRUE;
-    return self->linearisation_.factor(gamma) ? 0 : 1;
+    return self->kept([&] {
+      if (!old_will_do) {
+        const double* y = N_VGetArrayPointer(state);
+        self->equations_.want_slopes(true);
+        self->equations_.evaluate(time, y, &self->modes_, *self->inputs_, N_VGetArrayPointer(scratch));
+        self->linearisation_.take(self->equations_, y, *self->inputs_, rigid_slopes::exact);
+        self->work_.jacobians += 1;
+      }
+      *taken = old_will_do ? SUNFALSE : SUNTRUE;
+      return self->linearisation_.factor(gamma) ? 0 : 1;
+    });
   }
 
   dynamics& equations_;
@@ -210,6 +257,7 @@ class cvode_integrator : public integrator {
   bool created_ = false, fresh_ = true;
   const commands* inputs_ = nullptr;
   contact_modes modes_;
+  std::exception_ptr thrown_;
   statistics counted_;
 };
 

@@ -139,6 +139,10 @@ void fixed_step_integrator::step(const commands& inputs, double time, double siz
 void fixed_step_integrator::advance(const commands& inputs, double until, moment* now) {
   const double span = until - now->time;
   if (span <= 0.0) return;
+  if (same_moment(now->time, until)) {  // 1/span would overflow in the end
+    now->time = until;
+    return;
+  }
   const double count = std::max(1.0, std::ceil(span / step_ - 1e-9));
   const double size = span / count;
   state_ = now->state;

@@ -2,6 +2,8 @@
 #ifndef TENDONFMU_PLANT_INTEGRATOR_H
 #define TENDONFMU_PLANT_INTEGRATOR_H
 
+#include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <vector>
 
@@ -24,6 +26,11 @@ struct moment {
   std::vector<double> state;
   contact_modes modes;
 };
+
+/* Whether nothing lies between two times that a step could be told from: an integrator then only sets the clock. */
+inline bool same_moment(double time, double until) {
+  return until - time <= 1e-15 + 4.0 * std::numeric_limits<double>::epsilon() * std::fabs(until);
+}
 
 class integrator {
  public:
