@@ -12,12 +12,6 @@ namespace tendonfmu::plant {
 
 constexpr double pi = 3.14159265358979323846;
 
-/* Nearest integer of |x| < 2^51, exact, without a library call. */
-inline double nearest(double x) {
-  constexpr double shift = 6755399441055744.0;  // 1.5 · 2^52
-  return (x + shift) - shift;
-}
-
 /* Two numbers at once, in one register of every 64-bit machine, with the same bits as one at a time. */
 using pair = double __attribute__((vector_size(16)));
 using pair_bits = std::uint64_t __attribute__((vector_size(16)));
@@ -86,7 +80,8 @@ struct sine_and_cosine {
 
 /* Of |x| < 1e5 rad: reduced by multiples of π/2 in three parts, then Taylor's series. */
 inline sine_and_cosine sine_cosine(double x) {
-  const double k = nearest(x * 0.63661977236758134308);
+  constexpr double shift = 6755399441055744.0;  // as above
+  const double shifted = x * 0.63661977236758134308 + shift, k = shifted - shift;
   const double r =
       ((x - k * 1.57079632673412561417e+00) - k * 6.07710050630396597660e-11) - k * 2.02226624879595063154e-21;
   const double r2 = r * r;
@@ -103,7 +98,7 @@ inline sine_and_cosine sine_cosine(double x) {
                                    r2 * (1.0 / 40320 + r2 * (-1.0 / 3628800 +
                                                              r2 * (1.0 / 479001600 - r2 * (1.0 / 87178291200.0 -
                                                                                            r2 / 20922789888000.0)))))));
-  switch (static_cast<long long>(k) & 3) {
+  switch (bits_of(shifted) & 3) {
     case 0: return {s, c};
     case 1: return {c, -s};
     case 2: return {-s, -c};
