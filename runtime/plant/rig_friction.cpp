@@ -29,6 +29,14 @@ law read_law(const json_node& node, double asymmetry) {
   const json_node negative = two_sided ? node.member("negative") : node;
   law found = {read_side(positive, 1.0 + asymmetry), read_side(negative, 1.0 - asymmetry), 0.0};
   found.break_away = 0.5 * (found.positive.break_away + found.negative.break_away);
+  // the bristle is measured by the mean of both sides: it must have a level to slide at on either
+  for (const bool negative_side : {false, true}) {
+    const law_side& side = negative_side ? found.negative : found.positive;
+    if (side.sliding >= 1e-6 * found.break_away && side.break_away >= 1e-6 * found.break_away) continue;
+    (negative_side ? negative : positive)
+        .member("coulomb")
+        .refuse("a positive number where the other side's `static` is one: bristles need sliding friction");
+  }
   return found;
 }
 

@@ -12,7 +12,7 @@
 namespace tendonfmu::plant {
 namespace {
 
-constexpr double largest_seed = 9007199254740992.0;  // 2^53: exact as a double
+constexpr std::size_t largest_seed = 9007199254740992;  // 2^53: exact as a double
 
 /* The finger description must be one: the product's own reader judges it, its numbers are then taken as they are. */
 void check_finger(const json_node& finger) {
@@ -63,7 +63,7 @@ rig read_rig(const char* text, std::size_t size) {
   }
   rig rig;
   rig.name = document.member("name").text();
-  rig.seed = static_cast<std::uint64_t>(number_in(document, "seed", {0.0, largest_seed, ""}, 0.0));
+  rig.seed = index_in(document, "seed", 0, largest_seed, 0);
   const json_node finger = document.member("finger");
   check_finger(finger);
   const json_node physics = physics_of(document);
