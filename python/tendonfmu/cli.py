@@ -319,22 +319,19 @@ def _print_demo(result: Any) -> None:
     from rich.table import Table
 
     free, more, pushed = result.recordings
-    table = Table(
-        title=f"{result.finger}: torque, rms in mN·m",
-        caption="measured → left over; in contact: external torque → error",
-    )
-    table.add_column("joint")
-    for recording, motion in ((free, "free motion"), (more, "the same"), (pushed, "with pushes, free")):
-        table.add_column(f"{motion}\n{recording.mean_force:.0f} N", justify="right")
-    table.add_column("in contact", justify="right")
+    table = Table(title=f"{result.finger}: joint torque → left after compensation, rms in mN·m")
+    table.add_column("")
+    for letter, motion, recording in (("a", "free", free), ("b", "the same", more), ("c", "no push", pushed)):
+        table.add_column(f"({letter}) {motion}\n{recording.mean_force:.0f} N", justify="right")
+    table.add_column("(c) pushed\nexternal → error", justify="right")
     for joints in zip(*(recording.joints for recording in result.recordings), strict=True):
         cells = [f"{1e3 * joint.measured:.1f} → {1e3 * joint.left:.1f}" for joint in joints]
         table.add_row(joints[0].name, *cells, f"{1e3 * joints[2].load:.1f} → {1e3 * joints[2].error:.1f}")
     console = Console()
     console.print(table)
-    console.print(f"pushes: {pushed.score.found} of {pushed.score.pushes} pushes found")
-    for recording in result.recordings:
-        console.print(f"alarms without a push, {recording.name}: {_alarms(recording.score)}", highlight=False)
+    console.print(f"(c) {pushed.score.found} of {pushed.score.pushes} pushes found", highlight=False)
+    for letter, recording in zip("abc", result.recordings, strict=True):
+        console.print(f"({letter}) alarms without a push: {_alarms(recording.score)}", highlight=False, soft_wrap=True)
     for path, what in result.files.items():
         console.print(f"  {path}  {what}", highlight=False, soft_wrap=True)
 
@@ -344,7 +341,8 @@ def _alarms(score: Any) -> str:
         return "none"
     begin, end = max(score.outside, key=lambda alarm: alarm[1] - alarm[0])
     many = f"{len(score.outside)}, {100 * score.outside_share:.1f} % of the time"
-    return f"{many}, the longest for {end - begin:.1f} s from {begin:.1f} s on"
+    feeds = " (in contact the bias is frozen: an alarm can feed itself)" if end - begin > 1.0 else ""
+    return f"{many}, the longest {end - begin:.1f} s from {begin:.1f} s on{feeds}"
 
 
 def _progress(wanted: bool | None = None) -> Progress:

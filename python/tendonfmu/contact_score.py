@@ -12,8 +12,7 @@ from tendonfmu.figure_data import Interval, intervals
 
 Flags = NDArray[Any]
 
-QUIET = 0.2  # s before a push; an alarm in there was on already and has not found it
-MERGE = 0.1  # s; alarms closer than this are one
+QUIET = 0.2  # s before a push: an alarm in there was on already and has not found it. Alarms closer than that are one.
 
 
 @dataclass(frozen=True)
@@ -43,7 +42,7 @@ def score_contacts(time: NDArray[np.float64], label: Flags, alarm: Flags) -> Con
     return ContactScore(
         pushes=len(pushes),
         found=found,
-        outside=merged(intervals(time, outside), MERGE),
+        outside=merged(intervals(time, outside), QUIET),
         outside_share=float(outside.sum()) / free if free else 0.0,
     )
 
