@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
 from plant_rigs import needs_plant
-from tendonfmu.plant_figures import bristle_numbers, led, loop_figure, model_friction, presliding_figure
+from tendonfmu.plant_figures import bristle_numbers, led, loop_figure, model_friction, presliding_figure, truth_figure
 from tendonfmu.rig import Rig, read_rig
 from tendonfmu.rig_drawing import GAP, rig_drawing
 
@@ -83,6 +83,21 @@ def test_the_model_sees_the_led_joint_alone(rig: Rig) -> None:
     np.testing.assert_array_equal(
         model_friction(rig, JOINT, signals), model_friction(rig, JOINT, signals | {"joint_velocity": other})
     )
+
+
+@needs_plant
+def test_the_truth_of_a_part_of_a_recording() -> None:
+    """20 to 36 s of the rig with pushes: three of the four turn the joint, and the labels are where the pushes are."""
+    figure = truth_figure(read_rig(RIGS / "index_finger_pushes.json"), JOINT, 20.0, 36.0)
+    assert (figure.time[0], figure.time[-1]) == (20.0, 36.0) and figure.forces.shape == (8001, 8)
+    assert sum(figure.flexors) == 4
+    largest = [
+        np.abs(figure.torques["external torque"][(figure.time >= begin) & (figure.time < end)]).max()
+        for begin, end in figure.contacts
+    ]
+    assert [value > 0.03 for value in largest] == [True, False, True, True]
+    rest = figure.torques["joint torque"] - figure.torques["friction"] - figure.torques["external torque"]
+    assert np.abs(rest).max() < 0.012  # gravity
 
 
 @needs_plant

@@ -80,7 +80,7 @@ def test_every_test_on_the_page_is_there() -> None:
 
 def test_every_figure_is_there() -> None:
     figures = re.findall(r"\]\((figures/[^)]+)\)", PAGE)
-    assert len(figures) == 3 and all((ROOT / "docs" / figure).is_file() for figure in figures)
+    assert len(figures) == 4 and all((ROOT / "docs" / figure).is_file() for figure in figures)
 
 
 @needs_plant

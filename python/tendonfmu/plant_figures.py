@@ -12,9 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.figure_data import Interval, intervals
 from tendonfmu.native import Finger
 from tendonfmu.plant import Array, Plant
 from tendonfmu.rig import Rig
+from tendonfmu.simulation import simulate
 
 Signals = Mapping[str, Array]
 WAYS = tuple[tuple[float, float], ...]
@@ -70,6 +72,21 @@ class PreslidingFigure:
     contacts: list[Contact]
     small: Loop
     last_move: int
+
+
+@dataclass(frozen=True)
+class TruthFigure:
+    """A part of a recording with its truth. time: [N] s. forces: [N, m] N measured. angle: [N] rad. torques: label ->
+    [N] N·m, of one joint. contacts: begin and end in s.
+    """
+
+    joint: str
+    time: Array
+    forces: Array
+    flexors: list[bool]
+    angle: Array
+    torques: dict[str, Array]
+    contacts: list[Interval]
 
 
 def led(rig: Rig, joint: int, ways: WAYS, pretension: float) -> dict[str, Array]:
@@ -171,6 +188,25 @@ def _contacts(rig: Rig, joint: int, tendon: int) -> dict[str, int]:
         label = f"{kind}: {1e3 * d:g} mrad" if kind == "joint" else f"{kind}: {1e6 * d:g} µm = {1e3 * d / arm:.1f} mrad"
         labels[label] = number
     return labels
+
+
+def truth_figure(rig: Rig, joint: int, begin: float, end: float) -> TruthFigure:
+    """From begin to end (s) of a rig's own recording, one joint (0-based)."""
+    simulation = simulate(rig, truth=True)
+    recording, truth = simulation.recording, simulation.truth or {}
+    shown = (recording["time"] >= begin) & (recording["time"] <= end)
+    time = recording["time"][shown]
+    labels = {"joint_torque": "joint torque", "friction_torque": "friction", "external_torque": "external torque"}
+    arms = rig.finger.moment_arms
+    return TruthFigure(
+        joint=rig.finger.joint_names[joint],
+        time=time,
+        forces=np.column_stack([recording[f"tendon_force[{i + 1}]"][shown] for i in range(rig.tendons)]),
+        flexors=[arms[i][joint] > 0.0 for i in range(rig.tendons)],
+        angle=truth[f"joint_position[{joint + 1}]"][shown],
+        torques={label: truth[f"{name}[{joint + 1}]"][shown] for name, label in labels.items()},
+        contacts=intervals(time, truth["contact"][shown]),
+    )
 
 
 def bristle_numbers(rig: Rig, joint: int, tendon: int) -> dict[str, int]:

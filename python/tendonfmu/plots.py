@@ -18,7 +18,7 @@ from matplotlib.text import Text
 
 from tendonfmu.drawing import DrawnTendon, FingerDrawing, Points
 from tendonfmu.figure_data import CompensationFigure, JointCurves, ReferenceCurves, ReferenceFigure, StoryFigure
-from tendonfmu.plant_figures import LoopFigure, PreslidingFigure
+from tendonfmu.plant_figures import LoopFigure, PreslidingFigure, TruthFigure
 from tendonfmu.rig_drawing import DrawnBody, DrawnRoute, RigDrawing, View
 from tendonfmu.whole_file import whole_file
 
@@ -451,3 +451,29 @@ def _draw_small_moves(axes: Axes, data: PreslidingFigure) -> None:
         arrowprops={"arrowstyle": "->", "color": DARK},
         fontsize=12.5,
     )
+
+
+def draw_truth(data: TruthFigure, target: Target) -> None:
+    """Tendon forces as measured, and the truth of one joint: its angle, and its torque with what takes it, as PNG."""
+    figure = Figure(figsize=(12.8, 7.6), layout="constrained")
+    panels = forces, angle, torque = figure.subplots(3, 1, sharex=True, height_ratios=[1.0, 0.7, 1.2])
+    for axes, name in zip(panels, ("tendon force (N)", "angle (rad)", "torque (N·m)"), strict=True):
+        _clean(axes)
+        axes.set_ylabel(name, fontsize=13)
+        for begin, end in data.contacts:
+            axes.axvspan(begin, end, color=ORANGE, alpha=0.18, linewidth=0)
+    for i, flexor in enumerate(data.flexors):
+        same = [k for k, other in enumerate(data.flexors) if other == flexor]
+        colours = FLEXOR_COLOURS if flexor else EXTENSOR_COLOURS
+        forces.plot(data.time, data.forces[:, i], color=colours[same.index(i) % len(colours)], linewidth=1.1)
+    forces.set_title("measured: all tendons", loc="left", fontsize=14, fontweight="bold", color=DARK)
+    angle.plot(data.time, data.angle, color=DARK, linewidth=1.3)
+    angle.set_title(f"truth: {data.joint}", loc="left", fontsize=14, fontweight="bold", color=DARK)
+    for (label, values), colour in zip(data.torques.items(), (DARK, SKY, GREEN), strict=True):
+        torque.plot(data.time, values, color=colour, linewidth=1.6, label=label)
+    torque.plot([], [], color=ORANGE, alpha=0.3, linewidth=9.0, label="contact")
+    torque.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=4, frameon=False, fontsize=12.5)
+    torque.set_xlabel("time (s)", fontsize=13)
+    torque.set_xlim(data.time[0], data.time[-1])
+    figure.align_ylabels(panels)
+    _save(figure, target, 100)
