@@ -144,6 +144,15 @@ CORE = listed_sources(ROOT / "runtime" / "CMakeLists.txt", "set(TENDONFMU_CORE_S
 DESCRIPTION = listed_sources(
     ROOT / "runtime" / "description" / "CMakeLists.txt", "add_library(tendonfmu_description STATIC"
 )
+PLANT = listed_sources(ROOT / "runtime" / "plant" / "CMakeLists.txt", "set(TENDONFMU_PLANT_SOURCES")
+# all that the simulated finger may know of the rest
+KNOWN_TO_PLANT = {
+    "tendonfmu_plant.h",
+    "tendonfmu_description.h",
+    "json_document.h",
+    "json_node.h",
+    "description_error.h",
+}
 
 
 def test_core_includes_only_what_stands_above_it() -> None:
@@ -154,6 +163,53 @@ def test_core_includes_only_what_stands_above_it() -> None:
 def test_description_includes_only_what_stands_above_it() -> None:
     known = {"tendonfmu.h", "tendonfmu_description.h", "core_inside.h"}
     assert is_ordered(ROOT / "runtime" / "description", DESCRIPTION, known) == []
+
+
+def test_plant_includes_only_what_stands_above_it() -> None:
+    assert len(PLANT) > 20
+    assert is_ordered(ROOT / "runtime" / "plant", PLANT, KNOWN_TO_PLANT) == []
+
+
+def test_every_plant_file_is_in_the_list() -> None:
+    folder = ROOT / "runtime" / "plant"
+    listed = {(folder / source).with_suffix("") for source in PLANT}
+    files = {file.with_suffix("") for file in folder.rglob("*") if file.suffix in (".h", ".cpp")}
+    assert files == listed
+
+
+def test_plant_and_model_share_no_header() -> None:
+    """The model is judged against the simulated finger: neither sees the other; no header name stands in both."""
+    runtime = ROOT / "runtime"
+    plant = {file.name for file in (runtime / "plant").glob("*.h")} | {"tendonfmu_plant.h"}
+    model = {file.name for part in ("core", "description") for file in (runtime / part).rglob("*.h")} | {"tendonfmu.h"}
+    assert len(plant) > 15
+    assert len(model) > 30
+    assert plant & model == set()
+    wrong = [
+        f"{file.relative_to(runtime).as_posix()}: {name}"
+        for part, others in (("core", plant), ("description", plant), ("plant", model - KNOWN_TO_PLANT))
+        for file in sorted((runtime / part).rglob("*"))
+        if file.suffix in (".c", ".h", ".cpp")
+        for _, name in includes_of(file)
+        if Path(name).name in others
+    ]
+    assert wrong == []
+
+
+@pytest.mark.parametrize(
+    ("library", "users"),
+    [
+        (r"(cvode|nvector|sundials|sunlinsol|sunmatrix)/", {"cvode_integrator", "newton_solver", "sundials_version"}),
+        (r"Eigen/", {"dynamics", "linearisation", "rig_checks"}),
+    ],
+)
+def test_only_these_plant_files_know(library: str, users: set[str]) -> None:
+    found = {
+        file.stem
+        for file in (ROOT / "runtime" / "plant").glob("*")
+        if file.suffix in (".h", ".cpp") and any(angle and re.match(library, name) for angle, name in includes_of(file))
+    }
+    assert found == users
 
 
 def test_the_order_test_sees_a_wrong_include(tmp_path: Path) -> None:
