@@ -10,7 +10,7 @@ namespace {
 
 constexpr int most_iterations = 20;
 constexpr int most_divisions = 10;      /* of a step in two */
-constexpr double good_progress = 0.25;  // per iteration, else the matrix is taken anew
+constexpr double good_progress = 0.1;   // per iteration, else the matrix is taken anew
 constexpr double close_enough = 1e-6;   // rad/s, of the speed in the middle of a step
 constexpr double longest_change = 2.0;  // rad/s per iteration
 constexpr double beyond_reason = 1e6;   // rad, rad/s, m
@@ -84,7 +84,10 @@ bool fixed_step_integrator::find_middle(const commands& inputs, double middle, d
       largest = change_of_speed(half, speed);
     }
     if (!(largest < beyond_reason)) return false;
-    if (largest < close_enough) return true;
+    if (largest < close_enough) {
+      if (iteration > 1) factored_for_ = 0.0;  // the next step is better off with its own matrix
+      return true;
+    }
     before = largest;
     const double scale = std::min(1.0, longest_change / largest);
     for (std::size_t j = 0; j < n; ++j) speed[j] += scale * change_[j];
