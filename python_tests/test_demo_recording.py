@@ -218,6 +218,9 @@ def test_most_pushes_are_found_and_felt_in_size(
     assert (score.pushes, score.found) == (11, 8)
     # one latch-up, 4.4 s from the first stroke on: the bias is frozen while in contact
     assert score.outside_share < 0.12
+    late = ~label & (recording.time > 8.0)
+    assert np.all(rms(given["compensated_torque"][late]) < rms(given["joint_torque"][late]) / 3)
+    assert not given["contact"].ravel()[late].any()
     load = recording.groups["external_torque"][label]
     assert np.all(rms(given["compensated_torque"][label] - load) < 0.4 * rms(load))
 
