@@ -19,7 +19,8 @@ namespace tendonfmu::plant {
 namespace {
 
 constexpr double longest_step = 0.02;     // s: a push of the schedule is never stepped over
-constexpr double most_steps = 200000;     // for one advance, and for each of its seconds where it is longer
+constexpr double least_steps = 50000;     // for one advance, ...
+constexpr double most_frequent = 200000;  // ... and as many more for each of its seconds
 constexpr int most_roots_at_once = 10000; /* for one advance: chattering */
 
 /* Absolute tolerances: the relative one times what is small for the quantity. */
@@ -65,7 +66,7 @@ class cvode_integrator : public integrator {
       start(now->time);
     }
     double reached = now->time;
-    double left = most_steps * std::max(1.0, until - now->time);
+    double left = least_steps + most_frequent * (until - now->time);
     for (int found = 0;; ++found) {
       CVodeSetMaxNumSteps(cvode_, static_cast<long>(std::clamp(left, 1.0, 2e9)));
       const unsigned long long steps_before = work_.steps;
