@@ -1,6 +1,7 @@
-// make_seeds FOLDER FINGER.json...: writes what the fuzzers begin with: corpus/fuzz_json, corpus/fuzz_image and
-// keys.dict from the given fingers, the one of the tests and a least one; corpus/fuzz_calls, where any bytes are a
-// sequence of calls.
+// make_seeds FOLDER DOCUMENT.json...: writes what the fuzzers begin with: corpus/fuzz_json, corpus/fuzz_image and
+// keys.dict from the given fingers, the one of the tests and a least one; corpus/fuzz_rig from the given rigs;
+// corpus/fuzz_calls, where any bytes are a sequence of calls.
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -48,6 +49,20 @@ std::string quoted(const std::string& word) {
   return text + "\"\n";
 }
 
+// a rig, and again without one of its parts each: smaller ones are mutated more deeply
+void write_rigs(const std::filesystem::path& folder, const nlohmann::json& rig) {
+  write(folder / "whole", rig.dump());
+  for (const char* part :
+       {"/physics/friction", "/physics/wrist", "/physics/obstacle", "/physics/tendons", "/sensors"}) {
+    const nlohmann::json::json_pointer place(part);
+    nlohmann::json less = rig;
+    less.at(place.parent_pointer()).erase(place.back());
+    std::string name = part;
+    std::replace(name.begin(), name.end(), '/', '_');
+    write(folder / ("without" + name), less.dump());
+  }
+}
+
 std::string any_bytes(unsigned seed, std::size_t size) {
   std::mt19937 random(seed);
   std::string bytes(size, 0);
@@ -59,7 +74,7 @@ std::string any_bytes(unsigned seed, std::size_t size) {
 
 int main(int count, char** arguments) {
   if (count < 2) {
-    std::fprintf(stderr, "usage: make_seeds FOLDER FINGER.json...\n");
+    std::fprintf(stderr, "usage: make_seeds FOLDER DOCUMENT.json...\n");
     return 2;
   }
   std::vector<std::string> fingers = {test_finger::json, least_finger};
@@ -71,6 +86,7 @@ int main(int count, char** arguments) {
   std::filesystem::create_directories(folder / "corpus" / "fuzz_json");
   std::filesystem::create_directories(folder / "corpus" / "fuzz_image");
   std::filesystem::create_directories(folder / "corpus" / "fuzz_calls");
+  std::filesystem::create_directories(folder / "corpus" / "fuzz_rig");
   for (unsigned seed = 0; seed < 40; ++seed) {
     write(folder / "corpus" / "fuzz_calls" / ("calls" + std::to_string(seed)), any_bytes(seed, 100 * (seed + 1)));
   }
@@ -78,6 +94,11 @@ int main(int count, char** arguments) {
   for (std::size_t i = 0; i < fingers.size(); ++i) {
     const std::string name = "finger" + std::to_string(i);
     const auto document = nlohmann::json::parse(fingers[i]);
+    if (document.at("format") != "tendonfmu-finger-1") {
+      write_rigs(folder / "corpus" / "fuzz_rig", document);
+      collect(document, words);
+      continue;
+    }
     const std::vector<unsigned char> image = test_finger::image(fingers[i]);
     write(folder / "corpus" / "fuzz_json" / name, document.dump());
     write(folder / "corpus" / "fuzz_image" / name, std::string(image.begin(), image.end()));

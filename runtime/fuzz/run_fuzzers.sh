@@ -24,7 +24,7 @@ while IFS= read -r program; do
   mkdir -p "$corpus" "$build/findings"
   arguments=("$corpus")
   if [[ -d $folder/corpus/$name ]]; then arguments+=("$folder/corpus/$name"); fi
-  if [[ $name == *json* ]]; then arguments+=("-dict=$folder/keys.dict"); fi
+  if [[ $name == *json* || $name == *rig* ]]; then arguments+=("-dict=$folder/keys.dict"); fi
   log=$build/$name.log
   if "$program" -max_total_time="$seconds" -timeout=10 -rss_limit_mb=4096 -print_final_stats=1 \
     -artifact_prefix="$build/findings/$name-" "${arguments[@]}" >"$log" 2>&1; then
