@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BPoly
 
+from excite_fingers import INDEX, INDEX_DATA, INDEX_RANGES, SMALL, SMALL_RANGES
 from tendonfmu import native
 from tendonfmu.balance import balanced_forces, moment_arms, pretension_vector
 from tendonfmu.coverage import effect_coverage, joint_coverage
@@ -20,49 +21,10 @@ from tendonfmu.description import estimated_numbers
 from tendonfmu.effects import effects, working_point_weights
 from tendonfmu.errors import InputError
 from tendonfmu.excitation import ACCELERATION, Excitation, Plan, plan_excitation
-from tendonfmu.excite import as_array, excite, find_pretensions, find_ranges, read_subject, report
-from tendonfmu.identifiability import information, noise_of, sensitivities, unknowns
-from tendonfmu.judgement import LIMIT
+from tendonfmu.excite import as_array, find_pretensions, find_ranges, read_subject
+from tendonfmu.identifiability import unknowns
 from tendonfmu.quintic import evaluate
 from tendonfmu.tables import read_table
-
-ROOT = Path(__file__).resolve().parent.parent
-INDEX = ROOT / "examples" / "fingers" / "index_finger.json"
-INDEX_DATA: dict[str, Any] = json.loads(INDEX.read_text(encoding="utf-8"))
-INDEX_RANGES = np.array([[-0.35, 0.35], [-0.3, 1.4], [0.0, 1.6], [-0.15, 0.85]])
-
-
-def law(static: float, coulomb: float, stribeck: float, viscous: float = 0.0) -> dict[str, float]:
-    return {"static": static, "coulomb": coulomb, "stribeck_velocity": stribeck, "viscous": viscous}
-
-
-SMALL: dict[str, Any] = {
-    "format": "tendonfmu-finger-1",
-    "name": "two_joints",
-    "joints": [
-        {"name": "base", "cover": {"stiffness": 0.02, "rest_angle": 0.1}, "friction": law(0.02, 0.015, 0.1, 0.01)},
-        {"name": "tip", "load_friction": law(1e-3, 8e-4, 0.1)},
-    ],
-    "tendons": [
-        {
-            "name": "flexor",
-            "stiffness": 6000.0,
-            "moment_arms": [0.009, 0.006],
-            "pulley_friction": [law(0.03, 0.03, 0.006)],
-            "edge_friction": [
-                {"positive": law(0.06, 0.05, 0.004), "negative": law(0.05, 0.04, 0.004, 1.0)},
-                {
-                    "angles": [-0.5, 0.0, 0.6],
-                    "laws": [law(0.2, 0.15, 0.004), law(0.1, 0.06, 0.004), law(0.2, 0.2, 0.004)],
-                },
-            ],
-        },
-        {"name": "extensor", "stiffness": 6000.0, "moment_arms": [-0.006, -0.006]},
-        {"name": "base_extensor", "stiffness": 5000.0, "moment_arms": [-0.006, 0.0]},
-    ],
-    "contact": {"threshold": [0.03, 0.02]},
-}
-SMALL_RANGES = np.array([[-0.5, 0.6], [-0.4, 0.4]])
 
 
 @pytest.fixture(scope="module")
@@ -281,143 +243,6 @@ def test_numbers_are_those_of_the_description() -> None:
     assert len(unknowns(INDEX_DATA)) == 468
     paths = {parameter.path for parameter in native.Finger.from_description(INDEX_DATA).parameters()}
     assert {number.path for number in unknowns(INDEX_DATA)} <= paths
-
-
-def small_samples(data: dict[str, Any], duration: float = 60.0) -> dict[str, np.ndarray]:
-    motion = plan_excitation(data, Plan(SMALL_RANGES, duration=duration, rate=50))
-    samples = {name: getattr(motion, name) for name in ("time", "joint_position", "joint_velocity")}
-    return samples | {"tendon_force": balanced_forces(data, samples, motion.pretension)}
-
-
-def innovations(data: dict[str, Any], samples: dict[str, np.ndarray], change: dict[str, float]) -> np.ndarray:
-    """[N, n] τ − T_eff before the bias step, by the core's own filter, in units of their standard deviation."""
-    free = {**data, "contact": {"threshold": [1e9] * 2}}
-    finger = native.Finger.from_description(free, kinematics_source=3)
-    finger.set({path: finger.get(path) + step for path, step in change.items()})
-    left = finger.run(samples)["compensated_torque"]
-    bias = data["bias"]
-    variance, noise = bias["initial_variance"], bias["noise_std"] ** 2 * bias["noise_time"]
-    result = np.zeros_like(left)
-    steps = np.diff(samples["time"])
-    for k, step in enumerate(steps, start=1):
-        variance += bias["drift_variance"] * step
-        total = variance + noise / step
-        result[k] = left[k] * total / (noise / step) / np.sqrt(total)  # left = (1 − K) innovation
-        variance *= 1 - variance / total
-    return result
-
-
-def test_information_is_that_of_the_cores_own_innovations() -> None:
-    """Bundled runs, shared out and filtered in numpy, against one run of the whole core per number."""
-    bias = {"drift_variance": 1e-4, "noise_std": 0.02, "noise_time": 0.01, "initial_variance": 1e-3, "forget_rate": 2.0}
-    data = {**SMALL, "bias": bias}
-    samples, numbers = small_samples(data), unknowns(SMALL)
-    force = np.abs(samples["tendon_force"]).mean(axis=1)
-    found = information(sensitivities(data, numbers, samples), samples["time"], force, noise_of(data, 0.02))
-    plain = innovations(data, samples, {})
-    slopes = []
-    for number in numbers:
-        step = (-1e-5 if number.key == "coulomb" and number.with_path is None else 1e-5) * number.reference
-        paths = [path for path in (number.path, number.with_path) if path]
-        slopes.append(
-            (innovations(data, samples, dict.fromkeys(paths, step)) - plain).ravel() / step * number.reference
-        )
-    expected = np.array(slopes) @ np.array(slopes).T
-    scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
-    assert (np.diag(expected) > 0).all()
-    np.testing.assert_allclose(found / scale, expected / scale, atol=2e-3)
-
-
-def test_standard_errors_are_those_of_estimates() -> None:
-    """A fit of simulated recordings scatters as foretold: cover and base friction of the small finger."""
-    bias = {"drift_variance": 0.0, "noise_std": 0.02, "noise_time": 0.02, "initial_variance": 1e6, "forget_rate": 2.0}
-    data = {**SMALL, "bias": bias}
-    samples, numbers = small_samples(data), unknowns(SMALL)
-    chosen = [k for k, number in enumerate(numbers) if number.path.startswith("joints[1]")]
-    force = np.abs(samples["tendon_force"]).mean(axis=1)
-    changes = np.concatenate(list(sensitivities(data, numbers, samples)))[:, :, chosen]
-    known = information([changes.copy()], samples["time"], force, noise_of(data, 0.02))
-    columns = np.column_stack([changes[:, 0], np.ones(len(changes))])  # and a constant bias
-    random = np.random.default_rng(5)
-    estimates = [
-        np.linalg.lstsq(columns, columns[:, :-1].sum(axis=1) + random.normal(0, 0.02, len(columns)), rcond=None)[0][:-1]
-        for _ in range(400)
-    ]
-    np.testing.assert_allclose(np.std(estimates, axis=0), np.sqrt(np.diag(np.linalg.inv(known))), rtol=0.12)
-
-
-@pytest.fixture(scope="module")
-def index_report() -> dict[str, Any]:
-    subject = read_subject(INDEX)
-    ranges = find_ranges(subject, [])
-    return report(excite(subject, ranges, Plan(as_array(ranges))), "tendonfmu excite")
-
-
-def test_index_finger_counts(index_report: dict[str, Any]) -> None:
-    """Antagonists and effects in a row share their velocity, so most numbers show in combinations only."""
-    assert index_report["numbers"] == 468
-    assert index_report["identifiable"] >= 60
-    assert index_report["identifiable_alone"] >= 240
-    assert index_report["known_combinations"] >= 150
-    for entry in index_report["parameters"]:
-        assert entry["identifiable"] == (entry["relative_standard_error"] <= LIMIT) == (entry["reason"] is None)
-        assert entry["relative_standard_error_alone"] <= entry["relative_standard_error"] * (1 + 1e-6)
-        assert bool(entry["in_combination_with"]) == (entry["cause"] == "combination")
-
-
-def test_antagonists_are_named_together(index_report: dict[str, Any]) -> None:
-    entry = next(e for e in index_report["parameters"] if e["path"] == "tendons[5].pulley_friction[2].coulomb")
-    assert entry["cause"] == "combination"
-    assert any("tendons[6].pulley_friction[2]" in path for path in entry["in_combination_with"])
-    assert index_report["least_known_combinations"][0]["relative_standard_error"] > LIMIT
-
-
-def small_report(small_file: Path, *ranges: str, **plan: Any) -> dict[str, Any]:
-    subject = read_subject(small_file)
-    found = find_ranges(subject, ranges)
-    return report(excite(subject, found, Plan(as_array(found), **{"duration": 60, **plan})), "tendonfmu excite")
-
-
-def reasons(result: dict[str, Any], part: str) -> set[tuple[str | None, str | None]]:
-    return {(e["cause"], e["reason"]) for e in result["parameters"] if part in e["path"]}
-
-
-def test_an_angle_that_is_never_reached(small_file: Path) -> None:
-    result = small_report(small_file, "base=0.1:0.6", "tip=-0.4:0.4")
-    expected = ("working_point", "joint 1 never comes near working point 1 at -0.5 rad")
-    assert reasons(result, "edge_friction[2].laws[1]") == {expected}
-    assert expected not in reasons(result, "edge_friction[2].laws[2]")
-    points = next(e for e in result["effects"] if e["path"] == "tendons[1].edge_friction[2]")["working_points"]
-    assert points[0]["time"] == {"positive": 0, "negative": 0, "stuck": 0}
-
-
-def test_a_joint_that_never_moves(small_file: Path) -> None:
-    result = small_report(small_file, "1=0.2:0.2", "2=-0.4:0.4")
-    assert reasons(result, "joints[1].friction") == {("side", "never slides: always within v_min = 0.01")}
-    assert {cause for cause, _ in reasons(result, "joints[1].cover")} == {"noise"}
-    assert result["joints"][0]["strokes"] == 0 and result["joints"][1]["strokes"] > 10
-
-
-def test_slower_than_the_threshold_is_no_sliding(small_file: Path) -> None:
-    result = small_report(small_file, "base=-0.05:0.05", "tip=-0.01:0.01", max_speed=0.009)
-    assert {cause for cause, _ in reasons(result, "friction")} == {"side"}
-    assert result["identifiable"] == 0
-
-
-def test_more_noise_identifies_less(small_file: Path, tmp_path: Path) -> None:
-    counts = []
-    for noise in (0.001, 0.01, 0.1):
-        path = tmp_path / "noisy.json"
-        path.write_text(json.dumps({**SMALL, "bias": {"noise_std": noise}}))
-        counts.append(small_report(path, "tip=-0.4:0.4")["known_combinations"])
-    assert counts[0] > counts[1] > counts[2]
-
-
-def test_asymmetric_laws_have_numbers_for_each_side(small_file: Path) -> None:
-    paths = {e["path"] for e in small_report(small_file)["parameters"]}
-    assert {f"tendons[1].edge_friction[1].{side}.coulomb" for side in ("positive", "negative")} <= paths
-    assert "tendons[1].edge_friction[1].negative.viscous" in paths
-    assert "tendons[1].edge_friction[1].positive.viscous" not in paths
 
 
 def test_weights_are_the_cores_interpolation() -> None:
