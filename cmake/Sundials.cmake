@@ -70,6 +70,14 @@ function(tendonfmu_add_sundials_target)
   if(TENDONFMU_LINKER_HIDES_LIBRARIES)
     target_link_options(tendonfmu_sundials INTERFACE "LINKER:--exclude-libs,${names}")
   endif()
+
+  # CVODE takes its step sizes by pow(), whose last bit in the C library depends on the processor (fused multiply-add):
+  # runtime/plant/cvode_integrator.cpp has one that is the same everywhere. Not for who links the installed library: his own pow() would
+  # be taken as well.
+  check_linker_flag(C "LINKER:--wrap=pow" TENDONFMU_LINKER_WRAPS)
+  if(TENDONFMU_LINKER_WRAPS)
+    target_link_options(tendonfmu_sundials INTERFACE "$<BUILD_INTERFACE:LINKER:--wrap=pow>")
+  endif()
 endfunction()
 
 # Makes the target from what is in `folder`, or from what find_package finds if that is empty; notes in the caller's

@@ -420,4 +420,4 @@ def test_settle_stands_still() -> None:
     """After `settle` the finger rests, at time 0."""
     plant = make(calm(small_rig(motion=still([0.3]), joints=[{"friction": dry(0.005)}])))
     assert plant.time == 0.0
-    assert abs(plant.continuous_state()[1]) < 1e-8
+    assert abs(plant.continuous_state()[1]) < 1e-6  # rad/s; the solver's tolerance is 1e-8 of each quantity's scale

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import platform
 import signal
 import subprocess
 import sys
@@ -174,6 +176,27 @@ def test_progress_is_told_to_the_end(tmp_path: Path) -> None:
 
 
 # --- reproducibility --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.skipif(
+    not sys.platform.startswith("linux") or platform.machine() != "x86_64",
+    reason="SAME BYTES ON ANOTHER PROCESSOR NOT TESTED: the C library of x86-64 Linux can be told to do without FMA",
+)
+@pytest.mark.parametrize("integrator", ["cvode", "fixed_step"])
+def test_the_processor_does_not_show(integrator: str, tmp_path: Path) -> None:
+    """The C library's functions differ in the last bit between processors with and without fused multiply-add."""
+    for name, environment in {"with": {}, "without": {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4"}}.items():
+        command = [sys.executable, "-m", "tendonfmu.cli", "simulate", str(RIGS / "index_finger.json")]
+        files = ["-o", f"{name}.parquet", "--truth", f"{name}_truth.parquet"]
+        subprocess.run(
+            [*command, *files, "--integrator", integrator],
+            cwd=tmp_path,
+            env=os.environ | environment,
+            check=True,
+            capture_output=True,
+        )
+    for file in (".parquet", "_truth.parquet"):
+        assert (tmp_path / f"with{file}").read_bytes() == (tmp_path / f"without{file}").read_bytes()
 
 
 def test_the_same_seed_gives_the_same_bytes(call: Call, tmp_path: Path) -> None:

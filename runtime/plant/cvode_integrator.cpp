@@ -5,15 +5,28 @@
 #include <nvector/nvector_serial.h>
 
 #include <algorithm>
+#include <cmath>
 #include <exception>
 #include <new>
 #include <string>
 #include <utility>
 
+#include "elementary.h"
 #include "linearisation.h"
 #include "newton_solver.h"
 #include "sentence.h"
 #include "sundials_version.h"
+
+/* The linker gives this to CVODE for pow() (cmake/Sundials.cmake), which takes its step sizes by it: the same bits on
+ * every machine of one architecture. CVODE's bases are not negative. It stands here, and in no file of its own, so that
+ * it is there before the archives of SUNDIALS ask for it. */
+extern "C" double __wrap_pow(double base, double exponent);
+extern "C" double __wrap_pow(double base, double exponent) {
+  if (base != base) return base;
+  if (base <= 0.0) return exponent == 0.0 ? 1.0 : 0.0;
+  if (std::isinf(base)) return exponent > 0.0 ? base : 0.0;
+  return tendonfmu::plant::exponential(exponent * tendonfmu::plant::logarithm(base));
+}
 
 namespace tendonfmu::plant {
 namespace {
