@@ -135,7 +135,10 @@ void fixed_step_integrator::step(const commands& inputs, double time, double siz
   for (std::size_t s = 0; s < at.bristles; ++s) {
     state_[at.bristle() + s] += half * bent.rate[s] * (1.0 + bent.kept[s]);
   }
-  for (std::size_t i = at.heat(); i < at.size(); ++i) state_[i] += size * rate_[i];
+  // heat fades by itself, implicitly: it may be gone within a step
+  const double fading = half / equations_.the_rig().friction.heat_time, heat = state_[at.heat()];
+  state_[at.heat()] = heat + size * rate_[at.heat()] / (1.0 + fading);
+  for (std::size_t i = at.motor_work(); i < at.size(); ++i) state_[i] += size * rate_[i];
   work_.steps += 1;
 }
 
@@ -150,6 +153,10 @@ void fixed_step_integrator::advance(const commands& inputs, double until, moment
   const double size = span / count;
   state_ = now->state;
   for (double k = 0.0; k < count; ++k) step(inputs, now->time + k * size, size, 0);
+  if (!std::all_of(state_.begin(), state_.end(), [](double x) { return std::isfinite(x); })) {
+    forget();
+    throw solver_error(sentence("the motion left all bounds before t = ", until, " s: try a smaller step, or cvode"));
+  }
   last_step_ = size;
   now->state = state_;
   now->time = until;

@@ -178,6 +178,17 @@ TEST(FixedSteps, AgreeWithCvodeTheBetterTheSmaller) {
   EXPECT_LT(error[1], 0.25 * error[0]);
 }
 
+// Heat that is gone within a step must not swing up.
+TEST(FixedSteps, StayStableHoweverFastHeatFades) {
+  for (const double time : {1e-12, 1e-6, 1e-3}) {
+    Case one(test_plant::changed({{"/physics/friction/heat/time_constant", time}}));
+    one.now.state[one.equations.layout().heat()] = 1.0;
+    fixed_step_integrator with(&one.equations, 1e-3);
+    with.advance(one.inputs, 0.2, &one.now);
+    EXPECT_LT(std::fabs(one.now.state[one.equations.layout().heat()]), 1.0 + 1e-3);
+  }
+}
+
 TEST(FixedSteps, DivideTheTimeEvenly) {
   Case one(test_plant::plain(2, 4));
   fixed_step_integrator with(&one.equations, 1e-3);
