@@ -59,6 +59,8 @@ set(TENDONFMU_HAS_PLANT OFF)
 set(plant_missing "")
 if(NOT TENDONFMU_PLANT)
   set(plant_missing "it is switched off (TENDONFMU_PLANT)")
+elseif(MSVC)
+  set(plant_missing "it needs the vector types of gcc and clang (runtime/plant/elementary.h)")
 else()
   # Compared here: Eigen 5 does not call itself compatible with 3.4, and is.
   find_package(Eigen3 QUIET NO_MODULE)

@@ -273,7 +273,14 @@ def test_ctrl_c_ends_a_long_simulation_at_once(tmp_path: Path) -> None:
     data = short_rig(recording={"duration": 20000.0})
     data["motion"]["duration"] = 20000.0
     command = [sys.executable, "-m", "tendonfmu.cli", "simulate", str(written(tmp_path, data)), "-o", "rec.csv"]
-    with subprocess.Popen([*command, "--progress"], cwd=tmp_path, stderr=subprocess.PIPE) as process:
+
+    def take_interrupts() -> None:
+        """A job in the background of a shell inherits that SIGINT is ignored."""
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+    with subprocess.Popen(
+        [*command, "--progress"], cwd=tmp_path, stderr=subprocess.PIPE, preexec_fn=take_interrupts
+    ) as process:
         assert process.stderr is not None
         process.stderr.read(1)  # the bar is drawn: it runs
         process.send_signal(signal.SIGINT)

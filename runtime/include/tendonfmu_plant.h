@@ -125,7 +125,7 @@ tendonfmu_plant_status tendonfmu_plant_run(tendonfmu_plant* plant, size_t sample
 
 /* State at the present time: continuous and discrete states, inputs, sensors, last step size. Restoring restarts CVODE
  * (it cannot store its history): two restored runs agree to the bit, and with the uninterrupted one within the
- * tolerances. Needs an initialised plant of the same rig and settings. */
+ * tolerances. Saving needs an initialised plant; restoring one of the same rig and settings, initialised or not. */
 size_t tendonfmu_plant_state_size(const tendonfmu_plant* plant);
 tendonfmu_plant_status tendonfmu_plant_save_state(const tendonfmu_plant* plant, void* bytes, size_t size);
 tendonfmu_plant_status tendonfmu_plant_restore_state(tendonfmu_plant* plant, const void* bytes, size_t size);

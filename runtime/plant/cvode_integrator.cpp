@@ -31,7 +31,7 @@ extern "C" double __wrap_pow(double base, double exponent) {
 namespace tendonfmu::plant {
 namespace {
 
-constexpr double longest_step = 0.02;     // s: a push of the schedule is never stepped over
+constexpr double longest_step = 0.02;     // s
 constexpr double least_steps = 50000;     // for one advance, ...
 constexpr double most_frequent = 200000;  // ... and as many more for each of its seconds
 constexpr int most_roots_at_once = 10000; /* for one advance: chattering */
@@ -40,6 +40,13 @@ constexpr int most_roots_at_once = 10000; /* for one advance: chattering */
 constexpr double small_angle = 0.1, small_speed = 1.0;                     // rad, rad/s
 constexpr double small_motor = 1e-3, small_motor_speed = 0.1;              // m, m/s
 constexpr double small_bristle = 1.0, small_heat = 1.0, small_work = 0.1;  // -, J, J
+
+/* No push of the schedule is stepped over: a quarter of the shortest, at most. */
+double longest_step_of(const rig& rig) {
+  double longest = longest_step;
+  for (const push& push : rig.pushes) longest = std::min(longest, 0.25 * (push.rise + push.hold + push.fall));
+  return longest;
+}
 
 class cvode_integrator : public integrator {
  public:
@@ -132,7 +139,7 @@ class cvode_integrator : public integrator {
       good = good && CVodeSetLinearSolver(cvode_, solver_, matrix_) == CV_SUCCESS;
       good = good && CVodeSetLinSysFn(cvode_, prepare) == CV_SUCCESS;
       good = good && CVodeRootInit(cvode_, static_cast<int>(equations_.root_count()), root_functions) == CV_SUCCESS;
-      good = good && CVodeSetMaxStep(cvode_, longest_step) == CV_SUCCESS;
+      good = good && CVodeSetMaxStep(cvode_, longest_step_of(equations_.the_rig())) == CV_SUCCESS;
       good = good && CVodeSetMaxErrTestFails(cvode_, 15) == CV_SUCCESS;
       CVodeSetNoInactiveRootWarn(cvode_);
       if (!good) throw std::bad_alloc();

@@ -7,6 +7,7 @@
 #include "motion.h"
 #include "rig_parts.h"
 #include "sentence.h"
+#include "site_law.h"
 
 namespace tendonfmu::plant {
 namespace {
@@ -58,16 +59,30 @@ void check_start(const json_node& motion, const rig& rig) {
   }
 }
 
+/* Largest break-away level of a site; of a diverted edge within the limits of the joint it depends on. */
+double most_of(const rig& rig, const friction_site& site) {
+  double most = 0.0;
+  for (const law& law : site.friction.laws) {
+    most = std::max({most, law.positive.break_away, law.negative.break_away});
+  }
+  if (site.turn.shape == diversion::form::none) return most;
+  const link& bent = rig.links[site.angle_joint];
+  law_columns column(1);
+  double diverted = 0.0;
+  for (int k = 0; k <= 100; ++k) {
+    const double angle = bent.lower + 0.01 * k * (bent.upper - bent.lower);
+    set_site_law(site, angle, 0.0, rig.friction.stribeck_exponent, 0, &column);
+    diverted = std::max(diverted, column.break_away[0]);
+  }
+  return diverted;
+}
+
 void check_friction(const rig& rig) {
   for (std::size_t i = 0; i < rig.tendon_count(); ++i) {
     const tendon& tendon = rig.tendons[i];
     double taken = 0.0;
     for (std::size_t s = tendon.first_site; s < tendon.first_site + tendon.site_count; ++s) {
-      double most = 0.0;
-      for (const law& law : rig.sites[s].friction.laws) {
-        most = std::max({most, law.positive.break_away, law.negative.break_away});
-      }
-      taken += most;
+      taken += most_of(rig, rig.sites[s]);
     }
     if (rig.friction.loss == tension_loss::linear && taken > most_friction) {
       throw description_error(sentence("finger.tendons[", i + 1, "]: static friction takes ", taken,

@@ -162,6 +162,18 @@ TEST(RigReader, RefusesFrictionThatLeavesNoTension) {
   EXPECT_NE(line.find("finger.tendons[2]: static friction takes"), std::string::npos) << line;
 }
 
+// What counts of a diverted edge is its shape, not the law that it replaces.
+TEST(RigReader, RefusesDiversionsThatLeaveNoTension) {
+  Json rig = test_plant::plain(2, 4);
+  const Json law = {{"static", 0.02}, {"coulomb", 0.02}, {"stribeck_velocity", 0.1}};
+  rig["finger"]["tendons"][0]["edge_friction"] = {nullptr, law};
+  Json edge = {{"tendon", 1}, {"joint", 2}, {"shape", "sine"}, {"rest", 0.0}, {"coefficient", 0.5}};
+  rig["physics"]["friction"]["edges"] = {edge};
+  EXPECT_EQ(refusal(rig).find("static friction takes"), std::string::npos) << refusal(rig);
+  rig["physics"]["friction"]["edges"][0]["coefficient"] = 9.0;
+  EXPECT_NE(refusal(rig).find("finger.tendons[1]: static friction takes"), std::string::npos) << refusal(rig);
+}
+
 // A bristle that slides one way without friction has no level to bend to.
 TEST(RigReader, RefusesFrictionInOneDirectionOnly) {
   const Json none = {{"static", 0.0}, {"coulomb", 0.0}, {"stribeck_velocity", 0.1}};
