@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import json
+import re
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -190,6 +193,20 @@ def test_what_is_in_the_package(package: Path, tmp_path: Path) -> None:
     assert build_ssp(package.parent / "rig.json", tmp_path / "again.ssp").read_bytes() == package.read_bytes()
 
 
+def test_the_package_never_takes_the_place_of_its_rig(tmp_path: Path) -> None:
+    from tendonfmu.errors import InputError
+    from tendonfmu.ssp import build_ssp
+
+    base, rig = tmp_path / "base.json", tmp_path / "rig.json"
+    base.write_text(json.dumps(fmu_rig()))
+    rig.write_text(json.dumps({"format": fmu_rig()["format"], "name": "small", "base": "base.json"}))
+    before = base.read_bytes(), rig.read_bytes()
+    for output in (rig, base):
+        with pytest.raises(InputError, match="the same file as the input"):
+            build_ssp(rig, output)
+    assert (base.read_bytes(), rig.read_bytes()) == before
+
+
 def test_the_scripts_of_the_example(tmp_path: Path) -> None:
     def script(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, str(EXAMPLE / name), *arguments]
@@ -201,3 +218,109 @@ def test_the_scripts_of_the_example(tmp_path: Path) -> None:
     assert shown.returncode == 0 and len(shown.stdout.splitlines()) == 4, shown.stderr
     refused = script("make_ssp.py", "missing.json")
     assert refused.returncode == 2 and "missing.json" in refused.stderr and not refused.stdout
+    for arguments, named in (
+        (("missing.ssp",), "missing.ssp: no such file"),
+        (("not.ssp",), "not.ssp: no SSP package"),
+        (("finger.ssp", "abc"), "SECONDS = abc: expected a number"),
+        (("finger.ssp", "nan"), "SECONDS = nan: expected a number"),
+        (("finger.ssp", "-1"), "SECONDS = -1: expected a number"),
+    ):
+        (tmp_path / "not.ssp").write_text("{}")
+        refused = script("step_by_hand.py", *arguments)
+        assert refused.returncode == 2 and named in refused.stderr and len(refused.stderr.splitlines()) == 1
+        assert not refused.stdout
+
+
+# --- README.md --------------------------------------------------------------------------------------------------------
+
+PAGE = (EXAMPLE / "README.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("module", ["fmpy", "ecospy", "libcosimpy"])
+def test_the_snippets_of_the_page(module: str, package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    snippets = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    (code,) = [code for code in snippets if f"from {module}" in code]
+    if module != "fmpy":
+        try:
+            importlib.import_module(module)
+        except (ImportError, OSError) as missing:
+            pytest.skip(f"{module.upper()} NOT TESTED: {missing}")
+    shutil.copy(package, tmp_path / "finger.ssp")
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {}
+    exec(compile(code, f"README.md, {module}", "exec"), names)
+    expected = example().run(package, 2000)["friction.compensated_torque[2]"]
+    np.testing.assert_allclose(names["torque"], expected, rtol=0, atol=1e-12)
+
+
+@pytest.fixture(scope="module")
+def index_finger(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from tendonfmu.ssp import build_ssp
+
+    rig = EXAMPLE.parent / "rigs" / "index_finger_pushes.json"
+    return build_ssp(rig, tmp_path_factory.mktemp("index") / "finger.ssp")
+
+
+def table_of_page(heading: str) -> list[list[str]]:
+    """Cells of the rows of the table whose first heading this is."""
+    rows = PAGE[PAGE.index(f"| {heading} |") :].partition("\n\n")[0].splitlines()[2:]
+    return [[cell.strip() for cell in row.replace("−", "-").strip("|").split("|")] for row in rows]
+
+
+def test_the_tables_of_the_page(index_finger: Path) -> None:
+    """Torques at the begin of a push within 0.05 mN·m; false contacts within 20 ms; largest errors within 2 mN·m."""
+    runs = {
+        name: example().run(index_finger, 9040, **{name: True} if name else {})
+        for name in ("", "sequential", "blind_start")
+    }
+    ours, there, blind = runs.values()
+    rows = table_of_page("time s")
+    assert len(rows) == 5
+    for time, *shown in rows:
+        k = round(float(time) / STEP) - 1
+        found = [
+            ours["plant.truth.joint_torque[2]"][k],
+            *(table["friction.joint_torque[2]"][k] for table in (ours, there)),
+            ours["plant.truth.external_torque[2]"][k],
+            *(table["friction.compensated_torque[2]"][k] for table in (ours, there)),
+        ]
+        np.testing.assert_allclose([float(x) for x in shown], 1e3 * np.array(found), rtol=0, atol=0.05, err_msg=time)
+
+    free = ours["time"] < 9.0
+    starts = table_of_page("first sample of the friction FMU")
+    for (_, contact, largest), table in zip(starts, (ours, blind), strict=False):
+        wrong = table["time"][free][table["friction.contact"][free] > 0.0]
+        begin, end = re.findall(r"[\d.]+", contact)[:2]
+        assert (wrong[0], wrong[-1]) == pytest.approx((float(begin), float(end)), abs=0.02)
+        error = 1e3 * np.abs(table["friction.compensated_torque[2]"][free]).max()
+        assert error == pytest.approx(float(largest), abs=2.0)
+    assert not ours["plant.truth.contact"][free].any()
+    late = (ours["time"] > 8.0) & free
+    for j in range(1, 5):
+        name = f"friction.compensated_torque[{j}]"
+        assert 1e3 * np.abs(ours[name] - blind[name])[late].max() < 0.3
+
+
+def test_a_friction_fmu_that_starts_in_motion_has_no_false_contact(index_finger: Path) -> None:
+    """As the page says: it takes its first sample at 1.5 s."""
+    hand = example()
+    with zipfile.ZipFile(index_finger) as archive:
+        archive.extractall(index_finger.parent)
+    resources = index_finger.parent / "resources"
+    plant, friction = (hand.Component(name, resources / fmu) for name, fmu in hand.COMPONENTS.items())
+    plant.fmu.exitInitializationMode()
+    plant.fmu.doStep(0.0, 1.5)
+    friction.set(friction.inputs, plant.get(friction.inputs))
+    friction.fmu.exitInitializationMode()
+    results = []
+    for k in range(7400):
+        friction.set(friction.inputs, plant.get(friction.inputs))
+        friction.fmu.doStep(k * STEP, STEP)
+        plant.fmu.doStep(1.5 + k * STEP, STEP)
+        results.append(friction.results())
+    found = dict(zip(friction.outputs + friction.flags, np.array(results).T, strict=True))
+    for component in (plant, friction):
+        component.close()
+    assert not found["contact"].any()
+    largest = float(table_of_page("first sample of the friction FMU")[2][2])
+    assert 1e3 * np.abs(found["compensated_torque[2]"]).max() == pytest.approx(largest, abs=2.0)

@@ -1,10 +1,11 @@
 """Steps the two FMUs of an SSP package by hand with fmpy, both at the same time, as masters do that know no order.
 
-python step_by_hand.py FINGER.ssp [SECONDS]     prints the torques at the end of each tenth of a second
+python step_by_hand.py FINGER.ssp [SECONDS]     prints torques and contact at the end of each tenth of a second
 """
 
 from __future__ import annotations
 
+import math
 import shutil
 import sys
 import tempfile
@@ -19,6 +20,7 @@ from fmpy.fmi2 import FMU2Slave
 from numpy.typing import NDArray
 
 STEP = 0.001  # s
+LONGEST = 3600.0  # s
 COMPONENTS = {"plant": "TendonFinger.fmu", "friction": "friction.fmu"}
 
 
@@ -31,6 +33,7 @@ class Component:
         self._vr = {variable.name: variable.valueReference for variable in description.modelVariables}
         self.inputs = [v.name for v in description.modelVariables if v.causality == "input" and v.type == "Real"]
         self.outputs = [v.name for v in description.modelVariables if v.causality == "output" and v.type == "Real"]
+        self.flags = [v.name for v in description.modelVariables if v.causality == "output" and v.type == "Boolean"]
         self.fmu = FMU2Slave(
             guid=description.guid,
             unzipDirectory=self._folder,
@@ -44,6 +47,11 @@ class Component:
     def get(self, names: Sequence[str]) -> list[float]:
         return list(self.fmu.getReal([self._vr[name] for name in names]))
 
+    def results(self) -> list[float]:
+        """All outputs, flags as 0 and 1."""
+        flags = self.fmu.getBoolean([self._vr[name] for name in self.flags])
+        return [*self.get(self.outputs), *(float(flag) for flag in flags)]
+
     def set(self, names: Sequence[str], values: Sequence[float]) -> None:
         self.fmu.setReal([self._vr[name] for name in names], values)
 
@@ -54,7 +62,7 @@ class Component:
 
 
 def run(package: Path, steps: int, *, sequential: bool = False, blind_start: bool = False) -> dict[str, NDArray[Any]]:
-    """Rows of all Real outputs after each step, as `plant.tendon_force[1]`, and `time`, the end of the step.
+    """Rows of all outputs after each step, as `plant.tendon_force[1]`, flags 0 or 1, and `time`, the end of the step.
 
     sequential: the plant steps first, and the friction FMU takes the sample of that same time: no coupling delay.
     blind_start: the friction FMU starts from inputs of 0, as in fmpy's `simulate_ssp` without start values.
@@ -84,29 +92,58 @@ def run(package: Path, steps: int, *, sequential: bool = False, blind_start: boo
             friction.fmu.doStep(now, STEP)
             sample = plant.get(coupled)
         now += STEP
-        rows.append([now, *plant.get(plant.outputs), *friction.get(friction.outputs)])
-    names = [f"plant.{name}" for name in plant.outputs] + [f"friction.{name}" for name in friction.outputs]
-    for component in (plant, friction):
+        rows.append([now, *plant.results(), *friction.results()])
+    names = ["time"]
+    for prefix, component in (("plant", plant), ("friction", friction)):
+        names += [f"{prefix}.{name}" for name in component.outputs + component.flags]
         component.close()
-    return dict(zip(["time", *names], np.array(rows).T, strict=True))
+    return dict(zip(names, np.array(rows).T, strict=True))
+
+
+def read_arguments(arguments: list[str]) -> tuple[Path, int]:
+    """Package and number of steps. Raises ValueError."""
+    package = Path(arguments[0])
+    if not zipfile.is_zipfile(package):
+        raise ValueError(f"{package}: {'no SSP package' if package.exists() else 'no such file'}; see make_ssp.py")
+    with zipfile.ZipFile(package) as archive:
+        missing = {f"resources/{fmu}" for fmu in COMPONENTS.values()} - set(archive.namelist())
+    if missing:
+        raise ValueError(f"{package}: holds no {min(missing)}; expected a package of make_ssp.py")
+    text = arguments[1] if len(arguments) > 1 else "2"
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = math.nan
+    if not STEP <= seconds <= LONGEST:
+        raise ValueError(f"SECONDS = {text}: expected a number from {STEP:g} to {LONGEST:g}")
+    return package, round(seconds / STEP)
+
+
+def show(table: dict[str, NDArray[Any]]) -> None:
+    """A row each tenth of a second; of contact, whether the friction FMU detects one and whether there is one."""
+    joints = sum(name.startswith("friction.compensated_torque") for name in table)
+    heads = [f"joint {j}: compensated, true external mN·m" for j in range(1, joints + 1)]
+    print("   ".join(["time s", "contact: detected, true", *heads]))
+    for k in range(99, len(table["time"]), 100):
+        pairs = [
+            (table[f"friction.compensated_torque[{j}]"][k], table[f"plant.truth.external_torque[{j}]"][k])
+            for j in range(1, joints + 1)
+        ]
+        contact = [f"{table[name][k]:1.0f}" for name in ("friction.contact", "plant.truth.contact")]
+        torques = [f"{1e3 * ours:8.2f} {1e3 * true:8.2f}" for ours, true in pairs]
+        print("   ".join([f"{table['time'][k]:6.3f}", " ".join(contact), *torques]))
 
 
 def main(arguments: list[str]) -> int:
     if not 1 <= len(arguments) <= 2:
         print("usage: step_by_hand.py FINGER.ssp [SECONDS]", file=sys.stderr)
         return 2
-    seconds = float(arguments[1]) if len(arguments) > 1 else 2.0
-    table = run(Path(arguments[0]), round(seconds / STEP))
-    joints = sum(name.startswith("friction.compensated_torque") for name in table)
-    print("time s   " + "   ".join(f"joint {j}: compensated, true external mN·m" for j in range(1, joints + 1)))
-    for k in range(99, len(table["time"]), 100):
-        pairs = [
-            (table[f"friction.compensated_torque[{j}]"][k], table[f"plant.truth.external_torque[{j}]"][k])
-            for j in range(1, joints + 1)
-        ]
-        print(
-            f"{table['time'][k]:6.3f}   " + "   ".join(f"{1e3 * ours:8.2f} {1e3 * true:8.2f}" for ours, true in pairs)
-        )
+    try:
+        package, steps = read_arguments(arguments)
+    except (ValueError, OSError) as refused:
+        print(f"step_by_hand.py: {refused}", file=sys.stderr)
+        return 2
+    show(run(package, steps))
     return 0
 
 

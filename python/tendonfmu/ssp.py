@@ -18,7 +18,7 @@ from tendonfmu.plant import Plant
 from tendonfmu.plant_packaging import plant_members
 from tendonfmu.rig import Rig, read_rig
 from tendonfmu.signals import INPUTS
-from tendonfmu.whole_file import whole_file
+from tendonfmu.whole_file import check_output, whole_file
 
 PLANT, FRICTION = "plant", "friction"
 PLANT_FMU, FRICTION_FMU = "TendonFinger.fmu", "friction.fmu"
@@ -34,9 +34,11 @@ def build_ssp(rig_path: Path, output_path: Path) -> Path:
     """Packs the SSP package of a rig and returns its path; same input, same bytes.
 
     The friction FMU is that of the rig's finger description: a model without the rig's further physics.
-    Raises InputError. output_path appears whole or not at all.
+    Raises InputError, also where output_path is a file that the rig is made of. It appears whole or not at all.
     """
-    archive = pack(ssp_members(read_rig(rig_path)))
+    rig = read_rig(rig_path)
+    check_output(output_path, *rig.files)
+    archive = pack(ssp_members(rig))
     with whole_file(output_path) as file:
         file.write_bytes(archive)
     return output_path
