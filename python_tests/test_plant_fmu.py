@@ -381,6 +381,17 @@ def test_the_page_names_every_variable_and_the_floor(plant_fmu: UnpackedFmu) -> 
         assert named and contents.glibc_floor <= tuple(map(int, named[1].split(".")))
 
 
+def test_the_page_names_the_sizes(plant_fmu: UnpackedFmu, tmp_path: Path) -> None:
+    """Within 30 %: compilers differ, and a build of an old page is off by more."""
+    named = re.search(
+        r"the Python package: ([\d.]+) MB; the FMU of the index finger ([\d.]+) MB", PAGE.read_text("utf-8")
+    )
+    sizes = plant_binary(plant_fmu.folder), build_plant_fmu(INDEX_FINGER, tmp_path / "index.fmu")
+    assert named
+    for shown, file in zip(named.groups(), sizes, strict=True):
+        assert file.stat().st_size / 1e6 == pytest.approx(float(shown), rel=0.3)
+
+
 def test_the_snippets_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "rig.json").write_text(json.dumps(fmu_rig()))
     monkeypatch.chdir(tmp_path)
@@ -393,3 +404,6 @@ def test_the_snippets_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     result = names["result"]
     assert len(result) == 2001
     assert result["truth.external_torque[1]"][0] == pytest.approx(0.04, rel=0.05)  # 0.5 N at 0.08 m
+    exec(compile(code[1], PAGE.name, "exec"), names)
+    held, pulled = np.ptp(names["angles"][:250]), np.ptp(names["angles"][250:])
+    assert held < 1e-4 and pulled > 0.005
