@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
@@ -73,6 +74,33 @@ def test_the_loops_tell_what_the_page_says(rig: Rig) -> None:
         size = np.sqrt(np.mean(loop.rig[sliding] ** 2))
         assert np.sqrt(np.mean((loop.model - loop.rig)[sliding] ** 2)) < 0.05 * size
         assert np.abs(loop.model - loop.rig).max() > 1.5 * size
+
+
+@needs_plant
+def test_the_models_jumps_are_drawn_once(rig: Rig) -> None:
+    """Where the joint stands the model's torque jumps with each trembling of the velocity; its line has one jump at
+    either end of the loop, and one after the reversal."""
+
+    def jumps(torque: NDArray[np.float64]) -> int:
+        return int(np.sum(np.abs(np.diff(np.sign(torque))) > 0))
+
+    loops = loop_figure(rig, JOINT).loops
+    assert max(jumps(loop.model) for loop in loops) > 2
+    assert [jumps(loop.model_line[:, 1]) for loop in loops] == [2, 2]
+    for loop in loops:
+        assert np.abs(np.diff(loop.model_line[:-1, 0])).min() >= 1e-4
+    reversals = presliding_figure(rig, JOINT, TENDON).reversals
+    assert [jumps(loop.model_line[:, 1]) for loop in reversals] == [1, 1]
+
+
+@needs_plant
+def test_the_small_moves_are_numbered_where_they_turn(rig: Rig) -> None:
+    """To and fro by 2 to 21 mrad, as the page says."""
+    figure = presliding_figure(rig, JOINT, TENDON)
+    moves = 1e3 * np.diff([0.0, *figure.small.angle[figure.turns]])
+    assert len(moves) == 6 and np.all(moves[:-1] * moves[1:] < 0.0) and moves[0] < 0.0
+    sizes = np.abs(moves)
+    assert round(sizes.min()) == 2 and round(sizes.max()) == 21
 
 
 @needs_plant

@@ -22,10 +22,11 @@ Signals = Mapping[str, Array]
 WAYS = tuple[tuple[float, float], ...]
 
 STEP = 1e-3  # s, between the rows of a run
+DRAWN_APART = 1e-4  # rad, between points of a model's line
 KINEMATICS_MEASURED = 3  # joint positions and velocities, contract section 4
 PRETENSIONS = (10.0, 40.0)  # N
 TO_AND_FRO: WAYS = ((0.0, 0.35), (1.0, 0.35), (3.0, 0.1), (9.0, 1.0), (15.0, 0.1), (21.0, 1.0))  # s, rad
-# after a stroke small moves to and fro, each larger than the one before, then one that breaks away
+# after a stroke small moves to and fro, each commanded larger than the one before, then one that breaks away
 SMALL: WAYS = (
     (0.0, 0.35), (0.5, 0.35), (2.5, 0.7), (4.0, 0.69), (5.5, 0.704), (7.0, 0.684), (8.5, 0.708), (10.0, 0.672),
     (11.5, 0.712), (13.5, 1.2),
@@ -34,12 +35,15 @@ SMALL: WAYS = (
 
 @dataclass(frozen=True)
 class Loop:
-    """One joint: angle [N] rad, friction torque of the rig and of the friction model [N] N·m."""
+    """One joint: angle [N] rad, friction torque of the rig and of the friction model [N] N·m. model_line: [K, 2] angle
+    and model torque where the joint moves on, without standstill: each jump once.
+    """
 
     label: str
     angle: Array
     rig: Array
     model: Array
+    model_line: Array
 
 
 @dataclass(frozen=True)
@@ -63,7 +67,7 @@ class LoopFigure:
 class PreslidingFigure:
     """joint, tendon: their names. reversals: torque after a reversal, angle back from there, one per pretension.
     contacts: bristles in the same motion at the first pretension. small: small moves to and fro, angle from where they
-    begin. last_move: index in `small` from where the joint is led away.
+    begin. turns: index in `small` at the end of each small move; from the last one on the joint is led away.
     """
 
     joint: str
@@ -71,7 +75,7 @@ class PreslidingFigure:
     reversals: list[Loop]
     contacts: list[Contact]
     small: Loop
-    last_move: int
+    turns: list[int]
 
 
 @dataclass(frozen=True)
@@ -135,7 +139,9 @@ def loop_figure(rig: Rig, joint: int) -> LoopFigure:
     for pretension in PRETENSIONS:
         signals = led(rig, joint, TO_AND_FRO, pretension)
         shown = signals["time"] >= TO_AND_FRO[3][0]
-        loops.append(_loop(rig, joint, signals, shown, f"{pretension:g} N"))
+        loop = _loop(rig, joint, signals, shown, f"{pretension:g} N")
+        closed = np.concatenate([loop.model_line, loop.model_line[:1]])
+        loops.append(replace(loop, model_line=closed))
     return LoopFigure(rig.finger.joint_names[joint], loops)
 
 
@@ -149,7 +155,9 @@ def presliding_figure(rig: Rig, joint: int, tendon: int) -> PreslidingFigure:
         turn = int(np.argmax(angle))
         back = angle[turn] - angle[turn:]
         loop = _loop(rig, joint, signals, slice(turn, None), f"{pretension:g} N")
-        reversals.append(replace(loop, angle=back))
+        line = loop.model_line * [-1.0, 1.0] + [angle[turn], 0.0]
+        jump = [[0.0, loop.rig[0]], [0.0, line[0, 1]]]  # sliding before, sliding back
+        reversals.append(replace(loop, angle=back, model_line=np.concatenate([jump, line])))
         if not contacts:
             contacts = [
                 Contact(label, back, signals["bristle"][turn:, number])
@@ -165,17 +173,26 @@ def presliding_figure(rig: Rig, joint: int, tendon: int) -> PreslidingFigure:
         reversals=reversals,
         contacts=contacts,
         small=replace(small, angle=small.angle - begin),
-        last_move=int(np.searchsorted(signals["time"][shown], SMALL[-2][0])),
+        turns=[int(np.searchsorted(signals["time"][shown], way[0])) for way in SMALL[3:-1]],
     )
 
 
 def _loop(rig: Rig, joint: int, signals: Signals, shown: Array | slice, label: str) -> Loop:
-    return Loop(
-        label,
-        signals["joint_position"][shown, joint],
-        signals["friction_torque"][shown, joint],
-        model_friction(rig, joint, signals)[shown],
-    )
+    angle = signals["joint_position"][shown, joint]
+    model = model_friction(rig, joint, signals)[shown]
+    on = moving_on(angle, DRAWN_APART)
+    return Loop(label, angle, signals["friction_torque"][shown, joint], model, np.column_stack([angle[on], model[on]]))
+
+
+def moving_on(angle: Array, apart: float) -> NDArray[np.intp]:
+    """Indices of points at least `apart` (rad) from the one before. Where a joint stands its velocity trembles about
+    0 and the model's torque jumps from row to row, which a dashed line must not trace."""
+    kept, last = [], angle[0]
+    for k, value in enumerate(angle):
+        if abs(value - last) >= apart:
+            kept.append(k)
+            last = value
+    return np.array(kept, dtype=np.intp)
 
 
 def _contacts(rig: Rig, joint: int, tendon: int) -> dict[str, int]:

@@ -391,11 +391,11 @@ def draw_loops(data: LoopFigure, target: Target) -> None:
     axes = figure.subplots()
     _clean(axes)
     for loop, colour in zip(data.loops, (BLUE, VERMILION), strict=False):
-        axes.plot(loop.angle, loop.rig, color=colour, linewidth=1.8, label=f"rig, {loop.label}")
-        axes.plot(loop.angle, loop.model, color=DARK, linewidth=1.1, linestyle=(0, (4, 2)))
+        axes.plot(loop.angle, 1e3 * loop.rig, color=colour, linewidth=1.8, label=f"rig, {loop.label}")
+        axes.plot(loop.model_line[:, 0], 1e3 * loop.model_line[:, 1], color=DARK, linewidth=1.1, linestyle=(0, (4, 2)))
     axes.plot([], [], color=DARK, linewidth=1.1, linestyle=(0, (4, 2)), label="friction model")
     axes.set_xlabel("joint angle (rad)", fontsize=13)
-    axes.set_ylabel("friction torque (N·m)", fontsize=13)
+    axes.set_ylabel("friction torque (mN·m)", fontsize=13)
     axes.set_title(f"{data.joint}, slowly to and fro", loc="left", fontsize=14, fontweight="bold", color=DARK)
     axes.legend(loc="center", ncols=3, frameon=False, fontsize=13)
     _save(figure, target, 100)
@@ -407,8 +407,7 @@ def draw_presliding(data: PreslidingFigure, target: Target) -> None:
     turn, bent, small = figure.subplots(1, 3)
     for loop, colour in zip(data.reversals, (BLUE, VERMILION), strict=False):
         turn.plot(1e3 * loop.angle, 1e3 * loop.rig, color=colour, linewidth=1.9, label=f"rig, {loop.label}")
-        step = [1e3 * loop.rig[0], *1e3 * loop.model[1:]]
-        turn.plot(1e3 * loop.angle, step, color=DARK, linewidth=1.1, linestyle=(0, (4, 2)))
+        turn.plot(*1e3 * loop.model_line.T, color=DARK, linewidth=1.1, linestyle=(0, (4, 2)))
     turn.plot([], [], color=DARK, linewidth=1.1, linestyle=(0, (4, 2)), label="friction model")
     for contact, colour in zip(data.contacts, (EDGE_RED, PURPLE, GREEN), strict=False):
         bent.plot(1e3 * contact.angle, contact.bristle, color=colour, linewidth=1.9, label=contact.label)
@@ -438,9 +437,17 @@ def draw_presliding(data: PreslidingFigure, target: Target) -> None:
 
 def _draw_small_moves(axes: Axes, data: PreslidingFigure) -> None:
     angle, torque = 1e3 * data.small.angle, 1e3 * data.small.rig
-    end = data.last_move
-    axes.plot(angle[: end + 1], torque[: end + 1], color=SKY, linewidth=1.7)
-    axes.plot(angle[end:], torque[end:], color=BLUE, linewidth=2.1)
+    end = data.turns[-1]
+    axes.plot(
+        angle[: end + 1], torque[: end + 1], color=SKY, linewidth=1.7, label=f"small moves to 1 ... {len(data.turns)}"
+    )
+    axes.plot(angle[end:], torque[end:], color=BLUE, linewidth=2.1, label=f"led away from {len(data.turns)}")
+    axes.plot(angle[data.turns], torque[data.turns], "o", color="white", markeredgecolor=SKY, markersize=13.5, zorder=4)
+    for number, k in enumerate(data.turns, start=1):
+        axes.text(
+            angle[k], torque[k], str(number), fontsize=11, color=DARK, ha="center", va="center_baseline", zorder=5
+        )
+    axes.legend(loc="upper right", bbox_to_anchor=(1.0, 0.45), frameon=False, fontsize=12.5)
     axes.set_xlim(*SMALL_SHOWN)
     near = angle[end:] < SMALL_SHOWN[1]
     highest = end + int(torque[end:][near].argmax())
@@ -457,7 +464,7 @@ def draw_truth(data: TruthFigure, target: Target) -> None:
     """Tendon forces as measured, and the truth of one joint: its angle, and its torque with what takes it, as PNG."""
     figure = Figure(figsize=(12.8, 7.6), layout="constrained")
     panels = forces, angle, torque = figure.subplots(3, 1, sharex=True, height_ratios=[1.0, 0.7, 1.2])
-    for axes, name in zip(panels, ("tendon force (N)", "angle (rad)", "torque (N·m)"), strict=True):
+    for axes, name in zip(panels, ("tendon force (N)", "angle (rad)", "torque (mN·m)"), strict=True):
         _clean(axes)
         axes.set_ylabel(name, fontsize=13)
         for begin, end in data.contacts:
@@ -470,7 +477,7 @@ def draw_truth(data: TruthFigure, target: Target) -> None:
     angle.plot(data.time, data.angle, color=DARK, linewidth=1.3)
     angle.set_title(f"truth: {data.joint}", loc="left", fontsize=14, fontweight="bold", color=DARK)
     for (label, values), colour in zip(data.torques.items(), (DARK, SKY, GREEN), strict=True):
-        torque.plot(data.time, values, color=colour, linewidth=1.6, label=label)
+        torque.plot(data.time, 1e3 * values, color=colour, linewidth=1.6, label=label)
     torque.plot([], [], color=ORANGE, alpha=0.3, linewidth=9.0, label="contact")
     torque.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=4, frameon=False, fontsize=12.5)
     torque.set_xlabel("time (s)", fontsize=13)
