@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from plant_rigs import needs_plant
 from tendonfmu.excitation import Plan, plan_excitation
 from tendonfmu.excite import as_array, find_ranges, read_subject
 from tendonfmu.quintic import evaluate
@@ -60,3 +63,20 @@ def test_every_cause_is_on_the_page(folder: Path) -> None:
     causes = {entry["cause"] for entry in json.loads((folder / "excited.json").read_text())["parameters"]}
     assert causes >= {"noise", "combination"}
     assert {cause for cause in causes - {None} if f"`{cause}`" not in PAGE} == set()
+
+
+@needs_plant
+def test_the_simulated_finger_plays_it(tmp_path: Path) -> None:
+    """The page's commands and rig, in a folder with the repository's examples; 10 s of motion."""
+    part = PAGE.split("## On the simulated finger")[1].split("\n## ")[0]
+    rig = re.search(r"```json\n(.*?)```", part, re.DOTALL)
+    assert rig is not None
+    for folder in ("fingers", "rigs"):
+        shutil.copytree(ROOT / "examples" / folder, tmp_path / "examples" / folder)
+    (tmp_path / "trained.json").write_text(json.dumps(json.loads(rig[1]) | {"recording": {"duration": 10}}), "utf-8")
+    commands = re.findall(r"^tendonfmu (.*)$", part, re.MULTILINE)
+    assert [command.split()[0] for command in commands] == ["excite", "simulate"]
+    for command, more in zip(commands, (["--duration", "10"], []), strict=True):
+        words = [sys.executable, "-m", "tendonfmu.cli", *shlex.split(command), *more]
+        subprocess.run(words, cwd=tmp_path, check=True)
+    assert (tmp_path / "recording.parquet").is_file()
