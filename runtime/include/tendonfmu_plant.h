@@ -111,7 +111,7 @@ typedef struct tendonfmu_plant_signals {
   double* friction_level;  /* [1]        factor on all friction: drift and heat */
   double* energy;          /* [6] J      kinetic, potential (gravity, springs, cover, stops, obstacle), work of the
                                          motors, of friction (taken out), of damping (taken out), of pushes */
-  unsigned char* contact;  /* [1]        |contact force| above the rig's contact_force */
+  unsigned char* contact;  /* [1]        a force above the rig's contact_force */
   unsigned char* slack;    /* [m]        tendon without tension at the spring */
 } tendonfmu_plant_signals;
 

@@ -41,17 +41,13 @@ constexpr double small_angle = 0.1, small_speed = 1.0;                     // ra
 constexpr double small_motor = 1e-3, small_motor_speed = 0.1;              // m, m/s
 constexpr double small_bristle = 1.0, small_heat = 1.0, small_work = 0.1;  // -, J, J
 
-/* No push of the schedule is stepped over: a quarter of the shortest, at most. */
-double longest_step_of(const rig& rig) {
-  double longest = longest_step;
-  for (const push& push : rig.pushes) longest = std::min(longest, 0.25 * (push.rise + push.hold + push.fall));
-  return longest;
-}
-
 class cvode_integrator : public integrator {
  public:
   cvode_integrator(dynamics* equations, double relative_tolerance)
-      : equations_(*equations), linearisation_(equations->the_rig()), tolerance_(relative_tolerance) {
+      : equations_(*equations),
+        linearisation_(equations->the_rig()),
+        tolerance_(relative_tolerance),
+        stops_(push_times(equations->the_rig())) {
     if (create_context(&context_) != 0) throw std::bad_alloc();
     const auto size = static_cast<sunindextype>(equations->layout().size());
     state_ = N_VNew_Serial(size, context_);
@@ -87,7 +83,8 @@ class cvode_integrator : public integrator {
     }
     double reached = now->time;
     double left = least_steps + most_frequent * (until - now->time);
-    for (int found = 0;; ++found) {
+    for (int found = 0;;) {
+      if (inputs.scheduled_pushes) stop_at_next_push();
       CVodeSetMaxNumSteps(cvode_, static_cast<long>(std::clamp(left, 1.0, 2e9)));
       const unsigned long long steps_before = work_.steps;
       const int flag = CVode(cvode_, until, state_, &reached, CV_NORMAL);
@@ -97,9 +94,10 @@ class cvode_integrator : public integrator {
         fresh_ = true;
         std::rethrow_exception(std::exchange(thrown_, nullptr));
       }
+      if (flag == CV_TSTOP_RETURN && reached < until) continue;
       if (flag == CV_SUCCESS || flag == CV_TSTOP_RETURN) break;
       if (flag != CV_ROOT_RETURN) fail(flag, reached);
-      if (found == most_roots_at_once) fail(CV_TOO_MUCH_WORK, reached);
+      if (found++ == most_roots_at_once) fail(CV_TOO_MUCH_WORK, reached);
       int signs[max_roots];
       CVodeGetRootInfo(cvode_, signs);
       equations_.switch_modes(signs, &modes_);
@@ -139,17 +137,25 @@ class cvode_integrator : public integrator {
       good = good && CVodeSetLinearSolver(cvode_, solver_, matrix_) == CV_SUCCESS;
       good = good && CVodeSetLinSysFn(cvode_, prepare) == CV_SUCCESS;
       good = good && CVodeRootInit(cvode_, static_cast<int>(equations_.root_count()), root_functions) == CV_SUCCESS;
-      good = good && CVodeSetMaxStep(cvode_, longest_step_of(equations_.the_rig())) == CV_SUCCESS;
+      good = good && CVodeSetMaxStep(cvode_, longest_step) == CV_SUCCESS;
       good = good && CVodeSetMaxErrTestFails(cvode_, 15) == CV_SUCCESS;
       CVodeSetNoInactiveRootWarn(cvode_);
       if (!good) throw std::bad_alloc();
       created_ = true;
     } else {
-      CVodeReInit(cvode_, time, state_);
+      if (CVodeReInit(cvode_, time, state_) != CV_SUCCESS) throw std::bad_alloc();
       work_.restarts += 1;
     }
     counted_ = {};
     fresh_ = false;
+  }
+
+  /* A finger at rest is integrated in long steps: each must end where a push begins, is full, lets go or ends. */
+  void stop_at_next_push() {
+    double internal = 0.0;
+    CVodeGetCurrentTime(cvode_, &internal);
+    const auto next = std::upper_bound(stops_.begin(), stops_.end(), internal + 1e-12 * (1.0 + std::fabs(internal)));
+    if (next != stops_.end()) CVodeSetStopTime(cvode_, *next);
   }
 
   /* Messages come with the exception; nothing is printed. */
@@ -270,6 +276,7 @@ class cvode_integrator : public integrator {
   dynamics& equations_;
   linearisation linearisation_;
   double tolerance_;
+  std::vector<double> stops_; /* s, see stop_at_next_push() */
   SUNContext context_ = nullptr;
   N_Vector state_ = nullptr, tolerances_ = nullptr;
   SUNMatrix matrix_ = nullptr;

@@ -142,6 +142,8 @@ void dynamics::rub_tendons() {
       e.loss_by_share[s] = -(capstan ? tension * passed : tension) - extra.force;
       e.loss_by_force[s] = passed - extra.by_force * share[s];
       tension = tension * passed - extra.force * share[s];
+      // friction beyond the tension takes all of it: a tendon never pushes
+      if (tension < 0.0) tension = e.loss_by_share[s] = e.loss_by_force[s] = 0.0;
       e.tension[s] = tension;
     }
     // what moves the wrist works against the friction there, beside the finger
@@ -197,8 +199,11 @@ void dynamics::command_motors(double time, const commands& inputs, double* comma
     hold_command(rig_, command);
   }
   if (inputs.pretension == 0.0) return;
+  // on top of the rig's own: a hardening spring gives way less then
+  const double own = at_time(rig_.pretension, 0.0), both = own + inputs.pretension;
   for (std::size_t i = 0; i < m; ++i) {
-    command[i] += elongation_of(rig_.tendons[i], inputs.pretension * rig_.null_vector[i]);
+    const double share = rig_.null_vector[i];
+    command[i] += elongation_of(rig_.tendons[i], both * share) - elongation_of(rig_.tendons[i], own * share);
   }
 }
 

@@ -18,7 +18,10 @@ constexpr double beyond_reason = 1e6;   // rad, rad/s, m
 }  // namespace
 
 fixed_step_integrator::fixed_step_integrator(dynamics* equations, double step)
-    : equations_(*equations), linearisation_(equations->the_rig()), step_(step) {
+    : equations_(*equations),
+      linearisation_(equations->the_rig()),
+      step_(step),
+      stops_(push_times(equations->the_rig())) {
   change_.resize(equations->layout().joints);
   for (std::vector<double>* one : {&state_, &middle_, &rate_}) one->resize(equations->layout().size());
   acceleration_.assign(equations->layout().joints, 0.0);
@@ -142,6 +145,13 @@ void fixed_step_integrator::step(const commands& inputs, double time, double siz
   work_.steps += 1;
 }
 
+void fixed_step_integrator::take_steps(const commands& inputs, double from, double to) {
+  const double count = std::max(1.0, std::ceil((to - from) / step_ - 1e-9));
+  const double size = (to - from) / count;
+  for (double k = 0.0; k < count; ++k) step(inputs, from + k * size, size, 0);
+  last_step_ = size;
+}
+
 void fixed_step_integrator::advance(const commands& inputs, double until, moment* now) {
   const double span = until - now->time;
   if (span <= 0.0) return;
@@ -149,15 +159,20 @@ void fixed_step_integrator::advance(const commands& inputs, double until, moment
     now->time = until;
     return;
   }
-  const double count = std::max(1.0, std::ceil(span / step_ - 1e-9));
-  const double size = span / count;
   state_ = now->state;
-  for (double k = 0.0; k < count; ++k) step(inputs, now->time + k * size, size, 0);
+  double from = now->time;
+  auto stop = std::upper_bound(stops_.begin(), stops_.end(), from);
+  while (from < until) {
+    // equal steps up to where a push begins, is full, lets go or ends
+    double to = until;
+    if (inputs.scheduled_pushes && stop != stops_.end() && *stop < until) to = *stop++;
+    if (!same_moment(from, to)) take_steps(inputs, from, to);
+    from = to;
+  }
   if (!std::all_of(state_.begin(), state_.end(), [](double x) { return std::isfinite(x); })) {
     forget();
     throw solver_error(sentence("the motion left all bounds before t = ", until, " s: try a smaller step, or cvode"));
   }
-  last_step_ = size;
   now->state = state_;
   now->time = until;
   now->modes = equations_.modes_at(state_.data());

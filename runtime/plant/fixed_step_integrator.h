@@ -19,6 +19,7 @@ class fixed_step_integrator : public integrator {
   void advance(const commands& inputs, double until, moment* now) override;
 
  private:
+  void take_steps(const commands& inputs, double from, double to);
   void step(const commands& inputs, double time, double size, int divisions);
   void move_motors(const commands& inputs, double middle, double half);
   bool find_middle(const commands& inputs, double middle, double half);
@@ -28,6 +29,7 @@ class fixed_step_integrator : public integrator {
   dynamics& equations_;
   linearisation linearisation_;
   double step_;
+  std::vector<double> stops_; /* push_times(): steps end there */
   double factored_for_ = 0.0; /* half a step, s; 0: no matrix */
   std::vector<double> state_, middle_, rate_, change_;
   std::vector<double> acceleration_; /* of the step before: where to look first */

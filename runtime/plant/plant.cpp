@@ -86,6 +86,7 @@ void plant::set_inputs(const tendonfmu_plant_inputs& inputs) {
   const bool changed = next.given != inputs_.given || !std::equal(next.command, next.command + m, inputs_.command) ||
                        next.pretension != inputs_.pretension || next.push.force != inputs_.push.force;
   inputs_ = next;
+  if (changed) evaluated_ = false;
   if (changed && integrator_) integrator_->forget();
 }
 
@@ -103,6 +104,7 @@ void plant::make_integrator() {
 }
 
 void plant::reset() {
+  evaluated_ = false;
   initialised_ = false;
   integrator_.reset();
   inputs_ = {};
@@ -117,6 +119,7 @@ void plant::initialise() {
   if (initialised_) throw refusal(TENDONFMU_PLANT_WRONG_ORDER, "initialise: expected once only");
   make_integrator();
   const state_layout& at = equations_.layout();
+  evaluated_ = false;
   moment start;
   start.time = -rig_.settle;
   start.state.assign(at.size(), 0.0);
@@ -143,9 +146,11 @@ void plant::move_on(double until, moment* now) {
   while (settings_.sensors) {
     const double next = samples_ / rig_.sensors.rate;
     if (next > until + same_time) break;
+    evaluated_ = false;
     integrator_->advance(inputs_, std::min(next, until), now);
     sample(*now);
   }
+  if (now->time < until) evaluated_ = false;
   integrator_->advance(inputs_, until, now);
 }
 
@@ -154,12 +159,14 @@ void plant::advance(double until) {
   need(std::isfinite(until) && until < 1e9, "time: expected a finite number of seconds below 1e9");
   if (until < now_.time) throw refusal(TENDONFMU_PLANT_WRONG_ORDER, "time: expected not to go back");
   if (until == now_.time) return;
+  evaluated_ = false;
   moment ahead = now_;
   sensor_bank sensors_before = sensors_;
   const double samples_before = samples_, last_step_before = integrator_->last_step();
   try {
     move_on(until, &ahead);
   } catch (...) {
+    evaluated_ = false;
     sensors_ = std::move(sensors_before);
     samples_ = samples_before;
     integrator_->resume(last_step_before);
@@ -168,11 +175,14 @@ void plant::advance(double until) {
   std::swap(now_, ahead);
 }
 
-// --- signals
-// ----------------------------------------------------------------------------------------------------------
+// --- signals ---------------------------------------------------------------------------------------------
 
+/* Once for each moment: what the sensors have looked at, the signals show. */
 void plant::evaluate(const moment& now) const {
+  if (evaluated_) return;
+  equations_.want_slopes(false);
   equations_.evaluate(now.time, now.state.data(), &now.modes, inputs_, scratch_.data());
+  evaluated_ = true;
 }
 
 void plant::sample(const moment& now) {
@@ -276,12 +286,11 @@ void plant::write_signals(const tendonfmu_plant_signals& s, std::size_t row) con
                             state[at.motor_work()],         state[at.friction_work()],
                             state[at.damping_work()],       state[at.push_work()]};
   put(s.energy, row, energy, 6);
-  if (s.contact) s.contact[row] = std::sqrt(dot(e.contact.force, e.contact.force)) > rig_.contact_force;
+  if (s.contact) s.contact[row] = e.contact.largest > rig_.contact_force;
   if (s.slack) std::copy(now_.modes.slack, now_.modes.slack + m, s.slack + row * m);
 }
 
-// --- saved states
-// -----------------------------------------------------------------------------------------------------
+// --- saved states ----------------------------------------------------------------------------------------
 
 /* Everything that is remembered, as numbers of a length that the rig fixes. */
 std::vector<double> plant::state_numbers() const {
@@ -342,6 +351,7 @@ void plant::restore(const void* bytes, std::size_t size) {
   if (header.count != numbers.size() || header.digest != digest(numbers)) bad("state: damaged");
 
   const std::size_t n = rig_.joint_count(), m = rig_.tendon_count();
+  evaluated_ = false;
   make_integrator();
   const double* next = numbers.data();
   now_.time = *next++;
@@ -363,8 +373,7 @@ void plant::restore(const void* bytes, std::size_t size) {
   initialised_ = true;
 }
 
-// --- for checks
-// -------------------------------------------------------------------------------------------------------
+// --- for checks ------------------------------------------------------------------------------------------
 
 void plant::derivative(double time, const double* state, double* result, double* jacobian) const {
   commands inputs = inputs_;
@@ -373,6 +382,7 @@ void plant::derivative(double time, const double* state, double* result, double*
   // laws and motions are looked up by them: what is no number has no place there
   need(std::isfinite(time), "time: expected a finite number");
   for (std::size_t k = 0; k < rig_.order(); ++k) need(std::isfinite(state[k]), "state: expected finite numbers");
+  evaluated_ = false;
   equations_.want_slopes(true);
   equations_.evaluate(time, state, nullptr, inputs, result);
   if (!jacobian) return;

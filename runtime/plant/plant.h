@@ -63,6 +63,7 @@ class plant {
   tendonfmu_plant_settings settings_;
   commands inputs_;
   moment now_;
+  mutable bool evaluated_ = false;      /* equations_.last() is that of now_ */
   mutable std::vector<double> scratch_; /* derivative that nobody asked for */
   double samples_ = 0.0;                /* taken by the sensors */
   bool initialised_ = false;

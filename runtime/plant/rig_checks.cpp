@@ -12,7 +12,7 @@
 namespace tendonfmu::plant {
 namespace {
 
-constexpr double fastest_rate = 1e6;    // 1/s; a sample of 1 kHz sees nothing of it, an integrator all
+constexpr double fastest_rate = 2e5;    // 1/s; a sample of 1 kHz sees nothing of it, an integrator all
 constexpr double most_friction = 0.95;  // share of the tension that friction along a tendon may take
 
 using matrix = Eigen::MatrixXd;
@@ -80,9 +80,10 @@ double most_of(const rig& rig, const friction_site& site) {
 void check_friction(const rig& rig) {
   for (std::size_t i = 0; i < rig.tendon_count(); ++i) {
     const tendon& tendon = rig.tendons[i];
+    const double grown = 1.0 + std::max(0.0, rig.friction.drift_amplitude);
     double taken = 0.0;
     for (std::size_t s = tendon.first_site; s < tendon.first_site + tendon.site_count; ++s) {
-      taken += most_of(rig, rig.sites[s]);
+      taken += grown * most_of(rig, rig.sites[s]);
     }
     if (rig.friction.loss == tension_loss::linear && taken > most_friction) {
       throw description_error(sentence("finger.tendons[", i + 1, "]: static friction takes ", taken,
@@ -92,7 +93,32 @@ void check_friction(const rig& rig) {
   }
 }
 
-/* Square root of stiffness over inertia: of what holds a joint by its tendons, stops, cover and presliding. */
+/* N·m/rad, of all that holds joint j at the start: tendons, their bristles, its own, stops, cover and coupling. */
+double stiffness_of(const rig& rig, const matrix& arms, std::size_t j) {
+  const link& link = rig.links[j];
+  const double pretension = at_time(rig.pretension, 0.0);
+  const double bent = std::max(std::fabs(link.lower - link.cover_rest), std::fabs(link.upper - link.cover_rest));
+  double stiffness = link.stop_stiffness + link.cover_stiffness + 3.0 * link.cover_hardening * bent * bent;
+  if (j > 0) stiffness += rig.coupling[j - 1];
+  if (j + 1 < rig.joint_count()) stiffness += rig.coupling[j];
+  for (std::size_t i = 0; i < rig.tendon_count(); ++i) {
+    const tendon& tendon = rig.tendons[i];
+    const double force = pretension * rig.null_vector[i], arm = arms(i, j);
+    double along = tendon.stiffness + 2.0 * tendon.hardening * elongation_of(tendon, force);
+    for (std::size_t s = tendon.first_site; s < tendon.first_site + tendon.site_count; ++s) {
+      const friction_site& site = rig.sites[s];
+      if (site.first_mover <= j) along += force * site.friction.laws.front().break_away * site.inverse_length;
+    }
+    stiffness += along * arm * arm;
+  }
+  for (const joint_site& site : rig.joint_sites) {
+    const double load = site.by_load ? pretension * static_cast<double>(rig.tendon_count()) : 1.0;
+    if (site.joint == j) stiffness += load * site.friction.break_away * site.inverse_length;
+  }
+  return stiffness;
+}
+
+/* Square root of stiffness over inertia of every joint. */
 void check_stiffness(const json_node& physics, const rig& rig) {
   const std::size_t n = rig.joint_count();
   double angle[max_joints], rest[max_joints] = {};
@@ -108,15 +134,13 @@ void check_stiffness(const json_node& physics, const rig& rig) {
   }
   const matrix arms = arms_at(rig, angle);
   for (std::size_t j = 0; j < n; ++j) {
-    double stiffness = rig.links[j].stop_stiffness + rig.links[j].cover_stiffness;
-    for (std::size_t i = 0; i < rig.tendon_count(); ++i) {
-      stiffness += rig.tendons[i].stiffness * arms(i, j) * arms(i, j);
-    }
+    const double stiffness = stiffness_of(rig, arms, j);
     const double rate = std::sqrt(stiffness * least[j]);
     if (rate <= fastest_rate) continue;
     const std::string said =
-        sentence("a body that its springs (", stiffness, " N·m/rad with tendons, cover and stops) swing at less than ",
-                 fastest_rate, " rad/s, not ", rate, ": heavier, or less stiff");
+        sentence("a body that its springs (", stiffness,
+                 " N·m/rad with tendons, presliding, cover, coupling and stops) swing at less than ", fastest_rate,
+                 " rad/s, not ", rate, ": heavier, or less stiff");
     physics.member("links").element(j).refuse(said);
   }
 }

@@ -166,9 +166,9 @@ TEST(RigReader, RefusesFrictionThatLeavesNoTension) {
 TEST(RigReader, RefusesDiversionsThatLeaveNoTension) {
   Json rig = test_plant::plain(2, 4);
   const Json law = {{"static", 0.02}, {"coulomb", 0.02}, {"stribeck_velocity", 0.1}};
-  rig["finger"]["tendons"][0]["edge_friction"] = {nullptr, law};
+  rig["finger"]["tendons"][0]["edge_friction"] = Json::array({nullptr, law});
   Json edge = {{"tendon", 1}, {"joint", 2}, {"shape", "sine"}, {"rest", 0.0}, {"coefficient", 0.5}};
-  rig["physics"]["friction"]["edges"] = {edge};
+  rig["physics"]["friction"]["edges"] = Json::array({edge});
   EXPECT_EQ(refusal(rig).find("static friction takes"), std::string::npos) << refusal(rig);
   rig["physics"]["friction"]["edges"][0]["coefficient"] = 9.0;
   EXPECT_NE(refusal(rig).find("finger.tendons[1]: static friction takes"), std::string::npos) << refusal(rig);
