@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import zipfile
@@ -385,3 +386,56 @@ def test_demo_into_a_place_that_cannot_be(call: Call, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("x")
     assert "file" in refused(call("demo", "-o", "file"))
     assert "file" in refused(call("demo", "-o", "file/folder"))
+
+
+# --- nothing that a command reads is lost -----------------------------------------------------------------------
+
+
+def test_build_keeps_what_a_rig_refers_to(call: Call, tmp_path: Path) -> None:
+    """Its base, its finger and its motion file are inputs as well."""
+    rigs = Path(__file__).resolve().parent.parent / "examples" / "rigs"
+    finger = tmp_path / "finger.json"
+    finger.write_bytes((rigs.parent / "fingers" / "index_finger.json").read_bytes())
+    base = tmp_path / "base.json"
+    base.write_text(json.dumps(json.loads((rigs / "index_finger.json").read_text()) | {"finger": "finger.json"}))
+    rig = tmp_path / "rig.json"
+    rig.write_text(json.dumps({"format": "tendonfmu-rig-1", "name": "own", "base": "base.json"}))
+    for victim in (finger, base, rig):
+        before = victim.read_bytes()
+        for arguments in (
+            ("build", rig, "-o", victim),
+            ("excite", rig, "-o", "motion.csv", "--report", victim, "--duration", "5"),
+        ):
+            result = call(*map(str, arguments))
+            assert result.status == 2 and "the same file as the input" in result.err
+            assert victim.read_bytes() == before
+
+
+def test_excite_keeps_motion_and_report_apart(call: Call, tmp_path: Path) -> None:
+    result = call("excite", str(INDEX_FINGER), "-o", str(tmp_path / "m.csv"), "--report", str(tmp_path / "m.csv"))
+    assert result.status == 2 and "the same file for motion and report" in result.err
+    assert not (tmp_path / "m.csv").exists()
+
+
+def test_outputs_replace_files_only(call: Call, tmp_path: Path) -> None:
+    pipe, kept = tmp_path / "pipe.fmu", tmp_path / "kept.fmu"
+    os.mkfifo(pipe)
+    kept.write_text("kept")
+    kept.chmod(0o444)
+    for output, reason in ((pipe, "a device or pipe"), (kept, "read-only")):
+        result = call("build", str(INDEX_FINGER), "-o", str(output))
+        assert result.status == 2 and reason in result.err
+    assert pipe.is_fifo() and kept.read_text() == "kept"
+
+
+def test_fingers_and_rigs_are_told_apart(call: Call, tmp_path: Path) -> None:
+    nameless = tmp_path / "nameless.json"
+    nameless.write_text(json.dumps({"name": "x", "physics": {}}))
+    for arguments, line in (
+        (("excite", nameless, "-o", "m.csv"), "format: missing"),
+        (("build", nameless, "-o", "x.fmu"), "format: missing"),
+        (("simulate", INDEX_FINGER, "-o", "out.csv"), 'expected "tendonfmu-rig-1"'),
+        (("check", nameless), "format: missing"),
+    ):
+        result = call(*map(str, arguments))
+        assert result.status in (1, 2) and line in result.err, result.err

@@ -116,10 +116,10 @@ def build(
     """
     from tendonfmu.packaging import build_fmu
     from tendonfmu.plant_packaging import build_plant_fmu
-    from tendonfmu.rig import is_rig
+    from tendonfmu.rig import is_rig, read_rig
     from tendonfmu.whole_file import check_output
 
-    check_output(output, file)
+    check_output(output, *(read_rig(file).files if is_rig(file) else [file]))
     (build_plant_fmu if is_rig(file) else build_fmu)(file, output, binaries=binaries)
     _say(f"{output}: {output.stat().st_size / 1024:.0f} KiB")
 
@@ -233,7 +233,7 @@ def excite(
     ] = None,
     pretension: Annotated[
         list[float] | None,
-        typer.Option(min=0.0, max=1e6, help="N; mean tendon force; may be repeated [default: 10]"),
+        typer.Option(min=1e-3, max=1e6, help="N; mean tendon force; may be repeated [default: 10]"),
     ] = None,
     alternate: Annotated[
         float | None, typer.Option(min=1.0, metavar="SECONDS", help="change the pretension that often")
@@ -250,12 +250,15 @@ def excite(
 
     from tendonfmu import excite as exciting
     from tendonfmu.excitation import Plan
+    from tendonfmu.rig import description_files, is_rig
     from tendonfmu.tables import check_format, write_table
     from tendonfmu.whole_file import check_output, whole_file
 
     check_format(output)
     for file in (output, *([report] if report is not None else [])):
-        check_output(file, finger)
+        check_output(file, *(description_files(finger) if is_rig(finger) else [finger]))
+    if report is not None and report.resolve() == output.resolve():
+        raise InputError(f"{report}: the same file for motion and report; expected two names")
     subject = exciting.read_subject(finger)
     ranges = exciting.find_ranges(subject, range_ or [])
     for span in ranges:

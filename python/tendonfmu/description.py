@@ -14,6 +14,7 @@ from typing import Any
 from tendonfmu import native
 from tendonfmu.errors import InputError
 
+FORMAT = "tendonfmu-finger-1"
 Law = Mapping[str, Any]
 
 
@@ -96,11 +97,26 @@ def read_finger(path: Path) -> FingerDescription:
         raise InputError(f"{path}: {failed.strerror}; expected a finger description (JSON)") from None
     if text.startswith(b"PK\x03\x04"):
         raise InputError(f"{path}: an archive, such as an FMU; expected a finger description (JSON)")
+    _check_format(path, text)
     try:
         image = native.image_from_json(text)
     except native.NativeError as refused:
         raise InputError(f"{path}: {refused}") from None
     return FingerDescription(path=path, text=text, data=json.loads(text), image=image)
+
+
+def _check_format(path: Path, text: bytes) -> None:
+    """Fingers and rigs are easily mixed up: say so before any other fault of the content."""
+    try:
+        data = json.loads(text)
+    except (ValueError, RecursionError):
+        return  # the runtime says where
+    if isinstance(data, dict):
+        found = data.get("format")
+        if found is None:
+            raise InputError(f'{path}: format: missing; expected "{FORMAT}"')
+        if isinstance(found, str) and found.startswith("tendonfmu-rig-"):
+            raise InputError(f'{path}: format = "{found}": a rig; expected a finger description, "{FORMAT}"')
 
 
 def laws(data: Mapping[str, Any]) -> Iterator[tuple[str, Law]]:

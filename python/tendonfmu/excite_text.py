@@ -101,4 +101,4 @@ def lines(result: ExciteResult) -> Iterator[str]:
     for i, seconds in enumerate(result.slack, start=1):
         if seconds > 0:
             name = result.subject.finger.tendon_names[i - 1]
-            yield f"  tendon {name} would go slack for {seconds:.1f} s: a higher --pretension keeps it taut"
+            yield f"  {name} would go slack for {seconds:.1f} s: a higher --pretension keeps it taut"

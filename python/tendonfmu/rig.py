@@ -100,6 +100,13 @@ def is_rig(path: Path) -> bool:
     return isinstance(data, dict) and str(data.get("format", "")).startswith("tendonfmu-rig-")
 
 
+def description_files(path: Path) -> list[Path]:
+    """The files that describe a rig: itself, its bases, its finger. Its motion is a result that may be made anew."""
+    files: list[Path] = []
+    finger = _with_base(path, files, []).get("finger")
+    return [*files, Path(finger)] if isinstance(finger, str) else files
+
+
 def read_rig(path: Path) -> Rig:
     """Reads and expands a rig. Raises InputError: file, key path, value, what was expected.
 
@@ -126,8 +133,9 @@ def _with_base(path: Path, files: list[Path], chain: list[Path]) -> dict[str, An
     data = read_json(path, WHAT)
     files.append(path)
     try:
+        if isinstance(data, dict):
+            Node(data).member("format").choice(FORMAT)  # before its keys: it may be a finger
         root = Node(data).keys(TOP)
-        root.member("format").choice(FORMAT)
         base = root.member("base")
         own = {key: value for key, value in data.items() if key != "base"}
         _place_paths(own, path.parent)

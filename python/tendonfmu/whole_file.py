@@ -24,6 +24,11 @@ def _check_place(file: Path) -> None:
         raise InputError(f"{file}: no folder {file.parent}; expected one that exists")
     if file.is_dir():
         raise InputError(f"{file}: a folder; expected the name of a file to write")
+    # a result takes the place of what is there: that must be a file, and one that may be written
+    if file.exists() and not file.is_file():
+        raise InputError(f"{file}: a device or pipe; expected the name of a file to write")
+    if file.exists() and not file.stat().st_mode & 0o222:
+        raise InputError(f"{file}: read-only; expected another name, or a file that may be written")
 
 
 @contextmanager
