@@ -357,7 +357,7 @@ def rows(arguments: argparse.Namespace) -> tuple[list[list[str]], str]:
     micro = (time.process_time() - before) / 500 * 1e6
     note = f"numpy right-hand side {micro:.0f} µs with {y.size} states, differs from the library's by {worst:.1g}"
     end = arguments.start + arguments.span
-    moments = np.union1d(np.arange(arguments.start, arguments.start + arguments.long, 0.01)[1:], [end])
+    moments = np.union1d(np.arange(arguments.start, arguments.start + arguments.long, arguments.every)[1:], [end])
     tight = reference.run(moments)
     exact = tight["joint_position"][np.searchsorted(moments, end)]
     return scipy_rows(peer, y, exact, arguments) + library_rows(text, tight, moments, arguments), note
@@ -369,6 +369,7 @@ def main() -> None:
     parser.add_argument("--start", type=float, default=1.5, help="s: where the comparison begins, in motion")
     parser.add_argument("--span", type=float, default=0.5, help="s simulated by scipy")
     parser.add_argument("--long", type=float, default=20.0, help="s simulated by the library")
+    parser.add_argument("--every", type=float, default=0.01, help="s between the library's outputs")
     parser.add_argument("--rounds", type=int, default=3, help="of the library's integrators")
     parser.add_argument("--peer-tolerances", type=float, nargs="+", default=[1e-4, 1e-5])
     found, note = rows(parser.parse_args())
