@@ -378,6 +378,27 @@ def test_friction_never_drives() -> None:
         assert taken[1] > 0.2 * 4 * 15.0 * 0.03 * 4 * 0.01 * 0.2 * 0.2, taken
 
 
+@pytest.mark.parametrize(("where", "drives"), [("beyond_joint", False), ("at_joint", True)])
+def test_power_of_pulleys(where: str, drives: bool) -> None:
+    """Sliding pulleys of joint 1 rub by q̇_2. Beyond the joint the loss turns joint 2 alone: power λ f |r_2 q̇_2|. At the
+    joint, as eq. (10) has it, it turns joint 1 as well, which may then be driven."""
+    rub: dict[str, Any] = {"pulley_friction": [dry(0.03)]}
+    pulley = {"pulley_torque": where}
+    plant = make(small_rig(TWO_JOINTS, tendons=[rub, {}, {}, rub], friction=pulley, pretension=15.0))
+    arms = np.array(TWO_JOINTS)
+    rubbing = arms[[0, 3]]
+    for speeds in ([2.0, -0.3], [-2.0, 0.3], [0.0, 0.5]):
+        state = plant.continuous_state()
+        state[2:4] = speeds
+        slides = rubbing[:, 1] * speeds[1]
+        state[4 + 2 * len(arms) : 6 + 2 * len(arms)] = np.sign(slides)
+        power = plant.derivative(0.0, state)[-3]
+        turned = rubbing @ speeds if where == "at_joint" else slides
+        assert power == pytest.approx(np.sum(0.03 * 15.0 * np.sign(slides) * turned), rel=1e-6)
+        if speeds[0] != 0.0:
+            assert (power < 0.0) == drives
+
+
 def test_stiffness_of_the_finger_by_hand() -> None:
     """A quasi-static push deflects the joint by torque / (Σ k r²)."""
     push = {"start": 0.0, "rise": 0.3, "hold": 1.0, "fall": 0.1, "force": 0.5, "direction": [0.0, 0.0, -1.0]}
