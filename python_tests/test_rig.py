@@ -52,6 +52,10 @@ def test_the_numbers_of_version_1_are_frozen() -> None:
         for name in INDEX_RIGS
     ]
     assert digests == ["c5684190258469be", "310606ed8d953861", "e7bbe71ce308b482"]
+    # and the laws, arms and springs of the finger they refer to; its thresholds and bias are the model's
+    finger = json.loads((RIGS / "../fingers/index_finger.json").read_text())
+    physics = json.dumps({key: finger[key] for key in ("joints", "tendons")}, sort_keys=True)
+    assert hashlib.sha256(physics.encode()).hexdigest()[:16] == "51d5ec52adb92818"
 
 
 def test_expansion_is_reproducible() -> None:
