@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
 
+from command import Answer, Call
 from fmu_binary import FINGER, UnpackedFmu, unpack
 from plant_fmu_rig import fmu_rig
 
@@ -42,3 +44,22 @@ def plant_fmu_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def plant_fmu(plant_fmu_path: Path) -> UnpackedFmu:
     """The same, unpacked and loaded."""
     return unpack(plant_fmu_path, plant_fmu_path.parent / "unpacked")
+
+
+@pytest.fixture
+def call(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> Call:
+    """Runs `tendonfmu ARGUMENTS` in an empty folder and gives its exit status and both streams."""
+    from tendonfmu.cli import main
+
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: str | Path) -> Answer:
+        monkeypatch.setattr(sys, "argv", ["tendonfmu", *map(str, arguments)])
+        capfd.readouterr()
+        with pytest.raises(SystemExit) as ended:
+            main()
+        out, err = capfd.readouterr()
+        assert isinstance(ended.value.code, int)
+        return Answer(ended.value.code, out, err)
+
+    return run

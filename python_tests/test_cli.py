@@ -7,8 +7,6 @@ import os
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,39 +18,12 @@ pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not insta
 import oracle
 import random_fingers
 from agreement import agree_with_oracle, few_left_out
-from tendonfmu.cli import main
+from command import Answer, Call
 from tendonfmu.tables import read_table, write_table
 
 ROOT = Path(__file__).resolve().parent.parent
 INDEX_FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
 COMMANDS = ("check", "build", "run", "simulate", "convert", "demo")
-
-
-@dataclass(frozen=True)
-class Answer:
-    status: int
-    out: str
-    err: str
-
-
-Call = Callable[..., Answer]
-
-
-@pytest.fixture
-def call(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> Call:
-    """Runs `tendonfmu ARGUMENTS` in an empty folder and gives its exit status and both streams."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: str | Path) -> Answer:
-        monkeypatch.setattr(sys, "argv", ["tendonfmu", *map(str, arguments)])
-        capfd.readouterr()
-        with pytest.raises(SystemExit) as ended:
-            main()
-        out, err = capfd.readouterr()
-        assert isinstance(ended.value.code, int)
-        return Answer(ended.value.code, out, err)
-
-    return run
 
 
 def refused(answer: Answer, status: int = 2) -> str:

@@ -9,19 +9,17 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from command import Call
 from plant_rigs import needs_plant
 from random_rigs import random_rig
 from rig_cases import RIGS, changed, index_rig, with_everything, written
 from tendonfmu import plant as binding
-from tendonfmu.cli import main
 from tendonfmu.errors import InputError
 from tendonfmu.plant import Plant, PlantError, SolverError
 from tendonfmu.recording import read_recording
@@ -30,33 +28,6 @@ from tendonfmu.simulation import CHUNK, ENERGIES, Simulation, simulate
 from tendonfmu.tables import write_table
 
 pytestmark = needs_plant
-
-
-@dataclass(frozen=True)
-class Answer:
-    status: int
-    out: str
-    err: str
-
-
-Call = Callable[..., Answer]
-
-
-@pytest.fixture
-def call(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> Call:
-    """Runs `tendonfmu ARGUMENTS` in an empty folder and gives its exit status and both streams."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: str | Path) -> Answer:
-        monkeypatch.setattr(sys, "argv", ["tendonfmu", *map(str, arguments)])
-        capfd.readouterr()
-        with pytest.raises(SystemExit) as ended:
-            main()
-        out, err = capfd.readouterr()
-        assert isinstance(ended.value.code, int)
-        return Answer(ended.value.code, out, err)
-
-    return run
 
 
 def short_rig(**changes: Any) -> dict[str, Any]:
