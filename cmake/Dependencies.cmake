@@ -7,6 +7,7 @@
 #   GTest::gtest_main              with TENDONFMU_BUILD_TESTS
 #   benchmark::benchmark_main      with TENDONFMU_BUILD_BENCH
 #   TENDONFMU_HAS_PLANT            the simulated finger can be built: then also the targets tendonfmu_sundials and Eigen3::Eigen
+#   TENDONFMU_HAS_ESTIMATION       parameters can be estimated: then also the targets Eigen3::Eigen and Threads::Threads
 
 find_package(nlohmann_json 3.9 QUIET)
 if(NOT nlohmann_json_FOUND)
@@ -54,29 +55,54 @@ if(TENDONFMU_BUILD_BENCH)
   endif()
 endif()
 
-# Nothing but the simulated finger needs these: the rest is built without them.
+# For the simulated finger and the estimation of parameters: the rest is built without it.
+set(eigen_missing "")
+if(TENDONFMU_PLANT OR TENDONFMU_ESTIMATION)
+  # Compared here: Eigen 5 does not call itself compatible with 3.4, and is.
+  find_package(Eigen3 QUIET NO_MODULE)
+  if(NOT TARGET Eigen3::Eigen OR Eigen3_VERSION VERSION_LESS 3.4)
+    set(eigen_missing "Eigen >= 3.4 not found: install libeigen3-dev (Debian, Ubuntu) or eigen (Homebrew)")
+  endif()
+endif()
+
+# Where the output of CMake is not shown, tools/setup.sh says from the files written here what is not built, and why.
+set(TENDONFMU_HAS_ESTIMATION OFF)
+set(estimation_missing "")
+if(NOT TENDONFMU_ESTIMATION)
+  set(estimation_missing "it is switched off (TENDONFMU_ESTIMATION)")
+elseif(eigen_missing)
+  set(estimation_missing "${eigen_missing}")
+else()
+  set(THREADS_PREFER_PTHREAD_FLAG ON)
+  find_package(Threads QUIET)
+  if(Threads_FOUND)
+    set(TENDONFMU_HAS_ESTIMATION ON)
+  else()
+    set(estimation_missing "CMake found no threads for ${CMAKE_SYSTEM_NAME}")
+  endif()
+endif()
+if(NOT TENDONFMU_HAS_ESTIMATION)
+  message(NOTICE "The estimation of parameters is not built: ${estimation_missing}")
+endif()
+file(WRITE "${PROJECT_BINARY_DIR}/estimation_missing.txt" "${estimation_missing}")
+
 set(TENDONFMU_HAS_PLANT OFF)
 set(plant_missing "")
 if(NOT TENDONFMU_PLANT)
   set(plant_missing "it is switched off (TENDONFMU_PLANT)")
 elseif(MSVC)
   set(plant_missing "it needs the vector types of gcc and clang (runtime/plant/elementary.h)")
+elseif(eigen_missing)
+  set(plant_missing "${eigen_missing}")
 else()
-  # Compared here: Eigen 5 does not call itself compatible with 3.4, and is.
-  find_package(Eigen3 QUIET NO_MODULE)
-  if(NOT TARGET Eigen3::Eigen OR Eigen3_VERSION VERSION_LESS 3.4)
-    set(plant_missing "Eigen >= 3.4 not found: install libeigen3-dev (Debian, Ubuntu) or eigen (Homebrew)")
+  include(Sundials)
+  if(TARGET tendonfmu_sundials)
+    set(TENDONFMU_HAS_PLANT ON)
   else()
-    include(Sundials)
-    if(TARGET tendonfmu_sundials)
-      set(TENDONFMU_HAS_PLANT ON)
-    else()
-      set(plant_missing "${TENDONFMU_SUNDIALS_MISSING}")
-    endif()
+    set(plant_missing "${TENDONFMU_SUNDIALS_MISSING}")
   endif()
 endif()
 if(NOT TENDONFMU_HAS_PLANT)
   message(NOTICE "The simulated finger is not built: ${plant_missing}")
 endif()
-# Where the output of CMake is not shown, tools/setup.sh says it from here.
 file(WRITE "${PROJECT_BINARY_DIR}/simulated_finger_missing.txt" "${plant_missing}")

@@ -12,18 +12,35 @@ set_target_properties(tendonfmu_description PROPERTIES EXPORT_NAME description)
 install(TARGETS tendonfmu_core tendonfmu_description EXPORT tendonfmuTargets
         ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}" INCLUDES DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
 install(DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}/runtime/include/" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}"
-        FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp" PATTERN "tendonfmu_plant.h" EXCLUDE)
+        FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp" PATTERN "tendonfmu_plant.h" EXCLUDE PATTERN "tendonfmu_estimation.h" EXCLUDE
+        PATTERN "tendonfmu_learner.h" EXCLUDE)
 
 install(FILES LICENSE THIRD_PARTY_LICENSES.txt DESTINATION "${CMAKE_INSTALL_DOCDIR}")
+
+# Removes from what users of a library are told to link what they do not need.
+function(tendonfmu_forget library)
+  get_target_property(needed ${library} INTERFACE_LINK_LIBRARIES)
+  list(REMOVE_ITEM needed ${ARGN})
+  set_target_properties(${library} PROPERTIES INTERFACE_LINK_LIBRARIES "${needed}")
+endfunction()
+
+# The estimation of parameters, where it was built.
+set(TENDONFMU_NEEDS_THREADS OFF)
+if(TARGET tendonfmu_estimation)
+  set(TENDONFMU_NEEDS_THREADS ON)
+  set_target_properties(tendonfmu_estimation PROPERTIES EXPORT_NAME estimation)
+  tendonfmu_forget(tendonfmu_estimation "$<LINK_ONLY:Eigen3::Eigen>") # header-only
+  install(TARGETS tendonfmu_estimation EXPORT tendonfmuTargets ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")
+  file(GLOB headers runtime/include/tendonfmu_estimation.h runtime/include/tendonfmu_learner.h)
+  install(FILES ${headers} DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
+endif()
 
 # The simulated finger, where it was built, with the archives of SUNDIALS that it was linked with.
 if(TARGET tendonfmu_plant)
   set_target_properties(tendonfmu_plant PROPERTIES EXPORT_NAME plant)
   set_target_properties(tendonfmu_sundials PROPERTIES EXPORT_NAME sundials)
   # Header-only: those who link the installed library do not need them.
-  get_target_property(needed tendonfmu_plant INTERFACE_LINK_LIBRARIES)
-  list(REMOVE_ITEM needed "$<LINK_ONLY:nlohmann_json::nlohmann_json>" "$<LINK_ONLY:Eigen3::Eigen>")
-  set_target_properties(tendonfmu_plant PROPERTIES INTERFACE_LINK_LIBRARIES "${needed}")
+  tendonfmu_forget(tendonfmu_plant "$<LINK_ONLY:nlohmann_json::nlohmann_json>" "$<LINK_ONLY:Eigen3::Eigen>")
   install(TARGETS tendonfmu_plant tendonfmu_sundials EXPORT tendonfmuTargets
           ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}" INCLUDES DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
   install(FILES runtime/include/tendonfmu_plant.h DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
@@ -48,6 +65,9 @@ else()
   set(pc_cxx_runtime "-lstdc++")
 endif()
 set(pc_names tendonfmu tendonfmu-description)
+if(TARGET tendonfmu_estimation)
+  list(APPEND pc_names tendonfmu-estimation)
+endif()
 if(TARGET tendonfmu_plant)
   list(APPEND pc_names tendonfmu-plant)
   list(TRANSFORM archives REPLACE ".*/" "\${libdir}/tendonfmu/" OUTPUT_VARIABLE pc_archives)
@@ -64,6 +84,9 @@ if(NOT TARGET tendonfmu::tendonfmu)
 endif()
 if(NOT TARGET tendonfmu::description)
   add_library(tendonfmu::description ALIAS tendonfmu_description)
+endif()
+if(TARGET tendonfmu_estimation AND NOT TARGET tendonfmu::estimation)
+  add_library(tendonfmu::estimation ALIAS tendonfmu_estimation)
 endif()
 if(TARGET tendonfmu_plant AND NOT TARGET tendonfmu::plant)
   add_library(tendonfmu::plant ALIAS tendonfmu_plant)

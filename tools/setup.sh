@@ -102,8 +102,8 @@ apt_get_install() {
   "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@"
 }
 
-# What only the simulated finger needs: everything else is built without it.
-missing_for_finger() {
+# What only the simulated finger and `fit` need: everything else is built without it.
+missing_beyond_model() {
   if ! has_file_header eigen3/Eigen/Core; then
     if [ "$1" = apt ]; then echo libeigen3-dev; else echo eigen; fi
   fi
@@ -128,17 +128,17 @@ install_packages() {
 }
 
 set_up_system() {
-  local flavour=$1 family=apt missing for_finger
+  local flavour=$1 family=apt missing beyond
   if [ "$(uname)" = Darwin ]; then family=brew; fi
   missing=$(missing_packages "$family" "$flavour" | xargs)
-  for_finger=$(missing_for_finger "$family")
+  beyond=$(missing_beyond_model "$family")
   if [ -n "$missing" ]; then
     # shellcheck disable=SC2086
-    install_packages "$family" $missing $for_finger
+    install_packages "$family" $missing $beyond
     missing=$(missing_packages apt "$flavour" | xargs)
     [ -z "$missing" ] || die "still missing after the installation (named as on Debian): $missing"
-  elif [ -n "$for_finger" ]; then
-    (install_packages "$family" "$for_finger") || say "going on without $for_finger: there will be no simulated finger"
+  elif [ -n "$beyond" ]; then
+    (install_packages "$family" "$beyond") || say "going on without $beyond: there will be no simulated finger and no fit"
   fi
 }
 
@@ -242,9 +242,15 @@ set_up_package() {
 
 # pip hides what CMake says.
 say_what_is_missing() {
+  say_reason "the simulated finger" simulated_finger_missing.txt
+  say_reason "the estimation of parameters (tendonfmu fit)" estimation_missing.txt
+}
+
+# say_reason WHAT FILE: the file in the build folder of the package holds why it is not there, or nothing.
+say_reason() {
   local reason
-  for reason in build/package-*/simulated_finger_missing.txt; do
-    if [ -s "$reason" ]; then say "built without the simulated finger: $(cat "$reason")"; fi
+  for reason in build/package-*/"$2"; do
+    if [ -s "$reason" ]; then say "built without $1: $(cat "$reason")"; fi
   done
 }
 
