@@ -1,0 +1,362 @@
+#include "floating_point.h"
+
+#include "parameter_derivative.h"
+
+#include <string.h>
+
+#include "extensions.h"
+#include "slot_view.h"
+
+enum { NO_LAW = 0xffffffffu, LAWS_OF_PLACE = 2, SIDES_OF_JUMP = 2 };
+
+/* --- where things are -----------------------------------------------------------------------------------------------
+ */
+
+typedef struct sizes {
+  size_t records, rows, joints, places, friction, bias, plain;
+} sizes;
+
+static sizes sizes_of(const tendonfmu_finger* f) {
+  const size_t places = f->tendons * 2 * f->joints + 2 * f->joints;
+  return (sizes){.records = 2 + (size_t)f->shape.edge_law_count + 2 * (size_t)f->shape.edge_count,
+                 .rows = f->joints * f->tendon_lanes,
+                 .joints = f->joint_lanes,
+                 .places = places,
+                 .friction = places * LAWS_OF_PLACE,
+                 .bias = places * LAWS_OF_PLACE * SIDES_OF_JUMP,
+                 .plain = 2 * f->joints + EFFECT_MAX_PARAMETERS * (size_t)f->shape.extension_count};
+}
+
+size_t parameter_derivative_size(const tendonfmu_finger* finger) {
+  const sizes s = sizes_of(finger);
+  const size_t words = 2 * (s.records + s.rows + 2 * s.joints);
+  return (words + 1) / 2 * 2 * sizeof(uint32_t) + (s.friction + s.bias) * sizeof(law_term) +
+         s.plain * sizeof(plain_term) + (3 * s.places * finger->joints + 4 * finger->joints) * sizeof(double);
+}
+
+typedef struct law_search {
+  const tendonfmu_finger* finger;
+  parameter_derivative* found;
+  uint32_t next_record; /* as derived_numbers.c counts them */
+  uint32_t points;      /* working points of the edge being read */
+} law_search;
+
+static void note_law(uint32_t* const side[2], size_t at, const model_item* item) {
+  side[0][at] = item->first;
+  side[1][at] = item->first + (item->law == LAW_ASYMMETRIC ? 4 : 0);
+}
+
+/* an edge with K laws has K + 2 records: L1 L1 L2 … LK LK */
+static void note_edge(law_search* search, const model_item* item) {
+  const uint32_t points = item->has_angles ? search->points : 1;
+  uint32_t* const* side = search->found->edge_side;
+  const uint32_t first = search->next_record;
+  note_law(side, first + item->point + 1, item);
+  if (item->point == 0) {
+    note_law(side, first, item);
+  }
+  if (item->point + 1 == points) {
+    note_law(side, first + points + 1, item);
+    search->next_record += points + 2;
+  }
+}
+
+static void note_plain(parameter_derivative* d, uint32_t parameter, uint32_t joint, uint32_t extension, uint32_t at) {
+  d->plain[d->plain_count++] =
+      (plain_term){.parameter = parameter, .joint = joint, .extension = extension, .position = at};
+}
+
+static int note_item(void* context, const model_item* item) {
+  law_search* search = context;
+  const size_t lanes = search->finger->tendon_lanes;
+  switch (item->kind) {
+    case ITEM_JOINT_FRICTION: note_law(search->found->joint_side, item->joint, item); break;
+    case ITEM_LOAD_FRICTION: note_law(search->found->load_side, item->joint, item); break;
+    case ITEM_PULLEY_FRICTION:
+      note_law(search->found->pulley_side, (item->joint + 1) * lanes + item->tendon, item);
+      break;
+    case ITEM_EDGE_ANGLES: search->points = item->count; break;
+    case ITEM_EDGE_FRICTION: note_edge(search, item); break;
+    case ITEM_COVER:
+      note_plain(search->found, item->first, item->joint, PLAIN_COVER, 0);
+      note_plain(search->found, item->first + 1, item->joint, PLAIN_COVER, 1);
+      break;
+    case ITEM_EXTENSION:
+      for (uint32_t k = 0; k < item->count; ++k) {
+        note_plain(search->found, item->first + k, item->joint, item->extension, k);
+      }
+      break;
+    default: break;
+  }
+  return 0;
+}
+
+static void* take(unsigned char** from, size_t bytes) {
+  void* place = *from;
+  *from += bytes;
+  return place;
+}
+
+void parameter_derivative_place(const tendonfmu_finger* finger, void* memory, parameter_derivative* derivative) {
+  const sizes s = sizes_of(finger);
+  const size_t n = finger->joints, matrix = s.places * n * sizeof(double);
+  unsigned char* from = memory;
+  memset(memory, 0, parameter_derivative_size(finger));
+  *derivative = (parameter_derivative){.joints = n, .tendons = finger->tendons, .places = s.places};
+  derivative->torque_factor = take(&from, matrix);
+  derivative->jump_factor = take(&from, matrix);
+  derivative->bias_factor = take(&from, matrix);
+  derivative->moved = take(&from, 2 * n * sizeof(double));
+  derivative->jumped = take(&from, 2 * n * sizeof(double));
+  derivative->friction = take(&from, s.friction * sizeof(law_term));
+  derivative->bias = take(&from, s.bias * sizeof(law_term));
+  derivative->plain = take(&from, s.plain * sizeof(plain_term));
+  uint32_t* words = take(&from, 0);
+  const size_t count = 2 * (s.records + s.rows + 2 * s.joints);
+  for (size_t k = 0; k < count; ++k) {
+    words[k] = NO_LAW;
+  }
+  for (int negative = 0; negative < 2; ++negative) {
+    derivative->edge_side[negative] = words;
+    derivative->pulley_side[negative] = words + s.records;
+    derivative->joint_side[negative] = words + s.records + s.rows;
+    derivative->load_side[negative] = words + s.records + s.rows + s.joints;
+    words += count / 2;
+  }
+  law_search search = {.finger = finger, .found = derivative, .next_record = 2};
+  model_visit(&finger->shape, note_item, &search);
+}
+
+/* --- what F and b depend on -----------------------------------------------------------------------------------------
+ */
+
+/* One place at the last sample. */
+typedef struct place_laws {
+  uint32_t place;
+  size_t slot;
+  double threshold;            /* v_min */
+  const double *below, *above; /* packed laws; above NULL: no working points */
+  const uint32_t *below_side[2], *above_side[2];
+  double weight; /* of the working point above */
+} place_laws;
+
+static void add_side(law_term* to, size_t* count, uint32_t place, uint32_t side, const law_slopes* s, double factor) {
+  to[(*count)++] =
+      (law_term){.place = place,
+                 .side = side,
+                 .slope = {factor * s->by_static, factor * s->by_coulomb, factor * s->by_rate, factor * s->by_viscous}};
+}
+
+/* appends the slopes of factor·|F(speed)| on one side; returns that value */
+static double add_magnitude(const place_laws* p, int negative, double speed, double factor, law_term* to,
+                            size_t* count) {
+  const law_slopes below = law_with_slopes(p->below + negative * LAW_SIDE_NUMBERS, speed);
+  double value = below.value;
+  if (p->above && p->weight != 0.0) {
+    const law_slopes above = law_with_slopes(p->above + negative * LAW_SIDE_NUMBERS, speed);
+    value += p->weight * (above.value - below.value);
+    add_side(to, count, p->place, *p->above_side[negative], &above, factor * p->weight);
+    factor *= 1.0 - p->weight;
+  }
+  add_side(to, count, p->place, *p->below_side[negative], &below, factor);
+  return value;
+}
+
+/* F where the place moves, 0 where it sticks */
+static double read_friction(const tendonfmu_finger* f, const place_laws* p, parameter_derivative* d) {
+  if (f->remembered.moving[p->slot] == 0.0) {
+    return 0.0;
+  }
+  const double v = f->scratch.velocity[p->slot], sign = v < 0.0 ? -1.0 : 1.0;
+  return sign * add_magnitude(p, v < 0.0, sign * v, sign, d->friction, &d->friction_count);
+}
+
+/* b of fig. 5 */
+static double read_jump(const tendonfmu_finger* f, const place_laws* p, parameter_derivative* d) {
+  const finger_state* s = &f->remembered;
+  const double before = s->side_before[p->slot], now = s->side[p->slot];
+  double jump = 0.0, kept = 1.0;
+  if (s->event[p->slot] == 0.0) {
+    return 0.0;
+  }
+  if (s->event[p->slot] < 0.0) {
+    const double rested = s->last_stuck[p->slot] - s->stuck_since[p->slot];
+    kept = before == 0.0 ? 0.0 : -law_exponential(f->derived.settings.forget_rate * rested);
+    const double factor = -(1.0 + kept) * now;
+    jump = factor * add_magnitude(p, now < 0.0, p->threshold, factor, d->bias, &d->bias_count);
+  }
+  if (before != 0.0 && kept != 0.0) {
+    const double factor = kept * before;
+    jump += factor * add_magnitude(p, before < 0.0, p->threshold, factor, d->bias, &d->bias_count);
+  }
+  return jump;
+}
+
+static place_laws edge_at(const tendonfmu_finger* f, const parameter_derivative* d, size_t i, size_t j) {
+  const size_t slot = j * f->tendon_lanes + i;
+  const double angle = j ? f->remembered.angle[j - 1] : 0.0;
+  const size_t record = f->derived.edge_record[slot] + slot_segment(f, j, i, angle);
+  const double* segment = f->derived.edge_segment + 2 * record;
+  place_laws p = {.place = (uint32_t)(2 * (i * f->joints + j)),
+                  .slot = slot,
+                  .threshold = f->derived.settings.tendon_threshold,
+                  .below = f->derived.edge_law + record * LAW_NUMBERS,
+                  .above = segment[1] != 0.0 ? f->derived.edge_law + (record + 1) * LAW_NUMBERS : NULL,
+                  .weight = (angle - segment[0]) * segment[1]};
+  for (int negative = 0; negative < 2; ++negative) {
+    p.below_side[negative] = d->edge_side[negative] + record;
+    p.above_side[negative] = d->edge_side[negative] + record + (p.above != NULL);
+  }
+  return p;
+}
+
+static place_laws single_law(uint32_t place, size_t slot, double threshold, const double* law, uint32_t* const side[2],
+                             size_t at) {
+  return (place_laws){
+      .place = place, .slot = slot, .threshold = threshold, .below = law, .below_side = {side[0] + at, side[1] + at}};
+}
+
+/* --- what F does to the torques -------------------------------------------------------------------------------------
+ */
+
+/* The forces along one tendon: before[k] acts at place k of 2n. */
+typedef struct tendon_forces {
+  double acting[2 * MODEL_MAX_JOINTS + 1];
+  double by_force[2 * MODEL_MAX_JOINTS + 1]; /* ∂acting/∂force: ±1, 0 where slack replaced the force by 0 */
+} tendon_forces;
+
+static void act(const tendonfmu_finger* f, size_t i, double* force, double* acting, double* by_force) {
+  const int bidirectional = f->derived.bidirectional[i] != 0.0, negative = *force < 0.0;
+  *by_force = negative ? (bidirectional ? -1.0 : 0.0) : 1.0;
+  if (negative && !bidirectional) {
+    *force = 0.0;
+  }
+  *acting = *force < 0.0 ? -*force : *force;
+}
+
+static void follow_forces(const tendonfmu_finger* f, size_t i, const double* moved, tendon_forces* t) {
+  double force = f->remembered.force[i];
+  for (size_t k = 0; k < 2 * f->joints; ++k) {
+    act(f, i, &force, &t->acting[k], &t->by_force[k]);
+    force -= t->acting[k] * moved[k];
+  }
+  act(f, i, &force, &t->acting[2 * f->joints], &t->by_force[2 * f->joints]);
+}
+
+/* factors of place k of tendon i: a change of F there, and what it does to forces, losses and jumps behind it */
+static void follow_change(const tendonfmu_finger* f, parameter_derivative* d, size_t i, size_t k,
+                          const tendon_forces* t) {
+  const finger_scratch* s = &f->scratch;
+  const size_t n = f->joints, row = (i * 2 * n + k) * n;
+  const int jumps = d->has_jump;
+  double force = -t->acting[k], lost = t->acting[k], jumped = 0.0;
+  for (size_t j = 0; j <= k / 2; ++j) {
+    d->torque_factor[row + j] = d->jump_factor[row + j] = d->bias_factor[row + j] = 0.0;
+  }
+  for (size_t next = k + 1; next <= 2 * n; ++next) {
+    if (next % 2 == 0 || next == 2 * n) { /* past the pulley of joint j */
+      const size_t j = next / 2 - 1;
+      const double arm = f->derived.moment_arm[j * f->tendon_lanes + i];
+      d->torque_factor[row + j] += arm * lost;
+      if (jumps) {
+        d->jump_factor[row + j] += arm * jumped;
+        d->bias_factor[row + j] = arm * t->acting[k];
+      }
+    }
+    if (next == 2 * n) {
+      break;
+    }
+    const double acting = t->by_force[next] * force;
+    if (next % 2 == 1) { /* f_B of joint j, just past its edge */
+      const size_t j = next / 2;
+      d->torque_factor[row + j] = s->load_friction[j] * acting;
+      d->jump_factor[row + j] = jumps ? s->load_bias[j] * acting : 0.0;
+    }
+    jumped += acting * d->jumped[next];
+    lost += acting * d->moved[next];
+    force = t->by_force[next] != 0.0 ? force - acting * d->moved[next] : 0.0;
+  }
+}
+
+static void read_tendon(const tendonfmu_finger* f, parameter_derivative* d, size_t i) {
+  const size_t n = f->joints, lanes = f->tendon_lanes;
+  int present[2 * MODEL_MAX_JOINTS] = {0};
+  tendon_forces forces;
+  for (size_t j = 0; j < n; ++j) {
+    const place_laws edge = edge_at(f, d, i, j);
+    const size_t behind = (j + 1) * lanes + i;
+    d->moved[2 * j] = d->jumped[2 * j] = d->moved[2 * j + 1] = d->jumped[2 * j + 1] = 0.0;
+    if (*edge.below_side[0] != NO_LAW) {
+      present[2 * j] = 1;
+      d->moved[2 * j] = read_friction(f, &edge, d);
+      d->jumped[2 * j] = read_jump(f, &edge, d);
+    }
+    if (j + 1 < n && d->pulley_side[0][behind] != NO_LAW) {
+      const place_laws pulley = single_law(edge.place + 1, behind, f->derived.settings.tendon_threshold,
+                                           f->derived.pulley_law + behind * LAW_NUMBERS, d->pulley_side, behind);
+      present[2 * j + 1] = 1;
+      d->moved[2 * j + 1] = read_friction(f, &pulley, d);
+      d->jumped[2 * j + 1] = read_jump(f, &pulley, d);
+    }
+  }
+  follow_forces(f, i, d->moved, &forces);
+  for (size_t k = 0; k + 1 < 2 * n; ++k) {
+    if (present[k]) {
+      follow_change(f, d, i, k, &forces);
+    }
+  }
+}
+
+static void read_joint(const tendonfmu_finger* f, parameter_derivative* d, size_t j) {
+  const size_t n = f->joints, slot = n * f->tendon_lanes + j;
+  const uint32_t place = (uint32_t)(2 * n * f->tendons + 2 * j);
+  const double threshold = f->derived.settings.joint_threshold;
+  const double load = f->scratch.load[j];
+  for (int loaded = 0; loaded < 2; ++loaded) {
+    uint32_t* const* side = loaded ? d->load_side : d->joint_side;
+    const double* laws = loaded ? f->derived.load_law : f->derived.joint_law;
+    const size_t row = (place + (size_t)loaded) * n;
+    if (side[0][j] == NO_LAW) {
+      continue;
+    }
+    const place_laws own = single_law(place + (uint32_t)loaded, slot, threshold, laws + j * LAW_NUMBERS, side, j);
+    read_friction(f, &own, d);
+    read_jump(f, &own, d);
+    for (size_t other = 0; other < n; ++other) {
+      d->torque_factor[row + other] = d->jump_factor[row + other] = d->bias_factor[row + other] = 0.0;
+    }
+    d->torque_factor[row + j] = d->bias_factor[row + j] = loaded ? load : 1.0;
+  }
+}
+
+static void read_plain(const tendonfmu_finger* f, plain_term* term) {
+  if (term->extension == PLAIN_COVER) {
+    const double bend = f->remembered.angle[term->joint] - f->derived.cover_rest[term->joint];
+    term->slope = term->position == 0 ? bend : -f->derived.cover_stiffness[term->joint];
+  } else {
+    size_t joint;
+    term->slope = extension_torque(f, term->extension, &joint).by_parameter[term->position];
+  }
+}
+
+static int any_transition(const tendonfmu_finger* f) {
+  double events = 0.0;
+  for (size_t slot = 0; slot < f->slots; ++slot) {
+    events += f->remembered.event[slot] * f->remembered.event[slot];
+  }
+  return events != 0.0;
+}
+
+void parameter_derivative_read(const tendonfmu_finger* finger, parameter_derivative* derivative) {
+  derivative->friction_count = derivative->bias_count = 0;
+  derivative->has_jump = any_transition(finger);
+  for (size_t i = 0; i < finger->tendons; ++i) {
+    read_tendon(finger, derivative, i);
+  }
+  for (size_t j = 0; j < finger->joints; ++j) {
+    read_joint(finger, derivative, j);
+  }
+  for (size_t k = 0; k < derivative->plain_count; ++k) {
+    read_plain(finger, derivative->plain + k);
+  }
+}
