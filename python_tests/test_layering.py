@@ -144,6 +144,7 @@ CORE = listed_sources(ROOT / "runtime" / "CMakeLists.txt", "set(TENDONFMU_CORE_S
 DESCRIPTION = listed_sources(
     ROOT / "runtime" / "description" / "CMakeLists.txt", "add_library(tendonfmu_description STATIC"
 )
+ESTIMATION = listed_sources(ROOT / "runtime" / "estimation" / "CMakeLists.txt", "set(TENDONFMU_ESTIMATION_SOURCES")
 PLANT = listed_sources(ROOT / "runtime" / "plant" / "CMakeLists.txt", "set(TENDONFMU_PLANT_SOURCES")
 # all that the simulated finger may know of the rest
 KNOWN_TO_PLANT = {
@@ -163,6 +164,47 @@ def test_core_includes_only_what_stands_above_it() -> None:
 def test_description_includes_only_what_stands_above_it() -> None:
     known = {"tendonfmu.h", "tendonfmu_description.h", "core_inside.h"}
     assert is_ordered(ROOT / "runtime" / "description", DESCRIPTION, known) == []
+
+
+def test_estimation_includes_only_what_stands_above_it() -> None:
+    """It stands on the core, inside included, and on nothing of the simulated finger."""
+    core = {Path(source).with_suffix(".h").name for source in CORE}
+    known = core | {"tendonfmu.h", "core_inside.h", "tendonfmu_estimation.h", "tendonfmu_learner.h"}
+    assert is_ordered(ROOT / "runtime" / "estimation", ESTIMATION, known) == []
+
+
+def test_every_estimation_file_is_in_the_list() -> None:
+    folder = ROOT / "runtime" / "estimation"
+    listed = {(folder / source).with_suffix("") for source in ESTIMATION}
+    files = {file.with_suffix("") for file in folder.rglob("*") if file.suffix in (".h", ".cpp")}
+    assert files == listed
+
+
+def test_the_kernel_for_one_processor_shares_no_inline_function() -> None:
+    """Compiled for AVX2 alone: of an inline function in two sources the linker keeps one, for all processors."""
+    folder = ROOT / "runtime" / "estimation"
+    found = {name for file in folder.glob("*_avx2.cpp") for _, name in includes_of(file)}
+    own = {file.name for file in folder.glob("*_avx2.h")} | {"symmetric_update.h"}
+    assert found <= {"immintrin.h", "cstddef", "stddef.h"} | own
+    for header in found & own:
+        text = (folder / header).read_text(encoding="utf-8")
+        assert {name for _, name in INCLUDE.findall(text)} <= {"cstddef", "stddef.h"}
+        assert not re.search(r"\b(inline|template|class)\b|^#include <(Eigen|vector)", text, re.MULTILINE), header
+
+
+def test_core_and_fmu_do_without_the_estimation() -> None:
+    runtime = ROOT / "runtime"
+    headers = {file.name for file in (runtime / "estimation").glob("*.h")} | {
+        "tendonfmu_estimation.h",
+        "tendonfmu_learner.h",
+    }
+    others = [*(runtime / part for part in ("core", "description", "plant")), ROOT / "fmu_src"]
+    sources = [file for folder in others for file in folder.rglob("*") if file.suffix in (".c", ".h", ".cpp")]
+    sources += [runtime / "include" / name for name in ("tendonfmu.h", "tendonfmu_description.h", "tendonfmu_plant.h")]
+    assert len(sources) > 100
+    assert [f"{file.name}: {name}" for file in sources for _, name in includes_of(file) if name in headers] == []
+    for cmake in (runtime / "CMakeLists.txt", *(folder / "CMakeLists.txt" for folder in others[1:])):
+        assert "tendonfmu_estimation" not in cmake.read_text(encoding="utf-8"), cmake
 
 
 def test_plant_includes_only_what_stands_above_it() -> None:

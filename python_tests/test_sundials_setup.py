@@ -1,4 +1,4 @@
-"""Where SUNDIALS comes from: what is refused and why, and that everything else is built without it."""
+"""Where SUNDIALS and Eigen come from: what is refused and why, and that everything else is built without them."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 MISSING = "The simulated finger is not built: "
+NO_ESTIMATION = "The estimation of parameters is not built: "
 
 needs_cmake = pytest.mark.skipif(
     shutil.which("cmake") is None or shutil.which("ninja") is None, reason="SKIPPED: cmake or ninja is not there"
@@ -23,7 +24,7 @@ needs_cmake = pytest.mark.skipif(
 
 
 def configure(build: Path, *options: str) -> str:
-    """Configures the project without tests; returns what CMake said. The plant may be missing, nothing else."""
+    """Configures the project without tests; returns what CMake said. Only plant and estimation may be missing."""
     command = ["cmake", "-S", str(ROOT), "-B", str(build), "-G", "Ninja", f"-DPython_EXECUTABLE={sys.executable}"]
     command += ["-DTENDONFMU_BUILD_TESTS=OFF", f"-DTENDONFMU_SUNDIALS_FOLDER={build / 'sundials'}", *options]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -62,8 +63,29 @@ def test_everything_but_the_finger_is_configured_without_sundials(tmp_path: Path
 
 
 @needs_cmake
-def test_the_finger_can_be_switched_off(tmp_path: Path) -> None:
-    assert f"{MISSING}it is switched off (TENDONFMU_PLANT)" in configure(tmp_path, "-DTENDONFMU_PLANT=OFF")
+def test_finger_and_estimation_can_be_switched_off(tmp_path: Path) -> None:
+    said = configure(tmp_path, "-DTENDONFMU_PLANT=OFF", "-DTENDONFMU_ESTIMATION=OFF")
+    assert f"{MISSING}it is switched off (TENDONFMU_PLANT)" in said
+    assert f"{NO_ESTIMATION}it is switched off (TENDONFMU_ESTIMATION)" in said
+
+
+@needs_cmake
+def test_the_model_is_configured_without_eigen(tmp_path: Path) -> None:
+    said = configure(tmp_path, "-DCMAKE_DISABLE_FIND_PACKAGE_Eigen3=ON")
+    assert f"{MISSING}Eigen >= 3.4 not found" in said
+    assert f"{NO_ESTIMATION}Eigen >= 3.4 not found" in said
+    assert "Eigen >= 3.4 not found" in (tmp_path / "estimation_missing.txt").read_text(encoding="utf-8")
+    built = targets(tmp_path)
+    assert "tendonfmu_plant" not in built and "tendonfmu_estimation" not in built
+    assert "tendonfmu_description" in built
+
+
+@needs_cmake
+def test_the_estimation_needs_no_sundials(tmp_path: Path) -> None:
+    said = configure(tmp_path, "-DTENDONFMU_PLANT=OFF")
+    if "Eigen" in said:
+        pytest.skip("SKIPPED: Eigen is not there")
+    assert "tendonfmu_estimation" in targets(tmp_path)
 
 
 @needs_cmake
