@@ -1,48 +1,34 @@
-"""All figures, and the only module that knows matplotlib. It computes nothing: what it draws comes ready-made.
-
-Colours are those of Okabe and Ito, which colour-blind readers tell apart.
-"""
+"""The figures of fingers, recordings and rigs. It computes nothing: what it draws comes ready-made."""
 
 from __future__ import annotations
 
-import warnings
-from pathlib import Path
-from typing import IO
-
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, FancyBboxPatch, Patch
-from matplotlib.text import Text
 
 from tendonfmu.drawing import DrawnTendon, FingerDrawing, Points
 from tendonfmu.figure_data import CompensationFigure, JointCurves, ReferenceCurves, ReferenceFigure, StoryFigure
 from tendonfmu.plant_figures import LoopFigure, PreslidingFigure, TruthFigure
+from tendonfmu.plot_style import (
+    BLUE,
+    DARK,
+    GREEN,
+    GREY,
+    LIGHT,
+    ORANGE,
+    PURPLE,
+    SKIN,
+    SKY,
+    VERMILION,
+    Target,
+    clean,
+    save,
+)
 from tendonfmu.rig_drawing import DrawnBody, DrawnRoute, RigDrawing, View
-from tendonfmu.whole_file import whole_file
 
-BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION = "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00"
-DARK, GREY, LIGHT, SKIN = "#222222", "#8A8A8A", "#D5D8DC", "#F4F1EC"
 EDGE_RED = "#CC1F1A"
 TENDON_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, "#5A5A5A", "#332288", "#999933")
-
-Target = Path | IO[bytes]
-
-
-def _save(figure: Figure, target: Target, dpi: int) -> None:
-    """PNG without a date or version in it: the same drawing, the same bytes. A file appears whole or not at all."""
-    FigureCanvasAgg(figure)
-    for text in figure.findobj(Text):
-        text.set_parse_math(False)  # a name may hold a $
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Glyph")  # letters that the font lacks are drawn as boxes
-        if isinstance(target, Path):
-            with whole_file(target) as partial:
-                figure.savefig(partial, format="png", dpi=dpi, facecolor="white", metadata={"Software": None})
-        else:
-            figure.savefig(target, format="png", dpi=dpi, facecolor="white", metadata={"Software": None})
-
 
 # --- routing of a finger ---------------------------------------------------------------------------------------------
 
@@ -64,7 +50,7 @@ def draw_finger(drawing: FingerDrawing, target: Target) -> None:
     for i, tendon in enumerate(drawing.tendons):
         _draw_tendon(axes, tendon, TENDON_COLOURS[i % len(TENDON_COLOURS)], drawing.left, size)
     _draw_finger_legend(axes, drawing, size)
-    _save(figure, target, 130)
+    save(figure, target, 130)
 
 
 def _draw_skeleton(axes: Axes, drawing: FingerDrawing, size: float) -> None:
@@ -162,7 +148,7 @@ def draw_story(data: StoryFigure, target: Target) -> None:
     panels[-1].set_xlabel("time (s)", fontsize=12)
     _draw_story_legend(figure, data.title)
     figure.align_ylabels(panels)
-    _save(figure, target, 100)
+    save(figure, target, 100)
 
 
 def _draw_story_legend(figure: Figure, title: str) -> None:
@@ -182,13 +168,6 @@ def _draw_story_legend(figure: Figure, title: str) -> None:
     legend.get_title().set(fontsize=17, color=DARK)
 
 
-def _clean(axes: Axes) -> None:
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(axis="y", color="#E6E6E6", linewidth=0.8)
-    axes.set_axisbelow(True)
-    axes.tick_params(labelsize=12)
-
-
 def _shade(axes: Axes, data: CompensationFigure) -> None:
     for found, colour in ((data.found, ORANGE), (data.unlabelled, PURPLE)):
         for begin, end in found:
@@ -196,7 +175,7 @@ def _shade(axes: Axes, data: CompensationFigure) -> None:
 
 
 def _draw_torques(axes: Axes, data: CompensationFigure, joint: JointCurves) -> None:
-    _clean(axes)
+    clean(axes)
     axes.plot(data.time, joint.measured, color=DARK, linewidth=1.1)
     axes.plot(data.time, joint.predicted, color=SKY, linewidth=1.4)
     axes.set_xlim(data.time[0], data.time[-1])
@@ -206,7 +185,7 @@ def _draw_torques(axes: Axes, data: CompensationFigure, joint: JointCurves) -> N
 
 
 def _draw_compensated(axes: Axes, data: CompensationFigure, joint: JointCurves) -> None:
-    _clean(axes)
+    clean(axes)
     _shade(axes, data)
     if joint.external is not None:
         axes.plot(data.time, joint.external, color=GREEN, linewidth=3.4, alpha=0.55)
@@ -247,11 +226,11 @@ def draw_reference(data: ReferenceFigure, target: Target) -> None:
     _draw_errors(figure.add_subplot(grid[:, 1]), data)
     figure.suptitle(data.title, fontsize=15, color=DARK)
     figure.align_ylabels(panels)
-    _save(figure, target, 100)
+    save(figure, target, 100)
 
 
 def _draw_against_sensor(axes: Axes, curves: ReferenceCurves) -> None:
-    _clean(axes)
+    clean(axes)
     axes.plot(curves.time, curves.measured, color=GREY, linewidth=0.9, label="measured torque, friction included")
     axes.plot(curves.time, curves.external, color=GREEN, linewidth=2.2, alpha=0.75, label="external torque (sensor)")
     axes.plot(curves.time, curves.compensated, color=BLUE, linewidth=1.1, label="compensated torque")
@@ -261,7 +240,7 @@ def _draw_against_sensor(axes: Axes, curves: ReferenceCurves) -> None:
 
 
 def _draw_errors(axes: Axes, data: ReferenceFigure) -> None:
-    _clean(axes)
+    clean(axes)
     for errors, shift, colour, label in (
         (data.error_without, -0.2, LIGHT, "without a friction model"),
         (data.error, 0.2, BLUE, "compensated"),
@@ -309,7 +288,7 @@ def draw_rig(drawing: RigDrawing, target: Target) -> None:
     for body in drawing.bodies:
         _draw_length(axes, body, 15.0)
     _draw_rig_legend(axes)
-    _save(figure, target, 100)
+    save(figure, target, 100)
 
 
 def _draw_body(axes: Axes, body: DrawnBody, middle: float) -> None:
@@ -389,7 +368,7 @@ def draw_loops(data: LoopFigure, target: Target) -> None:
     """Friction torque of one joint over its angle, the rig's and the friction model's, as PNG."""
     figure = Figure(figsize=(12.8, 6.4), layout="constrained")
     axes = figure.subplots()
-    _clean(axes)
+    clean(axes)
     for loop, colour in zip(data.loops, (BLUE, VERMILION), strict=False):
         axes.plot(loop.angle, 1e3 * loop.rig, color=colour, linewidth=1.8, label=f"rig, {loop.label}")
         axes.plot(loop.model_line[:, 0], 1e3 * loop.model_line[:, 1], color=DARK, linewidth=1.1, linestyle=(0, (4, 2)))
@@ -398,7 +377,7 @@ def draw_loops(data: LoopFigure, target: Target) -> None:
     axes.set_ylabel("friction torque (mN·m)", fontsize=13)
     axes.set_title(f"{data.joint}, slowly to and fro", loc="left", fontsize=14, fontweight="bold", color=DARK)
     axes.legend(loc="center", ncols=3, frameon=False, fontsize=13)
-    _save(figure, target, 100)
+    save(figure, target, 100)
 
 
 def draw_presliding(data: PreslidingFigure, target: Target) -> None:
@@ -425,14 +404,14 @@ def draw_presliding(data: PreslidingFigure, target: Target) -> None:
             "friction torque (mN·m)",
         ),
     ):
-        _clean(axes)
+        clean(axes)
         axes.set_title(title, loc="left", fontsize=14, fontweight="bold", color=DARK)
         axes.set_xlabel(way, fontsize=13)
         axes.set_ylabel(torque, fontsize=13)
     for axes in (turn, bent):
         axes.set_xlim(-0.8, 30.0)
         axes.legend(loc="upper right", bbox_to_anchor=(1.0, 0.95), frameon=False, fontsize=12.5)
-    _save(figure, target, 100)
+    save(figure, target, 100)
 
 
 def _draw_small_moves(axes: Axes, data: PreslidingFigure) -> None:
@@ -465,7 +444,7 @@ def draw_truth(data: TruthFigure, target: Target) -> None:
     figure = Figure(figsize=(12.8, 7.6), layout="constrained")
     panels = forces, angle, torque = figure.subplots(3, 1, sharex=True, height_ratios=[1.0, 0.7, 1.2])
     for axes, name in zip(panels, ("tendon force (N)", "angle (rad)", "torque (mN·m)"), strict=True):
-        _clean(axes)
+        clean(axes)
         axes.set_ylabel(name, fontsize=13)
         for begin, end in data.contacts:
             axes.axvspan(begin, end, color=ORANGE, alpha=0.18, linewidth=0)
@@ -483,4 +462,4 @@ def draw_truth(data: TruthFigure, target: Target) -> None:
     torque.set_xlabel("time (s)", fontsize=13)
     torque.set_xlim(data.time[0], data.time[-1])
     figure.align_ylabels(panels)
-    _save(figure, target, 100)
+    save(figure, target, 100)
