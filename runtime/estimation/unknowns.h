@@ -1,0 +1,73 @@
+/* What is estimated: unknowns, each one column, made of the numbers of the description.
+ *
+ * A side of a law becomes coulomb Fc, drop Fs − Fc, rate 1/vs and viscous Fv: every bound is then a box (Fs >= Fc >= 0,
+ * vs > vs_min), and 1/vs has no singularity (paper VII). Covers, extensions and the initial bias are taken as they are.
+ */
+#ifndef TENDONFMU_ESTIMATION_UNKNOWNS_H
+#define TENDONFMU_ESTIMATION_UNKNOWNS_H
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core_inside.h"
+
+extern "C" {
+#include "finger_memory.h"
+}
+
+namespace tendonfmu::estimation {
+
+enum class Role { coulomb, drop, rate, viscous, value };
+
+/* One unknown. */
+struct Unknown {
+  Role role;
+  std::vector<std::uint32_t> parameters; /* that it moves: of a drop the statics, of a tied coulomb both */
+  double start, lower, upper;
+  double scale;      /* expected magnitude: of the prior, and what makes the columns comparable */
+  std::size_t joint; /* the first that it turns, 0-based: it turns none before */
+  std::string path;  /* of its first parameter */
+};
+
+/* Columns of one side of a law: −1 where a number is fixed. */
+struct SideColumns {
+  std::array<std::int32_t, 4> column; /* coulomb, drop, rate, viscous */
+  bool static_follows;                /* the static friction moves with the coulomb friction */
+};
+
+class Unknowns {
+ public:
+  /* group [parameter_count]: −1 fixed, equal numbers share one value; nullptr: all that the structure has
+   * (contract section 7). scale [parameter_count]: expected magnitudes in the description's numbers, NaN or nullptr:
+   * from the start. Throws refused with one line. */
+  Unknowns(const tendonfmu_finger* finger, const std::int32_t* group, const double* scale);
+
+  std::size_t count() const { return list_.size(); }
+  const Unknown& operator[](std::size_t column) const { return list_[column]; }
+
+  /* unknowns [count] of the description's numbers [parameter_count] */
+  std::vector<double> read(const double* parameters) const;
+  /* the description's numbers for unknowns within their bounds; what is fixed is as in the image */
+  std::vector<double> write(const double* unknowns) const;
+
+  const SideColumns& side(std::uint32_t static_parameter) const { return sides_[static_parameter]; }
+  /* column of a parameter that enters as it is, −1 where fixed */
+  std::int32_t plain(std::uint32_t parameter) const { return plain_[parameter]; }
+  /* column of bias.initial_torque[j], −1 */
+  std::int32_t initial_torque(std::size_t joint) const {
+    return initial_first_ < 0 ? -1 : plain_[static_cast<std::size_t>(initial_first_) + joint];
+  }
+
+ private:
+  std::vector<Unknown> list_;
+  std::vector<SideColumns> sides_;
+  std::vector<std::int32_t> plain_;
+  std::vector<double> start_;
+  std::int64_t initial_first_ = -1;
+};
+
+}  // namespace tendonfmu::estimation
+
+#endif
