@@ -183,6 +183,24 @@ def test_pkg_config_of_the_simulated_finger(prefix: Path, consumer: Path, tmp_pa
     assert call(tmp_path / "program") == REFUSED
 
 
+def test_kernels_for_one_processor_share_no_function(prefix: Path) -> None:
+    """What they define weakly, the linker may give to sources for every processor."""
+    archive = prefix / "lib" / "libtendonfmu_estimation.a"
+    if not archive.exists() or shutil.which("nm") is None:
+        pytest.skip("SKIPPED: built without the estimation of parameters, or nm is not there")
+    symbols: dict[str, list[str]] = {}
+    for line in call("nm", archive).splitlines():
+        if line.endswith(":"):
+            member = symbols.setdefault(line[:-1], [])
+        elif line:
+            member.append(line.split()[-2])
+    kernels = [name for name in symbols if "_avx" in name]
+    assert kernels
+    assert {kind for name in kernels for kind in symbols[name]} & set("WwVvu") == set()
+    # the search finds what it looks for elsewhere
+    assert "W" in {kind for kinds in symbols.values() for kind in kinds}
+
+
 def test_installed_text_names_no_folder_of_the_build(prefix: Path) -> None:
     texts = [p for p in prefix.rglob("*") if p.is_file() and p.suffix in {".cmake", ".pc", ".h", ".hpp"}]
     assert len(texts) >= 7

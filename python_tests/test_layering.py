@@ -187,16 +187,17 @@ def test_every_estimation_file_is_in_the_list() -> None:
     assert files == listed
 
 
-def test_the_kernel_for_one_processor_shares_no_inline_function() -> None:
-    """Compiled for AVX2 alone: of an inline function in two sources the linker keeps one, for all processors."""
+def test_kernels_for_one_processor_share_no_inline_function() -> None:
+    """Of an inline function in two sources the linker keeps one, for all processors: none from another header.
+
+    test_installed_library.py looks at what the compiler made of them.
+    """
     folder = ROOT / "runtime" / "estimation"
-    found = {name for file in folder.glob("*_avx2.cpp") for _, name in includes_of(file)}
-    own = {file.name for file in folder.glob("*_avx2.h")} | {"symmetric_update.h"}
-    assert found <= {"immintrin.h", "cstddef", "stddef.h"} | own
-    for header in found & own:
-        text = (folder / header).read_text(encoding="utf-8")
-        assert {name for _, name in INCLUDE.findall(text)} <= {"cstddef", "stddef.h"}
-        assert not re.search(r"\b(inline|template|class)\b|^#include <(Eigen|vector)", text, re.MULTILINE), header
+    kernels = sorted(folder.glob("*_avx*.cpp"))
+    own = {file.name for file in folder.glob("symmetric_update*.h")}
+    assert len(kernels) >= 1
+    found = {name for file in (*kernels, *(folder / name for name in own)) for _, name in includes_of(file)}
+    assert found <= {"immintrin.h", "cstddef"} | own
 
 
 def test_core_and_fmu_do_without_the_estimation() -> None:
