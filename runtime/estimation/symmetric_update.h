@@ -1,0 +1,48 @@
+/* The two products that take nearly all the time of an estimation: a sum of outer products of rows, for the information
+ * matrix of the batch and the covariance of the filter, and rows times a symmetric matrix.
+ *
+ * A symmetric matrix of order p is its lower triangle in [p × p] numbers, column after column: (i, j), i >= j, stands
+ * at lower[j·p + i]. What stands above the diagonal is neither read nor written. Rows are row-major, [k × p] with
+ * `stride` >= p numbers from row to row.
+ *
+ * Deterministic: the order of summation depends on the sizes (and in multiply_symmetric on which columns are zero)
+ * alone. Any number of threads may call at once; nothing is allocated, up to 100 KiB of stack are used. */
+#ifndef TENDONFMU_SYMMETRIC_UPDATE_H
+#define TENDONFMU_SYMMETRIC_UPDATE_H
+
+#include <cstddef>
+
+namespace tendonfmu::estimation {
+
+/* lower += factor · rowsᵀ · rows */
+void add_outer_products(double* lower, std::size_t p, const double* rows, std::size_t k, std::size_t stride,
+                        double factor);
+
+/* product = rows · (the symmetric matrix), [k × p] with product_stride; columns that are zero in all rows cost nothing.
+ * The rows must not overlap with the product. */
+void multiply_symmetric(double* product, std::size_t product_stride, const double* lower, std::size_t p,
+                        const double* rows, std::size_t k, std::size_t stride);
+
+/* Which implementation the two calls take on this processor: "avx512", "avx2" or "portable". The first two round a
+ * product and its sum once and give the same bits; the portable one rounds twice. */
+const char* symmetric_update_name();
+
+/* One implementation; `name` NULL ends the list. For the dispatch, and for tests and measurements of each. */
+struct SymmetricUpdate {
+  const char* name;
+  void (*add_outer_products)(double*, std::size_t, const double*, std::size_t, std::size_t, double);
+  void (*multiply_symmetric)(double*, std::size_t, const double*, std::size_t, const double*, std::size_t, std::size_t);
+};
+
+/* Those that run on this processor, the fastest first; [4], the last one with name NULL. */
+const SymmetricUpdate* symmetric_updates();
+
+extern const SymmetricUpdate portable_symmetric_update;
+#if defined(TENDONFMU_ESTIMATION_AVX2)
+extern const SymmetricUpdate avx2_symmetric_update;
+extern const SymmetricUpdate avx512_symmetric_update;
+#endif
+
+}  // namespace tendonfmu::estimation
+
+#endif

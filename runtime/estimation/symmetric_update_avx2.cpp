@@ -1,0 +1,40 @@
+/* The products on AVX2 with fused multiply-add. CMake gives this one file the flags; symmetric_update.cpp sees to it
+ * that the code is only entered where it can run. */
+#include "symmetric_update.h"
+
+#if defined(TENDONFMU_ESTIMATION_AVX2)
+
+#include <immintrin.h>
+
+namespace tendonfmu::estimation {
+namespace {
+
+/* 12 sums, 3 factors and 1 spread number: all 16 registers */
+constexpr std::size_t LANES = 4, VECTORS = 3, COLUMNS = 4;
+using Vector = __m256d;
+
+inline __attribute__((always_inline)) Vector load(const double* from) {
+  return _mm256_loadu_pd(from);
+}
+inline __attribute__((always_inline)) void store(double* to, Vector v) {
+  _mm256_storeu_pd(to, v);
+}
+inline __attribute__((always_inline)) Vector spread(double x) {
+  return _mm256_set1_pd(x);
+}
+inline __attribute__((always_inline)) Vector multiply_add(Vector a, Vector b, Vector c) {
+  return _mm256_fmadd_pd(a, b, c);
+}
+
+}  // namespace
+}  // namespace tendonfmu::estimation
+
+#include "symmetric_update_kernel.h"
+
+namespace tendonfmu::estimation {
+
+const SymmetricUpdate avx2_symmetric_update = {"avx2", add_products, multiply_rows};
+
+}  // namespace tendonfmu::estimation
+
+#endif

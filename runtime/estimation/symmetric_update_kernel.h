@@ -1,0 +1,251 @@
+/* Both products of symmetric_update.h on vectors of any width. The source that includes this first defines, in its own
+ * unnamed namespace: Vector, LANES, load, store, spread (one number into all lanes), multiply_add(a, b, c) = a·b + c;
+ * and the size of a tile, VECTORS · LANES rows by COLUMNS columns, that fits into its registers.
+ *
+ * Everything here is in the unnamed namespace and uses no inline function of another header: compiled for different
+ * processors, no two copies of it may be taken for the same function. */
+#ifndef TENDONFMU_SYMMETRIC_UPDATE_KERNEL_H
+#define TENDONFMU_SYMMETRIC_UPDATE_KERNEL_H
+
+#include "symmetric_update.h"
+
+#if defined(_MSC_VER)
+#define ALWAYS_INLINE __forceinline
+#else
+#define ALWAYS_INLINE inline __attribute__((always_inline))
+#endif
+
+namespace tendonfmu::estimation {
+namespace {
+
+constexpr std::size_t TALL = VECTORS * LANES; /* rows of a tile */
+constexpr std::size_t STEPS = 128;            /* of the inner sum that are packed at once */
+constexpr std::size_t WIDE = 48;              /* columns of the result that are packed at once */
+static_assert(WIDE % TALL == 0 && WIDE % COLUMNS == 0, "tiles fill what is packed");
+
+constexpr std::ptrdiff_t EVERYTHING = -static_cast<std::ptrdiff_t>(COLUMNS); /* diagonal of a tile far below it */
+
+std::size_t least(std::size_t a, std::size_t b) {
+  return a < b ? a : b;
+}
+
+/* sum = Σ over the steps of left [steps × TALL] times right [steps × COLUMNS], both packed */
+ALWAYS_INLINE void multiply_tile(const double* left, const double* right, std::size_t steps,
+                                 Vector sum[COLUMNS][VECTORS]) {
+#pragma GCC unroll 8
+  for (std::size_t c = 0; c < COLUMNS; ++c) {
+#pragma GCC unroll 8
+    for (std::size_t v = 0; v < VECTORS; ++v) {
+      sum[c][v] = spread(0.0);
+    }
+  }
+  for (std::size_t s = 0; s < steps; ++s, left += TALL, right += COLUMNS) {
+    Vector tall[VECTORS];
+#pragma GCC unroll 8
+    for (std::size_t v = 0; v < VECTORS; ++v) {
+      tall[v] = load(left + v * LANES);
+    }
+#pragma GCC unroll 8
+    for (std::size_t c = 0; c < COLUMNS; ++c) {
+      const Vector one = spread(right[c]);
+#pragma GCC unroll 8
+      for (std::size_t v = 0; v < VECTORS; ++v) {
+        sum[c][v] = multiply_add(tall[v], one, sum[c][v]);
+      }
+    }
+  }
+}
+
+/* target += factor · tile, where it lies wholly within the target, column after column */
+void add_tile(const double* left, const double* right, std::size_t steps, double factor, double* target,
+              std::size_t stride) {
+  Vector sum[COLUMNS][VECTORS];
+  multiply_tile(left, right, steps, sum);
+  const Vector scale = spread(factor);
+#pragma GCC unroll 8
+  for (std::size_t c = 0; c < COLUMNS; ++c) {
+#pragma GCC unroll 8
+    for (std::size_t v = 0; v < VECTORS; ++v) {
+      double* at = target + c * stride + v * LANES;
+      store(at, multiply_add(sum[c][v], scale, load(at)));
+    }
+  }
+}
+
+/* The same for a tile at the edge: its first `tall` rows and `wide` columns, and of column c only from row diagonal + c
+ * on. The same bits as of add_tile(), so that an element does not depend on where the tiles begin. */
+void add_tile_edge(const double* left, const double* right, std::size_t steps, double factor, double* target,
+                   std::size_t stride, std::size_t tall, std::size_t wide, std::ptrdiff_t diagonal) {
+  Vector sum[COLUMNS][VECTORS];
+  multiply_tile(left, right, steps, sum);
+  const Vector scale = spread(factor);
+  for (std::size_t c = 0; c < wide; ++c) {
+    const std::ptrdiff_t row = diagonal + static_cast<std::ptrdiff_t>(c);
+    const std::size_t begin = row > 0 ? static_cast<std::size_t>(row) : 0;
+    double part[TALL] = {};
+    for (std::size_t r = begin; r < tall; ++r) {
+      part[r] = target[c * stride + r];
+    }
+    for (std::size_t v = 0; v < VECTORS; ++v) {
+      store(part + v * LANES, multiply_add(sum[c][v], scale, load(part + v * LANES)));
+    }
+    for (std::size_t r = begin; r < tall; ++r) {
+      target[c * stride + r] = part[r];
+    }
+  }
+}
+
+/* columns [first, first + width) of `steps` rows, side by side, FULL numbers a step: where width is less, then zeros */
+template <std::size_t FULL>
+void pack_rows(const double* rows, std::size_t stride, std::size_t steps, std::size_t first, std::size_t width,
+               double* packed) {
+  static_assert(FULL % LANES == 0, "whole vectors");
+  for (std::size_t s = 0; s < steps; ++s, packed += FULL) {
+    const double* row = rows + s * stride + first;
+    if (width == FULL) {
+#pragma GCC unroll 8
+      for (std::size_t i = 0; i < FULL; i += LANES) {
+        store(packed + i, load(row + i));
+      }
+      continue;
+    }
+    for (std::size_t i = 0; i < FULL; ++i) {
+      packed[i] = i < width ? row[i] : 0.0;
+    }
+  }
+}
+
+/* columns [first, first + WIDE) of the triangle, with the rows of one packing */
+void add_to_columns(double* lower, std::size_t p, std::size_t first, const double* rows, std::size_t steps,
+                    std::size_t stride, double factor) {
+  alignas(64) double right[WIDE * STEPS], left[TALL * STEPS];
+  const std::size_t end = least(first + WIDE, p);
+  for (std::size_t j = first; j < end; j += COLUMNS) {
+    pack_rows<COLUMNS>(rows, stride, steps, j, least(COLUMNS, p - j), right + (j - first) * steps);
+  }
+  for (std::size_t i = first; i < p; i += TALL) {
+    const std::size_t tall = least(TALL, p - i);
+    pack_rows<TALL>(rows, stride, steps, i, tall, left);
+    for (std::size_t j = first; j < least(end, i + tall); j += COLUMNS) {
+      const double* columns = right + (j - first) * steps;
+      double* target = lower + j * p + i;
+      if (tall == TALL && i >= j + COLUMNS - 1 && j + COLUMNS <= p) {
+        add_tile(left, columns, steps, factor, target, p);
+        continue;
+      }
+      add_tile_edge(left, columns, steps, factor, target, p, tall, least(COLUMNS, p - j),
+                    static_cast<std::ptrdiff_t>(j) - static_cast<std::ptrdiff_t>(i));
+    }
+  }
+}
+
+void add_products(double* lower, std::size_t p, const double* rows, std::size_t k, std::size_t stride, double factor) {
+  for (std::size_t done = 0; done < k; done += STEPS) {
+    for (std::size_t first = 0; first < p; first += WIDE) {
+      add_to_columns(lower, p, first, rows + done * stride, least(STEPS, k - done), stride, factor);
+    }
+  }
+}
+
+/* columns of the rows that are not zero, from `next` on, at most STEPS of them; `next` goes on */
+std::size_t used_columns(const double* rows, std::size_t k, std::size_t stride, std::size_t p, std::size_t* next,
+                         std::size_t used[STEPS]) {
+  std::size_t count = 0;
+  while (count < STEPS && *next < p) {
+    const std::size_t first = *next, width = least(LANES, p - first);
+    int nonzero[LANES] = {};
+    for (std::size_t r = 0; r < k; ++r) {
+      for (std::size_t i = 0; i < width; ++i) {
+        nonzero[i] |= rows[r * stride + first + i] != 0.0;
+      }
+    }
+    for (std::size_t i = 0; i < width && count < STEPS; ++i, ++*next) {
+      if (nonzero[i]) {
+        used[count++] = first + i;
+      }
+    }
+  }
+  return count;
+}
+
+/* the symmetric matrix at rows [first, first + tall) and the used columns, for multiply_tile; columns are increasing */
+void pack_symmetric(const double* lower, std::size_t p, std::size_t first, std::size_t tall, const std::size_t* used,
+                    std::size_t count, double* packed) {
+  for (std::size_t s = 0; s < count; ++s, packed += TALL) {
+    const std::size_t c = used[s];
+    const double* column = lower + c * p + first;
+    if (c <= first && tall == TALL) {
+#pragma GCC unroll 8
+      for (std::size_t v = 0; v < VECTORS; ++v) {
+        store(packed + v * LANES, load(column + v * LANES));
+      }
+      continue;
+    }
+    if (c >= first + TALL && tall == TALL) { /* beyond the diagonal: what stands in row c */
+      const double* row = lower + first * p + c;
+#pragma GCC unroll 32
+      for (std::size_t i = 0; i < TALL; ++i) {
+        packed[i] = row[i * p];
+      }
+      continue;
+    }
+    for (std::size_t i = 0; i < tall; ++i) {
+      packed[i] = first + i >= c ? column[i] : lower[(first + i) * p + c];
+    }
+    for (std::size_t i = tall; i < TALL; ++i) {
+      packed[i] = 0.0;
+    }
+  }
+}
+
+/* adds the part of the product that the used columns make, for at most WIDE rows */
+void add_used_columns(double* product, std::size_t product_stride, const double* lower, std::size_t p,
+                      const double* rows, std::size_t k, std::size_t stride, const std::size_t* used,
+                      std::size_t count) {
+  alignas(64) double right[WIDE * STEPS], left[TALL * STEPS];
+  for (std::size_t r = 0; r < k; r += COLUMNS) {
+    for (std::size_t s = 0; s < count; ++s) {
+      for (std::size_t c = 0; c < COLUMNS; ++c) {
+        right[r * count + s * COLUMNS + c] = r + c < k ? rows[(r + c) * stride + used[s]] : 0.0;
+      }
+    }
+  }
+  for (std::size_t i = 0; i < p; i += TALL) {
+    const std::size_t tall = least(TALL, p - i);
+    pack_symmetric(lower, p, i, tall, used, count, left);
+    for (std::size_t r = 0; r < k; r += COLUMNS) {
+      double* target = product + r * product_stride + i;
+      if (tall == TALL && r + COLUMNS <= k) {
+        add_tile(left, right + r * count, count, 1.0, target, product_stride);
+      } else {
+        add_tile_edge(left, right + r * count, count, 1.0, target, product_stride, tall, least(COLUMNS, k - r),
+                      EVERYTHING);
+      }
+    }
+  }
+}
+
+void multiply_rows(double* product, std::size_t product_stride, const double* lower, std::size_t p, const double* rows,
+                   std::size_t k, std::size_t stride) {
+  for (std::size_t done = 0; done < k; done += WIDE) {
+    const std::size_t some = least(WIDE, k - done);
+    double* target = product + done * product_stride;
+    const double* source = rows + done * stride;
+    for (std::size_t r = 0; r < some; ++r) {
+      for (std::size_t i = 0; i < p; ++i) {
+        target[r * product_stride + i] = 0.0;
+      }
+    }
+    std::size_t next = 0, used[STEPS];
+    while (const std::size_t count = used_columns(source, some, stride, p, &next, used)) {
+      add_used_columns(target, product_stride, lower, p, source, some, stride, used, count);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tendonfmu::estimation
+
+#undef ALWAYS_INLINE
+
+#endif

@@ -1,0 +1,183 @@
+// The products of symmetric_update.h against sums in long double, on every implementation that runs here.
+#include "symmetric_update.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <random>
+#include <string>
+#include <vector>
+
+namespace {
+
+using tendonfmu::estimation::SymmetricUpdate;
+
+// What nobody may read: it would be seen in every result it reached.
+const double untouched = std::nan("");
+
+std::vector<double> numbers(std::size_t count, unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  std::vector<double> all(count);
+  for (double& x : all) {
+    x = normal(random);
+  }
+  return all;
+}
+
+/* rows [k × p] with NaN between p and the stride */
+std::vector<double> some_rows(std::size_t k, std::size_t p, std::size_t stride, unsigned seed) {
+  std::vector<double> rows(k * stride, untouched);
+  const std::vector<double> values = numbers(k * p, seed);
+  for (std::size_t r = 0; r < k; ++r) {
+    std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(r * p), p,
+                rows.begin() + static_cast<std::ptrdiff_t>(r * stride));
+  }
+  return rows;
+}
+
+/* lower triangle with NaN above the diagonal */
+std::vector<double> some_triangle(std::size_t p, unsigned seed) {
+  std::vector<double> lower = numbers(p * p, seed);
+  for (std::size_t j = 0; j < p; ++j) {
+    std::fill_n(lower.begin() + static_cast<std::ptrdiff_t>(j * p), j, untouched);
+  }
+  return lower;
+}
+
+/* a sum of `count` products of size one, each rounded once or twice */
+double allowance(std::size_t count) {
+  return 1e-15 * static_cast<double>(count + 10);
+}
+
+struct Size {
+  std::size_t p, k, stride;
+};
+
+// below, at and beyond tiles (4, 12), packings (48 columns, 128 steps), and what an estimation has
+const Size sizes[] = {{1, 1, 1},       {3, 2, 5},      {4, 4, 4},     {5, 7, 5},     {12, 12, 12},
+                      {13, 129, 16},   {47, 3, 50},    {48, 48, 48},  {49, 128, 49}, {97, 130, 100},
+                      {145, 257, 145}, {200, 64, 208}, {251, 49, 251}};
+
+class SymmetricUpdateTest : public testing::TestWithParam<int> {
+ protected:
+  void SetUp() override {
+    kernel_ = tendonfmu::estimation::symmetric_updates() + GetParam();
+    if (!kernel_->name) {
+      GTEST_SKIP() << "this processor or build has no further implementation";
+    }
+  }
+  const SymmetricUpdate* kernel_ = nullptr;
+};
+
+TEST_P(SymmetricUpdateTest, AddsOuterProductsToTheLowerTriangleAlone) {
+  for (const auto& [p, k, stride] : sizes) {
+    const std::vector<double> rows = some_rows(k, p, stride, 1), before = some_triangle(p, 2);
+    std::vector<double> after = before;
+    kernel_->add_outer_products(after.data(), p, rows.data(), k, stride, -0.75);
+    for (std::size_t j = 0; j < p; ++j) {
+      for (std::size_t i = 0; i < p; ++i) {
+        if (i < j) {
+          ASSERT_TRUE(std::isnan(after[j * p + i])) << p << " " << i << " " << j;
+          continue;
+        }
+        long double expected = before[j * p + i];
+        for (std::size_t r = 0; r < k; ++r) {
+          expected -= 0.75L * rows[r * stride + i] * rows[r * stride + j];
+        }
+        ASSERT_NEAR(after[j * p + i], static_cast<double>(expected), allowance(k)) << p << " " << i << " " << j;
+      }
+    }
+  }
+}
+
+TEST_P(SymmetricUpdateTest, MultipliesByTheWholeSymmetricMatrix) {
+  for (const auto& [p, k, stride] : sizes) {
+    std::vector<double> rows = some_rows(k, p, stride, 3);
+    for (std::size_t i = 0; i < p; i += 3) {  // columns of zeros, as of parameters that do not matter at present
+      for (std::size_t r = 0; r < k; ++r) {
+        rows[r * stride + i] = 0.0;
+      }
+    }
+    const std::vector<double> lower = some_triangle(p, 4);
+    const std::size_t product_stride = p + 2;
+    std::vector<double> product(k * product_stride, untouched);
+    kernel_->multiply_symmetric(product.data(), product_stride, lower.data(), p, rows.data(), k, stride);
+    for (std::size_t r = 0; r < k; ++r) {
+      for (std::size_t i = 0; i < p; ++i) {
+        long double expected = 0.0L;
+        for (std::size_t c = 0; c < p; ++c) {
+          expected += static_cast<long double>(rows[r * stride + c]) * lower[std::min(i, c) * p + std::max(i, c)];
+        }
+        ASSERT_NEAR(product[r * product_stride + i], static_cast<double>(expected), allowance(p)) << p << " " << i;
+      }
+      ASSERT_TRUE(std::isnan(product[r * product_stride + p]));
+    }
+  }
+}
+
+TEST_P(SymmetricUpdateTest, GivesTheSameBitsForAPartAsForTheWhole) {
+  // an element's sum does not depend on the tile it falls into: unknowns that are left out change no other number
+  const std::size_t p = 61, k = 37;
+  const std::vector<double> rows = some_rows(k, p, p, 5);
+  std::vector<double> whole(p * p, 1.0);
+  kernel_->add_outer_products(whole.data(), p, rows.data(), k, p, 2.0);
+  for (std::size_t first = 1; first < 14; ++first) {
+    const std::size_t q = p - first;
+    std::vector<double> part(q * q, 1.0);
+    kernel_->add_outer_products(part.data(), q, rows.data() + first, k, p, 2.0);
+    for (std::size_t j = 0; j < q; ++j) {
+      const double* expected = whole.data() + (j + first) * p + j + first;
+      ASSERT_EQ(std::memcmp(part.data() + j * q + j, expected, (q - j) * sizeof(double)), 0) << first << " " << j;
+    }
+  }
+}
+
+TEST_P(SymmetricUpdateTest, DoesNothingForNoRowsAndZeroRows) {
+  std::vector<double> lower = some_triangle(5, 6), product(10, untouched);
+  const std::vector<double> before = lower, zeros(10, 0.0);
+  kernel_->add_outer_products(lower.data(), 5, zeros.data(), 0, 5, 1.0);
+  EXPECT_EQ(std::memcmp(lower.data(), before.data(), sizeof(double) * lower.size()), 0);
+  kernel_->multiply_symmetric(product.data(), 5, lower.data(), 5, zeros.data(), 2, 5);
+  for (const double x : product) {
+    EXPECT_EQ(x, 0.0);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Kernels, SymmetricUpdateTest, testing::Values(0, 1, 2));
+
+TEST(SymmetricUpdate, GivesTheSameBitsOnAvx2AndAvx512) {
+  const SymmetricUpdate* list = tendonfmu::estimation::symmetric_updates();
+  if (std::string(list[0].name) != "avx512") {
+    GTEST_SKIP() << "no AVX-512 here";
+  }
+  const std::size_t p = 83, k = 131;
+  const std::vector<double> rows = some_rows(k, p, p, 7), before = some_triangle(p, 8);
+  std::vector<double> lower[2], product[2];
+  for (int i = 0; i < 2; ++i) {
+    lower[i] = before;
+    product[i].resize(k * p);
+    list[i].add_outer_products(lower[i].data(), p, rows.data(), k, p, -0.3);
+    list[i].multiply_symmetric(product[i].data(), p, lower[i].data(), p, rows.data(), k, p);
+  }
+  EXPECT_EQ(std::memcmp(lower[0].data(), lower[1].data(), sizeof(double) * p * p), 0);
+  EXPECT_EQ(std::memcmp(product[0].data(), product[1].data(), sizeof(double) * k * p), 0);
+}
+
+TEST(SymmetricUpdate, TakesTheFastestFirstAndEndsWithThePortable) {
+  const SymmetricUpdate* list = tendonfmu::estimation::symmetric_updates();
+  std::size_t last = 0;
+  while (list[last + 1].name) {
+    ++last;
+  }
+  EXPECT_STREQ(list[last].name, "portable");
+  EXPECT_STREQ(list[0].name, tendonfmu::estimation::symmetric_update_name());
+#if defined(TENDONFMU_ESTIMATION_AVX2)
+  const bool avx512 = __builtin_cpu_supports("avx512f"), avx2 = __builtin_cpu_supports("avx2");
+  EXPECT_STREQ(list[0].name, avx512 ? "avx512" : avx2 && __builtin_cpu_supports("fma") ? "avx2" : "portable");
+#endif
+}
+
+}  // namespace
