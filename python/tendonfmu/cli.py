@@ -200,21 +200,34 @@ def simulate(
 
 @app.command()
 def convert(
-    source: Annotated[str, typer.Argument(metavar="FORMAT", help="davinci")],
+    source: Annotated[str, typer.Argument(metavar="FORMAT", help="davinci or emps")],
     file: Annotated[Path, typer.Argument(metavar="FILE", help="third-party recording")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="REC.csv", help="recording, .csv or .parquet")],
     radius: Annotated[
-        float, typer.Option(min=1e-6, max=1.0, help="m; of the pulley on which the recorded torque acts")
-    ] = 0.005,
+        float | None,
+        typer.Option(
+            min=1e-6, max=1.0, help="m; davinci: of the pulley on which the recorded torque acts \\[default: 0.005]"
+        ),
+    ] = None,
+    mass: Annotated[
+        float | None,
+        typer.Option(
+            min=0.0, max=1e6, help="kg; emps: moved mass, its inertial force is known load \\[default: 95.1089]"
+        ),
+    ] = None,
+    decimation: Annotated[
+        int | None, typer.Option(min=1, max=1000, help="emps: keep one sample in so many, smoothed \\[default: 10]")
+    ] = None,
 ) -> None:
     """Turn a third-party recording into one of ours."""
-    from tendonfmu.converters import converter
+    from tendonfmu.converters import convert_file
     from tendonfmu.tables import check_format, write_table
     from tendonfmu.whole_file import check_output
 
     check_format(output)
     check_output(output, file)
-    table = converter(source)(file, radius)
+    given = {"radius": radius, "mass": mass, "decimation": decimation}
+    table = convert_file(source, file, {name: value for name, value in given.items() if value is not None})
     write_table(output, table)
     _say(f"{output}: {len(table['time'])} samples, {table['time'][-1] - table['time'][0]:.3f} s")
 

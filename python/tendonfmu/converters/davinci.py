@@ -31,9 +31,10 @@ COLUMNS = 10
 SPINDLE_COUNTS = 8192  # a turn
 JAW_COUNTS = 4000  # a turn
 TORQUE = 0.000039811  # N.m a count
+RADIUS = 0.005  # m; sets the scale of force and position, no torque depends on it
 
 
-def convert(file: Path, radius: float) -> dict[str, NDArray[Any]]:
+def convert(file: Path, radius: float = RADIUS) -> dict[str, NDArray[Any]]:
     """Columns of the recording, radius in m. Raises InputError naming row and column."""
     rows = _read(file)
     spindle = -rows[:, 1] * (2 * math.pi / SPINDLE_COUNTS)
