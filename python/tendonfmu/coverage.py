@@ -72,16 +72,24 @@ def durations(time: Numbers) -> Numbers:
 
 def effect_coverage(data: Mapping[str, Any], motion: Excitation) -> list[EffectCoverage]:
     """Of every effect of a finger description."""
-    share = durations(motion.time)
-    return [_cover(data, effect, motion, share) for effect in effects(data)]
+    return coverage_of(data, motion.joint_position, motion.joint_velocity, durations(motion.time))
 
 
-def _cover(data: Mapping[str, Any], effect: Effect, motion: Excitation, share: Numbers) -> EffectCoverage:
-    velocity = sliding_velocity(data, effect, motion.joint_velocity)
+def coverage_of(
+    data: Mapping[str, Any], joint_position: Numbers, joint_velocity: Numbers, share: Numbers
+) -> list[EffectCoverage]:
+    """The same of samples in any order. joint_position, joint_velocity: [N, n]. share: [N] s each stands for."""
+    return [_cover(data, effect, joint_position, joint_velocity, share) for effect in effects(data)]
+
+
+def _cover(
+    data: Mapping[str, Any], effect: Effect, joint_position: Numbers, joint_velocity: Numbers, share: Numbers
+) -> EffectCoverage:
+    velocity = sliding_velocity(data, effect, joint_velocity)
     threshold = velocity_threshold(data, effect)
     sides = (velocity > threshold, velocity < -threshold)
     masks = np.column_stack([*sides, ~(sides[0] | sides[1])]) * share[:, None]
-    points = working_point_weights(effect, motion.joint_position).T @ masks
+    points = working_point_weights(effect, joint_position).T @ masks
     speed = np.abs(velocity)
     return EffectCoverage(
         effect=effect,

@@ -70,24 +70,33 @@ def judge(numbers: Sequence[Unknown], information: Numbers, coverage: Sequence[E
     covariance = np.linalg.inv(known)
     error = np.sqrt(np.diag(covariance))
     alone = 1 / np.sqrt(np.diag(known))
-    correlation = covariance / np.outer(error, error)
+    verdicts = explain(numbers, error, alone, covariance / np.outer(error, error), coverage)
+    directions = int(np.sum(np.linalg.eigvalsh(information) > 1 / LIMIT**2))
+    return Judgement(verdicts, directions, _combinations(numbers, known, alone))
+
+
+def explain(
+    numbers: Sequence[Unknown], error: Numbers, alone: Numbers, correlation: Numbers, coverage: Sequence[EffectCoverage]
+) -> list[Verdict]:
+    """A verdict on each number. error, alone: [p] relative standard errors, of all numbers together and with all others
+    known. correlation: [p, p] of the errors.
+    """
     by_path = {cover.effect.path: cover for cover in coverage}
     verdicts = []
     for k, number in enumerate(numbers):
         cause, reason, partners = "", "", []
-        if error[k] > LIMIT:
+        if not error[k] <= LIMIT:
             cover = by_path[number.effect.path] if number.effect is not None else None
             cause, reason = _cause(number, cover, float(alone[k]))
             if cause == "combination":
                 partners = _partners(k, correlation[k], numbers)
                 reason += ", ".join(partners)
         verdicts.append(Verdict(number, float(error[k]), float(alone[k]), cause, reason, partners))
-    directions = int(np.sum(np.linalg.eigvalsh(information) > 1 / LIMIT**2))
-    return Judgement(verdicts, directions, _combinations(numbers, known, alone))
+    return verdicts
 
 
 def _cause(number: Unknown, cover: EffectCoverage | None, alone: float) -> tuple[str, str]:
-    found = _unvisited(number, cover) if cover is not None else None
+    found = unvisited(number, cover) if cover is not None else None
     if found is not None:
         return found
     if alone > LIMIT:
@@ -96,8 +105,8 @@ def _cause(number: Unknown, cover: EffectCoverage | None, alone: float) -> tuple
     return "combination", "only in combination with "
 
 
-def _unvisited(number: Unknown, cover: EffectCoverage) -> tuple[str, str] | None:
-    """What the motion never does, as the cause."""
+def unvisited(number: Unknown, cover: EffectCoverage) -> tuple[str, str] | None:
+    """(cause, reason) where it is the motion that never does what shows the number."""
     part = number.path.split(".")[-2]
     sides = [part] if part in ("positive", "negative") else ["positive", "negative"]
     time = sum(getattr(cover.times, side) for side in sides)
