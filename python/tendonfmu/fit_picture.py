@@ -81,3 +81,13 @@ class FitPicture:
     z: Numbers
     covariance: Numbers
     series: Sequence[FitSeries]
+
+    @property
+    def joint_names(self) -> list[str]:
+        """[n] names, `joint 2` where there is none."""
+        return [joint.get("name") or f"joint {j}" for j, joint in enumerate(self.fitted["joints"], start=1)]
+
+    @property
+    def tendon_names(self) -> list[str]:
+        """[m] names, `tendon 2` where there is none."""
+        return [tendon.get("name") or f"tendon {i}" for i, tendon in enumerate(self.fitted["tendons"], start=1)]
