@@ -43,4 +43,16 @@ void multiply_symmetric(double* product, std::size_t product_stride, const doubl
   symmetric_updates()->multiply_symmetric(product, product_stride, lower, p, rows, k, stride);
 }
 
+void add_weighted_rows(double* target, std::size_t target_stride, std::size_t a, const double* weights,
+                       std::size_t weight_stride, const double* rows, std::size_t k, std::size_t stride, std::size_t p,
+                       double factor) {
+  symmetric_updates()->add_weighted_rows(target, target_stride, a, weights, weight_stride, rows, k, stride, p, factor);
+}
+
+void multiply_transposed(double* product, std::size_t product_stride, const double* left, std::size_t a,
+                         std::size_t left_stride, const double* right, std::size_t b, std::size_t right_stride,
+                         std::size_t p) {
+  symmetric_updates()->multiply_transposed(product, product_stride, left, a, left_stride, right, b, right_stride, p);
+}
+
 }  // namespace tendonfmu::estimation

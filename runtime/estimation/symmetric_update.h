@@ -1,5 +1,5 @@
-/* The two products that take nearly all the time of an estimation: a sum of outer products of rows, for the information
- * matrix of the batch and the covariance of the filter, and rows times a symmetric matrix.
+/* The products that take nearly all the time of an estimation: a sum of outer products of rows, for the information
+ * matrix of the batch and the covariance of the filter, rows times a symmetric matrix, and rows among themselves.
  *
  * A symmetric matrix of order p is its lower triangle in [p × p] numbers, column after column: (i, j), i >= j, stands
  * at lower[j·p + i]. What stands above the diagonal is neither read nor written. Rows are row-major, [k × p] with
@@ -23,15 +23,27 @@ void add_outer_products(double* lower, std::size_t p, const double* rows, std::s
 void multiply_symmetric(double* product, std::size_t product_stride, const double* lower, std::size_t p,
                         const double* rows, std::size_t k, std::size_t stride);
 
-/* Which implementation the two calls take on this processor: "avx512", "avx2" or "portable". The first two round a
- * product and its sum once and give the same bits; the portable one rounds twice. */
+/* target [a × p] += factor · weights [a × k] · rows [k × p] */
+void add_weighted_rows(double* target, std::size_t target_stride, std::size_t a, const double* weights,
+                       std::size_t weight_stride, const double* rows, std::size_t k, std::size_t stride, std::size_t p,
+                       double factor);
+
+/* product [a × b] = left [a × p] · (right [b × p])ᵀ; columns that are zero in all of left cost nothing */
+void multiply_transposed(double* product, std::size_t product_stride, const double* left, std::size_t a,
+                         std::size_t left_stride, const double* right, std::size_t b, std::size_t right_stride,
+                         std::size_t p);
+
+/* Which implementation the calls take on this processor: "avx512", "avx2" or "portable". The first two round a product
+ * and its sum once and give the same bits; the portable one rounds twice. */
 const char* symmetric_update_name();
 
 /* One implementation; `name` NULL ends the list. For the dispatch, and for tests and measurements of each. */
 struct SymmetricUpdate {
   const char* name;
-  void (*add_outer_products)(double*, std::size_t, const double*, std::size_t, std::size_t, double);
-  void (*multiply_symmetric)(double*, std::size_t, const double*, std::size_t, const double*, std::size_t, std::size_t);
+  decltype(&tendonfmu::estimation::add_outer_products) add_outer_products;
+  decltype(&tendonfmu::estimation::multiply_symmetric) multiply_symmetric;
+  decltype(&tendonfmu::estimation::add_weighted_rows) add_weighted_rows;
+  decltype(&tendonfmu::estimation::multiply_transposed) multiply_transposed;
 };
 
 /* Those that run on this processor, the fastest first; [4], the last one with name NULL. */

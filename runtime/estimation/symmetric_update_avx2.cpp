@@ -33,7 +33,7 @@ inline __attribute__((always_inline)) Vector multiply_add(Vector a, Vector b, Ve
 
 namespace tendonfmu::estimation {
 
-const SymmetricUpdate avx2_symmetric_update = {"avx2", add_products, multiply_rows};
+const SymmetricUpdate avx2_symmetric_update = {"avx2", add_products, multiply_rows, mix_rows, multiply_by_rows};
 
 }  // namespace tendonfmu::estimation
 

@@ -34,7 +34,7 @@ inline __attribute__((always_inline)) Vector multiply_add(Vector a, Vector b, Ve
 
 namespace tendonfmu::estimation {
 
-const SymmetricUpdate avx512_symmetric_update = {"avx512", add_products, multiply_rows};
+const SymmetricUpdate avx512_symmetric_update = {"avx512", add_products, multiply_rows, mix_rows, multiply_by_rows};
 
 }  // namespace tendonfmu::estimation
 

@@ -1,4 +1,4 @@
-/* Both products of symmetric_update.h on vectors of any width. The source that includes this first defines, in its own
+/* The products of symmetric_update.h on vectors of any width. The source that includes this first defines, in its own
  * unnamed namespace: Vector, LANES, load, store, spread (one number into all lanes), multiply_add(a, b, c) = a·b + c;
  * and the size of a tile, VECTORS · LANES rows by COLUMNS columns, that fits into its registers.
  *
@@ -147,6 +147,31 @@ void add_products(double* lower, std::size_t p, const double* rows, std::size_t 
   }
 }
 
+/* `full` of the rows from `first` on, one number of each a step, from the used columns (nullptr: all); beyond `end`
+ * zeros */
+void pack_columns(const double* rows, std::size_t stride, std::size_t first, std::size_t end, std::size_t full,
+                  const std::size_t* used, std::size_t count, double* packed) {
+  for (std::size_t s = 0; s < count; ++s, packed += full) {
+    for (std::size_t r = 0; r < full; ++r) {
+      packed[r] = first + r < end ? rows[(first + r) * stride + (used ? used[s] : s)] : 0.0;
+    }
+  }
+}
+
+/* target += factor · left · right, packed both: `tall` rows of at most WIDE columns */
+void add_rectangle(double* target, std::size_t stride, std::size_t wide, const double* left, std::size_t tall,
+                   const double* right, std::size_t steps, double factor) {
+  for (std::size_t c = 0; c < wide; c += COLUMNS) {
+    const double* columns = right + c * steps;
+    if (tall == TALL && c + COLUMNS <= wide) {
+      add_tile(left, columns, steps, factor, target + c * stride, stride);
+    } else {
+      add_tile_edge(left, columns, steps, factor, target + c * stride, stride, tall, least(COLUMNS, wide - c),
+                    EVERYTHING);
+    }
+  }
+}
+
 /* columns of the rows that are not zero, from `next` on, at most STEPS of them; `next` goes on */
 std::size_t used_columns(const double* rows, std::size_t k, std::size_t stride, std::size_t p, std::size_t* next,
                          std::size_t used[STEPS]) {
@@ -204,23 +229,19 @@ void add_used_columns(double* product, std::size_t product_stride, const double*
                       std::size_t count) {
   alignas(64) double right[WIDE * STEPS], left[TALL * STEPS];
   for (std::size_t r = 0; r < k; r += COLUMNS) {
-    for (std::size_t s = 0; s < count; ++s) {
-      for (std::size_t c = 0; c < COLUMNS; ++c) {
-        right[r * count + s * COLUMNS + c] = r + c < k ? rows[(r + c) * stride + used[s]] : 0.0;
-      }
-    }
+    pack_columns(rows, stride, r, k, COLUMNS, used, count, right + r * count);
   }
   for (std::size_t i = 0; i < p; i += TALL) {
     const std::size_t tall = least(TALL, p - i);
     pack_symmetric(lower, p, i, tall, used, count, left);
-    for (std::size_t r = 0; r < k; r += COLUMNS) {
-      double* target = product + r * product_stride + i;
-      if (tall == TALL && r + COLUMNS <= k) {
-        add_tile(left, right + r * count, count, 1.0, target, product_stride);
-      } else {
-        add_tile_edge(left, right + r * count, count, 1.0, target, product_stride, tall, least(COLUMNS, k - r),
-                      EVERYTHING);
-      }
+    add_rectangle(product + i, product_stride, k, left, tall, right, count, 1.0);
+  }
+}
+
+void clear(double* target, std::size_t stride, std::size_t rows, std::size_t width) {
+  for (std::size_t r = 0; r < rows; ++r) {
+    for (std::size_t i = 0; i < width; ++i) {
+      target[r * stride + i] = 0.0;
     }
   }
 }
@@ -231,14 +252,59 @@ void multiply_rows(double* product, std::size_t product_stride, const double* lo
     const std::size_t some = least(WIDE, k - done);
     double* target = product + done * product_stride;
     const double* source = rows + done * stride;
-    for (std::size_t r = 0; r < some; ++r) {
-      for (std::size_t i = 0; i < p; ++i) {
-        target[r * product_stride + i] = 0.0;
-      }
-    }
+    clear(target, product_stride, some, p);
     std::size_t next = 0, used[STEPS];
     while (const std::size_t count = used_columns(source, some, stride, p, &next, used)) {
       add_used_columns(target, product_stride, lower, p, source, some, stride, used, count);
+    }
+  }
+}
+
+/* at most WIDE rows of the target, with at most STEPS of the rows */
+void add_mixed(double* target, std::size_t target_stride, std::size_t a, const double* weights,
+               std::size_t weight_stride, const double* rows, std::size_t steps, std::size_t stride, std::size_t p,
+               double factor) {
+  alignas(64) double right[WIDE * STEPS], left[TALL * STEPS];
+  for (std::size_t r = 0; r < a; r += COLUMNS) {
+    pack_columns(weights, weight_stride, r, a, COLUMNS, nullptr, steps, right + r * steps);
+  }
+  for (std::size_t i = 0; i < p; i += TALL) {
+    const std::size_t tall = least(TALL, p - i);
+    pack_rows<TALL>(rows, stride, steps, i, tall, left);
+    add_rectangle(target + i, target_stride, a, left, tall, right, steps, factor);
+  }
+}
+
+void mix_rows(double* target, std::size_t target_stride, std::size_t a, const double* weights,
+              std::size_t weight_stride, const double* rows, std::size_t k, std::size_t stride, std::size_t p,
+              double factor) {
+  for (std::size_t first = 0; first < a; first += WIDE) {
+    for (std::size_t done = 0; done < k; done += STEPS) {
+      add_mixed(target + first * target_stride, target_stride, least(WIDE, a - first),
+                weights + first * weight_stride + done, weight_stride, rows + done * stride, least(STEPS, k - done),
+                stride, p, factor);
+    }
+  }
+}
+
+void multiply_by_rows(double* product, std::size_t product_stride, const double* left, std::size_t a,
+                      std::size_t left_stride, const double* right, std::size_t b, std::size_t right_stride,
+                      std::size_t p) {
+  alignas(64) double columns[WIDE * STEPS], packed[TALL * STEPS];
+  clear(product, product_stride, a, b);
+  for (std::size_t first = 0; first < a; first += WIDE) {
+    const double* some = left + first * left_stride;
+    const std::size_t wide = least(WIDE, a - first);
+    std::size_t next = 0, used[STEPS];
+    while (const std::size_t count = used_columns(some, wide, left_stride, p, &next, used)) {
+      for (std::size_t r = 0; r < wide; r += COLUMNS) {
+        pack_columns(some, left_stride, r, wide, COLUMNS, used, count, columns + r * count);
+      }
+      for (std::size_t i = 0; i < b; i += TALL) {
+        pack_columns(right, right_stride, i, b, TALL, used, count, packed);
+        add_rectangle(product + first * product_stride + i, product_stride, wide, packed, least(TALL, b - i), columns,
+                      count, 1.0);
+      }
     }
   }
 }

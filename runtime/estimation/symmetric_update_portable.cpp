@@ -52,6 +52,6 @@ Vector multiply_add(Vector a, Vector b, Vector c) {
 
 namespace tendonfmu::estimation {
 
-const SymmetricUpdate portable_symmetric_update = {"portable", add_products, multiply_rows};
+const SymmetricUpdate portable_symmetric_update = {"portable", add_products, multiply_rows, mix_rows, multiply_by_rows};
 
 }  // namespace tendonfmu::estimation

@@ -118,6 +118,50 @@ TEST_P(SymmetricUpdateTest, MultipliesByTheWholeSymmetricMatrix) {
   }
 }
 
+TEST_P(SymmetricUpdateTest, AddsWeightedRows) {
+  for (const auto& [p, k, stride] : sizes) {
+    for (const std::size_t a : {std::size_t{1}, std::size_t{7}, std::size_t{50}}) {
+      const std::vector<double> rows = some_rows(k, p, stride, 9), weights = some_rows(a, k, k + 1, 10);
+      const std::vector<double> before = some_rows(a, p, p + 3, 11);
+      std::vector<double> after = before;
+      kernel_->add_weighted_rows(after.data(), p + 3, a, weights.data(), k + 1, rows.data(), k, stride, p, -2.0);
+      for (std::size_t r = 0; r < a; ++r) {
+        for (std::size_t i = 0; i < p; ++i) {
+          long double expected = before[r * (p + 3) + i];
+          for (std::size_t s = 0; s < k; ++s) {
+            expected -= 2.0L * weights[r * (k + 1) + s] * rows[s * stride + i];
+          }
+          ASSERT_NEAR(after[r * (p + 3) + i], static_cast<double>(expected), allowance(k)) << p << " " << a;
+        }
+        ASSERT_TRUE(std::isnan(after[r * (p + 3) + p]));
+      }
+    }
+  }
+}
+
+TEST_P(SymmetricUpdateTest, MultipliesRowsByRows) {
+  for (const auto& [p, k, stride] : sizes) {
+    const std::size_t a = std::min<std::size_t>(k, 61);
+    std::vector<double> left = some_rows(a, p, stride, 12);
+    for (std::size_t r = 0; r < a; ++r) {
+      left[r * stride + p / 2] = 0.0;
+    }
+    const std::vector<double> right = some_rows(k, p, p, 13);
+    std::vector<double> product(a * (k + 1), untouched);
+    kernel_->multiply_transposed(product.data(), k + 1, left.data(), a, stride, right.data(), k, p, p);
+    for (std::size_t r = 0; r < a; ++r) {
+      for (std::size_t s = 0; s < k; ++s) {
+        long double expected = 0.0L;
+        for (std::size_t i = 0; i < p; ++i) {
+          expected += static_cast<long double>(left[r * stride + i]) * right[s * p + i];
+        }
+        ASSERT_NEAR(product[r * (k + 1) + s], static_cast<double>(expected), allowance(p)) << p << " " << r << " " << s;
+      }
+      ASSERT_TRUE(std::isnan(product[r * (k + 1) + k]));
+    }
+  }
+}
+
 TEST_P(SymmetricUpdateTest, GivesTheSameBitsForAPartAsForTheWhole) {
   // an element's sum does not depend on the tile it falls into: unknowns that are left out change no other number
   const std::size_t p = 61, k = 37;
