@@ -25,6 +25,7 @@ from tendonfmu.excite import as_array, find_pretensions, find_ranges, read_subje
 from tendonfmu.identifiability import unknowns
 from tendonfmu.quintic import evaluate
 from tendonfmu.tables import read_table
+from tendonfmu.tension_plan import Variation
 
 
 @pytest.fixture(scope="module")
@@ -226,6 +227,76 @@ def test_balanced_forces_carry_the_friction() -> None:
     assert np.abs(torque).max() > 0.02
 
 
+# --- tensions that vary -----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def varied() -> Excitation:
+    """400 s of the index finger, at 20 rows per second."""
+    return plan_excitation(INDEX_DATA, Plan(INDEX_RANGES, rate=20, vary=Variation(5.0, 30.0, 10.0)))
+
+
+def test_varied_tensions_hold_themselves_within_their_limits(varied: Excitation) -> None:
+    np.testing.assert_allclose(varied.tension @ moment_arms(INDEX_DATA), 0, atol=1e-12)
+    assert varied.tension.min() >= 5.0 - 1e-9 and varied.tension.max() <= 30.0 + 1e-9
+    assert (varied.tension.min(axis=0) < 6.5).all() and (varied.tension.max(axis=0) > 24.0).all()
+    np.testing.assert_allclose(varied.pretension, varied.tension.mean(axis=1))
+    stretch = varied.tendon_position - varied.joint_position @ moment_arms(INDEX_DATA).T
+    stiffness = [tendon["stiffness"] for tendon in INDEX_DATA["tendons"]]
+    np.testing.assert_allclose(stretch * stiffness, varied.tension, rtol=1e-9)
+
+
+def test_varied_tensions_change_in_every_way_there_is(varied: Excitation) -> None:
+    """8 tendons, 4 joints: 4 ways, none of them faint; a tendon is tight while another one is loose."""
+    ways = np.linalg.svd(varied.tension - varied.tension.mean(axis=0), compute_uv=False)
+    assert ways[3] > 0.2 * ways[0] and ways[4] < 1e-9 * ways[0]
+    together = np.corrcoef(varied.tension.T)[np.ix_((0, 1, 4, 6), (0, 1, 4, 6))]  # one of each pair of antagonists
+    assert np.abs(together - np.eye(4)).max() < 0.5
+
+
+def test_varied_tensions_stand_and_change_in_turn(varied: Excitation) -> None:
+    phase = np.mod(varied.time[1:], 10.0)
+    step = np.abs(np.diff(varied.tension, axis=0)).max(axis=1)
+    assert step[(phase > 1.6) | (varied.time[1:] < 10.0)].max() < 1e-9
+    assert step.max() < 25.0 * 15 / 8 / 1.5 / 20 * (1 + 1e-9)  # the fastest of a quintic of 1.5 s
+    moving = np.abs(varied.joint_velocity[1:][step > 1e-3]).max(axis=1)
+    assert np.mean(moving > 0.01) > 0.9
+
+
+def test_varied_tensions_leave_the_strokes_as_they_are(varied: Excitation) -> None:
+    plain = plan_excitation(INDEX_DATA, Plan(INDEX_RANGES, rate=20))
+    np.testing.assert_array_equal(plain.joint_position, varied.joint_position)
+    again = plan_excitation(INDEX_DATA, Plan(INDEX_RANGES, rate=20, vary=Variation(5.0, 30.0), seed=1))
+    assert np.abs(again.tension - varied.tension).max() > 10.0
+
+
+def test_cable_loops_pull_and_push() -> None:
+    data = copy.deepcopy(SMALL)
+    data["tendons"] = [{**tendon, "bidirectional": True} for tendon in data["tendons"]]
+    tension = plan_excitation(data, Plan(SMALL_RANGES, duration=60, vary=Variation(2.0, 20.0, 5.0))).tension
+    assert tension.min() < -10.0 and np.abs(tension).max() <= 20.0 + 1e-9
+    np.testing.assert_allclose(tension @ moment_arms(data), 0, atol=1e-12)
+
+
+def test_varied_tensions_that_cannot_be_are_refused() -> None:
+    tight = Plan(SMALL_RANGES, duration=20, vary=Variation(10.0, 11.0))
+    with pytest.raises(InputError, match=r"--vary-tension 10:11: no pretension .*HIGH at least 2 times LOW"):
+        plan_excitation(SMALL, tight)
+    data = {**SMALL, "tendons": [{**tendon, "bidirectional": True} for tendon in SMALL["tendons"][:2]]}
+    with pytest.raises(InputError, match="2 tendons at 2 joints hold no tension; expected more tendons than joints"):
+        plan_excitation(data, tight)
+
+
+def test_faster_joints_need_more_acceleration() -> None:
+    slow, fast = (
+        plan_excitation(SMALL, Plan(SMALL_RANGES, duration=60, max_speed=3.0, max_acceleration=limit))
+        for limit in (10.0, 20.0)
+    )
+    for motion, limit in ((slow, 10.0), (fast, 20.0)):
+        assert 0.7 * limit < np.abs(motion.joint_acceleration).max() <= limit * (1 + 1e-9)
+    assert (np.abs(fast.joint_velocity).max(axis=0) > 1.2 * np.abs(slow.joint_velocity).max(axis=0)).all()
+
+
 # --- what it says -----------------------------------------------------------------------------------------------------
 
 
@@ -306,6 +377,24 @@ def test_command(small_file: Path, tmp_path: Path) -> None:
     assert f"{written['identifiable']} of {written['numbers']} numbers" in done.stdout
 
 
+def test_command_with_varied_tensions(small_file: Path, tmp_path: Path) -> None:
+    out, found = tmp_path / "motion.csv", tmp_path / "report.json"
+    words = ["--duration", 30, "--vary-tension", "5:25", "--vary-every", 4, "--max-acceleration", 15, "--report", found]
+    done = run(small_file, "-o", out, *words)
+    assert done.returncode == 0, done.stderr
+    table = read_table(out, lambda file, names: None)
+    span = np.array([[-0.5, 0.6], [-0.5, 0.5]])
+    motion = plan_excitation(SMALL, Plan(span, duration=30, vary=Variation(5.0, 25.0, 4.0), max_acceleration=15.0))
+    for name, column in motion.columns().items():
+        np.testing.assert_array_equal(table[name], column)
+    written = json.loads(found.read_text())
+    assert written["vary_tension"] == {"lowest": 5.0, "highest": 25.0, "every": 4.0}
+    assert written["pretension"] is None and written["max_acceleration"] == 15.0
+    assert "tensions of 5 to 25 N, other ones every 4 s" in done.stdout
+    assert "a higher lowest tension of --vary-tension keeps it taut" in done.stdout or not any(written["slack"])
+    assert "loads the tendons in turn" not in done.stdout
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -319,6 +408,12 @@ def test_command(small_file: Path, tmp_path: Path) -> None:
         (["--max-speed", "0"], "max-speed"),
         (["--pretension", "-3"], "pretension"),
         (["--report", "nowhere/report.json"], "no folder nowhere"),
+        (["--vary-tension", "20:5"], "--vary-tension 20:5: expected LOW:HIGH in N, 0 < LOW < HIGH"),
+        (["--vary-tension", "tight"], "--vary-tension tight: expected LOW:HIGH"),
+        (["--vary-tension", "5:20", "--pretension", "9"], "with --pretension; expected one of the two"),
+        (["--vary-tension", "5:20", "--alternate", "9"], "with --alternate; expected one of the two"),
+        (["--vary-tension", "9:9.5"], "expected HIGH at least"),
+        (["--vary-tension", "5:20", "--vary-every", "1"], "vary-every"),
     ],
 )
 def test_command_refuses(small_file: Path, tmp_path: Path, arguments: list[str], message: str) -> None:

@@ -16,6 +16,7 @@ from tendonfmu.excitation import Plan, plan_excitation
 from tendonfmu.excite import as_array, excite, find_ranges, read_subject, report
 from tendonfmu.identifiability import information, noise_of, sensitivities, unknowns
 from tendonfmu.judgement import LIMIT
+from tendonfmu.tension_plan import Variation
 
 
 @pytest.fixture
@@ -112,6 +113,20 @@ def test_antagonists_are_named_together(index_report: dict[str, Any]) -> None:
     assert entry["cause"] == "combination"
     assert any("tendons[6].pulley_friction[2]" in path for path in entry["in_combination_with"])
     assert index_report["least_known_combinations"][0]["relative_standard_error"] > LIMIT
+
+
+def test_varied_tensions_tell_more_apart(index_report: dict[str, Any]) -> None:
+    """At the same mean force, the same strokes and the same number of them."""
+    subject = read_subject(INDEX)
+    ranges = as_array(find_ranges(subject, []))
+    varied, even = (
+        report(excite(subject, find_ranges(subject, []), Plan(ranges, **plan)), "tendonfmu excite")
+        for plan in ({"vary": Variation(5.0, 20.0)}, {"pretensions": (12.0,)})
+    )
+    assert varied["blocks"][0]["pretension"] == pytest.approx(12.0, rel=0.1)
+    assert varied["identifiable"] >= 1.25 * even["identifiable"]
+    assert varied["known_combinations"] > even["known_combinations"]
+    assert even["identifiable"] >= index_report["identifiable"]
 
 
 def small_report(small_file: Path, *ranges: str, **plan: Any) -> dict[str, Any]:

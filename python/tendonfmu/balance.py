@@ -71,13 +71,14 @@ def friction_probe(data: Mapping[str, Any]) -> native.Finger:
 def balanced_forces(data: Mapping[str, Any], motion: Mapping[str, Numbers], pretension: Numbers) -> Numbers:
     """[N, m] tendon forces that carry the friction of a motion: f0 = pretension·ν + (Rᵀ)⁺ T(f0), N.
 
-    motion: `time` [N], `joint_position` and `joint_velocity` [N, n]. pretension: [N] mean tendon force, N.
+    motion: `time` [N], `joint_position` and `joint_velocity` [N, n]. pretension: [N] mean tendon force, N; or [N, m]
+    tensions that hold themselves, in place of pretension·ν.
     T is eq. (10) of what slides, cover included; what sticks adds nothing, since its share is not known.
     """
     finger = friction_probe(data)
     start = finger.save_state()
     spread = np.linalg.pinv(moment_arms(data))
-    own = np.outer(pretension, pretension_vector(data))
+    own = np.outer(pretension, pretension_vector(data)) if pretension.ndim == 1 else pretension
     forces = own
     for _ in range(_ITERATIONS):
         finger.restore_state(start)

@@ -251,6 +251,12 @@ def excite(
     alternate: Annotated[
         float | None, typer.Option(min=1.0, metavar="SECONDS", help="change the pretension that often")
     ] = None,
+    vary_tension: Annotated[
+        str | None,
+        typer.Option(metavar="LOW:HIGH", help="N; instead of a pretension, each tendon tight and loose in turn"),
+    ] = None,
+    vary_every: Annotated[float, typer.Option(min=2.0, max=1e5, help="s; other tensions that often")] = 10.0,
+    max_acceleration: Annotated[float, typer.Option(min=0.1, max=1e4, help="rad/s²; of every joint")] = 10.0,
     rate: Annotated[float, typer.Option(min=20.0, max=10000.0, help="rows per second")] = 100.0,
     seed: Annotated[int, typer.Option(min=0, max=2**53, help="of the strokes")] = 0,
     report: Annotated[
@@ -277,8 +283,9 @@ def excite(
     for span in ranges:
         if span.guessed:
             _say(f"tendonfmu: warning: joint {span.name}: {span.source}; --range {span.name}=LOW:HIGH says better")
+    vary = exciting.find_variation(vary_tension, vary_every, pretension, alternate)
     levels = exciting.find_pretensions(subject, pretension or [])
-    plan = Plan(exciting.as_array(ranges), max_speed, duration, levels, alternate, rate, seed)
+    plan = Plan(exciting.as_array(ranges), max_speed, duration, levels, alternate, rate, seed, vary, max_acceleration)
     with _progress() as bar:
         task = bar.add_task("judging the motion", total=None)
         result = exciting.excite(subject, ranges, plan, lambda done, all_: bar.update(task, completed=done, total=all_))

@@ -19,14 +19,15 @@ from numpy.typing import NDArray
 from tendonfmu.balance import moment_arms, pretension_vector
 from tendonfmu.errors import InputError
 from tendonfmu.quintic import evaluate
+from tendonfmu.tension_plan import Variation, internal_tensions
 
 Numbers = NDArray[np.float64]
 
 START = 2.0  # s; all joints at rest at the beginning of a block, while the pretension changes
 END = 1.0  # s; and at its end
 PRETENSION_CHANGE = 1.5  # s
-ACCELERATION = 10.0  # rad/s², never exceeded
-SPEED_UP = 0.15  # s, or as long as ACCELERATION asks for
+ACCELERATION = 10.0  # rad/s², never exceeded unless the plan allows more
+SPEED_UP = 0.15  # s, or as long as the greatest acceleration asks for
 SLOWEST = 0.05  # share of the greatest speed
 SLOW = 0.25  # share of the greatest speed; a reversal between two strokes up to it counts as slow
 SHORTEST, LONGEST = 0.3, 2.0  # s; of a stroke as drawn
@@ -54,8 +55,9 @@ class Stroke:
 class Excitation:
     """A training motion, a row each 1/rate s.
 
-    time [N] s; joint_position, joint_velocity, joint_acceleration [N, n]; pretension [N] N, mean tendon force;
-    tendon_position [N, m] m, motor side x0 that holds the posture at that pretension without friction.
+    time [N] s; joint_position, joint_velocity, joint_acceleration [N, n]; tension [N, m] N, that hold themselves;
+    pretension [N] N, their mean; tendon_position [N, m] m, motor side x0 that holds the posture at that tension without
+    friction.
     knots: per joint [k, 4] of time, position, velocity, acceleration; strokes: per joint; blocks: (begin, end, N).
     """
 
@@ -63,6 +65,7 @@ class Excitation:
     joint_position: Numbers
     joint_velocity: Numbers
     joint_acceleration: Numbers
+    tension: Numbers
     pretension: Numbers
     tendon_position: Numbers
     knots: list[Numbers]
@@ -81,7 +84,8 @@ class Excitation:
 @dataclass(frozen=True)
 class Plan:
     """What is asked for. ranges: [n, 2] rad. max_speed: rad/s. duration: s, of the whole motion at each pretension, or
-    with `alternate` (s, how long at a time) of all together. pretensions: N. rate: rows per second.
+    with `alternate` (s, how long at a time) of all together. pretensions: N. rate: rows per second. vary: the tensions
+    change by this instead of standing at a pretension. max_acceleration: rad/s².
     """
 
     ranges: Numbers
@@ -91,6 +95,8 @@ class Plan:
     alternate: float | None = None
     rate: float = 100.0
     seed: int = 0
+    vary: Variation | None = None
+    max_acceleration: float = ACCELERATION
 
 
 def plan_excitation(data: Mapping[str, Any], plan: Plan) -> Excitation:
@@ -141,7 +147,7 @@ def _blocks(plan: Plan) -> list[tuple[int, int, float]]:
 
 def _speed_up(plan: Plan) -> float:
     """s; a quintic piece from rest to v in time T has its greatest acceleration 1.5 v/T in the middle."""
-    return max(SPEED_UP, 1.5 * plan.max_speed / ACCELERATION, 1 / plan.rate)
+    return max(SPEED_UP, 1.5 * plan.max_speed / plan.max_acceleration, 1 / plan.rate)
 
 
 class _JointBlock:
@@ -229,22 +235,34 @@ def _sample(
     time = np.arange(blocks[-1][1] + 1) / plan.rate
     curves = [evaluate(path, time) for path in knots]
     position, velocity, acceleration = (np.column_stack([curve[k] for curve in curves]) for k in range(3))
+    stiffness = np.array([tendon["stiffness"] for tendon in data["tendons"]], dtype=float)
+    if plan.vary is not None:
+        tension = internal_tensions(data, plan.vary, time, plan.seed)
+        pretension = tension.mean(axis=1)
+        blocks = [(blocks[0][0], blocks[-1][1], float(pretension.mean()))]
+    else:
+        pretension = _pretension(plan, blocks, time)
+        tension = np.outer(pretension, pretension_vector(data))
+    return Excitation(
+        time=time,
+        joint_position=position,
+        joint_velocity=velocity,
+        joint_acceleration=acceleration,
+        tension=tension,
+        pretension=pretension,
+        tendon_position=position @ moment_arms(data).T + tension / stiffness,
+        knots=knots,
+        strokes=strokes,
+        blocks=[(begin / plan.rate, end / plan.rate, level) for begin, end, level in blocks],
+    )
+
+
+def _pretension(plan: Plan, blocks: list[tuple[int, int, float]], time: Numbers) -> Numbers:
+    """[N] N, constant in each block but for the change at its beginning."""
     level = np.array([[blocks[0][0], blocks[0][2], 0.0, 0.0]])
     for (_, _, before), (begin, _, now) in pairwise(blocks):
         change = round(PRETENSION_CHANGE * plan.rate)
         level = np.vstack([level, [begin, before, 0.0, 0.0], [begin + change, now, 0.0, 0.0]])
     level[:, 0] /= plan.rate
     pretension, _, _ = evaluate(level, time)
-    stiffness = np.array([tendon["stiffness"] for tendon in data["tendons"]], dtype=float)
-    stretch = np.outer(pretension, pretension_vector(data) / stiffness)
-    return Excitation(
-        time=time,
-        joint_position=position,
-        joint_velocity=velocity,
-        joint_acceleration=acceleration,
-        pretension=pretension,
-        tendon_position=position @ moment_arms(data).T + stretch,
-        knots=knots,
-        strokes=strokes,
-        blocks=[(begin / plan.rate, end / plan.rate, level) for begin, end, level in blocks],
-    )
+    return pretension

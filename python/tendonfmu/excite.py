@@ -22,9 +22,11 @@ from tendonfmu.errors import InputError
 from tendonfmu.excitation import Excitation, Plan, plan_excitation
 from tendonfmu.identifiability import Noise, Progress, information, noise_of, sensitivities, unknowns
 from tendonfmu.judgement import Judgement, as_json, judge
+from tendonfmu.tension_plan import Variation
 
 RIG_FORMAT = "tendonfmu-rig-1"
 DEFAULT_PRETENSION = 10.0  # N
+STRONGEST = 1e6  # N
 MARGIN = 0.05  # of a rig's range between limits, kept free at either end
 UNKNOWN_RANGE = 0.5  # rad, either side of the rest angle
 ANALYSIS_RATE = 25.0  # 1/s; 100 gives the same count for the index finger, and standard errors within 1 %
@@ -132,6 +134,27 @@ def find_pretensions(subject: Subject, given: Sequence[float]) -> list[float]:
     return [0.0] * max(len(given), 1)
 
 
+def find_variation(
+    given: str | None, every: float, pretension: Sequence[float] | None = None, alternate: float | None = None
+) -> Variation | None:
+    """given: "LOW:HIGH" in N; every: s. pretension, alternate: as asked for beside it, which has no sense. Raises
+    InputError.
+    """
+    if given is None:
+        return None
+    for option, value in (("--pretension", pretension), ("--alternate", alternate)):
+        if value:
+            raise InputError(f"--vary-tension {given}: with {option}; expected one of the two")
+    low_text, _, high_text = given.partition(":")
+    try:
+        low, high = float(low_text), float(high_text)
+    except ValueError:
+        low, high = math.nan, math.nan
+    if not 0.0 < low < high <= STRONGEST:
+        raise InputError(f"--vary-tension {given}: expected LOW:HIGH in N, 0 < LOW < HIGH, at most {STRONGEST:g}")
+    return Variation(low, high, every)
+
+
 def as_array(ranges: Sequence[Range]) -> NDArray[np.float64]:
     """[n, 2] low and high, rad."""
     return np.array([[span.low, span.high] for span in ranges])
@@ -183,7 +206,7 @@ def excite(subject: Subject, ranges: list[Range], plan: Plan, progress: Progress
         "joint_position": motion.joint_position[::every],
         "joint_velocity": motion.joint_velocity[::every],
     }
-    force = balanced_forces(data, samples, motion.pretension[::every])
+    force = balanced_forces(data, samples, motion.tension[::every])
     numbers, noise = unknowns(data), noise_of(data, 1 / plan.rate)
     parts = sensitivities(data, numbers, {**samples, "tendon_force": force}, progress)
     known = information(parts, samples["time"], np.abs(force).mean(axis=1), noise)
@@ -214,7 +237,9 @@ def report(result: ExciteResult, command: str) -> dict[str, Any]:
         "rate": plan.rate,
         "duration": float(result.motion.time[-1]),
         "max_speed": plan.max_speed,
-        "pretension": list(plan.pretensions),
+        "max_acceleration": plan.max_acceleration,
+        "pretension": list(plan.pretensions) if plan.vary is None else None,
+        "vary_tension": None if plan.vary is None else asdict(plan.vary),
         "blocks": [{"begin": a, "end": b, "pretension": level} for a, b, level in result.motion.blocks],
         "joints": [
             {"joint": j, "range": asdict(span), **asdict(cover)}

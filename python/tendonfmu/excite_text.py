@@ -17,9 +17,8 @@ NEVER = ("side", "working_point", "slow")  # causes that another motion mends
 def tables(result: ExciteResult) -> Iterator[tuple[str, Row, list[Row]]]:
     """(title, headings, rows) of joints, effects and kinds of numbers."""
     motion = result.motion
-    levels = ", ".join(f"{level:g}" for level in result.plan.pretensions)
     yield (
-        f"{result.subject.finger.name}: {motion.time[-1]:g} s of motion, pretension {levels} N",
+        f"{result.subject.finger.name}: {motion.time[-1]:g} s of motion, {_load(result)}",
         ("joint", "range, rad", "fastest, rad/s", "strokes", "reversals", "slow ones", "rests", "resting, s"),
         [
             (
@@ -45,6 +44,13 @@ def tables(result: ExciteResult) -> Iterator[tuple[str, Row, list[Row]]]:
             for (kind, key), counts in sorted(counts_by_kind(result.judgement.verdicts).items())
         ],
     )
+
+
+def _load(result: ExciteResult) -> str:
+    plan = result.plan
+    if plan.vary is None:
+        return f"pretension {', '.join(f'{level:g}' for level in plan.pretensions)} N"
+    return f"tensions of {plan.vary.lowest:g} to {plan.vary.highest:g} N, other ones every {plan.vary.every:g} s"
 
 
 def _effect_row(cover: EffectCoverage, verdicts: list[Verdict]) -> Row:
@@ -91,6 +97,9 @@ def lines(result: ExciteResult) -> Iterator[str]:
     )
     for cause, count in causes(verdicts).items():
         yield f"  {count} not: {CAUSES[cause]}"
+    tendons, joints = len(result.subject.finger.tendon_names), len(result.ranges)
+    if result.plan.vary is None and "combination" in causes(verdicts) and tendons > joints + 1:
+        yield "  --vary-tension LOW:HIGH loads the tendons in turn and tells more of those combinations apart"
     yield (
         f"assumed: white noise of {noise.std:g} N·m + {noise.per_force:g} N·m per N in each {1e3 * noise.time:g} ms, "
         f"bias a random walk of {noise.drift:g} (N·m)²/s"
@@ -101,4 +110,5 @@ def lines(result: ExciteResult) -> Iterator[str]:
     for i, seconds in enumerate(result.slack, start=1):
         if seconds > 0:
             name = result.subject.finger.tendon_names[i - 1]
-            yield f"  {name} would go slack for {seconds:.1f} s: a higher --pretension keeps it taut"
+            higher = "--pretension" if result.plan.vary is None else "lowest tension of --vary-tension"
+            yield f"  {name} would go slack for {seconds:.1f} s: a higher {higher} keeps it taut"
