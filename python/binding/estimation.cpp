@@ -1,0 +1,265 @@
+// The C interface of the estimation as the Python module _estimation: numpy arrays in and out.
+#include "tendonfmu_estimation.h"
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace nb = nanobind;
+
+namespace {
+
+using Rows = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Numbers = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Groups = nb::ndarray<const std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Flags = nb::ndarray<const unsigned char, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+
+// A numpy array that owns `values`.
+nb::object as_array(std::vector<double> values, std::vector<std::size_t> shape) {
+  auto* kept = new std::vector<double>(std::move(values));
+  nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<double>*>(p); });
+  return nb::cast(nb::ndarray<nb::numpy, double>(kept->data(), shape.size(), shape.data(), owner));
+}
+
+void expect_rows(const std::optional<Rows>& rows, std::size_t samples, std::size_t columns, const char* name) {
+  if (rows && (rows->shape(0) != samples || rows->shape(1) != columns)) {
+    throw nb::value_error((std::string(name) + ": expected " + std::to_string(samples) + " rows of " +
+                           std::to_string(columns) + " columns")
+                              .c_str());
+  }
+}
+
+const double* data(const std::optional<Rows>& rows) {
+  return rows ? rows->data() : nullptr;
+}
+
+// What a recording's arrays have in common for estimator and learner.
+struct Samples {
+  Numbers time;
+  Rows tendon_force;
+  std::optional<Rows> tendon_position, joint_position, joint_velocity, external_torque;
+  std::optional<Flags> use;
+
+  void check(std::size_t joints, std::size_t tendons) const {
+    const std::size_t count = time.shape(0);
+    expect_rows(tendon_force, count, tendons, "tendon_force");
+    expect_rows(tendon_position, count, tendons, "tendon_position");
+    expect_rows(joint_position, count, joints, "joint_position");
+    expect_rows(joint_velocity, count, joints, "joint_velocity");
+    expect_rows(external_torque, count, joints, "external_torque");
+    if (use && use->shape(0) != count) {
+      throw nb::value_error("use: expected one flag a sample");
+    }
+  }
+  tendonfmu_inputs inputs() const {
+    return {tendon_force.data(), data(tendon_position), data(joint_position), data(joint_velocity)};
+  }
+};
+
+class Estimator {
+ public:
+  Estimator(const nb::bytes& image, const std::optional<Groups>& group, const std::optional<Numbers>& scale) {
+    if (group || scale) {
+      create(image, nullptr, nullptr); /* how many numbers are expected, before they are read */
+      check_length(group ? group->shape(0) : parameters(), "group");
+      check_length(scale ? scale->shape(0) : parameters(), "scale");
+    }
+    create(image, group ? group->data() : nullptr, scale ? scale->data() : nullptr);
+  }
+
+  std::size_t joints() const { return tendonfmu_estimator_joint_count(get()); }
+  std::size_t tendons() const { return tendonfmu_estimator_tendon_count(get()); }
+  std::size_t unknowns() const { return tendonfmu_estimator_unknown_count(get()); }
+  std::size_t parameters() const { return tendonfmu_estimator_parameter_count(get()); }
+
+  nb::tuple unknown(std::size_t index) const {
+    tendonfmu_unknown u;
+    expect(tendonfmu_estimator_get_unknown(get(), index, &u));
+    return nb::make_tuple(std::string(u.path), static_cast<int>(u.role),
+                          std::vector<std::uint32_t>(u.parameters, u.parameters + u.parameter_count), u.start, u.lower,
+                          u.upper, u.scale);
+  }
+
+  nb::object values(const Numbers& z) const {
+    expect_unknowns(z);
+    std::vector<double> values(parameters());
+    expect(tendonfmu_estimator_get_values(get(), z.data(), values.data()));
+    return as_array(std::move(values), {parameters()});
+  }
+
+  nb::object unknown_values(const Numbers& values) const {
+    check_length(values.shape(0), "values");
+    std::vector<double> z(unknowns());
+    expect(tendonfmu_estimator_get_unknowns(get(), values.data(), z.data()));
+    return as_array(std::move(z), {unknowns()});
+  }
+
+  std::size_t add_recording(const Numbers& time, const Rows& force, const std::optional<Rows>& position,
+                            const std::optional<Rows>& angle, const std::optional<Rows>& velocity, int source,
+                            const std::optional<Rows>& external, const std::optional<Flags>& use) {
+    const Samples samples{time, force, position, angle, velocity, external, use};
+    samples.check(joints(), tendons());
+    const tendonfmu_inputs inputs = samples.inputs();
+    std::size_t index = 0;
+    expect(tendonfmu_estimator_add_recording(get(), time.shape(0), time.data(), &inputs, source, data(external),
+                                             use ? use->data() : nullptr, &index));
+    lengths_.push_back(time.shape(0));
+    return index;
+  }
+
+  nb::tuple evaluate(const Numbers& z, std::size_t stride, unsigned threads) const {
+    expect_unknowns(z);
+    const std::size_t u = unknowns();
+    double cost = 0.0;
+    std::vector<double> gradient(u), information(u * u);
+    tendonfmu_status status;
+    {
+      const nb::gil_scoped_release without_gil;
+      status =
+          tendonfmu_estimator_evaluate(get(), z.data(), stride, threads, &cost, gradient.data(), information.data());
+    }
+    expect(status);
+    return nb::make_tuple(cost, as_array(std::move(gradient), {u}), as_array(std::move(information), {u, u}));
+  }
+
+  nb::tuple jacobian(std::size_t recording, const Numbers& z, std::size_t first, std::size_t count) const {
+    expect_unknowns(z);
+    const std::size_t u = unknowns(), n = joints();
+    std::vector<double> torque(count * n), jump(count * n), by_torque(count * n * u), by_jump(count * n * u);
+    expect(tendonfmu_estimator_jacobian(get(), recording, z.data(), first, count, torque.data(), jump.data(),
+                                        by_torque.data(), by_jump.data()));
+    return nb::make_tuple(as_array(std::move(torque), {count, n}), as_array(std::move(jump), {count, n}),
+                          as_array(std::move(by_torque), {count, n, u}), as_array(std::move(by_jump), {count, n, u}));
+  }
+
+  nb::tuple innovations(std::size_t recording, const Numbers& z) const {
+    expect_unknowns(z);
+    const std::size_t samples = recording < lengths_.size() ? lengths_[recording] : 0, n = joints();
+    std::vector<double> innovation(samples * n), variance(samples), bias(samples * n);
+    expect(
+        tendonfmu_estimator_innovations(get(), recording, z.data(), innovation.data(), variance.data(), bias.data()));
+    return nb::make_tuple(as_array(std::move(innovation), {samples, n}), as_array(std::move(variance), {samples}),
+                          as_array(std::move(bias), {samples, n}));
+  }
+
+  // watch(pass, stride, samples_done, samples, cost, best) -> bool
+  nb::dict fit(const Numbers& start, double prior_std, double tolerance, std::size_t passes, std::size_t stride,
+               unsigned threads, const nb::object& watch) const {
+    expect_unknowns(start);
+    const std::size_t u = unknowns();
+    std::vector<double> z(u), gradient(u), information(u * u), covariance(u * u);
+    tendonfmu_fit_result result{z.data(), gradient.data(), information.data(), covariance.data(), 0, 0, 0, 0, 0, 0};
+    const tendonfmu_fit_options options{prior_std, tolerance, passes, stride, threads};
+    Watching watching{watch.is_none() ? nullptr : &watch, u, nullptr};
+    tendonfmu_status status;
+    {
+      const nb::gil_scoped_release without_gil;
+      status = tendonfmu_estimator_fit(get(), start.data(), &options, &Watching::call, &watching, &result);
+    }
+    if (watching.raised) {
+      watching.raised->restore();
+      throw nb::python_error();
+    }
+    expect(status);
+    nb::dict found;
+    found["z"] = as_array(std::move(z), {u});
+    found["gradient"] = as_array(std::move(gradient), {u});
+    found["information"] = as_array(std::move(information), {u, u});
+    found["covariance"] = as_array(std::move(covariance), {u, u});
+    found["cost"] = result.cost;
+    found["prior_cost"] = result.prior_cost;
+    found["passes"] = result.passes;
+    found["steps"] = result.steps;
+    found["converged"] = result.converged != 0;
+    found["stopped"] = result.stopped != 0;
+    return found;
+  }
+
+ private:
+  struct Watching {
+    const nb::object* watch;
+    std::size_t unknowns;
+    std::unique_ptr<nb::python_error> raised;
+
+    static int call(void* context, const tendonfmu_fit_progress* p) {
+      auto* self = static_cast<Watching*>(context);
+      const nb::gil_scoped_acquire gil;
+      try {
+        if (PyErr_CheckSignals() != 0) { /* Ctrl-C */
+          throw nb::python_error();
+        }
+        if (!self->watch) {
+          return 1;
+        }
+        const nb::object best = as_array(std::vector<double>(p->best, p->best + self->unknowns), {self->unknowns});
+        const nb::object answer = (*self->watch)(p->pass, p->stride, p->samples_done, p->samples, p->cost, best);
+        return answer.is(nb::bool_(false)) ? 0 : 1;
+      } catch (nb::python_error& error) {
+        self->raised = std::make_unique<nb::python_error>(std::move(error));
+        return 0;
+      }
+    }
+  };
+
+  struct Deleter {
+    void operator()(tendonfmu_estimator* e) const { tendonfmu_estimator_destroy(e); }
+  };
+
+  void create(const nb::bytes& image, const std::int32_t* group, const double* scale) {
+    char message[600] = "";
+    estimator_.reset(tendonfmu_estimator_create(image.data(), image.size(), group, scale, message, sizeof message));
+    if (!estimator_) {
+      throw nb::value_error(message);
+    }
+  }
+  tendonfmu_estimator* get() const { return estimator_.get(); }
+  void expect(tendonfmu_status status) const {
+    if (status != TENDONFMU_OK) {
+      throw nb::value_error(tendonfmu_estimator_last_error(get()));
+    }
+  }
+  void expect_unknowns(const Numbers& z) const {
+    if (z.shape(0) != unknowns()) {
+      throw nb::value_error(("z: expected " + std::to_string(unknowns()) + " unknowns").c_str());
+    }
+  }
+  void check_length(std::size_t length, const char* name) const {
+    if (length != parameters()) {
+      throw nb::value_error((std::string(name) + ": expected " + std::to_string(parameters()) + " numbers").c_str());
+    }
+  }
+
+  std::unique_ptr<tendonfmu_estimator, Deleter> estimator_;
+  std::vector<std::size_t> lengths_;
+};
+
+}  // namespace
+
+NB_MODULE(_estimation, m) {
+  nb::class_<Estimator>(m, "Estimator")
+      .def(nb::init<const nb::bytes&, const std::optional<Groups>&, const std::optional<Numbers>&>(), nb::arg("image"),
+           nb::arg("group") = nb::none(), nb::arg("scale") = nb::none())
+      .def_prop_ro("joints", &Estimator::joints)
+      .def_prop_ro("tendons", &Estimator::tendons)
+      .def_prop_ro("unknown_count", &Estimator::unknowns)
+      .def_prop_ro("parameter_count", &Estimator::parameters)
+      .def("unknown", &Estimator::unknown)
+      .def("values", &Estimator::values)
+      .def("unknown_values", &Estimator::unknown_values)
+      .def("add_recording", &Estimator::add_recording, nb::arg("time"), nb::arg("tendon_force"),
+           nb::arg("tendon_position") = nb::none(), nb::arg("joint_position") = nb::none(),
+           nb::arg("joint_velocity") = nb::none(), nb::arg("kinematics_source") = 1,
+           nb::arg("external_torque") = nb::none(), nb::arg("use") = nb::none())
+      .def("evaluate", &Estimator::evaluate, nb::arg("z"), nb::arg("stride") = 1, nb::arg("threads") = 0)
+      .def("jacobian", &Estimator::jacobian)
+      .def("innovations", &Estimator::innovations)
+      .def("fit", &Estimator::fit, nb::arg("start"), nb::arg("prior_std"), nb::arg("tolerance"), nb::arg("passes"),
+           nb::arg("stride"), nb::arg("threads"), nb::arg("watch") = nb::none());
+}

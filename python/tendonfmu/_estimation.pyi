@@ -1,0 +1,49 @@
+"""Types of the compiled module (python/binding/estimation.cpp)."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Numbers = NDArray[np.float64]
+
+class Estimator:
+    def __init__(self, image: bytes, group: NDArray[np.int32] | None = None, scale: Numbers | None = None) -> None: ...
+    @property
+    def joints(self) -> int: ...
+    @property
+    def tendons(self) -> int: ...
+    @property
+    def unknown_count(self) -> int: ...
+    @property
+    def parameter_count(self) -> int: ...
+    def unknown(self, index: int) -> tuple[str, int, list[int], float, float, float, float]: ...
+    def values(self, z: Numbers | None) -> Numbers: ...
+    def unknown_values(self, values: Numbers | None) -> Numbers: ...
+    def add_recording(
+        self,
+        time: Numbers | None,
+        tendon_force: Numbers | None,
+        tendon_position: Numbers | None = None,
+        joint_position: Numbers | None = None,
+        joint_velocity: Numbers | None = None,
+        kinematics_source: int = 1,
+        external_torque: Numbers | None = None,
+        use: NDArray[np.uint8] | None = None,
+    ) -> int: ...
+    def evaluate(self, z: Numbers | None, stride: int = 1, threads: int = 0) -> tuple[float, Numbers, Numbers]: ...
+    def jacobian(
+        self, recording: int, z: Numbers | None, first: int, count: int
+    ) -> tuple[Numbers, Numbers, Numbers, Numbers]: ...
+    def innovations(self, recording: int, z: Numbers | None) -> tuple[Numbers, Numbers, Numbers]: ...
+    def fit(
+        self,
+        start: Numbers | None,
+        prior_std: float,
+        tolerance: float,
+        passes: int,
+        stride: int,
+        threads: int,
+        watch: Callable[..., Any] | None = None,
+    ) -> dict[str, Any]: ...

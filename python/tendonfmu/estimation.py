@@ -1,0 +1,217 @@
+"""The binding of the estimation (runtime/include/tendonfmu_estimation.h), and only it.
+
+Where Eigen was not found when the package was built, there is no estimation: `Estimator` then raises
+`InputError(ESTIMATION_MISSING)`, and everything else works.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib.util import find_spec
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.errors import InputError
+
+# a module that is there and does not load is a fault to be seen, not a missing one
+HAS_ESTIMATION = find_spec("tendonfmu._estimation") is not None
+if HAS_ESTIMATION:
+    from tendonfmu import _estimation
+
+Numbers = NDArray[np.float64]
+Array = NDArray[Any]
+
+ESTIMATION_MISSING = "this installation cannot estimate parameters (Eigen was not found when it was built)"
+ROLES = ("coulomb", "drop", "rate", "viscous", "value")
+
+# (pass, stride, samples done, samples, cost of the best so far, its unknowns) -> False to stop
+BatchWatch = Callable[[int, int, int, int, float, Numbers], bool | None]
+
+
+class EstimationError(InputError):
+    """Refused by the estimation: a structure, a recording, unknowns."""
+
+
+@contextmanager
+def _refusals() -> Iterator[None]:
+    try:
+        yield
+    except ValueError as refused:
+        raise EstimationError(str(refused)) from None
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """What is estimated.
+
+    path: of the first number of the description that it moves; parameters: indices of all of them.
+    role: `coulomb` Fc, `drop` Fs - Fc, `rate` 1/vs, `viscous` Fv, or `value`, a number as it is.
+    start, lower, upper: value at the start and the box it stays in. scale: expected magnitude.
+    """
+
+    path: str
+    role: str
+    parameters: tuple[int, ...]
+    start: float
+    lower: float
+    upper: float
+    scale: float
+
+
+@dataclass(frozen=True)
+class BatchResult:
+    """A fit of all recordings at once, of u unknowns.
+
+    z: [u]. cost: ½ Σ e²/S + prior_cost. gradient [u], information [u, u]: of the data's part at z.
+    covariance: [u, u] inverse of information and prior; unknowns at a bound count as if they were free.
+    steps: of Levenberg and Marquardt; passes: over the data, coarse ones included. stopped: `progress` said so.
+    """
+
+    z: Numbers
+    cost: float
+    prior_cost: float
+    gradient: Numbers
+    information: Numbers
+    covariance: Numbers
+    steps: int
+    passes: int
+    converged: bool
+    stopped: bool
+    seconds: float
+
+
+def _matrix(values: Array | None) -> Numbers | None:
+    return None if values is None else np.ascontiguousarray(values, dtype=np.float64)
+
+
+def _samples(arrays: Mapping[str, Array]) -> dict[str, Numbers | None]:
+    names = ("time", "tendon_force", "tendon_position", "joint_position", "joint_velocity")
+    return {name: _matrix(arrays.get(name)) for name in names}
+
+
+class Estimator:
+    """A finger, what is unknown of it, and recordings.
+
+    image: of the description (`native.image_from_json`); its numbers are the start and the prior's mean.
+    group: [p] by parameter: -1 fixed, others estimated, equal numbers share one value; None: all that is present.
+    scale: [p] expected magnitudes in the description's units, NaN or None where the start's is meant.
+    """
+
+    def __init__(self, image: bytes, group: Array | None = None, scale: Array | None = None) -> None:
+        if not HAS_ESTIMATION:
+            raise InputError(ESTIMATION_MISSING)
+        groups = None if group is None else np.ascontiguousarray(group, dtype=np.int32)
+        with _refusals():
+            self._estimator = _estimation.Estimator(image, groups, _matrix(scale))
+        self.unknowns = [self._unknown(k) for k in range(self._estimator.unknown_count)]
+
+    def _unknown(self, index: int) -> Unknown:
+        path, role, parameters, start, lower, upper, scale = self._estimator.unknown(index)
+        return Unknown(path, ROLES[role], tuple(parameters), start, lower, upper, scale)
+
+    @property
+    def joints(self) -> int:
+        return int(self._estimator.joints)
+
+    @property
+    def tendons(self) -> int:
+        return int(self._estimator.tendons)
+
+    @property
+    def start(self) -> Numbers:
+        """[u] unknowns of the description."""
+        return np.array([unknown.start for unknown in self.unknowns])
+
+    @property
+    def scale(self) -> Numbers:
+        """[u] expected magnitudes."""
+        return np.array([unknown.scale for unknown in self.unknowns])
+
+    def values(self, z: Array) -> Numbers:
+        """[p] numbers of the description for unknowns z within their boxes."""
+        with _refusals():
+            return np.asarray(self._estimator.values(_matrix(z)))
+
+    def unknown_values(self, parameters: Array) -> Numbers:
+        """[u] unknowns of numbers of the description [p]."""
+        with _refusals():
+            return np.asarray(self._estimator.unknown_values(_matrix(parameters)))
+
+    def add_recording(
+        self,
+        arrays: Mapping[str, Array],
+        kinematics_source: int = 1,
+        external_torque: Array | None = None,
+        use: Array | None = None,
+    ) -> int:
+        """Takes over a recording and returns its number, from 0.
+
+        arrays: `time` [N] (s), `tendon_force`, `tendon_position` [N, m], `joint_position`, `joint_velocity` [N, n],
+            those that the kinematics source needs.
+        external_torque: [N, n] known load, N.m. use: [N] bool, where to learn.
+        """
+        flags = None if use is None else np.ascontiguousarray(use, dtype=np.uint8)
+        with _refusals():
+            return int(
+                self._estimator.add_recording(
+                    **_samples(arrays),
+                    kinematics_source=kinematics_source,
+                    external_torque=_matrix(external_torque),
+                    use=flags,
+                )
+            )
+
+    def evaluate(self, z: Array, stride: int = 1, threads: int = 0) -> tuple[float, Numbers, Numbers]:
+        """Cost ½ Σ e²/S of the data at z, gradient [u], information [u, u]; without prior.
+
+        stride: only every stride-th sample is looked at, each for `stride`.
+        threads: 0 for all cores; any number gives the same result.
+        """
+        with _refusals():
+            cost, gradient, information = self._estimator.evaluate(_matrix(z), stride, threads)
+        return float(cost), np.asarray(gradient), np.asarray(information)
+
+    def jacobian(self, recording: int, z: Array, start: int, stop: int) -> tuple[Numbers, Numbers, Numbers, Numbers]:
+        """T of eq. (10) and the jumps Δb of fig. 5 [N, n] at samples start..stop-1, and their derivatives [N, n, u]."""
+        with _refusals():
+            found = self._estimator.jacobian(recording, _matrix(z), start, max(stop - start, 0))
+        torque, jump, by_torque, by_jump = (np.asarray(array) for array in found)
+        return torque, jump, by_torque, by_jump
+
+    def innovations(self, recording: int, z: Array) -> tuple[Numbers, Numbers, Numbers]:
+        """Residuals before the bias update [N, n] (N.m), their variance [N], and the bias after it [N, n].
+
+        NaN where the bias has not started; the variance is NaN, too, at samples that are not used.
+        """
+        with _refusals():
+            found = self._estimator.innovations(recording, _matrix(z))
+        innovation, variance, bias = (np.asarray(array) for array in found)
+        return innovation, variance, bias
+
+    def fit(
+        self,
+        start: Array | None = None,
+        *,
+        prior_std: float = 1.0,
+        max_passes: int = 60,
+        tolerance: float = 1e-3,
+        threads: int = 0,
+        stride: int = 0,
+        progress: BatchWatch | None = None,
+    ) -> BatchResult:
+        """Maximum likelihood under a Gaussian prior of prior_std · scale about the description's numbers.
+
+        start: [u], None: the description's. tolerance: it ends with a step this small in standard errors.
+        stride: of the first, coarse passes; 0: by the number of samples.
+        progress: called now and then, returns False to stop.
+        """
+        begun = perf_counter()
+        first = self.start if start is None else start
+        with _refusals():
+            found = self._estimator.fit(_matrix(first), prior_std, tolerance, max_passes, stride, threads, progress)
+        return BatchResult(**found, seconds=perf_counter() - begun)

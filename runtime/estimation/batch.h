@@ -1,0 +1,45 @@
+/* The whole of the recordings at once: maximum likelihood of the model under a weak Gaussian prior, by
+ * Levenberg-Marquardt steps within the unknowns' boxes. */
+#ifndef TENDONFMU_ESTIMATION_BATCH_H
+#define TENDONFMU_ESTIMATION_BATCH_H
+
+#include "information.h"
+
+namespace tendonfmu::estimation {
+
+struct BatchOptions {
+  double prior_std = 1.0;  /* of an unknown, in expected magnitudes; infinite: no prior */
+  double tolerance = 1e-3; /* a step this small in standard errors, for every unknown, ends it */
+  std::size_t most_passes = 60;
+  std::size_t stride = 0; /* of the first, coarse passes; 0: chosen by the number of samples */
+  unsigned threads = 0;
+};
+
+struct BatchProgress {
+  std::size_t pass, stride, samples_done, samples;
+  double cost; /* of the best so far, prior included; NaN before the first pass */
+  const std::vector<double>* best;
+};
+/* false stops */
+using BatchWatch = std::function<bool(const BatchProgress&)>;
+
+struct BatchResult {
+  std::vector<double> z;
+  double cost = 0.0, prior_cost = 0.0;
+  Evaluation at;              /* at z, over all samples */
+  Eigen::MatrixXd covariance; /* (information + prior)^-1; an unknown held by its bound is counted as if it were free */
+  std::size_t passes = 0, steps = 0;
+  bool converged = false, stopped = false;
+};
+
+/* start [unknowns]: where to begin, clipped to the bounds; the prior's mean is the description's start. Throws refused.
+ */
+BatchResult fit_batch(const Problem& problem, const std::vector<double>& start, const BatchOptions& options,
+                      const BatchWatch& watch);
+
+/* (information + prior)^-1 for unknowns of these scales */
+Eigen::MatrixXd posterior_covariance(const Unknowns& unknowns, const Eigen::MatrixXd& information, double prior_std);
+
+}  // namespace tendonfmu::estimation
+
+#endif

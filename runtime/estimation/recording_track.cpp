@@ -1,0 +1,185 @@
+#include "recording_track.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "refusal.h"
+
+namespace tendonfmu::estimation {
+
+/* --- a finger without contact ---------------------------------------------------------------------------------------
+ */
+
+FreeFinger::FreeFinger(const void* image, std::size_t image_size) {
+  char message[ERROR_BYTES] = "";
+  finger_.reset(tendonfmu_create(image, image_size, message, sizeof message));
+  if (!finger_) {
+    throw refused(message);
+  }
+}
+
+void FreeFinger::set(const std::vector<double>& numbers) {
+  free_ = numbers;
+  model_visit(
+      &finger_->shape,
+      [](void* context, const model_item* item) {
+        if (item->kind == ITEM_CONTACT_THRESHOLD) {
+          const double highest = parameter_range_of(item, item->first).maximum;
+          std::fill_n(static_cast<double*>(context) + item->first, item->count, highest);
+        }
+        return 0;
+      },
+      free_.data());
+  /* moment arms and the start are fixed after the first sample, and the same here */
+  if (tendonfmu_is_initialised(finger_.get())) {
+    std::vector<std::size_t> tunable;
+    std::vector<double> values;
+    for (std::uint32_t p = 0; p < free_.size(); ++p) {
+      if (free_[p] != finger_->parameters[p]) {
+        tunable.push_back(p);
+        values.push_back(free_[p]);
+      }
+    }
+    if (tendonfmu_set_parameters(finger_.get(), tunable.size(), tunable.data(), values.data()) != TENDONFMU_OK) {
+      throw refused(tendonfmu_last_error(finger_.get()));
+    }
+  } else if (tendonfmu_set_parameters(finger_.get(), free_.size(), nullptr, free_.data()) != TENDONFMU_OK) {
+    throw refused(tendonfmu_last_error(finger_.get()));
+  }
+}
+
+void FreeFinger::begin(const std::vector<double>& numbers, int kinematics_source) {
+  tendonfmu_reset(finger_.get());
+  if (tendonfmu_set_kinematics_source(finger_.get(), kinematics_source) != TENDONFMU_OK) {
+    throw refused(tendonfmu_last_error(finger_.get()));
+  }
+  set(numbers);
+}
+
+void FreeFinger::resume(const std::vector<unsigned char>& state, const std::vector<double>& numbers) {
+  if (tendonfmu_restore_state(finger_.get(), state.data(), state.size()) != TENDONFMU_OK) {
+    throw refused(tendonfmu_last_error(finger_.get()));
+  }
+  set(numbers);
+}
+
+void FreeFinger::step(std::size_t row, double time, const tendonfmu_inputs& inputs) {
+  const tendonfmu_status status = tendonfmu_is_initialised(finger_.get())
+                                      ? tendonfmu_step(finger_.get(), time, &inputs)
+                                      : tendonfmu_initialise(finger_.get(), time, &inputs);
+  if (status != TENDONFMU_OK) {
+    throw refused("row " + std::to_string(row + 1) + ": " + tendonfmu_last_error(finger_.get()));
+  }
+}
+
+std::vector<unsigned char> FreeFinger::save() const {
+  std::vector<unsigned char> state(tendonfmu_state_size(finger_.get()));
+  tendonfmu_save_state(finger_.get(), state.data(), state.size());
+  return state;
+}
+
+/* --- recordings -----------------------------------------------------------------------------------------------------
+ */
+
+namespace {
+
+constexpr std::size_t most_segments = 24;      /* enough for the cores of today's machines; fixed, so that any */
+constexpr std::size_t shortest_segment = 2000; /* number of threads sums in the same order */
+
+std::vector<double> copied(const double* values, std::size_t count) {
+  return values ? std::vector<double>(values, values + count) : std::vector<double>();
+}
+
+}  // namespace
+
+Recording::Recording(FreeFinger* finger, const RecordingArrays& a)
+    : joints_(finger->get()->joints), tendons_(finger->get()->tendons), source_(a.kinematics_source) {
+  const finger_settings& settings = finger->get()->derived.settings;
+  if (a.samples < 2) {
+    throw refused(std::to_string(a.samples) + " samples: expected at least 2");
+  }
+  time_ = copied(a.time, a.samples);
+  force_ = copied(a.inputs.tendon_force, a.samples * tendons_);
+  position_ = copied(a.inputs.tendon_position, a.samples * tendons_);
+  angle_ = copied(a.inputs.joint_position, a.samples * joints_);
+  velocity_ = copied(a.inputs.joint_velocity, a.samples * joints_);
+  external_ = copied(a.external_torque, a.samples * joints_);
+  use_.assign(a.samples, 1);
+  if (a.use) {
+    std::copy_n(a.use, a.samples, use_.begin());
+  }
+  for (std::size_t k = 0; k < external_.size(); ++k) {
+    if (!std::isfinite(external_[k])) {
+      throw refused("row " + std::to_string(k / joints_ + 1) + ": external_torque[" + std::to_string(k % joints_ + 1) +
+                    "]: expected a finite number, N.m");
+    }
+  }
+  segment_length_ = std::max(shortest_segment, (a.samples + most_segments - 1) / most_segments);
+  noise_.resize(a.samples);
+  noise_scale_.assign(a.samples, 1.0);
+  const std::vector<double> start(finger->get()->start, finger->get()->start + finger->get()->shape.parameter_count);
+  finger->begin(start, source_);
+  for (std::size_t k = 0; k < a.samples; ++k) {
+    if (k % segment_length_ == 0) {
+      states_.push_back(finger->save());
+    }
+    finger->step(k, time_[k], inputs(k));
+    if (k > 0 && time_[k] == time_[k - 1]) {
+      throw refused("row " + std::to_string(k + 1) + ": time: expected later than the row before");
+    }
+    double force = 0.0;
+    for (std::size_t i = 0; i < tendons_; ++i) {
+      force += std::fabs(force_[k * tendons_ + i]) / static_cast<double>(tendons_);
+    }
+    const double noise = settings.noise_std + settings.noise_std_per_force * force;
+    noise_[k] = noise * noise;
+    if (k > 0 && settings.noise_time >= 0.0) {
+      noise_scale_[k] = std::min(settings.noise_time / (time_[k] - time_[k - 1]), 1e300);
+    }
+    if (!(noise_[k] * noise_scale_[k] > 0.0)) {
+      throw refused("bias.noise_std = 0: expected above 0 N.m for a fit, which weighs the residuals by it");
+    }
+    mean_force_ += force / static_cast<double>(a.samples);
+    used_count_ += use_[k] != 0;
+  }
+  if (used_count_ < 2) {
+    throw refused(std::to_string(used_count_) + " samples to learn from: expected at least 2");
+  }
+}
+
+tendonfmu_inputs Recording::inputs(std::size_t row) const {
+  const auto at = [](const std::vector<double>& values, std::size_t offset) {
+    return values.empty() ? nullptr : values.data() + offset;
+  };
+  return {at(force_, row * tendons_), at(position_, row * tendons_), at(angle_, row * joints_),
+          at(velocity_, row * joints_)};
+}
+
+BiasGains::BiasGains(const Recording& r, const finger_settings& settings, std::size_t stride)
+    : gain(r.samples(), 0.0), weight(r.samples(), 0.0) {
+  bool started = settings.has_initial_torque != 0;
+  const double given = settings.initial_variance;
+  double variance = given >= 0.0 ? given : r.plain_noise(0);
+  for (std::size_t k = 0; k < r.samples(); ++k) {
+    if (k > 0 && started) {
+      variance += settings.drift_variance * (r.time(k) - r.time(k - 1));
+    }
+    const bool looked_at = r.used(k) && (k % stride == 0 || (!started && k < stride));
+    if (!looked_at || (k == 0 && started)) {
+      continue; /* steps 5 and 6 are not for the first sample */
+    }
+    if (!started) {
+      started = true;
+      gain[k] = 1.0;
+      variance = given >= 0.0 ? given : r.plain_noise(k);
+      continue;
+    }
+    const double noise = r.noise(k) / static_cast<double>(stride);
+    const double total = variance + noise;
+    gain[k] = variance / total;
+    weight[k] = 1.0 / std::sqrt(total);
+    variance *= 1.0 - gain[k];
+  }
+}
+
+}  // namespace tendonfmu::estimation

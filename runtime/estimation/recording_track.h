@@ -1,0 +1,96 @@
+/* The finger and the recordings that it is fitted to. What does not depend on the friction (velocities, what moves and
+ * what sticks since when) is found once, and remembered where a recording is cut into segments. */
+#ifndef TENDONFMU_ESTIMATION_RECORDING_TRACK_H
+#define TENDONFMU_ESTIMATION_RECORDING_TRACK_H
+
+#include <memory>
+
+#include "unknowns.h"
+
+namespace tendonfmu::estimation {
+
+struct FingerDeleter {
+  void operator()(tendonfmu_finger* finger) const { tendonfmu_destroy(finger); }
+};
+using FingerPointer = std::unique_ptr<tendonfmu_finger, FingerDeleter>;
+
+/* A finger of the core that never detects contact. */
+class FreeFinger {
+ public:
+  /* throws refused */
+  FreeFinger(const void* image, std::size_t image_size);
+
+  tendonfmu_finger* get() const { return finger_.get(); }
+
+  /* Back to before the first sample, with these numbers of the description [parameter_count]. Throws refused. */
+  void begin(const std::vector<double>& numbers, int kinematics_source);
+  /* A saved state, with these numbers instead of those saved with it. */
+  void resume(const std::vector<unsigned char>& state, const std::vector<double>& numbers);
+  /* The next sample. Throws refused with the row. */
+  void step(std::size_t row, double time, const tendonfmu_inputs& inputs);
+  std::vector<unsigned char> save() const;
+
+ private:
+  void set(const std::vector<double>& numbers);
+
+  FingerPointer finger_;
+  std::vector<double> free_; /* numbers with thresholds that nothing reaches */
+};
+
+/* Arrays of the caller, row-major. */
+struct RecordingArrays {
+  std::size_t samples;
+  const double* time;            /* [N] s */
+  tendonfmu_inputs inputs;       /* [N × m], [N × n] */
+  const double* external_torque; /* [N × n] N·m, or nullptr */
+  const unsigned char* use;      /* [N], or nullptr: all */
+  int kinematics_source;
+};
+
+/* One recording, copied. */
+class Recording {
+ public:
+  /* Throws refused: a sample that the finger refuses, fewer than 2 used samples, noise of 0. */
+  Recording(FreeFinger* finger, const RecordingArrays& arrays);
+
+  std::size_t samples() const { return time_.size(); }
+  int kinematics_source() const { return source_; }
+  double time(std::size_t row) const { return time_[row]; }
+  tendonfmu_inputs inputs(std::size_t row) const;
+  bool used(std::size_t row) const { return use_[row] != 0; }
+  std::size_t used_count() const { return used_count_; }
+  double external_torque(std::size_t row, std::size_t joint) const {
+    return external_.empty() ? 0.0 : external_[row * joints_ + joint];
+  }
+  /* variance R of the sample's torques, (N·m)²; plain: as at the first sample, without bias.noise_time */
+  double noise(std::size_t row) const { return noise_[row] * noise_scale_[row]; }
+  double plain_noise(std::size_t row) const { return noise_[row]; }
+  double mean_force() const { return mean_force_; } /* N */
+
+  /* Rows at which the finger's state is kept: 0, length, 2·length, … */
+  std::size_t segment_length() const { return segment_length_; }
+  std::size_t segments() const { return states_.size(); }
+  const std::vector<unsigned char>& state(std::size_t segment) const { return states_[segment]; }
+
+ private:
+  std::vector<double> time_, force_, position_, angle_, velocity_, external_, noise_, noise_scale_;
+  std::vector<unsigned char> use_;
+  std::vector<std::vector<unsigned char>> states_;
+  std::size_t joints_, tendons_, used_count_ = 0, segment_length_ = 0;
+  double mean_force_ = 0.0;
+  int source_;
+};
+
+/* What the bias filter of contract section 5, step 6 does at every sample; the same for all joints and all parameters.
+ */
+struct BiasGains {
+  /* stride: only every stride-th sample is looked at, for `stride` of them */
+  BiasGains(const Recording& recording, const finger_settings& settings, std::size_t stride);
+
+  std::vector<double> gain;   /* [N] K; 0 where not used, 1 where the bias starts */
+  std::vector<double> weight; /* [N] 1/√S; 0 where nothing is learned */
+};
+
+}  // namespace tendonfmu::estimation
+
+#endif

@@ -1,0 +1,354 @@
+/* The C interface of the batch, tendonfmu_estimation.h. */
+#include "tendonfmu_estimation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <limits>
+#include <new>
+
+#include "batch.h"
+#include "refusal.h"
+#include "sample_rows.h"
+
+using namespace tendonfmu::estimation;
+
+struct tendonfmu_estimator {
+  tendonfmu_estimator(const void* image, std::size_t size, const std::int32_t* group, const double* scale)
+      : problem(image, size, group, scale) {}
+  Problem problem;
+  mutable std::string error;
+};
+
+namespace {
+
+constexpr const char* missing = "an argument is missing: NULL";
+
+tendonfmu_status fail(const tendonfmu_estimator* e, tendonfmu_status status, const std::string& reason) {
+  e->error = reason;
+  return status;
+}
+
+/* runs what may throw */
+template <typename Body>
+tendonfmu_status guarded(const tendonfmu_estimator* e, tendonfmu_status refusal, const Body& body) {
+  try {
+    body();
+    return TENDONFMU_OK;
+  } catch (const refused& reason) {
+    return fail(e, refusal, reason.what());
+  } catch (const std::bad_alloc&) {
+    return fail(e, refusal, "out of memory");
+  } catch (const std::exception& reason) {
+    return fail(e, refusal, reason.what());
+  }
+}
+
+/* unknowns within their boxes, a rounding aside */
+std::vector<double> checked(const Problem& problem, const double* z) {
+  std::vector<double> values(z, z + problem.unknowns.count());
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    const Unknown& u = problem.unknowns[k];
+    const double slack = 1e-9 * u.scale;
+    if (!(values[k] >= u.lower - slack && values[k] <= u.upper + slack)) {
+      char text[200];
+      std::snprintf(text, sizeof text, "unknown %zu (%s) = %g: expected %g to %g", k, u.path.c_str(), values[k],
+                    u.lower, u.upper);
+      throw refused(text);
+    }
+    values[k] = std::min(std::max(values[k], u.lower), u.upper);
+  }
+  return values;
+}
+
+/* the finger over the samples of a recording from `first` on, with a call after each */
+template <typename Body>
+void replay(const Problem& problem, std::size_t recording, const std::vector<double>& z, std::size_t first,
+            std::size_t count, FreeFinger* finger, const Body& body) {
+  if (recording >= problem.recordings.size()) {
+    throw refused("recording " + std::to_string(recording) + ": expected below " +
+                  std::to_string(problem.recordings.size()));
+  }
+  const Recording& r = problem.recordings[recording];
+  if (first > r.samples() || count > r.samples() - first) {
+    throw refused("samples up to " + std::to_string(first + count) + ": expected at most " +
+                  std::to_string(r.samples()));
+  }
+  if (count == 0) {
+    return;
+  }
+  const std::size_t segment = first / r.segment_length();
+  finger->resume(r.state(segment), problem.unknowns.write(z.data()));
+  for (std::size_t k = segment * r.segment_length(); k < first + count; ++k) {
+    finger->step(k, r.time(k), r.inputs(k));
+    if (k >= first) {
+      body(r, k);
+    }
+  }
+}
+
+void put(double* to, std::size_t at, double value) {
+  if (to) {
+    to[at] = value;
+  }
+}
+
+/* the scalar bias filter of one joint */
+struct BiasFilter {
+  double bias = 0.0;
+  bool started = false;
+
+  double take(double torque, double jump, double gain, bool starts) {
+    bias += jump;
+    if (starts) {
+      bias = torque;
+      started = true;
+    }
+    const double innovation = torque - bias;
+    bias += gain * innovation;
+    return innovation;
+  }
+};
+
+}  // namespace
+
+extern "C" {
+
+tendonfmu_estimator* tendonfmu_estimator_create(const void* image, size_t image_size, const int32_t* group,
+                                                const double* scale, char* message, size_t message_size) {
+  const auto say = [message, message_size](const char* line) {
+    if (message && message_size) {
+      std::snprintf(message, message_size, "%s", line);
+    }
+  };
+  say("");
+  if (!image) {
+    say(missing);
+    return nullptr;
+  }
+  try {
+    return new tendonfmu_estimator(image, image_size, group, scale);
+  } catch (const std::bad_alloc&) {
+    say("out of memory");
+  } catch (const std::exception& reason) {
+    say(reason.what());
+  }
+  return nullptr;
+}
+
+void tendonfmu_estimator_destroy(tendonfmu_estimator* estimator) {
+  delete estimator;
+}
+
+const char* tendonfmu_estimator_last_error(const tendonfmu_estimator* estimator) {
+  return estimator ? estimator->error.c_str() : "no estimator: NULL";
+}
+
+size_t tendonfmu_estimator_joint_count(const tendonfmu_estimator* estimator) {
+  return estimator ? estimator->problem.joints() : 0;
+}
+size_t tendonfmu_estimator_tendon_count(const tendonfmu_estimator* estimator) {
+  return estimator ? estimator->problem.finger.get()->tendons : 0;
+}
+size_t tendonfmu_estimator_parameter_count(const tendonfmu_estimator* estimator) {
+  return estimator ? estimator->problem.finger.get()->shape.parameter_count : 0;
+}
+size_t tendonfmu_estimator_unknown_count(const tendonfmu_estimator* estimator) {
+  return estimator ? estimator->problem.unknowns.count() : 0;
+}
+
+tendonfmu_status tendonfmu_estimator_get_unknown(const tendonfmu_estimator* estimator, size_t index,
+                                                 tendonfmu_unknown* unknown) {
+  if (!estimator || !unknown) {
+    return estimator ? fail(estimator, TENDONFMU_BAD_ARGUMENT, missing) : TENDONFMU_BAD_ARGUMENT;
+  }
+  if (index >= estimator->problem.unknowns.count()) {
+    return fail(
+        estimator, TENDONFMU_BAD_ARGUMENT,
+        "unknown " + std::to_string(index) + ": expected below " + std::to_string(estimator->problem.unknowns.count()));
+  }
+  static const tendonfmu_role roles[] = {TENDONFMU_COULOMB, TENDONFMU_DROP, TENDONFMU_RATE, TENDONFMU_VISCOUS,
+                                         TENDONFMU_VALUE};
+  const Unknown& u = estimator->problem.unknowns[index];
+  *unknown = {roles[static_cast<int>(u.role)],
+              u.start,
+              u.lower,
+              u.upper,
+              u.scale,
+              u.parameters.size(),
+              u.parameters.data(),
+              u.path.c_str()};
+  return TENDONFMU_OK;
+}
+
+tendonfmu_status tendonfmu_estimator_get_values(const tendonfmu_estimator* estimator, const double* z, double* values) {
+  if (!estimator || !z || !values) {
+    return estimator ? fail(estimator, TENDONFMU_BAD_ARGUMENT, missing) : TENDONFMU_BAD_ARGUMENT;
+  }
+  return guarded(estimator, TENDONFMU_BAD_PARAMETER, [&] {
+    const std::vector<double> numbers = estimator->problem.unknowns.write(checked(estimator->problem, z).data());
+    std::copy(numbers.begin(), numbers.end(), values);
+  });
+}
+
+tendonfmu_status tendonfmu_estimator_get_unknowns(const tendonfmu_estimator* estimator, const double* values,
+                                                  double* z) {
+  if (!estimator || !z || !values) {
+    return estimator ? fail(estimator, TENDONFMU_BAD_ARGUMENT, missing) : TENDONFMU_BAD_ARGUMENT;
+  }
+  return guarded(estimator, TENDONFMU_BAD_PARAMETER, [&] {
+    const std::vector<double> unknowns = estimator->problem.unknowns.read(values);
+    std::copy(unknowns.begin(), unknowns.end(), z);
+  });
+}
+
+tendonfmu_status tendonfmu_estimator_add_recording(tendonfmu_estimator* estimator, size_t samples, const double* time,
+                                                   const tendonfmu_inputs* inputs, int kinematics_source,
+                                                   const double* external_torque, const unsigned char* use,
+                                                   size_t* index) {
+  if (!estimator || !time || !inputs) {
+    return estimator ? fail(estimator, TENDONFMU_BAD_ARGUMENT, missing) : TENDONFMU_BAD_ARGUMENT;
+  }
+  return guarded(estimator, TENDONFMU_BAD_SAMPLE, [&] {
+    Problem& problem = estimator->problem;
+    problem.recordings.emplace_back(&problem.finger,
+                                    RecordingArrays{samples, time, *inputs, external_torque, use, kinematics_source});
+    if (index) {
+      *index = problem.recordings.size() - 1;
+    }
+  });
+}
+
+tendonfmu_status tendonfmu_estimator_evaluate(tendonfmu_estimator* estimator, const double* z, size_t stride,
+                                              unsigned threads, double* cost, double* gradient, double* information) {
+  if (!estimator || !z) {
+    return estimator ? fail(estimator, TENDONFMU_BAD_ARGUMENT, missing) : TENDONFMU_BAD_ARGUMENT;
+  }
+  return guarded(estimator, TENDONFMU_BAD_ARGUMENT, [&] {
+    const std::size_t every = std::max<std::size_t>(stride, 1);
+    const Evaluation found = evaluate(estimator->problem, checked(estimator->problem, z), {every, threads}, {});
+    put(cost, 0, found.cost);
+    if (gradient) {
+      std::copy_n(found.gradient.data(), found.gradient.size(), gradient);
+    }
+    if (information) {
+      std::copy_n(found.information.data(), found.information.size(), information);
+    }
+  });
+}
+
+tendonfmu_status tendonfmu_estimator_jacobian(tendonfmu_estimator* estimator, size_t recording, const double* z,
+                                              size_t first, size_t count, double* torque, double* jump,
+                                              double* torque_derivative, double* jump_derivative) {
+  if (!estimator || !z) {
+    return estimator ? fail(estimator, TENDONFMU_BAD_ARGUMENT, missing) : TENDONFMU_BAD_ARGUMENT;
+  }
+  return guarded(estimator, TENDONFMU_BAD_ARGUMENT, [&] {
+    const Problem& problem = estimator->problem;
+    const std::size_t n = problem.joints(), row = n * problem.unknowns.count();
+    FreeFinger finger(problem.image.data(), problem.image.size());
+    SampleRows rows(problem.unknowns, finger.get());
+    std::vector<double> by_torque(row), by_jump(row);
+    replay(problem, recording, checked(problem, z), first, count, &finger, [&](const Recording&, std::size_t k) {
+      rows.read();
+      rows.dense(by_torque.data(), by_jump.data());
+      for (std::size_t j = 0; j < n; ++j) {
+        put(torque, (k - first) * n + j, rows.torque(j));
+        put(jump, (k - first) * n + j, rows.jump(j));
+      }
+      if (torque_derivative) {
+        std::copy(by_torque.begin(), by_torque.end(), torque_derivative + (k - first) * row);
+      }
+      if (jump_derivative) {
+        std::copy(by_jump.begin(), by_jump.end(), jump_derivative + (k - first) * row);
+      }
+    });
+  });
+}
+
+tendonfmu_status tendonfmu_estimator_innovations(tendonfmu_estimator* estimator, size_t recording, const double* z,
+                                                 double* innovation, double* variance, double* bias) {
+  if (!estimator || !z) {
+    return estimator ? fail(estimator, TENDONFMU_BAD_ARGUMENT, missing) : TENDONFMU_BAD_ARGUMENT;
+  }
+  return guarded(estimator, TENDONFMU_BAD_ARGUMENT, [&] {
+    const Problem& problem = estimator->problem;
+    const std::vector<double> unknowns = checked(problem, z);
+    const derived_numbers& derived = problem.finger.get()->derived;
+    const std::size_t n = problem.joints(),
+                      samples = recording < problem.recordings.size() ? problem.recordings[recording].samples() : 0;
+    FreeFinger finger(problem.image.data(), problem.image.size());
+    std::vector<BiasFilter> filters(n);
+    std::vector<double> gain, weight;
+    if (samples > 0) {
+      BiasGains gains(problem.recordings[recording], derived.settings, 1);
+      gain = std::move(gains.gain);
+      weight = std::move(gains.weight);
+    }
+    for (std::size_t j = 0; j < n && derived.settings.has_initial_torque; ++j) {
+      const std::int32_t column = problem.unknowns.initial_torque(j);
+      filters[j] = {column < 0 ? derived.initial_torque[j] : unknowns[static_cast<std::size_t>(column)], true};
+    }
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    replay(problem, recording, unknowns, 0, samples, &finger, [&](const Recording& r, std::size_t k) {
+      const finger_scratch& s = finger.get()->scratch;
+      const bool starts = gain[k] == 1.0 && weight[k] == 0.0;
+      for (std::size_t j = 0; j < n; ++j) {
+        const double torque = finger.get()->remembered.torque[j] - r.external_torque(k, j) - s.friction[j];
+        const double e = filters[j].take(torque, s.bias_step[j], starts ? 0.0 : gain[k], starts);
+        put(innovation, k * n + j, filters[j].started && !starts ? e : nan);
+        put(bias, k * n + j, filters[j].started ? filters[j].bias : nan);
+      }
+      put(variance, k, weight[k] > 0.0 ? 1.0 / (weight[k] * weight[k]) : nan);
+    });
+  });
+}
+
+tendonfmu_fit_options tendonfmu_default_fit_options(void) {
+  const BatchOptions options;
+  return {options.prior_std, options.tolerance, options.most_passes, options.stride, options.threads};
+}
+
+tendonfmu_status tendonfmu_estimator_fit(tendonfmu_estimator* estimator, const double* start,
+                                         const tendonfmu_fit_options* options, tendonfmu_fit_watch watch, void* context,
+                                         tendonfmu_fit_result* result) {
+  if (!estimator || !options || !result || !result->z) {
+    return estimator ? fail(estimator, TENDONFMU_BAD_ARGUMENT, missing) : TENDONFMU_BAD_ARGUMENT;
+  }
+  return guarded(estimator, TENDONFMU_BAD_ARGUMENT, [&] {
+    const Problem& problem = estimator->problem;
+    std::vector<double> begin;
+    for (std::size_t k = 0; k < problem.unknowns.count(); ++k) {
+      begin.push_back(start ? start[k] : problem.unknowns[k].start);
+    }
+    BatchWatch look;
+    if (watch) {
+      look = [watch, context](const BatchProgress& p) {
+        const tendonfmu_fit_progress progress = {p.pass, p.stride, p.samples_done, p.samples, p.cost, p.best->data()};
+        return watch(context, &progress) != 0;
+      };
+    }
+    const BatchResult found = fit_batch(
+        problem, begin,
+        {options->prior_std, options->tolerance, options->most_passes, options->stride, options->threads}, look);
+    std::copy(found.z.begin(), found.z.end(), result->z);
+    if (result->gradient && found.at.complete) {
+      std::copy_n(found.at.gradient.data(), found.at.gradient.size(), result->gradient);
+    }
+    if (result->information && found.at.complete) {
+      std::copy_n(found.at.information.data(), found.at.information.size(), result->information);
+    }
+    if (result->covariance && found.at.complete) {
+      std::copy_n(found.covariance.data(), found.covariance.size(), result->covariance);
+    }
+    result->cost = found.cost;
+    result->prior_cost = found.prior_cost;
+    result->passes = found.passes;
+    result->steps = found.steps;
+    result->converged = found.converged;
+    result->stopped = found.stopped;
+  });
+}
+
+}  // extern "C"
