@@ -318,11 +318,17 @@ std::vector<double> Unknowns::read(const double* parameters) const {
 }
 
 std::vector<double> Unknowns::write(const double* unknowns) const {
-  std::vector<double> numbers = start_;
+  std::vector<double> numbers(start_.size());
+  write(unknowns, numbers.data());
+  return numbers;
+}
+
+void Unknowns::write(const double* unknowns, double* numbers) const {
+  std::copy(start_.begin(), start_.end(), numbers);
   const auto at = [unknowns](std::int32_t column, double otherwise) {
     return column < 0 ? otherwise : unknowns[column];
   };
-  for (std::uint32_t p = 0; p < numbers.size(); ++p) {
+  for (std::uint32_t p = 0; p < start_.size(); ++p) {
     const SideColumns& side = sides_[p];
     numbers[p] = at(plain_[p], numbers[p]);
     if (side.column[2] >= 0) {
@@ -337,7 +343,6 @@ std::vector<double> Unknowns::write(const double* unknowns) const {
       numbers[p] = side.static_follows || side.column[1] >= 0 ? numbers[p + 1] + drop : start_[p];
     }
   }
-  return numbers;
 }
 
 }  // namespace tendonfmu::estimation

@@ -51,6 +51,8 @@ class Unknowns {
   std::vector<double> read(const double* parameters) const;
   /* the description's numbers for unknowns within their bounds; what is fixed is as in the image */
   std::vector<double> write(const double* unknowns) const;
+  /* the same into numbers [parameter_count], without allocating */
+  void write(const double* unknowns, double* numbers) const;
 
   const SideColumns& side(std::uint32_t static_parameter) const { return sides_[static_parameter]; }
   /* column of a parameter that enters as it is, −1 where fixed */

@@ -1,0 +1,107 @@
+/* The extended Kalman filter of sect. V and VI: unknowns that are nearly constant, a bias per joint that is not.
+ *
+ *   y_k = T_k(z) + b_k + e_k,   b_k = b_{k−1} + Δb_k(z) + w_k,   e ~ N(0, R_k),   w ~ N(0, drift_variance·Δt)
+ *
+ * Samples are gathered in blocks that are linearised where they begin and taken in at once. Within a block the walk of
+ * the bias and its jumps, with their dependence on z, are kept exactly; what a block costs is only that its later
+ * samples are linearised at unknowns up to a block old. A block of 1 is the filter of the textbook.
+ *
+ * Of the covariance there is only the lower triangle, so it cannot become unsymmetric, and it changes by −W Wᵀ with W
+ * from the Cholesky factor of the innovations' covariance: P − K H P loses nine digits in twenty samples here. */
+#ifndef TENDONFMU_ESTIMATION_KALMAN_H
+#define TENDONFMU_ESTIMATION_KALMAN_H
+
+#include <cstddef>
+#include <vector>
+
+namespace tendonfmu::estimation {
+
+struct KalmanSettings {
+  std::size_t unknowns, joints;
+  std::size_t block;         /* samples, at least 1 */
+  double drift_variance;     /* of the bias, (N·m)²/s */
+  double parameter_drift;    /* of the unknowns: variance of z/scale, 1/s */
+  std::vector<double> scale; /* [p] expected magnitudes; the state is z/scale */
+  std::vector<double> lower; /* [p] bounds of z */
+  std::vector<double> upper; /* [p] */
+};
+
+/* One sample, linearised. Rows: [n × p] by z. */
+struct KalmanSample {
+  const double* torque;      /* [n] T, N·m */
+  const double* torque_rows; /* ∂T/∂z */
+  const double* jump;        /* [n] Δb, N·m; nullptr: none at this sample */
+  const double* jump_rows;   /* ∂Δb/∂z; not read without jump */
+  const double* measured;    /* [n] y, N·m */
+  double step;               /* s since the sample before */
+  double noise;              /* R, (N·m)² > 0 */
+  bool use;                  /* false: only the walk and the jumps */
+};
+
+class KalmanFilter {
+ public:
+  /* z [p] at the start, prior_std: standard deviation of z/scale. */
+  KalmanFilter(KalmanSettings settings, const std::vector<double>& start, double prior_std);
+
+  /* The bias begins anew at `bias` [n] with `variance`, and with z as the rows [n × p] say. What was gathered must have
+   * been taken in. */
+  void start_bias(const double* bias, const double* rows, double variance);
+
+  /* Gathers a sample; at most a block of them. */
+  void add(const KalmanSample& sample);
+  std::size_t gathered() const { return gathered_; }
+  bool full() const { return gathered_ == settings_.block; }
+
+  /* Takes in what was gathered. False, and of no further use, where the innovations' covariance is not positive
+   * definite: a number was not finite. Allocates nothing, like add() and start_bias(). */
+  bool update();
+
+  /* Of the samples that the last update took in: residuals before each sample itself, with all before it, and their
+   * variances; [samples × n]. */
+  std::size_t updated() const { return updated_; }
+  const double* innovation() const { return innovation_.data(); }
+  const double* innovation_variance() const { return innovation_variance_.data(); }
+
+  const double* z() const { return z_.data(); }       /* [p] */
+  const double* bias() const { return bias_.data(); } /* [n] N·m */
+  double variance(std::size_t unknown) const;         /* of z */
+  double bias_variance(std::size_t joint) const;      /* (N·m)² */
+  void covariance(double* matrix) const;              /* [p × p] of z, both triangles */
+
+ private:
+  std::size_t order() const { return settings_.unknowns + settings_.joints; }
+  double& at(std::size_t row, std::size_t column) { return covariance_[column * order() + row]; } /* row >= column */
+  double at(std::size_t row, std::size_t column) const { return covariance_[column * order() + row]; }
+  void scale_row(const double* first, const double* second, double* row) const;
+  /* the steps of an update; rows: measurements, and joints more where the bias jumped */
+  void propagate(std::size_t rows);
+  void add_noise(std::size_t rows);
+  bool factor(std::size_t rows);
+  void find_innovations(std::size_t rows);
+  void whiten(std::size_t rows);
+  void correct();
+  void keep_within_bounds();
+
+  KalmanSettings settings_;
+  std::vector<double> z_, bias_;
+  std::vector<double> covariance_; /* of (z/scale, b): lower triangle, as symmetric_update.h has it */
+  /* what is gathered; rows of the state's order, samples × joints of them and one more sample's for the jumps */
+  std::size_t gathered_ = 0, updated_ = 0;
+  bool jumped_ = false;
+  double elapsed_ = 0.0;                 /* s since the block's start */
+  std::vector<double> jump_, jump_rows_; /* [n], [n × p] sums since the block's start */
+  std::vector<double> rows_;             /* H */
+  std::vector<double> residual_, noise_, time_;
+  std::vector<unsigned char> use_;
+  /* of the update */
+  std::vector<double> product_;    /* H P, then W */
+  std::vector<double> inner_;      /* H P Hᵀ, then its Cholesky factor: [rows × rows], lower triangle by rows */
+  std::vector<double> pivot_;      /* [rows] variance of each measurement with all before it */
+  std::vector<double> white_;      /* [rows] L⁻¹ (y − ŷ) */
+  std::vector<double> correction_; /* [order] */
+  std::vector<double> innovation_, innovation_variance_;
+};
+
+}  // namespace tendonfmu::estimation
+
+#endif
