@@ -45,7 +45,7 @@ ONLY = {
     "rich": "cli.py",
 }
 # those that draw, and what they share
-DRAWING = {"plot_style.py", "plots.py"}
+DRAWING = {"fit_plots.py", "plot_style.py", "plots.py"}
 
 
 def imports_of(tree: ast.AST) -> Iterator[str]:

@@ -1,0 +1,285 @@
+"""What a fit says on the first screen of its page: plain sentences, the figures that matter, tables of residuals and of
+numbers. All values come from the report.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from tendonfmu.fit_picture import FitPicture
+from tendonfmu.fit_verdicts import CAUSES
+from tendonfmu.judgement import LIMIT
+
+_METHODS = {
+    "batch": "Maximum likelihood over all samples at once (batch)",
+    "ekf": "The extended Kalman filter of the paper (ekf), sample by sample",
+}
+_LIMIT = f"{100 * LIMIT:.0f} %"
+_GROUP = re.compile(r"(joints|tendons)\[(\d+)\]\.?(.*)")
+
+
+@dataclass(frozen=True)
+class Tile:
+    """A figure that matters, and what it is."""
+
+    value: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class ResidualRow:
+    """Of one joint, or of all together: rms in `ResidualTable.unit`, None where unknown. left: residual over torque."""
+
+    name: str
+    torque: float | None
+    start: float | None
+    bias_only: float | None
+    model_only: float | None
+    fitted: float | None
+    left: float | None
+
+
+@dataclass(frozen=True)
+class ResidualTable:
+    """One set of data."""
+
+    title: str
+    unit: str
+    rows: list[ResidualRow]
+
+    @property
+    def all(self) -> ResidualRow:
+        return self.rows[-1]
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """Numbers that the data do not identify for one reason; numbers: entries of the report."""
+
+    reason: str
+    numbers: list[Mapping[str, Any]]
+
+
+@dataclass(frozen=True)
+class NumberGroup:
+    """All estimated numbers of one joint or tendon: (path without it, entry of the report)."""
+
+    name: str
+    identified: int
+    numbers: list[tuple[str, Mapping[str, Any]]]
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Everything of the page that is not a figure."""
+
+    state: str
+    sentences: list[str]
+    tiles: list[Tile]
+    residuals: list[ResidualTable]
+    doubts: list[Doubt]
+    groups: list[NumberGroup]
+    consistency: list[str]
+
+
+def summarise(picture: FitPicture) -> Summary:
+    """From a fit's report and descriptions."""
+    report = picture.report
+    tables = list(residual_tables(picture))
+    return Summary(
+        state=_state(report),
+        sentences=[*_what(picture), *_how(report), *_how_well(tables), _known(report)],
+        tiles=_tiles(report, tables),
+        residuals=tables,
+        doubts=_doubts(report),
+        groups=_groups(picture),
+        consistency=_consistency(picture),
+    )
+
+
+def _state(report: Mapping[str, Any]) -> str:
+    """Empty where nothing is wrong."""
+    if not report["finished"]:
+        return "Unfinished: the fit was interrupted. These are the best values so far."
+    return "" if report["converged"] else "Not converged: the values may still change with more iterations."
+
+
+# --- residuals --------------------------------------------------------------------------------------------------------
+
+
+def residual_tables(picture: FitPicture) -> Iterator[ResidualTable]:
+    """Training, held-out data, and each comparison."""
+    residual = picture.report["residual"]
+    sets = [("Training", residual["train"]), ("Held out of training", residual.get("held_out"))]
+    sets += [(f"Not trained on: {each['label']}", each) for each in residual.get("comparisons") or []]
+    for title, found in sets:
+        if found and found.get("rms"):
+            yield _table(title, found, picture.joint_names)
+
+
+def _table(title: str, found: Mapping[str, Any], joints: Sequence[str]) -> ResidualTable:
+    keys = ("torque_rms", "start_rms", "bias_only_rms", "model_only_rms", "rms")
+    columns = [[math.nan if value is None else float(value) for value in found.get(key) or []] for key in keys]
+    factor, unit = (1e3, "mN·m") if max(columns[0], default=0.0) < 2.0 else (1.0, "N·m")
+    rows = [[column[j] if j < len(column) else math.nan for column in columns] for j in range(len(joints))]
+    rows.append([_together(column) for column in columns])
+    found_rows = []
+    for name, (torque, *others) in zip([*joints, "all joints"], rows, strict=True):
+        start, bias_only, model_only, fitted = (_known_or_none(factor * value) for value in others)
+        left = _known_or_none(others[-1] / torque) if torque > 0 else None
+        found_rows.append(
+            ResidualRow(name, _known_or_none(factor * torque), start, bias_only, model_only, fitted, left)
+        )
+    return ResidualTable(title, unit, found_rows)
+
+
+def _together(values: Sequence[float]) -> float:
+    """rms over all joints of the rms of each."""
+    return math.sqrt(sum(value * value for value in values) / len(values)) if values else math.nan
+
+
+def _known_or_none(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+# --- sentences --------------------------------------------------------------------------------------------------------
+
+
+def _what(picture: FitPicture) -> Iterator[str]:
+    report, recordings = picture.report, picture.report["recordings"]
+    seconds = sum(each["duration"] or 0.0 for each in recordings)
+    used, held = (sum(each[key] for each in recordings) for key in ("used", "held_out"))
+    one = len(recordings) == 1
+    source = f"one recording of {seconds:.4g} s" if one else f"{len(recordings)} recordings of {seconds:.4g} s together"
+    finger = f"{_count(picture.joint_names, 'joint')}, {_count(picture.tendon_names, 'tendon')}"
+    sentence = (
+        f"{report['identified']['of']} numbers of the friction of {report['finger']} ({finger}) were estimated at once "
+        f"from {source}: {_thousands(used)} samples"
+    )
+    yield sentence + (f", and {_thousands(held)} held out to judge by." if held else ".")
+    out = sum(each.get("contact_left_out") or 0 for each in recordings)
+    if out:
+        yield f"{_thousands(out)} samples with contact were left out."
+
+
+def _count(names: Sequence[str], what: str) -> str:
+    return f"{len(names)} {what}" + ("" if len(names) == 1 else "s")
+
+
+def _thousands(number: int) -> str:
+    return f"{number:,}".replace(",", "\u202f")
+
+
+def _how(report: Mapping[str, Any]) -> Iterator[str]:
+    method = _METHODS.get(report["method"], str(report["method"]))
+    rounds = "" if report["method"] == "ekf" else f", {report['iterations']} iterations"
+    yield f"{method}{rounds}, {report['seconds']:.3g} s."
+
+
+def _how_well(tables: Sequence[ResidualTable]) -> Iterator[str]:
+    for table in tables:
+        row = table.all
+        if row.fitted is None or row.left is None or not row.torque:
+            continue
+        text = (
+            f"{table.title}: {row.fitted:.3g} of {row.torque:.3g} {table.unit} of torque are left, {_percent(row.left)}"
+        )
+        if row.start is not None:
+            text += f"; with the numbers it started from {_percent(row.start / row.torque)}"
+        if table is tables[0] and row.bias_only is not None and row.model_only is not None:
+            text += (
+                f". The bias alone, without friction, leaves {_percent(row.bias_only / row.torque)}; the friction "
+                f"alone, with a constant bias, {_percent(row.model_only / row.torque)}"
+            )
+        yield text + "."
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %" if share >= 0.0995 else f"{100 * share:.1f} %"
+
+
+def _known(report: Mapping[str, Any]) -> str:
+    count, of = report["identified"]["count"], report["identified"]["of"]
+    if count == of:
+        return f"All {of} numbers are identified: their standard errors are at most {_LIMIT} of their values."
+    return (
+        f"{count} of {of} numbers are identified, with standard errors of at most {_LIMIT} of their values; what would "
+        f"identify the other {of - count} is said below."
+    )
+
+
+def _tiles(report: Mapping[str, Any], tables: Sequence[ResidualTable]) -> list[Tile]:
+    tiles = [
+        Tile(_percent(table.all.left), f"of the torque is left: {table.title[0].lower() + table.title[1:]}")
+        for table in tables[:3]
+        if table.all.left is not None
+    ]
+    if tables and tables[0].all.bias_only is not None and tables[0].all.torque:
+        tiles.append(Tile(_percent(tables[0].all.bias_only / tables[0].all.torque), "would be left by the bias alone"))
+    return [*tiles, Tile(f"{report['identified']['count']}/{report['identified']['of']}", "numbers identified")]
+
+
+def _consistency(picture: FitPicture) -> list[str]:
+    """NIS and whiteness in words."""
+    found = picture.report["innovations"]
+    nis, lag_one = found["nis"], found["whiteness"]["lag_one"]
+    sentences = []
+    if nis.get("mean") is not None:
+        low, high = nis["interval"]
+        if nis["consistent"]:
+            meaning = "as large as the noise that the description states"
+        else:
+            size = "larger" if nis["mean"] > 1 else "smaller"
+            meaning = (
+                f"{size} than the noise that the description states, by a factor of {math.sqrt(nis['mean']):.2g}; the "
+                f"standard errors are {'too small' if size == 'larger' else 'too large'} by about as much"
+            )
+        sentences.append(
+            f"Mean squared standardised innovation (NIS) {nis['mean']:.3g}; expected 1, in 95 % of cases between "
+            f"{low:.4g} and {high:.4g}. The innovations are {meaning}."
+        )
+    strong = [
+        f"{name} {value:.2f}"
+        for name, value in zip(picture.joint_names, lag_one, strict=True)
+        if value is not None and abs(value) > 0.1
+    ]
+    if strong:
+        sentences.append(
+            f"Autocorrelation from sample to sample: {', '.join(strong)}. White innovations have none: what is left "
+            "has a shape in time that the model lacks, and the standard errors count each sample as new."
+        )
+    return sentences
+
+
+# --- numbers ----------------------------------------------------------------------------------------------------------
+
+
+def _doubts(report: Mapping[str, Any]) -> list[Doubt]:
+    """Numbers not identified, by reason, most frequent first."""
+    by_reason: dict[str, list[Mapping[str, Any]]] = {}
+    for entry in report["parameters"]:
+        if not entry["identified"]:
+            by_reason.setdefault(entry.get("reason") or "unknown", []).append(entry)
+    ordered = sorted(by_reason.items(), key=lambda item: -len(item[1]))
+    return [Doubt(CAUSES.get(reason, reason), numbers) for reason, numbers in ordered]
+
+
+def _groups(picture: FitPicture) -> list[NumberGroup]:
+    """All numbers by joint and tendon, in the order of the report."""
+    found: dict[str, list[tuple[str, Mapping[str, Any]]]] = {}
+    for entry in picture.report["parameters"]:
+        match = _GROUP.fullmatch(entry["path"])
+        if match is None:
+            found.setdefault("Others", []).append((entry["path"], entry))
+            continue
+        names = picture.joint_names if match[1] == "joints" else picture.tendon_names
+        number = int(match[2])
+        found.setdefault(f"{match[1][:-1].capitalize()} {number}: {names[number - 1]}", []).append((match[3], entry))
+    return [
+        NumberGroup(name, sum(bool(entry["identified"]) for _, entry in numbers), numbers)
+        for name, numbers in found.items()
+    ]
