@@ -75,11 +75,13 @@ def make_recording(
     start_bias: Array | float = 0.0,
     noise_in_forces: bool = False,
     quiet: bool = False,
+    settled: float = SETTLED,
 ) -> MadeRecording:
     """A recording of a motion (`time` [N], `joint_position`, `joint_velocity` [N, n]) with its true bias and noise.
 
     internal_force: [N, m] or [m] N; what of it acts on the joints is replaced by the balancing forces.
-    start_bias: [n] N·m. quiet: no noise and no wandering, jumps only.
+    start_bias: [n] N·m. quiet: no noise and no wandering, jumps only. settled: in place of
+    SETTLED, more where a long recording's rounding stays above that.
     Raises ValueError where the fixed point is not found or a tendon goes slack.
     """
     rng = np.random.default_rng(seed)
@@ -105,7 +107,7 @@ def make_recording(
         change = np.abs(wanted - torque).max()
         torque = wanted
         force = inner + torque @ balance
-        if change <= SETTLED * max(np.abs(torque).max(), 1e-6):
+        if change <= settled * max(np.abs(torque).max(), 1e-6):
             break
     else:
         raise ValueError(
