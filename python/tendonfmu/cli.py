@@ -8,6 +8,8 @@ The only module that prints. Results go to files or standard output, messages to
 from __future__ import annotations
 
 import sys
+import warnings
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -269,6 +271,7 @@ def excite(
 
     from tendonfmu import excite as exciting
     from tendonfmu.excitation import Plan
+    from tendonfmu.excite_text import lines, tables
     from tendonfmu.rig import description_files, is_rig
     from tendonfmu.tables import check_format, write_table
     from tendonfmu.whole_file import check_output, whole_file
@@ -294,28 +297,151 @@ def excite(
         everything = exciting.report(result, shlex.join(["tendonfmu", *sys.argv[1:]]))
         with whole_file(report) as temporary:
             temporary.write_text(json.dumps(everything, indent=1) + "\n", encoding="utf-8")
-    _print_excitation(result)
+    _print_tables(tables(result), lines(result), left="cannot be identified")
     _say(f"{output}: {len(result.motion.time)} rows, {result.motion.time[-1]:g} s")
 
 
-def _print_excitation(result: Any) -> None:
+def _print_tables(tables: Iterable[Any], lines: Iterable[str], left: str) -> None:
+    """Tables of (title, headings, rows), then lines. left: heading of a further column that is text."""
     from rich.console import Console
     from rich.table import Table
-
-    from tendonfmu.excite_text import lines, tables
 
     console = Console()
     if not console.is_terminal:  # nothing to fit into: no broken lines
         console.width = 160
-    for title, headings, rows in tables(result):
+    for title, headings, rows in tables:
         table = Table(title=title, title_justify="left")
         for k, heading in enumerate(headings):
-            table.add_column(heading, justify="right" if k > 0 and heading != "cannot be identified" else "left")
+            table.add_column(heading, justify="right" if k > 0 and heading != left else "left")
         for row in rows:
             table.add_row(*row)
         console.print(table)
-    for line in lines(result):
+    for line in lines:
         console.print(line, highlight=False, soft_wrap=True)
+
+
+@app.command()
+def fit(
+    finger: FingerFile,
+    recordings: Annotated[list[Path], typer.Argument(metavar="RECORDING...", help="free motion, .csv or .parquet")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FITTED.json", help="description to write")],
+    method: Annotated[str, typer.Option(metavar="batch|ekf", help="maximum likelihood, or Kalman filter")] = "batch",
+    report: Annotated[Path | None, typer.Option(metavar="R.json", help="everything that is known of the fit")] = None,
+    figures: Annotated[Path | None, typer.Option(metavar="DIR", help="folder for figures and report.html")] = None,
+    compare: Annotated[
+        list[Path] | None, typer.Option(metavar="RECORDING", help="judged, not trained on; may be repeated")
+    ] = None,
+    holdout: Annotated[
+        float, typer.Option(min=0.0, max=0.9, metavar="SHARE", help="of the time, not trained on")
+    ] = 0.0,
+    holdout_block: Annotated[float, typer.Option(min=1.0, metavar="SECONDS", help="longest block held out")] = 10.0,
+    kinematics: Annotated[
+        int,
+        typer.Option(
+            min=1, max=3, help="1: tendon positions, 2: measured joint positions, 3: joint positions and velocities"
+        ),
+    ] = 1,
+    only: Annotated[
+        list[str] | None, typer.Option(metavar="PATTERN", help="estimate these numbers alone; may be repeated")
+    ] = None,
+    fix: Annotated[
+        list[str] | None, typer.Option(metavar="PATTERN", help="keep these numbers; may be repeated")
+    ] = None,
+    share: Annotated[
+        list[str] | None,
+        typer.Option(metavar="tendons|pulleys|PATTERN", help="laws that share their values; may be repeated"),
+    ] = None,
+    asymmetric: Annotated[
+        bool | None, typer.Option("--asymmetric/--symmetric", help="each side of a law on its own, or both the same")
+    ] = None,
+    prior: Annotated[
+        float, typer.Option(min=1e-6, max=1e6, help="what is known beforehand: standard deviation / magnitude")
+    ] = 1.0,
+    scale: Annotated[
+        list[str] | None, typer.Option(metavar="PATTERN=VALUE", help="expected magnitude, if not the description's")
+    ] = None,
+    passes: Annotated[int, typer.Option(min=1, help="most passes over the data (batch)")] = 60,
+    tolerance: Annotated[float, typer.Option(min=1e-9, max=0.5, help="last step in standard errors (batch)")] = 1e-3,
+    drift: Annotated[float, typer.Option(min=0.0, max=1.0, help="relative variance of the numbers per s (ekf)")] = 0.0,
+    resume: Annotated[
+        Path | None, typer.Option(metavar="FITTED.unfinished.json", help="go on from an interrupted fit")
+    ] = None,
+    progress: Annotated[
+        bool | None, typer.Option("--progress/--no-progress", help="progress bar; by default on a terminal")
+    ] = None,
+) -> None:
+    """Estimate the numbers of a finger from recordings of free motion, and say how well each is known.
+
+    PATTERN is a path of the description, such as tendons[*].edge_friction[2]*.viscous; * stands for anything. Ctrl-C
+    leaves the best so far in FITTED.unfinished.json.
+    """
+    from tendonfmu.fit_files import check_outputs, write_text, write_unfinished
+    from tendonfmu.fit_report import report_text
+    from tendonfmu.fit_text import lines, tables
+    from tendonfmu.fitting import FitWarning, FrictionFit
+
+    inputs = [finger, *recordings, *(compare or [])]
+    check_outputs(output, report, figures, inputs)
+    with _progress(progress) as bar:
+        fitting = FrictionFit(
+            finger,
+            method,
+            kinematics=kinematics,
+            holdout=holdout,
+            holdout_block=holdout_block,
+            sides="given" if asymmetric is None else "asymmetric" if asymmetric else "symmetric",
+            only=only or [],
+            fix=fix or [],
+            share=share or [],
+            prior=prior,
+            scale=scale or [],
+            max_passes=passes,
+            tolerance=tolerance,
+            parameter_drift=drift,
+            start=resume,
+            progress=_fit_bar(bar),
+        )
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", FitWarning)  # said below, a line each
+                fitting.fit(recordings, compare=compare or [])
+        except KeyboardInterrupt:
+            if fitting.unfinished_ is None:
+                raise
+            bar.stop()
+            left = write_unfinished(output, fitting.unfinished_)
+            _say(f"tendonfmu: interrupted; the best so far is in {left}; --resume {left} goes on from there")
+            sys.exit(INTERRUPTED)
+    for sentence in fitting.warnings_:
+        _say(f"tendonfmu: warning: {sentence}")
+    write_text(output, fitting.description_text())
+    if report is not None:
+        write_text(report, report_text(fitting.report_))
+    _print_tables(tables(fitting), lines(fitting), left="joint")
+    _say(f"{output}: {len(fitting.parameters_)} numbers estimated")
+    if figures is not None:
+        from tendonfmu.fit_page import write_fit_page
+
+        for path, what in write_fit_page(fitting.picture(), figures).items():
+            _say(f"{path}: {what}")
+
+
+def _fit_bar(bar: Progress) -> Any:
+    """Shows where a fit is: its phase, cost and samples per second."""
+    task = bar.add_task("reading", total=None)
+    phase = ""
+
+    def show(now: Any) -> None:
+        nonlocal phase
+        if now.phase != phase:
+            bar.reset(task, total=now.total)
+            phase = now.phase
+        speed = bar.tasks[0].speed
+        rate = f", {speed:,.0f} samples/s" if speed else ""
+        cost = f", cost {now.cost:.6g}" if now.cost == now.cost else ""
+        bar.update(task, completed=now.done, total=now.total, description=f"{phase}{cost}{rate}")
+
+    return show
 
 
 @app.command()
@@ -326,6 +452,7 @@ def demo(
 ) -> None:
     """The whole story on built-in data: build an FMU, run it over three recordings, show what it feels."""
     from tendonfmu.demo import run_demo
+    from tendonfmu.demo_text import demo_lines, demo_tables
 
     with _progress() as bar:
         task = bar.add_task("samples", total=None)
@@ -334,38 +461,7 @@ def demo(
             bar.update(task, completed=done, total=total)
 
         result = run_demo(output, progress=show)
-    _print_demo(result)
-
-
-def _print_demo(result: Any) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    free, more, pushed = result.recordings
-    table = Table(title=f"{result.finger}: joint torque → left after compensation, rms in mN·m")
-    table.add_column("")
-    for letter, motion, recording in (("a", "free", free), ("b", "the same", more), ("c", "no push", pushed)):
-        table.add_column(f"({letter}) {motion}\n{recording.mean_force:.0f} N", justify="right")
-    table.add_column("(c) pushed\nexternal → error", justify="right")
-    for joints in zip(*(recording.joints for recording in result.recordings), strict=True):
-        cells = [f"{1e3 * joint.measured:.1f} → {1e3 * joint.left:.1f}" for joint in joints]
-        table.add_row(joints[0].name, *cells, f"{1e3 * joints[2].load:.1f} → {1e3 * joints[2].error:.1f}")
-    console = Console()
-    console.print(table)
-    console.print(f"(c) {pushed.score.found} of {pushed.score.pushes} pushes found", highlight=False)
-    for letter, recording in zip("abc", result.recordings, strict=True):
-        console.print(f"({letter}) alarms without a push: {_alarms(recording.score)}", highlight=False, soft_wrap=True)
-    for path, what in result.files.items():
-        console.print(f"  {path}  {what}", highlight=False, soft_wrap=True)
-
-
-def _alarms(score: Any) -> str:
-    if not score.outside:
-        return "none"
-    begin, end = max(score.outside, key=lambda alarm: alarm[1] - alarm[0])
-    many = f"{len(score.outside)}, {100 * score.outside_share:.1f} % of the time"
-    feeds = " (in contact the bias is frozen: an alarm can feed itself)" if end - begin > 1.0 else ""
-    return f"{many}, the longest {end - begin:.1f} s from {begin:.1f} s on{feeds}"
+    _print_tables(demo_tables(result), demo_lines(result), left="")
 
 
 def _progress(wanted: bool | None = None) -> Progress:

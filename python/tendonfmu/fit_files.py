@@ -1,0 +1,158 @@
+"""The files of a fit: the fitted description, and what an interrupted fit leaves to go on from."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu import native
+from tendonfmu.description import FingerDescription
+from tendonfmu.errors import InputError
+from tendonfmu.fit_structure import Structure, set_number
+from tendonfmu.json_node import read_json
+from tendonfmu.whole_file import check_output, whole_file
+
+Numbers = NDArray[np.float64]
+
+UNFINISHED = "tendonfmu-fit-unfinished-1"
+DIGITS = 10  # of a fitted number; far below any standard error, and enough to keep static above coulomb friction
+_WIDTH = 110  # of a line of JSON that stays one line
+
+
+def check_outputs(output: Path, report: Path | None, figures: Path | None, inputs: Sequence[Path]) -> None:
+    """Raises InputError where a result cannot be written, or would take the place of an input."""
+    for file in (output, *([report] if report is not None else [])):
+        if file.suffix.lower() != ".json":
+            raise InputError(f"{file}: expected a name that ends in .json")
+        check_output(file, *inputs)
+    if report is not None and report.resolve() == output.resolve():
+        raise InputError(f"{report}: the same file for description and report; expected two names")
+    if figures is not None and figures.exists() and not figures.is_dir():
+        raise InputError(f"{figures}: a file; expected a folder, or a name for one")
+
+
+# --- descriptions -----------------------------------------------------------------------------------------------------
+
+
+def with_values(structure: Structure, values: Numbers) -> FingerDescription:
+    """The start's description with the estimated numbers replaced; all else as it was.
+
+    values: [p] of all parameters, in canonical order.
+    """
+    data = copy.deepcopy(dict(structure.start.data))
+    for number in structure.numbers:
+        for path in (number.path, number.with_path):
+            if path is not None:
+                set_number(data, path, float(f"{values[structure.index[path]]:.{DIGITS}g}"))
+    text = description_text(data).encode()
+    try:
+        return FingerDescription(structure.start.path, text, data, native.image_from_json(text))
+    except native.NativeError as refused:  # a fit keeps every bound, so this is no fault of the user's
+        raise InputError(f"{structure.start.path}: the fitted description is refused: {refused}") from None
+
+
+def description_text(data: Mapping[str, Any]) -> str:
+    """JSON as a person would lay it out: a law, or a list of numbers, on one line."""
+    return _laid_out(data, "") + "\n"
+
+
+def _laid_out(value: Any, indent: str) -> str:
+    flat = json.dumps(value, ensure_ascii=False)
+    inner = list(value.values()) if isinstance(value, dict) else value if isinstance(value, list) else []
+    leaf = not any(isinstance(each, dict | list) for each in inner)
+    if not inner or (leaf and len(indent) + len(flat) <= _WIDTH):
+        return flat
+    deeper = indent + "  "
+    if isinstance(value, dict):
+        parts = [f"{json.dumps(key, ensure_ascii=False)}: {_laid_out(each, deeper)}" for key, each in value.items()]
+        return "{\n" + ",\n".join(deeper + part for part in parts) + f"\n{indent}}}"
+    parts = [_laid_out(each, deeper) for each in value]
+    return "[\n" + ",\n".join(deeper + part for part in parts) + f"\n{indent}]"
+
+
+def write_text(path: Path, text: str) -> None:
+    """Whole or not at all."""
+    with whole_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+# --- an interrupted fit -----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Unfinished:
+    """The best so far. z: [u]. unknowns: "path role" of each. cost: negative log likelihood with the prior, or NaN."""
+
+    finger: str
+    method: str
+    z: Numbers
+    unknowns: Sequence[str]
+    cost: float
+    options: Mapping[str, Any]
+    description: Mapping[str, Any]
+
+
+def unfinished_path(output: Path) -> Path:
+    """Where an interrupted fit to `output` leaves what it has."""
+    return output.with_name(f"{output.stem}.unfinished.json")
+
+
+def write_unfinished(output: Path, found: Unfinished) -> Path:
+    """Beside `output`; returns the file."""
+    content = {
+        "format": UNFINISHED,
+        "finger": found.finger,
+        "method": found.method,
+        "cost": None if np.isnan(found.cost) else found.cost,
+        "options": dict(found.options),
+        "unknowns": list(found.unknowns),
+        "z": [float(value) for value in found.z],
+        "description": dict(found.description),
+    }
+    path = unfinished_path(output)
+    write_text(path, json.dumps(content, indent=1, ensure_ascii=False) + "\n")
+    return path
+
+
+def read_unfinished(path: Path) -> Unfinished:
+    """Raises InputError: no such file, another format, a key that is missing or wrong."""
+    content = read_json(path, "what an interrupted fit left")
+    if not isinstance(content, dict) or content.get("format") != UNFINISHED:
+        found = content.get("format") if isinstance(content, dict) else None
+        raise InputError(f'{path}: format = {json.dumps(found)}; expected "{UNFINISHED}", of an interrupted fit')
+    numbers, names, data = content.get("z"), content.get("unknowns"), content.get("description")
+    if not isinstance(numbers, list) or not all(type(z) in (int, float) for z in numbers):
+        raise InputError(f"{path}: z: expected a list of numbers")
+    if not isinstance(names, list) or len(names) != len(numbers) or not isinstance(data, dict):
+        raise InputError(
+            f"{path}: unknowns, description: expected one name for each of the {len(numbers)} z, and an object"
+        )
+    return Unfinished(
+        finger=str(content.get("finger")),
+        method=str(content.get("method")),
+        z=np.array(numbers, dtype=float),
+        unknowns=[str(name) for name in names],
+        cost=float("nan") if content.get("cost") is None else float(content["cost"]),
+        options=content.get("options") or {},
+        description=data,
+    )
+
+
+def resumed_start(path: Path, unknowns: Sequence[str]) -> Numbers:
+    """[u] where to go on. Raises InputError unless the interrupted fit estimated the same unknowns."""
+    found = read_unfinished(path)
+    if list(found.unknowns) == list(unknowns):
+        return found.z
+    other = sorted(set(found.unknowns) ^ set(unknowns))
+    what = f"such as {other[0]}" if other else "in another order"
+    raise InputError(
+        f"{path}: an interrupted fit of {len(found.unknowns)} unknowns, {len(unknowns)} are asked for now ({what} "
+        "is not in both); expected the same finger, --asymmetric, --only, --fix and --share"
+    )

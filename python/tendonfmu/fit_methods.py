@@ -1,0 +1,149 @@
+"""The two methods of a fit, over the estimator of `estimation.py`: what they are given, and what they leave."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.estimation import Estimator
+from tendonfmu.fit_recordings import FitRecording
+from tendonfmu.fit_structure import Structure
+
+Numbers = NDArray[np.float64]
+Start = Callable[[Sequence[str]], Numbers]
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a fit is. phase: in words. done, total: samples of this phase. cost: so far, NaN where not known."""
+
+    phase: str
+    iteration: int
+    done: int
+    total: int
+    cost: float
+
+
+@dataclass(frozen=True)
+class Learned:
+    """A finished estimation. covariance: [u, u] of z, prior included; information: [u, u] of the data alone.
+    innovations: standardised [N, n] by recording where the method has its own, else empty.
+    """
+
+    estimator: Estimator
+    z: Numbers
+    covariance: Numbers
+    information: Numbers
+    cost: float
+    iterations: int
+    passes: int
+    converged: bool
+    innovations: list[Numbers]
+
+
+class Interrupted(Exception):
+    """The estimation was stopped; what it had. by_user: by Ctrl-C."""
+
+    def __init__(self, estimator: Estimator, z: Numbers, cost: float, by_user: bool) -> None:
+        super().__init__("stopped")
+        self.estimator, self.z, self.cost, self.by_user = estimator, z, cost, by_user
+
+
+class Watch:
+    """Passes progress on, and remembers that somebody wants to stop: Ctrl-C while the library computes shows here."""
+
+    def __init__(self, progress: Callable[[Progress], bool | None] | None) -> None:
+        self._progress = progress
+        self.stopped, self.by_user = False, False
+
+    def __call__(self, progress: Progress) -> bool:
+        """Whether to go on."""
+        try:
+            answer = self._progress(progress) if self._progress is not None else None
+        except KeyboardInterrupt:
+            self.by_user = True
+            answer = False
+        self.stopped = self.stopped or answer is False
+        return not self.stopped
+
+
+def unknown_names(estimator: Estimator) -> list[str]:
+    """[u] path of each unknown with its role: `….drop` is static − coulomb, `….rate` 1/stribeck_velocity."""
+    return [
+        unknown.path if unknown.role == "value" else f"{unknown.path.rsplit('.', 1)[0]}.{unknown.role}"
+        for unknown in estimator.unknowns
+    ]
+
+
+def _estimator(structure: Structure) -> Estimator:
+    return Estimator(structure.start.image, structure.group, structure.scale)
+
+
+def _starting_point(estimator: Estimator, start: Start | None) -> Numbers:
+    if start is None:
+        return estimator.start
+    low, high = (np.array([getattr(unknown, end) for unknown in estimator.unknowns]) for end in ("lower", "upper"))
+    return np.clip(start(unknown_names(estimator)), low, high)
+
+
+def _rows(recording: FitRecording, part: slice) -> dict[str, Any]:
+    """What the estimator takes of one part."""
+    external = recording.external
+    return {
+        "arrays": recording.arrays(part),
+        "kinematics_source": recording.kinematics,
+        "external_torque": None if external is None else np.ascontiguousarray(external[part]),
+        "use": np.ascontiguousarray(recording.train[part]),
+    }
+
+
+def learn_batch(
+    structure: Structure,
+    recordings: Sequence[FitRecording],
+    watch: Watch,
+    options: Mapping[str, Any],
+    start: Start | None,
+) -> Learned:
+    """Maximum likelihood. Raises Interrupted."""
+    estimator = _estimator(structure)
+    begin = _starting_point(estimator, start)
+    for recording in recordings:
+        for part in recording.parts:
+            if recording.train[part].any():
+                estimator.add_recording(**_rows(recording, part))
+    best, best_cost = begin, float("nan")
+
+    def show(number: int, stride: int, done: int, total: int, cost: float, z: Numbers) -> bool:
+        nonlocal best, best_cost
+        best, best_cost = np.array(z, dtype=float), float(cost)
+        phase = f"pass {number}" if stride == 1 else f"pass {number}, 1 of {stride} samples"
+        return watch(Progress(phase, number, done, total, cost))
+
+    try:
+        found = estimator.fit(
+            begin,
+            prior_std=options["prior"],
+            max_passes=options["max_passes"],
+            tolerance=options["tolerance"],
+            threads=options["threads"],
+            progress=show,
+        )
+    except KeyboardInterrupt:
+        raise Interrupted(estimator, best, best_cost, by_user=True) from None
+    if watch.stopped or found.stopped:
+        raise Interrupted(estimator, found.z, found.cost, watch.by_user)
+    return Learned(
+        estimator=estimator,
+        z=found.z,
+        covariance=found.covariance,
+        information=found.information,
+        cost=found.cost,
+        iterations=found.steps,
+        passes=found.passes,
+        converged=found.converged,
+        innovations=[],
+    )

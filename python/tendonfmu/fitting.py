@@ -1,0 +1,406 @@
+"""Learning a finger's friction from contact-free motion, in the manner of scikit-learn.
+
+from tendonfmu.fitting import FrictionFit
+
+fit = FrictionFit("finger.json", holdout=0.2).fit(["monday.parquet", "tuesday.parquet"])
+fit.parameters_["tendons[1].edge_friction[2].coulomb"], fit.report_["residual"]["held_out"]["rms"]
+fit.score("wednesday.parquet")
+"""
+
+from __future__ import annotations
+
+import inspect
+import json
+import os
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu import native
+from tendonfmu.coverage import EffectCoverage, coverage_of
+from tendonfmu.description import FingerDescription, read_finger
+from tendonfmu.errors import InputError
+from tendonfmu.fit_evaluation import Evaluation, evaluate, model_over, residuals
+from tendonfmu.fit_files import Unfinished, description_text, resumed_start, with_values
+from tendonfmu.fit_methods import Interrupted, Learned, Watch, learn_batch, unknown_names
+from tendonfmu.fit_picture import FitPicture, FitSeries
+from tendonfmu.fit_recordings import (
+    FitRecording,
+    Held,
+    motion_of,
+    prepare,
+    refuse_stillness,
+    require_noise,
+    slack_sentences,
+)
+from tendonfmu.fit_report import Outcome, Run, build_report
+from tendonfmu.fit_residuals import bias_settings
+from tendonfmu.fit_structure import Choice, build_structure
+from tendonfmu.fit_verdicts import Fitted, Knowledge, judge_numbers
+from tendonfmu.recording import Recording, read_recording
+
+Numbers = NDArray[np.float64]
+Finger = FingerDescription | Mapping[str, Any] | str | os.PathLike[str]
+Source = Recording | str | os.PathLike[str]
+
+METHODS = {"batch": learn_batch}
+LEAST_NIS, MOST_NIS, MOST_LAG_ONE = 0.5, 2.0, 0.3  # beyond, a warning
+SIDES = ("given", "symmetric", "asymmetric")
+
+
+class FitWarning(UserWarning):
+    """Something about the recordings or the fit that a user should know; also in `FrictionFit.warnings_`."""
+
+
+class FrictionFit:
+    """Estimates the numbers of a finger description (paper, sections V and VI).
+
+    finger: description: its file, parsed JSON, or as `read_finger` gives it. What is absent there stays absent.
+    method: "batch", maximum likelihood; or "ekf", the paper's extended Kalman filter.
+    kinematics: 1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
+    holdout: share of time not trained on, evenly spread blocks of `holdout_block` s or less.
+    sides: "given", "symmetric" (both sides of every law equal) or "asymmetric" (each on its own).
+    only, fix: patterns of the numbers to estimate, or not to; share: "tendons", "pulleys" or patterns of what
+        shares its values. Patterns are those of `fit_structure`.
+    prior: standard deviation known beforehand, in units of each number's expected magnitude; scale: "PATTERN=VALUE",
+        expected magnitudes other than the description's own values.
+    max_passes (over the data), tolerance (of the last step, in standard errors), threads (0: all cores): of "batch".
+    parameter_drift: of the filter, relative variance per s with which the parameters may wander.
+    start: file of an interrupted fit to go on from. progress: called with a `fit_methods.Progress`; False stops.
+
+    After `fit`: description_ (fitted), parameters_ and standard_errors_ (by path), covariance_ [p, p] in their order,
+    report_ (JSON of `tendonfmu fit --report`), warnings_, finished_, converged_, n_iter_, cost_, z_, unknowns_.
+    """
+
+    def __init__(
+        self,
+        finger: Finger,
+        method: str = "batch",
+        *,
+        kinematics: int = 1,
+        holdout: float = 0.0,
+        holdout_block: float = 10.0,
+        sides: str = "given",
+        only: Sequence[str] = (),
+        fix: Sequence[str] = (),
+        share: Sequence[str] = (),
+        prior: float = 1.0,
+        scale: Sequence[str] = (),
+        max_passes: int = 60,
+        tolerance: float = 1e-3,
+        threads: int = 0,
+        parameter_drift: float = 0.0,
+        start: str | os.PathLike[str] | None = None,
+        progress: Callable[[Any], bool | None] | None = None,
+    ) -> None:
+        self.finger = finger
+        self.method = method
+        self.kinematics = kinematics
+        self.holdout = holdout
+        self.holdout_block = holdout_block
+        self.sides = sides
+        self.only = only
+        self.fix = fix
+        self.share = share
+        self.prior = prior
+        self.scale = scale
+        self.max_passes = max_passes
+        self.tolerance = tolerance
+        self.threads = threads
+        self.parameter_drift = parameter_drift
+        self.start = start
+        self.progress = progress
+
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
+        """Constructor arguments by name."""
+        return {name: getattr(self, name) for name in list(inspect.signature(type(self).__init__).parameters)[1:]}
+
+    def set_params(self, **params: Any) -> FrictionFit:
+        """Changes constructor arguments; raises ValueError for a name that is none."""
+        known = self.get_params()
+        for name, value in params.items():
+            if name not in known:
+                raise ValueError(f"no parameter {name!r}; expected one of {', '.join(known)}")
+            setattr(self, name, value)
+        return self
+
+    def __repr__(self) -> str:
+        defaults = inspect.signature(type(self).__init__).parameters
+        given = {name: value for name, value in self.get_params().items() if value is not defaults[name].default}
+        return f"FrictionFit({', '.join(f'{name}={value!r}' for name, value in given.items())})"
+
+    # --- fit ----------------------------------------------------------------------------------------------------------
+
+    def fit(self, recordings: Source | Sequence[Source], compare: Source | Sequence[Source] = ()) -> FrictionFit:
+        """Learns from recordings, each with a bias path of its own. compare: recordings to judge only.
+
+        Raises InputError where nothing sound can come of it. Ctrl-C, or progress returning False, leaves `finished_`
+        False and the best so far in `unfinished_`; Ctrl-C goes on as KeyboardInterrupt.
+        """
+        self._check_options()
+        self.finished_ = False
+        self.unfinished_: Unfinished | None = None
+        finger = _read_finger(self.finger)
+        structure = build_structure(finger, Choice(self.sides, self.only, self.fix, self.share, self.scale))
+        self.structure_, self.start_ = structure, structure.start
+        held = Held(self.holdout, self.holdout_block)
+        self.recordings_ = [self._prepared(each, held) for each in _listed(recordings)]
+        if not self.recordings_:
+            raise InputError("no recording; expected at least one")
+        compared = [self._prepared(each, Held()) for each in _listed(compare)]
+        require_noise(self.start_, self.recordings_)
+        found = self._motion_warnings()
+        learned = self._learn(Watch(self.progress))
+        if learned is None:
+            return self
+        self._conclude(learned, compared, found)
+        return self
+
+    def _check_options(self) -> None:
+        checks = (
+            (self.method in METHODS, "method", self.method, " or ".join(METHODS)),
+            (self.sides in SIDES, "sides", self.sides, ", ".join(SIDES)),
+            (self.kinematics in (1, 2, 3), "kinematics", self.kinematics, "1, 2 or 3"),
+            (0 <= self.holdout <= 0.9, "holdout", self.holdout, "a share from 0 to 0.9"),
+            (self.holdout_block >= 1, "holdout_block", self.holdout_block, "at least 1 s"),
+            (
+                0 < self.prior <= 1e6,
+                "prior",
+                self.prior,
+                "above 0 and at most 1e6, in units of the expected magnitudes",
+            ),
+            (self.max_passes >= 1, "max_passes", self.max_passes, "at least 1"),
+            (0 < self.tolerance < 1, "tolerance", self.tolerance, "between 0 and 1"),
+            (0 <= self.parameter_drift <= 1, "parameter_drift", self.parameter_drift, "0 to 1, per s"),
+        )
+        for sound, name, value, expectation in checks:
+            if not sound:
+                raise InputError(f"{name} = {value!r}: expected {expectation}")
+
+    def _prepared(self, source: Source, held: Held) -> FitRecording:
+        recording = source if isinstance(source, Recording) else read_recording(source)
+        return prepare(self.start_, recording, self.kinematics, held)
+
+    def _motion_warnings(self) -> list[str]:
+        self.coverage_: list[EffectCoverage] = coverage_of(self.start_.data, *motion_of(self.recordings_))
+        moves = {cover.effect.path: cover.times.positive + cover.times.negative > 0 for cover in self.coverage_}
+        several = len(self.recordings_) > 1
+        found = [
+            f"{each.path}: {sentence}" if several else sentence
+            for each in self.recordings_
+            for sentence in each.warnings
+        ]
+        return [*found, *refuse_stillness(self.start_, self.recordings_, moves)]
+
+    def _learn(self, watch: Watch) -> Learned | None:
+        """None where it was stopped."""
+        begin = perf_counter()
+        learn = METHODS[self.method]
+        options = {
+            "prior": self.prior,
+            "max_passes": self.max_passes,
+            "tolerance": self.tolerance,
+            "threads": self.threads,
+            "parameter_drift": self.parameter_drift,
+        }
+        start = None if self.start is None else partial(resumed_start, Path(self.start))
+        try:
+            learned = learn(self.structure_, self.recordings_, watch, options, start)
+        except Interrupted as stopped:
+            self.unfinished_ = self._unfinished(stopped)
+            if stopped.by_user:
+                raise KeyboardInterrupt from None
+            return None
+        self.seconds_ = perf_counter() - begin
+        return learned
+
+    def _unfinished(self, stopped: Interrupted) -> Unfinished:
+        fitted = with_values(self.structure_, np.asarray(stopped.estimator.values(stopped.z)))
+        return Unfinished(
+            finger=fitted.name,
+            method=self.method,
+            z=stopped.z,
+            unknowns=unknown_names(stopped.estimator),
+            cost=stopped.cost,
+            options=self._options(),
+            description=fitted.data,
+        )
+
+    def _options(self) -> dict[str, Any]:
+        """Those that shape the result, as JSON has them."""
+        left_out = ("finger", "progress", "threads")
+        given = {name: value for name, value in self.get_params().items() if name not in left_out}
+        return {
+            name: os.fspath(value)
+            if isinstance(value, os.PathLike)
+            else list(value)
+            if isinstance(value, tuple)
+            else value
+            for name, value in given.items()
+        }
+
+    def _conclude(self, learned: Learned, compared: list[FitRecording], found: list[str]) -> None:
+        """All learned values, from what was estimated."""
+        self.unknowns_, self.z_, self.z_covariance_ = learned.estimator.unknowns, learned.z, learned.covariance
+        self.description_ = with_values(self.structure_, np.asarray(learned.estimator.values(learned.z)))
+        self.numbers_, self.covariance_ = judge_numbers(self.structure_, self._knowledge(learned))
+        self.parameters_ = {number.number.path: number.value for number in self.numbers_}
+        self.standard_errors_ = {number.number.path: number.standard_error for number in self.numbers_}
+        start, fitted = self.start_.data, self.description_.data
+        self.training_ = [evaluate(start, fitted, each) for each in self.recordings_]
+        self.comparisons_ = [evaluate(start, fitted, each) for each in compared]
+        self.converged_, self.n_iter_, self.cost_ = learned.converged, learned.iterations, learned.cost
+        slack = np.concatenate([each.model.slack[each.recording.train] for each in self.training_])
+        self.warnings_ = [*found, *slack_sentences(slack, self.description_), *_fit_sentences(learned, self.numbers_)]
+        innovations = learned.innovations or [_trained(each) for each in self.training_]
+        run = Run(self.method, learned.converged, learned.iterations, learned.passes, self.seconds_, learned.cost)
+        self.report_ = build_report(
+            Outcome(
+                fitted=self.description_,
+                run=run,
+                options=self._options(),
+                warnings=self.warnings_,
+                numbers=self.numbers_,
+                names=unknown_names(learned.estimator),
+                covariance=learned.covariance,
+                innovations=innovations,
+                training=self.training_,
+                comparisons=self.comparisons_,
+            )
+        )
+        self.warnings_ += _noise_sentences(self.report_["innovations"])
+        self.report_["warnings"] = list(self.warnings_)
+        self.finished_ = True
+        for sentence in self.warnings_:
+            warnings.warn(sentence, FitWarning, stacklevel=3)
+
+    def _knowledge(self, learned: Learned) -> Knowledge:
+        return Knowledge(
+            estimator=learned.estimator,
+            z=learned.z,
+            covariance=learned.covariance,
+            information=learned.information,
+            fitted=self.description_,
+            coverage=coverage_of(self.description_.data, *motion_of(self.recordings_)),
+            noise=bias_settings(self.description_.data).noise,
+        )
+
+    # --- what was learned, on other recordings ------------------------------------------------------------------------
+
+    def predict(self, recording: Source) -> Numbers:
+        """[N, n] N·m: T_eff before the bias learns from the sample itself; NaN where there is none, such as for the
+        first sample. τ, less external_torque where the recording has it, minus this is the residual.
+        """
+        prepared, left = self._left(recording)
+        return np.asarray(prepared.target - left)
+
+    def score(self, recording: Source) -> float:
+        """1 − Σ residual² / Σ (torque − mean)² over all joints and samples without contact; 1 is perfect."""
+        prepared, left = self._left(recording)
+        rows = prepared.tracked & ~np.isnan(left).any(axis=1)
+        torque = prepared.target[rows]
+        return float(1 - np.sum(left[rows] ** 2) / np.sum((torque - torque.mean(axis=0)) ** 2))
+
+    def _left(self, source: Source) -> tuple[FitRecording, Numbers]:
+        if not getattr(self, "finished_", False):
+            raise InputError("FrictionFit: not fitted yet; expected a call of fit that was not interrupted")
+        prepared = self._prepared(source, Held())
+        data = self.description_.data
+        return prepared, residuals(data, prepared, model_over(data, prepared)).residual
+
+    def picture(self) -> FitPicture:
+        """What `fit_page.write_fit_page` draws."""
+        return FitPicture(
+            report=self.report_,
+            start=self.start_.data,
+            fitted=self.description_.data,
+            unknowns=self.unknowns_,
+            z=self.z_,
+            covariance=self.z_covariance_,
+            series=[
+                *(_series(each, "training") for each in self.training_),
+                *(_series(each, "comparison") for each in self.comparisons_),
+            ],
+        )
+
+    def description_text(self) -> str:
+        """The fitted description as JSON, as `tendonfmu fit -o` writes it."""
+        return description_text(self.description_.data)
+
+
+def _read_finger(finger: Finger) -> FingerDescription:
+    if isinstance(finger, FingerDescription):
+        return finger
+    if isinstance(finger, Mapping):
+        text = json.dumps(finger).encode()
+        try:
+            return FingerDescription(Path("finger"), text, finger, native.image_from_json(text))
+        except native.NativeError as refused:
+            raise InputError(f"finger: {refused}") from None
+    return read_finger(Path(finger))
+
+
+def _listed(sources: Source | Sequence[Source]) -> list[Source]:
+    return [sources] if isinstance(sources, Recording | str | os.PathLike) else list(sources)
+
+
+def _trained(found: Evaluation) -> Numbers:
+    """[N, n] standardised innovations of the samples trained on, NaN elsewhere."""
+    return np.where(found.recording.train[:, None], found.fit.standardised, np.nan)
+
+
+def _fit_sentences(learned: Learned, numbers: Sequence[Fitted]) -> list[str]:
+    found = []
+    if not learned.converged:
+        found.append(
+            f"not converged after {learned.passes} passes over the data: allow more (--passes), or estimate "
+            "fewer numbers (--only, --fix, --share)"
+        )
+    at_bound = [number for number in numbers if number.at_bound]
+    if at_bound:
+        some = ", ".join(number.number.path for number in at_bound[:3])
+        more = f" and {len(at_bound) - 3} more" if len(at_bound) > 3 else ""
+        found.append(f"{len(at_bound)} numbers ended at a bound: {some}{more}")
+    return found
+
+
+def _noise_sentences(innovations: Mapping[str, Any]) -> list[str]:
+    """Where the noise settings are far from what the residuals show, and the standard errors with them."""
+    nis, lag_one = innovations["nis"]["mean"], innovations["whiteness"]["lag_one"]
+    found = []
+    if nis is not None and not LEAST_NIS <= nis <= MOST_NIS:
+        found.append(
+            f"the residuals' variance is {nis:.2g} times what bias.noise_std, noise_std_per_force, noise_time and "
+            "drift_variance say: standard errors are those of the settings, not of the data"
+        )
+    far = max((abs(value) for value in lag_one if value is not None), default=0.0)
+    if far > MOST_LAG_ONE:
+        found.append(
+            f"residuals are not white (autocorrelation {far:.2f} from one sample to the next): the model misses "
+            "something, or the noise is not that of single samples; take the standard errors with care"
+        )
+    return found
+
+
+def _series(found: Evaluation, role: Any) -> FitSeries:
+    recording, model = found.recording, found.model
+    training = role == "training"
+    return FitSeries(
+        label=recording.path.stem,
+        role=role,
+        mean_force=recording.mean_force,
+        time=recording.time,
+        torque=recording.target,
+        residual=found.fit.residual,
+        model_torque=model.torque,
+        joint_angle=model.joint_angle,
+        joint_speed=model.joint_speed,
+        used=recording.train if training else np.zeros(len(recording.time), dtype=bool),
+        held_out=recording.held_out if training and recording.held_out.any() else None,
+    )

@@ -1,0 +1,166 @@
+"""What is wrong with a recording beyond its format: gaps, sensors that stand still while others move, poor rates.
+
+Every finding is a sentence; which samples it costs is said too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.description import FingerDescription
+from tendonfmu.recording import Recording
+
+Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+GAP = 10.0  # sample times; a longer step is a gap
+SHORTEST_GAP = 0.1  # s; single lost samples do no harm
+STUCK = 1.0  # s; a sensor that repeats one value longer, while others say that it should not, is stuck
+SETTLING = 1.0  # s after a stuck sensor, until the velocity filter has forgotten it
+SLOW_RATE, FAST_RATE = 50.0, 5000.0  # samples per second; the model's events need the first, nothing needs the second
+_MOVES = {"tendon_position": 2e-4, "joint_position": 0.02, "joint_velocity": 0.05}  # m, rad, rad: should have moved by
+_FORCE_SHARE = 0.1  # of a tendon's mean force by which the others change meanwhile
+_OF_RANGE = 0.05  # of what it moves in the whole recording
+
+
+@dataclass(frozen=True)
+class StuckSensor:
+    """A channel that holds one value from sample begin to sample end (excluded) though it should change.
+
+    group: as in recording.GROUPS. element: from 1.
+    """
+
+    group: str
+    element: int
+    value: float
+    begin: int
+    end: int
+
+    @property
+    def column(self) -> str:
+        return f"{self.group}[{self.element}]"
+
+
+def gaps(time: Numbers) -> list[int]:
+    """Indices of the first sample after each gap, or after a jump of the clock."""
+    if len(time) < 3:
+        return []
+    step = np.diff(time)
+    return [int(k) + 1 for k in np.flatnonzero(step > max(GAP * float(np.median(step)), SHORTEST_GAP))]
+
+
+def gap_sentences(recording: Recording) -> Iterator[str]:
+    """About each gap, at most three of them."""
+    found = gaps(recording.time)
+    for k in found[:3]:
+        before, after = recording.time[k - 1], recording.time[k]
+        yield (
+            f"time goes on by {after - before:.4g} s after row {k} ({before:.6g} s): a gap or a jump of the clock; "
+            "the parts before and after it are fitted as recordings of their own"
+        )
+    if len(found) > 3:
+        yield f"{len(found) - 3} more gaps; every part is fitted as a recording of its own"
+
+
+def rate_sentences(recording: Recording, finger: FingerDescription) -> Iterator[str]:
+    """About a sample rate that is too low to see friction change sides, or higher than helps."""
+    if len(recording) < 3:
+        return
+    rate = 1 / float(np.median(np.diff(recording.time)))
+    if rate < SLOW_RATE:
+        yield (
+            f"{rate:.3g} samples per second: reversals, sticking and the velocity filter are poorly resolved, and so "
+            f"are static friction and Stribeck velocities; expected at least {SLOW_RATE:g}, better 500"
+        )
+    if rate > FAST_RATE:
+        per_sample = (finger.data.get("bias") or {}).get("noise_time") is None
+        noise = (
+            "; without bias.noise_time the noise counts per sample, so standard errors are too small unless the "
+            "sensors' noise is white up to there"
+        )
+        yield (
+            f"{rate:.5g} samples per second: works, but takes {rate / 1000:.2g} times as long as 1000 and tells no more"
+            f"{noise if per_sample else ''}; decimating (after a low-pass filter) is better"
+        )
+
+
+def silent_tendons(recording: Recording, finger: FingerDescription) -> Iterator[str]:
+    """About tendons whose force is zero throughout."""
+    for i in np.flatnonzero(~recording.groups["tendon_force"].any(axis=0)):
+        yield (
+            f"tendon_force[{i + 1}] ({finger.tendon_names[i]}) is 0 throughout: a tendon without tension or a sensor "
+            "without signal; what its friction is cannot be told, its numbers stay as they were"
+        )
+
+
+# --- stuck sensors ----------------------------------------------------------------------------------------------------
+
+
+def stuck_sensors(recording: Recording, finger: FingerDescription) -> list[StuckSensor]:
+    """Channels that repeat one value for more than `STUCK` while the other channels say that they should change."""
+    groups = recording.groups
+    arms = np.asarray(finger.moment_arms, dtype=float)
+    stiffness = np.array([float(tendon["stiffness"]) for tendon in finger.data["tendons"]])
+    stretch = groups["tendon_force"] / stiffness
+    found: list[StuckSensor] = []
+    for i in range(len(arms)):
+        found += _stuck_force(recording.time, groups["tendon_force"], i)
+        expected = _position_by_others(groups, arms, stretch, i)
+        if expected is not None:
+            found += _stuck(recording.time, "tendon_position", groups["tendon_position"], i, expected)
+    angle = (groups["tendon_position"] - stretch) @ np.linalg.pinv(arms).T
+    for j in range(arms.shape[1]):
+        if "joint_position" in groups:
+            found += _stuck(recording.time, "joint_position", groups["joint_position"], j, angle[:, j])
+        if "joint_velocity" in groups:
+            measured = groups.get("joint_position", angle)
+            # what the given velocity does not account for
+            step = np.diff(recording.time, prepend=recording.time[0])
+            rest = measured[:, j] - np.cumsum(groups["joint_velocity"][:, j] * step)
+            found += _stuck(recording.time, "joint_velocity", groups["joint_velocity"], j, rest)
+    return found
+
+
+def _position_by_others(groups: Mapping[str, Numbers], arms: Numbers, stretch: Numbers, i: int) -> Numbers | None:
+    """[N] m: tendon i's motor position as the other tendons, or the measured joint angles, have it."""
+    if "joint_position" in groups:
+        return np.asarray(groups["joint_position"] @ arms[i] + stretch[:, i])
+    others = np.delete(np.arange(len(arms)), i)
+    if np.linalg.matrix_rank(arms[others]) < arms.shape[1]:
+        return None
+    angle = (groups["tendon_position"] - stretch)[:, others] @ np.linalg.pinv(arms[others]).T
+    return np.asarray(angle @ arms[i] + stretch[:, i])
+
+
+def _runs(column: Numbers) -> Iterator[tuple[int, int]]:
+    """(begin, end) of each run of equal values, at least two of them; end excluded."""
+    ends = np.flatnonzero(np.diff(column)) + 1
+    bounds = np.concatenate([[0], ends, [len(column)]])
+    for begin, end in pairwise(bounds.tolist()):
+        if end - begin > 1:
+            yield begin, end
+
+
+def _stuck(time: Numbers, group: str, values: Numbers, k: int, expected: Numbers) -> Iterator[StuckSensor]:
+    enough = max(_MOVES[group], _OF_RANGE * float(np.ptp(expected)))
+    for begin, end in _runs(values[:, k]):
+        if time[end - 1] - time[begin] > STUCK and np.ptp(expected[begin:end]) > enough:
+            yield StuckSensor(group, k + 1, float(values[begin, k]), begin, end)
+
+
+def _stuck_force(time: Numbers, force: Numbers, i: int) -> Iterator[StuckSensor]:
+    """A force that stands still while those of most other tendons change; 0 throughout is another matter."""
+    others = np.delete(force, i, axis=1)
+    if not others.shape[1] or not force[:, i].any():
+        return
+    size = np.maximum(np.abs(others).mean(axis=0), 1e-9)
+    for begin, end in _runs(force[:, i]):
+        if time[end - 1] - time[begin] > STUCK and force[begin, i] != 0:
+            changes = np.ptp(others[begin:end], axis=0) / size
+            if np.median(changes) > _FORCE_SHARE:
+                yield StuckSensor("tendon_force", i + 1, float(force[begin, i]), begin, end)
