@@ -273,8 +273,8 @@ void KalmanFilter::keep_within_bounds() {
   }
 }
 
-double KalmanFilter::variance(std::size_t unknown) const {
-  return at(unknown, unknown) * settings_.scale[unknown] * settings_.scale[unknown];
+double KalmanFilter::covariance(std::size_t unknown, std::size_t other) const {
+  return at(std::max(unknown, other), std::min(unknown, other)) * settings_.scale[unknown] * settings_.scale[other];
 }
 
 double KalmanFilter::bias_variance(std::size_t joint) const {
@@ -284,9 +284,8 @@ double KalmanFilter::bias_variance(std::size_t joint) const {
 void KalmanFilter::covariance(double* matrix) const {
   const std::size_t p = settings_.unknowns;
   for (std::size_t column = 0; column < p; ++column) {
-    for (std::size_t row = column; row < p; ++row) {
-      const double value = at(row, column) * settings_.scale[row] * settings_.scale[column];
-      matrix[row * p + column] = matrix[column * p + row] = value;
+    for (std::size_t row = 0; row < p; ++row) {
+      matrix[row * p + column] = covariance(row, column);
     }
   }
 }

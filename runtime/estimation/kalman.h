@@ -62,11 +62,11 @@ class KalmanFilter {
   const double* innovation() const { return innovation_.data(); }
   const double* innovation_variance() const { return innovation_variance_.data(); }
 
-  const double* z() const { return z_.data(); }       /* [p] */
-  const double* bias() const { return bias_.data(); } /* [n] N·m */
-  double variance(std::size_t unknown) const;         /* of z */
-  double bias_variance(std::size_t joint) const;      /* (N·m)² */
-  void covariance(double* matrix) const;              /* [p × p] of z, both triangles */
+  const double* z() const { return z_.data(); }                    /* [p] */
+  const double* bias() const { return bias_.data(); }              /* [n] N·m */
+  double bias_variance(std::size_t joint) const;                   /* (N·m)² */
+  double covariance(std::size_t unknown, std::size_t other) const; /* of z */
+  void covariance(double* matrix) const;                           /* [p × p] of z, both triangles */
 
  private:
   std::size_t order() const { return settings_.unknowns + settings_.joints; }

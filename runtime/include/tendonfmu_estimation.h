@@ -136,4 +136,6 @@ tendonfmu_status tendonfmu_estimator_fit(tendonfmu_estimator* estimator, const d
 }
 #endif
 
+#include "tendonfmu_learner.h"
+
 #endif

@@ -156,7 +156,7 @@ class Pair {
     for (std::size_t i = 0; i < p; ++i) {
       const auto at = static_cast<Eigen::Index>(i);
       EXPECT_NEAR(filter.z()[i], static_cast<double>(naive.state(at)), tolerance * settings.scale[i]);
-      EXPECT_EQ(filter.variance(i), covariance[i * p + i]);
+      EXPECT_EQ(filter.covariance(i, i), covariance[i * p + i]);
       for (std::size_t k = 0; k < p; ++k) {
         const auto expected = static_cast<double>(naive.covariance(at, static_cast<Eigen::Index>(k)));
         EXPECT_NEAR(covariance[i * p + k], expected, tolerance * settings.scale[i] * settings.scale[k]);
@@ -220,8 +220,8 @@ TEST_P(KalmanBlocks, KeepUnknownsAndBiasWithinTheirErrors) {
   double squares = 0.0;
   for (std::size_t i = 0; i < 14; ++i) {
     const double error = pair.filter.z()[i] - pair.model.truth[i];
-    EXPECT_LT(std::sqrt(pair.filter.variance(i)), 0.1 * pair.settings.scale[i]);
-    squares += error * error / pair.filter.variance(i);
+    EXPECT_LT(std::sqrt(pair.filter.covariance(i, i)), 0.1 * pair.settings.scale[i]);
+    squares += error * error / pair.filter.covariance(i, i);
   }
   // χ² of 14 beyond 40: once in 4000 cases, and the seed is fixed
   EXPECT_LT(squares, 40.0);
@@ -244,7 +244,7 @@ TEST(Kalman, LetsUnknownsDrift) {
   pair.run(300);
   pair.compare(1e-10);
   // so far that it matters: the stationary error is many times that of constants
-  EXPECT_GT(pair.filter.variance(3), 1e-5 * s.scale[3] * s.scale[3]);
+  EXPECT_GT(pair.filter.covariance(3, 3), 1e-5 * s.scale[3] * s.scale[3]);
 }
 
 /* the same samples to a filter that is bounded and to one that is not */
@@ -330,7 +330,7 @@ TEST(Kalman, LearnsNothingFromSamplesThatAreNotUsed) {
   EXPECT_EQ(Numbers(filter.z(), filter.z() + 8), before);
   EXPECT_EQ(filter.bias()[0], 0.0);
   for (std::size_t i = 0; i < 8; ++i) {
-    EXPECT_DOUBLE_EQ(filter.variance(i), s.scale[i] * s.scale[i]);
+    EXPECT_DOUBLE_EQ(filter.covariance(i, i), s.scale[i] * s.scale[i]);
   }
   EXPECT_DOUBLE_EQ(filter.bias_variance(1), 0.01 + s.drift_variance * elapsed);
   EXPECT_NE(filter.innovation()[3], 0.0); /* what is left is told all the same */

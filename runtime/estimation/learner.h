@@ -1,0 +1,79 @@
+/* The extended Kalman filter on a finger: samples in, the description's numbers with their errors out. */
+#ifndef TENDONFMU_ESTIMATION_LEARNER_H
+#define TENDONFMU_ESTIMATION_LEARNER_H
+
+#include <functional>
+
+#include "kalman.h"
+#include "recording_track.h"
+#include "sample_rows.h"
+
+namespace tendonfmu::estimation {
+
+struct LearnerOptions {
+  double prior_std = 1.0;       /* of an unknown about its start, in scales */
+  std::size_t block = 8;        /* samples that are taken in at once */
+  double parameter_drift = 0.0; /* of the unknowns: variance of z/scale, 1/s */
+};
+
+/* One sample as the caller has it. */
+struct LearnerSample {
+  double time;
+  tendonfmu_inputs inputs;
+  const double* external_torque; /* [n] or nullptr */
+  bool use;
+};
+
+class Learner {
+ public:
+  /* Throws refused. */
+  Learner(const void* image, std::size_t image_size, const std::int32_t* group, const double* scale,
+          const LearnerOptions& options);
+
+  const tendonfmu_finger* finger() const { return finger_.get(); }
+  const Unknowns& unknowns() const { return unknowns_; }
+  const KalmanFilter& filter() const { return filter_; }
+  std::size_t block() const { return block_; }
+  bool initialised() const { return initialised_; }
+  bool bias_started() const { return bias_started_; }
+  std::size_t slack_samples() const { return slack_samples_; }
+
+  /* The first sample of a recording: what is remembered of the motion and the bias begin anew, the unknowns stay.
+   * Throws refused; then nothing is initialised. */
+  void initialise(const LearnerSample& first, int kinematics_source);
+
+  /* The next sample. True where it completed a block. Allocates nothing unless it throws refused, and then the learner
+   * is as it was. */
+  bool step(const LearnerSample& sample);
+
+  /* Takes in the samples of a block that is not full. */
+  void finish();
+
+  /* numbers of the description, and their standard errors (first order): [parameter_count]; 0 where fixed */
+  void values(double* numbers) const { unknowns_.write(filter_.z(), numbers); }
+  void standard_errors(double* errors) const;
+
+ private:
+  double noise_of(const tendonfmu_inputs& inputs, double step) const;
+  void check(const LearnerSample& sample, double step) const;
+  void write_unknowns();
+  void take(const LearnerSample& sample, double step);
+  void begin_bias(const LearnerSample& sample, double step);
+  bool is_slack() const;
+
+  FreeFinger finger_;
+  Unknowns unknowns_;
+  SampleRows rows_;
+  std::size_t block_;
+  KalmanFilter filter_;
+  bool initialised_ = false, bias_started_ = false, written_ = false;
+  std::size_t slack_samples_ = 0;
+  std::vector<double> numbers_;      /* [parameter_count] */
+  std::vector<std::size_t> moved_;   /* parameters that the unknowns move while the finger runs */
+  std::vector<double> moved_values_; /* theirs */
+  std::vector<double> torque_rows_, jump_rows_, torque_, jump_, measured_;
+};
+
+}  // namespace tendonfmu::estimation
+
+#endif
