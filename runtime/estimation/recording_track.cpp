@@ -30,12 +30,13 @@ void FreeFinger::set(const std::vector<double>& numbers) {
         return 0;
       },
       free_.data());
-  /* moment arms and the start are fixed after the first sample, and the same here */
+  /* moment arms and bias.initial_torque are fixed after the first sample; that one no longer matters then */
   if (tendonfmu_is_initialised(finger_.get())) {
     std::vector<std::size_t> tunable;
     std::vector<double> values;
     for (std::uint32_t p = 0; p < free_.size(); ++p) {
-      if (free_[p] != finger_->parameters[p]) {
+      const model_item item = parameter_item(&finger_->shape, p);
+      if (free_[p] != finger_->parameters[p] && item.kind != ITEM_INITIAL_TORQUE) {
         tunable.push_back(p);
         values.push_back(free_[p]);
       }
