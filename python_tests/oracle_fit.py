@@ -48,6 +48,20 @@ class Unknowns:
         self.numbers = [self._number(g) for g in sorted(set(self.group) - {-1})]
         self.start = np.array([number.start for number in self.numbers])
 
+    def in_order_of(self, others: Sequence[Any]) -> Unknowns:
+        """The same unknowns in the order of another list of them, told by the parameters they move."""
+        found = []
+        for other in others:
+            same = [number for number in self.numbers if set(number.parameters) & set(other.parameters)]
+            if len(same) != 1:
+                raise AssertionError(f"{other}: {len(same)} unknowns of the twin move any of its parameters")
+            found += same
+        if len(found) != len(self.numbers) or len({number.parameters for number in found}) != len(found):
+            raise AssertionError(f"{len(found)} unknowns where the twin has {len(self.numbers)}")
+        self.numbers = found
+        self.start = np.array([number.start for number in found])
+        return self
+
     def _partner(self, k: int, name: str) -> int:
         return self.index[f"{family(self.paths[k])[0]}.{name}"]
 
@@ -59,19 +73,21 @@ class Unknowns:
         return bool(self.values[k] == self.values[coulomb])
 
     def _number(self, g: int) -> Number:
+        """The unknown of one group; it starts at the mean of what it moves."""
         members = [k for k in range(len(self.paths)) if self.group[k] == g]
         names = {family(self.paths[k])[1] for k in members}
-        first = members[0]
         if "coulomb" in names:
             laws = [k for k in members if family(self.paths[k])[1] == "coulomb"]
             statics = [self._partner(k, "static") for k in laws]
             moved = laws + [k for k in statics if self._static_follows(k)]
-            return Number("coulomb", tuple(sorted(moved)), self.values[laws[0]])
+            return Number("coulomb", tuple(sorted(moved)), float(np.mean(self.values[laws])))
         if names == {"static"}:
-            return Number("drop", tuple(members), self.values[first] - self.values[self._partner(first, "coulomb")])
+            drops = [self.values[k] - self.values[self._partner(k, "coulomb")] for k in members]
+            return Number("drop", tuple(members), float(np.mean(drops)))
         if names == {"stribeck_velocity"}:
-            return Number("rate", tuple(members), 1.0 / self.values[first])
-        return Number("viscous" if names == {"viscous"} else "value", tuple(members), self.values[first])
+            return Number("rate", tuple(members), float(np.mean(1.0 / self.values[members])))
+        role = "viscous" if names == {"viscous"} else "value"
+        return Number(role, tuple(members), float(np.mean(self.values[members])))
 
     def parameters(self, z: Array) -> Array:
         """[..., p] numbers of the description at z [..., U]; may be complex."""
@@ -94,7 +110,7 @@ class Unknowns:
 
     def z(self, parameters: Array) -> Array:
         """[U] the unknowns of given numbers."""
-        return Unknowns(self.paths, parameters, self.group).start
+        return Unknowns(self.paths, parameters, self.group).in_order_of(self.numbers).start
 
     def theta(self, z: Array) -> dict[str, Any]:
         """path -> number at z [U], or path -> [U', 1] numbers at z [U', U]."""

@@ -69,6 +69,11 @@ class Recorder(oracle.FingerOracle):
         super().__init__(without_contact(description), kinematics_source)
         self.rows: dict[int, list[tuple[float, ...]]] = {}
         self.totals: list[Array] = []
+        self.residuals: list[Array] = []  # r of step 5, from the second sample on
+
+    def _contact(self, r: Array, *others: Any) -> Array:
+        self.residuals.append(r)
+        return super()._contact(r, *others)
 
     def _total(self, *arguments: Array) -> Array:
         self.totals.append(super()._total(*arguments))
@@ -116,7 +121,8 @@ def run_recorder(
 class Trace:
     """A recording seen through a finger: T and Δb as functions of all parameters.
 
-    q [N, n], tau [N, n], force [N, m], time [N]; torque and jump [N, n] are the oracle's own at the description.
+    q [N, n], tau [N, n], force [N, m], time [N]; torque, jump and residual (r of step 5) [N, n]
+    are the oracle's own at the description.
     """
 
     def __init__(
@@ -130,7 +136,10 @@ class Trace:
         self.force = np.asarray(recording["tendon_force"], dtype=float)
         self.q = np.array([step.values["joint_angle"] for step in steps])
         self.tau = np.array([step.values["joint_torque"] for step in steps])
-        self.near = np.array([min(step.velocity_margin, step.force_margin) < oracle.NEAR for step in steps])
+        # within 1e-9 of a threshold; exactly at it (at rest, v_min = 0) nothing is left to rounding
+        margins = np.array([[step.velocity_margin, step.force_margin] for step in steps])
+        self.near = ((margins > 0.0) & (margins < oracle.NEAR)).any(axis=1)
+        self.residual = np.array([np.full(self.n, np.nan), *finger.residuals])
         self.branches = finger.branches
         self.laws: dict[Place, tuple[Course, float, Array, list[tuple[str, str]]]] = {}
         for place, path, entry, effect in self._places(finger):
