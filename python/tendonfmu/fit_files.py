@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 from tendonfmu import native
 from tendonfmu.description import FingerDescription
 from tendonfmu.errors import InputError
-from tendonfmu.fit_structure import Structure, set_number
+from tendonfmu.fit_structure import Structure, own_copy, set_number
 from tendonfmu.json_node import read_json
 from tendonfmu.whole_file import check_output, whole_file
 
@@ -46,7 +45,7 @@ def with_values(structure: Structure, values: Numbers) -> FingerDescription:
 
     values: [p] of all parameters, in canonical order.
     """
-    data = copy.deepcopy(dict(structure.start.data))
+    data = own_copy(structure.start.data)
     for number in structure.numbers:
         for path in (number.path, number.with_path):
             if path is not None:

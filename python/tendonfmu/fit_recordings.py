@@ -16,7 +16,7 @@ from tendonfmu.description import FingerDescription
 from tendonfmu.effects import DEFAULT_THRESHOLD
 from tendonfmu.errors import InputError
 from tendonfmu.fit_residuals import Model, model_alone
-from tendonfmu.recording import Recording
+from tendonfmu.recording import Recording, check_times
 from tendonfmu.recording_faults import (
     SETTLING,
     StuckSensor,
@@ -117,6 +117,7 @@ def prepare(finger: FingerDescription, recording: Recording, kinematics: int, he
     """Checks a recording against a finger. Raises InputError where nothing sound can come of it."""
     joints, tendons = len(finger.joint_names), len(finger.tendon_names)
     recording.require(joints, tendons, INPUTS_OF_SOURCE[kinematics])
+    _check_numbers(recording)
     target = recording.groups["tendon_force"] @ moment_arms(finger.data)
     external = recording.groups.get("external_torque")
     contact = np.zeros(len(recording), dtype=bool)
@@ -148,6 +149,19 @@ def prepare(finger: FingerDescription, recording: Recording, kinematics: int, he
         model=model,
         warnings=[*warnings, *sentences],
     )
+
+
+def _check_numbers(recording: Recording) -> None:
+    """What the reader of files has seen to, for a recording that was made in memory."""
+    check_times(recording.path, recording.time)
+    for name, values in recording.groups.items():
+        wrong = np.argwhere(~np.isfinite(values))
+        if len(wrong):
+            row, column = wrong[0]
+            raise InputError(
+                f"{recording.path}: column {name}[{column + 1}], row {row + 1}: {values[row, column]:g}; "
+                "expected a finite number"
+            )
 
 
 def _arrays(recording: Recording, part: slice) -> dict[str, Numbers]:

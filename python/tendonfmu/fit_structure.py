@@ -6,7 +6,6 @@ literal. It matches a number, or a part of the description and so all numbers in
 
 from __future__ import annotations
 
-import copy
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -104,6 +103,12 @@ def _numbered(finger: FingerDescription, numbers: Sequence[Unknown]) -> list[Unk
     ]
 
 
+def own_copy(data: Mapping[str, Any]) -> dict[str, Any]:
+    """A copy in which no law is the same object as another, as parsed JSON made by a program may have them."""
+    copied: dict[str, Any] = json.loads(json.dumps(data))
+    return copied
+
+
 def _all_numbers(data: Mapping[str, Any]) -> list[Unknown]:
     return [*unknowns(data), *_initial_torques(data)]
 
@@ -135,7 +140,7 @@ def with_sides(data: Mapping[str, Any], wanted: str) -> Mapping[str, Any]:
     if wanted == "given":
         return data
     change = _two_sides if wanted == "asymmetric" else _one_side
-    result: dict[str, Any] = copy.deepcopy(dict(data))
+    result: dict[str, Any] = own_copy(data)
     for joint in result["joints"]:
         for kind in ("friction", "load_friction"):
             if joint.get(kind) is not None:
@@ -297,7 +302,7 @@ def _with_equal_values(data: Mapping[str, Any], numbers: Sequence[Unknown], owne
     """Numbers that share a value start from their mean."""
     if len(set(owners)) == len(owners):
         return data
-    result = copy.deepcopy(dict(data))
+    result = own_copy(data)
     for owner in set(owners):
         members = [number for number, own in zip(numbers, owners, strict=True) if own == owner]
         mean = float(np.mean([member.value for member in members]))

@@ -70,19 +70,24 @@ def read_recording(path: str | os.PathLike[str]) -> Recording:
     file = Path(path)
     table = read_table(file, _check_columns, flags=(LABEL,))
     time = table["time"]
-    late = np.flatnonzero(np.diff(time) <= 0)
-    if late.size:
-        row = int(late[0]) + 2
-        raise InputError(
-            f"{file}: column time, row {row}: {float(time[row - 1])!r} s after {float(time[row - 2])!r} s; "
-            "expected increasing times"
-        )
+    check_times(file, time)
     label = table.get(LABEL)
     if label is not None and not np.isin(label, (0.0, 1.0)).all():
         row = int(np.flatnonzero(~np.isin(label, (0.0, 1.0)))[0]) + 1
         raise InputError(f"{file}: column {LABEL}, row {row}: {label[row - 1]:g}; expected 0 or 1")
     groups = {name: np.column_stack(columns) for name, columns in _grouped(table).items()}
     return Recording(file, time, groups, None if label is None else label.astype(bool))
+
+
+def check_times(file: Path, time: NDArray[np.float64]) -> None:
+    """Raises InputError unless times [N] increase strictly."""
+    late = np.flatnonzero(~(np.diff(time) > 0))
+    if late.size:
+        row = int(late[0]) + 2
+        raise InputError(
+            f"{file}: column time, row {row}: {float(time[row - 1])!r} s after {float(time[row - 2])!r} s; "
+            "expected increasing times"
+        )
 
 
 def _grouped(table: Mapping[str, NDArray[np.float64]]) -> dict[str, list[NDArray[np.float64]]]:
