@@ -158,8 +158,8 @@ def correlation_sheet(picture: FitPicture) -> Sheet:
         name="correlation",
         title="What the data cannot tell apart",
         caption="Correlation of the errors of all unknowns, in the fit's own form (coulomb, drop = static − coulomb, "
-        "rate = 1/stribeck_velocity, viscous), ordered by where they act. Red: both can rise together without harm; "
-        "blue: one can take over what the other loses.",
+        "rate = 1/stribeck_velocity, viscous), ordered by where they act. Red: their difference is known better than "
+        "either of them; blue: their sum is.",
         keys=(("positive", "+1"), ("uncorrelated", "0"), ("opposed", "−1")),
         panels=(panel,),
     )

@@ -16,7 +16,7 @@ from tendonfmu.fit_error_figures import strongest_pairs
 from tendonfmu.fit_figures import fit_sheets
 from tendonfmu.fit_picture import FitPicture
 from tendonfmu.fit_sheet import MatrixPanel, Sheet
-from tendonfmu.fit_summary import Summary, summarise
+from tendonfmu.fit_summary import Summary, rounded, summarise
 from tendonfmu.whole_file import whole_file
 
 PAGE = "report.html"
@@ -88,7 +88,7 @@ def fit_page(picture: FitPicture, summary: Summary, figures: list[PageFigure]) -
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"number": _number, "rounded": _rounded}
+    environment.filters |= {"number": _number, "rounded": rounded}
     by_section: dict[str, list[PageFigure]] = {}
     for figure in figures:
         by_section.setdefault(figure.sheet.section, []).append(figure)
@@ -111,14 +111,6 @@ def _options(report: Mapping[str, Any]) -> dict[str, str]:
         return {True: "yes", False: "no", None: "none"}.get(value, str(value)) if not value else str(value)
 
     return {key: text(value) for key, value in report.get("options", {}).items()}
-
-
-def _rounded(value: float | None, digits: int = 3) -> str:
-    """The same with trailing zeros, never with an exponent: for columns to compare."""
-    if value is None or value != value:
-        return "–"
-    whole = len(str(int(abs(value)))) if abs(value) >= 1 else 0
-    return f"{value:.{max(digits - whole, 0)}f}"
 
 
 def _number(value: float | None, digits: int = 3) -> str:

@@ -185,9 +185,7 @@ def _how_well(tables: Sequence[ResidualTable]) -> Iterator[str]:
         row = table.all
         if row.fitted is None or row.left is None or not row.torque:
             continue
-        text = (
-            f"{table.title}: {row.fitted:.3g} of {row.torque:.3g} {table.unit} of torque are left, {_percent(row.left)}"
-        )
+        text = f"{table.title}: {rounded(row.fitted)} of {rounded(row.torque)} {table.unit} of torque are left, {_percent(row.left)}"
         if row.start is not None:
             text += f"; with the numbers it started from {_percent(row.start / row.torque)}"
         if table is tables[0] and row.bias_only is not None and row.model_only is not None:
@@ -196,6 +194,14 @@ def _how_well(tables: Sequence[ResidualTable]) -> Iterator[str]:
                 f"alone, with a constant bias, {_percent(row.model_only / row.torque)}"
             )
         yield text + "."
+
+
+def rounded(value: float | None, digits: int = 3) -> str:
+    """With trailing zeros and without an exponent, to be compared; a dash where there is none."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    whole = len(str(int(abs(value)))) if abs(value) >= 1 else 0
+    return f"{value:.{max(digits - whole, 0)}f}"
 
 
 def _percent(share: float) -> str:

@@ -1,0 +1,306 @@
+"""The page of a fit: complete, self-contained, escaped; and in a real browser without errors, at any width."""
+
+from __future__ import annotations
+
+import base64
+import copy
+import dataclasses
+import html
+import json
+import re
+import shutil
+import subprocess
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
+
+from fit_pictures import made_up_picture
+from tendonfmu.errors import InputError
+from tendonfmu.fit_page import PAGE, write_fit_page
+from tendonfmu.fit_page import fit_page as render
+from tendonfmu.fit_picture import FitPicture
+from tendonfmu.fit_summary import residual_tables, summarise
+
+LARGEST = 5_000_000  # bytes
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "microsoft-edge")
+HOSTILE = "<script>alert('x')</script>&\"$\\frac{"
+
+Written = tuple[FitPicture, Path, dict[Path, str]]
+
+
+class Elements(HTMLParser):
+    """Start tags with their attributes, and text without that of the style sheet."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.words: list[str] = []
+        self._inside = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        self._inside = tag
+
+    def handle_data(self, data: str) -> None:
+        if self._inside != "style":
+            self.words.append(data)
+
+    def all(self, tag: str) -> list[dict[str, str | None]]:
+        return [attributes for name, attributes in self.tags if name == tag]
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Written:
+    picture = made_up_picture()
+    folder = tmp_path_factory.mktemp("fit") / "figures"
+    return picture, folder, write_fit_page(picture, folder)
+
+
+@pytest.fixture(scope="module")
+def page(written: Written) -> str:
+    return (written[1] / PAGE).read_text("utf-8")
+
+
+def test_files_are_written_and_named(written: Written) -> None:
+    _, folder, files = written
+    assert {file.name for file in files} == {file.name for file in folder.iterdir()}
+    assert next(iter(files)).name == PAGE
+    assert {"torque_1.png", "torque_3.png", "residual_2.png", "laws_joints.png", "laws_tendon_8.png"} <= {
+        file.name for file in files
+    }
+    assert 500_000 < (folder / PAGE).stat().st_size < LARGEST
+    for file in files:
+        if file.suffix == ".png":
+            image = imread(file)[:, :, :3]
+            assert min(image.shape[:2]) > 300 and 0.005 < np.mean(image < 0.98) < 0.6, file.name
+
+
+def test_nothing_is_needed_from_elsewhere(page: str) -> None:
+    elements = Elements(page)
+    assert not {name for name, _ in elements.tags} & {"script", "iframe", "object", "embed", "base", "form"}
+    for tag, attributes in elements.tags:
+        assert not [name for name in attributes if name.startswith("on")], tag
+        for name in ("src", "href"):
+            address = attributes.get(name)
+            assert address is None or address.startswith(("data:", "#")), (tag, address)
+    assert not re.search(r"url\(|@import|https?://", page)
+
+
+def test_images_are_whole_and_described(written: Written, page: str) -> None:
+    images = Elements(page).all("img")
+    assert len(images) == 82  # 3 × 4 torque, 2 × 12 residual, 44 laws, 1 error, 1 correlation
+    for image in images:
+        source, alt = image["src"] or "", image["alt"] or ""
+        assert base64.b64decode(source.removeprefix("data:image/png;base64,"))[:8] == b"\x89PNG\r\n\x1a\n"
+        assert len(alt) > 40
+    assert len({image["alt"] for image in images}) > 75
+
+
+def test_links_lead_somewhere(page: str) -> None:
+    elements = Elements(page)
+    ids = {attributes["id"] for _, attributes in elements.tags if "id" in attributes}
+    targets = {(attributes["href"] or "").removeprefix("#") for attributes in elements.all("a")}
+    assert len(targets) == 7 and targets <= ids
+
+
+def test_every_number_is_in_the_tables(written: Written, page: str) -> None:
+    picture = written[0]
+    table = page.split('id="numbers"')[1]
+    assert table.count("<tr") - table.count("<thead") == len(picture.report["parameters"])
+    assert table.count('class="doubtful"') == sum(not entry["identified"] for entry in picture.report["parameters"])
+    for entry in picture.report["parameters"][::40]:
+        assert f"{entry['value']:.4g}" in table
+
+
+def test_the_first_screen_says_it_all(written: Written, page: str) -> None:
+    """How much is left, of what, against the start, the bias alone and the friction alone; by joint; what is known."""
+    picture = written[0]
+    first = page.split("<nav")[0]
+    residual = picture.report["residual"]["train"]
+    for key in ("torque_rms", "rms", "start_rms", "bias_only_rms", "model_only_rms"):
+        for value in residual[key]:
+            assert f"{1e3 * value:.1f}" in first or f"{1e3 * value:.2f}" in first, (key, value)
+    together = {key: np.sqrt(np.mean(np.square(residual[key]))) for key in residual}
+    assert f"{100 * together['rms'] / together['torque_rms']:.0f} %" in first
+    assert f"{picture.report['identified']['count']}/{picture.report['identified']['of']}" in first
+    assert "held out of training" in first.lower() and picture.report["warnings"][0] in html.unescape(first)
+    assert "24\u202f000 samples" in first
+
+
+def test_rms_of_all_joints_is_their_mean_power(written: Written) -> None:
+    for table in residual_tables(written[0]):
+        values = [row.fitted for row in table.rows[:-1]]
+        assert table.all.fitted == pytest.approx(np.sqrt(np.mean(np.square(np.array(values, dtype=float)))))
+
+
+def changed(picture: FitPicture, **changes: Any) -> FitPicture:
+    return dataclasses.replace(picture, report=copy.deepcopy(dict(picture.report)) | changes)
+
+
+def text_of(picture: FitPicture) -> str:
+    """The page without figures, as text."""
+    return " ".join("".join(Elements(render(picture, summarise(picture), [])).words).split())
+
+
+def test_names_and_warnings_are_escaped(written: Written) -> None:
+    picture = written[0]
+    fitted = copy.deepcopy(dict(picture.fitted))
+    fitted["joints"][0]["name"] = fitted["tendons"][0]["name"] = HOSTILE
+    recordings = [{**picture.report["recordings"][0], "path": HOSTILE}]
+    hostile = changed(picture, finger=HOSTILE, warnings=[HOSTILE], recordings=recordings, options={HOSTILE: [HOSTILE]})
+    text = render(dataclasses.replace(hostile, fitted=fitted), summarise(hostile), [])
+    assert "<script" not in text
+    assert text.count("&lt;script&gt;") >= 6
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"finished": False}, "Unfinished: the fit was interrupted."),
+        ({"converged": False}, "Not converged"),
+        ({"warnings": []}, "No warnings."),
+        ({"method": "ekf"}, "extended Kalman filter"),
+        ({"identified": {"count": 468, "of": 468}}, "All 468 numbers are identified"),
+    ],
+)
+def test_the_state_is_said(written: Written, changes: dict[str, Any], sentence: str) -> None:
+    assert sentence not in text_of(written[0])
+    assert sentence in text_of(changed(written[0], **changes))
+
+
+def test_what_is_missing_is_left_out(written: Written) -> None:
+    """No held-out data, no start, numbers that are null."""
+    picture = written[0]
+    residual = {"train": {**picture.report["residual"]["train"], "bias_only_rms": [None] * 4}, "held_out": None}
+    del residual["train"]["start_rms"]
+    innovations = {"nis": {"mean": None, "interval": [None, None], "consistent": False}}
+    innovations["whiteness"] = {"lag_one": [None] * 4, "ljung_box_p": [None] * 4}
+    text = text_of(changed(picture, residual=residual, innovations=innovations))
+    assert "Held out of training" not in text and "nan" not in text.lower().replace("finance", "")
+    assert "numbers it started from 3" not in text
+
+
+def test_comparisons_stand_beside_the_training(written: Written) -> None:
+    picture = written[0]
+    residual = dict(picture.report["residual"])
+    residual["comparisons"] = [{"label": "at 40 N", **residual["train"], "rms": [0.008, 0.026, 0.021, 0.011]}]
+    text = text_of(changed(picture, residual=residual))
+    assert "Not trained on: at 40 N: rms in mN·m" in text
+    assert "Not trained on: at 40 N: 18.0 of 21.4 mN·m of torque are left, 84 %" in text
+
+
+def test_noise_that_is_not_as_stated_is_said(written: Written) -> None:
+    nis = {"mean": 4.0, "interval": [0.99, 1.01], "consistent": False}
+    white = {"lag_one": [0.0, 0.0, 0.0, 0.0], "ljung_box_p": [0.5] * 4}
+    text = text_of(changed(written[0], innovations={"nis": nis, "whiteness": white}))
+    assert "larger than the noise that the description states, by a factor of 2" in text and "too small" in text
+    assert "Autocorrelation" not in text
+    nis |= {"mean": 1.0, "consistent": True}
+    assert "as large as the noise" in text_of(changed(written[0], innovations={"nis": nis, "whiteness": white}))
+
+
+def test_a_folder_that_cannot_be_made(written: Written, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    with pytest.raises(InputError, match="cannot be made"):
+        write_fit_page(written[0], tmp_path / "file" / "figures")
+
+
+# --- in a real browser ------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def browser() -> str:
+    found = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if found is None:
+        pytest.skip(f"SKIPPED: no browser to read the page in (looked for {', '.join(BROWSERS)})")
+    return found
+
+
+def visit(browser: str, file: Path, *options: str) -> subprocess.CompletedProcess[str]:
+    words = [browser, "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--hide-scrollbars"]
+    words += ["--enable-logging=stderr", f"--user-data-dir={file.parent / 'profile'}", *options, file.as_uri()]
+    return subprocess.run(words, capture_output=True, text=True, check=True, timeout=180)
+
+
+FRAME = """<!DOCTYPE html><body style="margin:0"><iframe id="f" style="border:0;width:{width}px;height:2400px"
+srcdoc="{page}"></iframe><script>
+addEventListener("load", () => {{
+  const inside = document.getElementById("f").contentDocument;
+  if ({measure}) {{
+    for (const each of inside.querySelectorAll("details")) each.open = true;
+    const root = inside.documentElement, edge = root.clientWidth + 0.5;
+    const out = [...inside.body.querySelectorAll("*")].filter(
+      e => !(e.closest(".scroll") && !e.matches(".scroll")) && e.getBoundingClientRect().right > edge);
+    const found = {{
+      width: root.clientWidth, scroll: root.scrollWidth, height: root.scrollHeight,
+      images: [...inside.images].map(image => [image.naturalWidth, image.width]),
+      out: out.map(e => e.outerHTML.slice(0, 80)),
+      scrolled: [...inside.querySelectorAll(".scroll")].filter(e => e.scrollWidth > e.clientWidth).length,
+      font: parseFloat(getComputedStyle(inside.body).fontSize),
+    }};
+    document.body.textContent = "MEASURED" + JSON.stringify(found) + "END";
+  }}
+}});
+</script></body>"""
+
+
+def framed(folder: Path, page: str, width: int, measure: bool) -> Path:
+    """A page that shows the page at a width, since a window has a least one; and measures it on demand."""
+    file = folder / f"frame_{width}_{measure}.html"
+    file.write_text(FRAME.format(width=width, page=html.escape(page), measure=json.dumps(measure)), encoding="utf-8")
+    return file
+
+
+def measure(browser: str, folder: Path, page: str, width: int) -> dict[str, Any]:
+    done = visit(browser, framed(folder, page, width, True), "--dump-dom")
+    found = re.search(r"MEASURED(\{.*\})END", done.stdout)
+    assert found is not None, done.stderr[-2000:]
+    result: dict[str, Any] = json.loads(html.unescape(found[1]))
+    return result
+
+
+@pytest.mark.parametrize("width", [1280, 400])
+def test_a_browser_shows_it_at_any_width(browser: str, page: str, tmp_path: Path, width: int) -> None:
+    """All figures there, nothing wider than the page; only tables scroll, each in its own box."""
+    found = measure(browser, tmp_path, page, width)
+    assert found["width"] == width and found["scroll"] == width and found["out"] == []
+    assert len(found["images"]) == 82
+    for natural, shown in found["images"]:
+        assert natural > 500 and 300 < shown <= width
+    assert found["font"] >= 15
+    if width == 400:
+        assert found["scrolled"] > 5
+
+
+def test_a_browser_has_nothing_to_complain_of(browser: str, written: Written, tmp_path: Path) -> None:
+    file = tmp_path / PAGE
+    shutil.copy(written[1] / PAGE, file)
+    assert "CONSOLE" not in visit(browser, file, "--dump-dom").stderr
+
+
+@pytest.mark.parametrize("width", [1280, 400])
+def test_screenshots_are_not_blank(browser: str, page: str, tmp_path: Path, width: int) -> None:
+    shot = tmp_path / "shot.png"
+    visit(
+        browser, framed(tmp_path, page, width, False), f"--window-size={max(width, 500)},2400", f"--screenshot={shot}"
+    )
+    image = imread(shot)[:2400, :width, :3]
+    assert image.shape[1] == width
+    bands = [np.mean(part < 0.8) for part in np.array_split(image, 8)]
+    assert all(0.005 < share < 0.5 for share in bands), bands  # ink in every part of it, and paper
+
+
+def test_the_browser_tests_can_fail(browser: str, tmp_path: Path) -> None:
+    wide = "<!DOCTYPE html><div style='width:900px'>wide</div><img src='data:image/png;base64,AAAA' alt=''>"
+    found = measure(browser, tmp_path, wide, 400)
+    assert found["scroll"] > 800 and len(found["out"]) >= 1 and found["images"][0][0] == 0
+    file = tmp_path / "error.html"
+    file.write_text("<!DOCTYPE html><script>console.error('wrong')</script>", encoding="utf-8")
+    assert "CONSOLE" in visit(browser, file, "--dump-dom").stderr
