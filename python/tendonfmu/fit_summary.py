@@ -185,7 +185,8 @@ def _how_well(tables: Sequence[ResidualTable]) -> Iterator[str]:
         row = table.all
         if row.fitted is None or row.left is None or not row.torque:
             continue
-        text = f"{table.title}: {rounded(row.fitted)} of {rounded(row.torque)} {table.unit} of torque are left, {_percent(row.left)}"
+        amounts = f"{rounded(row.fitted)} of {rounded(row.torque)} {table.unit}"
+        text = f"{table.title}: {amounts} of torque are left, {_percent(row.left)}"
         if row.start is not None:
             text += f"; with the numbers it started from {_percent(row.start / row.torque)}"
         if table is tables[0] and row.bias_only is not None and row.model_only is not None:
