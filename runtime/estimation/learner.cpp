@@ -5,6 +5,10 @@
 
 #include "refusal.h"
 
+extern "C" {
+#include "derived_numbers.h"
+}
+
 namespace tendonfmu::estimation {
 namespace {
 
@@ -80,7 +84,6 @@ Learner::Learner(const void* image, std::size_t image_size, const std::int32_t* 
                                                       return info.tunable == 0;
                               }),
                moved_.end());
-  moved_values_.assign(moved_.size(), 0.0);
   torque_rows_.assign(finger_.get()->joints * unknowns_.count(), 0.0);
   jump_rows_ = torque_rows_;
   torque_.assign(finger_.get()->joints, 0.0);
@@ -187,15 +190,14 @@ bool Learner::step(const LearnerSample& sample) {
   return true;
 }
 
-/* what the unknowns say now, to the finger: samples are linearised there */
+/* What the unknowns say now, to the finger: samples are linearised there. Not by tendonfmu_set_parameters(), which
+ * looks up every index for its range; the unknowns' bounds lie within the ranges, and hold static >= coulomb. */
 void Learner::write_unknowns() {
   unknowns_.write(filter_.z(), numbers_.data());
-  for (std::size_t i = 0; i < moved_.size(); ++i) {
-    moved_values_[i] = numbers_[moved_[i]];
+  for (const std::size_t parameter : moved_) {
+    finger_.get()->parameters[parameter] = numbers_[parameter];
   }
-  if (tendonfmu_set_parameters(finger_.get(), moved_.size(), moved_.data(), moved_values_.data()) != TENDONFMU_OK) {
-    throw refused(tendonfmu_last_error(finger_.get()));
-  }
+  derive_numbers(finger_.get(), 0);
   written_ = true;
 }
 

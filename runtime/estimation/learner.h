@@ -68,9 +68,8 @@ class Learner {
   KalmanFilter filter_;
   bool initialised_ = false, bias_started_ = false, written_ = false;
   std::size_t slack_samples_ = 0;
-  std::vector<double> numbers_;      /* [parameter_count] */
-  std::vector<std::size_t> moved_;   /* parameters that the unknowns move while the finger runs */
-  std::vector<double> moved_values_; /* theirs */
+  std::vector<double> numbers_;    /* [parameter_count] */
+  std::vector<std::size_t> moved_; /* parameters that the unknowns move while the finger runs */
   std::vector<double> torque_rows_, jump_rows_, torque_, jump_, measured_;
 };
 
