@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import importlib
+import json
 import math
 import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +23,11 @@ from command import Call
 from tendonfmu.converters import convert_file
 from tendonfmu.converters.emps import EDGE, MASS, convert
 from tendonfmu.errors import InputError
+from tendonfmu.native import run_recording
 from tendonfmu.recording import read_recording
 
 ROOT = Path(__file__).resolve().parent.parent
+EXAMPLE = ROOT / "examples" / "emps"
 DATA = Path(os.environ.get("TENDONFMU_DATA") or ROOT.parent / "shared" / "data") / "emps"
 MEASURED = [DATA / name for name in ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat")]
 measured = pytest.mark.skipif(
@@ -232,3 +237,73 @@ def test_it_moves_from_the_first_sample_on() -> None:
     for file in MEASURED:
         velocity = convert_file("emps", file, {})["joint_velocity[1]"]
         assert velocity[0] > 0.02 and np.abs(velocity).min() > 0.0
+
+
+# --- fitted -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Both files by the command, and the symmetric and the asymmetric carriage fitted to the one without pulses."""
+    pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not installed with its estimation")
+    folder = tmp_path_factory.mktemp("emps")
+    files = {file.stem: folder / f"{file.stem}.parquet" for file in MEASURED}
+    for file in MEASURED:
+        command("convert", "emps", file, "-o", files[file.stem])
+    for start, options in (("emps", []), ("emps_asymmetric", ["--fix", "bias.initial_torque[1]"])):
+        files[start] = folder / f"{start}.json"
+        command("fit", EXAMPLE / f"{start}.json", files["DATA_EMPS"], "-o", files[start], "--kinematics", "3", *options)
+    return files
+
+
+def command(*arguments: str | Path) -> None:
+    main = "from tendonfmu.cli import main; main()"
+    done = subprocess.run([sys.executable, "-c", main, *map(str, arguments)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def error(finger: Path, recording: Path) -> float:
+    """100·||y − ŷ||/||y||, %, y the force; over all samples."""
+    samples = read_recording(recording)
+    outputs = run_recording(finger.read_text(encoding="utf-8"), samples.arrays(), kinematics_source=3)
+    missed = outputs["compensated_torque"] - samples.groups["external_torque"]
+    return 100 * float(np.linalg.norm(missed) / np.linalg.norm(samples.groups["tendon_force"]))
+
+
+@measured
+def test_the_errors_are_those_of_the_benchmark(recordings: dict[str, Path]) -> None:
+    assert error(recordings["emps"], recordings["DATA_EMPS"]) <= 4.1
+    assert error(recordings["emps_asymmetric"], recordings["DATA_EMPS"]) <= 3.15
+    assert error(recordings["emps"], recordings["DATA_EMPS_PULSES"]) <= 5.99
+
+
+@measured
+def test_the_numbers_are_the_published_ones_within_one_percent(recordings: dict[str, Path]) -> None:
+    finger = json.loads(recordings["emps"].read_text(encoding="utf-8"))
+    law = finger["joints"][0]["friction"]
+    found = [law["viscous"], law["coulomb"], finger["bias"]["initial_torque"][0]]
+    assert found == pytest.approx(PUBLISHED[:3].tolist(), rel=0.01)
+    assert law["static"] == law["coulomb"]
+
+
+@measured
+@pytest.mark.slow
+def test_the_script_finds_the_mass_too() -> None:
+    """The rows of its first table: published, published M, all fitted, at 1 kHz, the same decimated."""
+    pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not installed with its estimation")
+    environment = os.environ | {"TENDONFMU_DATA": str(DATA.parent)}
+    script = [sys.executable, str(EXAMPLE / "fit_emps.py")]
+    done = subprocess.run(script, capture_output=True, text=True, env=environment)
+    assert done.returncode == 0, done.stderr
+    symmetric, asymmetric = (
+        {cells[1].strip(): [float(cell.split()[0]) for cell in cells[2:-1] if cell.strip()] for cells in rows[2:]}
+        for rows in ([line.split("|") for line in part.splitlines()] for part in done.stdout.strip().split("\n\n"))
+    )
+    expected = [PUBLISHED[3], *PUBLISHED[:3]]
+    for name in ("all fitted", "at 1 kHz"):
+        assert symmetric[name][:4] == pytest.approx(expected, rel=0.01)
+    assert symmetric["all fitted"][4] <= 4.1 and symmetric["all fitted"][5] <= 5.99
+    assert asymmetric["all fitted"][5] <= 3.15
+    # judged as the authors did: 4.04, 5.95 and 3.06 by least squares, as the data's own notes have it
+    assert symmetric["at 1 kHz, the error decimated"][4:] == pytest.approx([4.04, 5.95], abs=0.02)
+    assert asymmetric["at 1 kHz, the error decimated"][5] == pytest.approx(3.06, abs=0.02)

@@ -17,7 +17,6 @@ from tendonfmu.figure_data import ReferenceCurves, ReferenceFigure
 from tendonfmu.fmu import run_fmu
 from tendonfmu.packaging import build_fmu
 from tendonfmu.plots import draw_reference
-from tendonfmu.recording import Recording
 
 JAW = Path(__file__).with_name("jaw.json")
 LIMIT = 0.025  # N·m
@@ -49,11 +48,9 @@ class Comparison:
 def compare(fmu: Path, folder: Path, name: str) -> Comparison:
     """Runs the FMU over one of the recordings."""
     run = read_run(folder, name)
-    groups = {group: values for group, values in run.items() if group != "time"}
-    table = run_fmu(fmu, Recording(folder / f"{name}.TXT", run["time"], groups))
-    return Comparison(
-        run["time"], table["joint_torque[1]"], table["compensated_torque[1]"], run["external_torque"][:, 0]
-    )
+    table = run_fmu(fmu, run)
+    external = run.groups["external_torque"][:, 0]
+    return Comparison(run.time, table["joint_torque[1]"], table["compensated_torque[1]"], external)
 
 
 def print_table(runs: dict[str, Comparison]) -> None:

@@ -1,4 +1,4 @@
-"""Least-squares fit of jaw.json: three friction numbers and an offset, with the runtime itself as the model.
+"""Fits jaw.json: three friction numbers and an offset, by `tendonfmu fit` from jaw_start.json.
 
     python examples/davinci/fit_jaw.py [-o examples/davinci/jaw.json] [--train 00 02 04 06 08]
 
@@ -8,59 +8,58 @@ Everything else in jaw.json (thresholds, filter, stiffness) is chosen by hand, s
 from __future__ import annotations
 
 import argparse
-import copy
 import json
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaw_recordings import SLOW, Array, data_folder, read_run, rms, torque_error
-from scipy.optimize import least_squares
+from jaw_recordings import FAST, SLOW, data_folder, read_run, rms, torque_error
 
+from tendonfmu.fitting import FrictionFit
 from tendonfmu.native import run_recording
+from tendonfmu.recording import Recording
 
-HERE = Path(__file__).parent
-# joint friction (N·m), part of the cable force lost while closing and while opening (1), bias at the start (N·m)
-LOWER, UPPER = np.array([0.0, 0.0, 0.0, -1.0]), np.array([1.0, 1.0, 1.0, 1.0])
+START = Path(__file__).with_name("jaw_start.json")
 DIGITS = 4  # written to jaw.json
 
 
-def described(finger: dict[str, Any], numbers: Array) -> dict[str, Any]:
-    """A copy of the finger with the four numbers in place; no Stribeck effect: static = coulomb."""
-    joint, closing, opening, offset = (float(number) for number in numbers)
-    finger = copy.deepcopy(finger)
+def fit(recordings: list[Recording]) -> dict[str, Any]:
+    """The description with the least squared torque error over all samples of all recordings, numbers rounded.
+
+    What the fit warns of (residuals that are not white) is shown on standard error.
+    """
+    finger: dict[str, Any] = json.loads(FrictionFit(START).fit(recordings).description_text())
     edge = finger["tendons"][0]["edge_friction"][0]
-    finger["joints"][0]["friction"] |= {"static": joint, "coulomb": joint}
-    edge["positive"] |= {"static": closing, "coulomb": closing}
-    edge["negative"] |= {"static": opening, "coulomb": opening}
-    finger["bias"]["initial_torque"] = [offset]
+    for law in (finger["joints"][0]["friction"], edge["positive"], edge["negative"]):
+        law |= {"static": round(law["static"], DIGITS), "coulomb": round(law["coulomb"], DIGITS)}
+    finger["bias"]["initial_torque"] = [round(torque, DIGITS) for torque in finger["bias"]["initial_torque"]]
     return finger
 
 
-def fit(finger: dict[str, Any], recordings: list[dict[str, Array]]) -> Array:
-    """The four numbers with the least squared torque error over all samples of all recordings."""
-
-    def errors(numbers: Array) -> Array:
-        candidate = described(finger, numbers)
-        return np.asarray(np.concatenate([torque_error(run, run_recording(candidate, run)) for run in recordings]))
-
-    # The error is linear in the numbers, so any start will do; the step keeps clear of rounding.
-    found = least_squares(errors, x0=[0.05, 0.1, 0.1, 0.0], bounds=(LOWER, UPPER), x_scale=0.1, diff_step=1e-3)
-    return np.asarray(found.x).round(DIGITS)
+def numbers(finger: dict[str, Any]) -> tuple[float, float, float, float]:
+    """Joint friction in N·m, part of the cable force lost while closing and while opening, bias at the start in N·m."""
+    joint, edge = finger["joints"][0]["friction"], finger["tendons"][0]["edge_friction"][0]
+    offset = finger["bias"]["initial_torque"][0]
+    return joint["coulomb"], edge["positive"]["coulomb"], edge["negative"]["coulomb"], offset
 
 
 def written(text: str, finger: dict[str, Any]) -> str:
-    """The file's text with the finger's new numbers: the layout made by hand stays."""
-    joint = finger["joints"][0]["friction"]
-    edge = finger["tendons"][0]["edge_friction"][0]
-    for law, key in ((joint, "friction"), (edge["positive"], "positive"), (edge["negative"], "negative")):
-        pair = f'"static": {law["static"]}, "coulomb": {law["coulomb"]}'
+    """The start's text with the fitted numbers: the layout made by hand stays."""
+    joint, closing, opening, offset = numbers(finger)
+    for key, value in (("friction", joint), ("positive", closing), ("negative", opening)):
+        pair = f'"static": {value}, "coulomb": {value}'
         text = re.sub(rf'("{key}": *{{)"static": [^,]*, "coulomb": [^,]*', rf"\g<1>{pair}", text, count=1)
-    text = re.sub(r'("initial_torque": )\[[^]]*\]', rf"\g<1>{finger['bias']['initial_torque']}", text)
+    text = re.sub(r'("initial_torque": )\[[^]]*\]', rf"\g<1>[{offset}]", text)
     if json.loads(text) != finger:
-        raise SystemExit("jaw.json: its layout has changed; expected the keys static, coulomb in this order")
+        raise SystemExit("jaw_start.json: its layout has changed; expected the keys static, coulomb in this order")
     return text
+
+
+def pooled(finger: dict[str, Any], recordings: Iterable[Recording]) -> float:
+    """rms of the torque error over the samples of all recordings, mN·m."""
+    return 1e3 * rms(np.concatenate([torque_error(run, run_recording(finger, run.arrays())) for run in recordings]))
 
 
 def main() -> None:
@@ -68,19 +67,19 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, help="description to write; without it, only the figures")
     parser.add_argument("--train", nargs="+", default=SLOW, metavar="RUN", help="runs to fit (default: all of 0.1 Hz)")
     options = parser.parse_args()
-    text = (HERE / "jaw.json").read_text(encoding="utf-8")
     folder = data_folder()
-    recordings = {name: read_run(folder, name) for name in {*SLOW, *options.train}}
-    finger = json.loads(text)
-    numbers = fit(finger, [recordings[name] for name in options.train])
-    finger = described(finger, numbers)
-    print("joint friction {:g} N·m, lost closing {:g}, opening {:g}, initial torque {:g} N·m".format(*numbers))
-    for name in sorted(recordings):
-        error = torque_error(recordings[name], run_recording(finger, recordings[name]))
-        print(f"{name}  rms {1e3 * rms(error):5.1f} mN·m{'' if name in options.train else '  (not in the fit)'}")
+    runs = {name: read_run(folder, name) for name in (*SLOW, *FAST)}
+    finger = fit([runs[name] for name in options.train])
+    print("joint friction {:g} N·m, lost closing {:g}, opening {:g}, initial torque {:g} N·m".format(*numbers(finger)))
+    for name, run in runs.items():
+        print(f"{name}  rms {pooled(finger, [run]):5.1f} mN·m{'' if name in options.train else '  (not in the fit)'}")
+    for label, names in (("0.1 Hz, not in the fit", SLOW), ("0.5 Hz", FAST)):
+        rest = [runs[name] for name in names if name not in options.train]
+        if rest:
+            print(f"pooled, {label}: {pooled(finger, rest):.1f} mN·m")
     if options.output:
         partial = options.output.with_name(f".{options.output.name}.partial")
-        partial.write_text(written(text, finger), encoding="utf-8")
+        partial.write_text(written(START.read_text(encoding="utf-8"), finger), encoding="utf-8")
         partial.replace(options.output)
 
 

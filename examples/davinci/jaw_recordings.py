@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.converters.davinci import convert
+from tendonfmu.converters import convert_file
 from tendonfmu.errors import InputError
+from tendonfmu.recording import Recording
 
 Array = NDArray[Any]
 
-RADIUS = 0.005  # m: the default of `tendonfmu convert davinci`, and the moment arm in jaw.json
 SLOW = tuple(f"0{load}" for load in range(10))  # 0.1 Hz, jaw loaded with 10 % .. 100 %
 FAST = ("40", "42", "44", "46", "48")  # 0.5 Hz, those that are in the folder
 FAULT = {"07": 16.5}  # s; the instrument jams from 17.08 s on: not friction, left out of fit and score
@@ -34,12 +34,13 @@ def data_folder() -> Path:
     return folder
 
 
-def read_run(folder: Path, name: str) -> dict[str, Array]:
-    """One run up to its fault, if it has one: `time` [N], the inputs and `external_torque` [N, 1]."""
-    columns = convert(folder / f"{name}.TXT", RADIUS)
+def read_run(folder: Path, name: str) -> Recording:
+    """One run as `tendonfmu convert davinci` writes it, up to its fault if it has one."""
+    file = folder / f"{name}.TXT"
+    columns = convert_file("davinci", file, {})
     end = np.searchsorted(columns["time"], FAULT.get(name, np.inf), side="right")
-    recording = {column.removesuffix("[1]"): values[:end, None] for column, values in columns.items()}
-    return recording | {"time": columns["time"][:end]}
+    groups = {column.removesuffix("[1]"): values[:end, None] for column, values in columns.items() if column != "time"}
+    return Recording(file, columns["time"][:end], groups)
 
 
 def rms(values: Array) -> float:
@@ -47,6 +48,6 @@ def rms(values: Array) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def torque_error(recording: Mapping[str, Array], outputs: Mapping[str, Array]) -> Array:
+def torque_error(recording: Recording, outputs: Mapping[str, Array]) -> Array:
     """[N] N·m: compensated torque minus what the sensor at the jaw felt."""
-    return np.asarray(outputs["compensated_torque"] - recording["external_torque"])[:, 0]
+    return np.asarray(outputs["compensated_torque"] - recording.groups["external_torque"])[:, 0]
