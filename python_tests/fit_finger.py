@@ -43,16 +43,17 @@ def made_recording(
 
 
 def asymmetric_finger() -> Description:
-    """The small finger with negative sides that are half as rough again in the base joint and the first edges."""
+    """The small finger with a base joint whose negative side has twice the viscous friction.
+
+    (A difference of Coulomb friction is a constant, which the bias takes.)
+    """
     found = copy.deepcopy(small_finger())
     found["joints"][0]["friction"] = _two_sides(found["joints"][0]["friction"])
-    for tendon in found["tendons"]:
-        tendon["edge_friction"][0] = _two_sides(tendon["edge_friction"][0])
     return found
 
 
 def _two_sides(law: dict[str, float]) -> dict[str, Any]:
-    rough = {"static": 1.5, "coulomb": 1.5, "stribeck_velocity": 1.0, "viscous": 1.0}
+    rough = {"static": 1.0, "coulomb": 1.0, "stribeck_velocity": 1.0, "viscous": 2.0}
     return {"positive": dict(law), "negative": {key: value * rough[key] for key, value in law.items()}}
 
 

@@ -22,7 +22,7 @@ Numbers = NDArray[np.float64]
 
 UNFINISHED = "tendonfmu-fit-unfinished-1"
 DIGITS = 10  # of a fitted number; far below any standard error, and enough to keep static above coulomb friction
-_WIDTH = 110  # of a line of JSON that stays one line
+_WIDTH = 160  # of a line of JSON that stays one line: a law with all digits does
 
 
 def check_outputs(output: Path, report: Path | None, figures: Path | None, inputs: Sequence[Path]) -> None:
