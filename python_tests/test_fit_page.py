@@ -229,7 +229,8 @@ def visit(browser: str, file: Path, *options: str) -> subprocess.CompletedProces
     return subprocess.run(words, capture_output=True, text=True, check=True, timeout=180)
 
 
-FRAME = """<!DOCTYPE html><body style="margin:0"><iframe id="f" style="border:0;width:{width}px;height:2400px"
+FRAME = """<!DOCTYPE html><meta charset="utf-8"><body style="margin:0">
+<iframe id="f" style="border:0;width:{width}px;height:2400px"
 srcdoc="{page}"></iframe><script>
 addEventListener("load", () => {{
   const inside = document.getElementById("f").contentDocument;

@@ -18,6 +18,7 @@ Numbers = NDArray[np.float64]
 
 _SHOWN = (1e-3, 10.0)  # standard error over value
 _TICKS = ((1e-3, "0.1 %"), (1e-2, "1 %"), (1e-1, "10 %"), (1.0, "100 %"), (10.0, "1000 %"))
+_STRONG, _MANY = 0.5, 100  # correlation, and unknowns from which on such entries are drawn larger
 _NARROWEST = 0.035  # of all unknowns, a group that has its own name beside the correlation matrix
 _KINDS = {
     "friction": "joint friction",
@@ -152,6 +153,7 @@ def correlation_sheet(picture: FitPicture) -> Sheet:
         "are correlated by more than 0.9.",
         matrix=matrix,
         groups=groups,
+        marked=_marked(matrix),
     )
     return Sheet(
         section="correlation",
@@ -159,10 +161,17 @@ def correlation_sheet(picture: FitPicture) -> Sheet:
         title="What the data cannot tell apart",
         caption="Correlation of the errors of all unknowns, in the fit's own form (coulomb, drop = static − coulomb, "
         "rate = 1/stribeck_velocity, viscous), ordered by where they act. Red: their difference is known better than "
-        "either of them; blue: their sum is.",
+        "either of them; blue: their sum is. Strong ones are drawn larger than they are.",
         keys=(("positive", "+1"), ("uncorrelated", "0"), ("opposed", "−1")),
         panels=(panel,),
     )
+
+
+def _marked(matrix: Numbers) -> NDArray[np.intp]:
+    """Entries beside the diagonal that must not be overlooked among many."""
+    if len(matrix) < _MANY:
+        return np.empty((0, 2), dtype=np.intp)
+    return np.argwhere((np.abs(matrix) >= _STRONG) & ~np.eye(len(matrix), dtype=bool))
 
 
 def _groups(picture: FitPicture, places: list[tuple[int, int]]) -> tuple[tuple[str, int, int], ...]:

@@ -67,12 +67,12 @@ STYLES = {
     "confidence": Style(BLUE, alpha=0.2, patch=True),
     "fitted_confidence": Style(BLUE, alpha=0.2, patch=True),
     "slow_limit": Style(ORANGE, 0.9, ":"),
-    "standstill": Style("#B9BEC4", alpha=0.35, patch=True),
+    "standstill": Style("#BDBDBD", alpha=0.35, patch=True),
     "negative_confidence": Style(VERMILION, alpha=0.18, patch=True),
     "median": Style(BLUE, 1.6),
     "spread": Style(SKY, alpha=0.35, patch=True),
     "held_out": Style(ORANGE, alpha=0.16, patch=True),
-    "data": Style("#B9BEC4", alpha=0.6, patch=True),
+    "data": Style("#BDBDBD", alpha=0.6, patch=True),
     "identified": Style(BLUE, 0.0, alpha=0.7),
     "unidentified": Style(VERMILION, 0.0, filled=False),
     "positive": Style("#B2182B", patch=True),
@@ -255,6 +255,8 @@ def _short(panel: Panel) -> str:
 
 def _draw_matrix(axes: Axes, panel: MatrixPanel) -> None:
     axes.imshow(panel.matrix, cmap=_DIVERGING, vmin=-1.0, vmax=1.0, interpolation="nearest", aspect="equal")
+    rows, columns = panel.marked.T
+    axes.scatter(columns, rows, 5.0, panel.matrix[rows, columns], cmap=_DIVERGING, vmin=-1.0, vmax=1.0, linewidths=0)
     middles = [(begin + end - 1) / 2 for _, begin, end in panel.groups]
     names = [name for name, _, _ in panel.groups]
     axes.set_yticks(middles, names)

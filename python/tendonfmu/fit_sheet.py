@@ -78,12 +78,16 @@ class Panel:
 
 @dataclass(frozen=True)
 class MatrixPanel:
-    """A matrix of numbers from −1 to 1, [p, p]. groups: name, and the rows (from, to) that it spans, in order."""
+    """A matrix of numbers from −1 to 1, [p, p]. groups: name, and the rows (from, to) that it spans, in order.
+
+    marked: [k, 2] rows and columns of entries that are drawn larger than they are, where all are too small to be seen.
+    """
 
     title: str
     alt: str
     matrix: Numbers
     groups: tuple[tuple[str, int, int], ...]
+    marked: NDArray[np.intp]
     size: Size = "large"
 
 

@@ -176,7 +176,7 @@ def _thousands(number: int) -> str:
 
 def _how(report: Mapping[str, Any]) -> Iterator[str]:
     method = _METHODS.get(report["method"], str(report["method"]))
-    rounds = "" if report["method"] == "ekf" else f", {report['iterations']} iterations"
+    rounds = "" if report["method"] == "ekf" else f", {report['passes']} passes over the data"
     yield f"{method}{rounds}, {report['seconds']:.3g} s."
 
 
