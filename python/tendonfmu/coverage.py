@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -80,6 +80,12 @@ def coverage_of(
 ) -> list[EffectCoverage]:
     """The same of samples in any order. joint_position, joint_velocity: [N, n]. share: [N] s each stands for."""
     return [_cover(data, effect, joint_position, joint_velocity, share) for effect in effects(data)]
+
+
+def with_laws_of(data: Mapping[str, Any], coverage: Sequence[EffectCoverage]) -> list[EffectCoverage]:
+    """The same motion beside the laws of another description of the same structure."""
+    by_path = {effect.path: effect for effect in effects(data)}
+    return [replace(cover, effect=by_path[cover.effect.path]) for cover in coverage]
 
 
 def _cover(

@@ -32,6 +32,7 @@ Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 FEWEST = 20  # samples of a part; fewer say nothing of a bias, let alone of friction
+_LOOKED_AT = 50_000  # samples, about, of which is said where the motion has been
 SHORTEST_BLOCK = 1.0  # s; of a held-out block
 
 
@@ -274,11 +275,18 @@ def _held_out(recording: Recording, parts: list[slice], held: Held) -> Flags:
 
 
 def motion_of(recordings: list[FitRecording]) -> tuple[Numbers, Numbers, Numbers]:
-    """Of all samples trained on: joint angle [K, n] rad, speed [K, n] rad/s, time [K] s that each stands for."""
-    angle = np.concatenate([each.model.joint_angle[each.train] for each in recordings])
-    speed = np.concatenate([each.model.joint_speed[each.train] for each in recordings])
-    share = np.concatenate([_sample_time(each)[each.train] for each in recordings])
-    return angle, speed, share
+    """Of the samples trained on: joint angle [K, n] rad, speed [K, n] rad/s, time [K] s that each stands for.
+
+    Every so many'th of very many: where a motion has been is seen well enough.
+    """
+    every = max(1, sum(len(each.time) for each in recordings) // _LOOKED_AT)
+    angle, speed, share = [], [], []
+    for each in recordings:
+        rows = np.flatnonzero(each.train)[::every]
+        angle.append(each.model.joint_angle[rows])
+        speed.append(each.model.joint_speed[rows])
+        share.append(_sample_time(each)[rows] * every)
+    return np.concatenate(angle), np.concatenate(speed), np.concatenate(share)
 
 
 def _sample_time(recording: FitRecording) -> Numbers:

@@ -23,6 +23,7 @@ Flags = NDArray[np.bool_]
 
 LAGS = 20  # of the Ljung-Box test; even, so that the chi-square tail is a finite sum
 CONFIDENCE = 0.95
+_BLOCK, _SMALL = 64, 1e-30
 _NEVER = 1e9  # N·m; no contact threshold is ever passed
 _BIAS = {"noise_std": 0.01, "noise_std_per_force": 0.0, "drift_variance": 1e-6}  # contract section 2
 
@@ -137,16 +138,15 @@ def track(
             continue
         part = slice(whole.start + late, whole.stop)
         gain, variance[part] = _gains(settings, time[part], mean_force[part], learns[part])
-        for j in range(remainder.shape[1]):
-            moved = None if jump is None else jump[part, j].tolist()
-            first = None if settings.initial_torque is None else float(settings.initial_torque[j])
-            bias[part, j] = _filter(remainder[part, j].tolist(), moved, gain, first)
+        moved = np.zeros_like(remainder[part]) if jump is None else jump[part]
+        first = remainder[part][0] if settings.initial_torque is None else settings.initial_torque
+        bias[part] = _filter(remainder[part], moved, gain, first)
         residual[part] = remainder[part] - bias[part]
         residual[part.start] = np.nan
     return Residuals(residual, variance, bias)
 
 
-def _gains(settings: BiasSettings, time: Numbers, mean_force: Numbers, learns: Flags) -> tuple[list[float], Numbers]:
+def _gains(settings: BiasSettings, time: Numbers, mean_force: Numbers, learns: Flags) -> tuple[Numbers, Numbers]:
     """K [N], 0 where nothing is learned, and S [N] (NaN for the first sample)."""
     step = np.diff(time, prepend=time[0])
     spread = (settings.noise + settings.per_force * mean_force) ** 2
@@ -161,20 +161,31 @@ def _gains(settings: BiasSettings, time: Numbers, mean_force: Numbers, learns: F
         gain = known / (known + noise) if learn and known + noise > 0 else 0.0
         known *= 1 - gain
         gains.append(gain)
-    return gains, total
+    return np.array(gains), total
 
 
-def _filter(remainder: list[float], jump: list[float] | None, gain: list[float], first: float | None) -> list[float]:
-    """b before each update."""
-    bias = remainder[0] if first is None else first
-    found = [bias]
-    if jump is None:
-        jump = [0.0] * len(remainder)
-    for rest, moved, weight in zip(remainder[1:], jump[1:], gain[1:], strict=True):
-        bias += moved
-        found.append(bias)
-        bias += weight * (rest - bias)
-    return found
+def _filter(remainder: Numbers, jump: Numbers, gain: Numbers, first: Numbers) -> Numbers:
+    """[N, n] b before each update: s_k = (1 − K_k)(s_k−1 + Δb_k) + K_k (y − T)_k, b_k = s_k−1 + Δb_k, s_0 = first.
+
+    In blocks, s = A (s_before + Σ c/A) with A the running product of 1 − K: exact but for rounding, while A is far from
+    underflow; blocks of an eager filter, whose A is not, are walked through.
+    """
+    after = np.empty_like(remainder)
+    keep = 1 - gain[:, None]
+    forced = keep * jump + gain[:, None] * remainder
+    after[0] = state = first
+    for begin in range(1, len(remainder), _BLOCK):
+        rows = slice(begin, begin + _BLOCK)
+        product = np.cumprod(keep[rows], axis=0)
+        if product[-1, 0] > _SMALL:
+            after[rows] = product * (state + np.cumsum(forced[rows] / product, axis=0))
+        else:
+            for k in range(*rows.indices(len(remainder))):
+                after[k] = state = keep[k] * state + forced[k]
+        state = after[rows][-1]
+    before = np.empty_like(after)
+    before[0], before[1:] = first, after[:-1] + jump[1:]
+    return before
 
 
 # --- what is random in them -------------------------------------------------------------------------------------------

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu import native
-from tendonfmu.coverage import EffectCoverage, coverage_of
+from tendonfmu.coverage import EffectCoverage, coverage_of, with_laws_of
 from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.errors import InputError
 from tendonfmu.fit_evaluation import Evaluation, evaluate, model_over, residuals
@@ -287,7 +287,7 @@ class FrictionFit:
             covariance=learned.covariance,
             information=learned.information,
             fitted=self.description_,
-            coverage=coverage_of(self.description_.data, *motion_of(self.recordings_)),
+            coverage=with_laws_of(self.description_.data, self.coverage_),
             noise=bias_settings(self.description_.data).noise,
         )
 

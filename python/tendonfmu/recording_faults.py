@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,7 @@ from tendonfmu.description import FingerDescription
 from tendonfmu.recording import Recording
 
 Numbers = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+Runs = list[tuple[int, int]]  # (begin, end) of samples, end excluded
 
 GAP = 10.0  # sample times; a longer step is a gap
 SHORTEST_GAP = 0.1  # s; single lost samples do no harm
@@ -108,22 +107,34 @@ def stuck_sensors(recording: Recording, finger: FingerDescription) -> list[Stuck
     stiffness = np.array([float(tendon["stiffness"]) for tendon in finger.data["tendons"]])
     stretch = groups["tendon_force"] / stiffness
     found: list[StuckSensor] = []
-    for i in range(len(arms)):
-        found += _stuck_force(recording.time, groups["tendon_force"], i)
-        expected = _position_by_others(groups, arms, stretch, i)
-        if expected is not None:
-            found += _stuck(recording.time, "tendon_position", groups["tendon_position"], i, expected)
     angle = (groups["tendon_position"] - stretch) @ np.linalg.pinv(arms).T
-    for j in range(arms.shape[1]):
-        if "joint_position" in groups:
-            found += _stuck(recording.time, "joint_position", groups["joint_position"], j, angle[:, j])
-        if "joint_velocity" in groups:
-            measured = groups.get("joint_position", angle)
-            # what the given velocity does not account for
+    for name, k, runs in _still(recording):
+        if name == "tendon_force":
+            found += _stuck_force(groups["tendon_force"], k, runs)
+            continue
+        expected: Numbers | None
+        if name == "tendon_position":
+            expected = _position_by_others(groups, arms, stretch, k)
+        elif name == "joint_position":
+            expected = angle[:, k]
+        else:  # what the given velocity does not account for
             step = np.diff(recording.time, prepend=recording.time[0])
-            rest = measured[:, j] - np.cumsum(groups["joint_velocity"][:, j] * step)
-            found += _stuck(recording.time, "joint_velocity", groups["joint_velocity"], j, rest)
+            expected = groups.get("joint_position", angle)[:, k] - np.cumsum(groups[name][:, k] * step)
+        if expected is not None:
+            found += _stuck(name, groups[name], k, expected, runs)
     return found
+
+
+def _still(recording: Recording) -> Iterator[tuple[str, int, Runs]]:
+    """Columns (group, element from 0) with their runs of equal values longer than `STUCK`, where there are any."""
+    for name, values in recording.groups.items():
+        if name == "external_torque":
+            continue
+        for k in range(values.shape[1]):
+            bounds = np.concatenate([[0], np.flatnonzero(np.diff(values[:, k])) + 1, [len(values)]])
+            long = recording.time[bounds[1:] - 1] - recording.time[bounds[:-1]] > STUCK
+            if long.any():
+                yield name, k, list(zip(bounds[:-1][long].tolist(), bounds[1:][long].tolist(), strict=True))
 
 
 def _position_by_others(groups: Mapping[str, Numbers], arms: Numbers, stretch: Numbers, i: int) -> Numbers | None:
@@ -137,30 +148,20 @@ def _position_by_others(groups: Mapping[str, Numbers], arms: Numbers, stretch: N
     return np.asarray(angle @ arms[i] + stretch[:, i])
 
 
-def _runs(column: Numbers) -> Iterator[tuple[int, int]]:
-    """(begin, end) of each run of equal values, at least two of them; end excluded."""
-    ends = np.flatnonzero(np.diff(column)) + 1
-    bounds = np.concatenate([[0], ends, [len(column)]])
-    for begin, end in pairwise(bounds.tolist()):
-        if end - begin > 1:
-            yield begin, end
-
-
-def _stuck(time: Numbers, group: str, values: Numbers, k: int, expected: Numbers) -> Iterator[StuckSensor]:
+def _stuck(group: str, values: Numbers, k: int, expected: Numbers, runs: Runs) -> Iterator[StuckSensor]:
+    """Runs during which the expected values [N] change."""
     enough = max(_MOVES[group], _OF_RANGE * float(np.ptp(expected)))
-    for begin, end in _runs(values[:, k]):
-        if time[end - 1] - time[begin] > STUCK and np.ptp(expected[begin:end]) > enough:
+    for begin, end in runs:
+        if np.ptp(expected[begin:end]) > enough:
             yield StuckSensor(group, k + 1, float(values[begin, k]), begin, end)
 
 
-def _stuck_force(time: Numbers, force: Numbers, i: int) -> Iterator[StuckSensor]:
-    """A force that stands still while those of most other tendons change; 0 throughout is another matter."""
+def _stuck_force(force: Numbers, i: int, runs: Runs) -> Iterator[StuckSensor]:
+    """A force that stands still while those of most other tendons change; 0 is a slack tendon or a silent one."""
     others = np.delete(force, i, axis=1)
-    if not others.shape[1] or not force[:, i].any():
-        return
     size = np.maximum(np.abs(others).mean(axis=0), 1e-9)
-    for begin, end in _runs(force[:, i]):
-        if time[end - 1] - time[begin] > STUCK and force[begin, i] != 0:
+    for begin, end in runs:
+        if force[begin, i] != 0 and others.shape[1]:
             changes = np.ptp(others[begin:end], axis=0) / size
             if np.median(changes) > _FORCE_SHARE:
                 yield StuckSensor("tendon_force", i + 1, float(force[begin, i]), begin, end)
