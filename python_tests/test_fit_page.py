@@ -122,7 +122,7 @@ def test_every_number_is_in_the_tables(written: Written, page: str) -> None:
 def test_the_first_screen_says_it_all(written: Written, page: str) -> None:
     """How much is left, of what, against the start, the bias alone and the friction alone; by joint; what is known."""
     picture = written[0]
-    first = page.split("<nav")[0]
+    first = page.split("<nav")[0].replace("\u00a0", " ")
     residual = picture.report["residual"]["train"]
     for key in ("torque_rms", "rms", "start_rms", "bias_only_rms", "model_only_rms"):
         for value in residual[key]:
@@ -136,6 +136,7 @@ def test_the_first_screen_says_it_all(written: Written, page: str) -> None:
 
 def test_rms_of_all_joints_is_their_mean_power(written: Written) -> None:
     for table in residual_tables(written[0]):
+        assert table.rows[-1] is table.all
         values = [row.fitted for row in table.rows[:-1]]
         assert table.all.fitted == pytest.approx(np.sqrt(np.mean(np.square(np.array(values, dtype=float)))))
 
@@ -194,6 +195,32 @@ def test_comparisons_stand_beside_the_training(written: Written) -> None:
     text = text_of(changed(picture, residual=residual))
     assert "Not trained on: at 40 N: rms in mN·m" in text
     assert "Not trained on: at 40 N: 18.0 of 21.4 mN·m of torque are left, 84 %" in text
+
+
+def test_many_comparisons_are_told_together(written: Written) -> None:
+    picture = written[0]
+    train = picture.report["residual"]["train"]
+    residual = {"train": train, "held_out": None}
+    residual["comparisons"] = [{"label": f"run {k}", **train, "rms": [0.002 * k] * 4} for k in (1, 2, 3)]
+    text = text_of(changed(picture, residual=residual))
+    assert "3 recordings not trained on: 9.4 % to 28 % of the torque are left." in text
+    assert "Not trained on: run 1: rms in mN·m" in text and "Not trained on: run 1: 2.0" not in text
+
+
+def test_one_joint_has_one_table(written: Written) -> None:
+    """A row for each set of data instead of a table."""
+    picture = written[0]
+    one = copy.deepcopy(dict(picture.fitted))
+    del one["joints"][1:]
+    residual = {key: value[:1] for key, value in picture.report["residual"]["train"].items()}
+    report: dict[str, Any] = {
+        "residual": {"train": residual, "held_out": residual, "comparisons": [{"label": "b", **residual}]},
+        "parameters": [each for each in picture.report["parameters"] if each["path"].startswith("joints[1].")],
+        "innovations": {"nis": {"mean": None}, "whiteness": {"lag_one": [0.0], "ljung_box_p": [1.0]}},
+    }
+    found = summarise(dataclasses.replace(changed(picture, **report), fitted=one)).residuals
+    assert [row.name for row in found[0].rows] == ["Training", "Held out of training", "Not trained on: b"]
+    assert len(found) == 1 and found[0].rows[1].fitted == pytest.approx(1e3 * residual["rms"][0])
 
 
 def test_noise_that_is_not_as_stated_is_said(written: Written) -> None:

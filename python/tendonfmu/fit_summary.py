@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from tendonfmu.fit_picture import FitPicture
@@ -18,7 +18,8 @@ _METHODS = {
     "batch": "Maximum likelihood over all samples at once (batch)",
     "ekf": "The extended Kalman filter of the paper (ekf), sample by sample",
 }
-_LIMIT = f"{100 * LIMIT:.0f} %"
+_LIMIT = f"{100 * LIMIT:.0f}\u00a0%"
+_COMPARED = "Not trained on: "
 _GROUP = re.compile(r"(joints|tendons)\[(\d+)\]\.?(.*)")
 
 
@@ -45,15 +46,12 @@ class ResidualRow:
 
 @dataclass(frozen=True)
 class ResidualTable:
-    """One set of data."""
+    """One set of data, a row per joint; or all sets of a finger with one joint. all: all joints together."""
 
     title: str
     unit: str
     rows: list[ResidualRow]
-
-    @property
-    def all(self) -> ResidualRow:
-        return self.rows[-1]
+    all: ResidualRow
 
 
 @dataclass(frozen=True)
@@ -94,7 +92,7 @@ def summarise(picture: FitPicture) -> Summary:
         state=_state(report),
         sentences=[*_what(picture), *_how(report), *_how_well(tables), _known(report)],
         tiles=_tiles(report, tables),
-        residuals=tables,
+        residuals=tables if len(picture.joint_names) > 1 else _joined(picture.joint_names[0], tables),
         doubts=_doubts(report),
         groups=_groups(picture),
         consistency=_consistency(picture),
@@ -115,7 +113,7 @@ def residual_tables(picture: FitPicture) -> Iterator[ResidualTable]:
     """Training, held-out data, and each comparison."""
     residual = picture.report["residual"]
     sets = [("Training", residual["train"]), ("Held out of training", residual.get("held_out"))]
-    sets += [(f"Not trained on: {each['label']}", each) for each in residual.get("comparisons") or []]
+    sets += [(f"{_COMPARED}{each['label']}", each) for each in residual.get("comparisons") or []]
     for title, found in sets:
         if found and found.get("rms"):
             yield _table(title, found, picture.joint_names)
@@ -134,7 +132,15 @@ def _table(title: str, found: Mapping[str, Any], joints: Sequence[str]) -> Resid
         found_rows.append(
             ResidualRow(name, _known_or_none(factor * torque), start, bias_only, model_only, fitted, left)
         )
-    return ResidualTable(title, unit, found_rows)
+    return ResidualTable(title, unit, found_rows if len(joints) > 1 else found_rows[:1], found_rows[-1])
+
+
+def _joined(joint: str, tables: Sequence[ResidualTable]) -> list[ResidualTable]:
+    """The tables of one joint as one, a row per set of data; those in other units stay apart."""
+    by_unit: dict[str, list[ResidualRow]] = {}
+    for table in tables:
+        by_unit.setdefault(table.unit, []).append(replace(table.all, name=table.title))
+    return [ResidualTable(joint, unit, rows, rows[0]) for unit, rows in by_unit.items()]
 
 
 def _together(values: Sequence[float]) -> float:
@@ -181,7 +187,8 @@ def _how(report: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _how_well(tables: Sequence[ResidualTable]) -> Iterator[str]:
-    for table in tables:
+    few, many = _apart(tables)
+    for table in few:
         row = table.all
         if row.fitted is None or row.left is None or not row.torque:
             continue
@@ -195,6 +202,21 @@ def _how_well(tables: Sequence[ResidualTable]) -> Iterator[str]:
                 f"alone, with a constant bias, {_percent(row.model_only / row.torque)}"
             )
         yield text + "."
+    if many:
+        yield f"{len(many)} recordings not trained on: {_range(many)} of the torque are left."
+
+
+def _apart(tables: Sequence[ResidualTable]) -> tuple[list[ResidualTable], list[ResidualTable]]:
+    """Those to be told one by one, and comparisons that are too many for that."""
+    compared = [table for table in tables if table.title.startswith(_COMPARED)]
+    if len(compared) <= 2:
+        return list(tables), []
+    return [table for table in tables if table not in compared], compared
+
+
+def _range(tables: Sequence[ResidualTable]) -> str:
+    found = [table.all.left for table in tables if table.all.left is not None]
+    return f"{_percent(min(found))} to {_percent(max(found))}" if found else "an unknown share"
 
 
 def rounded(value: float | None, digits: int = 3) -> str:
@@ -206,7 +228,7 @@ def rounded(value: float | None, digits: int = 3) -> str:
 
 
 def _percent(share: float) -> str:
-    return f"{100 * share:.0f} %" if share >= 0.0995 else f"{100 * share:.1f} %"
+    return f"{100 * share:.0f}\u00a0%" if share >= 0.0995 else f"{100 * share:.1f}\u00a0%"
 
 
 def _known(report: Mapping[str, Any]) -> str:
@@ -220,11 +242,14 @@ def _known(report: Mapping[str, Any]) -> str:
 
 
 def _tiles(report: Mapping[str, Any], tables: Sequence[ResidualTable]) -> list[Tile]:
+    few, many = _apart(tables)
     tiles = [
         Tile(_percent(table.all.left), f"of the torque is left: {table.title[0].lower() + table.title[1:]}")
-        for table in tables[:3]
+        for table in few
         if table.all.left is not None
     ]
+    if many:
+        tiles.append(Tile(_range(many), f"of the torque is left in {len(many)} recordings not trained on"))
     if tables and tables[0].all.bias_only is not None and tables[0].all.torque:
         tiles.append(Tile(_percent(tables[0].all.bias_only / tables[0].all.torque), "would be left by the bias alone"))
     return [*tiles, Tile(f"{report['identified']['count']}/{report['identified']['of']}", "numbers identified")]
