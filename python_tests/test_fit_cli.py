@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 import subprocess
 import sys
 import time
+from importlib.resources import files as files_of
 from pathlib import Path
 
+import jsonschema
 import pytest
 
 from command import Call
@@ -52,6 +55,21 @@ def test_a_fit_writes_a_description_and_a_report(call: Call, files: tuple[Path, 
     assert "held out" in answer.out and "batch: converged" in answer.out
     assert call("check", "fitted.json").status == 0
     assert call("run", "fitted.json", recording, "-o", "out.csv", "--kinematics", "3").status == 0
+
+
+def test_the_report_is_as_its_schema_says(call: Call, files: tuple[Path, Path]) -> None:
+    schema = json.loads(files_of("tendonfmu").joinpath("schema", "fit_report.schema.json").read_text())
+    jsonschema.Draft202012Validator.check_schema(schema)
+    finger, recording = files
+    assert call("fit", finger, recording, "-o", "f.json", "--report", "r.json", "--holdout", "0.1", *FIT).status == 0
+    jsonschema.validate(json.loads(Path("r.json").read_text()), schema)
+
+
+def test_every_option_is_on_the_page(call: Call) -> None:
+    page = (ROOT / "docs" / "fit.md").read_text(encoding="utf-8")
+    options = set(re.findall(r"--[a-z][a-z-]+", call("fit", "--help").out)) - {"--help"}
+    assert len(options) > 15
+    assert {option for option in options if option not in page} == {"--output"}
 
 
 def test_a_report_holds_no_nan(call: Call, files: tuple[Path, Path]) -> None:

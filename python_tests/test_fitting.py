@@ -315,7 +315,7 @@ def test_warnings_are_warnings() -> None:
 
 def test_a_stopped_fit_is_marked_and_goes_on(tmp_path: Path) -> None:
     """Long enough for passes of more than the 50 ms after which progress is told."""
-    recording = [made_recording(duration=40.0)] * 8
+    recording = [made_recording(duration=40.0)] * 4
     whole = shared(moved_start(), threads=1).fit(recording)
 
     def stop(progress: Any) -> bool:
