@@ -121,6 +121,10 @@ def random_fit_case(seed: int, samples: int) -> tuple[Description, Recording, in
     description = copy.deepcopy(description)
     if seed % 8 == 3:
         jam(description)
+    # without noise there is no likelihood
+    rng = np.random.default_rng([seed, 10])
+    noise = {"drift_variance": 10.0 ** rng.uniform(-6, -3), "noise_std": 10.0 ** rng.uniform(-3, -1.5)}
+    description["bias"] = dict(description.get("bias") or {}) | noise
     if seed % 4 == 0:
         joints = len(description["joints"])
         description["extensions"] = [

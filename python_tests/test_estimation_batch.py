@@ -1,0 +1,294 @@
+"""The batch estimation against its naive twin: cost, gradient, information and innovations by a dense covariance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import oracle
+import oracle_fit
+from fit_cases import few_unknowns, groups, image_of, off_start, random_fit_case, shared_key, small_finger, twin_of
+from fit_data import make_recording, wavy_forces, wavy_motion
+from oracle_trace import Trace, with_values, without_contact
+from random_fingers import Description, Recording, random_recording
+from tendonfmu import estimation
+
+if not estimation.HAS_ESTIMATION:
+    pytest.skip(f"SKIPPED: {estimation.ESTIMATION_MISSING}", allow_module_level=True)
+
+Array = NDArray[Any]
+
+EXACT = 1e-9  # of the largest entry: a filter of 400 samples against Cholesky of the whole covariance
+
+
+@dataclass
+class Part:
+    """A recording as both sides take it."""
+
+    recording: Recording
+    source: int = 1
+    external_torque: Array | None = None
+    use: Array | None = None
+
+
+def both(description: Description, group: Array, parts: list[Part]) -> tuple[Any, list[oracle_fit.Likelihood]]:
+    """The estimator with its recordings, and the twin's likelihoods."""
+    estimator = estimation.Estimator(image_of(description), group)
+    twin = twin_of(description, group, estimator.unknowns)
+    likelihoods = []
+    for number, part in enumerate(parts):
+        added = estimator.add_recording(part.recording, part.source, part.external_torque, part.use)
+        assert added == number
+        likelihoods.append(
+            oracle_fit.Likelihood(description, twin, part.recording, part.source, part.external_torque, part.use)
+        )
+    return estimator, likelihoods
+
+
+def assert_equal_evaluation(estimator: Any, likelihoods: list[oracle_fit.Likelihood], z: Array, **how: int) -> None:
+    cost, gradient, information = estimator.evaluate(z, **how)
+    expected = oracle_fit.evaluate(likelihoods, z)
+    # in units that make the unknowns comparable: standard errors where the data say something
+    size = np.sqrt(np.where(np.diag(expected[2]) > 0.0, np.diag(expected[2]), 1.0))
+    assert cost == pytest.approx(expected[0], rel=EXACT)
+    largest = np.sqrt(2.0 * expected[0])  # Cauchy-Schwarz: |gradient / size| cannot be larger
+    np.testing.assert_allclose(gradient / size, expected[1] / size, rtol=0.0, atol=EXACT * max(largest, 1.0))
+    ratio = np.outer(size, size)
+    np.testing.assert_allclose(information / ratio, expected[2] / ratio, rtol=0.0, atol=EXACT)
+    np.testing.assert_array_equal(information, information.T)
+
+
+def leave_out(seed: int, samples: int) -> Array:
+    """[N] bool: a few stretches and single samples not used, at times the first ones."""
+    rng = np.random.default_rng([seed, 11])
+    use = rng.random(samples) > 0.05
+    for start in rng.integers(0, samples, 3):
+        use[start : start + int(rng.integers(1, 30))] = False
+    if seed % 3 == 0:
+        use[: 1 + seed % 7] = False
+    return np.asarray(use)
+
+
+def random_parts(seed: int, samples: int, recordings: int) -> tuple[Description, list[Part]]:
+    """A random finger with several recordings: left-out samples, known load, any kinematics."""
+    description = random_fit_case(seed, samples)[0]
+    rng = np.random.default_rng([seed, 12])
+    parts = []
+    for number in range(recordings):
+        recording = random_recording(description, 1000 * number + seed, samples - 20 * number)
+        length = len(recording["time"])
+        part = Part(recording, 1 + (seed + number) % 3)
+        if (seed + number) % 2:
+            part.external_torque = rng.normal(0.0, 0.05, (length, len(description["joints"])))
+        if (seed + number) % 4 > 1:
+            part.use = leave_out(seed + number, length)
+        parts.append(part)
+    return description, parts
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_cost_gradient_and_information_are_those_of_the_dense_twin(seed: int) -> None:
+    description, parts = random_parts(seed, 100, 1 + seed % 3)
+    group = groups(description, shared_key(seed) if seed % 2 else lambda path: path)
+    estimator, likelihoods = both(description, group, parts)
+    for z in (np.array([u.start for u in estimator.unknowns]), off_start(estimator.unknowns, seed)):
+        for likelihood, part in zip(likelihoods, parts, strict=True):
+            moved = with_values(description, likelihood.unknowns.moved(z))
+            assert not Trace(moved, part.recording, part.source).near.any(), "a decision that rounding may turn"
+        assert_equal_evaluation(estimator, likelihoods, z)
+
+
+def made(description: Description, seed: int, duration: float, rate: float = 20.0, **how: Any) -> Recording:
+    joints = len(description["joints"])
+    motion = wavy_motion(seed, duration, rate, joints)
+    forces = wavy_forces(seed, motion["time"], len(description["tendons"]), mean=30.0)
+    return make_recording(description, motion, forces, seed, 0.02, **how).recording
+
+
+def made_part(description: Description, seed: int, duration: float, rate: float = 20.0, **how: Any) -> Part:
+    recording = made(description, seed, duration, rate, **how)
+    return Part(recording, 3, recording.get("external_torque"))
+
+
+BIASES: dict[str, Description] = {
+    "as given": {},
+    "initial_variance": {"initial_variance": 4e-3},
+    "noise_per_force": {"noise_std_per_force": 4e-4},
+    "noise_time": {"noise_time": 0.02},
+    "initial_torque": {"initial_torque": [0.02, -0.01], "initial_variance": 1e-6},
+    "initial_torque of default variance": {"initial_torque": [0.02, -0.01]},
+    "no wandering": {"drift_variance": 0.0},
+    "known start": {"initial_variance": 0.0},
+    "forgets at once": {"forget_rate": 1e3},
+    "never forgets": {"forget_rate": 0.0},
+    "all": {"initial_torque": [0.01, 0.0], "noise_time": 0.01, "noise_std_per_force": 1e-4, "initial_variance": 1e-4},
+}
+
+
+@pytest.mark.parametrize("name", BIASES)
+@pytest.mark.parametrize("left_out", [False, True], ids=["all used", "some left out"])
+def test_every_bias_option(name: str, left_out: bool) -> None:
+    description = small_finger()
+    description["bias"] |= BIASES[name]
+    parts = [made_part(description, 1, 12.0), made_part(description, 2, 8.0, rate=31.0)]
+    if left_out:
+        for seed, part in enumerate(parts, start=2):
+            part.use = leave_out(seed, len(part.recording["time"]))
+    estimator, likelihoods = both(description, groups(description), parts)
+    assert_equal_evaluation(estimator, likelihoods, off_start(estimator.unknowns, 1))
+
+
+def test_gap_in_time() -> None:
+    """A pause of 40 s wanders as far as 40 s of samples; what moved, stuck and was forgotten goes on."""
+    description = small_finger()
+    part = made_part(description, 5, 15.0)
+    part.recording["time"] = part.recording["time"] + 40.0 * (np.arange(300) >= 170)
+    estimator, likelihoods = both(description, groups(description), [part])
+    assert_equal_evaluation(estimator, likelihoods, off_start(estimator.unknowns, 2))
+
+
+def test_one_gap_or_two_recordings_differ_by_the_bias_alone() -> None:
+    """Two recordings have two bias paths: their costs add up, also in another order."""
+    description = small_finger()
+    group = groups(description)
+    parts = [made_part(description, 1, 9.0), made_part(description, 2, 7.0)]
+    together, likelihoods = both(description, group, parts)
+    z = off_start(together.unknowns, 3)
+    alone = [both(description, group, [part])[0].evaluate(z) for part in parts]
+    swapped = both(description, group, parts[::-1])[0].evaluate(z)
+    for found, first, second, other in zip(together.evaluate(z), *alone, swapped, strict=True):
+        np.testing.assert_allclose(found, first + second, rtol=1e-11, atol=1e-11 * np.abs(found).max())
+        np.testing.assert_allclose(found, other, rtol=1e-11, atol=1e-11 * np.abs(found).max())
+    assert_equal_evaluation(together, likelihoods, z)
+
+
+@pytest.mark.parametrize("samples", [2, 3, 4, 7, 8, 9, 31, 32, 33, 63, 64, 65, 127, 128, 129, 255, 256, 257, 400])
+def test_any_length(samples: int) -> None:
+    description = small_finger()
+    whole = made(description, 7, 20.0)
+    recording = {name: series[:samples] for name, series in whole.items()}
+    part = Part(recording, 3, recording["external_torque"])
+    estimator, likelihoods = both(description, groups(description), [part])
+    assert_equal_evaluation(estimator, likelihoods, off_start(estimator.unknowns, 3))
+
+
+def filtered(rows: tuple[Array, ...], y: Array, time: Array, noise: float, drift: float, use: Array) -> tuple[Any, ...]:
+    """Cost, gradient and information by a plain loop over samples, one scalar filter for residual and derivatives."""
+    torque, jump, d_torque, d_jump = rows
+    left = np.concatenate([(y - torque)[..., None], -d_torque], axis=2)
+    steps = np.concatenate([jump[..., None], d_jump], axis=2)
+    b, P = left[0], noise
+    whitened = []
+    for k in range(1, len(time)):
+        P += drift * (time[k] - time[k - 1])
+        b = b + steps[k]
+        if use[k]:
+            e, S = left[k] - b, P + noise
+            # the derivative of e by z is that of y − T − b: the jump turns b the other way
+            whitened.append(e / np.sqrt(S))
+            b, P = b + P / S * e, P * noise / S
+    stacked = np.concatenate(whitened)
+    r, J = stacked[:, 0], stacked[:, 1:]
+    return 0.5 * float(r @ r), J.T @ r, J.T @ J
+
+
+@pytest.mark.parametrize("threads", [0, 1, 2, 3])
+def test_a_long_recording_on_any_number_of_threads(threads: int) -> None:
+    """30,001 samples, longer than any block, against a filter that takes them one by one."""
+    description = small_finger()
+    description["bias"] |= {"initial_variance": 9e-6, "forget_rate": 0.1}
+    group = groups(description, few_unknowns)
+    part = made_part(description, 9, 150.005, rate=200.0)
+    samples = len(part.recording["time"])
+    part.use = np.ones(samples, dtype=bool)
+    part.use[5000:5400] = False
+    part.use[-700:-3] = False
+    estimator = estimation.Estimator(image_of(description), group)
+    estimator.add_recording(part.recording, 3, part.external_torque, part.use)
+    z = off_start(estimator.unknowns, 6)
+    R = np.array([tendon["moment_arms"] for tendon in description["tendons"]])
+    y = part.recording["tendon_force"] @ R - part.external_torque
+    rows = estimator.jacobian(0, z, 0, samples)
+    expected = filtered(rows, y, part.recording["time"], 9e-6, 1e-5, part.use)
+    size = np.sqrt(np.diag(expected[2]))
+    cost, gradient, information = estimator.evaluate(z, threads=threads)
+    assert cost == pytest.approx(expected[0], rel=1e-9)
+    np.testing.assert_allclose(gradient / size, expected[1] / size, rtol=0.0, atol=1e-9 * np.sqrt(2.0 * cost))
+    np.testing.assert_allclose(information / np.outer(size, size), expected[2] / np.outer(size, size), atol=1e-9)
+    again = estimator.evaluate(z, threads=threads)
+    for first, second in zip((cost, gradient, information), again, strict=True):
+        np.testing.assert_array_equal(first, second)  # the same call gives the same bits
+
+
+def test_a_coarse_pass_knows_about_as_much() -> None:
+    """Every s-th sample with the noise of s of them: the information of all samples, roughly, for less work."""
+    description = small_finger()
+    group = groups(description, few_unknowns)
+    part = made_part(description, 9, 60.0, rate=200.0)
+    estimator = estimation.Estimator(image_of(description), group)
+    estimator.add_recording(part.recording, 3, part.external_torque)
+    z = np.array([unknown.start for unknown in estimator.unknowns])
+    full, coarse = (np.diag(estimator.evaluate(z, stride=stride)[2]) for stride in (1, 4))
+    np.testing.assert_allclose(coarse / full, 1.0, atol=0.3)
+
+
+# --- innovations
+
+
+@pytest.mark.parametrize("seed", range(9))
+def test_innovations_are_the_contracts_residuals(seed: int) -> None:
+    """r of contract section 5, step 5, and b_eff of step 6, with contact detection out of reach."""
+    description, recording, source = random_fit_case(seed, 200)
+    group = groups(description)
+    estimator = estimation.Estimator(image_of(description), group)
+    estimator.add_recording(recording, source)
+    twin = twin_of(description, group, estimator.unknowns)
+    z = off_start(estimator.unknowns, seed)
+    moved = with_values(description, twin.moved(z))
+    trace = Trace(moved, recording, source)
+    e, S, bias = estimator.innovations(0, z)
+    # without initial_torque, the first sample starts the bias
+    first = moved["bias"].get("initial_torque")
+    left = np.full(trace.n, np.nan) if first is None else trace.tau[0] - trace.torque[0] - first
+    np.testing.assert_allclose(e[0], left, rtol=1e-9, atol=1e-12)
+    assert np.isnan(S[0])
+    np.testing.assert_allclose(e[1:], trace.residual[1:], rtol=0.0, atol=1e-9 * np.abs(trace.residual[1:]).max())
+    expected = oracle.run(without_contact(moved), recording, source).outputs["bias_torque"]
+    np.testing.assert_allclose(bias, expected, rtol=0.0, atol=1e-9 * np.abs(expected).max())
+    assert (S[1:] > 0.0).all()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_innovations_with_samples_left_out(seed: int) -> None:
+    """Of left-out samples too: what the used ones before them foretell; S of the used ones alone."""
+    description, parts = random_parts(seed, 100, 2)
+    for part in parts:
+        part.use = leave_out(seed, len(part.recording["time"]))
+    estimator, likelihoods = both(description, groups(description), parts)
+    z = off_start(estimator.unknowns, seed)
+    for number, likelihood in enumerate(likelihoods):
+        e, S, _ = estimator.innovations(number, z)
+        expected_e, expected_S = likelihood.innovations(z)
+        known = ~np.isnan(expected_e)
+        assert (np.isnan(e) == ~known)[1:].all()  # of the first, see above
+        scale = np.abs(expected_e[known]).max()
+        np.testing.assert_allclose(e[known], expected_e[known], rtol=0.0, atol=1e-9 * scale)
+        rows = likelihood.rows()
+        np.testing.assert_allclose(S[rows], expected_S[rows, 0], rtol=1e-9)
+        assert np.isnan(np.delete(S, rows)).all()
+
+
+def test_innovations_make_up_the_cost() -> None:
+    description, parts = random_parts(5, 100, 2)
+    estimator, likelihoods = both(description, groups(description), parts)
+    z = off_start(estimator.unknowns, 5)
+    total = 0.0
+    for number, likelihood in enumerate(likelihoods):
+        e, S, _ = estimator.innovations(number, z)
+        rows = likelihood.rows()
+        total += 0.5 * float(np.sum(e[rows] ** 2 / S[rows, None]))
+    assert estimator.evaluate(z)[0] == pytest.approx(total, rel=1e-10)

@@ -1,0 +1,173 @@
+"""∂T/∂z and ∂Δb/∂z of the estimation on random fingers: against formulas in complex numbers (exact) and against
+central differences of the oracle itself."""
+
+from __future__ import annotations
+
+import functools
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import oracle_fit
+from fit_cases import (
+    groups,
+    image_of,
+    off_start,
+    random_fit_case,
+    shared_key,
+    small_finger,
+    twin_of,
+)
+from fit_data import make_recording, wavy_forces, wavy_motion
+from oracle_trace import Trace, run_recorder, with_values
+from tendonfmu import estimation
+
+if not estimation.HAS_ESTIMATION:
+    pytest.skip(f"SKIPPED: {estimation.ESTIMATION_MISSING}", allow_module_level=True)
+
+Array = NDArray[Any]
+
+FINGERS = 40
+SAMPLES = 100
+ROUNDING = 1e-10  # of the column's largest: sums of products of numbers between 1e-4 and 1e3
+BY_DIFFERENCES = 1e-6  # of the column's largest, after one Richardson extrapolation
+
+
+class Case:
+    """A random finger, its estimator and twin, and both sides' rows at a point off the start."""
+
+    def __init__(self, seed: int) -> None:
+        self.description, self.recording, self.source = random_fit_case(seed, SAMPLES)
+        group = groups(self.description, shared_key(seed) if seed % 2 else lambda path: path)
+        self.estimator = estimation.Estimator(image_of(self.description), group)
+        self.estimator.add_recording(self.recording, self.source)
+        self.twin = twin_of(self.description, group, self.estimator.unknowns)
+        self.z = off_start(self.estimator.unknowns, seed)
+        moved = with_values(self.description, self.twin.moved(self.z))
+        self.trace = Trace(moved, self.recording, self.source)
+        self.rows = self.estimator.jacobian(0, self.z, 0, SAMPLES)
+        # a force, a velocity within 1e-9 of its threshold may be decided either way
+        self.compared = ~self.trace.near
+
+
+@functools.cache
+def case(seed: int) -> Case:
+    return Case(seed)
+
+
+def excess(found: Array, expected: Array) -> float:
+    """Largest difference, in units of the largest of its column (last axis)."""
+    largest = np.abs(expected).reshape(-1, expected.shape[-1]).max(axis=0)
+    return float((np.abs(found - expected) / np.where(largest > 0.0, largest, 1.0)).max(initial=0.0))
+
+
+@pytest.mark.parametrize("seed", range(FINGERS))
+def test_torques_jumps_and_their_derivatives(seed: int) -> None:
+    each = case(seed)
+    torque, jump, d_torque, d_jump = (rows[each.compared] for rows in each.rows)
+    expected = oracle_fit.derivatives(each.trace, each.twin, each.z)
+    assert excess(torque, each.trace.torque[each.compared]) < ROUNDING
+    np.testing.assert_allclose(jump, each.trace.jump[each.compared], rtol=0.0, atol=1e-14)
+    assert excess(d_torque, expected[0][each.compared]) < ROUNDING
+    assert excess(d_jump, expected[1][each.compared]) < ROUNDING
+
+
+@pytest.mark.parametrize("seed", range(FINGERS))
+def test_derivatives_are_the_oracles_differences(seed: int) -> None:
+    """Two columns a finger, of which one turns the jumps where any does."""
+    each = case(seed)
+    _, _, d_torque, d_jump = each.rows
+    rng = np.random.default_rng([seed, 9])
+    jumping = np.flatnonzero(np.abs(d_jump).max(axis=(0, 1)))
+    columns = {int(rng.integers(0, len(each.z))), int(rng.choice(jumping)) if len(jumping) else 0}
+
+    def rows_at(column: int, step: float) -> Array:
+        z = each.z.copy()
+        z[column] += step
+        changed = with_values(each.description, each.twin.moved(z))
+        return np.stack(run_recorder(changed, each.recording, each.source)[1:3])
+
+    def difference(column: int, step: float) -> Array:
+        return (rows_at(column, step) - rows_at(column, -step)) / (2.0 * step)
+
+    for column in columns:
+        step = 1e-3 * (abs(each.z[column]) or 1.0)
+        expected = (4.0 * difference(column, step / 2.0) - difference(column, step)) / 3.0
+        # rounding of T in units of the derivative: what a difference cannot resolve
+        floor = 1e-15 * max(np.abs(each.rows[0]).max(), 1e-3) / step
+        found = np.stack([d_torque[..., column], d_jump[..., column]])
+        error = np.abs(found - expected)[:, each.compared].max()
+        assert error <= BY_DIFFERENCES * np.abs(expected).max() + 100.0 * floor, each.estimator.unknowns[column].path
+
+
+def test_the_random_fingers_take_every_branch_that_matters() -> None:
+    branches: Counter[str] = Counter()
+    roles: Counter[str] = Counter()
+    sources: Counter[int] = Counter()
+    for seed in range(FINGERS):
+        branches += case(seed).trace.branches
+        roles.update(unknown.role for unknown in case(seed).estimator.unknowns)
+        sources[case(seed).source] += 1
+        roles["shared"] += sum(len(unknown.parameters) > 2 for unknown in case(seed).estimator.unknowns)
+    wanted = {
+        "first_sample_moves", "first_sample_stuck", "keeps_moving", "reversal_between_samples", "enter", "stays_stuck",
+        "first_exit", "exit_after_one_sample", "exit_with_memory", "exit_same_side", "exit_other_side",
+        "moves_above_zero_threshold", "symmetric_positive", "symmetric_negative", "asymmetric_positive",
+        "asymmetric_negative", "working_points_below", "working_points_inside", "working_points_above",
+        "slack_at_spring", "slack_by_loss", "bidirectional_pulls", "bidirectional_pushes", "initial_torque",
+    }  # fmt: skip
+    assert not {name for name in wanted if branches[name] < 10}
+    assert min(roles[name] for name in ("coulomb", "drop", "rate", "viscous", "value", "shared")) > 20
+    assert set(sources) == {1, 2, 3}
+
+
+def test_forces_follow_the_parameters() -> None:
+    """The paper freezes f_A and f_B; the estimation does not, and the difference is not small."""
+    description = small_finger()
+    group = groups(description)
+    estimator = estimation.Estimator(image_of(description), group)
+    motion = wavy_motion(3, 10.0, 20.0, 2)
+    made = make_recording(description, motion, wavy_forces(3, motion["time"], 4), 3)
+    estimator.add_recording(made.recording, 3)
+    twin = twin_of(description, group, estimator.unknowns)
+    trace = Trace(description, made.recording, 3)
+    z = twin.start
+    _, _, d_torque, d_jump = estimator.jacobian(0, z, 0, len(trace.time))
+    carried = oracle_fit.derivatives(trace, twin, z)
+    frozen = oracle_fit.derivatives_with_frozen_forces(trace, twin, z)
+    assert excess(d_torque, carried[0]) < ROUNDING
+    assert excess(d_jump, carried[1]) < ROUNDING
+    assert excess(d_torque, frozen[0]) > 0.03
+    assert excess(d_jump, frozen[1]) > 0.03
+
+
+@pytest.mark.parametrize(("start", "stop"), [(0, 1), (0, 7), (40, 41), (13, 100), (99, 100)])
+def test_any_part_of_a_recording(start: int, stop: int) -> None:
+    each = case(2)
+    part = each.estimator.jacobian(0, each.z, start, stop)
+    for found, whole in zip(part, each.rows, strict=True):
+        np.testing.assert_array_equal(found, whole[start:stop])
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda e, z: e.jacobian(0, z, 0, SAMPLES + 1),
+        lambda e, z: e.jacobian(1, z, 0, 1),
+        lambda e, z: e.jacobian(0, z[:-1], 0, 1),
+        lambda e, z: e.jacobian(0, np.where(np.arange(len(z)) == 1, np.nan, z), 0, 1),
+    ],
+    ids=["past the end", "no such recording", "too few numbers", "not a number"],
+)
+def test_refusals_are_one_line(call: Callable[[Any, Array], Any]) -> None:
+    from tendonfmu.errors import InputError
+
+    each = case(2)
+    with pytest.raises((InputError, IndexError, ValueError)) as refused:
+        call(each.estimator, each.z)
+    assert "\n" not in str(refused.value)
+    assert str(refused.value)

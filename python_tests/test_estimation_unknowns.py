@@ -1,0 +1,245 @@
+"""Unknowns of the estimation: which numbers they move, starts, bounds, scales, sharing, fixed numbers."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import numpy as np
+import pytest
+
+import oracle_fit
+from fit_cases import (
+    few_unknowns,
+    groups,
+    image_of,
+    law,
+    off_start,
+    parameters_of,
+    plain,
+    random_fit_case,
+    shared_key,
+    small_finger,
+    twin_of,
+)
+from random_fingers import Description
+from tendonfmu import estimation
+
+if not estimation.HAS_ESTIMATION:
+    pytest.skip(f"SKIPPED: {estimation.ESTIMATION_MISSING}", allow_module_level=True)
+
+SMALL = small_finger()
+PATHS, VALUES = parameters_of(SMALL)
+INDEX = {path: k for k, path in enumerate(PATHS)}
+
+
+def estimator_of(description: Description, chosen: dict[str, int], scale: dict[str, float] | None = None) -> Any:
+    """An estimator of the numbers at some paths, in groups."""
+    paths = parameters_of(description)[0]
+    group = np.array([chosen.get(path, -1) for path in paths], dtype=np.int32)
+    scales = None if scale is None else np.array([scale.get(path, np.nan) for path in paths])
+    return estimation.Estimator(image_of(description), group, scales)
+
+
+def law_paths(prefix: str) -> list[str]:
+    return [f"{prefix}.{name}" for name in ("static", "coulomb", "stribeck_velocity", "viscous")]
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_round_trip_on_random_fingers(seed: int) -> None:
+    """z -> numbers as the twin has them, and back; the start is the description's."""
+    description = random_fit_case(seed, 60)[0]
+    group = groups(description, shared_key(seed) if seed % 2 else lambda path: path)
+    estimator = estimation.Estimator(image_of(description), group)
+    twin = twin_of(description, group, estimator.unknowns)
+    # the mean of what is shared, but never above a static friction that is fixed
+    bounds = [[getattr(unknown, name) for unknown in estimator.unknowns] for name in ("lower", "upper")]
+    start = estimator.start
+    np.testing.assert_allclose(start, np.clip(twin.start, *bounds), rtol=1e-12)
+    z = off_start(estimator.unknowns, seed)
+    np.testing.assert_allclose(estimator.values(z), twin.parameters(z), rtol=1e-14)
+    np.testing.assert_allclose(estimator.unknown_values(estimator.values(z)), z, rtol=1e-9)
+    assert [unknown.role for unknown in estimator.unknowns] == [number.role for number in twin.numbers]
+    if not seed % 2:  # nothing shared: the start is the description itself
+        np.testing.assert_allclose(estimator.values(start), twin.values, rtol=1e-14)
+
+
+def test_a_side_becomes_coulomb_drop_rate_viscous() -> None:
+    prefix = "tendons[2].edge_friction[1]"
+    static, coulomb, velocity, viscous = law_paths(prefix)
+    estimator = estimator_of(SMALL, {static: 0, coulomb: 1, velocity: 2, viscous: 3})
+    by_role = {unknown.role: unknown for unknown in estimator.unknowns}
+    assert set(by_role) == {"coulomb", "drop", "rate", "viscous"}
+    number = dict(zip(PATHS, VALUES, strict=True))
+    expected = {
+        "coulomb": number[coulomb],
+        "drop": number[static] - number[coulomb],
+        "rate": 1.0 / number[velocity],
+        "viscous": number[viscous],
+    }
+    for role, value in expected.items():
+        assert by_role[role].start == pytest.approx(value, rel=1e-12)
+        assert by_role[role].scale == pytest.approx(value, rel=1e-12)
+    # what is present stays present; vs > 0.2 v_min, v_min = 0.5 mm/s by default
+    for role in ("coulomb", "drop", "viscous"):
+        assert by_role[role].lower == pytest.approx(1e-6 * expected[role], rel=1e-12)
+    assert by_role["rate"].lower == pytest.approx(1e-3 * expected["rate"], rel=1e-12)
+    assert by_role["rate"].upper == pytest.approx(1.0 / (0.2 * 0.0005), rel=1e-12)
+    for role, path in zip(("drop", "coulomb", "rate", "viscous"), law_paths(prefix), strict=True):
+        assert by_role[role].path == path
+        assert by_role[role].parameters == (INDEX[path],)
+
+
+def test_stribeck_velocity_is_bounded_by_its_own_threshold() -> None:
+    joint = estimator_of(SMALL, {"joints[1].friction.stribeck_velocity": 0})
+    assert joint.unknowns[0].upper == pytest.approx(1.0 / (0.2 * 0.01), rel=1e-12)
+    without = copy.deepcopy(SMALL) | {"velocity_threshold": {"tendon": 0.0, "joint": 0.0}}
+    for path, velocity in (
+        ("joints[1].friction.stribeck_velocity", 0.08),
+        ("tendons[1].edge_friction[1].stribeck_velocity", 0.004),
+    ):
+        unknown = estimator_of(without, {path: 0}).unknowns[0]
+        assert unknown.upper == pytest.approx(1.0 / (1e-3 * velocity), rel=1e-12)
+
+
+def test_equal_static_and_coulomb_move_together() -> None:
+    """Without a group of its own, or in that of its Coulomb friction; there is no drop then."""
+    description = copy.deepcopy(SMALL)
+    description["joints"][0]["friction"] = plain(0.006, 0.08, 0.2)
+    static, coulomb, _, _ = law_paths("joints[1].friction")
+    at = {path: k for k, path in enumerate(parameters_of(description)[0])}
+    for chosen in ({coulomb: 0}, {static: 0, coulomb: 0}):
+        estimator = estimator_of(description, chosen)
+        assert [unknown.role for unknown in estimator.unknowns] == ["coulomb"]
+        assert at[coulomb] in estimator.unknowns[0].parameters
+        values = estimator.values(np.array([0.0087]))
+        assert values[at[static]] == values[at[coulomb]] == 0.0087
+
+
+def test_static_of_its_own_stays_above_coulomb() -> None:
+    static, coulomb, _, _ = law_paths("joints[1].friction")
+    estimator = estimator_of(SMALL, {static: 0, coulomb: 1})
+    for z in (np.array([u.lower for u in estimator.unknowns]), off_start(estimator.unknowns, 1)):
+        values = estimator.values(z)
+        assert values[INDEX[static]] > values[INDEX[coulomb]] > 0.0
+    only_static = estimator_of(SMALL, {static: 0})
+    assert [unknown.role for unknown in only_static.unknowns] == ["drop"]
+    values = only_static.values(np.array([0.004]))
+    assert values[INDEX[static]] == pytest.approx(values[INDEX[coulomb]] + 0.004, rel=1e-14)
+
+
+def test_fixed_static_bounds_the_coulomb_friction() -> None:
+    static, coulomb, _, _ = law_paths("joints[1].friction")
+    (unknown,) = estimator_of(SMALL, {coulomb: 0}).unknowns
+    assert unknown.upper == VALUES[INDEX[static]]
+
+
+def test_shared_laws_are_one() -> None:
+    """All tendons alike: 4 numbers of each law and 3 of the one without viscous friction, 2 covers, 2 joints."""
+    group = groups(SMALL, few_unknowns)
+    estimator = estimation.Estimator(image_of(SMALL), group)
+    assert len(estimator.unknowns) == 2 + 4 + 4 + 4 + 4 + 3 + 4
+    twin = twin_of(SMALL, group, estimator.unknowns)
+    z = off_start(estimator.unknowns, 4)
+    values = estimator.values(z)
+    np.testing.assert_allclose(values, twin.parameters(z), rtol=1e-14)
+    for path in (path for path in PATHS if path.startswith("tendons[1].") and few_unknowns(path)):
+        alike = [values[INDEX[path.replace("[1]", f"[{i}]", 1)]] for i in range(1, 5)]
+        assert len(set(alike)) == 1
+    for number, unknown in zip(twin.numbers, estimator.unknowns, strict=True):
+        assert tuple(unknown.parameters) == number.parameters
+
+
+def test_both_directions_tied() -> None:
+    """An asymmetric law whose sides share their groups stays symmetric."""
+    description = copy.deepcopy(SMALL)
+    description["joints"][0]["friction"] = {side: law(0.006, 0.08, 0.2) for side in ("positive", "negative")}
+    group = groups(description, lambda path: path.replace(".negative.", ".positive."))
+    estimator = estimation.Estimator(image_of(description), group)
+    values = estimator.values(off_start(estimator.unknowns, 5))
+    at = {path: k for k, path in enumerate(parameters_of(description)[0])}
+    for name in ("static", "coulomb", "stribeck_velocity", "viscous"):
+        prefix = "joints[1].friction"
+        assert values[at[f"{prefix}.positive.{name}"]] == values[at[f"{prefix}.negative.{name}"]]
+        assert values[at[f"{prefix}.positive.{name}"]] != VALUES[INDEX[f"{prefix}.{name}"]]
+
+
+def test_what_is_fixed_stays_to_the_last_bit() -> None:
+    group = groups(SMALL, shared_key(3))
+    estimator = estimation.Estimator(image_of(SMALL), group)
+    twin = twin_of(SMALL, group, estimator.unknowns)
+    values = estimator.values(off_start(estimator.unknowns, 8))
+    moved = set(twin.moved(twin.start))
+    still = np.array([path not in moved for path in PATHS])
+    assert still.sum() > 20
+    np.testing.assert_array_equal(values[still], VALUES[still])
+
+
+def test_scale_in_the_numbers_of_the_description() -> None:
+    static, coulomb, velocity, viscous = law_paths("tendons[2].edge_friction[1]")
+    scale = {static: 0.09, coulomb: 0.05, velocity: 0.01, viscous: 2.0}
+    estimator = estimator_of(SMALL, {static: 0, coulomb: 1, velocity: 2, viscous: 3}, scale)
+    found = {unknown.role: unknown.scale for unknown in estimator.unknowns}
+    assert found == pytest.approx({"drop": 0.04, "coulomb": 0.05, "rate": 100.0, "viscous": 2.0}, rel=1e-12)
+    lower = {unknown.role: unknown.lower for unknown in estimator.unknowns}
+    expected = {"drop": 0.04e-6, "coulomb": 0.05e-6, "rate": 0.1, "viscous": 2e-6}
+    assert lower == pytest.approx(expected, rel=1e-12)
+
+
+def test_initial_torque_is_an_unknown_of_any_sign() -> None:
+    description = copy.deepcopy(SMALL)
+    description["bias"]["initial_torque"] = [0.02, 0.0]
+    estimator = estimator_of(description, {"bias.initial_torque[1]": 0, "bias.initial_torque[2]": 1})
+    assert [unknown.role for unknown in estimator.unknowns] == ["value", "value"]
+    assert [unknown.start for unknown in estimator.unknowns] == [0.02, 0.0]
+    assert estimator.unknowns[0].lower < -1.0 and estimator.unknowns[0].upper > 1.0
+    assert estimator.unknowns[1].scale > 0.0
+
+
+@pytest.mark.parametrize(
+    ("chosen", "named"),
+    [
+        ({"tendons[1].stiffness": 0}, "tendons[1].stiffness"),
+        ({"bias.noise_std": 0}, "bias.noise_std"),
+        ({"velocity_threshold.tendon": 0}, "velocity_threshold.tendon"),
+        ({"tendons[1].edge_friction[2].angles[1]": 0}, "angles[1]"),
+        ({"joints[1].friction.viscous": 0, "joints[1].friction.stribeck_velocity": 0}, "joints[1].friction"),
+    ],
+    ids=["stiffness", "noise", "threshold", "angle", "two kinds in one group"],
+)
+def test_what_cannot_be_estimated_is_refused(chosen: dict[str, int], named: str) -> None:
+    from tendonfmu.errors import InputError
+
+    with pytest.raises(InputError) as refused:
+        estimator_of(SMALL, chosen)
+    assert named in str(refused.value)
+    assert "expected" in str(refused.value) and "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("group", "scale"),
+    [
+        (np.full(len(PATHS) - 1, -1, dtype=np.int32), None),
+        (groups(SMALL), np.full(len(PATHS) + 1, np.nan)),
+    ],
+    ids=["group too short", "scale too long"],
+)
+def test_wrong_lengths_are_refused(group: Any, scale: Any) -> None:
+    from tendonfmu.errors import InputError
+
+    with pytest.raises(InputError) as refused:
+        estimation.Estimator(image_of(SMALL), group, scale)
+    assert str(len(PATHS)) in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_free_groups_are_the_numbers_that_a_fit_counts() -> None:
+    """The twin's choice of what is present is the description's own count (`tendonfmu check`)."""
+    from tendonfmu.description import estimated_numbers
+
+    for seed in range(10):
+        description = random_fit_case(seed, 60)[0]
+        counted = sum(estimated_numbers(description).values()) - len(description["joints"])
+        torques = len((description.get("bias") or {}).get("initial_torque") or [])
+        paths, values = parameters_of(description)
+        assert max(oracle_fit.free_groups(paths, values)) + 1 - torques == counted
