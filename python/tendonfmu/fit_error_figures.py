@@ -161,7 +161,8 @@ def correlation_sheet(picture: FitPicture) -> Sheet:
         title="What the data cannot tell apart",
         caption="Correlation of the errors of all unknowns, in the fit's own form (coulomb, drop = static − coulomb, "
         "rate = 1/stribeck_velocity, viscous), ordered by where they act. Red: their difference is known better than "
-        "either of them; blue: their sum is. Strong ones are drawn larger than they are.",
+        "either of them; blue: their sum is. "
+        + ("Strong ones are drawn larger than they are." if len(panel.marked) else ""),
         keys=(("positive", "+1"), ("uncorrelated", "0"), ("opposed", "−1")),
         panels=(panel,),
     )

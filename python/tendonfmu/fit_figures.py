@@ -30,6 +30,10 @@ _TORQUE_KEYS = (
     ("predicted", "model with bias, before it sees the sample"),
     ("bias", "the bias's part of it"),
 )
+_RESIDUAL_CAPTION = (
+    "Residual before the bias has seen the sample: measured minus modelled torque. A median away from 0 over the angle "
+    "or the velocity is friction that the model does not have; a wide band is noise or stick-slip."
+)
 _RESIDUAL_KEYS = (("median", "median"), ("spread", "10 to 90 % of the samples"), ("held_out", "held out of training"))
 
 
@@ -74,8 +78,12 @@ def torque_sheets(picture: FitPicture) -> Iterator[Sheet]:
             section="torque",
             name=f"torque_{number}",
             title=f"{part}: {series.label}, {begin:.0f} to {end:.0f} s",
-            caption=f"Mean tendon force {series.mean_force:.3g} N. The residual is taken before the bias has seen the "
-            "sample; its share is that of the rms in the time shown.",
+            caption=f"Mean tendon force {series.mean_force:.3g} N."
+            + (
+                " The residual is taken before the bias has seen the sample; its share is of the rms in the time shown."
+                if number == 1
+                else ""
+            ),
             keys=_TORQUE_KEYS,
             panels=tuple(panels),
         )
@@ -164,8 +172,7 @@ def _residual_sheet(picture: FitPicture, series: Sequence[FitSeries], title: str
         section="residual",
         name=f"residual_{number}",
         title=title,
-        caption="Residual before the bias has seen the sample: measured minus modelled torque. A median away from 0 "
-        "over the angle or the velocity is friction that the model does not have; a wide band is noise or stick-slip.",
+        caption=_RESIDUAL_CAPTION if number == 1 else "",
         keys=_RESIDUAL_KEYS if held_out else _RESIDUAL_KEYS[:2],
         panels=tuple(panels),
     )

@@ -23,14 +23,6 @@ _LAW_KEYS = (
     ("start", "start"),
     ("data", "where the training's samples are"),
 )
-_JOINT_CAPTION = (
-    "Friction over the joint's velocity; below v_min (grey) none acts, that is the bias's part. Load friction is per "
-    "newton of tendon force."
-)
-_TENDON_CAPTION = (
-    "Share of the tendon force that is lost, over the tendon's velocity, or over the angle of the joint before where "
-    "the law has working points: there at the training's median speed, and at v_min where sliding begins."
-)
 
 
 def law_sheets(picture: FitPicture) -> Iterator[Sheet]:
@@ -46,21 +38,38 @@ def law_sheets(picture: FitPicture) -> Iterator[Sheet]:
             section="laws",
             name=f"laws_tendon_{tendon}" if tendon else "laws_joints",
             title=f"Tendon {tendon}: {name}" if tendon else "In the joints",
-            caption=(_TENDON_CAPTION if tendon else _JOINT_CAPTION) + hidden,
-            keys=_keys([fitted for _, fitted in here]),
+            caption=_caption([fitted for _, fitted in here]) + hidden,
+            keys=_keys(picture, [fitted for _, fitted in here]),
             panels=tuple(desk.panel(start, fitted) for start, fitted in here),
             folded=tendon > 1,
         )
 
 
-def _keys(drawn: Sequence[Effect]) -> tuple[tuple[str, str], ...]:
+def _caption(drawn: Sequence[Effect]) -> str:
+    if not drawn[0].tendon:
+        load = any(effect.kind == "load_friction" for effect in drawn)
+        return "Friction over the joint's velocity." + (" Load friction is per newton of tendon force." if load else "")
+    text = "Share of the tendon force that is lost, over the tendon's velocity."
+    if any(effect.angles for effect in drawn):
+        text += " Laws with working points: over the angle of the joint before, at the training's median speed"
+        text += ", and at v_min where sliding begins." if any(map(_is_plain, drawn)) else "."
+    return text
+
+
+def _is_plain(effect: Effect) -> bool:
+    """Whether it has working points and one side for both directions."""
+    return bool(effect.angles) and not asymmetric(effect)
+
+
+def _keys(picture: FitPicture, drawn: Sequence[Effect]) -> tuple[tuple[str, str], ...]:
     points = [effect for effect in drawn if effect.angles]
     first = [("fitted", "fitted, over the angle at the median speed" if points else "fitted")]
-    if any(not asymmetric(effect) for effect in points):
+    if any(map(_is_plain, points)):
         first += [("slow", "at v_min"), ("slow_limit", "its 95 %")]
     if any(asymmetric(effect) for effect in points):
         first += [("negative", "negative direction")]
-    rest = [("standstill", "below v_min")] if len(points) < len(drawn) else []
+    still = any(not effect.angles and velocity_threshold(picture.fitted, effect) for effect in drawn)
+    rest = [("standstill", "below v_min: none acts, that is the bias's part")] if still else []
     return (*first, *_LAW_KEYS, *rest)
 
 

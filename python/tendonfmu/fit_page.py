@@ -88,7 +88,7 @@ def fit_page(picture: FitPicture, summary: Summary, figures: list[PageFigure]) -
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"number": _number, "rounded": rounded}
+    environment.filters |= {"number": _number, "rounded": rounded, "unit": _unit}
     by_section: dict[str, list[PageFigure]] = {}
     for figure in figures:
         by_section.setdefault(figure.sheet.section, []).append(figure)
@@ -111,6 +111,11 @@ def _options(report: Mapping[str, Any]) -> dict[str, str]:
         return {True: "yes", False: "no", None: "none"}.get(value, str(value)) if not value else str(value)
 
     return {key: text(value) for key, value in report.get("options", {}).items()}
+
+
+def _unit(name: str) -> str:
+    """As people write it; nothing for a plain number."""
+    return "" if name == "1" else name.replace(".", "·")
 
 
 def _number(value: float | None, digits: int = 3) -> str:

@@ -188,9 +188,8 @@ def _draw_axes(axes: Axes, panel: Panel) -> None:
         axes.plot(curve.x, curve.y, color=style.colour, linewidth=style.width, linestyle=style.dash, alpha=style.alpha)
     for dots in panel.dots:
         style = STYLES[dots.style]
-        axes.plot(
-            dots.x, dots.y, "o", markersize=2.8, color=_face(style), markeredgecolor=style.colour, alpha=style.alpha
-        )
+        face, edge = _face(style), style.colour
+        axes.plot(dots.x, dots.y, "o", ms=2.8, color=face, markeredgecolor=edge, alpha=style.alpha, clip_on=False)
     if panel.log_x:
         axes.set_xscale("log")
     if panel.line is not None:

@@ -237,7 +237,7 @@ def _known(report: Mapping[str, Any]) -> str:
         return f"All {of} numbers are identified: their standard errors are at most {_LIMIT} of their values."
     return (
         f"{count} of {of} numbers are identified, with standard errors of at most {_LIMIT} of their values; what would "
-        f"identify the other {of - count} is said below."
+        f"identify the {'last one' if of - count == 1 else f'other {of - count}'} is said below."
     )
 
 
@@ -265,10 +265,10 @@ def _consistency(picture: FitPicture) -> list[str]:
         if nis["consistent"]:
             meaning = "as large as the noise that the description states"
         else:
-            size = "larger" if nis["mean"] > 1 else "smaller"
+            size, far = ("larger", "small") if nis["mean"] > 1 else ("smaller", "large")
             meaning = (
-                f"{size} than the noise that the description states, by a factor of {math.sqrt(nis['mean']):.2g}; the "
-                f"standard errors are {'too small' if size == 'larger' else 'too large'} by about as much"
+                f"{size} than the noise that the description states, by a factor of {math.sqrt(nis['mean']):.2g}; by "
+                f"that alone the standard errors are too {far} by about as much"
             )
         sentences.append(
             f"Mean squared standardised innovation (NIS) {nis['mean']:.3g}; expected 1, in 95 % of cases between "
