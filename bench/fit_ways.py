@@ -1,0 +1,206 @@
+"""One way of fitting in a process of its own, for compare_fit.py: prints a line of JSON with its time and peak memory.
+
+python bench/fit_ways.py data --folder F --duration 400
+python bench/fit_ways.py batch --folder F --samples 400000
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from fit_data import model_torques, noise_scale
+from fit_peers import Task, Watch, least_squares_fit, outer_products, run_filter
+from numpy.typing import NDArray
+
+from tendonfmu.balance import balanced_forces
+from tendonfmu.description import read_finger
+from tendonfmu.estimation import Estimator, Learner
+from tendonfmu.excitation import START, Plan, plan_excitation
+from tendonfmu.excite import as_array, find_ranges, read_subject
+from tendonfmu.fit_structure import Choice, Structure, build_structure
+
+Array = NDArray[Any]
+ROOT = Path(__file__).resolve().parent.parent
+FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
+RATE = 1000.0  # Hz
+BEGIN = round(START * RATE)  # before it, all joints rest
+PRETENSIONS = (15.0, 30.0)  # N, in turn
+ALTERNATE = 50.0  # s
+SPREAD = 0.3  # of the logarithm of each number of the truth about the description
+PRIOR_STD = 1.0
+MOST_CALLS = 40  # of scipy
+
+# --- the data ---------------------------------------------------------------------------------------------------------
+
+
+def other_numbers(node: Any, draw: Callable[[], float]) -> Any:
+    """The same description with the numbers of its laws and covers multiplied by draws."""
+    if isinstance(node, list):
+        return [other_numbers(each, draw) for each in node]
+    if not isinstance(node, dict):
+        return node
+    if "coulomb" in node:
+        coulomb = node["coulomb"] * draw()
+        drop = (node["static"] - node["coulomb"]) * draw()
+        return {
+            **node,
+            "static": coulomb + drop,
+            "coulomb": coulomb,
+            "stribeck_velocity": node["stribeck_velocity"] * draw(),
+            "viscous": node.get("viscous", 0.0) * draw(),
+        }
+    return {
+        key: {**value, "stiffness": value["stiffness"] * draw()}
+        if key == "cover" and value
+        else other_numbers(value, draw)
+        for key, value in node.items()
+    }
+
+
+def make_data(folder: Path, duration: float) -> dict[str, Any]:
+    """Writes recording.npz: a motion of `excite` with smooth forces, and y = T + b + e of another finger's numbers.
+
+    The forces carry that finger's friction; what the jumps of fig. 5, a random walk and white noise add to it comes as
+    known load, `external_torque` = Rᵀ f0 − y, so that no tendon goes slack however far the bias wanders.
+    """
+    rng = np.random.default_rng(1)
+    subject = read_subject(FINGER)
+    truth = other_numbers(subject.finger.data, lambda: float(np.exp(SPREAD * rng.standard_normal())))
+    ranges = as_array(find_ranges(subject, []))
+    alternate = min(ALTERNATE, duration / 2)
+    plan = Plan(ranges, duration=duration, pretensions=PRETENSIONS, alternate=alternate, rate=RATE)
+    motion = plan_excitation(truth, plan)
+    arrays = {"time": motion.time, "joint_position": motion.joint_position, "joint_velocity": motion.joint_velocity}
+    arrays["tendon_force"] = balanced_forces(truth, arrays, motion.pretension)
+    torque, jumps = model_torques(truth, arrays)
+    white, steps = rng.standard_normal((2, *torque.shape))
+    walk = np.sqrt(truth["bias"]["drift_variance"] / RATE) * np.cumsum(steps, axis=0)
+    noise = noise_scale(truth, motion.time, arrays["tendon_force"]) * white
+    pull = arrays["tendon_force"] @ np.array(subject.finger.moment_arms)
+    np.savez(folder / "recording.npz", **arrays, external_torque=pull - (torque + jumps + walk + noise))
+    return {"samples": len(motion.time), "least_force": float(arrays["tendon_force"].min())}
+
+
+def load(folder: Path, samples: int) -> dict[str, Array]:
+    """So many samples of what make_data wrote, from the beginning of the motion on."""
+    with np.load(folder / "recording.npz") as file:
+        return {name: np.ascontiguousarray(file[name][BEGIN : BEGIN + samples]) for name in file.files}
+
+
+def structure() -> Structure:
+    return build_structure(read_finger(FINGER), Choice())
+
+
+def call_with(arrays: Mapping[str, Array]) -> dict[str, Any]:
+    """Arguments of Estimator.add_recording and Learner.run."""
+    given = {name: array for name, array in arrays.items() if name != "external_torque"}
+    return {"arrays": given, "kinematics_source": 3, "external_torque": arrays["external_torque"]}
+
+
+# --- the ways ---------------------------------------------------------------------------------------------------------
+
+
+def batch(arrays: Mapping[str, Array]) -> dict[str, Any]:
+    chosen = structure()
+    estimator = Estimator(chosen.start.image, chosen.group, chosen.scale)
+    estimator.add_recording(**call_with(arrays))
+    with Watch() as watch:
+        found = estimator.fit(prior_std=PRIOR_STD)
+    figures = {name: getattr(found, name) for name in ("z", "cost", "passes", "converged")}
+    return watch.times() | figures | {"std": np.sqrt(np.diag(found.covariance)), "iterations": found.steps}
+
+
+def ekf(arrays: Mapping[str, Array], block: int | None = None) -> dict[str, Any]:
+    chosen = structure()
+    options = {} if block is None else {"block": block}
+    learner = Learner(chosen.start.image, chosen.group, chosen.scale, prior_std=PRIOR_STD, **options)
+    with Watch() as watch:
+        learner.run(**call_with(arrays))
+    return watch.times() | {"z": learner.z, "std": np.sqrt(np.diag(learner.covariance))}
+
+
+def ekf_sample_by_sample(arrays: Mapping[str, Array]) -> dict[str, Any]:
+    return ekf(arrays, block=1)
+
+
+def task_of(arrays: Mapping[str, Array]) -> Any:
+    """What the peers are given."""
+    chosen = structure()
+    bias = chosen.start.data["bias"]
+    estimator = Estimator(chosen.start.image, chosen.group, chosen.scale)
+    estimator.add_recording(**call_with(arrays))
+    columns = {
+        name: np.array([getattr(unknown, name) for unknown in estimator.unknowns])
+        for name in ("start", "lower", "upper", "scale")
+    }
+    force = arrays["tendon_force"]
+    return Task(
+        estimator=estimator,
+        time=arrays["time"],
+        measured=force @ np.array(chosen.start.moment_arms) - arrays["external_torque"],
+        noise=noise_scale(chosen.start.data, arrays["time"], force)[:, 0] ** 2,
+        drift=bias["drift_variance"],
+        initial=bias["initial_variance"],
+        **columns,
+    )
+
+
+def scipy_least_squares(arrays: Mapping[str, Array]) -> dict[str, Any]:
+    return least_squares_fit(task_of(arrays), PRIOR_STD, MOST_CALLS)
+
+
+def peer_filter(kind: str) -> Callable[[Mapping[str, Array]], dict[str, Any]]:
+    def run(arrays: Mapping[str, Array]) -> dict[str, Any]:
+        return run_filter(task_of(arrays), kind, PRIOR_STD, len(arrays["time"]))
+
+    return run
+
+
+def one_product(arrays: Mapping[str, Array]) -> dict[str, Any]:
+    """Jᵀ J of a dense Jacobian that is there: a lower bound of any pass that does not use its zeros."""
+    rows, columns = arrays["joint_position"].size, len(Estimator(structure().start.image, structure().group).unknowns)
+    return outer_products(rows, columns)
+
+
+WAYS: dict[str, Callable[[Mapping[str, Array]], dict[str, Any]]] = {
+    "batch": batch,
+    "ekf": ekf,
+    "ekf_sample_by_sample": ekf_sample_by_sample,
+    "product": one_product,
+    "least_squares": scipy_least_squares,
+    "symmetric": peer_filter("symmetric"),
+    "joseph": peer_filter("joseph"),
+    "filterpy": peer_filter("filterpy"),
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("way", choices=["data", *WAYS])
+    parser.add_argument("--folder", type=Path, required=True)
+    parser.add_argument("--samples", type=int, default=400_000)
+    parser.add_argument("--duration", type=float, default=400.0, help="s, of the data")
+    asked = parser.parse_args()
+    if asked.way == "data":
+        found: dict[str, Any] = make_data(asked.folder, asked.duration)
+    else:
+        arrays = load(asked.folder, asked.samples)
+        try:
+            found = WAYS[asked.way](arrays) | {"samples": len(arrays["time"])}
+        except ImportError as missing:
+            found = {"missing": str(missing)}
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    found |= {"peak_memory": used.ru_maxrss * 1024, "cpu_seconds": used.ru_utime + used.ru_stime}
+    print(
+        json.dumps({name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in found.items()})
+    )
+
+
+if __name__ == "__main__":
+    main()
