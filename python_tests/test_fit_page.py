@@ -10,6 +10,7 @@ import json
 import re
 import shutil
 import subprocess
+import sys
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -21,11 +22,13 @@ from matplotlib.image import imread
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
 from fit_pictures import made_up_picture
+from tendonfmu.balance import balanced_forces, moment_arms
 from tendonfmu.errors import InputError
 from tendonfmu.fit_page import PAGE, write_fit_page
 from tendonfmu.fit_page import fit_page as render
 from tendonfmu.fit_picture import FitPicture
-from tendonfmu.fit_summary import residual_tables, summarise
+from tendonfmu.fit_summary import residual_tables, rounded, summarise
+from tendonfmu.tables import write_table
 
 LARGEST = 5_000_000  # bytes
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "microsoft-edge")
@@ -237,6 +240,64 @@ def test_a_folder_that_cannot_be_made(written: Written, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(InputError, match="cannot be made"):
         write_fit_page(written[0], tmp_path / "file" / "figures")
+
+
+# --- from the command line --------------------------------------------------------------------------------------------
+
+
+def finger_of_one_joint() -> dict[str, Any]:
+    law = {"static": 0.03, "coulomb": 0.02, "stribeck_velocity": 0.005, "viscous": 0.3}
+    tendons = [
+        {"name": name, "stiffness": 4000.0, "moment_arms": [arm], "edge_friction": [law]}
+        for name, arm in (("flexor", 0.01), ("extensor", -0.01))
+    ]
+    return {
+        "format": "tendonfmu-finger-1",
+        "name": "one joint",
+        "joints": [{"name": "only", "friction": {"static": 0.01, "coulomb": 0.01, "stribeck_velocity": 0.1}}],
+        "tendons": tendons,
+        "bias": {"noise_std": 0.001},
+        "contact": {"threshold": [1.0]},
+    }
+
+
+def recording_of(data: dict[str, Any], pretension: float, seed: int) -> dict[str, Any]:
+    """20 s of the finger's own model, to and fro, with some noise on the forces."""
+    time = np.arange(2000) * 0.01
+    angle = 0.4 * np.sin(2.1 * time) + 0.2 * np.sin(0.7 * time)
+    motion = {"time": time, "joint_position": angle[:, None], "joint_velocity": np.gradient(angle, time)[:, None]}
+    force = balanced_forces(data, motion, np.full(len(time), pretension))
+    force += np.random.default_rng(seed).normal(scale=0.02, size=force.shape)
+    stretch = angle[:, None] * moment_arms(data)[:, 0] + force / 4000.0
+    table = {"time": time}
+    for i in (0, 1):
+        table |= {f"tendon_force[{i + 1}]": force[:, i], f"tendon_position[{i + 1}]": stretch[:, i]}
+    return table
+
+
+def test_the_command_writes_it(tmp_path: Path) -> None:
+    """A real fit, with the two recordings of figs. 6 and 7: training, and four times the pretension."""
+    pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is built without the estimation")
+    data = finger_of_one_joint()
+    (tmp_path / "finger.json").write_text(json.dumps(data), encoding="utf-8")
+    for name, pretension in (("train", 10.0), ("x4", 40.0)):
+        write_table(tmp_path / f"{name}.csv", recording_of(data, pretension, seed=7))
+    words = "fit finger.json train.csv -o fitted.json --report r.json --figures figures --compare x4.csv"
+    done = subprocess.run(
+        [sys.executable, "-m", "tendonfmu.cli", *words.split()], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    folder = tmp_path / "figures"
+    assert {"report.html", "torque_1.png", "torque_2.png", "laws_joints.png", "correlation.png"} <= {
+        file.name for file in folder.iterdir()
+    }
+    page = html.unescape((folder / PAGE).read_text("utf-8")).replace("\u00a0", " ")
+    report = json.loads((tmp_path / "r.json").read_text("utf-8"))
+    assert f"{report['identified']['count']}/{report['identified']['of']}" in page
+    for found in (report["residual"]["train"], report["residual"]["comparisons"][0]):
+        assert f"<b>{rounded(1e3 * found['rms'][0])}</b>" in page
+    assert "Not trained on: x4" in page
+    assert all(entry["path"].split(".", 1)[1] in page for entry in report["parameters"])
 
 
 # --- in a real browser ------------------------------------------------------------------------------------------------

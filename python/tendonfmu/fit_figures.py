@@ -67,6 +67,11 @@ def torque_sheets(picture: FitPicture) -> Iterator[Sheet]:
     """Ten seconds of the first training recording, of what was held out of it, and of each comparison, there the same
     seconds as of the training if it has them: it may be the same motion."""
     first = BEGIN
+    explanation = (
+        " The residual is taken before the bias has seen the sample; its share is of the rms in the time shown."
+    )
+    if any(each.get("external_torque") for each in picture.report["recordings"]):
+        explanation += " Where an external torque was measured, the torque shown is less that."
     for number, (part, series, where) in enumerate(_parts(picture), start=1):
         shown = _window(series.time, where, first)
         begin, end = float(series.time[shown][0]), float(series.time[shown][-1])
@@ -78,12 +83,7 @@ def torque_sheets(picture: FitPicture) -> Iterator[Sheet]:
             section="torque",
             name=f"torque_{number}",
             title=f"{part}: {series.label}, {begin:.0f} to {end:.0f} s",
-            caption=f"Mean tendon force {series.mean_force:.3g} N."
-            + (
-                " The residual is taken before the bias has seen the sample; its share is of the rms in the time shown."
-                if number == 1
-                else ""
-            ),
+            caption=f"Mean tendon force {series.mean_force:.3g} N." + (explanation if number == 1 else ""),
             keys=_TORQUE_KEYS,
             panels=tuple(panels),
         )
