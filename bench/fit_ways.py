@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from fit_data import model_torques, noise_scale
 from fit_peers import Task, Watch, least_squares_fit, outer_products, run_filter
 from numpy.typing import NDArray
 
+from fit_data import model_torques, noise_scale
 from tendonfmu.balance import balanced_forces
 from tendonfmu.description import read_finger
 from tendonfmu.estimation import Estimator, Learner
