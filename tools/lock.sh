@@ -14,4 +14,5 @@ compile() {
 compile requirements.lock pyproject.toml --group build --group test
 compile requirements-portable.lock --group portable --constraints requirements.lock
 compile requirements-peers.lock --group peers --constraints requirements.lock
+compile requirements-fit-peers.lock --group fit-peers --constraints requirements.lock
 compile requirements-coupling.lock --group coupling --constraints requirements.lock
