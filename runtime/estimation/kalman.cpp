@@ -8,14 +8,16 @@
 namespace tendonfmu::estimation {
 
 KalmanFilter::KalmanFilter(KalmanSettings settings, const std::vector<double>& start, double prior_std)
-    : settings_(std::move(settings)), z_(start) {
+    : settings_(std::move(settings)), prior_std_(prior_std), start_(start) {
   const std::size_t p = settings_.unknowns, n = settings_.joints, most = settings_.block * n;
   bias_.assign(n, 0.0);
   covariance_.assign(order() * order(), 0.0);
+  offset_.assign(p, 0.0);
   for (std::size_t i = 0; i < p; ++i) {
-    z_[i] = std::clamp(z_[i], settings_.lower[i], settings_.upper[i]);
-    at(i, i) = prior_std * prior_std;
+    start_[i] = std::clamp(start_[i], settings_.lower[i], settings_.upper[i]);
   }
+  z_ = anchor_ = start_;
+  set_prior();
   jump_.assign(n, 0.0);
   jump_rows_.assign(n * p, 0.0);
   rows_.assign((most + n) * order(), 0.0);
@@ -27,6 +29,36 @@ KalmanFilter::KalmanFilter(KalmanSettings settings, const std::vector<double>& s
   residual_.assign(most, 0.0);
   pivot_ = white_ = innovation_ = innovation_variance_ = residual_;
   correction_.assign(order(), 0.0);
+}
+
+void KalmanFilter::set_prior() {
+  std::fill(covariance_.begin(), covariance_.end(), 0.0);
+  for (std::size_t i = 0; i < settings_.unknowns; ++i) {
+    at(i, i) = prior_std_ * prior_std_;
+  }
+}
+
+void KalmanFilter::begin_pass() {
+  anchor_ = z_;
+  z_ = start_;
+  settled_ = true;
+  set_prior();
+}
+
+/* how far z is from where the samples are linearised */
+void KalmanFilter::find_offset() {
+  for (std::size_t i = 0; settled_ && i < settings_.unknowns; ++i) {
+    offset_[i] = (z_[i] - anchor_[i]) / settings_.scale[i];
+  }
+}
+
+/* and what a row makes of it */
+double KalmanFilter::offset(const double* row) const {
+  double sum = 0.0;
+  for (std::size_t i = 0; settled_ && i < settings_.unknowns; ++i) {
+    sum += row[i] * offset_[i];
+  }
+  return sum;
 }
 
 /* row = (first + second)·scale; the bias columns are left alone */
@@ -44,9 +76,10 @@ void KalmanFilter::start_bias(const double* bias, const double* rows, double var
       at(row, column) = 0.0;
     }
   }
+  find_offset();
   for (std::size_t j = 0; j < n; ++j) {
-    bias_[j] = bias[j];
     scale_row(rows + j * p, nullptr, rows_.data() + j * order());
+    bias_[j] = bias[j] + offset(rows_.data() + j * order());
     std::fill_n(rows_.begin() + static_cast<std::ptrdiff_t>(j * order() + p), n, 0.0);
   }
   multiply_symmetric(product_.data(), order(), covariance_.data(), order(), rows_.data(), n, order());
@@ -67,6 +100,7 @@ void KalmanFilter::add(const KalmanSample& sample) {
     elapsed_ = 0.0;
     jumped_ = false;
     std::fill(jump_.begin(), jump_.end(), 0.0);
+    find_offset();
   }
   elapsed_ += sample.step;
   if (sample.jump) {
@@ -84,7 +118,7 @@ void KalmanFilter::add(const KalmanSample& sample) {
     scale_row(sample.torque_rows + j * p, jumped_ ? jump_rows_.data() + j * p : nullptr, h);
     std::fill_n(h + p, n, 0.0);
     h[p + j] = 1.0;
-    residual_[row] = sample.measured[j] - sample.torque[j] - (bias_[j] + jump_[j]);
+    residual_[row] = sample.measured[j] - sample.torque[j] - (bias_[j] + jump_[j]) - offset(h);
   }
   time_[gathered_] = elapsed_;
   noise_[gathered_] = sample.noise;
@@ -133,6 +167,7 @@ void KalmanFilter::propagate(std::size_t rows) {
   }
   for (std::size_t j = 0; measured + j < rows; ++j) {
     const double* moved = product_.data() + (measured + j) * order();
+    bias_[j] += offset(rows_.data() + (measured + j) * order());
     for (std::size_t i = 0; i < p; ++i) {
       at(p + j, i) += moved[i];
     }

@@ -26,7 +26,7 @@ struct KalmanSettings {
   std::vector<double> upper; /* [p] */
 };
 
-/* One sample, linearised. Rows: [n × p] by z. */
+/* One sample, linearised where KalmanFilter::linearise_at() says. Rows: [n × p] by z. */
 struct KalmanSample {
   const double* torque;      /* [n] T, N·m */
   const double* torque_rows; /* ∂T/∂z */
@@ -43,8 +43,16 @@ class KalmanFilter {
   /* z [p] at the start, prior_std: standard deviation of z/scale. */
   KalmanFilter(KalmanSettings settings, const std::vector<double>& start, double prior_std);
 
-  /* The bias begins anew at `bias` [n] with `variance`, and with z as the rows [n × p] say. What was gathered must have
-   * been taken in. */
+  /* Begins again with the start and the prior, for the same samples once more: from now on they are linearised at what
+   * has been found so far. That is a step of Gauss and Newton; the first pass is linearised at unknowns still on their
+   * way. */
+  void begin_pass();
+
+  /* Where samples are to be linearised: z itself, or what the pass before found. */
+  const double* linearise_at() const { return settled_ ? anchor_.data() : z_.data(); }
+
+  /* The bias begins anew at `bias` [n] with `variance`; the rows [n × p] say how it depends on z, and `bias` is for
+   * linearise_at(). What was gathered must have been taken in. */
   void start_bias(const double* bias, const double* rows, double variance);
 
   /* Gathers a sample; at most a block of them. */
@@ -72,6 +80,9 @@ class KalmanFilter {
   std::size_t order() const { return settings_.unknowns + settings_.joints; }
   double& at(std::size_t row, std::size_t column) { return covariance_[column * order() + row]; } /* row >= column */
   double at(std::size_t row, std::size_t column) const { return covariance_[column * order() + row]; }
+  void set_prior();
+  void find_offset();
+  double offset(const double* row) const;
   void scale_row(const double* first, const double* second, double* row) const;
   /* the steps of an update; rows: measurements, and joints more where the bias jumped */
   void propagate(std::size_t rows);
@@ -83,8 +94,11 @@ class KalmanFilter {
   void keep_within_bounds();
 
   KalmanSettings settings_;
-  std::vector<double> z_, bias_;
-  std::vector<double> covariance_; /* of (z/scale, b): lower triangle, as symmetric_update.h has it */
+  double prior_std_;
+  std::vector<double> z_, bias_, start_;
+  bool settled_ = false;                /* linearised at the anchor */
+  std::vector<double> anchor_, offset_; /* [p]; (z − anchor)/scale while a block is gathered */
+  std::vector<double> covariance_;      /* of (z/scale, b): lower triangle, as symmetric_update.h has it */
   /* what is gathered; rows of the state's order, samples × joints of them and one more sample's for the jumps */
   std::size_t gathered_ = 0, updated_ = 0;
   bool jumped_ = false;

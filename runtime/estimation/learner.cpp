@@ -122,7 +122,7 @@ void Learner::initialise(const LearnerSample& first, int kinematics_source) {
   finish();
   initialised_ = false;
   check(first, 0.0);
-  unknowns_.write(filter_.z(), numbers_.data());
+  unknowns_.write(filter_.linearise_at(), numbers_.data());
   finger_.begin(numbers_, kinematics_source);
   if (tendonfmu_initialise(finger_.get(), first.time, &first.inputs) != TENDONFMU_OK) {
     throw refused(tendonfmu_last_error(finger_.get()));
@@ -145,7 +145,7 @@ void Learner::begin_bias(const LearnerSample& sample, double step) {
       const std::int32_t column = unknowns_.initial_torque(j);
       torque_[j] = finger_.get()->derived.initial_torque[j];
       if (column >= 0) {
-        torque_[j] = filter_.z()[column];
+        torque_[j] = filter_.linearise_at()[column];
         torque_rows_[j * p + static_cast<std::size_t>(column)] = 1.0;
       }
     }
@@ -193,7 +193,7 @@ bool Learner::step(const LearnerSample& sample) {
 /* What the unknowns say now, to the finger: samples are linearised there. Not by tendonfmu_set_parameters(), which
  * looks up every index for its range; the unknowns' bounds lie within the ranges, and hold static >= coulomb. */
 void Learner::write_unknowns() {
-  unknowns_.write(filter_.z(), numbers_.data());
+  unknowns_.write(filter_.linearise_at(), numbers_.data());
   for (const std::size_t parameter : moved_) {
     finger_.get()->parameters[parameter] = numbers_[parameter];
   }
@@ -228,6 +228,13 @@ void Learner::finish() {
     throw refused("the covariance is no longer finite: expected inputs and expected magnitudes of sane size");
   }
   written_ = false;
+}
+
+void Learner::begin_pass() {
+  finish();
+  filter_.begin_pass();
+  initialised_ = bias_started_ = false;
+  slack_samples_ = 0;
 }
 
 void Learner::standard_errors(double* errors) const {

@@ -49,6 +49,9 @@ class Learner {
   /* Takes in the samples of a block that is not full. */
   void finish();
 
+  /* See KalmanFilter::begin_pass(). The samples of an unfinished block are taken in first. */
+  void begin_pass();
+
   /* numbers of the description, and their standard errors (first order): [parameter_count]; 0 where fixed */
   void values(double* numbers) const { unknowns_.write(filter_.z(), numbers); }
   void standard_errors(double* errors) const;

@@ -219,6 +219,13 @@ tendonfmu_status tendonfmu_learner_finish(tendonfmu_learner* learner) {
   return guarded(learner, [&] { learner->learner.finish(); });
 }
 
+tendonfmu_status tendonfmu_learner_begin_pass(tendonfmu_learner* learner) {
+  if (!learner) {
+    return TENDONFMU_BAD_ARGUMENT;
+  }
+  return guarded(learner, [&] { learner->learner.begin_pass(); });
+}
+
 tendonfmu_status tendonfmu_learner_run(tendonfmu_learner* learner, size_t samples, const double* time,
                                        const tendonfmu_inputs* inputs, int kinematics_source,
                                        const double* external_torque, const unsigned char* use, double* innovation,

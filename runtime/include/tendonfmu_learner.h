@@ -87,6 +87,12 @@ tendonfmu_status tendonfmu_learner_run(tendonfmu_learner* learner, size_t sample
                                        const double* external_torque, const unsigned char* use, double* innovation,
                                        double* variance, tendonfmu_learner_watch watch, void* context, size_t* done);
 
+/* For recordings, not for a robot that moves: goes back to the start and the prior, and linearises from now on at what
+ * has been found so far. Run the same recordings again. The first pass is linearised at unknowns still on their way;
+ * where they start far off, that leaves errors larger than their standard errors, and a second pass (a step of Gauss
+ * and Newton) removes them. */
+tendonfmu_status tendonfmu_learner_begin_pass(tendonfmu_learner* learner);
+
 /* What the blocks taken in so far say. */
 
 /* Numbers of the description [p], and their standard errors [p], 0 where fixed; NULL: not wanted. */

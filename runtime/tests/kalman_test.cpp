@@ -247,6 +247,43 @@ TEST(Kalman, LetsUnknownsDrift) {
   EXPECT_GT(pair.filter.covariance(3, 3), 1e-5 * s.scale[3] * s.scale[3]);
 }
 
+TEST(Kalman, ASecondPassOverALinearModelFindsTheSame) {
+  const KalmanSettings s = some_settings(8, 2, 4);
+  KalmanFilter filter(s, s.scale, 1.0);
+  const auto pass = [&](std::size_t samples) {
+    Model model(s, 0.0, 30); /* the same samples each time */
+    model.next();
+    const KalmanSample first = model.at(filter.linearise_at());
+    Numbers bias(2), rows(first.torque_rows, first.torque_rows + 16);
+    for (std::size_t j = 0; j < 2; ++j) {
+      bias[j] = first.measured[j] - first.torque[j];
+    }
+    for (double& slope : rows) {
+      slope = -slope;
+    }
+    filter.start_bias(bias.data(), rows.data(), 2e-4);
+    for (std::size_t k = 0; k < samples; ++k) {
+      model.next();
+      filter.add(model.at(filter.linearise_at()));
+      if (filter.full()) {
+        ASSERT_TRUE(filter.update());
+      }
+    }
+  };
+  pass(400);
+  const Numbers z(filter.z(), filter.z() + 8), bias(filter.bias(), filter.bias() + 2);
+  const double variance = filter.covariance(5, 5);
+  filter.begin_pass();
+  EXPECT_EQ(filter.z()[3], s.scale[3]);
+  EXPECT_EQ(filter.linearise_at()[3], z[3]);
+  pass(400);
+  for (std::size_t i = 0; i < 8; ++i) {
+    EXPECT_NEAR(filter.z()[i], z[i], 1e-9 * s.scale[i]);
+  }
+  EXPECT_NEAR(filter.bias()[1], bias[1], 1e-9);
+  EXPECT_NEAR(filter.covariance(5, 5), variance, 1e-9 * variance);
+}
+
 /* the same samples to a filter that is bounded and to one that is not */
 struct Bounded {
   explicit Bounded(const KalmanSettings& s)

@@ -59,6 +59,7 @@ struct Recording {
   std::size_t samples, joints, tendons;
   Numbers time, force, angle, velocity, external, bias;
   std::vector<unsigned char> use;
+  double noise_square = 0.0; /* mean of e²/R as it was drawn */
 
   tendonfmu_inputs inputs(std::size_t row = 0) const {
     return {force.data() + row * tendons, nullptr, angle.data() + row * joints, velocity.data() + row * joints};
@@ -159,7 +160,9 @@ inline void explain(const Json& description, Recording* r, unsigned seed) {
         measured += description["tendons"][i]["moment_arms"][j].get<double>() * r->force[k * r->tendons + i];
       }
       /* the first sample: its error is the bias' own, above */
-      r->external[at] = measured - (torque[at] + b[j] + (k > 0 ? noise * normal(random) : 0.0));
+      const double e = k > 0 ? normal(random) : 0.0;
+      r->external[at] = measured - (torque[at] + b[j] + noise * e);
+      r->noise_square += e * e / static_cast<double>((r->samples - 1) * r->joints);
       r->bias[at] = b[j];
     }
   }
@@ -199,6 +202,14 @@ class Learner {
               TENDONFMU_OK)
         << tendonfmu_learner_last_error(learner_);
     ASSERT_EQ(done, r.samples);
+  }
+
+  /* linearised anew, twice, where the pass before arrived */
+  void run_again(const Recording& r) {
+    for (int pass = 2; pass <= 3; ++pass) {
+      ASSERT_EQ(tendonfmu_learner_begin_pass(learner_), TENDONFMU_OK);
+      run(r);
+    }
   }
 
   tendonfmu_unknown unknown(std::size_t index) const {
