@@ -33,7 +33,9 @@ def _quiet() -> Any:
 
 def shared(finger: Any = None, **options: Any) -> FrictionFit:
     """All tendons alike: 19 unknowns, 70 numbers."""
-    return FrictionFit(finger or small_finger(), **({"share": ["tendons"], "kinematics": 3} | options))
+    return FrictionFit(
+        finger or small_finger(), **({"share": ["tendons"], "kinematics": 3, "tolerance": 1e-3} | options)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -139,6 +141,48 @@ def test_it_can_be_scored_on_other_recordings(fit: FrictionFit) -> None:
         .score(made_recording(seed=8))
         - 0.01
     )
+
+
+# --- the filter ----------------------------------------------------------------------------------------------------
+
+
+def test_the_filter_agrees_with_the_batch_within_their_errors(fit: FrictionFit) -> None:
+    recording = made_recording(duration=40.0)
+    ekf = shared(moved_start(), method="ekf", holdout=0.2).fit(recording)
+    assert ekf.report_["method"] == "ekf" and ekf.report_["cost"] is None
+    known = [p["path"] for p in fit.report_["parameters"] if p["identified"]]
+    away = [(ekf.parameters_[path] - fit.parameters_[path]) / fit.standard_errors_[path] for path in known]
+    assert np.abs(away).max() < 2.0
+    ratio = [ekf.standard_errors_[path] / fit.standard_errors_[path] for path in known]
+    assert 0.4 < min(ratio) and max(ratio) < 2.0
+    innovations = ekf.report_["innovations"]
+    assert innovations["nis"]["consistent"]
+    assert all(abs(value) < 0.03 for value in innovations["whiteness"]["lag_one"])
+    trained = ekf.recordings_[0].train.sum() * 2
+    low, high = innovations["nis"]["interval"]
+    assert high - low == pytest.approx(2 * 1.96 * np.sqrt(2 / trained), rel=0.02)  # held-out samples do not count
+
+
+def test_the_filter_goes_on_from_a_file(tmp_path: Path) -> None:
+    """From the values there, with the expected magnitudes of the description."""
+    recording = made_recording(duration=40.0)
+    stopped = shared(moved_start(), method="ekf", progress=lambda now: now.done < now.total / 2).fit(recording)
+    assert stopped.unfinished_ is not None
+    file = write_unfinished(tmp_path / "f.json", stopped.unfinished_)
+    resumed = shared(moved_start(), method="ekf", start=file).fit(recording)
+    fresh = shared(moved_start(), method="ekf").fit(recording)
+    assert [u.scale for u in resumed.unknowns_] == pytest.approx([u.scale for u in fresh.unknowns_])
+    known = [p["path"] for p in fresh.report_["parameters"] if p["identified"]]
+    away = [(resumed.parameters_[p] - fresh.parameters_[p]) / fresh.standard_errors_[p] for p in known]
+    assert 0.0 < np.abs(away).max() < 2.0
+
+
+def test_numbers_that_wander_are_known_less() -> None:
+    recording = made_recording()
+    still, wandering = (shared(method="ekf", parameter_drift=drift).fit(recording) for drift in (0.0, 1e-2))
+    linear = np.array([unknown.role != "rate" for unknown in still.unknowns_])
+    ratio = np.diag(wandering.z_covariance_) / np.diag(still.z_covariance_)
+    assert (ratio[linear] > 1.3).all()
 
 
 # --- hold-out ---------------------------------------------------------------------------------------------------------

@@ -361,7 +361,7 @@ def fit(
         list[str] | None, typer.Option(metavar="PATTERN=VALUE", help="expected magnitude, if not the description's")
     ] = None,
     passes: Annotated[int, typer.Option(min=1, help="most passes over the data (batch)")] = 60,
-    tolerance: Annotated[float, typer.Option(min=1e-9, max=0.5, help="last step in standard errors (batch)")] = 1e-3,
+    tolerance: Annotated[float, typer.Option(min=1e-9, max=0.5, help="last step in standard errors (batch)")] = 0.05,
     drift: Annotated[float, typer.Option(min=0.0, max=1.0, help="relative variance of the numbers per s (ekf)")] = 0.0,
     resume: Annotated[
         Path | None, typer.Option(metavar="FITTED.unfinished.json", help="go on from an interrupted fit")

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.estimation import Estimator
+from tendonfmu.fit_files import with_values
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.fit_structure import Structure
 
@@ -146,4 +147,62 @@ def learn_batch(
         passes=found.passes,
         converged=found.converged,
         innovations=[],
+    )
+
+
+def learn_ekf(
+    structure: Structure,
+    recordings: Sequence[FitRecording],
+    watch: Watch,
+    options: Mapping[str, Any],
+    start: Start | None,
+) -> Learned:
+    """The extended Kalman filter, once over all recordings in their order. Raises Interrupted."""
+    estimator = _estimator(structure)
+    learner = _learner(structure, estimator, options, start)
+    total = sum(len(recording.time) for recording in recordings)
+    before = 0
+
+    def show(done: int, _: int) -> bool:
+        return watch(Progress("filtering", 1, before + done, total, float("nan")))
+
+    innovations = []
+    for recording in recordings:
+        found = np.full(recording.target.shape, np.nan)
+        for part in recording.parts:
+            try:
+                outputs = learner.run(**_rows(recording, part), progress=show)
+            except KeyboardInterrupt:
+                raise Interrupted(estimator, learner.z, float("nan"), by_user=True) from None
+            if watch.stopped:
+                raise Interrupted(estimator, learner.z, float("nan"), watch.by_user)
+            found[part] = outputs["innovation"] / np.sqrt(outputs["innovation_variance"])
+            before += part.stop - part.start
+        innovations.append(np.where(recording.train[:, None], found, np.nan))
+    scale = np.array([unknown.scale for unknown in learner.unknowns])
+    prior = np.diag(1 / (options["prior"] * scale) ** 2)
+    return Learned(
+        estimator=estimator,
+        z=learner.z,
+        covariance=learner.covariance,
+        information=np.linalg.inv(learner.covariance) - prior,
+        cost=float("nan"),
+        iterations=1,
+        passes=1,
+        converged=True,
+        innovations=innovations,
+    )
+
+
+def _learner(structure: Structure, estimator: Estimator, options: Mapping[str, Any], start: Start | None) -> Any:
+    """It begins at its description's numbers: on going on, those of the interrupted fit, with the scale as it was."""
+    from tendonfmu.estimation import Learner
+
+    image, scale = structure.start.image, structure.scale
+    if start is not None:
+        own = np.abs(estimator.values(estimator.start))
+        scale = np.where(np.isnan(scale), own, scale)
+        image = with_values(structure, estimator.values(_starting_point(estimator, start))).image
+    return Learner(
+        image, structure.group, scale, prior_std=options["prior"], parameter_drift=options["parameter_drift"]
     )

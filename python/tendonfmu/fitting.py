@@ -28,7 +28,7 @@ from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.errors import InputError
 from tendonfmu.fit_evaluation import Evaluation, evaluate, model_over, residuals
 from tendonfmu.fit_files import Unfinished, description_text, resumed_start, with_values
-from tendonfmu.fit_methods import Interrupted, Learned, Watch, learn_batch, unknown_names
+from tendonfmu.fit_methods import Interrupted, Learned, Watch, learn_batch, learn_ekf, unknown_names
 from tendonfmu.fit_picture import FitPicture, FitSeries
 from tendonfmu.fit_recordings import (
     FitRecording,
@@ -49,7 +49,7 @@ Numbers = NDArray[np.float64]
 Finger = FingerDescription | Mapping[str, Any] | str | os.PathLike[str]
 Source = Recording | str | os.PathLike[str]
 
-METHODS = {"batch": learn_batch}
+METHODS = {"batch": learn_batch, "ekf": learn_ekf}
 LEAST_NIS, MOST_NIS, MOST_LAG_ONE = 0.5, 2.0, 0.3  # beyond, a warning
 SIDES = ("given", "symmetric", "asymmetric")
 
@@ -70,7 +70,7 @@ class FrictionFit:
         shares its values. Patterns are those of `fit_structure`.
     prior: standard deviation known beforehand, in units of each number's expected magnitude; scale: "PATTERN=VALUE",
         expected magnitudes other than the description's own values.
-    max_passes (over the data), tolerance (of the last step, in standard errors), threads (0: all cores): of "batch".
+    max_passes (over the data), tolerance (length of the last step in standard errors), threads (0: all): of "batch".
     parameter_drift: of the filter, relative variance per s with which the parameters may wander.
     start: file of an interrupted fit to go on from. progress: called with a `fit_methods.Progress`; False stops.
 
@@ -93,7 +93,7 @@ class FrictionFit:
         prior: float = 1.0,
         scale: Sequence[str] = (),
         max_passes: int = 60,
-        tolerance: float = 1e-3,
+        tolerance: float = 0.05,
         threads: int = 0,
         parameter_drift: float = 0.0,
         start: str | os.PathLike[str] | None = None,
@@ -159,7 +159,10 @@ class FrictionFit:
         learned = self._learn(Watch(self.progress))
         if learned is None:
             return self
+        # what was estimated is not lost when judging it is interrupted
+        self.unfinished_ = self._unfinished(Interrupted(learned.estimator, learned.z, learned.cost, by_user=True))
         self._conclude(learned, compared, found)
+        self.unfinished_ = None
         return self
 
     def _check_options(self) -> None:
@@ -366,7 +369,8 @@ def _fit_sentences(learned: Learned, numbers: Sequence[Fitted]) -> list[str]:
     if at_bound:
         some = ", ".join(number.number.path for number in at_bound[:3])
         more = f" and {len(at_bound) - 3} more" if len(at_bound) > 3 else ""
-        found.append(f"{len(at_bound)} numbers ended at a bound: {some}{more}")
+        many = f"{len(at_bound)} numbers" if len(at_bound) > 1 else "1 number"
+        found.append(f"{many} ended at a bound: {some}{more}")
     return found
 
 
@@ -374,9 +378,10 @@ def _noise_sentences(innovations: Mapping[str, Any]) -> list[str]:
     """Where the noise settings are far from what the residuals show, and the standard errors with them."""
     nis, lag_one = innovations["nis"]["mean"], innovations["whiteness"]["lag_one"]
     found = []
+    times = "-" if nis is None else f"{nis:.2g}" if nis < 100 else f"{nis:.0f}"
     if nis is not None and not LEAST_NIS <= nis <= MOST_NIS:
         found.append(
-            f"the residuals' variance is {nis:.2g} times what bias.noise_std, noise_std_per_force, noise_time and "
+            f"the residuals' variance is {times} times what bias.noise_std, noise_std_per_force, noise_time and "
             "drift_variance say: standard errors are those of the settings, not of the data"
         )
     far = max((abs(value) for value in lag_one if value is not None), default=0.0)
