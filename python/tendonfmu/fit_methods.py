@@ -157,14 +157,40 @@ def learn_ekf(
     options: Mapping[str, Any],
     start: Start | None,
 ) -> Learned:
-    """The extended Kalman filter, once over all recordings in their order. Raises Interrupted."""
+    """The extended Kalman filter over all recordings in their order, each pass but the first linearised where the one
+    before arrived. Raises Interrupted.
+    """
     estimator = _estimator(structure)
     learner = _learner(structure, estimator, options, start)
-    total = sum(len(recording.time) for recording in recordings)
-    before = 0
+    passes = options["max_passes"]
+    innovations: list[Numbers] = []
+    for number in range(1, passes + 1):
+        if number > 1:
+            learner.begin_pass()
+        innovations = _filter_once(learner, estimator, recordings, watch, number)
+    scale = np.array([unknown.scale for unknown in learner.unknowns])
+    prior = np.diag(1 / (options["prior"] * scale) ** 2)
+    return Learned(
+        estimator=estimator,
+        z=learner.z,
+        covariance=learner.covariance,
+        information=np.linalg.inv(learner.covariance) - prior,
+        cost=float("nan"),
+        iterations=passes,
+        passes=passes,
+        converged=True,
+        innovations=innovations,
+    )
+
+
+def _filter_once(
+    learner: Any, estimator: Estimator, recordings: Sequence[FitRecording], watch: Watch, number: int
+) -> list[Numbers]:
+    """Standardised innovations [N, n] by recording, NaN where not trained on."""
+    total, before = sum(len(recording.time) for recording in recordings), 0
 
     def show(done: int, _: int) -> bool:
-        return watch(Progress("filtering", 1, before + done, total, float("nan")))
+        return watch(Progress(f"filtering, pass {number}", number, before + done, total, float("nan")))
 
     innovations = []
     for recording in recordings:
@@ -179,19 +205,7 @@ def learn_ekf(
             found[part] = outputs["innovation"] / np.sqrt(outputs["innovation_variance"])
             before += part.stop - part.start
         innovations.append(np.where(recording.train[:, None], found, np.nan))
-    scale = np.array([unknown.scale for unknown in learner.unknowns])
-    prior = np.diag(1 / (options["prior"] * scale) ** 2)
-    return Learned(
-        estimator=estimator,
-        z=learner.z,
-        covariance=learner.covariance,
-        information=np.linalg.inv(learner.covariance) - prior,
-        cost=float("nan"),
-        iterations=1,
-        passes=1,
-        converged=True,
-        innovations=innovations,
-    )
+    return innovations
 
 
 def _learner(structure: Structure, estimator: Estimator, options: Mapping[str, Any], start: Start | None) -> Any:

@@ -49,7 +49,7 @@ Numbers = NDArray[np.float64]
 Finger = FingerDescription | Mapping[str, Any] | str | os.PathLike[str]
 Source = Recording | str | os.PathLike[str]
 
-METHODS = {"batch": learn_batch, "ekf": learn_ekf}
+METHODS = {"batch": (learn_batch, 60), "ekf": (learn_ekf, 2)}  # with the passes over the data, at most
 LEAST_NIS, MOST_NIS, MOST_LAG_ONE = 0.5, 2.0, 0.3  # beyond, a warning
 SIDES = ("given", "symmetric", "asymmetric")
 
@@ -70,7 +70,8 @@ class FrictionFit:
         shares its values. Patterns are those of `fit_structure`.
     prior: standard deviation known beforehand, in units of each number's expected magnitude; scale: "PATTERN=VALUE",
         expected magnitudes other than the description's own values.
-    max_passes (over the data), tolerance (length of the last step in standard errors), threads (0: all): of "batch".
+    max_passes: over the data, at most; None: 60 of "batch", 2 of "ekf". tolerance (length of the last step in standard
+        errors), threads (0: all cores): of "batch".
     parameter_drift: of the filter, relative variance per s with which the parameters may wander.
     start: file of an interrupted fit to go on from. progress: called with a `fit_methods.Progress`; False stops.
 
@@ -92,7 +93,7 @@ class FrictionFit:
         share: Sequence[str] = (),
         prior: float = 1.0,
         scale: Sequence[str] = (),
-        max_passes: int = 60,
+        max_passes: int | None = None,
         tolerance: float = 0.05,
         threads: int = 0,
         parameter_drift: float = 0.0,
@@ -178,7 +179,7 @@ class FrictionFit:
                 self.prior,
                 "above 0 and at most 1e6, in units of the expected magnitudes",
             ),
-            (self.max_passes >= 1, "max_passes", self.max_passes, "at least 1"),
+            (self.max_passes is None or self.max_passes >= 1, "max_passes", self.max_passes, "at least 1"),
             (0 < self.tolerance < 1, "tolerance", self.tolerance, "between 0 and 1"),
             (0 <= self.parameter_drift <= 1, "parameter_drift", self.parameter_drift, "0 to 1, per s"),
         )
@@ -204,10 +205,10 @@ class FrictionFit:
     def _learn(self, watch: Watch) -> Learned | None:
         """None where it was stopped."""
         begin = perf_counter()
-        learn = METHODS[self.method]
+        learn, passes = METHODS[self.method]
         options = {
             "prior": self.prior,
-            "max_passes": self.max_passes,
+            "max_passes": passes if self.max_passes is None else self.max_passes,
             "tolerance": self.tolerance,
             "threads": self.threads,
             "parameter_drift": self.parameter_drift,
