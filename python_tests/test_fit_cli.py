@@ -105,13 +105,6 @@ def test_other_recordings_are_compared(call: Call, files: tuple[Path, Path], tmp
     assert entry["label"] == "other" and entry["rms"][0] < entry["bias_only_rms"][0]
 
 
-def test_figures_are_drawn(call: Call, files: tuple[Path, Path]) -> None:
-    answer = call("fit", *files, "-o", "f.json", "--figures", "figures", *FIT)
-    assert answer.status == 0
-    assert Path("figures/report.html").stat().st_size > 10000
-    assert len(list(Path("figures").glob("*.png"))) >= 4
-
-
 def test_patterns_choose_what_is_estimated(call: Call, files: tuple[Path, Path]) -> None:
     answer = call(
         "fit", *files, "-o", "f.json", "--kinematics", "3", "--only", "joints[*].*friction", "--fix", "*.viscous"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import re
 import warnings
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from tendonfmu.fit_files import description_text, write_unfinished
 from tendonfmu.fit_residuals import chi_square_tail, consistency, whiteness
 from tendonfmu.fit_structure import get_number, set_number, with_sides
 from tendonfmu.fitting import FitWarning, FrictionFit
+from tendonfmu.recording import Recording
 
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
 
@@ -183,6 +185,59 @@ def test_numbers_that_wander_are_known_less() -> None:
     linear = np.array([unknown.role != "rate" for unknown in still.unknowns_])
     ratio = np.diag(wandering.z_covariance_) / np.diag(still.z_covariance_)
     assert np.median(ratio[linear]) > 1.3
+
+
+# --- why a number is not identified -------------------------------------------------------------------------------
+
+
+def explained(recording: Recording, path: str, **options: Any) -> tuple[str | None, str]:
+    """Reason and advice on one number."""
+    fit = shared(share=[], **options).fit(recording)
+    found = next(p for p in fit.report_["parameters"] if p["path"] == path)
+    return found["reason"], found["advice"] or ""
+
+
+def test_a_side_that_never_slides_is_told() -> None:
+    recording = made_recording()
+    np.abs(recording.groups["joint_velocity"], out=recording.groups["joint_velocity"])
+    options: dict[str, Any] = {"sides": "asymmetric", "only": ["joints[1].friction"]}
+    assert explained(recording, "joints[1].friction.negative.coulomb", **options) == (
+        "side",
+        "move joint base both ways",
+    )
+    assert explained(recording, "joints[1].friction.positive.coulomb", **options)[0] != "side"
+
+
+def test_a_working_point_that_is_never_near_is_told() -> None:
+    recording = made_recording()
+    recording.groups["joint_position"][:, 0] += 2.0  # beyond both working points, at ±0.4 rad
+    options: dict[str, Any] = {"only": ["tendons[*].edge_friction[2]"]}
+    found = explained(recording, "tendons[2].edge_friction[2].laws[1].coulomb", **options)
+    assert found == ("working_point", "move joint tip while joint base is near -0.4 rad")
+
+
+def test_speeds_that_are_never_slow_are_told() -> None:
+    recording = made_recording()
+    velocity = recording.groups["joint_velocity"]
+    velocity += 0.8 * np.where(velocity >= 0, 1.0, -1.0)
+    reason, advice = explained(recording, "joints[1].friction.stribeck_velocity", only=["joints[1].friction"])
+    assert reason == "slow"
+    assert re.fullmatch(r"let joint base turn round slowly: strokes at 0.01 to 0\.\d+ rad/s", advice)
+
+
+def test_what_only_shows_together_names_its_partners() -> None:
+    """Two tendons side by side: what one loses, the other may have lost."""
+    finger = small_finger()
+    finger["tendons"][1]["moment_arms"] = finger["tendons"][0]["moment_arms"]
+    recording = made_recording(duration=40.0)
+    recording.groups["tendon_force"][:, 1] = recording.groups["tendon_force"][:, 0]
+    only = ["tendons[1].edge_friction[1].coulomb", "tendons[2].edge_friction[1].coulomb"]
+    fit = shared(finger, share=[], only=only).fit(recording)
+    one, other = fit.report_["parameters"]
+    for this, partner in ((one, other), (other, one)):
+        assert this["reason"] == "combination"
+        assert this["advice"].endswith(f"--fix or --share it with {partner['path']}")
+    assert fit.report_["correlation"]["matrix"][0][1] < -0.9
 
 
 # --- hold-out ---------------------------------------------------------------------------------------------------------

@@ -308,7 +308,8 @@ def refuse_stillness(finger: FingerDescription, recordings: list[FitRecording], 
             f"{', '.join(str(each.path) for each in recordings)}: no motion: nothing is ever faster than "
             "velocity_threshold; expected free motion of all joints (tendonfmu excite plans one)"
         )
-    threshold = float((finger.data.get("velocity_threshold") or {}).get("joint") or DEFAULT_THRESHOLD["joint"])
+    given = (finger.data.get("velocity_threshold") or {}).get("joint")
+    threshold = DEFAULT_THRESHOLD["joint"] if given is None else float(given)
     fastest = np.max([np.abs(each.model.joint_speed[each.train]).max(axis=0) for each in recordings], axis=0)
     return [
         f"joint {j} ({finger.joint_names[j - 1]}) never moves faster than {threshold:g} rad/s: its own friction cannot "
