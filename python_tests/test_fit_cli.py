@@ -67,9 +67,11 @@ def test_the_report_is_as_its_schema_says(call: Call, files: tuple[Path, Path]) 
 
 def test_every_option_is_on_the_page(call: Call) -> None:
     page = (ROOT / "docs" / "fit.md").read_text(encoding="utf-8")
-    options = set(re.findall(r"--[a-z][a-z-]+", call("fit", "--help").out)) - {"--help"}
+    shown = call("fit", "--help").out
+    options = set(re.findall(r"--[a-z][a-z-]+", shown)) - {"--help"}
     assert len(options) > 15
     assert {option for option in options if option not in page} == {"--output"}
+    assert "default: 60" in shown
 
 
 def test_a_report_holds_no_nan(call: Call, files: tuple[Path, Path]) -> None:

@@ -323,7 +323,7 @@ def _print_tables(tables: Iterable[Any], lines: Iterable[str], left: str) -> Non
 @app.command()
 def fit(
     finger: FingerFile,
-    recordings: Annotated[list[Path], typer.Argument(metavar="RECORDING...", help="free motion, .csv or .parquet")],
+    recordings: Annotated[list[Path], typer.Argument(metavar="RECORDING", help="free motion, .csv or .parquet")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FITTED.json", help="description to write")],
     method: Annotated[str, typer.Option(metavar="batch|ekf", help="maximum likelihood, or Kalman filter")] = "batch",
     report: Annotated[Path | None, typer.Option(metavar="R.json", help="everything that is known of the fit")] = None,
@@ -360,7 +360,9 @@ def fit(
     scale: Annotated[
         list[str] | None, typer.Option(metavar="PATTERN=VALUE", help="expected magnitude, if not the description's")
     ] = None,
-    passes: Annotated[int | None, typer.Option(min=1, help="most passes over the data [default: 60, of ekf 2]")] = None,
+    passes: Annotated[
+        int | None, typer.Option(min=1, help="most passes over the data \\[default: 60, of ekf 2]")
+    ] = None,
     tolerance: Annotated[float, typer.Option(min=1e-9, max=0.5, help="last step in standard errors (batch)")] = 0.05,
     drift: Annotated[float, typer.Option(min=0.0, max=1.0, help="relative variance of the numbers per s (ekf)")] = 0.0,
     resume: Annotated[
