@@ -31,8 +31,8 @@ if(TARGET tendonfmu_estimation)
   set_target_properties(tendonfmu_estimation PROPERTIES EXPORT_NAME estimation)
   tendonfmu_forget(tendonfmu_estimation "$<LINK_ONLY:Eigen3::Eigen>") # header-only
   install(TARGETS tendonfmu_estimation EXPORT tendonfmuTargets ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")
-  file(GLOB headers runtime/include/tendonfmu_estimation.h runtime/include/tendonfmu_learner.h)
-  install(FILES ${headers} DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
+  install(FILES runtime/include/tendonfmu_estimation.h runtime/include/tendonfmu_learner.h
+          DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
 endif()
 
 # The simulated finger, where it was built, with the archives of SUNDIALS that it was linked with.

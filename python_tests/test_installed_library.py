@@ -6,7 +6,7 @@ import os
 import re
 import shutil
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
@@ -22,6 +22,11 @@ add_executable(version version.c)
 target_link_libraries(version PRIVATE tendonfmu::tendonfmu)
 add_executable(sizes sizes.cpp)
 target_link_libraries(sizes PRIVATE tendonfmu::description)
+if(TARGET tendonfmu::estimation)
+  add_executable(estimation estimation.c)
+  target_link_libraries(estimation PRIVATE tendonfmu::estimation)
+  set_target_properties(estimation PROPERTIES LINKER_LANGUAGE CXX)
+endif()
 if(TARGET tendonfmu::plant)
   add_executable(plant plant.c)
   target_link_libraries(plant PRIVATE tendonfmu::plant)
@@ -53,6 +58,25 @@ int main(void) {
 """
 
 REFUSED = 'format = "tendonfmu-rig-0": expected "tendonfmu-rig-1"'
+
+# Would estimate and learn, which takes Eigen and threads, if the image were one.
+ESTIMATION_C = """\
+#include <stdio.h>
+#include <tendonfmu_estimation.h>
+#include <tendonfmu_learner.h>
+
+int main(void) {
+  char fit[512] = "", learn[512] = "";
+  tendonfmu_estimator* estimator = tendonfmu_estimator_create("x", 1, NULL, NULL, fit, sizeof fit);
+  tendonfmu_learner* learner = tendonfmu_learner_create("x", 1, NULL, NULL, NULL, learn, sizeof learn);
+  if (estimator) tendonfmu_estimator_fit(estimator, NULL, NULL, NULL, NULL, NULL);
+  tendonfmu_estimator_destroy(estimator);
+  tendonfmu_learner_destroy(learner);
+  return puts(fit) < 0 || puts(learn) < 0;
+}
+"""
+
+NO_IMAGE = 'not a model image: it does not begin with "TFMUIMG"'
 
 SIZES_CPP = """\
 #include <tendonfmu_description.h>
@@ -117,6 +141,15 @@ def has_plant(prefix: Path) -> bool:
     return there
 
 
+def has_estimation(prefix: Path) -> bool:
+    """Whether the estimation of parameters was built: headers and library are installed together, or not at all."""
+    there = (prefix / "lib" / "libtendonfmu_estimation.a").exists()
+    for name in ("tendonfmu_estimation.h", "tendonfmu_learner.h"):
+        assert (prefix / "include" / name).exists() == there
+    assert (prefix / "lib" / "pkgconfig" / "tendonfmu-estimation.pc").exists() == there
+    return there
+
+
 @pytest.fixture(scope="module")
 def consumer(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("consumer")
@@ -124,10 +157,11 @@ def consumer(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "version.c").write_text(VERSION_C, encoding="utf-8")
     (folder / "sizes.cpp").write_text(SIZES_CPP, encoding="utf-8")
     (folder / "plant.c").write_text(PLANT_C, encoding="utf-8")
+    (folder / "estimation.c").write_text(ESTIMATION_C, encoding="utf-8")
     return folder
 
 
-def test_find_package_gives_both_libraries(prefix: Path, consumer: Path) -> None:
+def test_find_package_gives_the_libraries(prefix: Path, consumer: Path) -> None:
     build = consumer / "build"
     call("cmake", "-G", "Ninja", "-S", consumer, "-B", build, f"-DCMAKE_PREFIX_PATH={prefix}")
     call("cmake", "--build", build)
@@ -136,6 +170,9 @@ def test_find_package_gives_both_libraries(prefix: Path, consumer: Path) -> None
     assert (build / "plant").exists() == has_plant(prefix)
     if has_plant(prefix):
         assert call(build / "plant") == REFUSED
+    assert (build / "estimation").exists() == has_estimation(prefix)
+    if has_estimation(prefix):
+        assert call(build / "estimation").splitlines() == [NO_IMAGE, NO_IMAGE]
 
 
 def test_find_package_refuses_a_newer_version(prefix: Path, consumer: Path, tmp_path: Path) -> None:
@@ -172,15 +209,21 @@ def test_pkg_config(
     assert call(tmp_path / "program", *arguments) == expected
 
 
-def test_pkg_config_of_the_simulated_finger(prefix: Path, consumer: Path, tmp_path: Path) -> None:
-    if not has_plant(prefix):
-        pytest.skip("SKIPPED: built without the simulated finger")
+@pytest.mark.parametrize(
+    ("part", "there", "printed"),
+    [("plant", has_plant, REFUSED), ("estimation", has_estimation, f"{NO_IMAGE}\n{NO_IMAGE}")],
+)
+def test_pkg_config_of_optional_parts(
+    prefix: Path, consumer: Path, tmp_path: Path, part: str, there: Callable[[Path], bool], printed: str
+) -> None:
+    if not there(prefix):
+        pytest.skip(f"SKIPPED: built without the {part}")
     if not shutil.which("pkg-config"):
         pytest.skip("pkg-config is not installed")
     search = {"PKG_CONFIG_PATH": str(prefix / "lib" / "pkgconfig")}
-    flags = call("pkg-config", "--cflags", "--libs", "tendonfmu-plant", env=search).split()
-    call("cc", consumer / "plant.c", "-o", tmp_path / "program", *flags)
-    assert call(tmp_path / "program") == REFUSED
+    flags = call("pkg-config", "--cflags", "--libs", f"tendonfmu-{part}", env=search).split()
+    call("cc", consumer / f"{part}.c", "-o", tmp_path / "program", *flags)
+    assert call(tmp_path / "program") == printed
 
 
 def test_kernels_for_one_processor_share_no_function(prefix: Path) -> None:
