@@ -199,14 +199,15 @@ class Estimator:
         *,
         prior_std: float = 1.0,
         max_passes: int = 60,
-        tolerance: float = 1e-3,
+        tolerance: float = 0.05,
         threads: int = 0,
         stride: int = 0,
         progress: BatchWatch | None = None,
     ) -> BatchResult:
         """Maximum likelihood under a Gaussian prior of prior_std · scale about the description's numbers.
 
-        start: [u], None: the description's. tolerance: it ends with a step this small in standard errors.
+        start: [u], None: the description's.
+        tolerance: it ends with a step this long in standard errors, all unknowns together.
         stride: of the first, coarse passes; 0: by the number of samples.
         progress: called now and then, returns False to stop.
         """

@@ -140,10 +140,12 @@ typedef struct place_laws {
   double weight; /* of the working point above */
 } place_laws;
 
-static void add_side(law_term* to, size_t* count, uint32_t place, uint32_t side, const law_slopes* s, double factor) {
+static void add_side(law_term* to, size_t* count, uint32_t place, uint32_t side, double speed, const law_slopes* s,
+                     double factor) {
   to[(*count)++] =
       (law_term){.place = place,
                  .side = side,
+                 .speed = speed,
                  .slope = {factor * s->by_static, factor * s->by_coulomb, factor * s->by_rate, factor * s->by_viscous}};
 }
 
@@ -155,10 +157,10 @@ static double add_magnitude(const place_laws* p, int negative, double speed, dou
   if (p->above && p->weight != 0.0) {
     const law_slopes above = law_with_slopes(p->above + negative * LAW_SIDE_NUMBERS, speed);
     value += p->weight * (above.value - below.value);
-    add_side(to, count, p->place, *p->above_side[negative], &above, factor * p->weight);
+    add_side(to, count, p->place, *p->above_side[negative], speed, &above, factor * p->weight);
     factor *= 1.0 - p->weight;
   }
-  add_side(to, count, p->place, *p->below_side[negative], &below, factor);
+  add_side(to, count, p->place, *p->below_side[negative], speed, &below, factor);
   return value;
 }
 

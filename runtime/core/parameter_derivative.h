@@ -20,8 +20,9 @@ enum { SIDE_STATIC, SIDE_COULOMB, SIDE_RATE, SIDE_VISCOUS };
 typedef struct law_term {
   uint32_t place;
   uint32_t side; /* parameter index of its static; coulomb, stribeck_velocity, viscous follow */
-  double
-      slope[LAW_SIDE_NUMBERS]; /* by static, coulomb, 1/vs (not vs), viscous: signed, with the working point's weight */
+  double speed;  /* |v|; of a jump v_min */
+  /* by static, coulomb, 1/vs (not vs), viscous: signed, with the working point's weight */
+  double slope[LAW_SIDE_NUMBERS];
 } law_term;
 
 /* Slope of T_j by a number that enters it directly: covers and extensions. */

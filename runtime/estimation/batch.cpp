@@ -14,9 +14,10 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr std::size_t coarse_samples = 40000; /* that a coarse pass looks at, about */
-constexpr double coarse_tolerance = 0.1;      /* standard errors: then all samples are looked at */
+constexpr double coarse_tolerance = 3.0;      /* standard errors: then all samples are looked at */
 constexpr double first_damping = 1e-4;        /* of the diagonal in scaled unknowns */
-constexpr double smallest_damping = 1e-10, largest_damping = 1e8;
+constexpr double smallest_damping = 1e-10;
+constexpr double first_share = 0.5, largest_share = 2.0, smallest_share = 1e-6; /* of a rate, in a step */
 
 double prior_weight(double prior_std) {
   return std::isinf(prior_std) ? 0.0 : 1.0 / (prior_std * prior_std);
@@ -25,6 +26,7 @@ double prior_weight(double prior_std) {
 /* Everything in unknowns divided by their scales. */
 struct Scaled {
   VectorXd scale, start, lower, upper;
+  std::vector<Eigen::Index> rates; /* 1/vs: the only unknowns in which the model is far from linear */
 
   explicit Scaled(const Unknowns& unknowns) {
     const auto p = static_cast<Eigen::Index>(unknowns.count());
@@ -38,7 +40,21 @@ struct Scaled {
       start[k] = u.start / u.scale;
       lower[k] = u.lower / u.scale;
       upper[k] = u.upper / u.scale;
+      if (u.role == Role::rate) {
+        rates.push_back(k);
+      }
     }
+  }
+
+  /* the box around x in which the linearisation is trusted: rates change by a share of what they are */
+  Scaled around(const VectorXd& x, double share) const {
+    Scaled box = *this;
+    for (const Eigen::Index k : rates) {
+      const double most = share * std::max(x[k], 0.5);
+      box.lower[k] = std::max(lower[k], x[k] - most);
+      box.upper[k] = std::min(upper[k], x[k] + most);
+    }
+    return box;
   }
 
   VectorXd clip(const VectorXd& x) const { return x.cwiseMax(lower).cwiseMin(upper); }
@@ -150,14 +166,15 @@ class Search {
 
   /* Levenberg-Marquardt on every stride-th sample; true: converged */
   bool descend(std::size_t stride, double tolerance) {
-    double damping = first_damping, growth = 2.0;
+    double damping = first_damping, share = first_share;
     if (!look(best_.x, stride, &best_)) {
       return false;
     }
     while (result_.passes < options_.most_passes) {
-      MatrixXd h = best_.information;
-      h.diagonal() += damping * h.diagonal();
-      const VectorXd step = boxed_step(h, best_.gradient, best_.x, box_);
+      const MatrixXd curvature = curvature_at(best_);
+      MatrixXd h = curvature;
+      h.diagonal() += damping * best_.information.diagonal();
+      const VectorXd step = boxed_step(h, best_.gradient, best_.x, box_.around(best_.x, share));
       ++result_.steps;
       if (small(step, tolerance)) {
         return true;
@@ -166,22 +183,60 @@ class Search {
       if (!look(box_.clip(best_.x + step), stride, &next)) {
         return false;
       }
-      const double expected = -(best_.gradient.dot(step) + 0.5 * step.dot(best_.information * step));
-      const double gained = best_.cost - next.cost;
-      const double ratio = gained / std::max(expected, 1e-300);
-      if (gained >= 0.0) {
+      const double expected = -(best_.gradient.dot(step) + 0.5 * step.dot(curvature * step));
+      const double ratio = (best_.cost - next.cost) / std::max(expected, 1e-300);
+      if (ratio > 0.0) {
         best_ = std::move(next);
-        damping = std::max(smallest_damping, damping * std::max(0.1, 1.0 - std::pow(2.0 * ratio - 1.0, 3.0)));
-        growth = 2.0;
-      } else {
-        damping *= growth;
-        growth *= 2.0;
-        if (damping > largest_damping) {
+      }
+      if (ratio > 0.75) {
+        damping = std::max(smallest_damping, 0.1 * damping);
+        share = std::min(largest_share, 2.0 * share);
+      } else if (ratio < 0.25) {
+        damping *= 4.0;
+        share *= 0.4;
+        if (share < smallest_share) {
           return expected <= 1e-9 * std::fabs(best_.cost); /* rounding is all that is left */
         }
       }
     }
     return false;
+  }
+
+  /* The information with the second derivatives of the laws: without them the unknowns that the data hardly tell swing
+   * to and fro. What they take away from the curvature is taken as far as it stays positive definite. */
+  MatrixXd curvature_at(const Point& point) const {
+    MatrixXd convex = point.information, concave = MatrixXd::Zero(convex.rows(), convex.cols());
+    const auto& rates = problem_.unknowns.rates();
+    for (std::size_t k = 0; k < rates.size(); ++k) {
+      const Eigen::Index r = rates[k][0], d = rates[k][1];
+      const double rr = point.data.second[static_cast<Eigen::Index>(2 * k)] * box_.scale[r] * box_.scale[r];
+      if (d < 0) {
+        (rr > 0.0 ? convex : concave)(r, r) += rr;
+      } else if (point.x[d] > box_.lower[d]) {
+        const double rd = point.data.second[static_cast<Eigen::Index>(2 * k + 1)] * box_.scale[r] * box_.scale[d];
+        add_pair(rr, rd, r, d, 1.0, &convex);
+        add_pair(rr, rd, r, d, -1.0, &concave);
+      }
+    }
+    for (const double share : {1.0, 0.9, 0.75, 0.5, 0.25}) {
+      MatrixXd h = convex + share * concave;
+      if (h.llt().info() == Eigen::Success) {
+        return h;
+      }
+    }
+    return convex;
+  }
+
+  /* adds the part of [rr rd; rd 0] that has the eigenvalue of this sign, λ v vᵀ with v ∝ (λ, rd), |v|² = |λ|·root */
+  static void add_pair(double rr, double rd, Eigen::Index r, Eigen::Index d, double sign, MatrixXd* h) {
+    const double root = std::hypot(rr, 2.0 * rd), eigenvalue = 0.5 * (rr + sign * root);
+    if (eigenvalue * sign <= 0.0) {
+      return;
+    }
+    (*h)(r, r) += sign * eigenvalue * eigenvalue / root;
+    (*h)(r, d) += sign * eigenvalue * rd / root;
+    (*h)(d, r) += sign * eigenvalue * rd / root;
+    (*h)(d, d) += sign * rd * rd / root;
   }
 
   /* every unknown moves by less than tolerance of its standard error; those at a side do not move */

@@ -38,7 +38,10 @@ struct Evaluation {
   double cost = 0.0;
   Eigen::VectorXd gradient;
   Eigen::MatrixXd information; /* symmetric, both triangles */
-  bool complete = false;       /* false: stopped */
+  /* What the cost's second derivative has beyond the information, −Σ e·∂ν/∂z, of the sides of Unknowns::rates():
+   * [2·k] by rate and rate, [2·k + 1] by rate and drop. All others are products of small numbers. */
+  Eigen::VectorXd second;
+  bool complete = false; /* false: stopped */
 };
 
 /* Called on the caller's thread now and then; false stops. */

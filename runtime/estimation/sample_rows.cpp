@@ -18,10 +18,25 @@ void SampleRows::add(const law_term& from, bool is_jump) {
   const double coulomb = from.slope[SIDE_COULOMB] + (side.static_follows ? from.slope[SIDE_STATIC] : 0.0);
   const std::size_t row = from.place * derivative_.joints;
   const double* jump = is_jump ? derivative_.bias_factor + row : derivative_.jump_factor + row;
-  terms_.push_back({side.column,
-                    {coulomb, from.slope[SIDE_STATIC], from.slope[SIDE_RATE], from.slope[SIDE_VISCOUS]},
-                    is_jump ? nullptr : derivative_.torque_factor + row,
-                    derivative_.has_jump ? jump : nullptr});
+  Term term{side.column,
+            {coulomb, from.slope[SIDE_STATIC], from.slope[SIDE_RATE], from.slope[SIDE_VISCOUS]},
+            0,
+            0,
+            {},
+            &side,
+            from.speed,
+            is_jump ? nullptr : derivative_.torque_factor + row,
+            derivative_.has_jump ? jump : nullptr};
+  if (side.run_length > 0) {
+    term.run_first = side.run_first;
+    term.run_length = side.run_length;
+    for (std::size_t k = 0; k < 4; ++k) {
+      if (side.column[k] >= 0) {
+        term.run_slope[static_cast<std::size_t>(side.column[k]) - side.run_first] = term.slope[k];
+      }
+    }
+  }
+  terms_.push_back(term);
 }
 
 void SampleRows::read() {

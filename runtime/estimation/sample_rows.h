@@ -16,6 +16,11 @@ namespace tendonfmu::estimation {
 struct Term {
   std::array<std::int32_t, 4> column;
   std::array<double, 4> slope;
+  /* the same as a run of columns that belong to this law alone; length 0 where some are shared */
+  std::size_t run_first, run_length;
+  std::array<double, 4> run_slope;
+  const SideColumns* side;
+  double speed; /* m/s or rad/s: ∂²/∂rate² = −speed·slope by rate, ∂²/∂rate∂drop = −speed·slope by drop */
   const double* torque; /* [n] ∂T_j; nullptr: a jump's own */
   const double* jump;   /* [n] ∂Δb_j; nullptr: no jump at this sample */
 };

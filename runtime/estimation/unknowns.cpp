@@ -291,19 +291,46 @@ Unknowns::Unknowns(const tendonfmu_finger* finger, const std::int32_t* group, co
   Columns columns(structure, present.data(), scale);
   list_ = std::move(columns.list);
   start_.assign(finger->start, finger->start + count);
-  sides_.assign(count, {{-1, -1, -1, -1}, false});
+  sides_.assign(count, {{-1, -1, -1, -1}, false, 0, 0, -1});
   plain_.assign(count, -1);
   initial_first_ = structure.initial_first;
   for (const std::uint32_t first : structure.statics) {
     const bool tied = columns.tied(first);
     const std::int32_t drop = tied ? -1 : columns.column(first);
     sides_[first] = {{columns.column(first + 1), drop, columns.column(first + 2), columns.column(first + 3)},
-                     tied || drop >= 0};
+                     tied || drop >= 0,
+                     0,
+                     0,
+                     -1};
+    find_run(first);
   }
   for (const Candidate& c : structure.candidates) {
     if (c.role == Role::value) {
       plain_[c.parameter] = columns.column(c.parameter);
     }
+  }
+}
+
+/* whether the columns of a side follow each other and move nothing else */
+void Unknowns::find_run(std::uint32_t first) {
+  SideColumns& side = sides_[first];
+  std::vector<std::int32_t> columns;
+  bool alone = true;
+  for (const std::int32_t column : side.column) {
+    if (column >= 0) {
+      const std::vector<std::uint32_t>& moved = list_[static_cast<std::size_t>(column)].parameters;
+      columns.push_back(column);
+      alone = alone && moved.size() == 1;
+    }
+  }
+  std::sort(columns.begin(), columns.end());
+  if (!columns.empty() && alone && columns.back() - columns.front() + 1 == static_cast<std::int32_t>(columns.size())) {
+    side.run_first = static_cast<std::size_t>(columns.front());
+    side.run_length = columns.size();
+  }
+  if (side.column[2] >= 0) {
+    side.index = static_cast<std::int32_t>(rates_.size());
+    rates_.push_back({side.column[2], side.column[1]});
   }
 }
 

@@ -35,6 +35,8 @@ struct Unknown {
 struct SideColumns {
   std::array<std::int32_t, 4> column; /* coulomb, drop, rate, viscous */
   bool static_follows;                /* the static friction moves with the coulomb friction */
+  std::size_t run_first, run_length;  /* the columns as a run; length 0 unless they belong to this side alone */
+  std::int32_t index;                 /* among the sides with a rate to estimate, −1 */
 };
 
 class Unknowns {
@@ -45,6 +47,8 @@ class Unknowns {
   Unknowns(const tendonfmu_finger* finger, const std::int32_t* group, const double* scale);
 
   std::size_t count() const { return list_.size(); }
+  /* of the sides with a rate to estimate: columns of rate and drop (−1) */
+  const std::vector<std::array<std::int32_t, 2>>& rates() const { return rates_; }
   const Unknown& operator[](std::size_t column) const { return list_[column]; }
 
   /* unknowns [count] of the description's numbers [parameter_count] */
@@ -63,8 +67,11 @@ class Unknowns {
   }
 
  private:
+  void find_run(std::uint32_t first);
+
   std::vector<Unknown> list_;
   std::vector<SideColumns> sides_;
+  std::vector<std::array<std::int32_t, 2>> rates_;
   std::vector<std::int32_t> plain_;
   std::vector<double> start_;
   std::int64_t initial_first_ = -1;

@@ -108,7 +108,7 @@ tendonfmu_status tendonfmu_estimator_innovations(tendonfmu_estimator* estimator,
 
 typedef struct tendonfmu_fit_options {
   double prior_std;   /* of an unknown about its start, in scales; INFINITY: no prior */
-  double tolerance;   /* the fit ends when a step is this small, in standard errors */
+  double tolerance;   /* the fit ends with a step this long, in standard errors, all unknowns together */
   size_t most_passes; /* over the data */
   size_t stride;      /* of the first, coarse passes; 0: by the number of samples */
   unsigned threads;   /* 0: all cores */

@@ -1,0 +1,204 @@
+#include "joint_sum.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "symmetric_update.h"
+
+namespace tendonfmu::estimation {
+namespace {
+
+constexpr std::size_t dense_rows = 32; /* rows of whole blocks summed at a time */
+constexpr std::size_t residual = 0;    /* its column */
+
+void add_scaled(const double* from, double factor, double* to, std::size_t count) {
+  for (std::size_t c = 0; c < count; ++c) {
+    to[c] += factor * from[c];
+  }
+}
+
+/* no power of two: rows do not fall onto each other in the cache */
+std::size_t stride_of(std::size_t columns) {
+  return (columns + 7) / 8 * 8 + 8;
+}
+
+}  // namespace
+
+BlockRows::BlockRows(std::size_t columns)
+    : stride_(stride_of(columns)),
+      local_(columns, -1),
+      rows_(block_length * stride_, 0.0),
+      row_(stride_, 0.0),
+      held_(stride_, 0.0),
+      mean_(stride_, 0.0) {
+  active_.reserve(columns);
+}
+
+void BlockRows::filter(double gain, double weight, std::size_t at) {
+  const std::size_t count = active_.size();
+  double *now = row_.data(), *held = held_.data();
+  if (weight > 0.0) {
+    double* to = rows_.data() + at * stride_;
+    for (std::size_t c = 0; c < count; ++c) {
+      const double innovation = now[c] - held[c];
+      to[c] = innovation * weight;
+      held[c] += gain * innovation;
+      now[c] = 0.0;
+    }
+    return;
+  }
+  for (std::size_t c = 0; c < count; ++c) {
+    held[c] += gain * (now[c] - held[c]);
+    now[c] = 0.0;
+  }
+}
+
+void BlockRows::take_off_mean(const double* decay, double squares, std::size_t count) {
+  std::fill_n(mean_.begin(), active_.size(), 0.0);
+  for (std::size_t i = 0; i < count; ++i) {
+    add_scaled(row(i), decay[i] / squares, mean_.data(), active_.size());
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    add_scaled(mean_.data(), -decay[i], rows_.data() + i * stride_, active_.size());
+  }
+}
+
+void BlockRows::clear(std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) {
+    std::fill_n(rows_.begin() + static_cast<std::ptrdiff_t>(i * stride_), active_.size(), 0.0);
+  }
+  std::fill_n(held_.begin(), active_.size(), 0.0);
+  std::fill_n(row_.begin(), active_.size(), 0.0);
+  for (const std::size_t column : active_) {
+    local_[column] = -1;
+  }
+  active_.clear();
+}
+
+JointSum::JointSum(std::size_t columns, std::size_t second_columns)
+    : first(columns),
+      second(second_columns),
+      held_(columns),
+      cross_(columns),
+      second_held_(second_columns),
+      second_cross_(second_columns),
+      second_sum_(second_columns),
+      dense_(dense_rows * columns),
+      dense_sum_(columns * columns),
+      product_(first.stride() * first.stride()),
+      second_z_(second_columns) {
+  begin_segment();
+}
+
+void JointSum::begin_segment() {
+  for (std::vector<double>* values : {&held_, &cross_, &second_held_, &second_cross_, &second_sum_, &dense_sum_}) {
+    std::fill(values->begin(), values->end(), 0.0);
+  }
+  kept_ = block_kept_ = 1.0;
+  squares_ = block_squares_ = 0.0;
+  first.clear(used_);
+  second.clear(used_);
+  used_ = dense_count_ = 0;
+  first.add(residual, 0.0); /* always the first of the active ones */
+}
+
+void JointSum::filter(double gain, double weight) {
+  first.filter(gain, weight, used_);
+  second.filter(gain, weight, used_);
+  if (weight > 0.0) {
+    decay_[used_] = block_kept_ * weight;
+    block_squares_ += decay_[used_] * decay_[used_];
+    ++used_;
+  }
+  block_kept_ *= 1.0 - gain;
+}
+
+/* z = √C·held − u/√C of all columns, cross −= … */
+void JointSum::pass_on(const BlockRows& rows, std::vector<double>* held, std::vector<double>* cross, double* z) const {
+  const double root = std::sqrt(block_squares_), share = kept_ * block_squares_;
+  for (std::size_t c = 0; c < held->size(); ++c) {
+    z[c] = root * (*held)[c];
+    (*cross)[c] -= share * (*held)[c];
+  }
+  for (std::size_t k = 0; k < rows.active().size(); ++k) {
+    const std::size_t c = rows.active()[k];
+    z[c] -= root * rows.mean(k);
+    (*cross)[c] += share * rows.mean(k);
+  }
+}
+
+void JointSum::sum_block(Eigen::MatrixXd* sum) {
+  if (block_squares_ > 0.0) {
+    first.take_off_mean(decay_.data(), block_squares_, used_);
+    second.take_off_mean(decay_.data(), block_squares_, used_);
+  }
+  const std::vector<std::size_t>& active = first.active();
+  const std::size_t count = active.size();
+  std::fill_n(product_.begin(), count * count, 0.0);
+  add_outer_products(product_.data(), count, first.row(0), used_, first.stride(), 1.0);
+  for (std::size_t c = 0; c < count; ++c) {
+    for (std::size_t r = c; r < count; ++r) {
+      const auto a = static_cast<Eigen::Index>(std::max(active[r], active[c]));
+      const auto b = static_cast<Eigen::Index>(std::min(active[r], active[c]));
+      (*sum)(a, b) += product_[c * count + r];
+    }
+  }
+  for (std::size_t i = 0; i < used_; ++i) {
+    const double e = first.row(i)[residual];
+    for (std::size_t k = 0; k < second.active().size(); ++k) {
+      second_sum_[second.active()[k]] += e * second.row(i)[k];
+    }
+  }
+}
+
+void JointSum::end_block(Eigen::MatrixXd* sum) {
+  if (used_ > 0) {
+    sum_block(sum);
+    double* z = dense_.data() + dense_count_ * held_.size();
+    pass_on(first, &held_, &cross_, z);
+    pass_on(second, &second_held_, &second_cross_, second_z_.data());
+    add_scaled(second_z_.data(), z[residual], second_sum_.data(), second_z_.size());
+    squares_ += kept_ * kept_ * block_squares_;
+    if (++dense_count_ == dense_rows) {
+      flush();
+    }
+  }
+  const auto go_on = [this](const BlockRows& rows, std::vector<double>* held) {
+    for (double& value : *held) {
+      value *= block_kept_;
+    }
+    for (std::size_t k = 0; k < rows.active().size(); ++k) {
+      (*held)[rows.active()[k]] += rows.held(k);
+    }
+  };
+  go_on(first, &held_);
+  go_on(second, &second_held_);
+  kept_ *= block_kept_;
+  first.clear(used_);
+  second.clear(used_);
+  used_ = 0;
+  block_kept_ = 1.0;
+  block_squares_ = 0.0;
+  first.add(residual, 0.0);
+}
+
+void JointSum::flush() {
+  add_outer_products(dense_sum_.data(), held_.size(), dense_.data(), dense_count_, held_.size(), 1.0);
+  dense_count_ = 0;
+}
+
+JointSegment JointSum::end_segment(Eigen::MatrixXd* sum) {
+  flush();
+  const std::size_t columns = held_.size();
+  for (std::size_t c = 0; c < columns; ++c) {
+    for (std::size_t r = c; r < columns; ++r) {
+      (*sum)(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)) += dense_sum_[c * columns + r];
+    }
+  }
+  const auto copy = [](const std::vector<double>& values) -> Eigen::VectorXd {
+    return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+  };
+  return {copy(held_), copy(cross_), copy(second_sum_), copy(second_held_), copy(second_cross_), kept_, squares_};
+}
+
+}  // namespace tendonfmu::estimation

@@ -1,0 +1,114 @@
+/* One joint's sums over samples: Σ ν νᵀ of the innovations' sensitivities with the bias eliminated, and Σ e·ν of their
+ * second derivatives; see information.h. */
+#ifndef TENDONFMU_ESTIMATION_JOINT_SUM_H
+#define TENDONFMU_ESTIMATION_JOINT_SUM_H
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace tendonfmu::estimation {
+
+constexpr std::size_t block_length = 128; /* samples whose rows are summed at a time */
+
+/* The filtered rows of a block, kept to the columns that appear in it. */
+class BlockRows {
+ public:
+  explicit BlockRows(std::size_t columns);
+
+  /* to this sample's row */
+  void add(std::size_t column, double value) { row_[activate(column)] += value; }
+  /* `count` columns from `first` on, which are always given together */
+  void add_run(std::size_t first, std::size_t count, const double* values, double factor) {
+    double* row = row_.data() + activate_run(first, count);
+    for (std::size_t k = 0; k < count; ++k) {
+      row[k] += factor * values[k];
+    }
+  }
+  /* the same to what the bias holds */
+  void jump(std::size_t column, double change) { held_[activate(column)] += change; }
+  void jump_run(std::size_t first, std::size_t count, const double* values, double factor) {
+    double* held = held_.data() + activate_run(first, count);
+    for (std::size_t k = 0; k < count; ++k) {
+      held[k] += factor * values[k];
+    }
+  }
+
+  /* ends the row of a sample: stores (row − held)·weight as row `at` of the block where weight > 0, and lets the bias
+   * take its share */
+  void filter(double gain, double weight, std::size_t at);
+
+  /* mean = Σ decay_i·row_i / squares over `count` rows; takes decay_i·mean off each */
+  void take_off_mean(const double* decay, double squares, std::size_t count);
+  void clear(std::size_t count);
+
+  const std::vector<std::size_t>& active() const { return active_; }
+  const double* row(std::size_t at) const { return rows_.data() + at * stride_; }
+  std::size_t stride() const { return stride_; }
+  double mean(std::size_t k) const { return mean_[k]; } /* of the k-th active column */
+  double held(std::size_t k) const { return held_[k]; }
+
+ private:
+  std::size_t activate(std::size_t column) {
+    if (local_[column] < 0) {
+      local_[column] = static_cast<std::int32_t>(active_.size());
+      active_.push_back(column);
+    }
+    return static_cast<std::size_t>(local_[column]);
+  }
+  std::size_t activate_run(std::size_t first, std::size_t count) {
+    if (local_[first] < 0) {
+      for (std::size_t k = 0; k < count; ++k) {
+        activate(first + k);
+      }
+    }
+    return static_cast<std::size_t>(local_[first]);
+  }
+
+  std::size_t stride_;
+  std::vector<std::int32_t> local_; /* place of a column among the active ones, −1 */
+  std::vector<std::size_t> active_;
+  std::vector<double> rows_, row_, held_, mean_;
+};
+
+/* What a segment of a recording adds up to for one joint, as if the bias held nothing at its start. */
+struct JointSegment {
+  Eigen::VectorXd held, cross;                       /* [q_j] at the end; Σ c_i ν_i */
+  Eigen::VectorXd second, second_held, second_cross; /* Σ e·ν of second derivatives; the same of them */
+  double kept = 1.0, squares = 0.0;                  /* Π (1 − K), Σ c_i² */
+};
+
+class JointSum {
+ public:
+  /* columns of sensitivities (0: the residual), columns of second derivatives */
+  JointSum(std::size_t columns, std::size_t second_columns);
+
+  BlockRows first, second; /* rows are given here, sample by sample */
+
+  void filter(double gain, double weight);
+  void begin_segment();
+  /* adds the rows of the block to sum [q × q], lower triangle */
+  void end_block(Eigen::MatrixXd* sum);
+  JointSegment end_segment(Eigen::MatrixXd* sum);
+
+ private:
+  void sum_block(Eigen::MatrixXd* sum);
+  void pass_on(const BlockRows& rows, std::vector<double>* held, std::vector<double>* cross, double* z) const;
+  void flush();
+
+  /* of the segment: what the bias holds at the block's start, Σ c_i ν_i, Π (1 − K), Σ c_i² */
+  std::vector<double> held_, cross_, second_held_, second_cross_, second_sum_;
+  double kept_ = 1.0, squares_ = 0.0;
+  /* of the block */
+  std::array<double, block_length> decay_{}; /* c_i */
+  std::size_t used_ = 0;
+  double block_kept_ = 1.0, block_squares_ = 0.0;
+  /* rows z of whole blocks, their sum, and the product of a block's rows */
+  std::vector<double> dense_, dense_sum_, product_, second_z_;
+  std::size_t dense_count_ = 0;
+};
+
+}  // namespace tendonfmu::estimation
+
+#endif
