@@ -9,9 +9,11 @@
  * joint walks with bias.drift_variance and jumps as fig. 5 says, with the dependence of these jumps on the unknowns.
  * What stands still (|v| <= v_min) says nothing about its own friction, as in the paper.
  *
- * Blocks: samples are gathered and taken in `block` at a time, linearised at the unknowns that the block before left.
- * Within a block nothing else is neglected. Against one at a time on a made-up finger: docs/estimation.md has figures.
- * A step that completes a block takes about 0.1 ms for 100 unknowns and 0.3 ms for 472; the others some µs.
+ * Blocks: samples are gathered and taken in `block` at a time, linearised at the unknowns that the block before left;
+ * within a block nothing else is neglected. After 10 s at 1 kHz of an index finger (468 unknowns, all 20 % off at the
+ * start), blocks of 8 differ from samples taken one by one by 0.008 standard errors (rms; at most 0.08) and 1e-4 N·m of
+ * bias; of 32 by 0.01 (at most 0.1). A step that completes a block of 8 takes 0.3 ms there, the other steps 6 µs
+ * (one core with AVX-512; with 37 unknowns 10 µs and 1 µs).
  *
  * A sample at which the model finds a tendon slack (a force below 0; the paper: "the training should be modified
  * whenever this appears") is not used, only counted.
