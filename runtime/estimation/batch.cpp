@@ -14,7 +14,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr std::size_t coarse_samples = 40000; /* that a coarse pass looks at, about */
-constexpr double coarse_tolerance = 3.0;      /* standard errors: then all samples are looked at */
+constexpr double coarse_share = 0.3;          /* of √unknowns, in standard errors: then all samples are looked at */
 constexpr double first_damping = 1e-4;        /* of the diagonal in scaled unknowns */
 constexpr double smallest_damping = 1e-10;
 constexpr double first_share = 0.5, largest_share = 2.0, smallest_share = 1e-6; /* of a rate, in a step */
@@ -129,6 +129,7 @@ struct Point {
   VectorXd x;
   Evaluation data;
   double cost = std::numeric_limits<double>::infinity(), prior_cost = 0.0;
+  double projected = std::numeric_limits<double>::infinity(); /* with the best of all unknowns but the rates */
   VectorXd gradient;
   MatrixXd information;
 };
@@ -143,7 +144,7 @@ class Search {
         Eigen::Map<const VectorXd>(start.data(), static_cast<Eigen::Index>(start.size())).cwiseQuotient(box_.scale));
     const std::size_t coarse = coarse_stride();
     if (coarse > 1) {
-      descend(coarse, coarse_tolerance);
+      descend(coarse, coarse_share * std::sqrt(static_cast<double>(start.size())));
     }
     result_.converged = !result_.stopped && descend(1, options_.tolerance);
     result_.z = box_.unknowns(best_.x);
@@ -164,7 +165,10 @@ class Search {
     return std::max<std::size_t>(1, problem_.samples() / coarse_samples);
   }
 
-  /* Levenberg-Marquardt on every stride-th sample; true: converged */
+  /* Levenberg-Marquardt on every stride-th sample; true: converged. The model is all but linear in everything except
+   * the rates, so a point is judged by the cost that is left with the best of the others, which its information tells
+   * (variable projection, Golub and Pereyra 1973): long steps along the curved valley of drop, rate and viscous pass.
+   */
   bool descend(std::size_t stride, double tolerance) {
     double damping = first_damping, share = first_share;
     if (!look(best_.x, stride, &best_)) {
@@ -176,7 +180,7 @@ class Search {
       h.diagonal() += damping * best_.information.diagonal();
       const VectorXd step = boxed_step(h, best_.gradient, best_.x, box_.around(best_.x, share));
       ++result_.steps;
-      if (small(step, tolerance)) {
+      if (step.dot(curvature * step) <= tolerance * tolerance) {
         return true;
       }
       Point next;
@@ -184,7 +188,9 @@ class Search {
         return false;
       }
       const double expected = -(best_.gradient.dot(step) + 0.5 * step.dot(curvature * step));
-      const double ratio = (best_.cost - next.cost) / std::max(expected, 1e-300);
+      const double hoped = expected - (best_.cost - best_.projected); /* by moving the rates */
+      const double ratio = hoped > 1e-6 * expected ? (best_.projected - next.projected) / hoped
+                                                   : (best_.cost - next.cost) / std::max(expected, 1e-300);
       if (ratio > 0.0) {
         best_ = std::move(next);
       }
@@ -239,12 +245,6 @@ class Search {
     (*h)(d, d) += sign * rd * rd / root;
   }
 
-  /* every unknown moves by less than tolerance of its standard error; those at a side do not move */
-  bool small(const VectorXd& step, double tolerance) const {
-    /* in the metric of the information: the step's whole length bounds that of each */
-    return step.dot(best_.information * step) <= tolerance * tolerance;
-  }
-
   bool look(const VectorXd& x, std::size_t stride, Point* point) {
     const std::vector<double> z = box_.unknowns(x);
     const Watch watch = [this, stride](std::size_t done) {
@@ -269,6 +269,8 @@ class Search {
     point->gradient = found.gradient.cwiseProduct(box_.scale) + weight * away;
     point->information = box_.scale.asDiagonal() * found.information * box_.scale.asDiagonal();
     point->information.diagonal().array() += weight;
+    const VectorXd rest = boxed_step(point->information, point->gradient, x, box_.around(x, 0.0));
+    point->projected = point->cost + point->gradient.dot(rest) + 0.5 * rest.dot(point->information * rest);
     point->data = std::move(found);
     return true;
   }

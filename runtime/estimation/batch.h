@@ -9,7 +9,7 @@ namespace tendonfmu::estimation {
 
 struct BatchOptions {
   double prior_std = 1.0;  /* of an unknown, in expected magnitudes; infinite: no prior */
-  double tolerance = 0.05; /* a step this long ends it: in standard errors, all unknowns together */
+  double tolerance = 0.1; /* a step this long ends it: in standard errors, all unknowns together */
   std::size_t most_passes = 60;
   std::size_t stride = 0; /* of the first, coarse passes; 0: chosen by the number of samples */
   unsigned threads = 0;
