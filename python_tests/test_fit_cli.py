@@ -74,6 +74,16 @@ def test_every_option_is_on_the_page(call: Call) -> None:
     assert "default: 60" in shown
 
 
+def test_the_filter_does_the_same(call: Call, files: tuple[Path, Path]) -> None:
+    finger, recording = files
+    answer = call("fit", finger, recording, "-o", "f.json", "--report", "r.json", "--method", "ekf", *FIT)
+    assert answer.status == 0
+    assert "ekf: converged" in answer.out and answer.err == "f.json: 70 numbers estimated\n"
+    report = json.loads(Path("r.json").read_text())
+    assert (report["method"], report["passes"], report["cost"]) == ("ekf", 2, None)
+    assert call("check", "f.json").status == 0
+
+
 def test_a_report_holds_no_nan(call: Call, files: tuple[Path, Path]) -> None:
     finger, recording = files
     assert call("fit", finger, recording, "-o", "f.json", "--report", "r.json", "--passes", "1", *FIT).status == 0
@@ -160,9 +170,13 @@ def test_a_recording_of_three_samples_is_refused(call: Call, files: tuple[Path, 
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="SKIPPED: no SIGINT for another process")
-def test_ctrl_c_leaves_the_best_so_far_and_resume_goes_on(call: Call, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("method", "phase"), [("batch", b"pass 2"), ("ekf", b"filtering, pass 1")])
+def test_ctrl_c_leaves_the_best_so_far_and_resume_goes_on(
+    call: Call, tmp_path: Path, method: str, phase: bytes
+) -> None:
     """The index finger with 468 numbers takes some seconds: time to interrupt it."""
-    command = ["fit", str(INDEX), str(DEMO / "index_finger_free.parquet"), "-o", "fitted.json", "--progress"]
+    free = DEMO / "index_finger_free.parquet"
+    command = ["fit", str(INDEX), str(free), "-o", "fitted.json", "--method", method, "--progress"]
     run = subprocess.Popen(
         [sys.executable, "-c", "from tendonfmu.cli import main; main()", *command],
         cwd=tmp_path,
@@ -171,20 +185,20 @@ def test_ctrl_c_leaves_the_best_so_far_and_resume_goes_on(call: Call, tmp_path: 
     )
     seen = b""
     assert run.stderr is not None
-    while b"pass 2" not in seen and run.poll() is None:
+    while phase not in seen and run.poll() is None:
         seen += run.stderr.read1(4096)  # type: ignore[attr-defined]
     begin = time.monotonic()
     run.send_signal(signal.SIGINT)
     _, rest = run.communicate(timeout=60)
     assert run.returncode == 130
     assert time.monotonic() - begin < 5.0
-    assert b"samples/s" in seen + rest and b"cost" in seen + rest
+    assert method == "ekf" or b"cost" in seen + rest
     last = rest.decode().strip().splitlines()[-1]
     assert "tendonfmu: interrupted; the best so far is in fitted.unfinished.json; --resume" in last
     assert sorted(path.name for path in tmp_path.iterdir()) == ["fitted.unfinished.json"]
     left = json.loads((tmp_path / "fitted.unfinished.json").read_text())
     assert left["format"] == "tendonfmu-fit-unfinished-1" and len(left["z"]) == len(left["unknowns"]) == 468
-    answer = call(*command[:-1], "--resume", "fitted.unfinished.json", "--passes", "3")
+    answer = call(*command[:-1], "--resume", "fitted.unfinished.json", "--passes", "1", "--holdout", "0.9")
     assert answer.status == 0
     assert call("check", "fitted.json").status == 0
 

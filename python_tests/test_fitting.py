@@ -14,7 +14,7 @@ import pytest
 from scipy import stats
 
 from fit_cases import small_finger
-from fit_finger import asymmetric_finger, made_recording, moved_start
+from fit_finger import asymmetric_finger, made_recording, moved_start, write_recording
 from tendonfmu import native
 from tendonfmu.errors import InputError
 from tendonfmu.fit_files import description_text, write_unfinished
@@ -405,6 +405,17 @@ def test_parameters_are_read_and_set_as_in_scikit_learn() -> None:
     assert "prior=3.0" in repr(again) and "holdout" not in repr(again)
     with pytest.raises(InputError, match="not fitted yet"):
         again.predict(made_recording())
+
+
+def test_the_page_s_example_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = (Path(__file__).parents[1] / "docs" / "fit.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    Path("finger.json").write_text(json.dumps(small_finger()))
+    for seed, day in ((1, "monday"), (2, "tuesday"), (5, "wednesday")):
+        write_recording(made_recording(seed=seed), Path(f"{day}.parquet"))
+    exec(compile(code, "fit.md", "exec"), {})
+    native.image_from_json(Path("fitted.json").read_bytes())
 
 
 def test_warnings_are_warnings() -> None:
