@@ -1,67 +1,7 @@
 // The C interface of the estimation as the Python module _estimation: numpy arrays in and out.
-#include "tendonfmu_estimation.h"
-
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
-#include <nanobind/stl/optional.h>
-#include <nanobind/stl/string.h>
-#include <nanobind/stl/vector.h>
-
-#include <memory>
-#include <optional>
-#include <string>
-#include <vector>
-
-namespace nb = nanobind;
+#include "estimation_arrays.h"
 
 namespace {
-
-using Rows = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Numbers = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Groups = nb::ndarray<const std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Flags = nb::ndarray<const unsigned char, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-
-// A numpy array that owns `values`.
-nb::object as_array(std::vector<double> values, std::vector<std::size_t> shape) {
-  auto* kept = new std::vector<double>(std::move(values));
-  nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<double>*>(p); });
-  return nb::cast(nb::ndarray<nb::numpy, double>(kept->data(), shape.size(), shape.data(), owner));
-}
-
-void expect_rows(const std::optional<Rows>& rows, std::size_t samples, std::size_t columns, const char* name) {
-  if (rows && (rows->shape(0) != samples || rows->shape(1) != columns)) {
-    throw nb::value_error((std::string(name) + ": expected " + std::to_string(samples) + " rows of " +
-                           std::to_string(columns) + " columns")
-                              .c_str());
-  }
-}
-
-const double* data(const std::optional<Rows>& rows) {
-  return rows ? rows->data() : nullptr;
-}
-
-// What a recording's arrays have in common for estimator and learner.
-struct Samples {
-  Numbers time;
-  Rows tendon_force;
-  std::optional<Rows> tendon_position, joint_position, joint_velocity, external_torque;
-  std::optional<Flags> use;
-
-  void check(std::size_t joints, std::size_t tendons) const {
-    const std::size_t count = time.shape(0);
-    expect_rows(tendon_force, count, tendons, "tendon_force");
-    expect_rows(tendon_position, count, tendons, "tendon_position");
-    expect_rows(joint_position, count, joints, "joint_position");
-    expect_rows(joint_velocity, count, joints, "joint_velocity");
-    expect_rows(external_torque, count, joints, "external_torque");
-    if (use && use->shape(0) != count) {
-      throw nb::value_error("use: expected one flag a sample");
-    }
-  }
-  tendonfmu_inputs inputs() const {
-    return {tendon_force.data(), data(tendon_position), data(joint_position), data(joint_velocity)};
-  }
-};
 
 class Estimator {
  public:
@@ -82,9 +22,7 @@ class Estimator {
   nb::tuple unknown(std::size_t index) const {
     tendonfmu_unknown u;
     expect(tendonfmu_estimator_get_unknown(get(), index, &u));
-    return nb::make_tuple(std::string(u.path), static_cast<int>(u.role),
-                          std::vector<std::uint32_t>(u.parameters, u.parameters + u.parameter_count), u.start, u.lower,
-                          u.upper, u.scale);
+    return as_tuple(u);
   }
 
   nb::object values(const Numbers& z) const {
@@ -157,16 +95,13 @@ class Estimator {
     std::vector<double> z(u), gradient(u), information(u * u), covariance(u * u);
     tendonfmu_fit_result result{z.data(), gradient.data(), information.data(), covariance.data(), 0, 0, 0, 0, 0, 0};
     const tendonfmu_fit_options options{prior_std, tolerance, passes, stride, threads};
-    Watching watching{watch.is_none() ? nullptr : &watch, u, nullptr};
+    FitWatch watching{Watching(watch), u};
     tendonfmu_status status;
     {
       const nb::gil_scoped_release without_gil;
-      status = tendonfmu_estimator_fit(get(), start.data(), &options, &Watching::call, &watching, &result);
+      status = tendonfmu_estimator_fit(get(), start.data(), &options, &FitWatch::call, &watching, &result);
     }
-    if (watching.raised) {
-      watching.raised->restore();
-      throw nb::python_error();
-    }
+    watching.watch.rethrow();
     expect(status);
     nb::dict found;
     found["z"] = as_array(std::move(z), {u});
@@ -183,28 +118,16 @@ class Estimator {
   }
 
  private:
-  struct Watching {
-    const nb::object* watch;
+  struct FitWatch {
+    Watching watch;
     std::size_t unknowns;
-    std::unique_ptr<nb::python_error> raised;
 
     static int call(void* context, const tendonfmu_fit_progress* p) {
-      auto* self = static_cast<Watching*>(context);
-      const nb::gil_scoped_acquire gil;
-      try {
-        if (PyErr_CheckSignals() != 0) { /* Ctrl-C */
-          throw nb::python_error();
-        }
-        if (!self->watch) {
-          return 1;
-        }
+      auto* self = static_cast<FitWatch*>(context);
+      return self->watch.ask([&] {
         const nb::object best = as_array(std::vector<double>(p->best, p->best + self->unknowns), {self->unknowns});
-        const nb::object answer = (*self->watch)(p->pass, p->stride, p->samples_done, p->samples, p->cost, best);
-        return answer.is(nb::bool_(false)) ? 0 : 1;
-      } catch (nb::python_error& error) {
-        self->raised = std::make_unique<nb::python_error>(std::move(error));
-        return 0;
-      }
+        return nb::make_tuple(p->pass, p->stride, p->samples_done, p->samples, p->cost, best);
+      });
     }
   };
 
@@ -243,6 +166,7 @@ class Estimator {
 }  // namespace
 
 NB_MODULE(_estimation, m) {
+  bind_learner(m);
   nb::class_<Estimator>(m, "Estimator")
       .def(nb::init<const nb::bytes&, const std::optional<Groups>&, const std::optional<Numbers>&>(), nb::arg("image"),
            nb::arg("group") = nb::none(), nb::arg("scale") = nb::none())

@@ -1,4 +1,4 @@
-"""Types of the compiled module (python/binding/estimation.cpp)."""
+"""Types of the compiled module (python/binding/estimation.cpp, learner.cpp)."""
 
 from collections.abc import Callable
 from typing import Any
@@ -47,3 +47,40 @@ class Estimator:
         threads: int,
         watch: Callable[..., Any] | None = None,
     ) -> dict[str, Any]: ...
+
+class Learner:
+    def __init__(
+        self,
+        image: bytes,
+        group: NDArray[np.int32] | None = None,
+        scale: Numbers | None = None,
+        prior_std: float = 1.0,
+        block: int = 8,
+        parameter_drift: float = 0.0,
+    ) -> None: ...
+    @property
+    def joints(self) -> int: ...
+    @property
+    def tendons(self) -> int: ...
+    @property
+    def unknown_count(self) -> int: ...
+    @property
+    def slack_samples(self) -> int: ...
+    def unknown(self, index: int) -> tuple[str, int, list[int], float, float, float, float]: ...
+    def run(
+        self,
+        time: Numbers | None,
+        tendon_force: Numbers | None,
+        tendon_position: Numbers | None = None,
+        joint_position: Numbers | None = None,
+        joint_velocity: Numbers | None = None,
+        kinematics_source: int = 1,
+        external_torque: Numbers | None = None,
+        use: NDArray[np.uint8] | None = None,
+        watch: Callable[..., Any] | None = None,
+    ) -> tuple[Numbers, Numbers, int]: ...
+    def begin_pass(self) -> None: ...
+    def values(self) -> tuple[Numbers, Numbers]: ...
+    def z(self) -> Numbers: ...
+    def covariance(self) -> Numbers: ...
+    def bias(self) -> tuple[Numbers, Numbers]: ...

@@ -29,6 +29,8 @@ Array = NDArray[Any]
 ESTIMATION_MISSING = "this installation cannot estimate parameters (Eigen was not found when it was built)"
 ROLES = ("coulomb", "drop", "rate", "viscous", "value")
 
+# (samples done, samples) of the recording -> False to stop
+LearnerWatch = Callable[[int, int], bool | None]
 # (pass, stride, samples done, samples, cost of the best so far, its unknowns) -> False to stop
 BatchWatch = Callable[[int, int, int, int, float, Numbers], bool | None]
 
@@ -94,6 +96,15 @@ def _samples(arrays: Mapping[str, Array]) -> dict[str, Numbers | None]:
     return {name: _matrix(arrays.get(name)) for name in names}
 
 
+def _flags(use: Array | None) -> NDArray[np.uint8] | None:
+    return None if use is None else np.ascontiguousarray(use, dtype=np.uint8)
+
+
+def _unknowns(source: Any) -> list[Unknown]:
+    found = (source.unknown(k) for k in range(source.unknown_count))
+    return [Unknown(path, ROLES[role], tuple(parameters), *numbers) for path, role, parameters, *numbers in found]
+
+
 class Estimator:
     """A finger, what is unknown of it, and recordings.
 
@@ -108,11 +119,7 @@ class Estimator:
         groups = None if group is None else np.ascontiguousarray(group, dtype=np.int32)
         with _refusals():
             self._estimator = _estimation.Estimator(image, groups, _matrix(scale))
-        self.unknowns = [self._unknown(k) for k in range(self._estimator.unknown_count)]
-
-    def _unknown(self, index: int) -> Unknown:
-        path, role, parameters, start, lower, upper, scale = self._estimator.unknown(index)
-        return Unknown(path, ROLES[role], tuple(parameters), start, lower, upper, scale)
+        self.unknowns = _unknowns(self._estimator)
 
     @property
     def joints(self) -> int:
@@ -155,14 +162,13 @@ class Estimator:
             those that the kinematics source needs.
         external_torque: [N, n] known load, N.m. use: [N] bool, where to learn.
         """
-        flags = None if use is None else np.ascontiguousarray(use, dtype=np.uint8)
         with _refusals():
             return int(
                 self._estimator.add_recording(
                     **_samples(arrays),
                     kinematics_source=kinematics_source,
                     external_torque=_matrix(external_torque),
-                    use=flags,
+                    use=_flags(use),
                 )
             )
 
@@ -199,7 +205,7 @@ class Estimator:
         *,
         prior_std: float = 1.0,
         max_passes: int = 60,
-        tolerance: float = 0.05,
+        tolerance: float = 0.1,
         threads: int = 0,
         stride: int = 0,
         progress: BatchWatch | None = None,
@@ -216,3 +222,87 @@ class Estimator:
         with _refusals():
             found = self._estimator.fit(_matrix(first), prior_std, tolerance, max_passes, stride, threads, progress)
         return BatchResult(**found, seconds=perf_counter() - begun)
+
+
+class Learner:
+    """The paper's extended Kalman filter over recordings, one after another.
+
+    image, group, scale: as for `Estimator`. prior_std: standard deviation of an unknown about its start, in scales.
+    block: samples that are taken in at once, 1..64 (tendonfmu_learner.h says what it costs).
+    parameter_drift: variance that an unknown gains per second, in scales²; 0 for constants.
+    """
+
+    def __init__(
+        self,
+        image: bytes,
+        group: Array | None = None,
+        scale: Array | None = None,
+        *,
+        prior_std: float = 1.0,
+        block: int = 8,
+        parameter_drift: float = 0.0,
+    ) -> None:
+        if not HAS_ESTIMATION:
+            raise InputError(ESTIMATION_MISSING)
+        groups = None if group is None else np.ascontiguousarray(group, dtype=np.int32)
+        with _refusals():
+            self._learner = _estimation.Learner(image, groups, _matrix(scale), prior_std, block, parameter_drift)
+        self.unknowns = _unknowns(self._learner)
+
+    @property
+    def z(self) -> Numbers:
+        """[u] the unknowns as they are known now."""
+        return np.asarray(self._learner.z())
+
+    @property
+    def covariance(self) -> Numbers:
+        """[u, u] of z."""
+        return np.asarray(self._learner.covariance())
+
+    @property
+    def bias(self) -> Numbers:
+        """[n] at the last sample, N.m."""
+        with _refusals():
+            return np.asarray(self._learner.bias()[0])
+
+    @property
+    def slack_samples(self) -> int:
+        """Samples left out because the model found a tendon slack; since the pass began."""
+        return int(self._learner.slack_samples)
+
+    def values(self) -> Numbers:
+        """[p] numbers of the description."""
+        return np.asarray(self._learner.values()[0])
+
+    def standard_errors(self) -> Numbers:
+        """[p] of `values`; 0 where fixed."""
+        return np.asarray(self._learner.values()[1])
+
+    def begin_pass(self) -> None:
+        """Back to the start and the prior; the recordings that follow are linearised at what has been found so far."""
+        with _refusals():
+            self._learner.begin_pass()
+
+    def run(
+        self,
+        arrays: Mapping[str, Array],
+        kinematics_source: int = 1,
+        external_torque: Array | None = None,
+        use: Array | None = None,
+        progress: LearnerWatch | None = None,
+    ) -> dict[str, Numbers]:
+        """Learns from a recording; arguments as for `Estimator.add_recording`. The bias begins anew.
+
+        progress: called now and then, returns False to stop.
+        Returns `innovation` [N, n] (N.m), the residuals before each sample itself is taken in, and their
+        `innovation_variance` [N, n]: NaN where the bias has not started, and after a stop.
+        """
+        with _refusals():
+            innovation, variance, _ = self._learner.run(
+                **_samples(arrays),
+                kinematics_source=kinematics_source,
+                external_torque=_matrix(external_torque),
+                use=_flags(use),
+                watch=progress,
+            )
+        return {"innovation": np.asarray(innovation), "innovation_variance": np.asarray(variance)}

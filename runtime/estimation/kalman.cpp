@@ -309,7 +309,7 @@ void KalmanFilter::keep_within_bounds() {
 }
 
 double KalmanFilter::covariance(std::size_t unknown, std::size_t other) const {
-  return at(std::max(unknown, other), std::min(unknown, other)) * settings_.scale[unknown] * settings_.scale[other];
+  return at(std::max(unknown, other), std::min(unknown, other)) * (settings_.scale[unknown] * settings_.scale[other]);
 }
 
 double KalmanFilter::bias_variance(std::size_t joint) const {

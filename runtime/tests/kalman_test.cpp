@@ -158,6 +158,7 @@ class Pair {
       EXPECT_NEAR(filter.z()[i], static_cast<double>(naive.state(at)), tolerance * settings.scale[i]);
       EXPECT_EQ(filter.covariance(i, i), covariance[i * p + i]);
       for (std::size_t k = 0; k < p; ++k) {
+        ASSERT_EQ(covariance[i * p + k], covariance[k * p + i]);
         const auto expected = static_cast<double>(naive.covariance(at, static_cast<Eigen::Index>(k)));
         EXPECT_NEAR(covariance[i * p + k], expected, tolerance * settings.scale[i] * settings.scale[k]);
       }

@@ -1,0 +1,108 @@
+// What the parts of the module _estimation share: numpy arrays in and out, and a watch in Python.
+#pragma once
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tendonfmu_estimation.h"
+
+namespace nb = nanobind;
+
+using Rows = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Numbers = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Groups = nb::ndarray<const std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Flags = nb::ndarray<const unsigned char, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+
+// A numpy array that owns `values`.
+inline nb::object as_array(std::vector<double> values, std::vector<std::size_t> shape) {
+  auto* kept = new std::vector<double>(std::move(values));
+  nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<double>*>(p); });
+  return nb::cast(nb::ndarray<nb::numpy, double>(kept->data(), shape.size(), shape.data(), owner));
+}
+
+inline void expect_rows(const std::optional<Rows>& rows, std::size_t samples, std::size_t columns, const char* name) {
+  if (rows && (rows->shape(0) != samples || rows->shape(1) != columns)) {
+    throw nb::value_error((std::string(name) + ": expected " + std::to_string(samples) + " rows of " +
+                           std::to_string(columns) + " columns")
+                              .c_str());
+  }
+}
+
+inline const double* data(const std::optional<Rows>& rows) {
+  return rows ? rows->data() : nullptr;
+}
+
+// What a recording's arrays have in common for estimator and learner.
+struct Samples {
+  Numbers time;
+  Rows tendon_force;
+  std::optional<Rows> tendon_position, joint_position, joint_velocity, external_torque;
+  std::optional<Flags> use;
+
+  void check(std::size_t joints, std::size_t tendons) const {
+    const std::size_t count = time.shape(0);
+    expect_rows(tendon_force, count, tendons, "tendon_force");
+    expect_rows(tendon_position, count, tendons, "tendon_position");
+    expect_rows(joint_position, count, joints, "joint_position");
+    expect_rows(joint_velocity, count, joints, "joint_velocity");
+    expect_rows(external_torque, count, joints, "external_torque");
+    if (use && use->shape(0) != count) {
+      throw nb::value_error("use: expected one flag a sample");
+    }
+  }
+  tendonfmu_inputs inputs() const {
+    return {tendon_force.data(), data(tendon_position), data(joint_position), data(joint_velocity)};
+  }
+};
+
+// An unknown: path, role, parameters, start, lower, upper, scale.
+inline nb::tuple as_tuple(const tendonfmu_unknown& u) {
+  return nb::make_tuple(std::string(u.path), static_cast<int>(u.role),
+                        std::vector<std::uint32_t>(u.parameters, u.parameters + u.parameter_count), u.start, u.lower,
+                        u.upper, u.scale);
+}
+
+// A Python callable that may stop a long call, also by Ctrl-C or by what it raises.
+class Watching {
+ public:
+  explicit Watching(const nb::object& watch) : watch_(watch.is_none() ? nullptr : &watch) {}
+
+  // Without the GIL; `arguments` are made with it. Returns 0 to stop.
+  template <typename Arguments>
+  int ask(const Arguments& arguments) {
+    const nb::gil_scoped_acquire gil;
+    try {
+      if (PyErr_CheckSignals() != 0) { /* Ctrl-C */
+        throw nb::python_error();
+      }
+      return !watch_ || !nb::object((*watch_)(*arguments())).is(nb::bool_(false));
+    } catch (nb::python_error& error) {
+      raised_ = std::make_unique<nb::python_error>(std::move(error));
+      return 0;
+    }
+  }
+
+  // Afterwards, with the GIL: what it raised.
+  void rethrow() {
+    if (raised_) {
+      raised_->restore();
+      throw nb::python_error();
+    }
+  }
+
+ private:
+  const nb::object* watch_;
+  std::unique_ptr<nb::python_error> raised_;
+};
+
+// learner.cpp
+void bind_learner(nb::module_& m);
