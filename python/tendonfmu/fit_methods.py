@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.estimation import Estimator
+from tendonfmu.estimation import Estimator, Learner
 from tendonfmu.fit_files import with_values
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.fit_structure import Structure
@@ -32,7 +32,7 @@ class Progress:
 @dataclass(frozen=True)
 class Learned:
     """A finished estimation. covariance: [u, u] of z, prior included; information: [u, u] of the data alone.
-    innovations: standardised [N, n] by recording where the method has its own, else empty.
+    innovations: standardised [N, n] by recording where the method has its own, else empty. warnings: sentences.
     """
 
     estimator: Estimator
@@ -44,6 +44,7 @@ class Learned:
     passes: int
     converged: bool
     innovations: list[Numbers]
+    warnings: list[str]
 
 
 class Interrupted(Exception):
@@ -147,7 +148,19 @@ def learn_batch(
         passes=found.passes,
         converged=found.converged,
         innovations=[],
+        warnings=[] if found.converged else [_not_converged(found.passes)],
     )
+
+
+def _not_converged(passes: int) -> str:
+    return (
+        f"not converged after {passes} passes over the data: allow more (--passes), or estimate fewer numbers "
+        "(--only, --fix, --share)"
+    )
+
+
+def _slack(samples: int) -> str:
+    return f"the filter did not learn from {samples} samples in which the model found a tendon slack"
 
 
 def learn_ekf(
@@ -174,17 +187,18 @@ def learn_ekf(
         estimator=estimator,
         z=learner.z,
         covariance=learner.covariance,
-        information=np.linalg.inv(learner.covariance) - prior,
+        information=np.asarray(np.linalg.inv(learner.covariance) - prior, dtype=np.float64),
         cost=float("nan"),
         iterations=passes,
         passes=passes,
         converged=True,
         innovations=innovations,
+        warnings=[_slack(learner.slack_samples)] if learner.slack_samples else [],
     )
 
 
 def _filter_once(
-    learner: Any, estimator: Estimator, recordings: Sequence[FitRecording], watch: Watch, number: int
+    learner: Learner, estimator: Estimator, recordings: Sequence[FitRecording], watch: Watch, number: int
 ) -> list[Numbers]:
     """Standardised innovations [N, n] by recording, NaN where not trained on."""
     total, before = sum(len(recording.time) for recording in recordings), 0
@@ -208,10 +222,8 @@ def _filter_once(
     return innovations
 
 
-def _learner(structure: Structure, estimator: Estimator, options: Mapping[str, Any], start: Start | None) -> Any:
+def _learner(structure: Structure, estimator: Estimator, options: Mapping[str, Any], start: Start | None) -> Learner:
     """It begins at its description's numbers: on going on, those of the interrupted fit, with the scale as it was."""
-    from tendonfmu.estimation import Learner
-
     image, scale = structure.start.image, structure.scale
     if start is not None:
         own = np.abs(estimator.values(estimator.start))

@@ -360,12 +360,7 @@ def _trained(found: Evaluation) -> Numbers:
 
 
 def _fit_sentences(learned: Learned, numbers: Sequence[Fitted]) -> list[str]:
-    found = []
-    if not learned.converged:
-        found.append(
-            f"not converged after {learned.passes} passes over the data: allow more (--passes), or estimate "
-            "fewer numbers (--only, --fix, --share)"
-        )
+    found = list(learned.warnings)
     at_bound = [number for number in numbers if number.at_bound]
     if at_bound:
         some = ", ".join(number.number.path for number in at_bound[:3])
