@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import json
 import resource
+import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -195,11 +196,11 @@ def main() -> None:
             found = WAYS[asked.way](arrays) | {"samples": len(arrays["time"])}
         except ImportError as missing:
             found = {"missing": str(missing)}
-    used = resource.getrusage(resource.RUSAGE_SELF)
-    found |= {"peak_memory": used.ru_maxrss * 1024, "cpu_seconds": used.ru_utime + used.ru_stime}
-    print(
-        json.dumps({name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in found.items()})
-    )
+    # kilobytes on Linux, bytes on macOS
+    unit = 1 if sys.platform == "darwin" else 1024
+    found["peak_memory"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit
+    plain = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in found.items()}
+    print(json.dumps(plain))
 
 
 if __name__ == "__main__":
