@@ -50,6 +50,13 @@ def small_finger() -> Description:
     }
 
 
+def lasting_finger(**bias: float) -> Description:
+    """The small finger, whose jumps of the bias mostly cancel: made data stay in reach for a minute and more."""
+    description = small_finger()
+    description["bias"] |= {"forget_rate": 0.1, **bias}
+    return description
+
+
 def few_unknowns(path: str) -> str | None:
     """All tendons of the small finger alike: 19 unknowns that half a minute of motion identifies."""
     before, name = oracle_fit.family(path)

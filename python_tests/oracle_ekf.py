@@ -1,6 +1,7 @@
 """Naive extended Kalman filter of the estimation: sample by sample, dense, Joseph form, for tests alone.
 
-State: the unknowns in units of their scale, and n biases. Each sample is linearised at the estimate before it.
+State: the unknowns in units of their scale, and n biases. Each sample is linearised at the estimate before it. Where
+the model finds a tendon slack, a sample foretells but does not teach.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ class JosephFilter:
         self.parameter_drift = parameter_drift
         self.z = unknowns.start.copy()
         self.bias = np.zeros(n)
+        self.slack_samples = 0
+        self.stopped_by_bounds = 0
         self.P = np.zeros((len(scale) + n, len(scale) + n))
         self.P[: len(scale), : len(scale)] = prior_std**2 * np.eye(len(scale))
 
@@ -50,11 +53,12 @@ class JosephFilter:
                 continue
             dt = time[k] - time[k - 1] if k > 0 else 0.0
             if k < part.first:
-                self._drift_parameters(dt)
                 continue
             self._predict(jump, G, part.drift * dt, dt)
             e[k] = part.y[k] - torque - self.bias
-            S[k] = self._correct(H, e[k], part.noise[k], apply=bool(part.use[k]))
+            slack = bool(part.use[k]) and bool(part.trace.slack(self.unknowns.theta(self.z), slice(k, k + 1))[0])
+            self.slack_samples += slack
+            S[k] = self._correct(H, e[k], part.noise[k], apply=bool(part.use[k]) and not slack)
         return e, S
 
     def _linearised(self, part: Likelihood, k: int) -> tuple[Array, Array, Array, Array]:
@@ -83,17 +87,13 @@ class JosephFilter:
         self.P[:u, u:] = self.P[u:, :u].T
         self.P[u:, u:] = slope @ Pz @ slope.T + part.initial_variance * np.eye(self.n)
 
-    def _drift_parameters(self, dt: float) -> None:
-        u = len(self.scale)
-        self.P[:u, :u] += self.parameter_drift * dt * np.eye(u)
-
     def _predict(self, jump: Array, G: Array, drift: float, dt: float) -> None:
         u = len(self.scale)
         F = np.eye(u + self.n)
         F[u:, :u] = G
         self.bias = self.bias + jump
+        self.P[:u, :u] += self.parameter_drift * dt * np.eye(u)  # the jump is that of the unknowns now
         self.P = F @ self.P @ F.T
-        self._drift_parameters(dt)
         self.P[u:, u:] += drift * np.eye(self.n)
 
     def _correct(self, H: Array, e: Array, noise: float, apply: bool) -> Array:
@@ -103,9 +103,20 @@ class JosephFilter:
         S = C @ self.P @ C.T + noise * np.eye(self.n)
         if apply:
             K = np.linalg.solve(S, C @ self.P).T
-            step = K @ e
-            self.z = np.clip(self.z + self.scale * step[:u], self.lower, self.upper)
-            self.bias = self.bias + step[u:]
             keep = np.eye(u + self.n) - K @ C
             self.P = keep @ self.P @ keep.T + noise * K @ K.T
+            step = self._within_bounds(K @ e)
+            self.z = np.clip(self.z + self.scale * step[:u], self.lower, self.upper)
+            self.bias = self.bias + step[u:]
         return np.diag(S)
+
+    def _within_bounds(self, step: Array) -> Array:
+        """Conditioned on each bound that it would cross, one after the other; what three rounds leave is clipped."""
+        step = step.copy()
+        for _ in range(3):
+            for i in range(len(self.scale)):
+                wanted = self.z[i] + self.scale[i] * step[i]
+                excess = np.clip(wanted, self.lower[i], self.upper[i]) - wanted
+                self.stopped_by_bounds += excess != 0.0
+                step += excess / self.scale[i] * self.P[:, i] / self.P[i, i]
+        return step

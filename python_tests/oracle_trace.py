@@ -230,6 +230,20 @@ class Trace:
             db[..., j] += own_jump + by_load_jump * load[j]
         return T, db
 
+    def slack(self, theta: Values, samples: slice = slice(None)) -> Array:
+        """[samples] whether the model finds a force below 0 in a tendon that can only pull."""
+        found = np.zeros(self.force[samples].shape[0], dtype=bool)
+        for i in (i for i in range(self.m) if not self.bidirectional[i]):
+            force: Any = self.force[samples, i]
+            for j in range(self.n):
+                for kind in ("edge_friction", "pulley_friction"):
+                    found |= force < 0.0
+                    force = np.maximum(force, 0.0)
+                    loss = self._friction_and_jump((kind, i, j), theta, samples)[0]
+                    force = force - force * np.reshape(loss, -1).real
+            found |= force < 0.0
+        return found
+
     def _not_slack(self, i: int, force: Array) -> Array:
         return force if self.bidirectional[i] else np.where(force.real < 0.0, 0.0, force)
 
