@@ -1,0 +1,276 @@
+"""The extended Kalman filter of the estimation against the naive one in Joseph form, sample by sample."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import oracle_fit
+from fit_cases import few_unknowns, groups, image_of, lasting_finger, random_fit_case, twin_of
+from fit_data import make_recording, wavy_forces, wavy_motion
+from oracle_ekf import JosephFilter
+from random_fingers import Description, Recording
+from tendonfmu import estimation
+
+if not estimation.HAS_ESTIMATION:
+    pytest.skip(f"SKIPPED: {estimation.ESTIMATION_MISSING}", allow_module_level=True)
+
+Array = NDArray[Any]
+
+CLOSE = 1e-8  # of a prior's standard deviation, or of the largest innovation: rounding through a few hundred updates
+
+
+def recorded(description: Description, seed: int, duration: float, rate: float, **how: Any) -> Recording:
+    motion = wavy_motion(seed, duration, rate, 2)
+    return make_recording(
+        description, motion, wavy_forces(seed, motion["time"], 4, mean=30.0), seed, 0.02, **how
+    ).recording
+
+
+class Pair:
+    """The learner with blocks of one sample, and the naive filter."""
+
+    def __init__(self, description: Description, group: Array, prior_std: float = 1.0, drift: float = 0.0) -> None:
+        self.description = description
+        image = image_of(description)
+        unknowns = estimation.Estimator(image, group).unknowns
+        self.learner = estimation.Learner(image, group, prior_std=prior_std, block=1, parameter_drift=drift)
+        self.twin = twin_of(description, group, unknowns)
+        lower, upper, self.scale = (
+            np.array([getattr(u, name) for u in unknowns]) for name in ("lower", "upper", "scale")
+        )
+        joints = len(description["joints"])
+        self.naive = JosephFilter(self.twin, joints, self.scale, lower, upper, prior_std, drift)
+        self.prior_std = prior_std
+
+    def run(
+        self, recording: Recording, source: int = 1, external: Array | None = None, use: Array | None = None
+    ) -> None:
+        """Both over a recording, compared: innovations, their variances, estimates, covariance, bias."""
+        found = self.learner.run(recording, source, external, use)
+        part = oracle_fit.Likelihood(self.description, self.twin, recording, source, external, use)
+        e, S = self.naive.run(part)
+        known = ~np.isnan(e)
+        assert (np.isnan(found["innovation"]) == ~known).all()
+        scale = np.abs(e[known]).max()
+        np.testing.assert_allclose(found["innovation"][known], e[known], rtol=0.0, atol=CLOSE * scale)
+        np.testing.assert_allclose(found["innovation_variance"][known], S[known], rtol=CLOSE)
+        assert self.learner.slack_samples == self.naive.slack_samples
+        self.compare()
+
+    def compare(self) -> None:
+        naive, learner = self.naive, self.learner
+        np.testing.assert_allclose(learner.z / self.scale, naive.z / self.scale, rtol=0.0, atol=CLOSE * self.prior_std)
+        sizes = np.outer(self.scale, self.scale) * self.prior_std**2
+        np.testing.assert_allclose(learner.covariance / sizes, naive.covariance / sizes, rtol=0.0, atol=CLOSE)
+        largest = max(np.abs(naive.bias).max(), 1e-3)
+        np.testing.assert_allclose(learner.bias, naive.bias, rtol=0.0, atol=CLOSE * largest)
+        np.testing.assert_allclose(learner.values(), self.twin.parameters(naive.z), rtol=0.0, atol=CLOSE * 1e3)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_random_fingers(seed: int) -> None:
+    """All structures: asymmetric, working points, loops, slack, jumps, three kinematics."""
+    description, recording, source = random_fit_case(seed, 120)
+    Pair(description, groups(description), prior_std=0.3).run(recording, source)
+
+
+BIASES: dict[str, Description] = {
+    "as given": {},
+    "initial_variance": {"initial_variance": 4e-3},
+    "noise_per_force": {"noise_std_per_force": 4e-4},
+    "noise_time": {"noise_time": 0.02},
+    "initial_torque": {"initial_torque": [0.02, -0.01], "initial_variance": 1e-6},
+    "no wandering": {"drift_variance": 0.0},
+    "never forgets": {"forget_rate": 0.0},
+}
+
+
+@pytest.mark.parametrize("name", BIASES)
+def test_every_bias_option(name: str) -> None:
+    description = lasting_finger()
+    description["bias"] |= BIASES[name]
+    recording = recorded(description, 2, 15.0, 20.0)
+    Pair(description, groups(description)).run(recording, 3, recording["external_torque"])
+
+
+@pytest.mark.parametrize("first", [0, 7])
+@pytest.mark.parametrize("bias", [{}, {"initial_torque": [0.02, -0.01]}], ids=str)
+def test_left_out_samples_foretell_and_do_not_teach(first: int, bias: Description) -> None:
+    """Also where the first ones are left out: the bias starts later, with the same default variance."""
+    description = lasting_finger(**bias)
+    recording = recorded(description, 3, 15.0, 20.0)
+    use = np.random.default_rng(1).random(300) > 0.1
+    use[100:160] = False
+    use[: first + 1] = np.arange(first + 1) == first
+    Pair(description, groups(description)).run(recording, 3, recording["external_torque"], use)
+
+
+def test_standard_errors_are_those_of_the_numbers() -> None:
+    """Of static = coulomb + drop and vs = 1/rate, to first order."""
+    description = lasting_finger()
+    group = groups(description, few_unknowns)
+    recording = recorded(description, 5, 10.0, 50.0)
+    learner = learner_over(description, group, recording)
+    twin = twin_of(description, group, learner.unknowns)
+    step = twin.steps(learner.z)
+    slopes = twin.parameters(learner.z + 1j * np.diag(step)).imag / step[:, None]
+    expected = np.sqrt(np.einsum("ip,ij,jp->p", slopes, learner.covariance, slopes))
+    np.testing.assert_allclose(learner.standard_errors(), expected, rtol=1e-9)
+
+
+def test_several_recordings_each_with_its_own_bias() -> None:
+    description = lasting_finger()
+    pair = Pair(description, groups(description, few_unknowns), drift=1e-4)
+    for seed in (4, 5, 6):
+        recording = recorded(description, seed, 8.0, 25.0)
+        pair.run(recording, 3, recording["external_torque"])
+
+
+def test_bounds_hold() -> None:
+    """A prior far too large for its data: estimates are pushed against their bounds and stay within."""
+    description = lasting_finger()
+    truth = copy.deepcopy(description)
+    for joint in truth["joints"]:
+        for kind in ("friction", "load_friction"):
+            if kind in joint:
+                joint[kind] |= {"static": joint[kind]["coulomb"], "viscous": 0.0}
+    recording = recorded(truth, 7, 15.0, 20.0)
+    group = groups(description, few_unknowns)
+    pair = Pair(description, group, prior_std=3.0)
+    pair.run(recording, 3, recording["external_torque"])
+    assert (pair.learner.z >= pair.naive.lower).all() and (pair.learner.z <= pair.naive.upper).all()
+    assert pair.naive.stopped_by_bounds > 10
+
+
+def learner_over(description: Description, group: Array, recording: Recording, passes: int = 1, **how: Any) -> Any:
+    learner = estimation.Learner(image_of(description), group, **how)
+    for number in range(passes):
+        if number > 0:
+            learner.begin_pass()
+        learner.run(recording, 3, recording["external_torque"])
+    return learner
+
+
+@pytest.mark.parametrize("block", [2, 4, 8])
+def test_blocks_are_exact_enough(block: int) -> None:
+    """Linearised once a block: within a standard error of the filter sample by sample, most unknowns far within."""
+    description = lasting_finger()
+    group = groups(description, few_unknowns)
+    recording = recorded(description, 8, 30.0, 200.0)
+    single, blocks = (learner_over(description, group, recording, block=each, prior_std=0.3) for each in (1, block))
+    std = np.sqrt(np.diag(single.covariance))
+    off = np.abs(blocks.z - single.z) / std
+    assert off.max() < 1.0 and np.median(off) < 0.05
+    np.testing.assert_allclose(np.sqrt(np.diag(blocks.covariance)) / std, 1.0, atol=0.3)
+    np.testing.assert_allclose(blocks.bias, single.bias, rtol=0.0, atol=1e-3)
+
+
+def test_further_passes_leave_nothing_to_blocks() -> None:
+    """From the second pass on every sample is linearised at the same unknowns: a block is then only arithmetic."""
+    description = lasting_finger()
+    group = groups(description, few_unknowns)
+    recording = recorded(description, 8, 20.0, 100.0)
+    learners = [
+        learner_over(description, group, recording, passes=6, block=block, prior_std=0.3) for block in (1, 7, 64)
+    ]
+    std = np.sqrt(np.diag(learners[0].covariance))
+    for each in learners[1:]:
+        np.testing.assert_allclose((each.z - learners[0].z) / std, 0.0, atol=1e-3)
+        np.testing.assert_allclose(np.sqrt(np.diag(each.covariance)) / std, 1.0, atol=1e-3)
+
+
+def test_blocks_of_one_linearisation_are_the_same_filter() -> None:
+    """With Coulomb friction known to a thousandth nothing is left to linearise: any block gives one result."""
+    description = lasting_finger()
+    group = groups(description, few_unknowns)
+    recording = recorded(description, 8, 20.0, 50.0)
+    results = [learner_over(description, group, recording, block=block, prior_std=1e-4) for block in (1, 3, 8, 64)]
+    for each in results[1:]:
+        np.testing.assert_allclose(each.z, results[0].z, rtol=1e-6)
+        np.testing.assert_allclose(each.covariance, results[0].covariance, rtol=0.0, atol=1e-4 * each.covariance.max())
+
+
+def test_covariance_stays_symmetric_and_positive_definite() -> None:
+    """20,000 samples with a noise far below what the start leaves open: where P − K H P would lose its digits."""
+    description = lasting_finger(noise_std=1e-4, drift_variance=1e-9)
+    recording = recorded(description, 9, 200.0, 100.0)
+    group = groups(description)
+    learner = learner_over(description, group, recording)
+    covariance = learner.covariance
+    np.testing.assert_array_equal(covariance, covariance.T)
+    std = np.sqrt(np.diag(covariance))
+    assert np.linalg.eigvalsh(covariance / np.outer(std, std)).min() > 0.0
+    scale = np.array([unknown.scale for unknown in estimation.Estimator(image_of(description), group).unknowns])
+    assert (std > 1e-5 * scale).all() and (std <= scale * (1 + 1e-12)).all()
+
+
+@pytest.mark.parametrize("prior_std", [0.3, 1.0])
+def test_agrees_with_the_batch(prior_std: float) -> None:
+    """Both maximise the same likelihood with the same prior: after a few passes they are one."""
+    description = lasting_finger(noise_std=0.001, drift_variance=1e-6)
+    group = groups(description, few_unknowns)
+    recording = recorded(description, 10, 60.0, 50.0)
+    learner = learner_over(description, group, recording, passes=8, prior_std=prior_std)
+    estimator = estimation.Estimator(image_of(description), group)
+    estimator.add_recording(recording, 3, recording["external_torque"])
+    result = estimator.fit(prior_std=prior_std, tolerance=1e-4)
+    std = np.sqrt(np.diag(result.covariance))
+    np.testing.assert_allclose((learner.z - result.z) / std, 0.0, atol=0.01)
+    np.testing.assert_allclose(np.sqrt(np.diag(learner.covariance)) / std, 1.0, atol=0.01)
+
+
+def test_one_pass_is_near_the_batch() -> None:
+    """With a start known to 30 %; standard errors within a half."""
+    description = lasting_finger(noise_std=0.003)
+    group = groups(description, few_unknowns)
+    recording = recorded(description, 10, 60.0, 50.0)
+    learner = learner_over(description, group, recording, prior_std=0.3)
+    estimator = estimation.Estimator(image_of(description), group)
+    estimator.add_recording(recording, 3, recording["external_torque"])
+    result = estimator.fit(prior_std=0.3)
+    std = np.sqrt(np.diag(result.covariance))
+    np.testing.assert_allclose((learner.z - result.z) / std, 0.0, atol=2.0)
+    np.testing.assert_allclose(np.sqrt(np.diag(learner.covariance)) / std, 1.0, atol=0.5)
+
+
+def test_innovations_are_white_and_of_the_size_foretold() -> None:
+    description = lasting_finger()
+    recording = recorded(description, 11, 60.0, 50.0)
+    learner = estimation.Learner(image_of(description), groups(description, few_unknowns), prior_std=0.1, block=1)
+    found = learner.run(recording, 3, recording["external_torque"])
+    white = (found["innovation"] / np.sqrt(found["innovation_variance"]))[1:]
+    assert np.mean(white**2) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / white.size))
+    for column in white.T:
+        assert abs(np.mean(column[1:] * column[:-1])) < 4.0 / np.sqrt(len(column))
+
+
+def test_slack_is_counted() -> None:
+    description = lasting_finger()
+    recording = recorded(description, 12, 10.0, 50.0)
+    recording["tendon_force"] = recording["tendon_force"].copy()
+    recording["tendon_force"][100:107, 2] = -0.5
+    learner = learner_over(description, groups(description, few_unknowns), recording)
+    assert learner.slack_samples == 7
+
+
+def test_progress_may_stop_it() -> None:
+    description = lasting_finger()
+    recording = recorded(description, 13, 60.0, 1000.0)
+    group = groups(description, few_unknowns)
+    seen: list[tuple[Any, ...]] = []
+
+    def stop(*arguments: Any) -> bool:
+        seen.append(arguments)
+        return False
+
+    stopped = estimation.Learner(image_of(description), group)
+    stopped.run(recording, 3, recording["external_torque"], progress=stop)
+    assert len(seen) == 1
+    assert np.isfinite(stopped.z).all()
+    whole = learner_over(description, group, recording)
+    assert np.trace(stopped.covariance) > np.trace(whole.covariance)
