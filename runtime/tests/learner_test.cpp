@@ -174,6 +174,43 @@ TEST(Learner, BlocksStayWithinAPartOfAStandardError) {
   }
 }
 
+TEST(Learner, WithNothingUnknownItIsTheBiasFilterOfTheCore) {
+  Json description = made::learnable_finger();
+  description["contact"] = {{"threshold", {1e6, 1e6}}};
+  const Recording r = made::moved(2, 2, 2001, 0.002, 40);
+  const std::vector<unsigned char> image = made::image_of(description);
+  tendonfmu_finger* finger = tendonfmu_create(image.data(), image.size(), nullptr, 0);
+  ASSERT_NE(finger, nullptr);
+  tendonfmu_set_kinematics_source(finger, TENDONFMU_JOINT_VELOCITIES);
+  Numbers bias(r.samples * 2);
+  tendonfmu_outputs outputs = {};
+  outputs.bias_torque = bias.data();
+  const tendonfmu_inputs inputs = r.inputs();
+  ASSERT_EQ(tendonfmu_run(finger, r.samples, r.time.data(), &inputs, &outputs, nullptr), TENDONFMU_OK);
+  const std::vector<std::int32_t> fixed(tendonfmu_parameter_count(finger), -1);
+  tendonfmu_destroy(finger);
+  for (const std::size_t block : {std::size_t{1}, std::size_t{8}}) {
+    const tendonfmu_learner_options options = {1.0, block, 0.0};
+    tendonfmu_learner* l =
+        tendonfmu_learner_create(image.data(), image.size(), fixed.data(), nullptr, &options, nullptr, 0);
+    ASSERT_NE(l, nullptr);
+    EXPECT_EQ(tendonfmu_learner_unknown_count(l), 0u);
+    for (std::size_t k = 0; k < r.samples; ++k) {
+      const tendonfmu_inputs row = r.inputs(k);
+      ASSERT_EQ(k == 0 ? tendonfmu_learner_initialise(l, r.time[0], &row, 3, nullptr, 1)
+                       : tendonfmu_learner_step(l, r.time[k], &row, nullptr, 1),
+                TENDONFMU_OK);
+      if (k % block == 0) {
+        Numbers found(2);
+        ASSERT_EQ(tendonfmu_learner_get_bias(l, found.data(), nullptr), TENDONFMU_OK);
+        ASSERT_NEAR(found[0], bias[2 * k], 1e-12) << k;
+        ASSERT_NEAR(found[1], bias[2 * k + 1], 1e-12) << k;
+      }
+    }
+    tendonfmu_learner_destroy(l);
+  }
+}
+
 TEST(Learner, TakesSamplesOneByOneAsTheRunDoes) {
   const Case c(7, 503);
   Learner whole(c.description), steps(c.description);
