@@ -25,6 +25,8 @@ from tendonfmu.estimation import Estimator, Learner
 from tendonfmu.excitation import START, Plan, plan_excitation
 from tendonfmu.excite import as_array, find_ranges, read_subject
 from tendonfmu.fit_structure import Choice, Structure, build_structure
+from tendonfmu.fitting import FrictionFit
+from tendonfmu.tables import write_table
 
 Array = NDArray[Any]
 ROOT = Path(__file__).resolve().parent.parent
@@ -34,7 +36,8 @@ BEGIN = round(START * RATE)  # before it, all joints rest
 PRETENSIONS = (15.0, 30.0)  # N, in turn
 ALTERNATE = 50.0  # s
 SPREAD = 0.3  # of the logarithm of each number of the truth about the description
-PRIOR_STD = 1.0
+FILE = "recording"
+PRIOR_STD, TOLERANCE = 1.0, 0.1  # as `tendonfmu fit` has them
 MOST_CALLS = 40  # of scipy
 
 # --- the data ---------------------------------------------------------------------------------------------------------
@@ -65,7 +68,7 @@ def other_numbers(node: Any, draw: Callable[[], float]) -> Any:
 
 
 def make_data(folder: Path, duration: float) -> dict[str, Any]:
-    """Writes recording.npz: a motion of `excite` with smooth forces, and y = T + b + e of another finger's numbers.
+    """Writes recording.parquet and .npz: a motion of `excite` with smooth forces, and y = T + b + e of another finger's numbers.
 
     The forces carry that finger's friction; what the jumps of fig. 5, a random walk and white noise add to it comes as
     known load, `external_torque` = Rᵀ f0 − y, so that no tendon goes slack however far the bias wanders.
@@ -83,14 +86,23 @@ def make_data(folder: Path, duration: float) -> dict[str, Any]:
     white, steps = rng.standard_normal((2, *torque.shape))
     walk = np.sqrt(truth["bias"]["drift_variance"] / RATE) * np.cumsum(steps, axis=0)
     noise = noise_scale(truth, motion.time, arrays["tendon_force"]) * white
-    pull = arrays["tendon_force"] @ np.array(subject.finger.moment_arms)
-    np.savez(folder / "recording.npz", **arrays, external_torque=pull - (torque + jumps + walk + noise))
+    arms, stiffness = np.array(subject.finger.moment_arms), [tendon["stiffness"] for tendon in truth["tendons"]]
+    arrays["external_torque"] = arrays["tendon_force"] @ arms - (torque + jumps + walk + noise)
+    arrays["tendon_position"] = motion.joint_position @ arms.T + arrays["tendon_force"] / stiffness
+    columns = {
+        f"{name}[{k}]": column
+        for name, array in arrays.items()
+        if name != "time"
+        for k, column in enumerate(array.T, start=1)
+    }
+    write_table(folder / f"{FILE}.parquet", {"time": motion.time} | columns)
+    np.savez(folder / f"{FILE}.npz", **arrays)
     return {"samples": len(motion.time), "least_force": float(arrays["tendon_force"].min())}
 
 
 def load(folder: Path, samples: int) -> dict[str, Array]:
     """So many samples of what make_data wrote, from the beginning of the motion on."""
-    with np.load(folder / "recording.npz") as file:
+    with np.load(folder / f"{FILE}.npz") as file:
         return {name: np.ascontiguousarray(file[name][BEGIN : BEGIN + samples]) for name in file.files}
 
 
@@ -107,27 +119,41 @@ def call_with(arrays: Mapping[str, Array]) -> dict[str, Any]:
 # --- the ways ---------------------------------------------------------------------------------------------------------
 
 
-def batch(arrays: Mapping[str, Array]) -> dict[str, Any]:
+def command(folder: Path) -> dict[str, Any]:
+    """`tendonfmu fit` of the whole file: reading, judging and the report included."""
+    with Watch() as watch:
+        fit = FrictionFit(FINGER, kinematics=3).fit([folder / f"{FILE}.parquet"])
+    samples = sum(each["used"] for each in fit.report_["recordings"])
+    return watch.times() | {"passes": fit.report_["passes"], "converged": fit.converged_, "samples": samples}
+
+
+def batch(arrays: Mapping[str, Array], tolerance: float = TOLERANCE) -> dict[str, Any]:
     chosen = structure()
     estimator = Estimator(chosen.start.image, chosen.group, chosen.scale)
     estimator.add_recording(**call_with(arrays))
     with Watch() as watch:
-        found = estimator.fit(prior_std=PRIOR_STD)
+        found = estimator.fit(prior_std=PRIOR_STD, tolerance=tolerance)
     figures = {name: getattr(found, name) for name in ("z", "cost", "passes", "converged")}
     return watch.times() | figures | {"std": np.sqrt(np.diag(found.covariance)), "iterations": found.steps}
 
 
-def ekf(arrays: Mapping[str, Array], block: int | None = None) -> dict[str, Any]:
+def batch_to_the_end(arrays: Mapping[str, Array]) -> dict[str, Any]:
+    return batch(arrays, 1e-3)
+
+
+def ekf(arrays: Mapping[str, Array], passes: int = 2, block: int = 8) -> dict[str, Any]:
     chosen = structure()
-    options = {} if block is None else {"block": block}
-    learner = Learner(chosen.start.image, chosen.group, chosen.scale, prior_std=PRIOR_STD, **options)
+    learner = Learner(chosen.start.image, chosen.group, chosen.scale, prior_std=PRIOR_STD, block=block)
     with Watch() as watch:
-        learner.run(**call_with(arrays))
-    return watch.times() | {"z": learner.z, "std": np.sqrt(np.diag(learner.covariance))}
+        for number in range(passes):
+            if number > 0:
+                learner.begin_pass()
+            learner.run(**call_with(arrays))
+    return {"passes": passes} | watch.times() | {"z": learner.z, "std": np.sqrt(np.diag(learner.covariance))}
 
 
 def ekf_sample_by_sample(arrays: Mapping[str, Array]) -> dict[str, Any]:
-    return ekf(arrays, block=1)
+    return ekf(arrays, passes=1, block=1)
 
 
 def task_of(arrays: Mapping[str, Array]) -> Any:
@@ -171,6 +197,7 @@ def one_product(arrays: Mapping[str, Array]) -> dict[str, Any]:
 
 WAYS: dict[str, Callable[[Mapping[str, Array]], dict[str, Any]]] = {
     "batch": batch,
+    "batch_to_the_end": batch_to_the_end,
     "ekf": ekf,
     "ekf_sample_by_sample": ekf_sample_by_sample,
     "product": one_product,
@@ -183,13 +210,15 @@ WAYS: dict[str, Callable[[Mapping[str, Array]], dict[str, Any]]] = {
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("way", choices=["data", *WAYS])
+    parser.add_argument("way", choices=["data", "command", *WAYS])
     parser.add_argument("--folder", type=Path, required=True)
     parser.add_argument("--samples", type=int, default=400_000)
     parser.add_argument("--duration", type=float, default=400.0, help="s, of the data")
     asked = parser.parse_args()
     if asked.way == "data":
         found: dict[str, Any] = make_data(asked.folder, asked.duration)
+    elif asked.way == "command":
+        found = command(asked.folder)
     else:
         arrays = load(asked.folder, asked.samples)
         try:
