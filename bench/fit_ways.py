@@ -68,7 +68,7 @@ def other_numbers(node: Any, draw: Callable[[], float]) -> Any:
 
 
 def make_data(folder: Path, duration: float) -> dict[str, Any]:
-    """Writes recording.parquet and .npz: a motion of `excite`, smooth forces, and y = T + b + e of another finger's numbers.
+    """Writes recording.parquet and .npz: a motion of `excite`, and y = T + b + e by another finger's numbers.
 
     The forces carry that finger's friction; what the jumps of fig. 5, a random walk and white noise add to it comes as
     known load, `external_torque` = Rᵀ f0 − y, so that no tendon goes slack however far the bias wanders.
