@@ -1,5 +1,5 @@
-/* The whole of the recordings at once: maximum likelihood of the model under a weak Gaussian prior, by
- * Levenberg-Marquardt steps within the unknowns' boxes. */
+/* All recordings at once: maximum likelihood of the model under a weak Gaussian prior, within the unknowns' boxes. Each
+ * pass over the data gives a local model of the cost, whose best step leads to the next. */
 #ifndef TENDONFMU_ESTIMATION_BATCH_H
 #define TENDONFMU_ESTIMATION_BATCH_H
 
@@ -8,8 +8,8 @@
 namespace tendonfmu::estimation {
 
 struct BatchOptions {
-  double prior_std = 1.0;  /* of an unknown, in expected magnitudes; infinite: no prior */
-  double tolerance = 0.1; /* a step this long ends it: in standard errors, all unknowns together */
+  double prior_std = 1.0; /* of an unknown, in expected magnitudes; infinite: no prior */
+  double tolerance = 0.3; /* a step this long ends it: in standard errors, all unknowns together */
   std::size_t most_passes = 60;
   std::size_t stride = 0; /* of the first, coarse passes; 0: chosen by the number of samples */
   unsigned threads = 0;

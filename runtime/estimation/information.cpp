@@ -33,14 +33,10 @@ class Worker {
   Worker(const Problem& problem, const std::vector<double>& numbers)
       : finger_(problem.image.data(), problem.image.size()),
         rows_(problem.unknowns, finger_.get()),
-        unknowns_(problem.unknowns),
+        columns_(problem.columns),
         numbers_(numbers) {
-    for (std::size_t j = 0; j < problem.joints(); ++j) {
-      std::size_t columns = 1;
-      while (columns <= unknowns_.count() && unknowns_[columns - 1].joint <= j) {
-        ++columns;
-      }
-      joints_.emplace_back(columns, 2 * unknowns_.rates().size());
+    for (const std::size_t columns : columns_.end) {
+      joints_.emplace_back(columns);
     }
   }
 
@@ -48,7 +44,7 @@ class Worker {
                  std::atomic<std::size_t>* done, const std::atomic<bool>& stopped) {
     const std::size_t first = segment * recording.segment_length();
     const std::size_t last = std::min(first + recording.segment_length(), recording.samples());
-    const auto q = static_cast<Eigen::Index>(unknowns_.count() + 1);
+    const auto q = static_cast<Eigen::Index>(columns_.count);
     SegmentSum result;
     result.information = MatrixXd::Zero(q, q);
     for (JointSum& joint : joints_) {
@@ -80,7 +76,7 @@ class Worker {
     rows_.read();
     if (rows_.has_jump()) {
       for (std::size_t j = 0; j < joints_.size(); ++j) {
-        joints_[j].first.jump(residual_column, rows_.jump(j));
+        joints_[j].rows.jump(residual_column, rows_.jump(j));
       }
     }
     for (const Term& term : rows_.terms()) {
@@ -90,11 +86,11 @@ class Worker {
       return;
     }
     for (const PlainTerm& term : rows_.plain_terms()) {
-      joints_[term.joint].first.add(static_cast<std::size_t>(term.column) + 1, term.slope);
+      joints_[term.joint].rows.add(columns_.unknown[static_cast<std::size_t>(term.column)], term.slope);
     }
     for (std::size_t j = 0; j < joints_.size(); ++j) {
       const double torque = rows_.measured(j) - recording.external_torque(k, j);
-      joints_[j].first.add(residual_column, torque - rows_.torque(j));
+      joints_[j].rows.add(residual_column, torque - rows_.torque(j));
       joints_[j].filter(gains.gain[k], gains.weight[k]);
     }
   }
@@ -120,43 +116,48 @@ class Worker {
     }
   }
 
-  /* second derivatives of a law stand in columns 2·index, by rate and rate, and 2·index + 1, by rate and drop; that the
-   * forces carry them along as well is left out: they only guide the steps */
-  static void add_row(const Term& term, double factor, JointSum* joint) {
+  void add_row(const Term& term, double factor, JointSum* joint) const {
     if (term.run_length > 0) {
-      joint->first.add_run(term.run_first + 1, term.run_length, term.run_slope.data(), factor);
+      joint->rows.add_run(columns_.unknown[term.run_first], term.run_length, term.run_slope.data(), factor);
     } else {
       for (std::size_t k = 0; k < 4; ++k) {
         if (term.column[k] >= 0) {
-          joint->first.add(static_cast<std::size_t>(term.column[k]) + 1, factor * term.slope[k]);
+          joint->rows.add(columns_.unknown[static_cast<std::size_t>(term.column[k])], factor * term.slope[k]);
         }
       }
     }
     if (term.side->index >= 0) {
-      const double second[2] = {-term.speed * term.slope[2], -term.speed * term.slope[1]};
-      joint->second.add_run(2 * static_cast<std::size_t>(term.side->index), 2, second, factor);
+      const std::array<double, 2> values = expanded(term);
+      joint->rows.add_run(columns_.expansion[static_cast<std::size_t>(term.side->index)], 2, values.data(), factor);
     }
   }
 
-  static void add_jump(const Term& term, double factor, JointSum* joint) {
+  void add_jump(const Term& term, double factor, JointSum* joint) const {
     if (term.run_length > 0) {
-      joint->first.jump_run(term.run_first + 1, term.run_length, term.run_slope.data(), -factor);
+      joint->rows.jump_run(columns_.unknown[term.run_first], term.run_length, term.run_slope.data(), -factor);
     } else {
       for (std::size_t k = 0; k < 4; ++k) {
         if (term.column[k] >= 0) {
-          joint->first.jump(static_cast<std::size_t>(term.column[k]) + 1, -factor * term.slope[k]);
+          joint->rows.jump(columns_.unknown[static_cast<std::size_t>(term.column[k])], -factor * term.slope[k]);
         }
       }
     }
     if (term.side->index >= 0) {
-      const double second[2] = {-term.speed * term.slope[2], -term.speed * term.slope[1]};
-      joint->second.jump_run(2 * static_cast<std::size_t>(term.side->index), 2, second, -factor);
+      const std::array<double, 2> values = expanded(term);
+      joint->rows.jump_run(columns_.expansion[static_cast<std::size_t>(term.side->index)], 2, values.data(), -factor);
     }
+  }
+
+  /* v²E and −v³E with sign and weight; that the forces carry changes along to second order, too, is left out: this only
+   * guides the steps */
+  static std::array<double, 2> expanded(const Term& term) {
+    const double square = term.speed * term.speed * term.slope[1];
+    return {square, -term.speed * square};
   }
 
   FreeFinger finger_;
   SampleRows rows_;
-  const Unknowns& unknowns_;
+  const Columns& columns_;
   const std::vector<double>& numbers_;
   std::vector<JointSum> joints_;
 };
@@ -164,41 +165,34 @@ class Worker {
 /* --- joining the segments of one recording, in order ---------------------------------------------------------------
  */
 
-/* What the bias holds of each column, one joint. */
-struct Held {
-  VectorXd first, second;
-};
-
-/* at the start of a recording: nothing, or bias.initial_torque and its derivative */
-std::vector<Held> held_at_start(const Problem& problem, const std::vector<double>& z, const SegmentSum& segment) {
+/* what the bias holds of each column at the start of a recording: nothing, or bias.initial_torque and its derivative */
+std::vector<VectorXd> held_at_start(const Problem& problem, const std::vector<double>& z) {
   const derived_numbers& derived = problem.finger.get()->derived;
-  std::vector<Held> held;
+  std::vector<VectorXd> held;
   for (std::size_t j = 0; j < problem.joints(); ++j) {
-    held.push_back({VectorXd::Zero(segment.joints[j].held.size()), VectorXd::Zero(segment.joints[j].second.size())});
+    held.push_back(VectorXd::Zero(static_cast<Eigen::Index>(problem.columns.end[j])));
     if (derived.settings.has_initial_torque) {
-      const std::int32_t column = problem.unknowns.initial_torque(j);
-      held[j].first[residual_column] = column < 0 ? derived.initial_torque[j] : z[static_cast<std::size_t>(column)];
-      if (column >= 0) {
-        held[j].first[column + 1] = -1.0;
+      const std::int32_t unknown = problem.unknowns.initial_torque(j);
+      const auto at = static_cast<std::size_t>(std::max(unknown, 0));
+      held[j][residual_column] = unknown < 0 ? derived.initial_torque[j] : z[at];
+      if (unknown >= 0) {
+        held[j][static_cast<Eigen::Index>(problem.columns.unknown[at])] = -1.0;
       }
     }
   }
   return held;
 }
 
-/* adds a segment to the sums, at whose start the bias holds `held`; leaves there what it holds at its end */
-void join(const SegmentSum& segment, std::vector<Held>* held, MatrixXd* sum, VectorXd* second) {
+/* adds a segment to the sum, at whose start the bias holds `held`; leaves there what it holds at its end */
+void join(const SegmentSum& segment, std::vector<VectorXd>* held, MatrixXd* sum) {
   *sum += segment.information;
   for (std::size_t j = 0; j < held->size(); ++j) {
     const JointSegment& part = segment.joints[j];
-    VectorXd &s = (*held)[j].first, &s2 = (*held)[j].second;
-    *second += part.second + s2 * (part.squares * s[residual_column] - part.cross[residual_column]) -
-               part.second_cross * s[residual_column];
+    VectorXd& s = (*held)[j];
     auto block = sum->topLeftCorner(s.size(), s.size());
     block.selfadjointView<Eigen::Lower>().rankUpdate(s, part.cross, -1.0);
     block.selfadjointView<Eigen::Lower>().rankUpdate(s, part.squares);
     s = part.kept * s + part.held;
-    s2 = part.kept * s2 + part.second_held;
   }
 }
 
@@ -220,15 +214,17 @@ class Pass {
       }
     }
     waiting_.resize(tasks_.size());
-    const auto q = static_cast<Eigen::Index>(problem.unknowns.count() + 1);
+    const auto q = static_cast<Eigen::Index>(problem.columns.count);
     sum_ = MatrixXd::Zero(q, q);
-    second_ = VectorXd::Zero(static_cast<Eigen::Index>(2 * problem.unknowns.rates().size()));
     const unsigned cores = options.threads ? options.threads : std::max(1u, std::thread::hardware_concurrency());
     threads_ = std::min<std::size_t>(cores, tasks_.size());
   }
 
   /* false: stopped */
   bool run(const Watch& watch) {
+    if (watch && !watch(0)) { /* once at least, however short the pass */
+      return false;
+    }
     std::vector<std::thread> threads;
     for (std::size_t k = 0; k < threads_; ++k) {
       threads.emplace_back([this] { work(); });
@@ -252,7 +248,6 @@ class Pass {
   }
 
   const MatrixXd& sum() const { return sum_; } /* [q × q] lower triangle */
-  const VectorXd& second() const { return second_; }
 
  private:
   void work() {
@@ -280,9 +275,9 @@ class Pass {
   void join_waiting() {
     for (; joined_ < tasks_.size() && waiting_[joined_]; ++joined_) {
       if (tasks_[joined_].segment == 0) {
-        held_ = held_at_start(problem_, z_, *waiting_[joined_]);
+        held_ = held_at_start(problem_, z_);
       }
-      join(*waiting_[joined_], &held_, &sum_, &second_);
+      join(*waiting_[joined_], &held_, &sum_);
       waiting_[joined_].reset();
     }
   }
@@ -293,9 +288,8 @@ class Pass {
   std::vector<BiasGains> gains_;
   std::vector<Task> tasks_;
   std::vector<std::unique_ptr<SegmentSum>> waiting_;
-  std::vector<Held> held_;
+  std::vector<VectorXd> held_;
   MatrixXd sum_;
-  VectorXd second_;
   std::size_t threads_ = 1, joined_ = 0, ended_ = 0;
   std::atomic<std::size_t> next_{0}, done_{0};
   std::atomic<bool> stopped_{false};
@@ -309,7 +303,27 @@ class Pass {
 Problem::Problem(const void* data, std::size_t size, const std::int32_t* group, const double* scale)
     : image(static_cast<const unsigned char*>(data), static_cast<const unsigned char*>(data) + size),
       finger(data, size),
-      unknowns(finger.get(), group, scale) {}
+      unknowns(finger.get(), group, scale),
+      columns(unknowns, finger.get()->joints) {}
+
+Columns::Columns(const Unknowns& unknowns, std::size_t joints) {
+  unknown.resize(unknowns.count());
+  expansion.resize(unknowns.rates().size());
+  for (std::size_t j = 0; j < joints; ++j) {
+    for (std::size_t k = 0; k < unknowns.count(); ++k) {
+      if (unknowns[k].joint == j) {
+        unknown[k] = count++;
+      }
+    }
+    for (std::size_t k = 0; k < expansion.size(); ++k) {
+      if (unknowns[static_cast<std::size_t>(unknowns.rates()[k][0])].joint == j) {
+        expansion[k] = count;
+        count += 2;
+      }
+    }
+    end.push_back(count);
+  }
+}
 
 std::size_t Problem::samples() const {
   std::size_t sum = 0;
@@ -324,17 +338,16 @@ Evaluation evaluate(const Problem& problem, const std::vector<double>& z, const 
   if (problem.recordings.empty()) {
     throw refused("no recording: expected at least one");
   }
-  const auto p = static_cast<Eigen::Index>(problem.unknowns.count());
   Pass pass(problem, z, options);
   Evaluation result;
   if (!pass.run(watch)) {
     return result;
   }
-  const MatrixXd sum = pass.sum().selfadjointView<Eigen::Lower>();
-  result.cost = 0.5 * sum(0, 0);
-  result.gradient = -sum.col(0).tail(p);
-  result.information = sum.bottomRightCorner(p, p);
-  result.second = -pass.second();
+  result.gram = pass.sum().selfadjointView<Eigen::Lower>();
+  const std::vector<std::size_t>& at = problem.columns.unknown;
+  result.cost = 0.5 * result.gram(0, 0);
+  result.gradient = -result.gram(at, residual_column);
+  result.information = result.gram(at, at);
   result.complete = true;
   return result;
 }

@@ -20,6 +20,19 @@
 
 namespace tendonfmu::estimation {
 
+/* The columns that a pass sums up: the residual e, the unknowns, and two for every side of a law with a rate to
+ * estimate, with which its Stribeck part drop·exp(−v·rate) is known to third order in a change δ of the rate: drop·(E −
+ * δ·v·E + δ²/2·v²E − δ³/6·v³E),  E = exp(−v·rate) Sorted by the first joint that they turn: those of joint j are a
+ * prefix. */
+struct Columns {
+  explicit Columns(const Unknowns& unknowns, std::size_t joints);
+
+  std::size_t count = 1;              /* q; column 0 is the residual */
+  std::vector<std::size_t> unknown;   /* [u] */
+  std::vector<std::size_t> expansion; /* [rates] v²E, followed by −v³E */
+  std::vector<std::size_t> end;       /* [n] of each joint's prefix */
+};
+
 /* A finger, its unknowns, its recordings. */
 struct Problem {
   Problem(const void* image, std::size_t image_size, const std::int32_t* group, const double* scale);
@@ -27,6 +40,7 @@ struct Problem {
   std::vector<unsigned char> image;
   FreeFinger finger;
   Unknowns unknowns;
+  Columns columns;
   std::vector<Recording> recordings;
 
   std::size_t joints() const { return finger.get()->joints; }
@@ -38,10 +52,8 @@ struct Evaluation {
   double cost = 0.0;
   Eigen::VectorXd gradient;
   Eigen::MatrixXd information; /* symmetric, both triangles */
-  /* What the cost's second derivative has beyond the information, −Σ e·∂ν/∂z, of the sides of Unknowns::rates():
-   * [2·k] by rate and rate, [2·k + 1] by rate and drop. All others are products of small numbers. */
-  Eigen::VectorXd second;
-  bool complete = false; /* false: stopped */
+  Eigen::MatrixXd gram;        /* [q × q] of all Columns, both triangles */
+  bool complete = false;       /* false: stopped */
 };
 
 /* Called on the caller's thread now and then; false stops. */

@@ -55,6 +55,9 @@ void BlockRows::filter(double gain, double weight, std::size_t at) {
 
 void BlockRows::take_off_mean(const double* decay, double squares, std::size_t count) {
   std::fill_n(mean_.begin(), active_.size(), 0.0);
+  if (!(squares > 0.0)) { /* the bias has begun in this block: nothing from before it counts */
+    return;
+  }
   for (std::size_t i = 0; i < count; ++i) {
     add_scaled(row(i), decay[i] / squares, mean_.data(), active_.size());
   }
@@ -75,36 +78,29 @@ void BlockRows::clear(std::size_t count) {
   active_.clear();
 }
 
-JointSum::JointSum(std::size_t columns, std::size_t second_columns)
-    : first(columns),
-      second(second_columns),
+JointSum::JointSum(std::size_t columns)
+    : rows(columns),
       held_(columns),
       cross_(columns),
-      second_held_(second_columns),
-      second_cross_(second_columns),
-      second_sum_(second_columns),
       dense_(dense_rows * columns),
       dense_sum_(columns * columns),
-      product_(first.stride() * first.stride()),
-      second_z_(second_columns) {
+      product_(rows.stride() * rows.stride()) {
   begin_segment();
 }
 
 void JointSum::begin_segment() {
-  for (std::vector<double>* values : {&held_, &cross_, &second_held_, &second_cross_, &second_sum_, &dense_sum_}) {
+  for (std::vector<double>* values : {&held_, &cross_, &dense_sum_}) {
     std::fill(values->begin(), values->end(), 0.0);
   }
   kept_ = block_kept_ = 1.0;
   squares_ = block_squares_ = 0.0;
-  first.clear(used_);
-  second.clear(used_);
+  rows.clear(used_);
   used_ = dense_count_ = 0;
-  first.add(residual, 0.0); /* always the first of the active ones */
+  rows.add(residual, 0.0); /* always the first of the active ones */
 }
 
 void JointSum::filter(double gain, double weight) {
-  first.filter(gain, weight, used_);
-  second.filter(gain, weight, used_);
+  rows.filter(gain, weight, used_);
   if (weight > 0.0) {
     decay_[used_] = block_kept_ * weight;
     block_squares_ += decay_[used_] * decay_[used_];
@@ -113,29 +109,27 @@ void JointSum::filter(double gain, double weight) {
   block_kept_ *= 1.0 - gain;
 }
 
-/* z = √C·held − u/√C of all columns, cross −= … */
-void JointSum::pass_on(const BlockRows& rows, std::vector<double>* held, std::vector<double>* cross, double* z) const {
+/* z = √C·held − u/√C of all columns, and the block's share of Σ c_i ν_i */
+void JointSum::pass_on() {
   const double root = std::sqrt(block_squares_), share = kept_ * block_squares_;
-  for (std::size_t c = 0; c < held->size(); ++c) {
-    z[c] = root * (*held)[c];
-    (*cross)[c] -= share * (*held)[c];
+  double* z = dense_.data() + dense_count_ * held_.size();
+  for (std::size_t c = 0; c < held_.size(); ++c) {
+    z[c] = root * held_[c];
+    cross_[c] -= share * held_[c];
   }
   for (std::size_t k = 0; k < rows.active().size(); ++k) {
     const std::size_t c = rows.active()[k];
     z[c] -= root * rows.mean(k);
-    (*cross)[c] += share * rows.mean(k);
+    cross_[c] += share * rows.mean(k);
   }
 }
 
 void JointSum::sum_block(Eigen::MatrixXd* sum) {
-  if (block_squares_ > 0.0) {
-    first.take_off_mean(decay_.data(), block_squares_, used_);
-    second.take_off_mean(decay_.data(), block_squares_, used_);
-  }
-  const std::vector<std::size_t>& active = first.active();
+  rows.take_off_mean(decay_.data(), block_squares_, used_);
+  const std::vector<std::size_t>& active = rows.active();
   const std::size_t count = active.size();
   std::fill_n(product_.begin(), count * count, 0.0);
-  add_outer_products(product_.data(), count, first.row(0), used_, first.stride(), 1.0);
+  add_outer_products(product_.data(), count, rows.row(0), used_, rows.stride(), 1.0);
   for (std::size_t c = 0; c < count; ++c) {
     for (std::size_t r = c; r < count; ++r) {
       const auto a = static_cast<Eigen::Index>(std::max(active[r], active[c]));
@@ -143,43 +137,29 @@ void JointSum::sum_block(Eigen::MatrixXd* sum) {
       (*sum)(a, b) += product_[c * count + r];
     }
   }
-  for (std::size_t i = 0; i < used_; ++i) {
-    const double e = first.row(i)[residual];
-    for (std::size_t k = 0; k < second.active().size(); ++k) {
-      second_sum_[second.active()[k]] += e * second.row(i)[k];
-    }
-  }
 }
 
 void JointSum::end_block(Eigen::MatrixXd* sum) {
   if (used_ > 0) {
     sum_block(sum);
-    double* z = dense_.data() + dense_count_ * held_.size();
-    pass_on(first, &held_, &cross_, z);
-    pass_on(second, &second_held_, &second_cross_, second_z_.data());
-    add_scaled(second_z_.data(), z[residual], second_sum_.data(), second_z_.size());
+    pass_on();
     squares_ += kept_ * kept_ * block_squares_;
     if (++dense_count_ == dense_rows) {
       flush();
     }
   }
-  const auto go_on = [this](const BlockRows& rows, std::vector<double>* held) {
-    for (double& value : *held) {
-      value *= block_kept_;
-    }
-    for (std::size_t k = 0; k < rows.active().size(); ++k) {
-      (*held)[rows.active()[k]] += rows.held(k);
-    }
-  };
-  go_on(first, &held_);
-  go_on(second, &second_held_);
+  for (double& value : held_) {
+    value *= block_kept_;
+  }
+  for (std::size_t k = 0; k < rows.active().size(); ++k) {
+    held_[rows.active()[k]] += rows.held(k);
+  }
   kept_ *= block_kept_;
-  first.clear(used_);
-  second.clear(used_);
+  rows.clear(used_);
   used_ = 0;
   block_kept_ = 1.0;
   block_squares_ = 0.0;
-  first.add(residual, 0.0);
+  rows.add(residual, 0.0);
 }
 
 void JointSum::flush() {
@@ -198,7 +178,7 @@ JointSegment JointSum::end_segment(Eigen::MatrixXd* sum) {
   const auto copy = [](const std::vector<double>& values) -> Eigen::VectorXd {
     return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
   };
-  return {copy(held_), copy(cross_), copy(second_sum_), copy(second_held_), copy(second_cross_), kept_, squares_};
+  return {copy(held_), copy(cross_), kept_, squares_};
 }
 
 }  // namespace tendonfmu::estimation

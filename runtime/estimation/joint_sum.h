@@ -1,5 +1,4 @@
-/* One joint's sums over samples: Σ ν νᵀ of the innovations' sensitivities with the bias eliminated, and Σ e·ν of their
- * second derivatives; see information.h. */
+/* One joint's sums over samples: Σ ν νᵀ of filtered rows with the bias eliminated, see information.h. */
 #ifndef TENDONFMU_ESTIMATION_JOINT_SUM_H
 #define TENDONFMU_ESTIMATION_JOINT_SUM_H
 
@@ -74,17 +73,16 @@ class BlockRows {
 
 /* What a segment of a recording adds up to for one joint, as if the bias held nothing at its start. */
 struct JointSegment {
-  Eigen::VectorXd held, cross;                       /* [q_j] at the end; Σ c_i ν_i */
-  Eigen::VectorXd second, second_held, second_cross; /* Σ e·ν of second derivatives; the same of them */
-  double kept = 1.0, squares = 0.0;                  /* Π (1 − K), Σ c_i² */
+  Eigen::VectorXd held, cross;      /* [q_j] at the end; Σ c_i ν_i */
+  double kept = 1.0, squares = 0.0; /* Π (1 − K), Σ c_i² */
 };
 
 class JointSum {
  public:
-  /* columns of sensitivities (0: the residual), columns of second derivatives */
-  JointSum(std::size_t columns, std::size_t second_columns);
+  /* column 0 is the residual */
+  explicit JointSum(std::size_t columns);
 
-  BlockRows first, second; /* rows are given here, sample by sample */
+  BlockRows rows; /* they are given here, sample by sample */
 
   void filter(double gain, double weight);
   void begin_segment();
@@ -94,18 +92,18 @@ class JointSum {
 
  private:
   void sum_block(Eigen::MatrixXd* sum);
-  void pass_on(const BlockRows& rows, std::vector<double>* held, std::vector<double>* cross, double* z) const;
+  void pass_on();
   void flush();
 
   /* of the segment: what the bias holds at the block's start, Σ c_i ν_i, Π (1 − K), Σ c_i² */
-  std::vector<double> held_, cross_, second_held_, second_cross_, second_sum_;
+  std::vector<double> held_, cross_;
   double kept_ = 1.0, squares_ = 0.0;
   /* of the block */
   std::array<double, block_length> decay_{}; /* c_i */
   std::size_t used_ = 0;
   double block_kept_ = 1.0, block_squares_ = 0.0;
   /* rows z of whole blocks, their sum, and the product of a block's rows */
-  std::vector<double> dense_, dense_sum_, product_, second_z_;
+  std::vector<double> dense_, dense_sum_, product_;
   std::size_t dense_count_ = 0;
 };
 

@@ -229,7 +229,7 @@ class Columns {
       return;
     }
     unknown->lower = smallest_share * unknown->scale;
-    unknown->upper = 1e9; /* as parameters.c */
+    unknown->upper = 0.5e9; /* static = coulomb + drop <= 1e9, as parameters.c */
     if (unknown->role == Role::rate) {
       unknown->lower = slowest_share * unknown->scale;
       unknown->upper = fastest(*unknown);
@@ -331,6 +331,7 @@ void Unknowns::find_run(std::uint32_t first) {
   if (side.column[2] >= 0) {
     side.index = static_cast<std::int32_t>(rates_.size());
     rates_.push_back({side.column[2], side.column[1]});
+    fixed_drops_.push_back(start_[first] - start_[first + 1]);
   }
 }
 
@@ -365,7 +366,8 @@ void Unknowns::write(const double* unknowns, double* numbers) const {
       numbers[p + 3] = unknowns[side.column[3]];
     }
     if (side.column[0] >= 0 || side.column[1] >= 0) {
-      const double drop = at(side.column[1], start_[p] - start_[p + 1]);
+      const bool tied = side.static_follows && side.column[1] < 0;
+      const double drop = tied ? 0.0 : at(side.column[1], start_[p] - start_[p + 1]);
       numbers[p + 1] = at(side.column[0], start_[p + 1]);
       numbers[p] = side.static_follows || side.column[1] >= 0 ? numbers[p + 1] + drop : start_[p];
     }

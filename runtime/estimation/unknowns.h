@@ -24,7 +24,8 @@ enum class Role { coulomb, drop, rate, viscous, value };
 /* One unknown. */
 struct Unknown {
   Role role;
-  std::vector<std::uint32_t> parameters; /* that it moves: of a drop the statics, of a tied coulomb both */
+  std::vector<std::uint32_t>
+      parameters; /* that it moves: of a drop the statics; of a tied coulomb its static follows */
   double start, lower, upper;
   double scale;      /* expected magnitude: of the prior, and what makes the columns comparable */
   std::size_t joint; /* the first that it turns, 0-based: it turns none before */
@@ -49,6 +50,8 @@ class Unknowns {
   std::size_t count() const { return list_.size(); }
   /* of the sides with a rate to estimate: columns of rate and drop (−1) */
   const std::vector<std::array<std::int32_t, 2>>& rates() const { return rates_; }
+  /* static − coulomb of the k-th of them where it is fixed */
+  double fixed_drop(std::size_t k) const { return fixed_drops_[k]; }
   const Unknown& operator[](std::size_t column) const { return list_[column]; }
 
   /* unknowns [count] of the description's numbers [parameter_count] */
@@ -72,6 +75,7 @@ class Unknowns {
   std::vector<Unknown> list_;
   std::vector<SideColumns> sides_;
   std::vector<std::array<std::int32_t, 2>> rates_;
+  std::vector<double> fixed_drops_;
   std::vector<std::int32_t> plain_;
   std::vector<double> start_;
   std::int64_t initial_first_ = -1;

@@ -1,0 +1,161 @@
+#include "local_model.h"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+namespace tendonfmu::estimation {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr int most_steps = 15;
+constexpr double enough = 0.02; /* of what was gained so far: a step that gains less is the last one */
+
+/* adds the part of [rr rd; rd 0] that has the eigenvalue of this sign, λ v vᵀ with v ∝ (λ, rd), |v|² = |λ|·root */
+void add_pair(double rr, double rd, Index r, Index d, double sign, MatrixXd* h) {
+  const double root = std::hypot(rr, 2.0 * rd), eigenvalue = 0.5 * (rr + sign * root);
+  if (eigenvalue * sign <= 0.0) {
+    return;
+  }
+  (*h)(r, r) += sign * eigenvalue * eigenvalue / root;
+  (*h)(r, d) += sign * eigenvalue * rd / root;
+  (*h)(d, r) += sign * eigenvalue * rd / root;
+  (*h)(d, d) += sign * rd * rd / root;
+}
+
+}  // namespace
+
+LocalModel::LocalModel(const Problem& problem, const ScaledBox& box, const Evaluation& evaluation, const VectorXd& x,
+                       double prior_weight)
+    : problem_(problem), box_(box), gram_(evaluation.gram), x_(x), prior_weight_(prior_weight) {
+  const auto column = [&problem](Index unknown) {
+    return static_cast<Index>(problem.columns.unknown[static_cast<std::size_t>(unknown)]);
+  };
+  const auto& rates = problem.unknowns.rates();
+  for (std::size_t k = 0; k < rates.size(); ++k) {
+    const Index rate = rates[k][0], drop = rates[k][1];
+    const double at = drop < 0 ? problem.unknowns.fixed_drop(k) : x[drop] * box.scale[drop];
+    sides_.push_back(
+        {rate, drop, column(rate), drop < 0 ? -1 : column(drop), static_cast<Index>(problem.columns.expansion[k]), at});
+  }
+}
+
+double LocalModel::drop_of(const Stribeck& side, const VectorXd& step) const {
+  return side.drop < 0 ? side.at : side.at + step[side.drop] * box_.scale[side.drop];
+}
+
+/* w with e(x + step) = Σ w·columns: 1 for the residual, minus the change of what stands before each column */
+VectorXd LocalModel::weights(const VectorXd& step) const {
+  VectorXd w = VectorXd::Zero(gram_.rows());
+  w[0] = 1.0;
+  for (Index k = 0; k < step.size(); ++k) {
+    w[static_cast<Index>(problem_.columns.unknown[static_cast<std::size_t>(k)])] = -step[k] * box_.scale[k];
+  }
+  for (const Stribeck& side : sides_) {
+    const double rate = step[side.rate] * box_.scale[side.rate], drop = drop_of(side, step);
+    if (side.at > 0.0) { /* −δ·v·E has the drop at x in its column; of shared rates each side adds its part */
+      w[side.rate_column] -= rate * (drop - side.at) / side.at;
+    }
+    w[side.square_column] = -drop * rate * rate / 2.0;
+    w[side.square_column + 1] = -drop * rate * rate * rate / 6.0;
+  }
+  return w;
+}
+
+/* matrix · ∂w/∂step, by unknowns divided by their scales */
+MatrixXd LocalModel::slopes(const MatrixXd& matrix, const VectorXd& step) const {
+  MatrixXd product(matrix.rows(), step.size());
+  for (Index k = 0; k < step.size(); ++k) {
+    product.col(k) =
+        -box_.scale[k] * matrix.col(static_cast<Index>(problem_.columns.unknown[static_cast<std::size_t>(k)]));
+  }
+  for (const Stribeck& side : sides_) {
+    const double scale = box_.scale[side.rate], rate = step[side.rate] * scale, drop = drop_of(side, step);
+    const auto linear = matrix.col(side.rate_column);
+    const auto square = matrix.col(side.square_column), cubic = matrix.col(side.square_column + 1);
+    product.col(side.rate) -= scale * drop * rate * (square + rate / 2.0 * cubic);
+    if (side.at > 0.0) {
+      product.col(side.rate) -= scale * (drop - side.at) / side.at * linear;
+    }
+    if (side.drop >= 0) {
+      const double by = box_.scale[side.drop];
+      product.col(side.drop) -= by * rate * rate * (0.5 * square + rate / 6.0 * cubic);
+      if (side.at > 0.0) {
+        product.col(side.drop) -= by * rate / side.at * linear;
+      }
+    }
+  }
+  return product;
+}
+
+double LocalModel::cost(const VectorXd& step) const {
+  const VectorXd w = weights(step);
+  return 0.5 * w.dot(gram_ * w) + 0.5 * prior_weight_ * (x_ + step - box_.start).squaredNorm();
+}
+
+/* second derivatives of the weights, times what pulls on them: what makes the cost more convex, and less */
+void LocalModel::add_curvature(const VectorXd& step, const VectorXd& pull, MatrixXd* convex, MatrixXd* concave) const {
+  for (const Stribeck& side : sides_) {
+    const double scale = box_.scale[side.rate], rate = step[side.rate] * scale, drop = drop_of(side, step);
+    const double square = pull[side.square_column], cubic = pull[side.square_column + 1];
+    const double rr = -scale * scale * drop * (square + rate * cubic);
+    if (side.drop < 0) {
+      (rr > 0.0 ? *convex : *concave)(side.rate, side.rate) += rr;
+    } else if (x_[side.drop] + step[side.drop] > box_.lower[side.drop]) {
+      const double linear = side.at > 0.0 ? pull[side.rate_column] / side.at : 0.0;
+      const double rd = -scale * box_.scale[side.drop] * (linear + rate * (square + rate / 2.0 * cubic));
+      add_pair(rr, rd, side.rate, side.drop, 1.0, convex);
+      add_pair(rr, rd, side.rate, side.drop, -1.0, concave);
+    }
+  }
+}
+
+/* as much of the concave part as leaves the sum positive definite */
+MatrixXd LocalModel::positive(const MatrixXd& convex, const MatrixXd& concave) const {
+  for (const double share : {1.0, 0.8, 0.5}) {
+    MatrixXd h = convex + share * concave;
+    if (h.llt().info() == Eigen::Success) {
+      return h;
+    }
+  }
+  return convex;
+}
+
+VectorXd LocalModel::best_step(const ScaledBox& around) const {
+  VectorXd step = VectorXd::Zero(x_.size());
+  const double before = cost(step);
+  double least = before, damping = 1e-6;
+  for (int k = 0; k < most_steps; ++k) {
+    const VectorXd pull = gram_ * weights(step);
+    const MatrixXd turned = slopes(gram_, step);                         /* [q × u] */
+    const MatrixXd gauss = slopes(turned.transpose(), step).transpose(); /* [u × u] */
+    MatrixXd convex = 0.5 * (gauss + gauss.transpose()), concave = MatrixXd::Zero(step.size(), step.size());
+    convex.diagonal().array() += prior_weight_;
+    const VectorXd damped = damping * convex.diagonal();
+    add_curvature(step, pull, &convex, &concave);
+    convex.diagonal() += damped;
+    const VectorXd gradient = slopes(pull.transpose(), step).transpose() + prior_weight_ * (x_ + step - box_.start);
+    const VectorXd change = boxed_step(positive(convex, concave), gradient, x_ + step, around);
+    const double then = cost(step + change);
+    if (then < least) {
+      step += change;
+      const double gained = least - then;
+      least = then;
+      damping = std::max(1e-12, damping / 10.0);
+      if (gained < enough * (before - least)) {
+        break;
+      }
+    } else {
+      damping = std::max(1e-6, damping * 100.0);
+      if (damping > 1e6) {
+        break;
+      }
+    }
+  }
+  return step;
+}
+
+}  // namespace tendonfmu::estimation

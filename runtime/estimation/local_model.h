@@ -1,0 +1,48 @@
+/* The cost around a point, from one pass over the data: exact in the unknowns that enter linearly, to third order in
+ * the rates of the laws. */
+#ifndef TENDONFMU_ESTIMATION_LOCAL_MODEL_H
+#define TENDONFMU_ESTIMATION_LOCAL_MODEL_H
+
+#include "information.h"
+#include "scaled_box.h"
+
+namespace tendonfmu::estimation {
+
+/* In unknowns divided by their scales; the prior is in it. */
+class LocalModel {
+ public:
+  /* evaluation: at x. prior_weight: 1/prior_std². All must outlive the model. */
+  LocalModel(const Problem& problem, const ScaledBox& box, const Evaluation& evaluation, const Eigen::VectorXd& x,
+             double prior_weight);
+
+  /* cost of x + step */
+  double cost(const Eigen::VectorXd& step) const;
+  /* The step of least cost within a box around x, found by Newton's steps on the model alone. */
+  Eigen::VectorXd best_step(const ScaledBox& around) const;
+
+ private:
+  /* One side of a law with a rate to estimate, in the description's units. */
+  struct Stribeck {
+    Eigen::Index rate, drop;                              /* unknowns; drop −1: fixed */
+    Eigen::Index rate_column, drop_column, square_column; /* of the Gram matrix; the cubic one follows the square */
+    double at;                                            /* drop at x */
+  };
+
+  Eigen::VectorXd weights(const Eigen::VectorXd& step) const;
+  Eigen::MatrixXd slopes(const Eigen::MatrixXd& gram, const Eigen::VectorXd& step) const;
+  void add_curvature(const Eigen::VectorXd& step, const Eigen::VectorXd& pull, Eigen::MatrixXd* convex,
+                     Eigen::MatrixXd* concave) const;
+  Eigen::MatrixXd positive(const Eigen::MatrixXd& convex, const Eigen::MatrixXd& concave) const;
+  double drop_of(const Stribeck& side, const Eigen::VectorXd& step) const;
+
+  const Problem& problem_;
+  const ScaledBox& box_;
+  const Eigen::MatrixXd& gram_;
+  const Eigen::VectorXd& x_;
+  double prior_weight_;
+  std::vector<Stribeck> sides_;
+};
+
+}  // namespace tendonfmu::estimation
+
+#endif

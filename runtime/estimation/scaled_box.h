@@ -1,0 +1,30 @@
+/* Unknowns divided by their scales, with the box they stay in, and a Newton step within a box. */
+#ifndef TENDONFMU_ESTIMATION_SCALED_BOX_H
+#define TENDONFMU_ESTIMATION_SCALED_BOX_H
+
+#include <Eigen/Core>
+
+#include "unknowns.h"
+
+namespace tendonfmu::estimation {
+
+struct ScaledBox {
+  explicit ScaledBox(const Unknowns& unknowns);
+
+  Eigen::VectorXd scale, start, lower, upper; /* all but scale divided by it */
+  std::vector<Eigen::Index> rates;            /* 1/vs: the only unknowns in which the model is far from linear */
+
+  /* the box around x in which a local model is trusted: rates change by a share of what they are */
+  ScaledBox around(const Eigen::VectorXd& x, double share) const;
+  Eigen::VectorXd clip(const Eigen::VectorXd& x) const { return x.cwiseMax(lower).cwiseMin(upper); }
+  std::vector<double> unknowns(const Eigen::VectorXd& x) const;
+};
+
+/* The d of least gᵀd + ½ dᵀHd with lower <= x + d <= upper, H positive definite, by an active set: unknowns that would
+ * leave the box are held at its side, those that its gradient pulls inwards are let go. */
+Eigen::VectorXd boxed_step(const Eigen::MatrixXd& h, const Eigen::VectorXd& g, const Eigen::VectorXd& x,
+                           const ScaledBox& box);
+
+}  // namespace tendonfmu::estimation
+
+#endif
