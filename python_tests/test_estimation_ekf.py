@@ -99,7 +99,7 @@ def test_every_bias_option(name: str) -> None:
 
 
 @pytest.mark.parametrize("first", [0, 7])
-@pytest.mark.parametrize("bias", [{}, {"initial_torque": [0.02, -0.01]}], ids=str)
+@pytest.mark.parametrize("bias", [{}, {"noise_time": 0.02}, {"initial_torque": [0.02, -0.01]}], ids=str)
 def test_left_out_samples_foretell_and_do_not_teach(first: int, bias: Description) -> None:
     """Also where the first ones are left out: the bias starts later, with the same default variance."""
     description = lasting_finger(**bias)

@@ -363,7 +363,7 @@ def fit(
     passes: Annotated[
         int | None, typer.Option(min=1, help="most passes over the data \\[default: 60, of ekf 2]")
     ] = None,
-    tolerance: Annotated[float, typer.Option(min=1e-9, max=0.5, help="last step in standard errors (batch)")] = 0.1,
+    tolerance: Annotated[float, typer.Option(min=1e-9, max=0.5, help="last step in standard errors (batch)")] = 0.3,
     drift: Annotated[float, typer.Option(min=0.0, max=1.0, help="relative variance of the numbers per s (ekf)")] = 0.0,
     resume: Annotated[
         Path | None, typer.Option(metavar="FITTED.unfinished.json", help="go on from an interrupted fit")

@@ -205,7 +205,7 @@ class Estimator:
         *,
         prior_std: float = 1.0,
         max_passes: int = 60,
-        tolerance: float = 0.1,
+        tolerance: float = 0.3,
         threads: int = 0,
         stride: int = 0,
         progress: BatchWatch | None = None,

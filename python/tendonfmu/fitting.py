@@ -94,7 +94,7 @@ class FrictionFit:
         prior: float = 1.0,
         scale: Sequence[str] = (),
         max_passes: int | None = None,
-        tolerance: float = 0.1,
+        tolerance: float = 0.3,
         threads: int = 0,
         parameter_drift: float = 0.0,
         start: str | os.PathLike[str] | None = None,

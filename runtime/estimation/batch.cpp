@@ -64,7 +64,7 @@ class Search {
     }
     while (result_.passes < options_.most_passes) {
       const LocalModel model(problem_, box_, best_.data, best_.x, prior_weight(options_.prior_std));
-      const VectorXd step = model.best_step(box_.around(best_.x, share));
+      const VectorXd step = model.best_step(box_.around(best_.x, share), 0.05 * tolerance * tolerance);
       const double expected = best_.cost - model.cost(step);
       ++result_.steps;
       if (2.0 * expected <= tolerance * tolerance) {

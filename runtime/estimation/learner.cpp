@@ -131,12 +131,12 @@ void Learner::initialise(const LearnerSample& first, int kinematics_source) {
   bias_started_ = false;
   rows_.read();
   if (first.use || finger_.get()->derived.settings.has_initial_torque) {
-    begin_bias(first, 0.0);
+    begin_bias(first);
   }
 }
 
 /* b = y − T at the first sample that is used, or bias.initial_torque; both depend on the unknowns */
-void Learner::begin_bias(const LearnerSample& sample, double step) {
+void Learner::begin_bias(const LearnerSample& sample) {
   const finger_settings& s = finger_.get()->derived.settings;
   const std::size_t n = torque_.size(), p = unknowns_.count();
   if (s.has_initial_torque) {
@@ -158,7 +158,7 @@ void Learner::begin_bias(const LearnerSample& sample, double step) {
       torque_[j] = rows_.measured(j) - (sample.external_torque ? sample.external_torque[j] : 0.0) - rows_.torque(j);
     }
   }
-  const double variance = s.initial_variance >= 0.0 ? s.initial_variance : noise_of(sample.inputs, step);
+  const double variance = s.initial_variance >= 0.0 ? s.initial_variance : noise_of(sample.inputs, 0.0);
   filter_.start_bias(torque_.data(), torque_rows_.data(), variance);
   bias_started_ = true;
 }
@@ -178,7 +178,7 @@ bool Learner::step(const LearnerSample& sample) {
   rows_.read();
   if (!bias_started_) {
     if (sample.use) {
-      begin_bias(sample, step);
+      begin_bias(sample);
     }
     return false;
   }

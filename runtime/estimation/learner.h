@@ -61,7 +61,7 @@ class Learner {
   void check(const LearnerSample& sample, double step) const;
   void write_unknowns();
   void take(const LearnerSample& sample, double step);
-  void begin_bias(const LearnerSample& sample, double step);
+  void begin_bias(const LearnerSample& sample);
   bool is_slack() const;
 
   FreeFinger finger_;

@@ -11,8 +11,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int most_steps = 15;
-constexpr double enough = 0.02; /* of what was gained so far: a step that gains less is the last one */
+constexpr int most_steps = 25;
+constexpr double enough = 0.01; /* of what was gained so far: a step that gains less is the last one */
 
 /* adds the part of [rr rd; rd 0] that has the eigenvalue of this sign, λ v vᵀ with v ∝ (λ, rd), |v|² = |λ|·root */
 void add_pair(double rr, double rd, Index r, Index d, double sign, MatrixXd* h) {
@@ -38,8 +38,15 @@ LocalModel::LocalModel(const Problem& problem, const ScaledBox& box, const Evalu
   for (std::size_t k = 0; k < rates.size(); ++k) {
     const Index rate = rates[k][0], drop = rates[k][1];
     const double at = drop < 0 ? problem.unknowns.fixed_drop(k) : x[drop] * box.scale[drop];
-    sides_.push_back(
-        {rate, drop, column(rate), drop < 0 ? -1 : column(drop), static_cast<Index>(problem.columns.expansion[k]), at});
+    sides_.push_back({rate, drop, column(rate), drop < 0 ? -1 : column(drop),
+                      static_cast<Index>(problem.columns.expansion[k]), at, 0.0});
+  } /* −δ·v·E has the drop at x in its column, which sides with one rate share: each stands for its part of it */
+  std::vector<double> sharing(static_cast<std::size_t>(x.size()), 0.0);
+  for (const Stribeck& side : sides_) {
+    ++sharing[static_cast<std::size_t>(side.rate)];
+  }
+  for (Stribeck& side : sides_) {
+    side.per_drop = side.at > 0.0 ? 1.0 / (side.at * sharing[static_cast<std::size_t>(side.rate)]) : 0.0;
   }
 }
 
@@ -56,9 +63,7 @@ VectorXd LocalModel::weights(const VectorXd& step) const {
   }
   for (const Stribeck& side : sides_) {
     const double rate = step[side.rate] * box_.scale[side.rate], drop = drop_of(side, step);
-    if (side.at > 0.0) { /* −δ·v·E has the drop at x in its column; of shared rates each side adds its part */
-      w[side.rate_column] -= rate * (drop - side.at) / side.at;
-    }
+    w[side.rate_column] -= rate * (drop - side.at) * side.per_drop;
     w[side.square_column] = -drop * rate * rate / 2.0;
     w[side.square_column + 1] = -drop * rate * rate * rate / 6.0;
   }
@@ -77,15 +82,11 @@ MatrixXd LocalModel::slopes(const MatrixXd& matrix, const VectorXd& step) const 
     const auto linear = matrix.col(side.rate_column);
     const auto square = matrix.col(side.square_column), cubic = matrix.col(side.square_column + 1);
     product.col(side.rate) -= scale * drop * rate * (square + rate / 2.0 * cubic);
-    if (side.at > 0.0) {
-      product.col(side.rate) -= scale * (drop - side.at) / side.at * linear;
-    }
+    product.col(side.rate) -= scale * (drop - side.at) * side.per_drop * linear;
     if (side.drop >= 0) {
       const double by = box_.scale[side.drop];
       product.col(side.drop) -= by * rate * rate * (0.5 * square + rate / 6.0 * cubic);
-      if (side.at > 0.0) {
-        product.col(side.drop) -= by * rate / side.at * linear;
-      }
+      product.col(side.drop) -= by * rate * side.per_drop * linear;
     }
   }
   return product;
@@ -105,7 +106,7 @@ void LocalModel::add_curvature(const VectorXd& step, const VectorXd& pull, Matri
     if (side.drop < 0) {
       (rr > 0.0 ? *convex : *concave)(side.rate, side.rate) += rr;
     } else if (x_[side.drop] + step[side.drop] > box_.lower[side.drop]) {
-      const double linear = side.at > 0.0 ? pull[side.rate_column] / side.at : 0.0;
+      const double linear = pull[side.rate_column] * side.per_drop;
       const double rd = -scale * box_.scale[side.drop] * (linear + rate * (square + rate / 2.0 * cubic));
       add_pair(rr, rd, side.rate, side.drop, 1.0, convex);
       add_pair(rr, rd, side.rate, side.drop, -1.0, concave);
@@ -124,33 +125,52 @@ MatrixXd LocalModel::positive(const MatrixXd& convex, const MatrixXd& concave) c
   return convex;
 }
 
-VectorXd LocalModel::best_step(const ScaledBox& around) const {
-  VectorXd step = VectorXd::Zero(x_.size());
-  const double before = cost(step);
-  double least = before, damping = 1e-6;
+/* gradient and Gauss-Newton matrix of the model, prior included */
+void LocalModel::linearise(const VectorXd& step, VectorXd* pull, VectorXd* gradient, MatrixXd* gauss) const {
+  *pull = gram_ * weights(step);
+  *gradient = slopes(pull->transpose(), step).transpose() + prior_weight_ * (x_ + step - box_.start);
+  const MatrixXd half = slopes(slopes(gram_, step).transpose(), step);
+  *gauss = 0.5 * (half + half.transpose());
+  gauss->diagonal().array() += prior_weight_;
+}
+
+/* the best of all unknowns but the rates: with these held the model is a parabola */
+VectorXd LocalModel::settled(const VectorXd& step, const ScaledBox& around) const {
+  const VectorXd at = around.clip(x_ + step);
+  VectorXd pull, gradient;
+  MatrixXd gauss;
+  linearise(at - x_, &pull, &gradient, &gauss);
+  return at - x_ + boxed_step(gauss, gradient, at, around.around(at, 0.0));
+}
+
+VectorXd LocalModel::best_step(const ScaledBox& around, double negligible) const {
+  VectorXd step = settled(VectorXd::Zero(x_.size()), around);
+  double least = cost(step), damping = 1e-6;
+  const double before = cost(VectorXd::Zero(x_.size()));
   for (int k = 0; k < most_steps; ++k) {
-    const VectorXd pull = gram_ * weights(step);
-    const MatrixXd turned = slopes(gram_, step);                         /* [q × u] */
-    const MatrixXd gauss = slopes(turned.transpose(), step).transpose(); /* [u × u] */
-    MatrixXd convex = 0.5 * (gauss + gauss.transpose()), concave = MatrixXd::Zero(step.size(), step.size());
-    convex.diagonal().array() += prior_weight_;
+    VectorXd pull, gradient;
+    MatrixXd convex, concave = MatrixXd::Zero(step.size(), step.size());
+    linearise(step, &pull, &gradient, &convex);
     const VectorXd damped = damping * convex.diagonal();
     add_curvature(step, pull, &convex, &concave);
     convex.diagonal() += damped;
-    const VectorXd gradient = slopes(pull.transpose(), step).transpose() + prior_weight_ * (x_ + step - box_.start);
-    const VectorXd change = boxed_step(positive(convex, concave), gradient, x_ + step, around);
-    const double then = cost(step + change);
-    if (then < least) {
-      step += change;
-      const double gained = least - then;
-      least = then;
+    const MatrixXd curvature = positive(convex, concave);
+    const VectorXd change = boxed_step(curvature, gradient, x_ + step, around);
+    if (-gradient.dot(change) - 0.5 * change.dot(curvature * change) < negligible) {
+      break;
+    }
+    const VectorXd next = settled(step + change, around);
+    const double gained = least - cost(next);
+    if (gained > 0.0) {
+      step = next;
+      least -= gained;
       damping = std::max(1e-12, damping / 10.0);
       if (gained < enough * (before - least)) {
         break;
       }
     } else {
-      damping = std::max(1e-6, damping * 100.0);
-      if (damping > 1e6) {
+      damping = std::max(1e-4, damping * 10.0);
+      if (damping > 1e4) {
         break;
       }
     }

@@ -17,8 +17,10 @@ class LocalModel {
 
   /* cost of x + step */
   double cost(const Eigen::VectorXd& step) const;
-  /* The step of least cost within a box around x, found by Newton's steps on the model alone. */
-  Eigen::VectorXd best_step(const ScaledBox& around) const;
+  /* The step of least cost within a box around x, found by Newton's steps on the model alone, each followed by the best
+   * of all unknowns but the rates (variable projection, Golub and Pereyra 1973), until one promises less than
+   * `negligible` of cost. */
+  Eigen::VectorXd best_step(const ScaledBox& around, double negligible) const;
 
  private:
   /* One side of a law with a rate to estimate, in the description's units. */
@@ -26,8 +28,12 @@ class LocalModel {
     Eigen::Index rate, drop;                              /* unknowns; drop −1: fixed */
     Eigen::Index rate_column, drop_column, square_column; /* of the Gram matrix; the cubic one follows the square */
     double at;                                            /* drop at x */
+    double per_drop;                                      /* 1/(at · sides that share the rate), 0 without a drop */
   };
 
+  void linearise(const Eigen::VectorXd& step, Eigen::VectorXd* pull, Eigen::VectorXd* gradient,
+                 Eigen::MatrixXd* gauss) const;
+  Eigen::VectorXd settled(const Eigen::VectorXd& step, const ScaledBox& around) const;
   Eigen::VectorXd weights(const Eigen::VectorXd& step) const;
   Eigen::MatrixXd slopes(const Eigen::MatrixXd& gram, const Eigen::VectorXd& step) const;
   void add_curvature(const Eigen::VectorXd& step, const Eigen::VectorXd& pull, Eigen::MatrixXd* convex,
