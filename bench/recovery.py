@@ -31,10 +31,11 @@ Numbers = NDArray[np.float64]
 Row = dict[str, float]
 KINDS = ("static", "coulomb", "stribeck_velocity", "viscous", "stiffness", "initial_torque")
 FAR = 3.0  # standard errors
-EKF_PASSES = 4  # each but the first linearised where the one before arrived; the first is the paper's filter
+PRIOR = 0.3  # of a number's size: about as far as the starts are off
+EKF_PASSES = 3  # each but the first linearised where the one before arrived; the first is the paper's filter
 
 
-def run_seed(seed: int, duration: float = DURATION, rate: float = RATE, ekf: bool = True) -> Row:
+def run_seed(seed: int, duration: float = DURATION, rate: float = RATE, ekf: bool = True, prior: float = PRIOR) -> Row:
     """One case: made, judged, fitted both ways."""
     begun = time.perf_counter()
     case = make_case(seed, duration, rate)
@@ -49,7 +50,7 @@ def run_seed(seed: int, duration: float = DURATION, rate: float = RATE, ekf: boo
         "identifiable": int(known.sum()),
         "make_s": made - begun,
     }
-    z, covariance, row_of_batch = _batch(case)
+    z, covariance, row_of_batch = _batch(case, prior)
     errors = scale.standard_errors(covariance)
     row |= row_of_batch | {f"batch_{key}": value for key, value in judge(scale, known, z, covariance).items()}
     row |= {
@@ -59,7 +60,7 @@ def run_seed(seed: int, duration: float = DURATION, rate: float = RATE, ekf: boo
     }
     if ekf:
         begun = time.perf_counter()
-        passes = list(_ekf(case))
+        passes = list(_ekf(case, prior))
         row["ekf_s"] = time.perf_counter() - begun
         row |= {f"ekf_first_{key}": value for key, value in judge(scale, known, *passes[0]).items()}
         row |= {f"ekf_{key}": value for key, value in judge(scale, known, *passes[-1]).items()}
@@ -68,10 +69,10 @@ def run_seed(seed: int, duration: float = DURATION, rate: float = RATE, ekf: boo
     return row
 
 
-def _batch(case: Case) -> tuple[Numbers, Numbers, Row]:
+def _batch(case: Case, prior: float) -> tuple[Numbers, Numbers, Row]:
     estimator = Estimator(image(case.start))
     estimator.add_recording(case.recording, external_torque=case.recording["external_torque"])
-    found = estimator.fit()
+    found = estimator.fit(prior_std=prior)
     row: Row = {
         "batch_s": found.seconds,
         "passes": found.passes,
@@ -81,9 +82,9 @@ def _batch(case: Case) -> tuple[Numbers, Numbers, Row]:
     return found.z, found.covariance, row
 
 
-def _ekf(case: Case) -> Iterator[tuple[Numbers, Numbers]]:
+def _ekf(case: Case, prior: float) -> Iterator[tuple[Numbers, Numbers]]:
     """What each pass finds."""
-    learner = Learner(image(case.start))
+    learner = Learner(image(case.start), prior_std=prior)
     for number in range(EKF_PASSES):
         if number > 0:
             learner.begin_pass()
@@ -107,14 +108,16 @@ def _of_kind(scale: Scale, chosen: NDArray[np.bool_], z: Numbers, errors: Number
 # --- the campaign -----------------------------------------------------------------------------------------------------
 
 
-def campaign(seeds: int, file: Path, duration: float, rate: float, ekf: bool) -> list[Row]:
+def campaign(
+    seeds: int, file: Path, duration: float = DURATION, rate: float = RATE, ekf: bool = True, prior: float = PRIOR
+) -> list[Row]:
     """Rows of all seeds, from the file where they are there."""
     console = Console()
     rows = read_rows(file)
     for seed in range(seeds):
         if any(row["seed"] == seed for row in rows):
             continue
-        row = run_seed(seed, duration, rate, ekf)
+        row = run_seed(seed, duration, rate, ekf, prior)
         rows = [*rows, row]
         _write_rows(file, rows)
         line = ", ".join(f"{key} {value:.4g}" for key, value in row.items() if not key.endswith(KINDS))
@@ -167,10 +170,11 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=20, help="0 to SEEDS − 1")
     parser.add_argument("--duration", type=float, default=DURATION, help="s")
     parser.add_argument("--rate", type=float, default=RATE, help="samples per second")
+    parser.add_argument("--prior", type=float, default=PRIOR, help="standard deviation of a number about its start")
     parser.add_argument("--no-ekf", action="store_true", help="batch only")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="RECOVERY.csv")
     given = parser.parse_args()
-    rows = campaign(given.seeds, given.output, given.duration, given.rate, not given.no_ekf)
+    rows = campaign(given.seeds, given.output, given.duration, given.rate, not given.no_ekf, given.prior)
     table = Table(title=f"recovery, {rows[0]['samples']:.0f} samples, {rows[0]['numbers']:.0f} numbers")
     table.add_column("")
     table.add_column("", justify="right")

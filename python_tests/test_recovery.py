@@ -113,7 +113,7 @@ def test_campaign(tmp_path: Path) -> None:
     """20 seeds of 400 s at 1 kHz."""
     import recovery
 
-    found = recovery.summary(recovery.campaign(20, tmp_path / "rows.csv", 400.0, 1000.0, True))
+    found = recovery.summary(recovery.campaign(20, tmp_path / "rows.csv"))
     assert found["least identifiable"] >= 0.7
     assert found["not converged"] == 0
     for method in ("batch", "ekf"):
