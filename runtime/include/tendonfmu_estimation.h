@@ -48,10 +48,11 @@ typedef struct tendonfmu_unknown {
 } tendonfmu_unknown;
 
 /* Makes an estimator for the finger of an image (tendonfmu_description.h).
- *   group         [p] by parameter index: −1 fixed; others: estimated, equal numbers share one value. NULL: everything
- * that is present: no viscous friction where it is 0, no Stribeck effect where static equals coulomb scale         [p]
- * expected magnitudes, > 0, NaN where the start's is meant; NULL: the start's NULL when refused, with one line in
- * message [message_size]. */
+ *   group         [p] by parameter index: −1 fixed; others: estimated, equal numbers share one value. NULL: all that is
+ *                 present: no viscous friction where it is 0, no Stribeck effect where static equals coulomb
+ *   scale         [p] expected magnitudes, > 0, NaN where the start's is meant. NULL: the start's
+ *
+ * Returns NULL when refused, with one line in message [message_size]. */
 tendonfmu_estimator* tendonfmu_estimator_create(const void* image, size_t image_size, const int32_t* group,
                                                 const double* scale, char* message, size_t message_size);
 void tendonfmu_estimator_destroy(tendonfmu_estimator* estimator);

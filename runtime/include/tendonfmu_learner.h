@@ -63,9 +63,10 @@ tendonfmu_status tendonfmu_learner_get_unknown(const tendonfmu_learner* learner,
 
 /* Takes the first sample of a recording. Unknowns and their covariance stay, the bias and what is remembered of the
  * motion begin anew: b = y − T at the first sample that is used, with bias.initial_variance, or bias.initial_torque.
- * May be called again for the next recording. kinematics_source  tendonfmu_kinematics_source external_torque    [n] N·m
- * known load on the joints (eq. 9), or NULL use                0: the sample says nothing, as in contact with an
- * unknown load */
+ * May be called again for the next recording.
+ *   kinematics_source  tendonfmu_kinematics_source
+ *   external_torque    [n] N·m, known load on the joints (eq. 9), or NULL
+ *   use                0: the sample says nothing, as in contact with an unknown load */
 tendonfmu_status tendonfmu_learner_initialise(tendonfmu_learner* learner, double time, const tendonfmu_inputs* inputs,
                                               int kinematics_source, const double* external_torque, int use);
 
