@@ -146,16 +146,33 @@ def test_patterns_choose_what_is_estimated(call: Call, files: tuple[Path, Path])
         ),
         (("-o", "f.json", "--resume", "nothing.json"), "nothing.json"),
         (("-o", "f.json", "--compare", "nothing.csv"), "nothing.csv: no such file"),
+        (("./rec.parquet", "-o", "f.json"), "rec.parquet: given twice; expected each recording once"),
+        (("-o", "f.json", "--compare", "rec.parquet"), "rec.parquet: compared with, but trained on as well"),
+        (("-o", "left.json", "--resume", "left.json"), "left.json: the same file as the input left.json"),
+        (("-o", "f.json", "--figures", "finger.json/figures"), "finger.json is a file; expected a folder"),
+        (("-o", "f.json", "--drift", "0.1"), "parameter_drift = 0.1: expected 0 with method batch"),
     ],
 )
 def test_bad_usage_is_one_line_and_writes_nothing(
     call: Call, files: tuple[Path, Path], arguments: tuple[str, ...], words: str
 ) -> None:
+    Path("left.json").write_text('{"format": "tendonfmu-fit-unfinished-1"}')
     before = {path: path.read_bytes() for path in Path().iterdir()}
     answer = call("fit", *files, *arguments)
     assert answer.status == 2
     assert words in answer.err and answer.err.count("\n") == 1
     assert {path: path.read_bytes() for path in Path().iterdir()} == before
+
+
+@pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="SKIPPED: no folder here that nobody may write into")
+@pytest.mark.parametrize("place", [("-o", "/proc/f.json"), ("-o", "f.json", "--figures", "/proc/figures/new")])
+def test_a_folder_that_cannot_be_written_is_refused_before_the_fit(
+    call: Call, files: tuple[Path, Path], place: tuple[str, ...]
+) -> None:
+    answer = call("fit", *files, *place, *FIT)
+    assert answer.status == 2 and not answer.out
+    assert f"{place[-1]}: cannot be written" in answer.err and answer.err.count("\n") == 1
+    assert not Path("f.json").exists()
 
 
 def test_a_recording_of_three_samples_is_refused(call: Call, files: tuple[Path, Path]) -> None:
@@ -210,6 +227,8 @@ def test_an_unfinished_file_is_no_finger(call: Call, files: tuple[Path, Path]) -
         )
     )
     answer = call("check", "left.unfinished.json")
-    assert answer.status == 1 and "left.unfinished.json: " in answer.err
+    assert answer.status == 1
+    expected = 'format = "tendonfmu-fit-unfinished-1": of a fit; expected a finger description'
+    assert f"left.unfinished.json: {expected}" in answer.err
     answer = call("fit", *files, "-o", "f.json", "--resume", "left.unfinished.json", *FIT)
     assert answer.status == 2 and "an interrupted fit of 1 unknowns, 25 are asked for now" in answer.err

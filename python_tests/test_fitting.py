@@ -375,6 +375,8 @@ def test_the_prior_holds_what_the_data_do_not_know() -> None:
         ({"scale": ["joints[1].friction"]}, "expected PATTERN=VALUE"),
         ({"scale": ["joints[1].friction.static=-1"]}, "expected PATTERN=VALUE"),
         ({"share": ["fingers"]}, "--share fingers: matches none"),
+        ({"fix": "*.colour"}, "--fix *.colour: matches none"),
+        ({"parameter_drift": 1e-3}, "parameter_drift = 0.001: expected 0 with method batch"),
     ],
 )
 def test_options_that_make_no_sense_are_refused(options: dict[str, Any], words: str) -> None:
@@ -405,6 +407,16 @@ def test_parameters_are_read_and_set_as_in_scikit_learn() -> None:
     assert "prior=3.0" in repr(again) and "holdout" not in repr(again)
     with pytest.raises(InputError, match="not fitted yet"):
         again.predict(made_recording())
+    with pytest.raises(InputError, match="not fitted yet"):
+        again.description_text()
+
+
+def test_one_pattern_may_be_a_string() -> None:
+    fit = shared(only="joints[1].friction", share=(), max_passes=2).fit(made_recording())
+    assert set(fit.parameters_) == {
+        f"joints[1].friction.{key}" for key in ("static", "coulomb", "stribeck_velocity")
+    } | {path for path in fit.parameters_ if path == "joints[1].friction.viscous"}
+    assert fit.report_["options"]["only"] == ["joints[1].friction"]
 
 
 def test_the_page_s_example_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

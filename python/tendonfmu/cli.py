@@ -382,7 +382,7 @@ def fit(
     from tendonfmu.fit_text import lines, tables
     from tendonfmu.fitting import FitWarning, FrictionFit
 
-    inputs = [finger, *recordings, *(compare or [])]
+    inputs = [finger, *recordings, *(compare or []), *([] if resume is None else [resume])]
     check_outputs(output, report, figures, inputs)
     with _progress(progress) as bar:
         fitting = FrictionFit(

@@ -106,7 +106,7 @@ def read_finger(path: Path) -> FingerDescription:
 
 
 def _check_format(path: Path, text: bytes) -> None:
-    """Fingers and rigs are easily mixed up: say so before any other fault of the content."""
+    """Fingers, rigs and reports are easily mixed up: say so before any other fault of the content."""
     try:
         data = json.loads(text)
     except (ValueError, RecursionError):
@@ -117,6 +117,8 @@ def _check_format(path: Path, text: bytes) -> None:
             raise InputError(f'{path}: format: missing; expected "{FORMAT}"')
         if isinstance(found, str) and found.startswith("tendonfmu-rig-"):
             raise InputError(f'{path}: format = "{found}": a rig; expected a finger description, "{FORMAT}"')
+        if isinstance(found, str) and found.startswith("tendonfmu-fit-"):
+            raise InputError(f'{path}: format = "{found}": of a fit; expected a finger description, "{FORMAT}"')
 
 
 def laws(data: Mapping[str, Any]) -> Iterator[tuple[str, Law]]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from tendonfmu.description import FingerDescription
 from tendonfmu.errors import InputError
 from tendonfmu.fit_structure import Structure, own_copy, set_number
 from tendonfmu.json_node import read_json
-from tendonfmu.whole_file import check_output, whole_file
+from tendonfmu.whole_file import check_output, check_output_folder, whole_file
 
 Numbers = NDArray[np.float64]
 
@@ -33,8 +34,26 @@ def check_outputs(output: Path, report: Path | None, figures: Path | None, input
         check_output(file, *inputs)
     if report is not None and report.resolve() == output.resolve():
         raise InputError(f"{report}: the same file for description and report; expected two names")
-    if figures is not None and figures.exists() and not figures.is_dir():
-        raise InputError(f"{figures}: a file; expected a folder, or a name for one")
+    if figures is not None:
+        check_output_folder(figures)
+
+
+def check_given_once(training: Iterable[object], compared: Iterable[object]) -> None:
+    """Raises InputError where a file is trained on twice, as if it were two measurements, or compared as if new.
+
+    Only files are told apart; recordings in memory may be pieces of one file.
+    """
+    seen: dict[Path, bool] = {}
+    for sources, trained in ((training, True), (compared, False)):
+        for source in sources:
+            if not isinstance(source, str | os.PathLike):
+                continue
+            file = Path(source).resolve()
+            if seen.get(file) and not trained:
+                raise InputError(f"{source}: compared with, but trained on as well; expected another recording")
+            if file in seen:
+                raise InputError(f"{source}: given twice; expected each recording once")
+            seen[file] = trained
 
 
 # --- descriptions -----------------------------------------------------------------------------------------------------

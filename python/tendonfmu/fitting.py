@@ -27,7 +27,7 @@ from tendonfmu.coverage import EffectCoverage, coverage_of, with_laws_of
 from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.errors import InputError
 from tendonfmu.fit_evaluation import Evaluation, evaluate, model_over, residuals
-from tendonfmu.fit_files import Unfinished, description_text, resumed_start, with_values
+from tendonfmu.fit_files import Unfinished, check_given_once, description_text, resumed_start, with_values
 from tendonfmu.fit_methods import Interrupted, Learned, Watch, learn_batch, learn_ekf, unknown_names
 from tendonfmu.fit_picture import FitPicture, FitSeries
 from tendonfmu.fit_recordings import (
@@ -67,7 +67,7 @@ class FrictionFit:
     holdout: share of time not trained on, evenly spread blocks of `holdout_block` s or less.
     sides: "given", "symmetric" (both sides of every law equal) or "asymmetric" (each on its own).
     only, fix: patterns of the numbers to estimate, or not to; share: "tendons", "pulleys" or patterns of what
-        shares its values. Patterns are those of `fit_structure`.
+        shares its values. Patterns are those of `fit_structure`; a single one may be a string.
     prior: standard deviation known beforehand, in units of each number's expected magnitude; scale: "PATTERN=VALUE",
         expected magnitudes other than the description's own values.
     max_passes: over the data, at most; None: 60 of "batch", 2 of "ekf". tolerance (length of the last step in standard
@@ -148,13 +148,16 @@ class FrictionFit:
         self.finished_ = False
         self.unfinished_: Unfinished | None = None
         finger = _read_finger(self.finger)
-        structure = build_structure(finger, Choice(self.sides, self.only, self.fix, self.share, self.scale))
+        chosen = (self.only, self.fix, self.share, self.scale)
+        structure = build_structure(finger, Choice(self.sides, *map(_listed_text, chosen)))
         self.structure_, self.start_ = structure, structure.start
         held = Held(self.holdout, self.holdout_block)
-        self.recordings_ = [self._prepared(each, held) for each in _listed(recordings)]
+        training, others = _listed(recordings), _listed(compare)
+        check_given_once(training, others)
+        self.recordings_ = [self._prepared(each, held) for each in training]
         if not self.recordings_:
             raise InputError("no recording; expected at least one")
-        compared = [self._prepared(each, Held()) for each in _listed(compare)]
+        compared = [self._prepared(each, Held()) for each in others]
         require_noise(self.start_, self.recordings_)
         found = self._motion_warnings()
         learned = self._learn(Watch(self.progress))
@@ -182,6 +185,12 @@ class FrictionFit:
             (self.max_passes is None or self.max_passes >= 1, "max_passes", self.max_passes, "at least 1"),
             (0 < self.tolerance < 1, "tolerance", self.tolerance, "between 0 and 1"),
             (0 <= self.parameter_drift <= 1, "parameter_drift", self.parameter_drift, "0 to 1, per s"),
+            (
+                self.parameter_drift == 0 or self.method == "ekf",
+                "parameter_drift",
+                self.parameter_drift,
+                f"0 with method {self.method}; only those of method ekf wander",
+            ),
         )
         for sound, name, value, expectation in checks:
             if not sound:
@@ -240,6 +249,7 @@ class FrictionFit:
         """Those that shape the result, as JSON has them."""
         left_out = ("finger", "progress", "threads")
         given = {name: value for name, value in self.get_params().items() if name not in left_out}
+        given |= {name: list(_listed_text(given[name])) for name in ("only", "fix", "share", "scale")}
         return {
             name: os.fspath(value)
             if isinstance(value, os.PathLike)
@@ -312,14 +322,18 @@ class FrictionFit:
         return float(1 - np.sum(left[rows] ** 2) / np.sum((torque - torque.mean(axis=0)) ** 2))
 
     def _left(self, source: Source) -> tuple[FitRecording, Numbers]:
-        if not getattr(self, "finished_", False):
-            raise InputError("FrictionFit: not fitted yet; expected a call of fit that was not interrupted")
+        self._require_fitted()
         prepared = self._prepared(source, Held())
         data = self.description_.data
         return prepared, residuals(data, prepared, model_over(data, prepared)).residual
 
+    def _require_fitted(self) -> None:
+        if not getattr(self, "finished_", False):
+            raise InputError("FrictionFit: not fitted yet; expected a call of fit that was not interrupted")
+
     def picture(self) -> FitPicture:
         """What `fit_page.write_fit_page` draws."""
+        self._require_fitted()
         return FitPicture(
             report=self.report_,
             start=self.start_.data,
@@ -335,6 +349,7 @@ class FrictionFit:
 
     def description_text(self) -> str:
         """The fitted description as JSON, as `tendonfmu fit -o` writes it."""
+        self._require_fitted()
         return description_text(self.description_.data)
 
 
@@ -352,6 +367,11 @@ def _read_finger(finger: Finger) -> FingerDescription:
 
 def _listed(sources: Source | Sequence[Source]) -> list[Source]:
     return [sources] if isinstance(sources, Recording | str | os.PathLike) else list(sources)
+
+
+def _listed_text(patterns: str | Sequence[str]) -> Sequence[str]:
+    """A single pattern is meant as one, not as its letters."""
+    return [patterns] if isinstance(patterns, str) else patterns
 
 
 def _trained(found: Evaluation) -> Numbers:

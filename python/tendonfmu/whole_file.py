@@ -14,6 +14,7 @@ from tendonfmu.errors import InputError
 def check_output(output: Path, *inputs: Path) -> None:
     """Raises InputError where no file can be, and where a result would take the place of what it is made from."""
     _check_place(output)
+    _check_writable(output, output.parent)
     for file in inputs:
         if output.exists() and file.exists() and output.samefile(file):
             raise InputError(f"{output}: the same file as the input {file}; expected another name for the output")
@@ -29,6 +30,24 @@ def _check_place(file: Path) -> None:
         raise InputError(f"{file}: a device or pipe; expected the name of a file to write")
     if file.exists() and not file.stat().st_mode & 0o222:
         raise InputError(f"{file}: read-only; expected another name, or a file that may be written")
+
+
+def check_output_folder(folder: Path) -> None:
+    """Raises InputError where a folder that need not exist yet could not be made, or not be written into."""
+    there = next(each for each in (folder, *folder.absolute().parents) if each.exists())
+    if not there.is_dir():
+        what = "a file" if there == folder else f"{there} is a file"
+        raise InputError(f"{folder}: {what}; expected a folder, or a name for one")
+    _check_writable(folder, there)
+
+
+def _check_writable(output: Path, folder: Path) -> None:
+    """By writing: permissions alone do not tell of read-only disks. What takes minutes is not computed in vain."""
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise InputError(f"{output}: cannot be written ({error.strerror})") from None
 
 
 @contextmanager
