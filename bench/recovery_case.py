@@ -46,7 +46,7 @@ Description = dict[str, Any]
 FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
 START_BIAS = (0.004, -0.003, 0.003, -0.002)  # N·m
 BIAS_DRIFT = 1e-8  # (N·m)²/s
-BIAS = {
+BIAS: dict[str, Any] = {
     "noise_std": 5e-4,  # N·m, in each
     "noise_time": 1e-3,  # s
     "drift_variance": BIAS_DRIFT,
@@ -113,7 +113,9 @@ def make_case(seed: int, duration: float = DURATION, rate: float = RATE) -> Case
     noise = random.standard_normal(friction.shape) * noise_scale(truth, motion.time, force)
     steps = np.sqrt(BIAS_DRIFT * np.diff(motion.time, prepend=motion.time[0]))
     wander = np.cumsum(random.standard_normal(friction.shape) * steps[:, None], axis=0)
-    recording["external_torque"] = force @ arms - (friction + np.array(START_BIAS) + wander + jumps + noise)
+    first = random.standard_normal(len(START_BIAS)) * np.sqrt(BIAS["initial_variance"])
+    bias = np.array(START_BIAS) + first + wander + jumps
+    recording["external_torque"] = force @ arms - (friction + bias + noise)
     return Case(truth, _start(truth, seed), recording, float(force.min()))
 
 
