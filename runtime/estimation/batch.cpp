@@ -58,10 +58,11 @@ class Search {
    * gives, a pass there. True: converged. */
   bool descend(std::size_t stride, double tolerance) {
     double share = first_share;
-    best_.cost = std::numeric_limits<double>::infinity(); /* of another number of samples */
-    if (!look(best_.x, stride, &best_)) {
+    Point here; /* the costs so far are of another number of samples */
+    if (!look(best_.x, stride, &here)) {
       return false;
     }
+    best_ = std::move(here);
     while (result_.passes < options_.most_passes) {
       const LocalModel model(problem_, box_, best_.data, best_.x, prior_weight(options_.prior_std));
       const VectorXd step = model.best_step(box_.around(best_.x, share), 0.05 * tolerance * tolerance);

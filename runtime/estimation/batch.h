@@ -26,7 +26,7 @@ using BatchWatch = std::function<bool(const BatchProgress&)>;
 struct BatchResult {
   std::vector<double> z;
   double cost = 0.0, prior_cost = 0.0;
-  Evaluation at;              /* at z, over all samples */
+  Evaluation at;              /* at z; over all samples unless stopped in the coarse passes */
   Eigen::MatrixXd covariance; /* (information + prior)^-1; an unknown held by its bound is counted as if it were free */
   std::size_t passes = 0, steps = 0;
   bool converged = false, stopped = false;

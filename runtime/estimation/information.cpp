@@ -20,6 +20,7 @@ using Eigen::VectorXd;
 
 /* Column 0 is the residual, y − T and what the bias holds of it; unknown k is column k + 1. */
 constexpr std::size_t residual_column = 0;
+constexpr std::size_t told_every = 256; /* samples, of what is done */
 
 /* What a segment of a recording adds up to, as if the bias held nothing at its start; see join(). */
 struct SegmentSum {
@@ -54,11 +55,13 @@ class Worker {
     for (std::size_t k = first; k < last && !stopped; ++k) {
       finger_.step(k, recording.time(k), recording.inputs(k));
       take(recording, gains, k);
-      if ((k + 1 - first) % block_length == 0 || k + 1 == last) {
+      if (joints_.front().full() || k + 1 == last) {
         for (JointSum& joint : joints_) {
           joint.end_block(&result.information);
         }
-        *done += (k - first) % block_length + 1;
+      }
+      if ((k + 1 - first) % told_every == 0 || k + 1 == last) {
+        *done += (k - first) % told_every + 1;
       }
     }
     for (JointSum& joint : joints_) {
@@ -225,10 +228,7 @@ class Pass {
     if (watch && !watch(0)) { /* once at least, however short the pass */
       return false;
     }
-    std::vector<std::thread> threads;
-    for (std::size_t k = 0; k < threads_; ++k) {
-      threads.emplace_back([this] { work(); });
-    }
+    const Team team(this); /* however this ends */
     std::unique_lock<std::mutex> lock(mutex_);
     while (!finished_.wait_for(lock, std::chrono::milliseconds(50), [this] { return ended_ == threads_; })) {
       lock.unlock();
@@ -236,10 +236,6 @@ class Pass {
         stopped_ = true;
       }
       lock.lock();
-    }
-    lock.unlock();
-    for (std::thread& thread : threads) {
-      thread.join();
     }
     if (failure_) {
       std::rethrow_exception(failure_);
@@ -250,6 +246,39 @@ class Pass {
   const MatrixXd& sum() const { return sum_; } /* [q × q] lower triangle */
 
  private:
+  /* The threads, ended with it: a thread that is destroyed while it runs ends the program. */
+  class Team {
+   public:
+    explicit Team(Pass* pass) : pass_(pass) {
+      try {
+        for (std::size_t k = 0; k < pass_->threads_; ++k) {
+          threads_.emplace_back([pass] { pass->work(); });
+        }
+      } catch (...) { /* the system gives no more: fewer do the same */
+        if (threads_.empty()) {
+          throw;
+        }
+        const std::lock_guard<std::mutex> lock(pass_->mutex_);
+        pass_->threads_ = threads_.size();
+      }
+    }
+    ~Team() {
+      {
+        const std::lock_guard<std::mutex> lock(pass_->mutex_);
+        pass_->stopped_ = pass_->stopped_ || pass_->ended_ < pass_->threads_;
+      }
+      for (std::thread& thread : threads_) {
+        thread.join();
+      }
+    }
+    Team(const Team&) = delete;
+    Team& operator=(const Team&) = delete;
+
+   private:
+    Pass* pass_;
+    std::vector<std::thread> threads_;
+  };
+
   void work() {
     try {
       Worker worker(problem_, numbers_);

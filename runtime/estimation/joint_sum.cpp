@@ -45,6 +45,7 @@ void BlockRows::filter(double gain, double weight, std::size_t at) {
       held[c] += gain * innovation;
       now[c] = 0.0;
     }
+    stored_ = at + 1;
     return;
   }
   for (std::size_t c = 0; c < count; ++c) {
@@ -66,16 +67,14 @@ void BlockRows::take_off_mean(const double* decay, double squares, std::size_t c
   }
 }
 
-void BlockRows::clear(std::size_t count) {
-  for (std::size_t i = 0; i < count; ++i) {
-    std::fill_n(rows_.begin() + static_cast<std::ptrdiff_t>(i * stride_), active_.size(), 0.0);
-  }
+void BlockRows::clear() {
   std::fill_n(held_.begin(), active_.size(), 0.0);
   std::fill_n(row_.begin(), active_.size(), 0.0);
   for (const std::size_t column : active_) {
     local_[column] = -1;
   }
   active_.clear();
+  stored_ = 0;
 }
 
 JointSum::JointSum(std::size_t columns)
@@ -94,7 +93,7 @@ void JointSum::begin_segment() {
   }
   kept_ = block_kept_ = 1.0;
   squares_ = block_squares_ = 0.0;
-  rows.clear(used_);
+  rows.clear();
   used_ = dense_count_ = 0;
   rows.add(residual, 0.0); /* always the first of the active ones */
 }
@@ -155,7 +154,7 @@ void JointSum::end_block(Eigen::MatrixXd* sum) {
     held_[rows.active()[k]] += rows.held(k);
   }
   kept_ *= block_kept_;
-  rows.clear(used_);
+  rows.clear();
   used_ = 0;
   block_kept_ = 1.0;
   block_squares_ = 0.0;

@@ -40,7 +40,7 @@ class BlockRows {
 
   /* mean = Σ decay_i·row_i / squares over `count` rows; takes decay_i·mean off each */
   void take_off_mean(const double* decay, double squares, std::size_t count);
-  void clear(std::size_t count);
+  void clear();
 
   const std::vector<std::size_t>& active() const { return active_; }
   const double* row(std::size_t at) const { return rows_.data() + at * stride_; }
@@ -51,8 +51,12 @@ class BlockRows {
  private:
   std::size_t activate(std::size_t column) {
     if (local_[column] < 0) {
-      local_[column] = static_cast<std::int32_t>(active_.size());
+      const std::size_t at = active_.size();
+      local_[column] = static_cast<std::int32_t>(at);
       active_.push_back(column);
+      for (std::size_t i = 0; i < stored_; ++i) { /* the rows before have nothing in it */
+        rows_[i * stride_ + at] = 0.0;
+      }
     }
     return static_cast<std::size_t>(local_[column]);
   }
@@ -65,7 +69,7 @@ class BlockRows {
     return static_cast<std::size_t>(local_[first]);
   }
 
-  std::size_t stride_;
+  std::size_t stride_, stored_ = 0; /* rows of the block */
   std::vector<std::int32_t> local_; /* place of a column among the active ones, −1 */
   std::vector<std::size_t> active_;
   std::vector<double> rows_, row_, held_, mean_;
@@ -85,6 +89,7 @@ class JointSum {
   BlockRows rows; /* they are given here, sample by sample */
 
   void filter(double gain, double weight);
+  bool full() const { return used_ == block_length; } /* the block must be ended */
   void begin_segment();
   /* adds the rows of the block to sum [q × q], lower triangle */
   void end_block(Eigen::MatrixXd* sum);

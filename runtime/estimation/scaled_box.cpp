@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <cmath>
 
 namespace tendonfmu::estimation {
 
@@ -47,75 +48,155 @@ std::vector<double> ScaledBox::unknowns(const VectorXd& x) const {
 
 namespace {
 
-constexpr int most_rounds = 60, last_release = 30; /* of the active set; releases end, so that it ends */
+constexpr int most_rounds = 40;         /* of whole sets; most end after a few */
+constexpr int most_single_rounds = 500; /* of one unknown each */
+
+/* of h; where a combination that nothing shows leaves it singular, of one a rounding larger */
+Eigen::LLT<MatrixXd> factored(MatrixXd h) {
+  Eigen::LLT<MatrixXd> factor(h);
+  double more = 1e-14 * h.diagonal().cwiseAbs().maxCoeff();
+  for (int k = 0; factor.info() != Eigen::Success && k < 12; ++k, more *= 10.0) {
+    h.diagonal().array() += more > 0.0 ? more : 1.0;
+    factor.compute(h);
+  }
+  return factor;
+}
 
 struct ActiveSet {
   const MatrixXd& h;
   const VectorXd &g, &x;
   const ScaledBox& box;
   VectorXd step;
-  std::vector<bool> held;
+  std::vector<int> side; /* at which an unknown is held: −1 lower, 1 upper; 0 free */
 
-  bool at_lower(Index k) const { return x[k] + step[k] <= box.lower[k]; }
-  bool at_upper(Index k) const { return x[k] + step[k] >= box.upper[k]; }
-  bool is_held(Index k) const { return held[static_cast<std::size_t>(k)]; }
-  void hold(Index k, bool value) { held[static_cast<std::size_t>(k)] = value; }
-
-  /* moves those that are not held to their best; false: some would leave the box, and are held at its side */
-  bool move_free() {
-    std::vector<Index> free, fixed;
+  ActiveSet(const MatrixXd& h_, const VectorXd& g_, const VectorXd& x_, const ScaledBox& box_)
+      : h(h_), g(g_), x(x_), box(box_), step(VectorXd::Zero(x_.size())), side(static_cast<std::size_t>(x_.size())) {
     for (Index k = 0; k < x.size(); ++k) {
-      (is_held(k) ? fixed : free).push_back(k);
+      if ((x[k] <= box.lower[k] && g[k] > 0.0) || !(box.lower[k] < box.upper[k])) {
+        held(k) = -1;
+      } else if (x[k] >= box.upper[k] && g[k] < 0.0) {
+        held(k) = 1;
+      }
     }
-    if (free.empty()) {
-      return true;
+  }
+
+  int& held(Index k) { return side[static_cast<std::size_t>(k)]; }
+
+  double value() const { return g.dot(step) + 0.5 * step.dot(h * step); }
+
+  /* how those that are not held move to their best with the others where they are */
+  VectorXd move(std::vector<Index>* free) {
+    for (Index k = 0; k < x.size(); ++k) {
+      if (held(k) == 0) {
+        free->push_back(k);
+      }
     }
-    VectorXd pull = g(free);
-    if (!fixed.empty()) {
-      pull += h(free, fixed) * step(fixed);
-    }
-    const VectorXd move = h(free, free).llt().solve(-pull);
+    const VectorXd pull = g + h * step;
+    return free->empty() ? VectorXd() : VectorXd(factored(h(*free, *free)).solve(-pull(*free)));
+  }
+
+  /* moves the free ones; false: some would leave the box, and all of them are held at its side */
+  bool move_all() {
+    std::vector<Index> free;
+    const VectorXd by = move(&free);
     bool inside = true;
     for (std::size_t k = 0; k < free.size(); ++k) {
       const Index at = free[k];
-      const double to = x[at] + move[static_cast<Index>(k)];
-      const double clipped = std::min(std::max(to, box.lower[at]), box.upper[at]);
-      step[at] = clipped == to ? move[static_cast<Index>(k)] : clipped - x[at];
-      if (clipped != to) {
-        hold(at, true);
+      const double to = x[at] + step[at] + by[static_cast<Index>(k)];
+      if (to < box.lower[at] || to > box.upper[at]) {
+        held(at) = to < box.lower[at] ? -1 : 1;
+        step[at] = (to < box.lower[at] ? box.lower[at] : box.upper[at]) - x[at];
         inside = false;
+      } else {
+        step[at] += by[static_cast<Index>(k)];
       }
     }
     return inside;
   }
 
-  /* lets go what is pulled inwards; true: something was */
-  bool release() {
-    const VectorXd pull = g + h * step;
-    bool released = false;
-    for (Index k = 0; k < x.size(); ++k) {
-      const bool inwards = (at_lower(k) && pull[k] < -1e-12) || (at_upper(k) && pull[k] > 1e-12);
-      if (is_held(k) && inwards && box.lower[k] < box.upper[k]) {
-        hold(k, false);
-        released = true;
+  /* moves the free ones until the first meets its side, and holds that one; false: one did */
+  bool move_to_first() {
+    std::vector<Index> free;
+    const VectorXd by = move(&free);
+    double share = 1.0;
+    Index first = -1;
+    for (std::size_t k = 0; k < free.size(); ++k) {
+      const Index at = free[k];
+      const double way = by[static_cast<Index>(k)];
+      const double room = (way < 0.0 ? box.lower[at] : box.upper[at]) - x[at] - step[at];
+      if (std::fabs(way) * share > std::fabs(room)) {
+        share = std::fabs(room / way);
+        first = at;
       }
     }
+    for (std::size_t k = 0; k < free.size(); ++k) {
+      const double way = by[static_cast<Index>(k)];
+      step[free[k]] += share * way;
+      if (free[k] == first) {
+        held(first) = way < 0.0 ? -1 : 1;
+        step[first] = (way < 0.0 ? box.lower[first] : box.upper[first]) - x[first];
+      }
+    }
+    return first < 0;
+  }
+
+  /* lets go what is pulled inwards, all of it or only the one that gains the most; true: something was */
+  bool release(bool all) {
+    const VectorXd pull = g + h * step;
+    Index best = -1;
+    double most = 0.0;
+    bool released = false;
+    for (Index k = 0; k < x.size(); ++k) {
+      const double inwards = held(k) * pull[k], gain = inwards * inwards / std::max(h(k, k), 1e-300);
+      if (inwards > 1e-12 && box.lower[k] < box.upper[k]) {
+        released = true;
+        if (all) {
+          held(k) = 0;
+        } else if (gain > most) {
+          most = gain;
+          best = k;
+        }
+      }
+    }
+    if (best >= 0) {
+      held(best) = 0;
+    }
     return released;
+  }
+
+  /* whole sets at a time: fast, and may go round in circles. False: it does. */
+  bool settle_quickly() {
+    for (int round = 0; round < most_rounds; ++round) {
+      if (move_all() && !release(true)) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  /* one at a time: no move goes uphill, so that it ends */
+  void settle_surely() {
+    for (int round = 0; round < most_single_rounds; ++round) {
+      if (move_to_first() && !release(false)) {
+        return;
+      }
+    }
   }
 };
 
 }  // namespace
 
 VectorXd boxed_step(const MatrixXd& h, const VectorXd& g, const VectorXd& x, const ScaledBox& box) {
-  ActiveSet set{h, g, x, box, VectorXd::Zero(x.size()), std::vector<bool>(static_cast<std::size_t>(x.size()))};
-  for (Index k = 0; k < x.size(); ++k) {
-    set.hold(k, (set.at_lower(k) && g[k] > 0.0) || (set.at_upper(k) && g[k] < 0.0) || !(box.lower[k] < box.upper[k]));
+  ActiveSet set(h, g, x, box);
+  if (set.settle_quickly()) {
+    return set.step;
   }
-  for (int round = 0; round < most_rounds; ++round) {
-    if (set.move_free() && (round >= last_release || !set.release())) {
-      break;
-    }
+  if (!(set.value() < 0.0)) { /* worse than not to move */
+    ActiveSet anew(h, g, x, box);
+    anew.settle_surely();
+    return anew.step;
   }
+  set.settle_surely();
   return set.step;
 }
 

@@ -321,6 +321,10 @@ tendonfmu_status tendonfmu_estimator_fit(tendonfmu_estimator* estimator, const d
     std::vector<double> begin;
     for (std::size_t k = 0; k < problem.unknowns.count(); ++k) {
       begin.push_back(start ? start[k] : problem.unknowns[k].start);
+      if (std::isnan(begin[k])) {
+        throw refused("unknown " + std::to_string(k) + " (" + problem.unknowns[k].path +
+                      ") = nan: expected a finite number");
+      }
     }
     BatchWatch look;
     if (watch) {

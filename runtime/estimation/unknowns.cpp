@@ -331,7 +331,8 @@ void Unknowns::find_run(std::uint32_t first) {
   if (side.column[2] >= 0) {
     side.index = static_cast<std::int32_t>(rates_.size());
     rates_.push_back({side.column[2], side.column[1]});
-    fixed_drops_.push_back(start_[first] - start_[first + 1]);
+    const bool tied = side.static_follows && side.column[1] < 0;
+    fixed_drops_.push_back(tied ? 0.0 : start_[first] - start_[first + 1]);
   }
 }
 
