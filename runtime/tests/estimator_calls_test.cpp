@@ -1,0 +1,425 @@
+// tendonfmu_estimation.h: what its calls give, on fingers whose truth is known, and what they refuse.
+#include <algorithm>
+#include <limits>
+
+#include "made_recording.h"
+
+namespace {
+
+using made::Json;
+using made::Numbers;
+using Groups = std::vector<std::int32_t>;
+
+const double nan = std::numeric_limits<double>::quiet_NaN();
+
+/* An estimator, destroyed with it. */
+class Estimator {
+ public:
+  explicit Estimator(const Json& description, const Groups* group = nullptr) {
+    const std::vector<unsigned char> image = made::image_of(description);
+    char message[400] = "";
+    handle_ = tendonfmu_estimator_create(image.data(), image.size(), group ? group->data() : nullptr, nullptr, message,
+                                         sizeof message);
+    EXPECT_NE(handle_, nullptr) << message;
+  }
+  ~Estimator() { tendonfmu_estimator_destroy(handle_); }
+  Estimator(const Estimator&) = delete;
+  Estimator& operator=(const Estimator&) = delete;
+
+  tendonfmu_estimator* get() const { return handle_; }
+  std::string error() const { return tendonfmu_estimator_last_error(handle_); }
+  std::size_t unknowns() const { return tendonfmu_estimator_unknown_count(handle_); }
+  std::size_t parameters() const { return tendonfmu_estimator_parameter_count(handle_); }
+  tendonfmu_unknown unknown(std::size_t index) const {
+    tendonfmu_unknown found = {};
+    EXPECT_EQ(tendonfmu_estimator_get_unknown(handle_, index, &found), TENDONFMU_OK);
+    return found;
+  }
+  Numbers start() const {
+    Numbers z;
+    for (std::size_t k = 0; k < unknowns(); ++k) {
+      z.push_back(unknown(k).start);
+    }
+    return z;
+  }
+  tendonfmu_status add(const made::Recording& r, const tendonfmu_inputs& inputs) const {
+    return tendonfmu_estimator_add_recording(handle_, r.samples, r.time.data(), &inputs, TENDONFMU_JOINT_VELOCITIES,
+                                             r.load(), r.use.data(), nullptr);
+  }
+  tendonfmu_status add(const made::Recording& r) const { return add(r, r.inputs()); }
+
+  double cost(const Numbers& z, Numbers* gradient = nullptr, Numbers* information = nullptr, unsigned threads = 1) {
+    double found = nan;
+    if (gradient) {
+      gradient->assign(unknowns(), nan);
+    }
+    if (information) {
+      information->assign(unknowns() * unknowns(), nan);
+    }
+    EXPECT_EQ(tendonfmu_estimator_evaluate(handle_, z.data(), 1, threads, &found, gradient ? gradient->data() : nullptr,
+                                           information ? information->data() : nullptr),
+              TENDONFMU_OK)
+        << error();
+    return found;
+  }
+
+ private:
+  tendonfmu_estimator* handle_;
+};
+
+/* What a fit leaves. */
+struct Fit {
+  Numbers z, gradient, information, covariance;
+  tendonfmu_fit_result result;
+  tendonfmu_status status;
+
+  Fit(const Estimator& e, const tendonfmu_fit_options& options, const double* start = nullptr,
+      tendonfmu_fit_watch watch = nullptr, void* context = nullptr)
+      : z(e.unknowns(), nan),
+        gradient(z),
+        information(z.size() * z.size(), nan),
+        covariance(information),
+        result{z.data(), gradient.data(), information.data(), covariance.data(), nan, nan, 0, 0, 0, 0},
+        status(tendonfmu_estimator_fit(e.get(), start, &options, watch, context, &result)) {}
+};
+
+/* the truth, a guess 20 % off, and what the truth does */
+struct Case {
+  explicit Case(unsigned seed, std::size_t samples, const Json& description = made::learnable_finger())
+      : truth(description), recording(made::made(truth, samples, 0.004, seed)) {
+    std::mt19937_64 random(seed);
+    guess = made::disturbed(truth, 0.2, &random);
+  }
+
+  Json truth, guess;
+  made::Recording recording;
+};
+
+Json with_initial_torque() {
+  Json finger = made::learnable_finger();
+  finger["bias"]["initial_torque"] = {0.1, -0.2};
+  return finger;
+}
+
+/* --- what the calls give --------------------------------------------------------------------------------------------
+ */
+
+/* cost and information from the innovations, and the gradient from differences of the cost; with a bias that starts
+ * late, one that is given, samples held out, and two recordings of several segments */
+TEST(Estimator, CostGradientAndInformationAreThoseOfTheInnovations) {
+  for (const Json& description : {made::learnable_finger(), with_initial_torque()}) {
+    Case c(21, 2300, description);
+    std::fill_n(c.recording.use.begin(), 40, 0);
+    std::fill_n(c.recording.use.begin() + 900, 300, 0);
+    Estimator e(c.guess);
+    ASSERT_EQ(e.add(c.recording), TENDONFMU_OK) << e.error();
+    const Numbers z = e.start();
+    const std::size_t u = z.size(), n = 2, samples = c.recording.samples;
+    Numbers gradient, information, s(samples);
+    const double cost = e.cost(z, &gradient, &information);
+    const auto innovations = [&](const Numbers& at) {
+      Numbers scaled(samples * n);
+      EXPECT_EQ(tendonfmu_estimator_innovations(e.get(), 0, at.data(), scaled.data(), s.data(), nullptr), TENDONFMU_OK);
+      for (std::size_t k = 0; k < scaled.size(); ++k) {
+        scaled[k] = std::isnan(s[k / n]) ? 0.0 : scaled[k] / std::sqrt(s[k / n]);
+      }
+      return scaled;
+    };
+    const Numbers here = innovations(z);
+    double sum = 0.0;
+    for (const double e2 : here) {
+      sum += 0.5 * e2 * e2;
+    }
+    EXPECT_NEAR(cost, sum, 1e-10 * sum);
+    std::vector<Numbers> slope(u);
+    for (std::size_t k = 0; k < u; ++k) {
+      Numbers low = z, high = z;
+      const double step = 1e-4 * e.unknown(k).scale;
+      low[k] -= step;
+      high[k] += step;
+      slope[k] = innovations(high);
+      const Numbers below = innovations(low);
+      for (std::size_t at = 0; at < below.size(); ++at) {
+        slope[k][at] = (slope[k][at] - below[at]) / (2.0 * step);
+      }
+    }
+    for (std::size_t a = 0; a < u; ++a) {
+      double by = 0.0;
+      for (std::size_t at = 0; at < here.size(); ++at) {
+        by += slope[a][at] * here[at];
+      }
+      const double size = std::sqrt(information[a * u + a]);
+      EXPECT_NEAR(gradient[a], by, 1e-5 * size * std::sqrt(2.0 * cost)) << e.unknown(a).path;
+      for (std::size_t b = 0; b < u; ++b) {
+        double product = 0.0;
+        for (std::size_t at = 0; at < here.size(); ++at) {
+          product += slope[a][at] * slope[b][at];
+        }
+        EXPECT_NEAR(information[a * u + b], product, 1e-5 * size * std::sqrt(information[b * u + b]));
+      }
+    }
+  }
+}
+
+TEST(Estimator, EvaluationHasTheSameBitsWithAnyNumberOfThreads) {
+  const Case c(22, 5000), d(23, 2100);
+  Estimator e(c.guess);
+  ASSERT_EQ(e.add(c.recording), TENDONFMU_OK) << e.error();
+  ASSERT_EQ(e.add(d.recording), TENDONFMU_OK) << e.error();
+  Numbers gradient, information, other_gradient, other_information;
+  const double cost = e.cost(e.start(), &gradient, &information, 1);
+  for (const unsigned threads : {2u, 3u, 64u}) {
+    EXPECT_EQ(e.cost(e.start(), &other_gradient, &other_information, threads), cost);
+    EXPECT_EQ(gradient, other_gradient);
+    EXPECT_EQ(information, other_information);
+  }
+}
+
+TEST(Estimator, JacobianIsTheDerivativeOfTorqueAndJumps) {
+  const Case c(24, 2300);
+  const Estimator e(c.guess);
+  ASSERT_EQ(e.add(c.recording), TENDONFMU_OK) << e.error();
+  const Numbers z = e.start();
+  const std::size_t u = z.size(), first = 1900, count = 400, rows = count * 2; /* across two segments */
+  Numbers torque(rows), jump(rows), by_torque(rows * u), by_jump(rows * u);
+  ASSERT_EQ(tendonfmu_estimator_jacobian(e.get(), 0, z.data(), first, count, torque.data(), jump.data(),
+                                         by_torque.data(), by_jump.data()),
+            TENDONFMU_OK)
+      << e.error();
+  EXPECT_GT(*std::max_element(jump.begin(), jump.end()), 0.0) << "nothing came to rest: not a test of jumps";
+  for (std::size_t k = 0; k < u; ++k) {
+    Numbers at[2] = {z, z}, t[2], b[2];
+    const double step = 1e-4 * e.unknown(k).scale;
+    for (int side = 0; side < 2; ++side) {
+      at[side][k] += side ? step : -step;
+      t[side].resize(rows);
+      b[side].resize(rows);
+      tendonfmu_estimator_jacobian(e.get(), 0, at[side].data(), first, count, t[side].data(), b[side].data(), nullptr,
+                                   nullptr);
+    }
+    for (std::size_t row = 0; row < rows; ++row) {
+      const double scale = e.unknown(k).scale;
+      ASSERT_NEAR(scale * by_torque[row * u + k], scale * (t[1][row] - t[0][row]) / (2.0 * step), 1e-8) << row;
+      ASSERT_NEAR(scale * by_jump[row * u + k], scale * (b[1][row] - b[0][row]) / (2.0 * step), 1e-8) << row;
+    }
+  }
+}
+
+TEST(Estimator, FitFindsTheTruthToWithinItsErrors) {
+  const Case c(25, 8000);
+  Estimator e(c.guess), knows(c.truth);
+  ASSERT_EQ(e.add(c.recording), TENDONFMU_OK) << e.error();
+  tendonfmu_fit_options options = tendonfmu_default_fit_options();
+  options.prior_std = 3.0;
+  options.tolerance = 0.01;
+  const Fit fit(e, options);
+  ASSERT_EQ(fit.status, TENDONFMU_OK) << e.error();
+  EXPECT_TRUE(fit.result.converged);
+  EXPECT_FALSE(fit.result.stopped);
+  const Numbers truth = knows.start();
+  const std::size_t u = truth.size();
+  double squares = 0.0;
+  for (std::size_t k = 0; k < u; ++k) {
+    const double error = std::sqrt(fit.covariance[k * u + k]);
+    EXPECT_LT(std::fabs(fit.z[k] - truth[k]), 5.0 * error) << e.unknown(k).path;
+    EXPECT_GE(fit.z[k], e.unknown(k).lower);
+    EXPECT_LE(fit.z[k], e.unknown(k).upper);
+    squares += (fit.z[k] - truth[k]) * (fit.z[k] - truth[k]) / (error * error) / static_cast<double>(u);
+  }
+  EXPECT_LT(squares, 2.5);
+  Numbers gradient;
+  EXPECT_DOUBLE_EQ(e.cost(fit.z, &gradient) + fit.result.prior_cost, fit.result.cost);
+  EXPECT_EQ(gradient, fit.gradient);
+  EXPECT_LT(e.cost(fit.z), e.cost(truth) + 1e-6 * fit.result.cost) << "the truth explains what is seen less well";
+}
+
+/* ends at a point, wherever it begins; without a prior it does not need one */
+TEST(Estimator, FitWithoutPriorGoesOnWhereSomethingNeverMoves) {
+  Case c(26, 4000);
+  for (std::size_t k = 0; k < c.recording.samples; ++k) { /* the last joint rests */
+    c.recording.angle[2 * k + 1] = 0.1;
+    c.recording.velocity[2 * k + 1] = 0.0;
+  }
+  made::explain(c.truth, &c.recording, 5);
+  const Estimator e(c.guess);
+  ASSERT_EQ(e.add(c.recording), TENDONFMU_OK) << e.error();
+  tendonfmu_fit_options options = tendonfmu_default_fit_options();
+  options.prior_std = std::numeric_limits<double>::infinity();
+  const Fit fit(e, options);
+  ASSERT_EQ(fit.status, TENDONFMU_OK) << e.error();
+  EXPECT_TRUE(fit.result.converged);
+  EXPECT_EQ(fit.result.prior_cost, 0.0);
+  EXPECT_LT(fit.result.cost, 0.5 * static_cast<double>(2 * c.recording.samples) * 1.1);
+  for (std::size_t k = 0; k < fit.z.size(); ++k) {
+    EXPECT_TRUE(std::isfinite(fit.z[k])) << e.unknown(k).path;
+    if (fit.information[k * fit.z.size() + k] == 0.0) {
+      EXPECT_DOUBLE_EQ(fit.z[k], e.unknown(k).start) << "nothing speaks about " << e.unknown(k).path;
+    }
+  }
+}
+
+struct Stopper {
+  std::size_t after, asked = 0;
+  std::size_t most_stride = 0;
+  static int look(void* context, const tendonfmu_fit_progress* p) {
+    auto* s = static_cast<Stopper*>(context);
+    s->most_stride = std::max(s->most_stride, p->stride);
+    return ++s->asked <= s->after;
+  }
+};
+
+TEST(Estimator, AStoppedFitGivesTheBestSoFar) {
+  const Case c(27, 4200);
+  const Estimator e(c.guess);
+  ASSERT_EQ(e.add(c.recording), TENDONFMU_OK) << e.error();
+  tendonfmu_fit_options options = tendonfmu_default_fit_options();
+  Stopper at_once{0};
+  const Fit nothing(e, options, nullptr, &Stopper::look, &at_once);
+  ASSERT_EQ(nothing.status, TENDONFMU_OK);
+  EXPECT_TRUE(nothing.result.stopped);
+  EXPECT_EQ(nothing.result.passes, 0u);
+  EXPECT_EQ(nothing.z, e.start());
+  options.stride = 4; /* coarse passes first; a second thought before every pass: stop when the fine ones begin */
+  std::size_t coarse = 0;
+  for (std::size_t after = 1; after < 60; ++after) {
+    Stopper later{after};
+    const Fit some(e, options, nullptr, &Stopper::look, &later);
+    ASSERT_EQ(some.status, TENDONFMU_OK);
+    if (!some.result.stopped) {
+      EXPECT_TRUE(some.result.converged);
+      break;
+    }
+    EXPECT_FALSE(some.result.converged);
+    if (some.result.passes > 0) {
+      EXPECT_TRUE(std::isfinite(some.result.cost)) << "stopped after " << some.result.passes << " passes";
+      EXPECT_TRUE(std::isfinite(some.gradient[0] + some.information[0] + some.covariance[0]));
+    }
+    coarse += later.most_stride == 4;
+  }
+  EXPECT_GT(coarse, 0u);
+}
+
+/* --- what they refuse -----------------------------------------------------------------------------------------------
+ */
+
+TEST(Estimator, NothingToEstimateIsRefusedByTheFitAlone) {
+  const Case c(28, 300);
+  const Estimator counted(c.truth);
+  const Groups fixed(counted.parameters(), -1);
+  Estimator e(c.truth, &fixed);
+  EXPECT_EQ(e.unknowns(), 0u);
+  ASSERT_EQ(e.add(c.recording), TENDONFMU_OK) << e.error();
+  const Numbers z(1, nan); /* nothing of it is read */
+  EXPECT_GT(e.cost(z), 0.0);
+  Numbers torque(600);
+  EXPECT_EQ(tendonfmu_estimator_jacobian(e.get(), 0, z.data(), 0, 300, torque.data(), nullptr, nullptr, nullptr),
+            TENDONFMU_OK);
+  double nothing = nan;
+  tendonfmu_fit_result result = {&nothing, nullptr, nullptr, nullptr, 0.0, 0.0, 0, 0, 0, 0};
+  const tendonfmu_fit_options options = tendonfmu_default_fit_options();
+  EXPECT_EQ(tendonfmu_estimator_fit(e.get(), nullptr, &options, nullptr, nullptr, &result), TENDONFMU_BAD_ARGUMENT);
+  EXPECT_EQ(e.error(), "nothing to estimate: expected at least one number that is not fixed");
+}
+
+TEST(Estimator, RefusesRecordingsItCannotWeigh) {
+  const Case c(29, 50);
+  const Estimator e(c.truth);
+  const auto why = [&](made::Recording r) {
+    EXPECT_EQ(e.add(r), TENDONFMU_BAD_SAMPLE);
+    return e.error();
+  };
+  made::Recording r = c.recording;
+  r.samples = 1;
+  EXPECT_EQ(why(r), "1 samples: expected at least 2");
+  r = c.recording;
+  std::fill(r.use.begin() + 1, r.use.end(), 0);
+  EXPECT_EQ(why(r), "1 samples to learn from: expected at least 2");
+  r = c.recording;
+  r.external[2 * 30 + 1] = nan;
+  EXPECT_EQ(why(r), "row 31: external_torque[2]: expected a finite number, N.m");
+  r = c.recording;
+  r.time[20] = r.time[19];
+  EXPECT_EQ(why(r).find("row 21: time"), 0u);
+  r = c.recording;
+  r.force[2 * 10] = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(why(r).find("row 11: "), 0u);
+  tendonfmu_inputs none = c.recording.inputs();
+  none.tendon_force = nullptr;
+  EXPECT_EQ(e.add(c.recording, none), TENDONFMU_BAD_SAMPLE);
+  Json silent = c.truth;
+  silent["bias"]["noise_std"] = 0.0;
+  const Estimator certain(silent);
+  EXPECT_EQ(certain.add(c.recording), TENDONFMU_BAD_SAMPLE);
+  EXPECT_EQ(certain.error().find("bias.noise_std = 0: expected above 0"), 0u);
+  double cost;
+  EXPECT_EQ(tendonfmu_estimator_evaluate(e.get(), e.start().data(), 1, 1, &cost, nullptr, nullptr),
+            TENDONFMU_BAD_ARGUMENT);
+  EXPECT_EQ(e.error(), "no recording: expected at least one") << "none of the refused ones stayed";
+  EXPECT_EQ(e.add(c.recording), TENDONFMU_OK) << e.error();
+}
+
+TEST(Estimator, RefusesUnknownsOutsideTheirBoxes) {
+  const Case c(30, 50);
+  const Estimator e(c.truth);
+  ASSERT_EQ(e.add(c.recording), TENDONFMU_OK) << e.error();
+  Numbers values(e.parameters());
+  for (const double wrong : {nan, -1.0, 1e12}) {
+    Numbers z = e.start();
+    z[1] = wrong;
+    EXPECT_EQ(tendonfmu_estimator_get_values(e.get(), z.data(), values.data()), TENDONFMU_BAD_PARAMETER);
+    EXPECT_EQ(e.error().find("unknown 1 (" + std::string(e.unknown(1).path) + ") = "), 0u) << e.error();
+  }
+  Numbers z = e.start();
+  z[2] = nan;
+  const tendonfmu_fit_options options = tendonfmu_default_fit_options();
+  const Fit fit(e, options, z.data());
+  EXPECT_EQ(fit.status, TENDONFMU_BAD_ARGUMENT);
+  EXPECT_EQ(e.error().find("unknown 2 (" + std::string(e.unknown(2).path) + ") = nan"), 0u) << e.error();
+  tendonfmu_fit_options odd = options;
+  odd.prior_std = 0.0;
+  EXPECT_EQ(Fit(e, odd).status, TENDONFMU_BAD_ARGUMENT);
+  EXPECT_EQ(e.error().find("prior_std = 0"), 0u);
+}
+
+TEST(Estimator, RefusesNumbersOfWhatIsNotThere) {
+  const Case c(31, 50);
+  const Estimator e(c.truth);
+  ASSERT_EQ(e.add(c.recording), TENDONFMU_OK) << e.error();
+  const Numbers z = e.start();
+  tendonfmu_unknown unknown;
+  EXPECT_EQ(tendonfmu_estimator_get_unknown(e.get(), z.size(), &unknown), TENDONFMU_BAD_ARGUMENT);
+  EXPECT_EQ(tendonfmu_estimator_innovations(e.get(), 1, z.data(), nullptr, nullptr, nullptr), TENDONFMU_BAD_ARGUMENT);
+  EXPECT_EQ(e.error(), "recording 1: expected below 1");
+  EXPECT_EQ(tendonfmu_estimator_jacobian(e.get(), 0, z.data(), 40, 11, nullptr, nullptr, nullptr, nullptr),
+            TENDONFMU_BAD_ARGUMENT);
+  EXPECT_EQ(tendonfmu_estimator_jacobian(e.get(), 0, z.data(), 2, SIZE_MAX, nullptr, nullptr, nullptr, nullptr),
+            TENDONFMU_BAD_ARGUMENT);
+  EXPECT_EQ(tendonfmu_estimator_jacobian(e.get(), 0, z.data(), 50, 0, nullptr, nullptr, nullptr, nullptr),
+            TENDONFMU_OK);
+}
+
+TEST(Estimator, RefusesNullAndBadImages) {
+  char message[200] = "";
+  EXPECT_EQ(tendonfmu_estimator_create(nullptr, 0, nullptr, nullptr, message, sizeof message), nullptr);
+  EXPECT_STREQ(message, "an argument is missing: NULL");
+  EXPECT_EQ(tendonfmu_estimator_create("nonsense", 8, nullptr, nullptr, message, sizeof message), nullptr);
+  EXPECT_STRNE(message, "");
+  EXPECT_EQ(tendonfmu_estimator_create("nonsense", 8, nullptr, nullptr, nullptr, 0), nullptr);
+  tendonfmu_estimator_destroy(nullptr);
+  EXPECT_EQ(tendonfmu_estimator_unknown_count(nullptr), 0u);
+  EXPECT_STREQ(tendonfmu_estimator_last_error(nullptr), "no estimator: NULL");
+  const Estimator e(made::learnable_finger());
+  const tendonfmu_fit_options options = tendonfmu_default_fit_options();
+  tendonfmu_fit_result result = {};
+  EXPECT_EQ(tendonfmu_estimator_get_unknown(e.get(), 0, nullptr), TENDONFMU_BAD_ARGUMENT);
+  EXPECT_EQ(tendonfmu_estimator_get_values(e.get(), nullptr, nullptr), TENDONFMU_BAD_ARGUMENT);
+  EXPECT_EQ(tendonfmu_estimator_get_unknowns(e.get(), nullptr, nullptr), TENDONFMU_BAD_ARGUMENT);
+  EXPECT_EQ(tendonfmu_estimator_add_recording(e.get(), 2, nullptr, nullptr, 1, nullptr, nullptr, nullptr),
+            TENDONFMU_BAD_ARGUMENT);
+  EXPECT_EQ(tendonfmu_estimator_evaluate(e.get(), nullptr, 1, 1, nullptr, nullptr, nullptr), TENDONFMU_BAD_ARGUMENT);
+  EXPECT_EQ(tendonfmu_estimator_fit(e.get(), nullptr, &options, nullptr, nullptr, &result), TENDONFMU_BAD_ARGUMENT);
+  EXPECT_EQ(e.error(), "an argument is missing: NULL");
+  EXPECT_EQ(tendonfmu_estimator_fit(nullptr, nullptr, &options, nullptr, nullptr, &result), TENDONFMU_BAD_ARGUMENT);
+}
+
+}  // namespace

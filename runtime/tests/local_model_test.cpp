@@ -1,0 +1,290 @@
+// local_model.h against the cost itself at points nearby, and boxed_step against all of its active sets.
+#include "local_model.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "made_recording.h"
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using made::Json;
+using tendonfmu::estimation::boxed_step;
+using tendonfmu::estimation::evaluate;
+using tendonfmu::estimation::Evaluation;
+using tendonfmu::estimation::LocalModel;
+using tendonfmu::estimation::Problem;
+using tendonfmu::estimation::Role;
+using tendonfmu::estimation::ScaledBox;
+using Groups = std::vector<std::int32_t>;
+
+/* --- the model of the cost ------------------------------------------------------------------------------------------
+ */
+
+/* A finger that expects other numbers than those that made its recording, and its cost around x. */
+class Case {
+ public:
+  explicit Case(const Groups* group = nullptr, double prior = 0.0)
+      : truth_(made::learnable_finger()),
+        image_(made::image_of(guess())),
+        problem_(image_.data(), image_.size(), group ? group->data() : nullptr, nullptr),
+        box_(problem_.unknowns),
+        prior_(prior) {
+    made::Recording r = made::made(truth_, 2500, 0.004, 7);
+    problem_.recordings.emplace_back(
+        &problem_.finger, tendonfmu::estimation::RecordingArrays{r.samples, r.time.data(), r.inputs(), r.load(),
+                                                                 nullptr, TENDONFMU_JOINT_VELOCITIES});
+    x = box_.start;
+    at = pass(x);
+  }
+
+  const Problem& problem() const { return problem_; }
+  const ScaledBox& box() const { return box_; }
+  LocalModel model() const { return {problem_, box_, at, x, prior_}; }
+  Evaluation pass(const VectorXd& where) const { return evaluate(problem_, box_.unknowns(where), {1, 1}, {}); }
+  double cost(const VectorXd& step) const {
+    return pass(x + step).cost + 0.5 * prior_ * (x + step - box_.start).squaredNorm();
+  }
+  double error(const VectorXd& step) const { return std::fabs(model().cost(step) - cost(step)); }
+  std::vector<Index> with(Role role) const {
+    std::vector<Index> found;
+    for (std::size_t k = 0; k < problem_.unknowns.count(); ++k) {
+      if (problem_.unknowns[k].role == role) {
+        found.push_back(static_cast<Index>(k));
+      }
+    }
+    return found;
+  }
+
+  VectorXd x;
+  Evaluation at;
+
+ private:
+  static Json guess() {
+    std::mt19937_64 random(3);
+    return made::disturbed(made::learnable_finger(), 0.3, &random);
+  }
+
+  Json truth_;
+  std::vector<unsigned char> image_;
+  Problem problem_;
+  ScaledBox box_;
+  double prior_;
+};
+
+VectorXd along(const Case& c, Index unknown, double length) {
+  VectorXd step = VectorXd::Zero(c.x.size());
+  step[unknown] = length;
+  return step;
+}
+
+TEST(LocalModel, IsTheCostWhereItStands) {
+  const Case c(nullptr, 0.7);
+  EXPECT_NEAR(c.model().cost(VectorXd::Zero(c.x.size())), c.at.cost, 1e-10 * c.at.cost);
+}
+
+/* e is linear in the friction of a place, and that in all numbers of its law but the rate */
+TEST(LocalModel, IsExactInWhatEntersLinearly) {
+  const Case c(nullptr, 0.7);
+  for (const Role role : {Role::coulomb, Role::drop, Role::viscous, Role::value}) {
+    for (const Index k : c.with(role)) {
+      const double truth = c.cost(along(c, k, 0.4));
+      EXPECT_NEAR(c.model().cost(along(c, k, 0.4)), truth, 1e-9 * truth) << c.problem().unknowns[std::size_t(k)].path;
+    }
+  }
+}
+
+/* Third order in e: what is left falls 16 times when the step is halved. */
+TEST(LocalModel, ErrorFallsWithTheFourthPowerOfAStepInARate) {
+  const Case c;
+  std::size_t judged = 0;
+  for (const Index k : c.with(Role::rate)) {
+    const double whole = c.error(along(c, k, 0.2)), half = c.error(along(c, k, 0.1));
+    if (half > 1e-10 * c.at.cost) { /* above rounding */
+      EXPECT_GT(whole / half, 12.0) << c.problem().unknowns[std::size_t(k)].path;
+      EXPECT_LT(whole / half, 24.0) << c.problem().unknowns[std::size_t(k)].path;
+      ++judged;
+    }
+  }
+  EXPECT_GE(judged, 5u);
+}
+
+/* a rate and the drop in front of it, together; where the fourth power nearly vanishes, the fifth is seen */
+TEST(LocalModel, ErrorFallsSoAlsoWhereTheDropChangesWithTheRate) {
+  const Case c;
+  std::size_t judged = 0;
+  for (std::size_t side = 0; side < c.problem().unknowns.rates().size(); ++side) {
+    const auto [rate, drop] = c.problem().unknowns.rates()[side];
+    const auto error = [&, rate = rate, drop = drop](double length) {
+      return c.error(along(c, rate, length) + along(c, drop, 0.5));
+    };
+    const double whole = error(0.2), half = error(0.1);
+    if (half > 1e-10 * c.at.cost) {
+      EXPECT_GT(whole / half, 12.0) << c.problem().unknowns[static_cast<std::size_t>(rate)].path;
+      ++judged;
+    }
+  }
+  EXPECT_GE(judged, 5u);
+}
+
+/* laws of both joints with one rate; and a drop that is fixed */
+TEST(LocalModel, ErrorFallsSoWhereLawsShareARateOrTheirDropIsFixed) {
+  const Case all;
+  Groups group(all.problem().finger.get()->shape.parameter_count, -1);
+  std::vector<std::uint32_t> rates;
+  for (const Index k : all.with(Role::rate)) {
+    const auto& unknown = all.problem().unknowns[static_cast<std::size_t>(k)];
+    if (unknown.path.find(".friction.stribeck") != std::string::npos) {
+      rates.push_back(unknown.parameters[0]);
+    }
+  }
+  ASSERT_EQ(rates.size(), 2u);
+  for (const std::uint32_t p : rates) {
+    group[p] = 0;
+  }
+  const Case shared(&group);
+  ASSERT_EQ(shared.problem().unknowns.count(), 1u);
+  const double whole = shared.error(along(shared, 0, 0.2)), half = shared.error(along(shared, 0, 0.1));
+  EXPECT_GT(whole / half, 12.0);
+  EXPECT_LT(whole / half, 24.0);
+}
+
+TEST(LocalModel, ItsBestStepStaysInTheBoxAndNothingNearIsBetter) {
+  const Case c(nullptr, 1.0);
+  const LocalModel model = c.model();
+  const ScaledBox around = c.box().around(c.x, 0.8);
+  const VectorXd best = model.best_step(around, 1e-6);
+  const double least = model.cost(best);
+  const double gained = c.at.cost - least;
+  EXPECT_GT(gained, 50.0);
+  EXPECT_NEAR(c.cost(best), least, 0.05 * gained) << "the cost itself falls as the model says";
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal;
+  for (int trial = 0; trial < 300; ++trial) {
+    VectorXd other(c.x.size());
+    const double length = std::pow(10.0, -3.0 + trial % 4);
+    for (Index k = 0; k < other.size(); ++k) {
+      other[k] = best[k] + length * normal(random);
+    }
+    other = around.clip(c.x + other) - c.x;
+    EXPECT_GT(model.cost(other), least - 0.02 * gained);
+  }
+  const VectorXd there = c.x + best;
+  EXPECT_LT((around.clip(there) - there).cwiseAbs().maxCoeff(), 1e-12);
+}
+
+/* --- a step within a box --------------------------------------------------------------------------------------------
+ */
+
+struct Parabola {
+  MatrixXd h;
+  VectorXd g, x;
+  ScaledBox box;
+
+  double at(const VectorXd& d) const { return g.dot(d) + 0.5 * d.dot(h * d); }
+};
+
+/* a box with nothing in it, to be filled */
+ScaledBox empty_box() {
+  static const std::vector<unsigned char> image = made::image_of(made::learnable_finger());
+  const tendonfmu::estimation::FreeFinger finger(image.data(), image.size());
+  return ScaledBox(tendonfmu::estimation::Unknowns(finger.get(), nullptr, nullptr));
+}
+
+Parabola random_parabola(Index p, std::mt19937_64* random) {
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform;
+  const auto some = [&](double spread) {
+    return VectorXd::NullaryExpr(p, [&] { return spread * normal(*random); }).eval();
+  };
+  Parabola q{MatrixXd::NullaryExpr(p, p, [&] { return normal(*random); }), some(2.0), some(1.0), empty_box()};
+  q.h = (q.h * q.h.transpose()).eval();
+  q.h.diagonal().array() += 0.01;
+  q.box.rates.clear();
+  q.box.lower = q.box.upper = q.x;
+  for (Index k = 0; k < p; ++k) { /* at a side, at both, inside, or unbounded */
+    const double kind = uniform(*random);
+    q.box.lower[k] -= kind < 0.3 ? 0.0 : uniform(*random);
+    q.box.upper[k] += kind > 0.2 && kind < 0.5 ? 0.0 : uniform(*random);
+    if (kind > 0.9) {
+      q.box.lower[k] = -std::numeric_limits<double>::infinity();
+    }
+  }
+  return q;
+}
+
+/* the least of all choices of what is held at which side */
+double least_by_brute_force(const Parabola& q) {
+  const Index p = q.x.size();
+  double least = std::numeric_limits<double>::infinity();
+  std::vector<int> choice(static_cast<std::size_t>(p), 0);
+  for (int number = 0; number < static_cast<int>(std::pow(3, p)); ++number) {
+    VectorXd d = VectorXd::Zero(p);
+    std::vector<Index> free;
+    for (Index k = 0, rest = number; k < p; ++k, rest /= 3) {
+      if (rest % 3 == 2) {
+        free.push_back(k);
+      } else {
+        d[k] = (rest % 3 ? q.box.upper[k] : q.box.lower[k]) - q.x[k];
+      }
+    }
+    if (!d.allFinite()) {
+      continue;
+    }
+    const VectorXd pull = q.g + q.h * d;
+    if (!free.empty()) {
+      const VectorXd move = q.h(free, free).llt().solve(-pull(free));
+      d(free) = move;
+    }
+    if (((q.x + d).array() >= q.box.lower.array() - 1e-12).all() &&
+        ((q.x + d).array() <= q.box.upper.array() + 1e-12).all()) {
+      least = std::min(least, q.at(d));
+    }
+  }
+  return least;
+}
+
+TEST(BoxedStep, IsTheBestOfAllActiveSets) {
+  std::mt19937_64 random(11);
+  for (int trial = 0; trial < 1500; ++trial) {
+    const Parabola q = random_parabola(1 + trial % 5, &random);
+    const VectorXd d = boxed_step(q.h, q.g, q.x, q.box);
+    const VectorXd there = q.x + d;
+    ASSERT_LT((q.box.clip(there) - there).cwiseAbs().maxCoeff(), 1e-12) << "trial " << trial;
+    const double least = least_by_brute_force(q);
+    ASSERT_NEAR(q.at(d), least, 1e-9 * (1.0 + std::fabs(least))) << "trial " << trial;
+  }
+}
+
+TEST(BoxedStep, MovesNothingWhereEverythingIsHeld) {
+  std::mt19937_64 random(12);
+  Parabola q = random_parabola(4, &random);
+  q.box.lower = q.box.upper = q.x;
+  EXPECT_EQ(boxed_step(q.h, q.g, q.x, q.box), VectorXd::Zero(4));
+}
+
+/* an unknown that nothing depends on, and two that only their sum shows: without a prior h is singular */
+TEST(BoxedStep, IsFiniteWhereTheMatrixIsSingular) {
+  Parabola q{MatrixXd::Zero(4, 4), VectorXd::Zero(4), VectorXd::Constant(4, 0.5), empty_box()};
+  q.box.rates.clear();
+  q.box.lower = VectorXd::Zero(4);
+  q.box.upper = VectorXd::Constant(4, 3.0);
+  q.h(1, 1) = q.h(1, 2) = q.h(2, 1) = q.h(2, 2) = 4e6;
+  q.h(3, 3) = 1e3;
+  q.g << 0.0, -2e6, -2e6, 100.0;
+  const VectorXd d = boxed_step(q.h, q.g, q.x, q.box);
+  ASSERT_TRUE(d.allFinite()) << d.transpose();
+  EXPECT_EQ(d[0], 0.0);
+  EXPECT_NEAR(d[1] + d[2], 0.5, 1e-6);
+  EXPECT_NEAR(d[3], -0.1, 1e-6);
+}
+
+}  // namespace
