@@ -143,12 +143,14 @@ struct ActiveSet {
   /* lets go what is pulled inwards, all of it or only the one that gains the most; true: something was */
   bool release(bool all) {
     const VectorXd pull = g + h * step;
+    /* rounding of a pull that is none must not let go */
+    const double negligible = 1e-12 * std::max(1.0, std::fabs(0.5 * step.dot(g + pull)));
     Index best = -1;
     double most = 0.0;
     bool released = false;
     for (Index k = 0; k < x.size(); ++k) {
       const double inwards = held(k) * pull[k], gain = inwards * inwards / std::max(h(k, k), 1e-300);
-      if (inwards > 1e-12 && box.lower[k] < box.upper[k]) {
+      if (inwards > 0.0 && gain > negligible && box.lower[k] < box.upper[k]) {
         released = true;
         if (all) {
           held(k) = 0;
