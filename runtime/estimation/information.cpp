@@ -18,7 +18,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/* Column 0 is the residual, y − T and what the bias holds of it; unknown k is column k + 1. */
+/* Column 0 is the residual: y − T, and what the bias holds of it. */
 constexpr std::size_t residual_column = 0;
 constexpr std::size_t told_every = 256; /* samples, of what is done */
 

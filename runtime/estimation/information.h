@@ -22,7 +22,7 @@ namespace tendonfmu::estimation {
 
 /* The columns that a pass sums up: the residual e, the unknowns, and two for every side of a law with a rate to
  * estimate, with which its Stribeck part drop·exp(−v·rate) is known to third order in a change δ of the rate: drop·(E −
- * δ·v·E + δ²/2·v²E − δ³/6·v³E),  E = exp(−v·rate) Sorted by the first joint that they turn: those of joint j are a
+ * δ·v·E + δ²/2·v²E − δ³/6·v³E),  E = exp(−v·rate). Sorted by the first joint that they turn: those of joint j are a
  * prefix. */
 struct Columns {
   explicit Columns(const Unknowns& unknowns, std::size_t joints);

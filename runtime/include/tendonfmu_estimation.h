@@ -101,9 +101,9 @@ tendonfmu_status tendonfmu_estimator_jacobian(tendonfmu_estimator* estimator, si
                                               size_t first, size_t count, double* torque, double* jump,
                                               double* torque_derivative, double* jump_derivative);
 
-/* Residuals before the bias update, e [samples × n] (r of contract section 5, step 5), and their variances S [samples]:
- * NaN where the bias has not started; samples not used have an e, too. bias [samples × n] after the update. NULL: not
- * wanted. */
+/* Residuals before the bias update, e [samples × n] (r of contract section 5, step 5), and their variances S [samples].
+ * NaN: e where the bias has not started, S where nothing is learned either (samples not used, which have an e, and the
+ * first). bias [samples × n] after the update. NULL: not wanted. */
 tendonfmu_status tendonfmu_estimator_innovations(tendonfmu_estimator* estimator, size_t recording, const double* z,
                                                  double* innovation, double* variance, double* bias);
 
