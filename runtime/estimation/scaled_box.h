@@ -20,8 +20,8 @@ struct ScaledBox {
   std::vector<double> unknowns(const Eigen::VectorXd& x) const;
 };
 
-/* The d of least gᵀd + ½ dᵀHd with lower <= x + d <= upper, H positive semidefinite, x within the box, by an active set:
- * unknowns that would leave the box are held at its side, those that the gradient pulls inwards are let go. */
+/* The d of least gᵀd + ½ dᵀHd with lower <= x + d <= upper, H positive semidefinite, x within the box. By an active
+ * set: unknowns that would leave the box are held at its side, those that the gradient pulls inwards are let go. */
 Eigen::VectorXd boxed_step(const Eigen::MatrixXd& h, const Eigen::VectorXd& g, const Eigen::VectorXd& x,
                            const ScaledBox& box);
 
