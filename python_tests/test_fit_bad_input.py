@@ -13,6 +13,7 @@ import pytest
 from fit_cases import jam, small_finger
 from fit_finger import made_recording
 from tendonfmu.errors import InputError
+from tendonfmu.fit_recordings import slack_sentences
 from tendonfmu.fitting import FitWarning, FrictionFit
 from tendonfmu.recording import Recording
 
@@ -95,6 +96,27 @@ def test_slack_tendons_are_named() -> None:
     jam(finger)
     fit = fitted(made_recording(), finger, only=["joints[*].cover"], share=[])
     assert said(fit, "tendon 1 (tendon_1) is slack", "the training should be modified")
+    throughout = slack_sentences(np.ones((3, len(fit.description_.tendon_names)), dtype=bool), fit.description_)
+    assert "is slack in 100 % of the samples" in throughout[0]
+
+
+# --- units and signs --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("kinematics", "group"), [(1, "tendon_position"), (2, "joint_position")])
+def test_positions_in_mm_and_angles_in_milliradians_are_told(kinematics: int, group: str) -> None:
+    recording = made_recording()
+    recording.groups[group][:] *= 1000.0
+    fit = fitted(recording, kinematics=kinematics, max_passes=1)
+    assert said(fit, "joint base turns from -", "positions in mm, or angles in degrees? expected m and rad")
+
+
+@pytest.mark.parametrize(("kinematics", "group"), [(1, "tendon_position"), (3, "joint_velocity")])
+def test_a_wrong_sign_is_told(kinematics: int, group: str) -> None:
+    recording = made_recording()
+    assert not said(fitted(recording, kinematics=kinematics, max_passes=1), "wrong sign")
+    recording.groups[group][:] *= -1.0
+    assert said(fitted(recording, kinematics=kinematics, max_passes=1), "wrong sign", "against the pull")
 
 
 # --- samples ----------------------------------------------------------------------------------------------------------

@@ -23,6 +23,7 @@ from tendonfmu.recording_faults import (
     gap_sentences,
     gaps,
     rate_sentences,
+    sense_sentences,
     silent_tendons,
     stuck_sensors,
 )
@@ -136,6 +137,9 @@ def prepare(finger: FingerDescription, recording: Recording, kinematics: int, he
     _refuse_too_little(recording, parts, usable, contact)
     held_out = _held_out(recording, parts, held) & usable
     model = model_alone(finger.data, [_arrays(recording, part) for part in parts], parts, len(recording), kinematics)
+    warnings += sense_sentences(
+        target[usable], model.joint_angle[usable], model.joint_speed[usable], finger.joint_names
+    )
     if contact.any():
         warnings.append(f"{int(contact.sum())} samples labelled contact are left out: no column external_torque")
     return FitRecording(
@@ -201,11 +205,16 @@ def slack_sentences(slack: Flags, finger: FingerDescription) -> list[str]:
     """About tendons whose modelled force falls below zero. slack: [N, m]."""
     share = slack.mean(axis=0)
     return [
-        f"tendon {i + 1} ({finger.tendon_names[i]}) is slack in {100 * part:.2g} % of the samples: its modelled force "
+        f"tendon {i + 1} ({finger.tendon_names[i]}) is slack in {_percent(part)} % of the samples: its modelled force "
         "falls below 0 and counts as 0; the training should be modified: more pretension"
         for i, part in enumerate(share)
         if part > 0
     ]
+
+
+def _percent(share: float) -> str:
+    """Two digits, and all of those of 100."""
+    return f"{100 * share:.2g}" if share < 0.995 else f"{100 * share:.0f}"
 
 
 # --- stuck sensors ----------------------------------------------------------------------------------------------------
