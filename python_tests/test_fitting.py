@@ -17,7 +17,7 @@ from fit_cases import small_finger
 from fit_finger import asymmetric_finger, made_recording, moved_start, write_recording
 from tendonfmu import native
 from tendonfmu.errors import InputError
-from tendonfmu.fit_files import description_text, write_unfinished
+from tendonfmu.fit_files import Unfinished, description_text, read_unfinished, write_unfinished
 from tendonfmu.fit_residuals import chi_square_tail, consistency, whiteness
 from tendonfmu.fit_structure import get_number, set_number, with_sides
 from tendonfmu.fitting import FitWarning, FrictionFit
@@ -433,6 +433,13 @@ def test_the_page_s_example_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 def test_warnings_are_warnings() -> None:
     with pytest.warns(FitWarning, match="never moves"):
         shared(max_passes=2).fit(made_recording(still=1))
+
+
+@pytest.mark.parametrize("cost", [np.inf, np.nan])
+def test_what_was_stopped_in_the_first_pass_can_be_read_again(cost: float, tmp_path: Path) -> None:
+    """No cost is known then, and JSON has neither inf nor nan."""
+    left = Unfinished("small", "batch", np.ones(1), ["joints[1].friction.coulomb"], cost, {}, small_finger())
+    assert np.isnan(read_unfinished(write_unfinished(tmp_path / "fitted.json", left)).cost)
 
 
 def test_a_stopped_fit_is_marked_and_goes_on(tmp_path: Path) -> None:

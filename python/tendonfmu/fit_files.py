@@ -128,7 +128,7 @@ def write_unfinished(output: Path, found: Unfinished) -> Path:
         "format": UNFINISHED,
         "finger": found.finger,
         "method": found.method,
-        "cost": None if np.isnan(found.cost) else found.cost,
+        "cost": found.cost if np.isfinite(found.cost) else None,
         "options": dict(found.options),
         "unknowns": list(found.unknowns),
         "z": [float(value) for value in found.z],
