@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
 import subprocess
+import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
+
+from fit_finger import made_recording, moved_start, write_recording
 
 ROOT = Path(__file__).resolve().parent.parent
 FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
@@ -224,6 +228,34 @@ def test_pkg_config_of_optional_parts(
     flags = call("pkg-config", "--cflags", "--libs", f"tendonfmu-{part}", env=search).split()
     call("cc", consumer / f"{part}.c", "-o", tmp_path / "program", *flags)
     assert call(tmp_path / "program") == printed
+
+
+def test_the_program_of_the_page_learns_what_the_command_does(prefix: Path, tmp_path: Path) -> None:
+    if not has_estimation(prefix) or not shutil.which("pkg-config"):
+        pytest.skip("SKIPPED: built without the estimation of parameters, or pkg-config is not installed")
+    pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: the package is built without Eigen")
+    from tendonfmu.fitting import FrictionFit
+
+    page = (ROOT / "docs" / "fit.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```c\n(.*?)```", page, re.DOTALL)
+    (tmp_path / "learn.c").write_text(code, encoding="utf-8")
+    (tmp_path / "finger.json").write_text(json.dumps(moved_start()), encoding="utf-8")
+    made = made_recording(duration=10.0)
+    made.groups.pop("external_torque", None)  # the program takes none
+    recording = write_recording(made, tmp_path / "recording.csv")
+    search = {"PKG_CONFIG_PATH": str(prefix / "lib" / "pkgconfig")}
+    flags = call(
+        "pkg-config", "--cflags", "--libs", "tendonfmu-estimation", "tendonfmu-description", env=search
+    ).split()
+    call("cc", "-std=c11", "-Wall", "-Wextra", "-Werror", tmp_path / "learn.c", "-o", tmp_path / "learn", *flags)
+    lines = [line.split() for line in call(tmp_path / "learn", tmp_path / "finger.json", recording).splitlines()]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        fit = FrictionFit(tmp_path / "finger.json", "ekf", max_passes=1).fit(recording)
+    assert {path for path, *_ in lines} == set(fit.parameters_)
+    for path, value, error in lines:
+        assert float(value) == pytest.approx(fit.parameters_[path], rel=1e-8)
+        assert float(error) == pytest.approx(fit.standard_errors_[path], rel=0.06)  # two digits
 
 
 def test_kernels_for_one_processor_share_no_function(prefix: Path) -> None:
