@@ -79,10 +79,10 @@ def main() -> None:
     print("| --- | --- | --- | ---: |" + " ---: |" * len(fresh))
     for bias, finger in (("of the finger", given), ("of the paper", with_paper_bias(given))):
         for name, recording in training.items():
-            for sides in ("symmetric", "asymmetric"):
+            for sides in ("symmetric", "asymmetric") if name == "varied" else ("symmetric",):
                 fit = FrictionFit(finger, sides=sides).fit(recording, compare=list(fresh.values()))
                 parts = fit.report_["residual"]["comparisons"]
-                if name == "constant" and sides == "symmetric":
+                if name == "constant":
                     for row, key in (("bias alone", "bias_only_rms"), ("the rig's own static numbers", "start_rms")):
                         cells = [f"{100 * pooled(part, key):.1f} %" for part in parts]
                         print(f"| {bias} | {row} | | | " + " | ".join(cells) + " |")
