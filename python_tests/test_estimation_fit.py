@@ -271,3 +271,13 @@ def test_standard_errors_are_honest() -> None:
     assert abs(np.mean(errors)) < 0.25
     # 80,000 values of χ²(1), less the unknowns: 1 ± 0.01
     assert np.mean(nis) == pytest.approx(1.0, abs=0.03)
+
+
+def test_what_nothing_tells_is_not_known() -> None:
+    """Three samples and no prior: no standard error may come out small, or as nothing."""
+    description = small_finger()
+    recording = {name: values[:3] for name, values in recorded(description, 6, 12.0, 20.0).items()}
+    estimator = estimator_with(description, recording)
+    result = estimator.fit(prior_std=np.inf)
+    errors = np.sqrt(np.diag(result.covariance)) / estimator.scale
+    assert np.isfinite(errors).all() and errors.min() > 10.0

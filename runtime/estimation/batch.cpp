@@ -18,6 +18,8 @@ constexpr std::size_t coarse_samples = 40000; /* that a coarse pass looks at, ab
 constexpr double coarse_share = 0.3;          /* of √unknowns, in standard errors: then all samples are looked at */
 constexpr double first_share = 0.8, largest_share = 1.5, smallest_share = 1e-4; /* of a rate, in a step */
 
+constexpr double least_prior_weight = 1e-10; /* of a covariance: standard deviations up to 1e5 scales */
+
 double prior_weight(double prior_std) {
   return std::isinf(prior_std) ? 0.0 : 1.0 / (prior_std * prior_std);
 }
@@ -126,7 +128,8 @@ class Search {
 
 MatrixXd posterior_covariance(const Unknowns& unknowns, const MatrixXd& information, double prior_std) {
   const ScaledBox box(unknowns);
-  const double weight = prior_weight(prior_std);
+  /* never nothing: what neither data nor prior know must not come out as known exactly */
+  const double weight = std::max(prior_weight(prior_std), least_prior_weight);
   const Eigen::Index p = information.rows();
   MatrixXd h = box.scale.asDiagonal() * information * box.scale.asDiagonal();
   h.diagonal().array() += weight;
