@@ -1,7 +1,7 @@
 """A fit finds the 472 numbers of a finger that made its recording itself (bench/recovery.py).
 
 Here one seed, 400 s at 25 Hz: as much noise per second as in the campaign at 1 kHz, so nearly the same errors, at a
-fortieth of the time. The campaign itself, 20 seeds at 1 kHz, takes half an hour on two cores: `./test -m campaign
+fortieth of the time. The campaign itself, 20 seeds at 1 kHz, takes an hour on two cores: `./test -m campaign
 python_tests/test_recovery.py`. docs/evidence.md has its figures.
 """
 
