@@ -2,23 +2,21 @@
 
 Exit status: 0 done, 1 the answer is no, 2 bad usage or input.
 
-The only module that prints. Results go to files or standard output, messages to standard error.
+Results go to files or standard output, messages to standard error.
 """
 
 from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
+from tendonfmu import cli_detect
+from tendonfmu.console import fit_bar, print_tables, progress_bar, say
 from tendonfmu.errors import InputError
-
-if TYPE_CHECKING:
-    from rich.progress import Progress
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -42,24 +40,24 @@ def main() -> None:
             sys.exit(0)
         _refuse(str(refused))
     except (KeyboardInterrupt, typer.Abort):
-        _say("tendonfmu: interrupted; no file was left half written")
+        say("tendonfmu: interrupted; no file was left half written")
         sys.exit(INTERRUPTED)
     except Exception as refused:  # bad usage; the class has moved between versions of typer
         if not hasattr(refused, "format_message"):
             raise
         if type(refused).__name__ == "NoArgsIsHelpError":
-            _say(refused.format_message())
+            say(refused.format_message())
             sys.exit(2)
         page = getattr(getattr(refused, "ctx", None), "command_path", "tendonfmu")
         _refuse(f"{refused.format_message().rstrip('.')}; see {page} --help")
     else:
         if status == INTERRUPTED:  # newer versions of typer turn Ctrl-C into a status
-            _say("tendonfmu: interrupted; no file was left half written")
+            say("tendonfmu: interrupted; no file was left half written")
         sys.exit(status if isinstance(status, int) else 0)
 
 
 def _refuse(reason: str) -> None:
-    _say(f"tendonfmu: {' '.join(reason.split())}")
+    say(f"tendonfmu: {' '.join(reason.split())}")
     sys.exit(2)
 
 
@@ -97,7 +95,7 @@ def check(
         lines = describe_rig(file) if rig else read_finger(file).summary()
     except InputError as refused:
         # the question was whether the description is sound; a file that cannot be read is bad input
-        _say(f"tendonfmu: {refused}")
+        say(f"tendonfmu: {refused}")
         raise typer.Exit(1 if file.is_file() else 2) from None
     for line in lines:
         print(line)
@@ -123,7 +121,7 @@ def build(
 
     check_output(output, *(read_rig(file).files if is_rig(file) else [file]))
     (build_plant_fmu if is_rig(file) else build_fmu)(file, output, binaries=binaries)
-    _say(f"{output}: {output.stat().st_size / 1024:.0f} KiB")
+    say(f"{output}: {output.stat().st_size / 1024:.0f} KiB")
 
 
 @app.command()
@@ -148,13 +146,13 @@ def run(
     check_format(output)
     check_output(output, model, recording)
     samples = read_recording(recording)
-    with _progress() as bar:
+    with progress_bar() as bar:
         task = bar.add_task("samples", total=len(samples))
         table = run_model(
             model, samples, kinematics_source=kinematics, progress=lambda done: bar.update(task, completed=done)
         )
     write_table(output, table)
-    _say(f"{output}: {summary(table)}")
+    say(f"{output}: {summary(table)}")
 
 
 @app.command()
@@ -185,7 +183,7 @@ def simulate(
         check_output(file, *found.files)
     if truth is not None and truth.resolve() == output.resolve():
         raise InputError(f"{truth}: the same file for recording and truth; expected two names")
-    with _progress(progress) as bar:
+    with progress_bar(progress) as bar:
         task = bar.add_task("samples", total=None)
         result = simulate_rig(
             found,
@@ -197,7 +195,7 @@ def simulate(
         write_table(truth, result.truth)
     write_table(output, result.recording)
     for line in result.summary(found):
-        _say(f"{output}: {line}")
+        say(f"{output}: {line}")
 
 
 @app.command()
@@ -231,7 +229,7 @@ def convert(
     given = {"radius": radius, "mass": mass, "decimation": decimation}
     table = convert_file(source, file, {name: value for name, value in given.items() if value is not None})
     write_table(output, table)
-    _say(f"{output}: {len(table['time'])} samples, {table['time'][-1] - table['time'][0]:.3f} s")
+    say(f"{output}: {len(table['time'])} samples, {table['time'][-1] - table['time'][0]:.3f} s")
 
 
 @app.command()
@@ -285,11 +283,11 @@ def excite(
     ranges = exciting.find_ranges(subject, range_ or [])
     for span in ranges:
         if span.guessed:
-            _say(f"tendonfmu: warning: joint {span.name}: {span.source}; --range {span.name}=LOW:HIGH says better")
+            say(f"tendonfmu: warning: joint {span.name}: {span.source}; --range {span.name}=LOW:HIGH says better")
     vary = exciting.find_variation(vary_tension, vary_every, pretension, alternate)
     levels = exciting.find_pretensions(subject, pretension or [])
     plan = Plan(exciting.as_array(ranges), max_speed, duration, levels, alternate, rate, seed, vary, max_acceleration)
-    with _progress() as bar:
+    with progress_bar() as bar:
         task = bar.add_task("judging the motion", total=None)
         result = exciting.excite(subject, ranges, plan, lambda done, all_: bar.update(task, completed=done, total=all_))
     write_table(output, result.motion.columns())
@@ -297,27 +295,8 @@ def excite(
         everything = exciting.report(result, shlex.join(["tendonfmu", *sys.argv[1:]]))
         with whole_file(report) as temporary:
             temporary.write_text(json.dumps(everything, indent=1) + "\n", encoding="utf-8")
-    _print_tables(tables(result), lines(result), left="cannot be identified")
-    _say(f"{output}: {len(result.motion.time)} rows, {result.motion.time[-1]:g} s")
-
-
-def _print_tables(tables: Iterable[Any], lines: Iterable[str], left: str) -> None:
-    """Tables of (title, headings, rows), then lines. left: heading of a further column that is text."""
-    from rich.console import Console
-    from rich.table import Table
-
-    console = Console()
-    if not console.is_terminal:  # nothing to fit into: no broken lines
-        console.width = 160
-    for title, headings, rows in tables:
-        table = Table(title=title, title_justify="left")
-        for k, heading in enumerate(headings):
-            table.add_column(heading, justify="right" if k > 0 and heading != left else "left")
-        for row in rows:
-            table.add_row(*row)
-        console.print(table)
-    for line in lines:
-        console.print(line, highlight=False, soft_wrap=True)
+    print_tables(tables(result), lines(result), left="cannot be identified")
+    say(f"{output}: {len(result.motion.time)} rows, {result.motion.time[-1]:g} s")
 
 
 @app.command()
@@ -384,7 +363,7 @@ def fit(
 
     inputs = [finger, *recordings, *(compare or []), *([] if resume is None else [resume])]
     check_outputs(output, report, figures, inputs)
-    with _progress(progress) as bar:
+    with progress_bar(progress) as bar:
         fitting = FrictionFit(
             finger,
             method,
@@ -401,7 +380,7 @@ def fit(
             tolerance=tolerance,
             parameter_drift=drift,
             start=resume,
-            progress=_fit_bar(bar),
+            progress=fit_bar(bar),
         )
         try:
             with warnings.catch_warnings():
@@ -412,38 +391,23 @@ def fit(
                 raise
             bar.stop()
             left = write_unfinished(output, fitting.unfinished_)
-            _say(f"tendonfmu: interrupted; the best so far is in {left}; --resume {left} goes on from there")
+            say(f"tendonfmu: interrupted; the best so far is in {left}; --resume {left} goes on from there")
             sys.exit(INTERRUPTED)
     for sentence in fitting.warnings_:
-        _say(f"tendonfmu: warning: {sentence}")
+        say(f"tendonfmu: warning: {sentence}")
     write_text(output, fitting.description_text())
     if report is not None:
         write_text(report, report_text(fitting.report_))
-    _print_tables(tables(fitting), lines(fitting), left="joint")
-    _say(f"{output}: {len(fitting.parameters_)} numbers estimated")
+    print_tables(tables(fitting), lines(fitting), left="joint")
+    say(f"{output}: {len(fitting.parameters_)} numbers estimated")
     if figures is not None:
         from tendonfmu.fit_page import write_fit_page
 
         for path, what in write_fit_page(fitting.picture(), figures).items():
-            _say(f"{path}: {what}")
+            say(f"{path}: {what}")
 
 
-def _fit_bar(bar: Progress) -> Any:
-    """Shows where a fit is: its phase, cost and samples per second."""
-    task = bar.add_task("reading", total=None)
-    phase = ""
-
-    def show(now: Any) -> None:
-        nonlocal phase
-        if now.phase != phase:
-            bar.reset(task, total=now.total)
-            phase = now.phase
-        speed = bar.tasks[0].speed
-        rate = f", {speed:,.0f} samples/s" if speed else ""
-        cost = f", cost {now.cost:.6g}" if now.cost == now.cost else ""
-        bar.update(task, completed=now.done, total=now.total, description=f"{phase}{cost}{rate}")
-
-    return show
+cli_detect.register(app)
 
 
 @app.command()
@@ -456,35 +420,14 @@ def demo(
     from tendonfmu.demo import run_demo
     from tendonfmu.demo_text import demo_lines, demo_tables
 
-    with _progress() as bar:
+    with progress_bar() as bar:
         task = bar.add_task("samples", total=None)
 
         def show(done: int, total: int) -> None:
             bar.update(task, completed=done, total=total)
 
         result = run_demo(output, progress=show)
-    _print_tables(demo_tables(result), demo_lines(result), left="")
-
-
-def _progress(wanted: bool | None = None) -> Progress:
-    """A progress bar on standard error; unless it is said, only where that is a terminal."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    console = Console(stderr=True, force_terminal=wanted or None)
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        console=console,
-        disable=not (console.is_terminal if wanted is None else wanted),
-        transient=True,
-    )
-
-
-def _say(message: str) -> None:
-    print(message, file=sys.stderr)
+    print_tables(demo_tables(result), demo_lines(result), left="")
 
 
 if __name__ == "__main__":
