@@ -1,0 +1,288 @@
+"""Recordings of the detection campaign: a virtual hand that moves and rests, pushed and left alone, and what is true.
+
+The rig is examples/rigs/index_finger.json. Its strokes come in stretches of 6 to 13 s, with all joints at rest between
+them; a push begins anywhere within its slot of 6 s, whatever the finger does then. Each pretension has, of other seeds
+each, three recordings of 10 min with 100 pushes, and three without any. Every pushed recording has a *twin*: the same
+motion and the same sensor noise without the pushes. What differs between the two is what a push does to the signals.
+
+Everything is kept in a folder under its name, and what is there is not made again.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.balance import moment_arms
+from tendonfmu.draws import Draws
+from tendonfmu.fitting import FrictionFit
+from tendonfmu.json_node import Node
+from tendonfmu.motion_plan import Joints, expand_motion
+from tendonfmu.quintic import evaluate
+from tendonfmu.recording import read_recording
+from tendonfmu.rig import read_rig
+from tendonfmu.simulation import Table, simulate
+from tendonfmu.tables import read_table, write_table
+from tendonfmu.whole_file import whole_file
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "examples" / "rigs"))
+from virtual_hand import TRAINING, record  # noqa: E402
+
+Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+RIG = ROOT / "examples" / "rigs" / "index_finger.json"
+FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
+
+PRETENSIONS = (10.0, 20.0, 40.0)  # N: trained at the first, on average
+PARTS = 3  # recordings of each kind and pretension
+DURATION = 600.0  # s, of one
+PUSHES = 100  # in one
+TRAINING_DURATION = 400.0  # s
+
+STRETCH, STILL = (6.0, 13.0), (0.7, 2.0)  # s: strokes with the rest at both ends; that rest
+FORCE = (0.1, 2.0)  # N, uniform in its logarithm
+RISE, HOLD = (0.01, 0.05), (0.3, 1.0)  # s; a fall is drawn like a rise
+EARLIEST, LATEST = 0.5, 4.4  # s into a push's slot that it begins
+LEAST_FORCE = 0.01  # N, from which the label says contact: a push is labelled within its first 5 ms
+NEAR = 0.15  # s between the onset and a joint's turning round,
+LONGEST_TURN = 0.5  # s, which begins and ends with motion and takes no longer than this
+LOOK_BACK = 0.05  # s before the push in which a finger at rest does not move
+_MOTION, _PUSH, _NOISE, _FORCES = range(4)  # what a seed is of
+
+
+@dataclass(frozen=True)
+class Take:
+    """One recording: kind "pushes", "free" or "twin" (of the pushes), pretension N, part from 1."""
+
+    kind: str
+    pretension: float
+    part: int
+
+    @property
+    def name(self) -> str:
+        return f"{self.kind}_{self.pretension:g}_{self.part}"
+
+    def seed(self, what: int) -> int:
+        """A twin has the seeds of its pushes."""
+        kind = 1 if self.kind == "free" else 0
+        return 100_000 + 1000 * round(self.pretension) + 100 * kind + 10 * self.part + what
+
+
+@dataclass(frozen=True)
+class Push:
+    """One push and what was true of it.
+
+    onset, end: s, first and last labelled sample. force: N. link: from 1. torque: [n] N·m, the external torque of the
+    largest magnitude in each joint. posture: "rest", "motion" or "reversal". stuck: no tendon and no joint moved faster
+    than the description's thresholds just before. excursion: [n] rad, how far each joint moved during the push.
+    stays: stuck, and no joint moved farther than the rig's presliding distance of joints.
+    """
+
+    pretension: float
+    part: int
+    onset: float
+    end: float
+    force: float
+    link: int
+    rise: float
+    torque: tuple[float, ...]
+    posture: str
+    stuck: bool
+    excursion: tuple[float, ...]
+    stays: bool
+
+
+def takes(kind: str, pretension: float, parts: int = PARTS) -> list[Take]:
+    return [Take(kind, pretension, part) for part in range(1, parts + 1)]
+
+
+# --- rigs -------------------------------------------------------------------------------------------------------------
+
+
+def motion_table(base: Mapping[str, Any], seed: int, duration: float) -> Table:
+    """A motion file: stretches of the base rig's strokes, all joints at rest between them."""
+    links = base["physics"]["links"]
+    limits = Joints(*([link["limits"][end] for link in links] for end in ("lower", "upper")))
+    recipe = {key: value for key, value in base["motion"].items() if key not in ("duration", "seed")}
+    draws, begin, stretch = Draws(seed, 0), 0.0, 0
+    knots = [[[0.0, angle, 0.0, 0.0]] for angle in recipe["position"]]
+    while begin + STRETCH[1] <= duration:
+        changed = recipe | {
+            "position": [each[-1][1] for each in knots],
+            "duration": draws.between(*STRETCH),
+            "still": draws.between(*STILL),
+        }
+        part = expand_motion(Node(changed), limits, seed + 1_000_000 * (stretch + 1), None)
+        for each, joint in zip(knots, part.joints, strict=True):
+            moves = zip(joint["time"][1:], joint["position"][1:], strict=True)
+            each.extend([begin + time, angle, 0.0, 0.0] for time, angle in moves)
+        begin, stretch = begin + changed["duration"], stretch + 1
+    time = np.unique(np.concatenate([[duration], *(np.array(each)[:, 0] for each in knots)]))
+    table: Table = {"time": time}
+    # between the knots of other joints it is the same polynomial again
+    for j, each in enumerate(knots, start=1):
+        curve = evaluate(np.array(each), time)
+        table |= {
+            f"joint_{name}[{j}]": values
+            for name, values in zip(("position", "velocity", "acceleration"), curve, strict=True)
+        }
+    return table
+
+
+def _placed(pushes: list[dict[str, Any]], seed: int) -> list[dict[str, Any]]:
+    """Pushes of the rig's recipe, each in its slot and with a force uniform in its logarithm."""
+    draws = Draws(seed, 3)
+    low, high = (math.log(force) for force in FORCE)
+    slot = DURATION / PUSHES
+    return [
+        push | {"start": k * slot + draws.between(EARLIEST, LATEST), "force": math.exp(draws.between(low, high))}
+        for k, push in enumerate(pushes)
+    ]
+
+
+def write_rig(folder: Path, take: Take) -> Path:
+    """The rig of a recording and its motion file."""
+    base = json.loads(RIG.read_text(encoding="utf-8"))
+    motion = folder / f"motion_{take.pretension:g}_{take.part}{'_free' if take.kind == 'free' else ''}.parquet"
+    if not motion.exists():
+        write_table(motion, motion_table(base, take.seed(_MOTION), DURATION))
+    rig: dict[str, Any] = {
+        "format": "tendonfmu-rig-1",
+        "base": str(RIG),
+        "name": take.name,
+        "seed": take.seed(_NOISE),
+        "physics": {"contact_force": LEAST_FORCE},
+        "motion": {"kind": "file", "file": motion.name, "pretension": take.pretension},
+        "recording": {"duration": DURATION, "columns": ["joint_position", "external_torque", "contact"]},
+    }
+    file = folder / f"{take.name}.json"
+    if take.kind == "pushes":
+        recipe = {"count": PUSHES, "seed": take.seed(_PUSH), "rise": RISE, "hold": HOLD, "where": "anywhere"}
+        file.write_text(json.dumps(rig | {"pushes": recipe | {"gap": [0.0, 0.0]}}), encoding="utf-8")
+        rig["pushes"] = _placed(list(read_rig(file).expanded["pushes"]), take.seed(_FORCES))
+    file.write_text(json.dumps(rig), encoding="utf-8")
+    return file
+
+
+# --- recordings -------------------------------------------------------------------------------------------------------
+
+
+def recording_file(folder: Path, take: Take) -> Path:
+    """Made if it is not there; beside it NAME_truth.parquet."""
+    file, truth = folder / f"{take.name}.parquet", truth_file(folder, take)
+    if not (file.exists() and truth.exists()):
+        made = simulate(read_rig(write_rig(folder, take)), truth=True)
+        assert made.truth is not None
+        force = np.sqrt(sum(made.truth[f"contact_force[{axis}]"] ** 2 for axis in (1, 2, 3)))
+        names = ("external_torque", "joint_torque", "joint_position", "joint_velocity")
+        kept = {name: values for name, values in made.truth.items() if name.split("[")[0] in names}
+        write_table(truth, {"time": made.truth["time"], **kept, "contact_force": np.asarray(force)})
+        write_table(file, made.recording)
+    return file
+
+
+def truth_file(folder: Path, take: Take) -> Path:
+    return folder / f"{take.name}_truth.parquet"
+
+
+def read_truth(folder: Path, take: Take) -> dict[str, Numbers]:
+    """time [N], contact_force [N] (N), external_torque, joint_torque, joint_position, joint_velocity [N, n]."""
+    table = read_table(truth_file(folder, take), lambda _path, _names: None)
+    joints = sum(name.startswith("joint_velocity[") for name in table)
+    arrays = {name: table[name] for name in ("time", "contact_force")}
+    for name in ("external_torque", "joint_torque", "joint_position", "joint_velocity"):
+        arrays[name] = np.column_stack([table[f"{name}[{j + 1}]"] for j in range(joints)])
+    return arrays
+
+
+def training_file(folder: Path) -> Path:
+    """`excite` at low, varied pretension, without contact."""
+    file = folder / "training.parquet"
+    return file if file.exists() else record(folder, "training", TRAINING_DURATION, TRAINING["varied"])
+
+
+def fitted_file(folder: Path) -> Path:
+    """The description fitted to the training recording, with the default settings of a fit."""
+    file = folder / "fitted.json"
+    if not file.exists():
+        fit = FrictionFit(FINGER).fit(training_file(folder))
+        with whole_file(file) as temporary:
+            temporary.write_text(fit.description_text(), encoding="utf-8")
+    return file
+
+
+# --- what is true of a push -------------------------------------------------------------------------------------------
+
+
+def pushes_of(folder: Path, take: Take) -> list[Push]:
+    """All pushes of a recording of kind "pushes"; without the push, a joint moves as in the twin."""
+    rig = read_rig(write_rig(folder, take))
+    truth, twin = read_truth(folder, take), read_truth(folder, Take("twin", take.pretension, take.part))
+    label = read_recording(recording_file(folder, take)).contact
+    assert label is not None
+    thresholds = rig.finger.data["velocity_threshold"]
+    arms = moment_arms(rig.finger.data)
+    presliding = float(rig.data["physics"]["friction"]["presliding"]["joint"])
+    found = []
+    for push in rig.expanded["pushes"]:
+        over = push["start"] + push["rise"] + push["hold"] + push["fall"]
+        inside = np.flatnonzero(label & (truth["time"] >= push["start"]) & (truth["time"] <= over))
+        during = slice(int(inside[0]), int(inside[-1]) + 1)
+        start = int(np.searchsorted(truth["time"], push["start"]))  # before the label: joints yield at once
+        before = slice(int(start - LOOK_BACK * rig.rate), start)
+        torque, position = truth["external_torque"][during], truth["joint_position"][start : during.stop]
+        excursion = np.abs(position - position[0]).max(axis=0)
+        speed = np.abs(truth["joint_velocity"][before])
+        stuck = bool(
+            np.all(speed <= thresholds["joint"])
+            and np.all(np.abs(tendon_velocity(arms, truth["joint_velocity"][before])) <= thresholds["tendon"])
+        )
+        found.append(
+            Push(
+                pretension=take.pretension,
+                part=take.part,
+                onset=float(truth["time"][during.start]),
+                end=float(truth["time"][during.stop - 1]),
+                force=float(push["force"]),
+                link=int(push["link"]),
+                rise=float(push["rise"]),
+                torque=tuple(map(float, torque[np.abs(torque).argmax(axis=0), np.arange(torque.shape[1])])),
+                posture=_posture(truth["joint_velocity"], twin["joint_velocity"], start, rig.rate, thresholds["joint"]),
+                stuck=stuck,
+                excursion=tuple(map(float, excursion)),
+                stays=stuck and bool(np.all(excursion <= presliding)),
+            )
+        )
+    return found
+
+
+def tendon_velocity(arms: Numbers, joint_velocity: Numbers) -> Numbers:
+    """[..., m, n] relative tendon velocities ẋ_ij = Σ_{j'≥j} r_ij' q̇_j', m/s, where a tendon has a moment arm."""
+    parts = arms * joint_velocity[..., None, :]
+    return np.asarray(np.flip(np.cumsum(np.flip(parts, axis=-1), axis=-1), axis=-1))
+
+
+def _posture(pushed: Numbers, free: Numbers, start: int, rate: float, threshold: float) -> str:
+    """By the joint velocities [N, n]: as they were before the push, as they would have gone on without it."""
+    if np.all(np.abs(pushed[int(start - LOOK_BACK * rate) : start]) <= threshold):
+        return "rest"
+    around = int((NEAR + LONGEST_TURN) * rate)
+    velocity = np.concatenate([pushed[max(0, start - around) : start], free[start : start + around]])
+    onset = min(around, start)
+    for joint in velocity.T:
+        moves = np.flatnonzero(np.abs(joint) > threshold)
+        turns = np.flatnonzero(np.diff(np.sign(joint[moves])))
+        for last, first in zip(moves[turns], moves[turns + 1], strict=True):
+            if first - last <= LONGEST_TURN * rate and last - NEAR * rate <= onset <= first + NEAR * rate:
+                return "reversal"
+    return "motion"
