@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
-import gc
 import json
 import os
 import re
@@ -19,6 +17,7 @@ import numpy as np
 import pytest
 
 from fmu_binary import ERROR, FINGER, OK, Instance, UnpackedFmu, motion, unpack
+from leak_count import least_growth, needs_count
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="SKIPPED: nm, objdump and /proc are those of Linux")
 
@@ -94,74 +93,19 @@ def test_lower_case_percent_encoding(small_fmu_path: Path, tmp_path: Path) -> No
 # --- in a host --------------------------------------------------------------------------------------------------------
 
 
-def handles() -> int:
-    return len(os.listdir("/proc/self/fd"))
+@needs_count
+@pytest.mark.parametrize(("cycle", "count"), [("bare", 500), ("whole", 1000)])
+def test_instances_leave_nothing(small_fmu: UnpackedFmu, cycle: str, count: int) -> None:
+    """Created and stepped; or saved, in error and refused as well: no handle, less than a byte each."""
+    used, opened = least_growth(small_fmu, cycle, count)
+    assert used < count and opened == 0
 
 
-def resident_bytes() -> int:
-    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
-
-
-@linux
-def test_ten_thousand_instances_leave_nothing(small_fmu: UnpackedFmu) -> None:
-    """Created, stepped, saved, in error, refused; 100 kB in 9,000 cycles would be 11 bytes each: below any block."""
-
-    def cycles(count: int) -> None:
-        for k in range(count):
-            with Instance(small_fmu, guid=small_fmu.guid.encode() if k % 10 else b"wrong") as instance:
-                if instance.component:
-                    instance.initialise()
-                    assert instance.step(0.0) == OK
-                    instance.save()
-                    if k % 3 == 0:
-                        assert instance.step(-1.0) == ERROR
-
-    cycles(1000)
-    gc.collect()
-    before = handles(), resident_bytes()
-    cycles(9000)
-    gc.collect()
-    assert handles() == before[0]
-    assert resident_bytes() - before[1] < 600_000  # Python's own arenas come and go in steps of 256 kB
-
-
-@linux
-def test_ten_thousand_bare_instances_leave_no_byte(small_fmu: UnpackedFmu) -> None:
-    """Without Python objects in between: the allocator's own count of bytes in use."""
-    libc = ctypes.CDLL("libc.so.6")
-
-    class Usage(ctypes.Structure):
-        _fields_ = [
-            (f, ctypes.c_size_t)
-            for f in (
-                "arena",
-                "ordblks",
-                "smblks",
-                "hblks",
-                "hblkhd",
-                "usmblks",
-                "fsmblks",
-                "uordblks",
-                "fordblks",
-                "kc",
-            )
-        ]
-
-    if not hasattr(libc, "mallinfo2"):
-        pytest.skip("SKIPPED: this C library has no mallinfo2")
-    libc.mallinfo2.restype = Usage
-    arguments = (b"finger", 1, small_fmu.guid.encode(), small_fmu.location, None, 0, 0)
-
-    def cycles(count: int) -> int:
-        for _ in range(count):
-            component = small_fmu.library.fmi2Instantiate(*arguments)
-            small_fmu.library.fmi2EnterInitializationMode(component)
-            small_fmu.library.fmi2ExitInitializationMode(component)
-            small_fmu.library.fmi2FreeInstance(component)
-        return int(libc.mallinfo2().uordblks)
-
-    first = cycles(100)
-    assert cycles(10_000) - first < 10_000  # less than a byte each
+@needs_count
+def test_the_count_finds_what_one_instance_in_ten_leaves(small_fmu: UnpackedFmu) -> None:
+    count = 200
+    used, opened = least_growth(small_fmu, "losing", count)
+    assert used >= count and opened == count // 10
 
 
 SECOND = {**FINGER, "name": "other finger", "tendons": FINGER["tendons"][:2]}

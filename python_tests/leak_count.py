@@ -1,0 +1,135 @@
+"""Bytes and handles that instances of an FMU leave behind, counted in a process that does nothing else.
+
+In pytest's own process other threads (execnet's, of pytest-xdist) and Python's allocations count too. Here one thread
+runs, garbage is collected only between rounds, and the least growth of several rounds decides: a block lost by every
+instance grows in each round, what the host itself happens to keep does not.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fmu_binary import ERROR, OK, Instance, UnpackedFmu
+
+ROUNDS = 3
+C_LIBRARY = ctypes.CDLL("libc.so.6") if sys.platform == "linux" else None
+
+needs_count = pytest.mark.skipif(
+    not hasattr(C_LIBRARY, "mallinfo2"), reason="SKIPPED: mallinfo2 (glibc 2.33) and /proc are those of Linux"
+)
+
+
+class Usage(ctypes.Structure):
+    """glibc's struct mallinfo2."""
+
+    _fields_ = [
+        *((name, ctypes.c_size_t) for name in ("arena", "ordblks", "smblks", "hblks", "hblkhd")),
+        *((name, ctypes.c_size_t) for name in ("usmblks", "fsmblks", "uordblks", "fordblks", "keepcost")),
+    ]
+
+
+def bytes_in_use() -> int:
+    """In the heap and in blocks of their own (mmap), by the allocator's own count."""
+    assert C_LIBRARY
+    C_LIBRARY.mallinfo2.restype = Usage
+    usage = C_LIBRARY.mallinfo2()
+    return int(usage.uordblks + usage.hblkhd)
+
+
+def handles() -> int:
+    return len(os.listdir("/proc/self/fd"))
+
+
+# --- what is done with an instance ------------------------------------------------------------------------------------
+
+
+def bare(fmu: UnpackedFmu) -> Callable[[int], None]:
+    """Created, initialised, stepped, freed; no Python object in between."""
+    library = fmu.library
+    arguments = (b"finger", 1, fmu.guid.encode(), fmu.location, None, 0, 0)
+
+    def cycle(_: int) -> None:
+        component = library.fmi2Instantiate(*arguments)
+        library.fmi2EnterInitializationMode(component)
+        assert library.fmi2ExitInitializationMode(component) == OK
+        assert library.fmi2DoStep(component, 0.0, 0.001, 1) == OK
+        library.fmi2FreeInstance(component)
+
+    return cycle
+
+
+def whole(fmu: UnpackedFmu) -> Callable[[int], None]:
+    """Stepped, saved, in error; every tenth is refused."""
+
+    def cycle(k: int) -> None:
+        with Instance(fmu, guid=fmu.guid.encode() if k % 10 else b"wrong") as instance:
+            if instance.component:
+                instance.initialise()
+                assert instance.step(0.0) == OK
+                instance.save()
+                if k % 3 == 0:
+                    assert instance.step(-1.0) == ERROR
+
+    return cycle
+
+
+def losing(fmu: UnpackedFmu) -> Callable[[int], None]:
+    """As bare(), but every tenth instance leaves a block of the smallest size and a handle."""
+    assert C_LIBRARY
+    malloc, one = C_LIBRARY.malloc, bare(fmu)
+
+    def cycle(k: int) -> None:
+        one(k)
+        if k % 10 == 0:
+            malloc(1)
+            os.open(os.devnull, os.O_RDONLY)
+
+    return cycle
+
+
+CYCLES = {function.__name__: function for function in (bare, whole, losing)}
+
+
+def growths(cycle: Callable[[int], None], count: int) -> Iterator[tuple[int, int]]:
+    """Bytes and handles that each round of `count` cycles leaves, after a first one that is not counted."""
+    before = (0, 0)
+    for turn in range(1 + ROUNDS):
+        for k in range(count if turn else count // 5):
+            cycle(k)
+            if k % 100 == 99:
+                gc.collect()
+        gc.collect()
+        now = bytes_in_use(), handles()
+        if turn:
+            yield now[0] - before[0], now[1] - before[1]
+        before = now
+
+
+def least_growth(fmu: UnpackedFmu, cycle: str, count: int) -> tuple[int, int]:
+    """The least bytes and handles of the rounds, in a process of its own. cycle: one of CYCLES."""
+    command = [sys.executable, __file__, str(fmu.folder), cycle, str(count)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    rounds: Any = json.loads(done.stdout)
+    assert len(rounds) == ROUNDS
+    return min(used for used, _ in rounds), min(opened for _, opened in rounds)
+
+
+def main() -> None:
+    folder, cycle, count = sys.argv[1:]
+    gc.disable()
+    print(json.dumps(list(growths(CYCLES[cycle](UnpackedFmu(Path(folder))), int(count)))))
+
+
+if __name__ == "__main__":
+    main()
