@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -36,13 +37,14 @@ class Recording:
     """Measured samples of one finger.
 
     time: [N] s, strictly increasing. groups: name -> [N, m] or [N, n], units in `GROUPS`.
-    contact: [N] bool label, or None.
+    contact: [N] bool label, or None. others: columns read because they were asked for, [N] each.
     """
 
     path: Path
     time: NDArray[np.float64]
     groups: Mapping[str, NDArray[np.float64]]
     contact: NDArray[np.bool_] | None = None
+    others: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -65,18 +67,23 @@ class Recording:
                 )
 
 
-def read_recording(path: str | os.PathLike[str]) -> Recording:
-    """Reads and checks a recording (.csv or .parquet). Raises InputError naming column and row."""
+def read_recording(path: str | os.PathLike[str], *, label: str = LABEL, others: Collection[str] = ()) -> Recording:
+    """Reads and checks a recording (.csv or .parquet). Raises InputError naming column and row.
+
+    label: column of the contact label, 0 or 1. others: further columns to keep where they are there.
+    """
     file = Path(path)
-    table = read_table(file, _check_columns, flags=(LABEL,))
+    known = {LABEL, label, *others}
+    table = read_table(file, partial(_check_columns, known=known), flags=(LABEL, label))
     time = table["time"]
     check_times(file, time)
-    label = table.get(LABEL)
-    if label is not None and not np.isin(label, (0.0, 1.0)).all():
-        row = int(np.flatnonzero(~np.isin(label, (0.0, 1.0)))[0]) + 1
-        raise InputError(f"{file}: column {LABEL}, row {row}: {label[row - 1]:g}; expected 0 or 1")
+    found = table.get(label)
+    if found is not None and not np.isin(found, (0.0, 1.0)).all():
+        row = int(np.flatnonzero(~np.isin(found, (0.0, 1.0)))[0]) + 1
+        raise InputError(f"{file}: column {label}, row {row}: {found[row - 1]:g}; expected 0 or 1")
     groups = {name: np.column_stack(columns) for name, columns in _grouped(table).items()}
-    return Recording(file, time, groups, None if label is None else label.astype(bool))
+    kept = {name: table[name] for name in others if name in table}
+    return Recording(file, time, groups, None if found is None else found.astype(bool), kept)
 
 
 def check_times(file: Path, time: NDArray[np.float64]) -> None:
@@ -99,8 +106,8 @@ def _grouped(table: Mapping[str, NDArray[np.float64]]) -> dict[str, list[NDArray
     return {name: [columns[i] for i in sorted(columns)] for name, columns in found.items()}
 
 
-def _check_columns(file: Path, names: list[str]) -> None:
-    """Every column known, none missing, no gap in a group."""
+def _check_columns(file: Path, names: list[str], known: Collection[str]) -> None:
+    """Every column known, none missing, no gap in a group. known: columns beside time and the groups."""
     for separator in ";\t":
         if len(names) == 1 and separator in names[0]:
             raise InputError(f"{file}: columns separated by {separator!r}; expected commas, and points in numbers")
@@ -111,9 +118,9 @@ def _check_columns(file: Path, names: list[str]) -> None:
         match = _ELEMENT.fullmatch(name)
         if match and match[1] in GROUPS:
             counts[match[1]].add(int(match[2]))
-        elif name not in ("time", LABEL):
-            known = ", ".join(f"{group}[i]" for group in GROUPS)
-            raise InputError(f"{file}: unknown column {name!r}; expected time, {known} or {LABEL}")
+        elif name != "time" and name not in known:
+            groups = ", ".join(f"{group}[i]" for group in GROUPS)
+            raise InputError(f"{file}: unknown column {name!r}; expected time, {groups} or {LABEL}")
     for name, indices in counts.items():
         if not indices and GROUPS[name][1]:
             raise InputError(f"{file}: no column {name}[1]; expected one {name}[i] per tendon, in {GROUPS[name][0]}")

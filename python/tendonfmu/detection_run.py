@@ -1,0 +1,178 @@
+"""Runs a finger, or its FMU, over recordings for a score: the decision of every sample and what it was made of."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu import native
+from tendonfmu.description import FingerDescription, read_finger
+from tendonfmu.detection_score import DetectionScore, Signals, pooled, score_detection
+from tendonfmu.errors import InputError
+from tendonfmu.fit_residuals import model_alone
+from tendonfmu.recording import Recording
+from tendonfmu.running import check_model, run_model
+from tendonfmu.signals import INPUTS_OF_SOURCE
+
+Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+THRESHOLDS = ("threshold", "threshold_per_force")  # of `contact`, of the paper's method
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is scored. path: as given. finger: its description. packed: it came as an FMU, which is what runs."""
+
+    path: Path
+    finger: FingerDescription
+    packed: bool
+
+
+@dataclass(frozen=True)
+class Track:
+    """A finger over a recording. label: [N], False throughout without labels. outputs: of `native.Finger.run`.
+
+    residual: [N, n] N·m before the bias update, NaN where it cannot be known. force: [N] N, sensed, or None.
+    """
+
+    recording: Recording
+    label: Flags
+    outputs: Mapping[str, NDArray[Any]]
+    residual: Numbers
+    force: Numbers | None
+
+    @property
+    def alarm(self) -> Flags:
+        return np.asarray(self.outputs["contact"].ravel().astype(bool))
+
+    @property
+    def external(self) -> Numbers | None:
+        """[N, n] N·m of the reference sensor, or None."""
+        return self.recording.groups.get("external_torque")
+
+    def score(self) -> DetectionScore:
+        signals = Signals(self.residual, self.outputs["compensated_torque"], self.external, self.force)
+        return score_detection(self.recording.time, self.label, self.alarm, signals)
+
+    def decisions(self) -> DetectionScore:
+        """The same of the decisions alone."""
+        return score_detection(self.recording.time, self.label, self.alarm)
+
+
+def read_subject(model: Path) -> Subject:
+    """A description, or an FMU with the description it was made of. Raises InputError."""
+    check_model(model)
+    if model.suffix.lower() == ".json":
+        return Subject(model, read_finger(model), packed=False)
+    try:
+        with zipfile.ZipFile(model) as archive:
+            text = archive.read("resources/finger.json")
+    except (OSError, zipfile.BadZipFile):
+        raise InputError(f"{model}: not an FMU; expected FINGER.json or FINGER.fmu") from None
+    except KeyError:
+        raise InputError(f"{model}: no resources/finger.json in it; expected an FMU of `tendonfmu build`") from None
+    try:
+        return Subject(
+            model, FingerDescription(model, text, json.loads(text), native.image_from_json(text)), packed=True
+        )
+    except ValueError as refused:
+        raise InputError(f"{model}: resources/finger.json: {refused}") from None
+
+
+def run_track(subject: Subject, recording: Recording, kinematics: int, force: str | None) -> Track:
+    """force: column with the sensed force, or None. Raises InputError where the recording does not fit the finger."""
+    data = subject.finger.data
+    joints, tendons = len(data["joints"]), len(data["tendons"])
+    recording.require(joints, tendons, INPUTS_OF_SOURCE[kinematics])
+    if subject.packed:
+        outputs = _grouped(run_model(subject.path, recording, kinematics_source=kinematics))
+    else:
+        outputs = _run(data, recording, kinematics)
+    label = np.zeros(len(recording), dtype=bool) if recording.contact is None else recording.contact
+    sensed = None if force is None else recording.others.get(force)
+    return Track(recording, label, outputs, residual_of(data, recording, outputs, kinematics), sensed)
+
+
+def _run(data: Mapping[str, Any], recording: Recording, kinematics: int) -> dict[str, NDArray[Any]]:
+    try:
+        return native.run_recording(data, recording.arrays(), kinematics)
+    except native.NativeError as refused:
+        raise InputError(f"{recording.path}: {refused}") from None
+
+
+def _grouped(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """[N, n] of the columns name[1], name[2], ...; what has no index as it is."""
+    groups: dict[str, list[NDArray[Any]]] = {}
+    for name, column in columns.items():
+        groups.setdefault(name.partition("[")[0], []).append(column)
+    return {name: each[0] if name in columns else np.column_stack(each) for name, each in groups.items()}
+
+
+def residual_of(
+    data: Mapping[str, Any], recording: Recording, outputs: Mapping[str, NDArray[Any]], kinematics: int
+) -> Numbers:
+    """[N, n] r of contract section 5, step 5, N·m, NaN for the first sample.
+
+    What the update took from it is in the bias: r = compensated + (b − b before), wherever the bias did not jump by
+    itself. Where it did, at the start and end of stiction, the gain is that of the sample before in the same state of
+    contact: r = compensated/(1 − K).
+    """
+    whole = slice(0, len(recording))
+    jumps = model_alone(data, [recording.arrays()], [whole], len(recording), kinematics).jump
+    jumped = (jumps != 0).any(axis=1)
+    left, moved = outputs["compensated_torque"], np.diff(outputs["bias_torque"], axis=0, prepend=np.nan)
+    residual = left + moved
+    power = np.sum(residual**2, axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        gain = np.sum(residual * moved, axis=1) / power
+        gain[jumped] = np.nan
+        contact = np.asarray(outputs["contact"]).ravel().astype(bool)
+        before = np.where(contact, _last_known(gain, contact, 0.0), _last_known(gain, ~contact, np.nan))
+        residual[jumped] = (left / (1 - before[:, None]))[jumped]
+    residual[~np.isfinite(residual)] = np.nan
+    return np.asarray(residual)
+
+
+def _last_known(values: Numbers, chosen: Flags, first: float) -> Numbers:
+    """[N] the last finite value among the chosen up to each sample."""
+    known = chosen & np.isfinite(values)
+    index = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))
+    return np.where(index >= 0, values[index], first)
+
+
+# --- other thresholds -------------------------------------------------------------------------------------------------
+
+
+def scaled_detection(data: Mapping[str, Any], factor: float) -> dict[str, Any]:
+    """The description with all that decides on contact times a factor: the paper's thresholds, or the level of a
+    method that has one.
+    """
+    contact = dict(data["contact"])
+    if contact.get("method") in (None, "threshold"):
+        for key in THRESHOLDS:
+            if contact.get(key) is not None:
+                contact[key] = [None if value is None else factor * value for value in contact[key]]
+    else:
+        level = contact.get("level")
+        if level is None:
+            level = native.Finger.from_description(data).get("contact.level")
+        contact["level"] = factor * level
+    return {**data, "contact": contact}
+
+
+def score_scaled(subject: Subject, tracks: Sequence[Track], kinematics: int, factor: float) -> DetectionScore:
+    """All recordings again with scaled detection, pooled; without what the ROC does not show."""
+    data = scaled_detection(subject.finger.data, factor)
+    scores = []
+    for track in tracks:
+        outputs = _run(data, track.recording, kinematics)
+        scores.append(replace(track, outputs=outputs).decisions())
+    return pooled(scores)

@@ -1,0 +1,91 @@
+"""95 % confidence intervals of what a score counts and measures: exact where a distribution is known, else a bootstrap.
+
+NaN stands for what is unknown.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import betaincinv, gammaincinv  # not scipy.stats, which takes a second to import
+
+Numbers = NDArray[np.float64]
+Statistic = Callable[[Numbers], Numbers]
+
+CONFIDENCE = 0.95
+_TAIL = (1 - CONFIDENCE) / 2
+RESAMPLES = 2000
+FEWEST = 5  # events or blocks; resampling fewer says nothing of their spread
+_MOST = 500  # blocks; neighbours are put together beyond that, so that memory stays small
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value and the interval [low, high] of the true one."""
+
+    value: float
+    low: float = math.nan
+    high: float = math.nan
+
+
+def share(count: int, of: int) -> Estimate:
+    """count/of with the exact binomial interval (Clopper and Pearson 1934); unknown of none."""
+    if not of:
+        return Estimate(math.nan)
+    low = float(betaincinv(count, of - count + 1, _TAIL)) if count else 0.0
+    high = float(betaincinv(count + 1, of - count, 1 - _TAIL)) if count < of else 1.0
+    return Estimate(count / of, low, high)
+
+
+def rate(count: int, exposure: float) -> Estimate:
+    """count/exposure with the exact Poisson interval (Garwood 1936); unknown without exposure."""
+    if not exposure > 0:
+        return Estimate(math.nan)
+    low = float(gammaincinv(count, _TAIL)) if count else 0.0
+    high = float(gammaincinv(count + 1, 1 - _TAIL))
+    return Estimate(count / exposure, low / exposure, high / exposure)
+
+
+def quantile(values: Numbers, probability: float, seed: int) -> Estimate:
+    """Of [k] values, one for each event; the interval by resampling events (percentiles)."""
+    if not len(values):
+        return Estimate(math.nan)
+    found = float(np.quantile(values, probability))
+    if len(values) < FEWEST:
+        return Estimate(found)
+    drawn = np.random.default_rng(seed).integers(0, len(values), (RESAMPLES, len(values)))
+    return Estimate(found, *_percentiles(np.quantile(values[drawn], probability, axis=1)))
+
+
+def of_sums(sums: Numbers, statistic: Statistic, seed: int) -> list[Estimate]:
+    """A statistic of sums over events or blocks; the interval by resampling these (percentiles).
+
+    sums: [b, k] of each event or block. statistic: [r, k] sums over all -> [r, n].
+    """
+    values = statistic(sums.sum(axis=0, keepdims=True))[0]
+    if len(sums) < FEWEST:
+        return [Estimate(float(value)) for value in values]
+    units = _joined(sums)
+    draws = np.random.default_rng(seed).multinomial(len(units), np.full(len(units), 1 / len(units)), RESAMPLES)
+    drawn = statistic(draws @ units)
+    return [Estimate(float(value), *_percentiles(drawn[:, j])) for j, value in enumerate(values)]
+
+
+def _joined(sums: Numbers) -> Numbers:
+    """Neighbouring blocks put together until there are at most `_MOST`."""
+    if len(sums) <= _MOST:
+        return sums
+    begins = np.unique(np.linspace(0, len(sums), _MOST, endpoint=False).astype(int))
+    return np.asarray(np.add.reduceat(sums, begins, axis=0))
+
+
+def _percentiles(drawn: Numbers) -> tuple[float, float]:
+    known = drawn[np.isfinite(drawn)]
+    if len(known) < RESAMPLES / 2:
+        return math.nan, math.nan
+    low, high = np.quantile(known, [_TAIL, 1 - _TAIL])
+    return float(low), float(high)
