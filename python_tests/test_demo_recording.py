@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
 from plant_rigs import needs_plant
-from tendonfmu.contact_score import score_contacts
+from tendonfmu.detection_score import score_detection
 from tendonfmu.native import Finger
 from tendonfmu.recording import Recording, read_recording
 from tendonfmu.rig import read_rig
@@ -205,8 +205,8 @@ def test_what_is_left_of_free_motion(
         assert np.all(left < most), (name, left)
     assert not outputs["index_finger_free"]["contact"].any()
     more = recordings["index_finger_free_x4"]
-    score = score_contacts(more.time, label_of(more), outputs["index_finger_free_x4"]["contact"])
-    assert score.outside_share < 0.03
+    score = score_detection(more.time, label_of(more), outputs["index_finger_free_x4"]["contact"])
+    assert score.free_alarm_share < 0.03
 
 
 def test_most_pushes_are_found_and_felt_in_size(
@@ -214,10 +214,10 @@ def test_most_pushes_are_found_and_felt_in_size(
 ) -> None:
     recording, given = recordings["index_finger_pushes"], outputs["index_finger_pushes"]
     label = label_of(recording)
-    score = score_contacts(recording.time, label, given["contact"])
-    assert (score.pushes, score.found) == (11, 8)
+    score = score_detection(recording.time, label, given["contact"])
+    assert (len(score.events), score.found) == (11, 8)
     # one latch-up, 4.4 s from the first stroke on: the bias is frozen while in contact
-    assert score.outside_share < 0.12
+    assert score.free_alarm_share < 0.12
     late = ~label & (recording.time > 8.0)
     assert np.all(rms(given["compensated_torque"][late]) < rms(given["joint_torque"][late]) / 3)
     assert not given["contact"].ravel()[late].any()

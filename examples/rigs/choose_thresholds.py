@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from tendonfmu.contact_score import ContactScore, score_contacts
+from tendonfmu.detection_score import DetectionScore, score_detection
 from tendonfmu.native import Finger
 from tendonfmu.rig import read_rig
 from tendonfmu.simulation import Table, simulate
@@ -44,14 +44,14 @@ def record(seed: int, folder: Path) -> Table:
     return simulate(read_rig(file)).recording
 
 
-def score(description: dict[str, Any], recording: Table) -> ContactScore:
+def score(description: dict[str, Any], recording: Table) -> DetectionScore:
     tendons = len(description["tendons"])
     inputs = {
         name: np.column_stack([recording[f"{name}[{i + 1}]"] for i in range(tendons)])
         for name in ("tendon_force", "tendon_position")
     }
     outputs = Finger.from_description(description).run({"time": recording["time"], **inputs})
-    return score_contacts(recording["time"], recording["contact"].astype(bool), outputs["contact"])
+    return score_detection(recording["time"], recording["contact"].astype(bool), outputs["contact"])
 
 
 def main() -> None:
@@ -66,8 +66,8 @@ def main() -> None:
     print(f"{'factor':>9} {'found':>9} {'alarms outside':>15}   seeds with more than 10 %")
     for name, description in {**candidates, "described": described}.items():
         scores = [score(description, recording) for recording in recordings]
-        found, pushes = sum(each.found for each in scores), sum(each.pushes for each in scores)
-        shares = [each.outside_share for each in scores]
+        found, pushes = sum(each.found for each in scores), sum(len(each.events) for each in scores)
+        shares = [each.free_alarm_share for each in scores]
         much = [str(seed) for seed, share in zip(SEEDS, shares, strict=True) if share > 0.1]
         print(f"{name:>9} {found:3} of {pushes} {100 * np.mean(shares):13.1f} %   {', '.join(much) or 'none'}")
 

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.contact_score import ContactScore, score_contacts
 from tendonfmu.description import FingerDescription, read_finger
+from tendonfmu.detection_score import DetectionScore, score_detection
 from tendonfmu.errors import InputError
 from tendonfmu.figure_data import CompensationFigure, StoryFigure, compensation_figure
 from tendonfmu.fmu import run_fmu
@@ -58,7 +58,7 @@ class RecordingResult:
     seconds: float
     mean_force: float
     joints: list[JointResult]
-    score: ContactScore
+    score: DetectionScore
 
 
 @dataclass(frozen=True)
@@ -166,5 +166,5 @@ def _result(description: FingerDescription, name: str, recording: Recording, out
         seconds=float(recording.time[-1] - recording.time[0]),
         mean_force=float(recording.groups["tendon_force"].mean()),
         joints=joints,
-        score=score_contacts(recording.time, label, outputs["contact"]),
+        score=score_detection(recording.time, label, outputs["contact"]),
     )

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from tendonfmu.contact_score import ContactScore
 from tendonfmu.demo import DemoResult
+from tendonfmu.detection_score import DetectionScore
 
 Row = tuple[str, ...]
 
@@ -26,17 +26,17 @@ def demo_tables(result: DemoResult) -> Iterator[tuple[str, Row, list[Row]]]:
 def demo_lines(result: DemoResult) -> Iterator[str]:
     """What of the pushes was found, what was said without one, and the files."""
     score = result.recordings[2].score
-    yield f"(c) {score.found} of {score.pushes} pushes found"
+    yield f"(c) {score.found} of {len(score.events)} pushes found"
     for letter, recording in zip("abc", result.recordings, strict=True):
         yield f"({letter}) alarms without a push: {_alarms(recording.score)}"
     for path, what in result.files.items():
         yield f"  {path}  {what}"
 
 
-def _alarms(score: ContactScore) -> str:
-    if not score.outside:
+def _alarms(score: DetectionScore) -> str:
+    if not score.false_alarms:
         return "none"
-    begin, end = max(score.outside, key=lambda alarm: alarm[1] - alarm[0])
-    many = f"{len(score.outside)}, {100 * score.outside_share:.1f} % of the time"
+    begin, end = max(score.false_alarms, key=lambda alarm: alarm[1] - alarm[0])
+    many = f"{len(score.false_alarms)}, {100 * score.free_alarm_share:.1f} % of the time"
     feeds = " (in contact the bias is frozen: an alarm can feed itself)" if end - begin > 1.0 else ""
     return f"{many}, the longest {end - begin:.1f} s from {begin:.1f} s on{feeds}"
