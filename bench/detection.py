@@ -1,0 +1,268 @@
+"""How well contact is detected: the campaign on the virtual hand (docs/evidence.md).
+
+300 pushes of 0.1 to 2 N in 30 min at 10, 20 and 40 N of pretension (detection_cases.py), a fit on free motion at low
+pretension, simpler models with the best thresholds each (detection_rivals.py), and the best that could be done with the
+residual (matched_detector.py).
+
+    python bench/detection.py -o FOLDER [--finger NAME=FILE ...]
+
+Recordings, the fit, the rivals with their thresholds and what they found are kept in the folder; fingers are run every
+time. Writes detection.md, and detection.csv with a row for each push.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import matched_detector as matched
+import numpy as np
+from detection_cases import (
+    FINGER,
+    PARTS,
+    PRETENSIONS,
+    Numbers,
+    Push,
+    Take,
+    fitted_file,
+    pushes_of,
+    read_truth,
+    recording_file,
+    takes,
+    training_file,
+)
+from detection_rivals import Detector, HighPass, best_thresholds, from_json, make_rivals, to_json
+from detection_table import Campaign, Free, Outcome, report
+
+from tendonfmu.recording import Recording, read_recording
+from tendonfmu.whole_file import whole_file
+
+WINDOWS = (
+    0.04,
+    0.1,
+    0.3,
+)  # s after the onset at which the matched detector decides; 0.3 s: all pushes are held so long
+KINDS = ("theory", "torque_known", "effect_known")
+
+
+class Hand:
+    """Recordings and truth in a folder, made where they are missing. parts: recordings of each kind and pretension."""
+
+    def __init__(self, folder: Path, parts: int) -> None:
+        self.folder, self.parts = folder, parts
+
+    def takes(self, kind: str) -> Iterator[Take]:
+        for pretension in PRETENSIONS:
+            yield from takes(kind, pretension, self.parts)
+
+    def recording(self, take: Take) -> Recording:
+        return read_recording(recording_file(self.folder, take))
+
+    def make(self) -> None:
+        for kind in ("pushes", "twin", "free"):
+            for take in self.takes(kind):
+                say(f"{recording_file(self.folder, take)}")
+
+    def pushes(self) -> list[Push]:
+        """Of all pretensions and parts, in order."""
+        return [push for take in self.takes("pushes") for push in pushes_of(self.folder, take)]
+
+
+def say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+def _kept(file: Path, text: str) -> None:
+    with whole_file(file) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+# --- detectors --------------------------------------------------------------------------------------------------------
+
+
+def rivals(hand: Hand, product: dict[str, Any]) -> list[Detector]:
+    """With the best thresholds each."""
+    file = hand.folder / "rivals.json"
+    tuned = from_json(file) if file.exists() else []
+    free = [[hand.recording(take) for take in takes("free", pretension, hand.parts)] for pretension in PRETENSIONS]
+    flat = [each for group in free for each in group]
+    for detector in make_rivals(product, read_recording(training_file(hand.folder)), flat)[len(tuned) :]:
+        tuned.append(best_thresholds(detector, free))
+        _kept(file, to_json(tuned))
+        say(f"{detector.name}: {tuned[-1].description['contact']}")
+    return tuned
+
+
+def run(hand: Hand, detectors: Sequence[Detector]) -> list[Outcome]:
+    """Every detector over every recording with pushes and without."""
+    outcomes = [Outcome(detector.name) for detector in detectors]
+    for kind in ("pushes", "free"):
+        for take in hand.takes(kind):
+            recording = hand.recording(take)
+            for detector, outcome in zip(detectors, outcomes, strict=True):
+                _add(outcome, detector, take, recording)
+            say(f"{take.name}: {len(detectors)} detectors")
+    return outcomes
+
+
+def _add(outcome: Outcome, detector: Detector, take: Take, recording: Recording) -> None:
+    score = detector.score(recording)
+    outcome.found += [float(event.found) for event in score.events]
+    outcome.delay += [event.delay for event in score.events]
+    place = outcome.between if take.kind == "pushes" else outcome.free
+    free = place.setdefault(take.pretension, Free())
+    free.seconds += score.free_seconds
+    free.alarms += len(score.false_alarms)
+    free.alarm_seconds += score.free_alarm_share * score.free_seconds
+
+
+def run_rivals(hand: Hand, detectors: Sequence[Detector]) -> list[Outcome]:
+    """From the folder where they have run before."""
+    file = hand.folder / "rival_outcomes.json"
+    if not file.exists():
+        _kept(file, json.dumps([asdict(outcome) for outcome in run(hand, detectors)]))
+    return [_outcome(each) for each in json.loads(file.read_text(encoding="utf-8"))]
+
+
+def _outcome(image: dict[str, Any]) -> Outcome:
+    by_pretension = {
+        key: {float(pretension): Free(**free) for pretension, free in image[key].items()} for key in ("free", "between")
+    }
+    return Outcome(**image | by_pretension)
+
+
+# --- the reference ----------------------------------------------------------------------------------------------------
+
+
+def free_rms(hand: Hand, reference: Detector) -> dict[float, list[float]]:
+    """[n] N·m by pretension, before the bias update and without any detection."""
+    found = {}
+    for pretension in PRETENSIONS:
+        squares = [
+            np.mean(reference.residual(reference.inputs(hand.recording(take))) ** 2, axis=0)
+            for take in takes("free", pretension, hand.parts)
+        ]
+        found[pretension] = [float(value) for value in np.sqrt(np.mean(squares, axis=0))]
+    return found
+
+
+def run_matched(hand: Hand, reference: Detector, pushes: Sequence[Push]) -> list[Outcome]:
+    """One outcome for each window and kind of knowledge."""
+    file = hand.folder / f"matched_{reference.name}.json"
+    if not file.exists():
+        found: dict[str, list[float]] = {_matched_name(kind, after): [] for after in WINDOWS for kind in KINDS}
+        for pretension in PRETENSIONS:
+            free = [
+                matched.means(reference.residual(reference.inputs(recording)), _rate(recording))
+                for recording in (hand.recording(take) for take in takes("free", pretension, hand.parts))
+            ]
+            asked = [
+                each
+                for take in takes("pushes", pretension, hand.parts)
+                for each in _asked(hand, reference, take, [push for push in pushes if _of(push, take)])
+            ]
+            for after in WINDOWS:
+                answer = matched.answer(free, asked, after)
+                for kind in KINDS:
+                    found[_matched_name(kind, after)] += [float(value) for value in getattr(answer, kind)]
+            say(f"matched detector, {pretension:g} N")
+        _kept(file, json.dumps(found))
+    return [Outcome(name, values) for name, values in json.loads(file.read_text(encoding="utf-8")).items()]
+
+
+def _matched_name(kind: str, after: float) -> str:
+    return f"matched, {kind.replace('_', ' ')}, {1e3 * after:.0f} ms"
+
+
+def _of(push: Push, take: Take) -> bool:
+    return (push.pretension, push.part) == (take.pretension, take.part)
+
+
+def _rate(recording: Recording) -> float:
+    return 1.0 / float(np.median(np.diff(recording.time)))
+
+
+def _asked(hand: Hand, reference: Detector, take: Take, pushes: Sequence[Push]) -> list[matched.Asked]:
+    pushed, twin = (hand.recording(each) for each in (take, Take("twin", take.pretension, take.part)))
+    with_push, without = (reference.residual(reference.inputs(each)) for each in (pushed, twin))
+    passed = HighPass.of(reference.description, pushed.time, pushed.groups["tendon_force"])
+    torque = read_truth(hand.folder, take)["external_torque"]
+
+    def cut(signals: Numbers, push: Push) -> Numbers:
+        return matched.cut(signals, pushed.time, push.onset, max(WINDOWS))
+
+    asked = []
+    for push in pushes:
+        begin = np.searchsorted(pushed.time, push.onset - 0.5)
+        own = np.where((pushed.time >= push.onset - 0.1)[:, None], torque, 0.0)  # nothing of the push before
+        filtered = np.zeros_like(torque)
+        part = slice(int(begin), int(begin) + round(1.5 * _rate(pushed)))
+        filtered[part] = passed(own[part])
+        asked.append(matched.Asked(cut(filtered, push), cut(with_push - without, push), cut(with_push, push)))
+    return asked
+
+
+# --- the campaign -----------------------------------------------------------------------------------------------------
+
+
+def campaign(folder: Path, fingers: Sequence[Detector], parts: int = PARTS) -> Campaign:
+    """fingers: run beside the example's description and the fitted one, with the thresholds that they have."""
+    hand = Hand(folder, parts)
+    hand.make()
+    fitted = Detector("fitted", json.loads(fitted_file(folder).read_text(encoding="utf-8")))
+    described = Detector("description", json.loads(FINGER.read_text(encoding="utf-8")))
+    pushes = hand.pushes()
+    others = run_rivals(hand, rivals(hand, fitted.description))
+    best = run_matched(hand, fitted, pushes)
+    products = run(hand, [described, fitted, *fingers])
+    return Campaign(pushes, free_rms(hand, fitted), [*products, *others, *best], fitted.name)
+
+
+def write_pushes(file: Path, found: Campaign) -> None:
+    """A row for each push: what was true of it, its size, and of every detector whether it was found, and the delay."""
+    with whole_file(file) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
+        rows = []
+        for k, (push, size) in enumerate(zip(found.pushes, found.sizes, strict=True)):
+            row: dict[str, Any] = asdict(push) | {"size": float(size)}
+            for name in ("torque", "excursion"):
+                row |= {f"{name}[{j}]": value for j, value in enumerate(row.pop(name), start=1)}
+            for outcome in found.outcomes:
+                row[f"found: {outcome.name}"] = outcome.found[k]
+                if outcome.delay:
+                    row[f"delay: {outcome.name}"] = outcome.delay[k]
+            rows.append(row)
+        writer = csv.DictWriter(stream, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("-o", "--output", type=Path, help="folder of everything; default: a temporary one")
+    parser.add_argument("--finger", action="append", default=[], metavar="NAME=FILE", help="run beside the others")
+    parser.add_argument("--parts", type=int, default=PARTS, help="of 10 min and 100 pushes, by pretension")
+    given = parser.parse_args()
+    folder = given.output or Path(tempfile.mkdtemp())
+    folder.mkdir(parents=True, exist_ok=True)
+    fingers = []
+    for each in given.finger:
+        name, separator, file = each.partition("=")
+        if not separator or not Path(file).is_file():
+            parser.error(f"--finger {each}: expected NAME=FILE with a finger description that exists")
+        fingers.append(Detector(name, json.loads(Path(file).read_text(encoding="utf-8"))))
+    found = campaign(folder, fingers, given.parts)
+    write_pushes(folder / "detection.csv", found)
+    text = report(found)
+    _kept(folder / "detection.md", text)
+    print(text)
+
+
+if __name__ == "__main__":
+    main()
