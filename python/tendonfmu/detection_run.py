@@ -95,15 +95,15 @@ def run_track(subject: Subject, recording: Recording, kinematics: int, force: st
     if subject.packed:
         outputs = _grouped(run_model(subject.path, recording, kinematics_source=kinematics))
     else:
-        outputs = _run(data, recording, kinematics)
+        outputs = _run(subject.finger.image, recording, kinematics)
     label = np.zeros(len(recording), dtype=bool) if recording.contact is None else recording.contact
     sensed = None if force is None else recording.others.get(force)
     return Track(recording, label, outputs, residual_of(data, recording, outputs, kinematics), sensed)
 
 
-def _run(data: Mapping[str, Any], recording: Recording, kinematics: int) -> dict[str, NDArray[Any]]:
+def _run(image: bytes, recording: Recording, kinematics: int) -> dict[str, NDArray[Any]]:
     try:
-        return native.run_recording(data, recording.arrays(), kinematics)
+        return native.Finger(image, kinematics).run(recording.arrays())
     except native.NativeError as refused:
         raise InputError(f"{recording.path}: {refused}") from None
 
@@ -170,9 +170,6 @@ def scaled_detection(data: Mapping[str, Any], factor: float) -> dict[str, Any]:
 
 def score_scaled(subject: Subject, tracks: Sequence[Track], kinematics: int, factor: float) -> DetectionScore:
     """All recordings again with scaled detection, pooled; without what the ROC does not show."""
-    data = scaled_detection(subject.finger.data, factor)
-    scores = []
-    for track in tracks:
-        outputs = _run(data, track.recording, kinematics)
-        scores.append(replace(track, outputs=outputs).decisions())
-    return pooled(scores)
+    image = native.image_from_json(json.dumps(scaled_detection(subject.finger.data, factor)))
+    runs = (replace(track, outputs=_run(image, track.recording, kinematics)) for track in tracks)
+    return pooled([run.decisions() for run in runs])

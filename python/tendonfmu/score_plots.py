@@ -32,7 +32,9 @@ from tendonfmu.score_figures import ContactFigure, DelayFigure, EventFigure, Roc
 
 JOINT_COLOURS = (BLUE, VERMILION, GREEN, PURPLE)
 LABELLED = "#F0C27A"
-_HEAT = LinearSegmentedColormap.from_list("torque", ["#FFFFFF", "#BBD9EE", SKY, BLUE, "#08306B"])
+_HEAT = LinearSegmentedColormap.from_list("torque", ["#FFFFFF", "#BBD9EE", SKY, BLUE, "#08306B"]).with_extremes(
+    bad=LIGHT
+)
 _TITLE, _LABEL, _LEGEND = 14.0, 12.5, 11.5  # pt
 
 
@@ -118,7 +120,6 @@ def draw_events(data: EventFigure, target: Target) -> None:
         vmin=0.0,
         extent=(data.begin, data.end, count - 0.5, -0.5),
     )
-    image.cmap.set_bad(LIGHT)
     rows, half = np.arange(count), 0.36
     axes.axvline(0.0, color=DARK, linewidth=1.2)
     inside = data.length < data.end
