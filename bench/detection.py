@@ -28,6 +28,7 @@ from detection_cases import (
     FINGER,
     PARTS,
     PRETENSIONS,
+    TWINS,
     Numbers,
     Push,
     Take,
@@ -35,11 +36,13 @@ from detection_cases import (
     pushes_of,
     read_truth,
     recording_file,
+    resting,
     takes,
     training_file,
 )
 from detection_rivals import Detector, HighPass, best_thresholds, from_json, make_rivals, to_json
 from detection_table import Campaign, Free, Outcome, report
+from numpy.typing import NDArray
 
 from tendonfmu.recording import Recording, read_recording
 from tendonfmu.whole_file import whole_file
@@ -66,13 +69,13 @@ class Hand:
         return read_recording(recording_file(self.folder, take))
 
     def make(self) -> None:
-        for kind in ("pushes", "twin", "free"):
+        for kind in (*TWINS, *TWINS.values(), "free"):
             for take in self.takes(kind):
                 say(f"{recording_file(self.folder, take)}")
 
     def pushes(self) -> list[Push]:
         """Of all pretensions and parts, in order."""
-        return [push for take in self.takes("pushes") for push in pushes_of(self.folder, take)]
+        return [push for kind in TWINS for take in self.takes(kind) for push in pushes_of(self.folder, take)]
 
 
 def say(text: str) -> None:
@@ -103,7 +106,7 @@ def rivals(hand: Hand, product: dict[str, Any]) -> list[Detector]:
 def run(hand: Hand, detectors: Sequence[Detector]) -> list[Outcome]:
     """Every detector over every recording with pushes and without."""
     outcomes = [Outcome(detector.name) for detector in detectors]
-    for kind in ("pushes", "free"):
+    for kind in (*TWINS, "free"):
         for take in hand.takes(kind):
             recording = hand.recording(take)
             for detector, outcome in zip(detectors, outcomes, strict=True):
@@ -116,7 +119,7 @@ def _add(outcome: Outcome, detector: Detector, take: Take, recording: Recording)
     score = detector.score(recording)
     outcome.found += [float(event.found) for event in score.events]
     outcome.delay += [event.delay for event in score.events]
-    place = outcome.between if take.kind == "pushes" else outcome.free
+    place = outcome.between if take.kind in TWINS else outcome.free
     free = place.setdefault(take.pretension, Free())
     free.seconds += score.free_seconds
     free.alarms += len(score.false_alarms)
@@ -157,23 +160,27 @@ def run_matched(hand: Hand, reference: Detector, pushes: Sequence[Push]) -> list
     """One outcome for each window and kind of knowledge."""
     file = hand.folder / f"matched_{reference.name}.json"
     if not file.exists():
-        found: dict[str, list[float]] = {_matched_name(kind, after): [] for after in WINDOWS for kind in KINDS}
+        found = {_matched_name(kind, after): np.zeros(len(pushes)) for after in WINDOWS for kind in KINDS}
         for pretension in PRETENSIONS:
-            free = [
-                matched.means(reference.residual(reference.inputs(recording)), _rate(recording))
-                for recording in (hand.recording(take) for take in takes("free", pretension, hand.parts))
-            ]
+            quiet = [_quiet(hand, reference, take) for take in takes("free", pretension, hand.parts)]
+            mine = [push for push in pushes if push.pretension == pretension]
             asked = [
                 each
-                for take in takes("pushes", pretension, hand.parts)
-                for each in _asked(hand, reference, take, [push for push in pushes if _of(push, take)])
+                for kind in TWINS
+                for take in takes(kind, pretension, hand.parts)
+                for each in _asked(hand, reference, take, [push for push in mine if _of(push, take)])
             ]
-            for after in WINDOWS:
-                answer = matched.answer(free, asked, after)
-                for kind in KINDS:
-                    found[_matched_name(kind, after)] += [float(value) for value in getattr(answer, kind)]
-            say(f"matched detector, {pretension:g} N")
-        _kept(file, json.dumps(found))
+            for rest in (True, False):
+                free = [matched.Quiet(residual, still == rest) for residual, still in quiet]
+                own = [each for each, push in zip(asked, mine, strict=True) if (push.posture == "rest") == rest]
+                chosen = [push.pretension == pretension and (push.posture == "rest") == rest for push in pushes]
+                for after in WINDOWS:
+                    answer = matched.answer(free, own, after)
+                    for kind in KINDS:
+                        found[_matched_name(kind, after)][chosen] = getattr(answer, kind)
+                    state = f"{pretension:g} N, {'rest' if rest else 'motion'}, {1e3 * after:.0f} ms"
+                    say(f"matched detector, {state}: limit of {answer.limit:.1f} standard deviations")
+        _kept(file, json.dumps({name: values.tolist() for name, values in found.items()}))
     return [Outcome(name, values) for name, values in json.loads(file.read_text(encoding="utf-8")).items()]
 
 
@@ -182,15 +189,23 @@ def _matched_name(kind: str, after: float) -> str:
 
 
 def _of(push: Push, take: Take) -> bool:
-    return (push.pretension, push.part) == (take.pretension, take.part)
+    return (push.kind, push.pretension, push.part) == (take.kind, take.pretension, take.part)
 
 
 def _rate(recording: Recording) -> float:
     return 1.0 / float(np.median(np.diff(recording.time)))
 
 
+def _quiet(hand: Hand, reference: Detector, take: Take) -> tuple[Numbers, NDArray[np.bool_]]:
+    """Means of the residual [N, n], and whether the finger rests [N]."""
+    recording, truth = hand.recording(take), read_truth(hand.folder, take)
+    residual = matched.means(reference.residual(reference.inputs(recording)), _rate(recording))
+    still = resting(truth["joint_velocity"], _rate(recording), reference.description)
+    return residual, matched.means(still[:, None].astype(float), _rate(recording))[:, 0] == 1.0
+
+
 def _asked(hand: Hand, reference: Detector, take: Take, pushes: Sequence[Push]) -> list[matched.Asked]:
-    pushed, twin = (hand.recording(each) for each in (take, Take("twin", take.pretension, take.part)))
+    pushed, twin = (hand.recording(each) for each in (take, take.twin))
     with_push, without = (reference.residual(reference.inputs(each)) for each in (pushed, twin))
     passed = HighPass.of(reference.description, pushed.time, pushed.groups["tendon_force"])
     torque = read_truth(hand.folder, take)["external_torque"]
@@ -222,7 +237,8 @@ def campaign(folder: Path, fingers: Sequence[Detector], parts: int = PARTS) -> C
     others = run_rivals(hand, rivals(hand, fitted.description))
     best = run_matched(hand, fitted, pushes)
     products = run(hand, [described, fitted, *fingers])
-    return Campaign(pushes, free_rms(hand, fitted), [*products, *others, *best], fitted.name)
+    detailed = [*(each.name for each in (*products, others[-1])), _matched_name("effect_known", max(WINDOWS))]
+    return Campaign(pushes, free_rms(hand, fitted), [*products, *others, *best], fitted.name, detailed)
 
 
 def write_pushes(file: Path, found: Campaign) -> None:

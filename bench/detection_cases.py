@@ -2,8 +2,10 @@
 
 The rig is examples/rigs/index_finger.json. Its strokes come in stretches of 6 to 13 s, with all joints at rest between
 them; a push begins anywhere within its slot of 6 s, whatever the finger does then. Each pretension has, of other seeds
-each, three recordings of 10 min with 100 pushes, and three without any. Every pushed recording has a *twin*: the same
-motion and the same sensor noise without the pushes. What differs between the two is what a push does to the signals.
+each, three recordings of 10 min with 100 pushes whose force is uniform in its logarithm, so that there are many light
+ones, three with 100 pushes whose force is uniform, so that there are many firm ones, and three without any. Every
+pushed recording has a *twin*: the same motion and the same sensor noise without the pushes. What differs between the
+two is what a push does to the signals.
 
 Everything is kept in a folder under its name, and what is there is not made again.
 """
@@ -14,7 +16,7 @@ import json
 import math
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -50,19 +52,20 @@ PUSHES = 100  # in one
 TRAINING_DURATION = 400.0  # s
 
 STRETCH, STILL = (6.0, 13.0), (0.7, 2.0)  # s: strokes with the rest at both ends; that rest
-FORCE = (0.1, 2.0)  # N, uniform in its logarithm
+FORCE = (0.1, 2.0)  # N, uniform in its logarithm or itself
 RISE, HOLD = (0.01, 0.05), (0.3, 1.0)  # s; a fall is drawn like a rise
 EARLIEST, LATEST = 0.5, 4.4  # s into a push's slot that it begins
 LEAST_FORCE = 0.01  # N, from which the label says contact: a push is labelled within its first 5 ms
 NEAR = 0.15  # s between the onset and a joint's turning round,
 LONGEST_TURN = 0.5  # s, which begins and ends with motion and takes no longer than this
 LOOK_BACK = 0.05  # s before the push in which a finger at rest does not move
+TWINS = {"light": "twin", "firm": "firm_twin"}
 _MOTION, _PUSH, _NOISE, _FORCES = range(4)  # what a seed is of
 
 
 @dataclass(frozen=True)
 class Take:
-    """One recording: kind "pushes", "free" or "twin" (of the pushes), pretension N, part from 1."""
+    """One recording. kind: "light" or "firm" pushes, one of their `TWINS`, or "free". pretension: N. part: from 1."""
 
     kind: str
     pretension: float
@@ -72,9 +75,13 @@ class Take:
     def name(self) -> str:
         return f"{self.kind}_{self.pretension:g}_{self.part}"
 
+    @property
+    def twin(self) -> Take:
+        return replace(self, kind=TWINS[self.kind])
+
     def seed(self, what: int) -> int:
         """A twin has the seeds of its pushes."""
-        kind = 1 if self.kind == "free" else 0
+        kind = {"free": 1, "firm": 2, "firm_twin": 2}.get(self.kind, 0)
         return 100_000 + 1000 * round(self.pretension) + 100 * kind + 10 * self.part + what
 
 
@@ -82,12 +89,14 @@ class Take:
 class Push:
     """One push and what was true of it.
 
-    onset, end: s, first and last labelled sample. force: N. link: from 1. torque: [n] N·m, the external torque of the
-    largest magnitude in each joint. posture: "rest", "motion" or "reversal". stuck: no tendon and no joint moved faster
-    than the description's thresholds just before. excursion: [n] rad, how far each joint moved during the push.
-    stays: stuck, and no joint moved farther than the rig's presliding distance of joints.
+    kind, pretension, part: of the recording. onset, end: s, first and last labelled sample. force: N. link: from 1.
+    rise: s. torque: [n] N·m, the external torque of the largest magnitude in each joint. posture: "rest", "motion" or
+    "reversal". stuck: no tendon and no joint moved faster than the description's thresholds just before. excursion: [n]
+    rad, how far each joint moved during the push. stays: stuck, and no joint moved farther than the rig's presliding
+    distance of joints.
     """
 
+    kind: str
     pretension: float
     part: int
     onset: float
@@ -139,21 +148,23 @@ def motion_table(base: Mapping[str, Any], seed: int, duration: float) -> Table:
     return table
 
 
-def _placed(pushes: list[dict[str, Any]], seed: int) -> list[dict[str, Any]]:
-    """Pushes of the rig's recipe, each in its slot and with a force uniform in its logarithm."""
-    draws = Draws(seed, 3)
+def _placed(pushes: list[dict[str, Any]], take: Take) -> list[dict[str, Any]]:
+    """Pushes of the rig's recipe, each in its slot and with a force of its own."""
+    draws, slot = Draws(take.seed(_FORCES), 3), DURATION / PUSHES
     low, high = (math.log(force) for force in FORCE)
-    slot = DURATION / PUSHES
-    return [
-        push | {"start": k * slot + draws.between(EARLIEST, LATEST), "force": math.exp(draws.between(low, high))}
-        for k, push in enumerate(pushes)
-    ]
+    placed = []
+    for k, push in enumerate(pushes):
+        start = k * slot + draws.between(EARLIEST, LATEST)
+        force = math.exp(draws.between(low, high)) if take.kind == "light" else draws.between(*FORCE)
+        placed.append(push | {"start": start, "force": force})
+    return placed
 
 
 def write_rig(folder: Path, take: Take) -> Path:
     """The rig of a recording and its motion file."""
     base = json.loads(RIG.read_text(encoding="utf-8"))
-    motion = folder / f"motion_{take.pretension:g}_{take.part}{'_free' if take.kind == 'free' else ''}.parquet"
+    of = take.kind.removesuffix("twin").removesuffix("_") or "light"
+    motion = folder / f"motion_{of}_{take.pretension:g}_{take.part}.parquet"
     if not motion.exists():
         write_table(motion, motion_table(base, take.seed(_MOTION), DURATION))
     rig: dict[str, Any] = {
@@ -166,10 +177,10 @@ def write_rig(folder: Path, take: Take) -> Path:
         "recording": {"duration": DURATION, "columns": ["joint_position", "external_torque", "contact"]},
     }
     file = folder / f"{take.name}.json"
-    if take.kind == "pushes":
+    if take.kind in TWINS:
         recipe = {"count": PUSHES, "seed": take.seed(_PUSH), "rise": RISE, "hold": HOLD, "where": "anywhere"}
         file.write_text(json.dumps(rig | {"pushes": recipe | {"gap": [0.0, 0.0]}}), encoding="utf-8")
-        rig["pushes"] = _placed(list(read_rig(file).expanded["pushes"]), take.seed(_FORCES))
+        rig["pushes"] = _placed(list(read_rig(file).expanded["pushes"]), take)
     file.write_text(json.dumps(rig), encoding="utf-8")
     return file
 
@@ -225,9 +236,9 @@ def fitted_file(folder: Path) -> Path:
 
 
 def pushes_of(folder: Path, take: Take) -> list[Push]:
-    """All pushes of a recording of kind "pushes"; without the push, a joint moves as in the twin."""
+    """All pushes of a recording; without the push, a joint moves as in the twin."""
     rig = read_rig(write_rig(folder, take))
-    truth, twin = read_truth(folder, take), read_truth(folder, Take("twin", take.pretension, take.part))
+    truth, twin = read_truth(folder, take), read_truth(folder, take.twin)
     label = read_recording(recording_file(folder, take)).contact
     assert label is not None
     thresholds = rig.finger.data["velocity_threshold"]
@@ -249,6 +260,7 @@ def pushes_of(folder: Path, take: Take) -> list[Push]:
         )
         found.append(
             Push(
+                kind=take.kind,
                 pretension=take.pretension,
                 part=take.part,
                 onset=float(truth["time"][during.start]),
@@ -270,6 +282,13 @@ def tendon_velocity(arms: Numbers, joint_velocity: Numbers) -> Numbers:
     """[..., m, n] relative tendon velocities ẋ_ij = Σ_{j'≥j} r_ij' q̇_j', m/s, where a tendon has a moment arm."""
     parts = arms * joint_velocity[..., None, :]
     return np.asarray(np.flip(np.cumsum(np.flip(parts, axis=-1), axis=-1), axis=-1))
+
+
+def resting(joint_velocity: Numbers, rate: float, description: Mapping[str, Any]) -> Flags:
+    """[N] no joint moved faster than the description's threshold in the `LOOK_BACK` before, [N, n] rad/s."""
+    still = np.all(np.abs(joint_velocity) <= description["velocity_threshold"]["joint"], axis=1)
+    moved = np.maximum.accumulate(np.where(still, -1, np.arange(len(still))))
+    return np.asarray(np.arange(len(still)) - moved > round(LOOK_BACK * rate))
 
 
 def _posture(pushed: Numbers, free: Numbers, start: int, rate: float, threshold: float) -> str:

@@ -46,12 +46,16 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Campaign:
-    """pushes, sizes: all, in the order of every outcome. free_rms: [n] N·m by pretension, of the reference finger."""
+    """pushes: all, in the order of every outcome. free_rms: [n] N·m by pretension, of the reference finger.
+
+    detailed: names of the outcomes that are shown by posture, too.
+    """
 
     pushes: Sequence[Push]
     free_rms: Mapping[float, Sequence[float]]
     outcomes: Sequence[Outcome]
     reference: str
+    detailed: Sequence[str]
 
     @property
     def sizes(self) -> Numbers:
@@ -104,7 +108,7 @@ def _by_size(campaign: Campaign, pretension: float) -> str:
 
 def _by_posture(campaign: Campaign, outcome: Outcome) -> str:
     kinds: list[tuple[str, Callable[[Push], bool]]] = [
-        *((posture, lambda push, posture=posture: push.posture == posture) for posture in POSTURES),  # type: ignore[misc]
+        *((posture, lambda push, posture=posture: push.posture == posture) for posture in POSTURES),
         ("all stuck, break-away", lambda push: push.stuck and not push.stays),
         ("all stuck, below break-away", lambda push: push.stays),
     ]

@@ -1,24 +1,25 @@
-"""The best that any detector could do with a given residual: one that knows each push beforehand.
+"""The best that a detector could do with a given residual: one that knows each push beforehand.
 
 Of every push it knows when it comes and what it does to the residual of all joints; the only question is whether it is
-there. The free residual is taken as a stationary, coloured Gaussian process with the covariance C of the free
-recordings of the same pretension, over windows of all joints at 100 Hz (means of 10 ms) from 0.1 s before the onset to
-some time after it. The likelihood ratio is then linear in the residual x: wᵀ x with C w = s, s the known signal, and it
-passes a threshold u with probability Φ(d − u), d² = sᵀ C⁻¹ s (Kay, *Fundamentals of Statistical Signal Processing:
-Detection Theory*, 1998, sect. 4.4).
+there. The free residual is taken as a Gaussian process, coloured, stationary while the finger rests and stationary
+while it moves, with the covariances C of the free recordings of the same pretension over windows of all joints at
+100 Hz (means of 10 ms), from 0.1 s before the onset to some time after it. The likelihood ratio is then linear in the
+residual x: wᵀ x with C w = s, s the known signal, and it passes a threshold u with probability Φ(d − u),
+d² = sᵀ C⁻¹ s (Kay, *Fundamentals of Statistical Signal Processing: Detection Theory*, 1998, sect. 4.4).
 
 It is given three ways:
 
 - *theory*: u by the Gaussian tail for one false alarm in 10 min, 100 tests a second taken as independent; s is the true
-  external torque behind the bias filter. As optimistic as it gets: friction lets all of the torque through, the
-  residual has no outliers, rest and motion have the same covariance.
+  external torque behind the bias filter. As optimistic as it gets: friction lets all of the torque through, and the
+  residual has no outliers.
 - *torque known*: the same s, but u is what wᵀ x exceeds once in 10 min of the free recordings themselves, and x is what
-  the push left in the residual.
+  was left of the push in the residual.
 - *effect known*: likewise, with s the difference of the residual with and without the push (the twin recording), after
-  friction took its part. This is what is left to be found at all.
+  friction took its part. This is what is left to be found.
 
-No detector that must find out when, where and in which direction somebody pushes can reach this: it has to ask all
-these questions at once, at the same rate of false alarms.
+A detector that must find out when, where and in which direction somebody pushes asks all these questions at once, at
+the same rate of false alarms. Where free residuals have outliers, as here, one that is not linear, or that knows more
+of the motion than whether there is any, can do better than the last two.
 """
 
 from __future__ import annotations
@@ -55,17 +56,26 @@ class Asked:
 
 
 @dataclass(frozen=True)
+class Quiet:
+    """A free recording. residual: [N, n] N·m, means. chosen: [N] whether the finger is in the state in question."""
+
+    residual: Numbers
+    chosen: Flags
+
+
+@dataclass(frozen=True)
 class Answer:
     """Of a window that ends `after` s after the onset, by push [k].
 
-    distance: d of the known torque. theory: probability of detection. torque_known, effect_known: passed or not.
+    theory: probability of detection. torque_known, effect_known: passed or not. limit: the median of what the
+    statistics of known torques exceed once in 10 min, in their standard deviations; Gaussian ones would 4.15.
     """
 
     after: float
-    distance: Numbers
     theory: Numbers
     torque_known: Flags
     effect_known: Flags
+    limit: float
 
 
 def means(signals: Numbers, rate: float) -> Numbers:
@@ -83,29 +93,25 @@ def cut(signals: Numbers, time: Numbers, onset: float, longest: float) -> Number
     return means(signals[first : first + count], rate)
 
 
-def answer(free: Sequence[Numbers], asked: Sequence[Asked], after: float) -> Answer:
-    """free: [N, n] residuals of each free recording, means. asked: the pushes of the same pretension."""
+def answer(free: Sequence[Quiet], asked: Sequence[Asked], after: float) -> Answer:
+    """free: all free recordings of a pretension. asked: pushes whose onset is in the same state."""
     length = round((BEFORE + after) / STEP)
-    windows = [_windows(each, length) for each in free]
-    covariance = _covariance(windows)
-    factor = cho_factor(covariance)
-
-    def known(signals: Sequence[Numbers]) -> tuple[Numbers, Numbers, Numbers]:
-        """Templates s [k, d], weights w [k, d] of unit deviation, distances d [k]."""
-        templates = np.array([each[:length].ravel() for each in signals])
+    windows = [_windows(each.residual, length) for each in free]
+    before = round(BEFORE / STEP)
+    chosen = [each.chosen[before : before + len(part)] for each, part in zip(free, windows, strict=True)]
+    factor = cho_factor(_covariance(windows, chosen))
+    seen = np.array([each.residual[:length].ravel() for each in asked])
+    found: dict[str, tuple[Flags, Numbers, Numbers]] = {}
+    for kind in ("torque", "effect"):
+        templates = np.array([getattr(each, kind)[:length].ravel() for each in asked])
         weights = cho_solve(factor, templates.T).T
         distances = np.sqrt(np.maximum(np.sum(weights * templates, axis=1), 1e-30))
-        return templates, weights / distances[:, None], distances
-
-    seen = np.array([each.residual[:length].ravel() for each in asked])
-    found, distance = [], []
-    for kind in ("torque", "effect"):
-        _, weights, distances = known([getattr(each, kind) for each in asked])
-        limits = _limits(windows, weights)
-        found.append(np.sum(weights * seen, axis=1) > limits)
-        distance.append(distances)
+        weights /= distances[:, None]  # of unit deviation
+        limits = _limits(windows, chosen, weights)
+        found[kind] = np.sum(weights * seen, axis=1) > limits, distances, limits
     limit = float(norm.isf(PER_SECOND * STEP))
-    return Answer(after, distance[0], np.asarray(norm.sf(limit - distance[0])), found[0], found[1])
+    passed, distances, limits = found["torque"]
+    return Answer(after, np.asarray(norm.sf(limit - distances)), passed, found["effect"][0], float(np.median(limits)))
 
 
 def _windows(values: Numbers, length: int) -> Numbers:
@@ -113,31 +119,28 @@ def _windows(values: Numbers, length: int) -> Numbers:
     return np.moveaxis(np.lib.stride_tricks.sliding_window_view(values, length, axis=0), 2, 1)
 
 
-def _covariance(windows: Sequence[Numbers]) -> Numbers:
-    """[d, d], of all windows of all recordings, about 0: a push has no known sign of a mean."""
+def _covariance(windows: Sequence[Numbers], chosen: Sequence[Flags]) -> Numbers:
+    """[d, d], of all chosen windows, about 0."""
     dimension = windows[0].shape[1] * windows[0].shape[2]
     total, count = np.zeros((dimension, dimension)), 0
-    for each in windows:
+    for each, wanted in zip(windows, chosen, strict=True):
         for begin in range(0, len(each), _ROWS):
-            rows = each[begin : begin + _ROWS].reshape(-1, dimension)
+            rows = each[begin : begin + _ROWS][wanted[begin : begin + _ROWS]].reshape(-1, dimension)
             total += rows.T @ rows
             count += len(rows)
     found = total / count
     return np.asarray((1 - SHRINKAGE) * found + SHRINKAGE * np.diag(np.diag(found)))
 
 
-def _limits(windows: Sequence[Numbers], weights: Numbers) -> Numbers:
+def _limits(windows: Sequence[Numbers], chosen: Sequence[Flags], weights: Numbers) -> Numbers:
     """[k] what each statistic exceeds as often as false alarms are allowed, excesses close to each other being one."""
-    statistics = [
-        np.concatenate(
-            [
-                each[begin : begin + _ROWS].reshape(-1, weights.shape[1]) @ weights.T
-                for begin in range(0, len(each), _ROWS)
-            ]
-        )
-        for each in windows
-    ]
-    allowed = int(PER_SECOND * STEP * sum(map(len, statistics)) + 0.5)
+    statistics = []
+    for each, wanted in zip(windows, chosen, strict=True):
+        parts = (each[begin : begin + _ROWS] for begin in range(0, len(each), _ROWS))
+        found = np.concatenate([part.reshape(len(part), -1) @ weights.T for part in parts])
+        found[~wanted] = -np.inf
+        statistics.append(found)
+    allowed = int(PER_SECOND * STEP * sum(int(wanted.sum()) for wanted in chosen) + 0.5)
     return np.array([_limit([each[:, k] for each in statistics], allowed) for k in range(len(weights))])
 
 
