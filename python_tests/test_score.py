@@ -193,13 +193,26 @@ def test_the_same_seed_gives_the_same_bytes(call: Call, pushes: Table) -> None:
     assert texts[0] == texts[1] != texts[2]
 
 
-def test_scaled_detection_scales_what_decides() -> None:
+def test_scaled_detection_scales_all_that_decides() -> None:
     data = {"contact": {"threshold": [0.1, 0.2], "threshold_per_force": [None, 0.01], "hold_time": 0.05}}
     scaled = scaled_detection(data, 2.0)["contact"]
     assert scaled == {"threshold": [0.2, 0.4], "threshold_per_force": [None, 0.02], "hold_time": 0.05}
-    level = scaled_detection({"contact": {"method": "cusum", "level": 6.0, "threshold": [0.1]}}, 0.5)["contact"]
-    assert level == {"method": "cusum", "level": 3.0, "threshold": [0.1]}
     assert data["contact"]["threshold"] == [0.1, 0.2]
+    more = {
+        "threshold": [0.1],
+        "method": "cusum",
+        "innovation": {"time": 0.1, "threshold": [0.2], "threshold_per_force": None, "evidence_time": 0.02},
+        "friction_bound": {"stuck_share": 0.3, "jump_share": 4.0, "jump_time": 0.06},
+        "uncertainty": [None],
+    }
+    assert scaled_detection({"contact": more}, 4.0)["contact"] == {
+        "threshold": [0.4],
+        "method": "cusum",
+        "innovation": {"time": 0.1, "threshold": [0.8], "threshold_per_force": None, "evidence_time": 0.02},
+        "friction_bound": {"stuck_share": 1.2, "jump_share": 10.0, "jump_time": 0.06},
+        "uncertainty": [None],
+        "uncertainty_level": 12.0,
+    }
 
 
 # --- bad input --------------------------------------------------------------------------------------------------------

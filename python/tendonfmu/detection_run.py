@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,11 @@ from tendonfmu.signals import INPUTS_OF_SOURCE
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-THRESHOLDS = ("threshold", "threshold_per_force")  # of `contact`, of the paper's method
+# what decides, in the description's `contact`
+THRESHOLDS = ("threshold", "threshold_per_force")
+SHARES = ("stuck_share", "jump_share")
+UNCERTAINTY_LEVEL = ("uncertainty_level", 3.0)  # key and default
+LARGEST = {"stuck_share": 10.0, "jump_share": 10.0, "uncertainty_level": 100.0}
 
 
 @dataclass(frozen=True)
@@ -98,7 +102,12 @@ def run_track(subject: Subject, recording: Recording, kinematics: int, force: st
         outputs = _run(subject.finger.image, recording, kinematics)
     label = np.zeros(len(recording), dtype=bool) if recording.contact is None else recording.contact
     sensed = None if force is None else recording.others.get(force)
-    return Track(recording, label, outputs, residual_of(data, recording, outputs, kinematics), sensed)
+    if "residual" in outputs:  # of `native.Finger.run`, 0 at the first sample
+        residual = outputs["residual"].copy()
+        residual[0] = np.nan
+    else:
+        residual = residual_of(data, recording, outputs, kinematics)
+    return Track(recording, label, outputs, residual, sensed)
 
 
 def _run(image: bytes, recording: Recording, kinematics: int) -> dict[str, NDArray[Any]]:
@@ -152,20 +161,30 @@ def _last_known(values: Numbers, chosen: Flags, first: float) -> Numbers:
 
 
 def scaled_detection(data: Mapping[str, Any], factor: float) -> dict[str, Any]:
-    """The description with all that decides on contact times a factor: the paper's thresholds, or the level of a
-    method that has one.
+    """The description with every bound that decides on contact times a factor, as far as its range goes.
+
+    These are the thresholds of the torque and of the innovation, with the parts that friction and its uncertainty add
+    (docs/contract-additions.md, step 5): the whole right side of |r| > threshold, and of |y| > B.
     """
     contact = dict(data["contact"])
-    if contact.get("method") in (None, "threshold"):
-        for key in THRESHOLDS:
-            if contact.get(key) is not None:
-                contact[key] = [None if value is None else factor * value for value in contact[key]]
-    else:
-        level = contact.get("level")
-        if level is None:
-            level = native.Finger.from_description(data).get("contact.level")
-        contact["level"] = factor * level
+    _scale(contact, THRESHOLDS, factor)
+    for part, keys in (("innovation", THRESHOLDS), ("friction_bound", SHARES)):
+        if contact.get(part) is not None:
+            contact[part] = dict(contact[part])
+            _scale(contact[part], keys, factor)
+    if contact.get("uncertainty") is not None:
+        contact.setdefault(*UNCERTAINTY_LEVEL)
+        _scale(contact, UNCERTAINTY_LEVEL[:1], factor)
     return {**data, "contact": contact}
+
+
+def _scale(part: dict[str, Any], keys: Iterable[str], factor: float) -> None:
+    for key in keys:
+        value = part.get(key)
+        if isinstance(value, list | tuple):
+            part[key] = [None if each is None else factor * each for each in value]
+        elif value is not None:
+            part[key] = min(factor * value, LARGEST[key])
 
 
 def score_scaled(subject: Subject, tracks: Sequence[Track], kinematics: int, factor: float) -> DetectionScore:

@@ -41,8 +41,8 @@ class JointTorques:
 
 @dataclass(frozen=True)
 class ContactFigure:
-    """time: [N] s. force: [N] N, sensed, or None. labelled, found, outside: contact as labelled; alarms that found an
-    event; those outside of events and what outlasts these.
+    """time: [N] s. force: [N] N, sensed, or None. labelled: contact as labelled. found, masked, outside: alarm while an
+    event is there that is found, or missed; outside of events, and what outlasts these.
     """
 
     title: str
@@ -57,17 +57,19 @@ class ContactFigure:
 
 @dataclass(frozen=True)
 class EventFigure:
-    """A row for each event, in order of delay, the missed ones last.
+    """A row for each event, in order of delay, then the missed ones, those that began in an alarm last.
 
     begin, end: s from the onset that are drawn. torque: [e, t] N·m, compensated torque, magnitude over all joints, NaN
-    beyond the recording. found: how many. delay, length: [e] s; the delay is NaN if missed.
+    beyond the recording. most: N·m, that few rows pass. groups: (what, how many rows). delay, length: [e] s; the delay
+    is NaN if missed.
     """
 
     title: str
     begin: float
     end: float
     torque: Numbers
-    found: int
+    most: float
+    groups: list[tuple[str, int]]
     delay: Numbers
     length: Numbers
 
@@ -141,8 +143,8 @@ def contact_figure(scored: Scored) -> ContactFigure:
     begin = counts[most][2]
     track, score = scored.tracks[most], scored.scores[most]
     time = track.recording.time
-    rows = np.flatnonzero((time >= begin) & (time <= begin + SHOWN))
-    alarm = track.alarm
+    shown = (time >= begin) & (time <= begin + SHOWN)
+    rows, alarm = np.flatnonzero(shown), track.alarm
     found, masked = _by_event(track, score)
     rows = rows[:: max(1, len(rows) // _POINTS)]
     torque, left = track.outputs["joint_torque"], track.outputs["compensated_torque"]
@@ -158,26 +160,30 @@ def contact_figure(scored: Scored) -> ContactFigure:
         time=time[rows],
         joints=joints,
         force=None if track.force is None else np.abs(track.force[rows]),
-        labelled=intervals(time, track.label),
-        found=intervals(time, alarm & found),
-        masked=intervals(time, alarm & masked & ~found),
-        outside=intervals(time, alarm & ~masked & ~found),
+        labelled=intervals(time, track.label & shown),
+        found=intervals(time, alarm & found & shown),
+        masked=intervals(time, alarm & masked & ~found & shown),
+        outside=intervals(time, alarm & ~masked & ~found & shown),
     )
 
 
 def _busiest(track: Track, score: DetectionScore) -> tuple[int, int, float]:
-    """(events, false alarms, begin in s) of the window of `SHOWN` seconds with most of them, the earliest."""
+    """(events, those found, begin in s) of the window of `SHOWN` seconds with most of them, the earliest.
+
+    Of a recording without events: (0, false alarms, begin).
+    """
     time = track.recording.time
     onsets = np.array([event.onset for event in score.events])
+    found = np.array([event.onset for event in score.events if event.found])
     alarms = np.array([begin for begin, _ in score.false_alarms])
     last = max(float(time[-1]) - SHOWN, float(time[0]))
-    begins = np.clip([float(time[0]), *(onsets - 1.0), *(alarms - 1.0)], time[0], last)
+    begins = np.clip([float(time[0]), *((onsets if len(onsets) else alarms) - 1.0)], time[0], last)
 
     def within(starts: Numbers, begin: float) -> int:
         return int(((starts >= begin) & (starts <= begin + SHOWN)).sum())
 
     return max(
-        ((within(onsets, begin), within(alarms, begin), float(begin)) for begin in begins),
+        ((within(onsets, begin), within(found if len(onsets) else alarms, begin), float(begin)) for begin in begins),
         key=lambda window: (window[0], window[1], -window[2]),
     )
 
@@ -208,19 +214,32 @@ def event_figure(scored: Scored) -> EventFigure:
     rows: list[tuple[Event, Track]] = [
         (event, track) for track, score in zip(scored.tracks, scored.scores, strict=True) for event in score.events
     ]
-    rows.sort(key=lambda row: (not row[0].found, row[0].delay if row[0].found else row[0].end - row[0].onset))
+    rows.sort(key=lambda row: _order(row[0]))
     length = np.array([event.end - event.onset for event, _ in rows])
     end = min(float(length.max()) + AFTER, LONGEST)
     grid = np.linspace(-BEFORE, end, _COLUMNS)
+    torque = np.array([_row(track, event.onset + grid) for event, track in rows])
+    found = scored.summary
+    groups = {
+        "found": found.found,
+        "missed": found.events - found.found - found.masked,
+        "missed, in\nan alarm before": found.masked,
+    }
     return EventFigure(
         title=f"{scored.subject.finger.name}: {len(rows)} events",
         begin=-BEFORE,
         end=end,
-        torque=np.array([_row(track, event.onset + grid) for event, track in rows]),
-        found=scored.summary.found,
+        torque=torque,
+        most=float(np.nanquantile(torque, 0.99)),
+        groups=[(name, count) for name, count in groups.items() if count],
         delay=np.array([event.delay for event, _ in rows]),
         length=length,
     )
+
+
+def _order(event: Event) -> tuple[int, float]:
+    """Group, and place in it."""
+    return (0, event.delay) if event.found else (1 if event.silent else 2, event.end - event.onset)
 
 
 def _row(track: Track, at: Numbers) -> Numbers:

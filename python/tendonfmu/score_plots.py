@@ -31,7 +31,7 @@ from tendonfmu.plot_style import (
 from tendonfmu.score_figures import ContactFigure, DelayFigure, EventFigure, RocFigure
 
 JOINT_COLOURS = (BLUE, VERMILION, GREEN, PURPLE)
-LABELLED = "#F0C27A"
+LABELLED, PALE = "#F0C27A", "#B4BBC4"
 _HEAT = LinearSegmentedColormap.from_list("torque", ["#FFFFFF", "#BBD9EE", SKY, BLUE, "#08306B"]).with_extremes(
     bad=LIGHT
 )
@@ -64,7 +64,15 @@ def _draw_torques(above: Axes, below: Axes, data: ContactFigure) -> None:
         above.plot(data.time, 1e3 * joint.measured, color=colour, linewidth=1.1)
         below.plot(data.time, 1e3 * joint.compensated, color=colour, linewidth=1.1)
         if joint.external is not None:
-            below.plot(data.time, 1e3 * joint.external, color=colour, linewidth=1.6, linestyle=(0, (4, 2)), alpha=0.75)
+            below.plot(
+                data.time,
+                1e3 * joint.external,
+                color=colour,
+                linewidth=1.6,
+                linestyle=(0, (4, 2)),
+                alpha=0.7,
+                zorder=1.5,
+            )
     above.set_ylabel("joint torque\n(mN·m)", fontsize=_LABEL)
     below.set_ylabel("compensated\n(mN·m)", fontsize=_LABEL)
     named = zip(data.joints, JOINT_COLOURS, strict=False)
@@ -97,11 +105,12 @@ def _legend(axes: Axes, handles: Sequence[Artist]) -> None:
     axes.legend(
         handles=handles,
         loc="lower right",
-        bbox_to_anchor=(1.0, 0.98),
+        bbox_to_anchor=(1.0, 1.0),
         ncols=len(handles),
         frameon=False,
         fontsize=_LEGEND,
         borderaxespad=0.0,
+        borderpad=0.15,
         handletextpad=0.5,
         columnspacing=1.4,
     )
@@ -118,6 +127,7 @@ def draw_events(data: EventFigure, target: Target) -> None:
         interpolation="nearest",
         cmap=_HEAT,
         vmin=0.0,
+        vmax=1e3 * data.most,
         extent=(data.begin, data.end, count - 0.5, -0.5),
     )
     rows, half = np.arange(count), 0.36
@@ -125,18 +135,20 @@ def draw_events(data: EventFigure, target: Target) -> None:
     inside = data.length < data.end
     axes.vlines(data.length[inside], rows[inside] - half, rows[inside] + half, color=DARK, linewidth=1.6)
     axes.vlines(data.delay, rows - half, rows + half, color=VERMILION, linewidth=2.6)
-    if data.found < count:
-        axes.axhline(data.found - 0.5, color=DARK, linewidth=1.0, linestyle=(0, (4, 3)))
-    middles = [(0.5 * (data.found - 1), f"found ({data.found})"), (0.5 * (data.found + count - 1), "missed")]
-    shown = [each for each, some in zip(middles, (data.found, count - data.found), strict=True) if some]
-    axes.set_yticks([at for at, _ in shown], [name for _, name in shown], rotation=90, va="center", fontsize=_LABEL)
+    begin, middles = 0, []
+    for _, rows_of_group in data.groups:
+        middles.append(begin + 0.5 * (rows_of_group - 1))
+        begin += rows_of_group
+        if begin < count:
+            axes.axhline(begin - 0.5, color=DARK, linewidth=1.0, linestyle=(0, (4, 3)))
+    axes.set_yticks(middles, [f"{number} {name}" for name, number in data.groups], fontsize=_LABEL)
     axes.tick_params(axis="y", length=0)
     axes.tick_params(axis="x", labelsize=12)
     axes.spines[:].set_visible(False)
     axes.set_xlabel("time from the onset (s)", fontsize=_LABEL)
     axes.set_title(data.title, loc="left", fontsize=_TITLE, fontweight="bold", color=DARK)
     _legend_of_events(axes)
-    bar = figure.colorbar(image, ax=axes, pad=0.01, fraction=0.03)
+    bar = figure.colorbar(image, ax=axes, pad=0.01, fraction=0.03, extend="max")
     bar.set_label("compensated torque,\nall joints (mN·m)", fontsize=_LABEL)
     bar.outline.set_visible(False)
     save(figure, target, 100)
@@ -202,7 +214,7 @@ def _draw_points(axes: Axes, data: RocFigure) -> None:
         xerr=[data.rate - data.rate_low, data.rate_high - data.rate],
         yerr=[data.found - data.found_low, data.found_high - data.found],
         fmt="none",
-        ecolor=LIGHT,
+        ecolor=PALE,
         elinewidth=1.2,
     )
     axes.plot(data.rate, data.found, color=SKY, linewidth=1.0)
@@ -213,7 +225,7 @@ def _draw_points(axes: Axes, data: RocFigure) -> None:
         at = (data.rate[k], data.found[k])
         axes.annotate(f"×{data.factors[k]:g}", at, (7, 5), textcoords="offset points", fontsize=10, color=DARK)
     axes.set_xscale("symlog", linthresh=data.least)
-    axes.set_xlim(left=-0.15 * data.least)
+    axes.set_xlim(-0.15 * data.least, 2.0 * max(data.rate_high.max(), data.least))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.set_xlabel("false alarms per hour of free time", fontsize=_LABEL)
     axes.set_ylabel("events found", fontsize=_LABEL)
@@ -244,7 +256,7 @@ def draw_delays(data: DelayFigure, target: Target) -> None:
         delays, data.low, data.high, step="post", color=BLUE, alpha=0.18, linewidth=0, label="95 % interval"
     )
     above.step([0.0, *delays], [0.0, *data.share], where="post", color=BLUE, linewidth=2.0, label="found so far")
-    above.set_ylim(0.0, 1.0)
+    above.set_ylim(0.0, min(1.0, 1.3 * data.high.max()))
     above.yaxis.set_major_formatter(PercentFormatter(1.0))
     above.set_ylabel("share of all events", fontsize=_LABEL)
     above.legend(loc="upper left", frameon=False, fontsize=_LEGEND)
