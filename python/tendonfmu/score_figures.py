@@ -25,6 +25,7 @@ Numbers = NDArray[np.float64]
 SHOWN = 20.0  # s of the recording, where most events are
 JOINTS = 4  # that are drawn
 BEFORE, AFTER, LONGEST = 0.3, 0.3, 2.5  # s; of an event's row before the onset, after the end, and at most after onset
+TAIL = 2.0  # times the delay of 90 %; what is found later is not drawn, but told
 NAMED = (0.25, 0.5, 1.0, 2.0, 4.0)  # factors
 _COLUMNS, _POINTS = 560, 5000
 
@@ -100,15 +101,21 @@ class RocFigure:
 
 @dataclass(frozen=True)
 class DelayFigure:
-    """delays: [k] s, increasing. share, low, high: [k] of all events found within that. marks: name -> s."""
+    """delays: [k] s, increasing. share, low, high: [k] of all events found within that. median, ninety: s.
+
+    end: s that are drawn. later: how many delays are beyond. bins: of the histogram.
+    """
 
     title: str
     delays: Numbers
     share: Numbers
     low: Numbers
     high: Numbers
-    events: int
-    marks: dict[str, float]
+    median: float
+    ninety: float
+    end: float
+    later: int
+    bins: int
 
 
 def write_figures(scored: Scored, folder: Path) -> dict[Path, str]:
@@ -285,7 +292,10 @@ def _named(points: Sequence[RocPoint]) -> list[int]:
 
 def delay_figure(scored: Scored) -> DelayFigure:
     delays = np.sort([event.delay for score in scored.scores for event in score.events if event.found])
-    total = scored.summary.events
+    total, known = scored.summary.events, scored.summary.delay
+    end = float(delays[-1])
+    if end > TAIL * known["ninety_percent"].value > 0:
+        end = TAIL * known["ninety_percent"].value
     within = [share(k, total) for k in range(1, len(delays) + 1)]
     return DelayFigure(
         title=f"{scored.subject.finger.name}: {len(delays)} of {total} events found",
@@ -293,6 +303,9 @@ def delay_figure(scored: Scored) -> DelayFigure:
         share=np.array([each.value for each in within]),
         low=np.array([each.low for each in within]),
         high=np.array([each.high for each in within]),
-        events=total,
-        marks={"median": scored.summary.delay["median"].value, "90 %": scored.summary.delay["ninety_percent"].value},
+        median=known["median"].value,
+        ninety=known["ninety_percent"].value,
+        end=end,
+        later=int((delays > end).sum()),
+        bins=int(np.clip(len(delays) // 2, 12, 40)),
     )

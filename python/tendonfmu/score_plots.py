@@ -35,6 +35,9 @@ LABELLED, PALE = "#F0C27A", "#B4BBC4"
 _HEAT = LinearSegmentedColormap.from_list("torque", ["#FFFFFF", "#BBD9EE", SKY, BLUE, "#08306B"]).with_extremes(
     bad=LIGHT
 )
+Dash = tuple[float, tuple[float, ...]]
+MEDIAN: Dash = (0.0, ())
+NINETY: Dash = (0.0, (4.0, 3.0))
 _TITLE, _LABEL, _LEGEND = 14.0, 12.5, 11.5  # pt
 
 
@@ -238,19 +241,8 @@ def draw_delays(data: DelayFigure, target: Target) -> None:
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1.0])
     for axes in (above, below):
         clean(axes)
-        for name, value in data.marks.items():
-            axes.axvline(1e3 * value, color=VERMILION, linewidth=1.2, linestyle=(0, (4, 3)))
-            if axes is above:
-                axes.text(
-                    1e3 * value,
-                    1.02,
-                    f"{name} {1e3 * value:.0f} ms",
-                    ha="center",
-                    va="bottom",
-                    fontsize=_LEGEND,
-                    color=VERMILION,
-                    transform=axes.get_xaxis_transform(),
-                )
+        for value, style in ((data.median, MEDIAN), (data.ninety, NINETY)):
+            axes.axvline(1e3 * value, color=VERMILION, linewidth=1.3, linestyle=style)
     delays = 1e3 * data.delays
     above.fill_between(
         delays, data.low, data.high, step="post", color=BLUE, alpha=0.18, linewidth=0, label="95 % interval"
@@ -259,11 +251,18 @@ def draw_delays(data: DelayFigure, target: Target) -> None:
     above.set_ylim(0.0, min(1.0, 1.3 * data.high.max()))
     above.yaxis.set_major_formatter(PercentFormatter(1.0))
     above.set_ylabel("share of all events", fontsize=_LABEL)
-    above.legend(loc="upper left", frameon=False, fontsize=_LEGEND)
-    above.set_title(data.title, loc="left", fontsize=_TITLE, fontweight="bold", color=DARK, pad=22)
-    below.hist(delays, bins="auto" if len(delays) > 30 else min(10, len(delays)), color=ORANGE, edgecolor="white")
+    handles = above.get_legend_handles_labels()[0]
+    for value, style, name in ((data.median, MEDIAN, "median"), (data.ninety, NINETY, "90 % within")):
+        label = f"{name} {1e3 * value:.0f} ms"
+        handles.append(Line2D([], [], color=VERMILION, linewidth=1.3, linestyle=style, label=label))
+    _legend(above, handles)
+    above.set_title(data.title, loc="left", fontsize=_TITLE, fontweight="bold", color=DARK)
+    if data.later:
+        said = f"{data.later} later, up to {delays[-1]:.0f} ms →"
+        above.text(0.995, 0.04, said, ha="right", fontsize=_LEGEND, color=DARK, transform=above.transAxes)
+    below.hist(delays, bins=data.bins, range=(0.0, 1e3 * data.end), color=ORANGE, edgecolor="white")
     below.yaxis.set_major_locator(MaxNLocator(integer=True, nbins=4))
     below.set_ylabel("events", fontsize=_LABEL)
     below.set_xlabel("delay from the onset (ms)", fontsize=_LABEL)
-    below.set_xlim(left=0.0)
+    below.set_xlim(0.0, 1.03e3 * max(data.end, 1e-3))
     save(figure, target, 100)
