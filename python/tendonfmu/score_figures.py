@@ -131,7 +131,7 @@ def write_figures(scored: Scored, folder: Path) -> dict[Path, str]:
     if scored.summary.events:
         written[folder / "events.png"] = "every event from its onset on"
         draw_events(event_figure(scored), folder / "events.png")
-    if scored.roc and scored.summary.events:
+    if scored.roc and scored.summary.events and scored.summary.free_minutes:
         written[folder / "roc.png"] = "found events against false alarms, over thresholds"
         draw_roc(roc_figure(scored, scored.roc), folder / "roc.png")
     if scored.summary.found:
@@ -277,7 +277,7 @@ def roc_figure(scored: Scored, points: Sequence[RocPoint]) -> RocFigure:
         masked=np.array([point.masked / point.events for point in points]),
         own=int(np.argmin([abs(math.log(point.factor)) for point in points])),
         named=_named(points),
-        least=60.0 / minutes if minutes else 1.0,
+        least=60.0 / minutes,
     )
 
 

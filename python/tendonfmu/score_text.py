@@ -45,7 +45,7 @@ def lines(scored: Scored) -> Iterator[str]:
         f"{_estimate(found.false_alarms_per_minute)} per minute; in alarm {_percent(found.free_alarm_share)} of it"
     )
     shown = [point for point in scored.roc or [] if any(math.isclose(point.factor, each) for each in SHOWN)]
-    if shown:
+    if shown and found.free_minutes:
         factors = ", ".join(f"{point.factor:g}" for point in shown)
         some = ", ".join(f"{point.found}" for point in shown)
         per_hour = ", ".join(f"{point.false_alarms_per_hour.value:.3g}" for point in shown)

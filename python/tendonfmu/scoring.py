@@ -95,7 +95,10 @@ def _read(path: Path, labels: str, force: str | None) -> Recording:
             raise InputError(f"{path}: column {name}: a signal of the finger; expected a column that holds {what}")
     if force is not None and force == labels:
         raise InputError(f"{path}: column {force}: both label and sensed force; expected two columns")
-    return read_recording(path, label=labels, others=() if force is None else (force,))
+    recording = read_recording(path, label=labels, others=() if force is None else (force,))
+    if len(recording) < 2:
+        raise InputError(f"{path}: one sample; expected at least two")
+    return recording
 
 
 def _unlabelled(read: Sequence[Recording], labels: str | None) -> list[str]:
