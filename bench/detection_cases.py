@@ -3,7 +3,7 @@
 The rig is examples/rigs/index_finger.json. Its strokes come in stretches of 6 to 13 s, with all joints at rest between
 them; a push begins anywhere within its slot of 6 s, whatever the finger does then. Each pretension has, of other seeds
 each, three recordings of 10 min with 100 pushes whose force is uniform in its logarithm, so that there are many light
-ones, three with 100 pushes whose force is uniform, so that there are many firm ones, and three without any. Every
+ones, two with 100 pushes whose force is uniform, so that there are many firm ones, and three without any. Every
 pushed recording has a *twin*: the same motion and the same sensor noise without the pushes. What differs between the
 two is what a push does to the signals.
 
@@ -46,7 +46,8 @@ RIG = ROOT / "examples" / "rigs" / "index_finger.json"
 FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
 
 PRETENSIONS = (10.0, 20.0, 40.0)  # N: trained at the first, on average
-PARTS = 3  # recordings of each kind and pretension
+PARTS = 3  # recordings of each kind and pretension,
+FIRM_PARTS = 2  # but no more with firm pushes
 DURATION = 600.0  # s, of one
 PUSHES = 100  # in one
 TRAINING_DURATION = 400.0  # s
@@ -112,7 +113,8 @@ class Push:
 
 
 def takes(kind: str, pretension: float, parts: int = PARTS) -> list[Take]:
-    return [Take(kind, pretension, part) for part in range(1, parts + 1)]
+    count = min(parts, FIRM_PARTS) if kind in ("firm", TWINS["firm"]) else parts
+    return [Take(kind, pretension, part) for part in range(1, count + 1)]
 
 
 # --- rigs -------------------------------------------------------------------------------------------------------------

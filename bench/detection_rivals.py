@@ -231,8 +231,9 @@ def best_thresholds(detector: Detector, free: Sequence[Sequence[Recording]]) -> 
     """The lowest thresholds with no more than `PER_SECOND` false alarms on all free recordings together.
 
     free: recordings by pretension. Constant and per newton: a line through what each joint's residual exceeds in `TAIL`
-    of the samples of each pretension. Both times the lowest factor, found from above: the first one that gives more
-    alarms, or more than `MOST_SHARE` of the time in alarm, ends the search.
+    of the samples of each pretension. Both times the lowest factor, searched from where a third of the alarms would be
+    given without any detection: the first lower one that gives too many alarms, or more than `MOST_SHARE` of the time
+    in alarm, ends the search.
     """
     prepared = [[detector.inputs(each) for each in group] for group in free]
     left = [[np.abs(detector.residual(each)) for each in group] for group in prepared]
@@ -250,10 +251,16 @@ def best_thresholds(detector: Detector, free: Sequence[Sequence[Recording]]) -> 
     ]
     excess = [_excess(each, values, constant, per_force) for each, values in flat]
     allowed = int(PER_SECOND * sum(each["time"][-1] - each["time"][0] for each, _ in flat) + 1e-6)
-    factor, best = _beyond(flat, excess, allowed), None
-    while best is None or _holds(detector.with_thresholds(factor * constant, factor * per_force), flat, allowed):
-        best, factor = factor, factor * FINER
-    return detector.with_thresholds(best * constant, best * per_force)
+
+    def at(factor: float) -> Detector:
+        return detector.with_thresholds(factor * constant, factor * per_force)
+
+    factor = _beyond(flat, excess, allowed)
+    while not _holds(at(factor), flat, allowed):
+        factor /= FINER
+    while _holds(at(factor * FINER), flat, allowed):
+        factor *= FINER
+    return at(factor)
 
 
 def _excess(inputs: Mapping[str, Numbers], left: Numbers, constant: Numbers, per_force: Numbers) -> Numbers:
