@@ -57,9 +57,9 @@ class Task:
     hold: float = 6.0  # s, each
     stroke: float = 0.003  # m, of the plate, forth and back, while a force is held
     frequency: float = 0.5  # Hz
-    threshold_scale: float = 1.0  # on the thresholds of the friction FMU
-    raw_threshold: tuple[float, ...] = (0.0065, 0.060, 0.034, 0.013)
-    raw_time: float = 0.2
+    threshold_scale: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0)  # per joint, on the thresholds of the friction FMU
+    raw_threshold: tuple[float, ...] = (0.0085, 0.070, 0.044, 0.024)
+    raw_time: float = 2.0
     raw_offset: float = 0.0
     integral: float = 4.0  # rad/s per N
     proportional: float = 0.02  # rad per N
@@ -103,7 +103,7 @@ class Loop:
     def __init__(self, task: Task, arms: Sequence[float], thresholds: Sequence[float]) -> None:
         self.task, self.plate = task, Plate(task)
         self.pull = np.reshape(arms, (len(TENDONS), len(JOINTS))) @ CLOSING  # m of tendon per rad of c
-        self._armed = task.threshold_scale * np.array(thresholds)
+        self._armed = np.tile(task.threshold_scale, 2) * np.array(thresholds)
         self._way = [(target, task.speed, self.PAUSE) for target in task.way]
         self._way = [(self.WARM_UP, task.speed, 0.0), (0.0, task.speed, 0.0), (self.ARMED, task.speed, 0.0), *self._way]
         self.phase, self.c, self.stopped_at, self.held_at = "warm up", 0.0, math.nan, math.nan

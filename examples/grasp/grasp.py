@@ -19,7 +19,7 @@ from pathlib import Path
 
 import fmpy
 import numpy as np
-from controller import RIG_PRETENSION, SPACE, STEP, Array, Loop, Task, numbered
+from controller import JOINTS, RIG_PRETENSION, SPACE, STEP, Array, Loop, Task, numbered
 from fmpy.fmi2 import FMU2Slave
 
 SETTLED = 1.5  # s after a new force is wanted, from which on errors count
@@ -53,14 +53,28 @@ class Component:
         shutil.rmtree(self._folder, ignore_errors=True)
 
 
-RECORDED = ["time", "c", "force", "estimate", "wanted", "contact"]  # then FRICTION; force: the plant's true one
+TRUTH = numbered("truth.contact_force", SPACE) + numbered("truth.external_torque", JOINTS)
+RECORDED = [
+    "time",
+    "c",
+    "force",
+    "estimate",
+    "wanted",
+    "contact",
+    *Loop.FRICTION,
+    *TRUTH,
+]  # force: |true contact force|
+
+
+def record(now: float, loop: Loop, contact: bool, sample: Array, truth: Array) -> list[float]:
+    force = float(np.linalg.norm(truth[: len(SPACE)]))
+    return [now, loop.c, force, loop.estimate, loop.wanted(now), float(contact), *sample, *truth]
 
 
 def run(hand: Path, model: Path, task: Task) -> tuple[dict[str, Array], Loop]:
     """Columns over the steps, and the loop as it ends."""
     plant, friction = Component(hand), Component(model)
     loop = Loop(task, friction.get(Loop.ARMS), friction.get(Loop.THRESHOLDS))
-    truth = numbered("truth.contact_force", SPACE)
     plant.set(["pretension"], [task.pretension - RIG_PRETENSION])
     friction.set(friction.inputs, plant.get(friction.inputs))
     for each in (plant, friction):
@@ -76,11 +90,10 @@ def run(hand: Path, model: Path, task: Task) -> tuple[dict[str, Array], Loop]:
         contact = bool(friction.fmu.getBoolean([friction.vr["contact"]])[0])
         sample = friction.get(Loop.FRICTION)
         plant.set(Loop.INPUTS, loop.step(now, plant.get(Loop.PLANT), sample, contact))
-        force = float(np.linalg.norm(plant.get(truth)))
-        rows.append([now, loop.c, force, loop.estimate, loop.wanted(now), contact, *sample])
+        rows.append(record(now, loop, contact, sample, plant.get(TRUTH)))
     for each in (plant, friction):
         each.close()
-    return dict(zip(RECORDED + Loop.FRICTION, np.array(rows).T, strict=True)), loop
+    return dict(zip(RECORDED, np.array(rows).T, strict=True)), loop
 
 
 def measures(table: dict[str, Array], loop: Loop) -> dict[str, float]:

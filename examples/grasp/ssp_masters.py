@@ -15,12 +15,10 @@ from typing import Protocol
 
 import fmpy
 import numpy as np
-from controller import SPACE, STEP, Array, Loop, Task, numbered
-from grasp import RECORDED, measures
+from controller import STEP, Array, Loop, Task
+from grasp import RECORDED, TRUTH, measures, record
 
 from tendonfmu.ssp import FRICTION_FMU
-
-TRUTH = numbered("truth.contact_force", SPACE)
 
 
 class Master(Protocol):
@@ -124,11 +122,11 @@ def run(master_name: str, package: Path, task: Task) -> tuple[dict[str, Array], 
         master.step()
         now = STEP * (len(rows) + 1)
         sample = master.get("friction", Loop.FRICTION)
-        master.set("plant", Loop.INPUTS, loop.step(now, master.get("plant", Loop.PLANT), sample, master.contact()))
-        force = float(np.linalg.norm(master.get("plant", TRUTH)))
-        rows.append([now, loop.c, force, loop.estimate, loop.wanted(now), master.contact(), *sample])
+        contact = master.contact()
+        master.set("plant", Loop.INPUTS, loop.step(now, master.get("plant", Loop.PLANT), sample, contact))
+        rows.append(record(now, loop, contact, sample, master.get("plant", TRUTH)))
     master.close()
-    return dict(zip(RECORDED + Loop.FRICTION, np.array(rows).T, strict=True)), loop
+    return dict(zip(RECORDED, np.array(rows).T, strict=True)), loop
 
 
 def main(arguments: list[str]) -> int:
