@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from pathlib import Path
+
+# Before numpy is imported. The matrices of the tests are small: a second thread of its linear algebra mostly waits, at
+# full speed, and takes the processor from the tests beside it (twice the CPU time of the estimation's).
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
 

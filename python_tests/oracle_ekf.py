@@ -89,11 +89,11 @@ class JosephFilter:
 
     def _predict(self, jump: Array, G: Array, drift: float, dt: float) -> None:
         u = len(self.scale)
-        F = np.eye(u + self.n)
-        F[u:, :u] = G
         self.bias = self.bias + jump
         self.P[:u, :u] += self.parameter_drift * dt * np.eye(u)  # the jump is that of the unknowns now
-        self.P = F @ self.P @ F.T
+        # F P Fᵀ, F = [[1, 0], [G, 1]]
+        self.P[u:] += G @ self.P[:u]
+        self.P[:, u:] += self.P[:, :u] @ G.T
         self.P[u:, u:] += drift * np.eye(self.n)
 
     def _correct(self, H: Array, e: Array, noise: float, apply: bool) -> Array:
@@ -103,8 +103,8 @@ class JosephFilter:
         S = C @ self.P @ C.T + noise * np.eye(self.n)
         if apply:
             K = np.linalg.solve(S, C @ self.P).T
-            keep = np.eye(u + self.n) - K @ C
-            self.P = keep @ self.P @ keep.T + noise * K @ K.T
+            kept = self.P - K @ (C @ self.P)  # (1 − K C) P (1 − K C)ᵀ + K noise Kᵀ, never a product of two [U, U]
+            self.P = kept - (kept @ C.T) @ K.T + noise * K @ K.T
             step = self._within_bounds(K @ e)
             self.z = np.clip(self.z + self.scale * step[:u], self.lower, self.upper)
             self.bias = self.bias + step[u:]
@@ -112,9 +112,12 @@ class JosephFilter:
 
     def _within_bounds(self, step: Array) -> Array:
         """Conditioned on each bound that it would cross, one after the other; what three rounds leave is clipped."""
-        step = step.copy()
+        step, u = step.copy(), len(self.scale)
         for _ in range(3):
-            for i in range(len(self.scale)):
+            reached = self.z + self.scale * step[:u]
+            if ((reached >= self.lower) & (reached <= self.upper)).all():
+                break
+            for i in range(u):
                 wanted = self.z[i] + self.scale[i] * step[i]
                 excess = np.clip(wanted, self.lower[i], self.upper[i]) - wanted
                 self.stopped_by_bounds += excess != 0.0
