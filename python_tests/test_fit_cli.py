@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import signal
 import subprocess
 import sys
-import time
 from importlib.resources import files as files_of
 from pathlib import Path
 
@@ -186,6 +186,22 @@ def test_a_recording_of_three_samples_is_refused(call: Call, files: tuple[Path, 
 # --- Ctrl-C -----------------------------------------------------------------------------------------------------------
 
 
+def spent(process: int) -> float:
+    """Processor time of a running process, s; of Linux alone."""
+    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def spent_by_ended_ones() -> float:
+    found = os.times()
+    return found.children_user + found.children_system
+
+
+def take_interrupts() -> None:
+    """A job in the background of a shell inherits that SIGINT is ignored."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="SKIPPED: no SIGINT for another process")
 @pytest.mark.parametrize(("method", "phase"), [("batch", b"pass 2"), ("ekf", b"filtering, pass 1")])
 def test_ctrl_c_leaves_the_best_so_far_and_resume_goes_on(
@@ -199,16 +215,18 @@ def test_ctrl_c_leaves_the_best_so_far_and_resume_goes_on(
         cwd=tmp_path,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
+        preexec_fn=take_interrupts,
     )
-    seen = b""
+    seen, before = b"", spent_by_ended_ones()
     assert run.stderr is not None
     while phase not in seen and run.poll() is None:
         seen += run.stderr.read1(4096)  # type: ignore[attr-defined]
-    begin = time.monotonic()
+    until_then = spent(run.pid) if sys.platform == "linux" else 0.0
     run.send_signal(signal.SIGINT)
-    _, rest = run.communicate(timeout=60)
+    _, rest = run.communicate(timeout=300)
     assert run.returncode == 130
-    assert time.monotonic() - begin < 5.0
+    # of the processor: on a loaded machine it may take longer
+    assert sys.platform != "linux" or spent_by_ended_ones() - before - until_then < 5.0
     assert method == "ekf" or b"cost" in seen + rest
     last = rest.decode().strip().splitlines()[-1]
     assert "tendonfmu: interrupted; the best so far is in fitted.unfinished.json; --resume" in last

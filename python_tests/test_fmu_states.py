@@ -179,9 +179,9 @@ def test_steps_of_any_length(small_fmu: UnpackedFmu) -> None:
         assert now > 1.0 and instance.step(now, 1 / 60) == OK
         assert instance.step(1.5, 0.01) == ERROR and "not past the stop time" in instance.last_message
     with brought_to(small_fmu, "stepComplete") as instance:
-        begin = time.perf_counter()
+        begin = time.thread_time()
         assert instance.step(0.0, 1e12) == OK and instance.step(1e12, 1e12) == OK
-        assert time.perf_counter() - begin < 0.1
+        assert time.thread_time() - begin < 0.1  # of the processor: a loaded machine may take longer
         assert all(abs(value) < 1e12 for value in instance.outputs())
 
 
