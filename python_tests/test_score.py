@@ -24,6 +24,8 @@ from tendonfmu.detection_run import read_subject, run_track, scaled_detection
 from tendonfmu.figure_data import contact_thresholds
 from tendonfmu.native import Finger
 from tendonfmu.recording import read_recording
+from tendonfmu.score_figures import contact_figure, delay_figure, event_figure, roc_figure
+from tendonfmu.scoring import score_recordings
 from tendonfmu.tables import read_table, write_table
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -215,6 +217,33 @@ def test_scaled_detection_scales_all_that_decides() -> None:
     }
 
 
+def test_figures_show_what_was_counted(pushes: Table, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    scored = score_recordings(INDEX, [written(pushes, "rec.parquet")])
+    track, events = scored.tracks[0], scored.scores[0].events
+    drawn = event_figure(scored)
+    assert drawn.groups == [("found", 3), ("missed", 1)]
+    assert drawn.delay[:3].tolist() == sorted(event.delay for event in events if event.found)
+    first = min((event for event in events if event.found), key=lambda event: event.delay)
+    size = np.linalg.norm(track.outputs["compensated_torque"], axis=1)
+    at = np.linspace(drawn.begin, drawn.end, drawn.torque.shape[1])
+    k = int(np.argmin(np.abs(at - drawn.delay[0])))
+    row = int(np.searchsorted(track.recording.time, first.onset + at[k] + 1e-9) - 1)
+    assert drawn.torque[0, k] == size[row]
+    assert np.isnan(drawn.torque).any(axis=1).sum() == 1  # the last event is close to the end
+    over_time = contact_figure(scored)
+    assert len(over_time.labelled) == 4 and len(over_time.found) == 3
+    assert over_time.masked == over_time.outside == [] and over_time.force is None
+    assert [begin for begin, _ in over_time.found] == [event.alarm for event in events if event.found]
+    assert [joint.name for joint in over_time.joints] == scored.subject.finger.joint_names
+    assert scored.roc is not None
+    curve = roc_figure(scored, scored.roc)
+    assert curve.factors[curve.own] == 1.0 and curve.found[curve.own] == 0.75 and curve.rate[curve.own] == 0.0
+    assert np.all(curve.found_low <= curve.found) and np.all(curve.rate <= curve.rate_high)
+    late = delay_figure(scored)
+    assert late.share.tolist() == [0.25, 0.5, 0.75] and late.delays.tolist() == drawn.delay[:3].tolist()
+
+
 # --- bad input --------------------------------------------------------------------------------------------------------
 
 
@@ -237,6 +266,11 @@ def two_tendons(table: Table) -> Path:
         (lambda table: written(table, "r.csv"), ("--kinematics", "3"), ("r.csv", "no column joint_velocity[1]")),
         (lambda table: written(table, "r.csv", touch=table["contact"]), (), ("r.csv", "unknown column 'touch'")),
         (two_tendons, (), ("small.csv", "2 columns tendon_force[...], expected 8")),
+        (
+            lambda table: written({name: column[:1] for name, column in table.items()}, "r.csv"),
+            (),
+            ("r.csv: one sample",),
+        ),
         (lambda table: Path("no.csv"), (), ("no.csv", "no such file")),
     ],
 )
