@@ -141,8 +141,8 @@ def test_the_residual_is_what_the_decision_was_made_of(path: Path) -> None:
 def test_labels_force_and_recordings_without_a_reference(call: Call, pushes: Table) -> None:
     load = {name: None for name in pushes if name.startswith("external")}
     force = np.linspace(0.0, 2.0, len(pushes["time"]))
-    labelled = written(pushes, "a.csv", contact=None, touched=pushes["contact"], newton=force)
-    plain = written(pushes, "b.csv", touched=pushes["contact"], contact=None, **load)
+    labelled = written(pushes, "a.parquet", contact=None, touched=pushes["contact"], newton=force)
+    plain = written(pushes, "b.parquet", touched=pushes["contact"], contact=None, **load)
     report = report_of(
         call("score", INDEX, labelled, plain, "-o", "s.json", "--labels", "touched", "--force", "newton")
     )
@@ -161,8 +161,8 @@ def test_labels_force_and_recordings_without_a_reference(call: Call, pushes: Tab
 
 
 def test_without_an_event_false_alarms_are_all(call: Call, pushes: Table) -> None:
-    alarms = report_of(call("score", INDEX, written(pushes, "all.csv"), "-o", "s.json"))["found"]
-    answer = call("score", INDEX, written(pushes, "free.csv", contact=None), "-o", "s.json", "--figures", "fig")
+    alarms = report_of(call("score", INDEX, written(pushes, "all.parquet"), "-o", "s.json"))["found"]
+    answer = call("score", INDEX, written(pushes, "free.parquet", contact=None), "-o", "s.json", "--figures", "fig")
     report = report_of(answer)
     assert "no event in column contact: false alarms only" in answer.err
     assert (report["events"], report["median_delay_s"], report["found_share"]["value"]) == (0, None, None)
@@ -174,7 +174,7 @@ def test_without_an_event_false_alarms_are_all(call: Call, pushes: Table) -> Non
 
 
 def test_an_fmu_scores_the_same_without_a_roc(call: Call, pushes: Table) -> None:
-    recording = written(pushes, "rec.csv")
+    recording = written(pushes, "rec.parquet")
     assert call("build", INDEX, "-o", "finger.fmu").status == 0
     packed = report_of(call("score", "finger.fmu", recording, "-o", "fmu.json"), "fmu.json")
     plain = report_of(call("score", INDEX, recording, "-o", "s.json"))
@@ -277,14 +277,15 @@ def two_tendons(table: Table) -> Path:
 def test_bad_input_is_named_and_leaves_nothing(
     call: Call, pushes: Table, make: Any, options: tuple[str, ...], words: tuple[str, ...]
 ) -> None:
-    answer = call("score", INDEX, make(pushes), "-o", "s.json", *options)
+    short = {name: column[:600] for name, column in pushes.items()}
+    answer = call("score", INDEX, make(short), "-o", "s.json", *options)
     assert answer.status == 2 and answer.out == "" and len(answer.err.splitlines()) == 1, answer
     assert all(word in answer.err for word in words), answer.err
     assert not Path("s.json").exists()
 
 
 def test_files_that_cannot_be(call: Call, pushes: Table) -> None:
-    recording = written(pushes, "r.csv")
+    recording = written({name: column[:600] for name, column in pushes.items()}, "r.csv")
     Path("broken.fmu").write_text("no archive")
     for arguments, words in (
         ((INDEX, recording, recording, "-o", "s.json"), "given twice"),
