@@ -1,7 +1,7 @@
 """Naive numpy implementation of the sample semantics (contract section 5), used by tests alone.
 
-Written from the contract's text and the paper, sharing no code with the runtime. It favours reading
-over speed: one plain loop over samples, and one small object per friction effect. Indices in this
+Written from the texts (the contract, docs/contract-additions.md, the paper), sharing no code with the runtime.
+It favours reading over speed: one plain loop over samples, and one small object per friction effect. Indices in this
 file start at 0; joint 0 is the first joint, so the edge before joint 0 sees the angle q_0 = 0.
 """
 
@@ -16,21 +16,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from oracle_finger import Effect, Joint, Tendon, given, read_effect, read_effects
+from oracle_detection import NEAR, Bounds, Detector
+from oracle_finger import Effect, Places, given, read_joints, read_tendons
 
 Array = NDArray[Any]
 Key = tuple[Any, ...]
 
-NEAR = 1e-9  # contract section 5: a decision closer than this to its threshold may go either way
+LARGEST_ABSORPTION = 700.0  # of one sample, -ln(1 - K): K = 1 leaves nothing, and exp(-700) is not yet 0
 
 
 @dataclass
 class Result:
     """Outputs of a run and what the agreement rule and the branch counts need.
 
-    outputs: name -> [N, n], [N, m] or [N] (`contact`).
+    outputs: name -> [N, n], [N, m], [N] (`contact`) or [N, n, m + 3] (`friction_parts`).
     velocity_margin, residual_margin, force_margin: [N], smallest distance of the sample to a
-        threshold (m/s or rad/s, N.m, N).
+        threshold (m/s or rad/s, N.m, N); evidence, in s, counts with the residual.
     alternatives: sample -> {decision key: values the decision may also take within NEAR}.
     branches: how often each branch was taken.
     """
@@ -72,6 +73,7 @@ class FingerOracle:
         self.branches: Counter[str] = Counter()
         self._read_structure(description)
         self._read_settings(description)
+        self.detector = Detector(description, self.n, self.m, self.branches)
         # state
         self.samples = 0
         self.time = math.nan
@@ -79,43 +81,30 @@ class FingerOracle:
         self.v = np.zeros(self.n)
         self.b_eff = np.zeros(self.n)
         self.P = np.zeros(self.n)
+        self.absorbed = 0.0  # Λ
         self.last = Step()
 
     def _read_structure(self, description: Mapping[str, Any]) -> None:
-        thresholds = given(description, "velocity_threshold", {})
-        v_tendon = float(given(thresholds, "tendon", 0.0005))
-        v_joint = float(given(thresholds, "joint", 0.01))
+        self.hysteresis = float(given(given(description, "velocity_threshold", {}), "hysteresis", 0.0))
         self.n = len(description["joints"])
         self.m = len(description["tendons"])
-        self.joints = []
-        for entry in description["joints"]:
-            cover = given(entry, "cover", {})
-            self.joints.append(
-                Joint(
-                    cover_stiffness=float(given(cover, "stiffness", 0.0)),
-                    rest_angle=float(given(cover, "rest_angle", 0.0)),
-                    friction=read_effect(entry.get("friction"), v_joint),
-                    load_friction=read_effect(entry.get("load_friction"), v_joint),
-                )
-            )
-        for extension in given(description, "extensions", []):
-            if extension["effect"] != "cover_hardening":
-                raise ValueError(f"extensions: effect {extension['effect']!r} is unknown to the oracle")
-            self.joints[extension["joint"] - 1].hardening += float(extension["stiffness"])
-        self.tendons = [
-            Tendon(
-                stiffness=float(entry["stiffness"]),
-                bidirectional=bool(given(entry, "bidirectional", False)),
-                pulley=read_effects(entry.get("pulley_friction"), self.n, v_tendon),
-                edge=read_effects(entry.get("edge_friction"), self.n, v_tendon),
-            )
-            for entry in description["tendons"]
-        ]
+        self.joints = read_joints(description)
+        self.tendons = read_tendons(description)
         self.R = np.array([entry["moment_arms"] for entry in description["tendons"]], dtype=float)
         singular_values = np.linalg.svd(self.R, compute_uv=False)
         if self.m < self.n or singular_values[-1] < 1e-15 * singular_values[0] or singular_values[0] == 0.0:
             raise ValueError("tendons: moment_arms have no full column rank")
         self.R_plus = np.linalg.pinv(self.R, rcond=1e-15)
+        self.places = self._list_places()
+
+    def _list_places(self) -> list[tuple[str, tuple[int, ...], Effect]]:
+        """Every effect with its kind (a field of Places) and its indices there, base first."""
+        found: list[tuple[str, tuple[int, ...], Effect | None]] = []
+        for j in range(self.n):
+            for i, tendon in enumerate(self.tendons):
+                found += [("edge", (i, j), tendon.edge[j]), ("pulley", (i, j), tendon.pulley[j])]
+            found += [("joint", (j,), self.joints[j].friction), ("load", (j,), self.joints[j].load_friction)]
+        return [(kind, at, effect) for kind, at, effect in found if effect is not None]
 
     def _read_settings(self, description: Mapping[str, Any]) -> None:
         bias = given(description, "bias", {})
@@ -127,9 +116,8 @@ class FingerOracle:
         self.initial_variance = given(bias, "initial_variance", None)
         self.initial_torque = given(bias, "initial_torque", None)
         self.noise_time = given(bias, "noise_time", None)
-        contact = description["contact"]
-        self.contact_threshold = np.array(contact["threshold"], dtype=float)
-        self.contact_per_force = np.array(given(contact, "threshold_per_force", [0.0] * self.n), dtype=float)
+        self.by_absorption = given(bias, "forgetting", "time") == "absorption"
+        self.has_entry_load = bool(given(bias, "entry_load", False))
 
     def step(self, time: float, inputs: Mapping[str, Array], forced: Mapping[Key, Any] | None = None) -> Step:
         """Takes one sample. `forced` fixes single decisions (by key) instead of deciding them."""
@@ -152,13 +140,14 @@ class FingerOracle:
         # 1. kinematics
         q, v = self._kinematics(inputs, f0, dt, first)
         x_dot = self._tendon_velocity(v)
-        # 2. each friction effect: F and the increment b, per place
-        F_B, b_B, F_A, b_A, F_joint, b_joint, F_load, b_load = self._effects(q, v, x_dot, time, first, decide, out)
-        # 3. forces at and between the joints
-        f_between, f_before_edge, slack = self._propagate(f0, F_B, F_A, decide, out)
+        # 2. each friction effect: F, the increment b, and what stiction may hide
+        F, b, hidden = self._effects(q, v, x_dot, time, first, decide, out)
+        # 3. forces at and between the joints, and with them what multiplies an F or a b
+        f_between, f_before_edge, slack = self._propagate(f0, F.edge, F.pulley, decide, out)
+        f = self._loads(f_before_edge, f_between)
         # 4. totals, eq. (10)
-        T = self._total(f_before_edge, f_between, F_B, F_A, F_joint, F_load) + self._springs(q)
-        db = self._total(f_before_edge, f_between, b_B, b_A, b_joint, b_load)
+        T = self._total(F * f) + self._springs(q)
+        db = self._total(self._increments(b * f))
         tau = self.R.T @ f0
         mean_force = float(np.mean(np.abs(f0)))
         noise = (self.noise_std + self.noise_std_per_force * mean_force) ** 2
@@ -166,20 +155,24 @@ class FingerOracle:
             self.P = np.full(self.n, noise if self.initial_variance is None else float(self.initial_variance))
             self.b_eff = tau - T if self.initial_torque is None else np.array(self.initial_torque, dtype=float)
             self.branches["initial_torque" if self.initial_torque is not None else "initial_bias"] += 1
-            joint_contact = np.zeros(self.n, dtype=bool)
         else:
             self.b_eff = self.b_eff + db
         T_eff = self.b_eff + T
+        # 4a. what friction may differ by
+        change = np.zeros(self.n) if first else T_eff - self.last.values["friction_torque"]
+        bounds = self.detector.bounds(self._at_joints(hidden * f, np.abs(self.R)), self._parts(F * f, q), change, dt)
+        joint_contact, r, y = np.zeros(self.n, dtype=bool), np.zeros(self.n), np.zeros(self.n)
         if not first:
             # 5. contact, 6. bias update or its inhibition
-            joint_contact = self._contact(tau - T_eff, mean_force, decide, out)
-            if joint_contact.any():
-                self._inhibit(time)
-            else:
-                K = self._gain(dt, noise)
-                correction = K * (tau - T_eff)
+            r = tau - T_eff
+            joint_contact, y = self._contact(r, bounds, mean_force, time, dt, decide, out)
+            if self.detector.updates(time):
+                correction = self._gain(dt, noise) * r
                 self.b_eff = self.b_eff + correction
                 T_eff = T_eff + correction
+                self.detector.update(r, dt)
+            else:
+                self._inhibit(time)
             self._count_in_contact(out, bool(joint_contact.any()))
         # 7. outputs
         out.values = {
@@ -192,6 +185,12 @@ class FingerOracle:
             "joint_contact": joint_contact,
             "contact": np.asarray(joint_contact.any()),
             "slack": slack,
+            "compensated_torque_std": self.detector.std(self.P, bounds, mean_force),
+            "residual": r,
+            "innovation": y,
+            "stuck_friction": bounds.H,
+            "friction_jump": bounds.J,
+            "friction_parts": bounds.parts,
         }
         self.q, self.v, self.time, self.last = q, v, time, out
         self.samples += 1
@@ -222,23 +221,26 @@ class FingerOracle:
 
     def _effects(
         self, q: Array, v: Array, x_dot: Array, time: float, first: bool, decide: Callable[..., Any], out: Step
-    ) -> tuple[Array, ...]:
-        F_B, b_B, F_A, b_A = (np.zeros((self.m, self.n)) for _ in range(4))
-        F_joint, b_joint, F_load, b_load = (np.zeros(self.n) for _ in range(4))
+    ) -> tuple[Places, Places, Places]:
+        """Step 2: F, b and, of the stuck effects, |F| at the present |v| on the side of their last motion (for H)."""
+        F, b, hidden = (Places.zeros(self.m, self.n) for _ in range(3))
+        for kind, at, effect in self.places:
+            velocity, angle, key = self._seen_by(kind, at, q, v, x_dot)
+            taken = self._take_effect(effect, velocity, angle, time, first, key, decide, out)
+            getattr(F, kind)[at], getattr(b, kind)[at] = taken
+            if effect.stuck and self.detector.friction_bound is not None:
+                getattr(hidden, kind)[at] = abs(effect.value(effect.side or 1, abs(velocity), angle))
+        return F, b, hidden
 
-        def take(effect: Effect | None, velocity: float, angle: float, key: Key) -> tuple[float, float]:
-            if effect is None:
-                return 0.0, 0.0
-            return self._take_effect(effect, velocity, angle, time, first, key, decide, out)
-
-        for j in range(self.n):
-            angle_before = q[j - 1] if j > 0 else 0.0
-            for i, tendon in enumerate(self.tendons):
-                F_B[i, j], b_B[i, j] = take(tendon.edge[j], x_dot[i, j], angle_before, ("tendon", i, j))
-                F_A[i, j], b_A[i, j] = take(tendon.pulley[j], x_dot[i, j + 1], 0.0, ("tendon", i, j + 1))
-            F_joint[j], b_joint[j] = take(self.joints[j].friction, v[j], 0.0, ("joint", j))
-            F_load[j], b_load[j] = take(self.joints[j].load_friction, v[j], 0.0, ("joint", j))
-        return F_B, b_B, F_A, b_A, F_joint, b_joint, F_load, b_load
+    def _seen_by(self, kind: str, at: tuple[int, ...], q: Array, v: Array, x_dot: Array) -> tuple[float, float, Key]:
+        """Velocity and angle of one place, and the key of its decision: who sees the same velocity decides together."""
+        if kind == "edge":
+            i, j = at
+            return x_dot[i, j], q[j - 1] if j > 0 else 0.0, ("tendon", i, j)
+        if kind == "pulley":
+            i, j = at
+            return x_dot[i, j + 1], 0.0, ("tendon", i, j + 1)
+        return v[at[0]], 0.0, ("joint", at[0])
 
     def _take_effect(
         self, effect: Effect, v: float, angle: float, time: float, first: bool, key: Key,
@@ -246,13 +248,15 @@ class FingerOracle:
     ) -> tuple[float, float]:  # fmt: skip
         """Step 2 of section 5: (F, b) of one effect, and what it remembers."""
         sign = int(np.sign(v))
-        margin = abs(abs(v) - effect.threshold)
+        limit = effect.limit(self.hysteresis)
+        margin = abs(abs(v) - limit)
         out.velocity_margin = min(out.velocity_margin, margin)
-        direction = sign if abs(v) > effect.threshold else 0
+        direction = sign if abs(v) > limit else 0
         others = [d for d in (-1, 0, 1) if d != direction] if abs(v) < NEAR else [0 if direction else sign]
         direction = decide(key, direction, others if margin < NEAR else [])
-        self._count_place(effect, direction, angle)
+        self._count_place(effect, direction, abs(v), angle)
 
+        effect.taken_out, effect.enters = 0.0, False
         if direction != 0:  # the effect moves
             F = effect.value(direction, abs(v), angle)
             b = 0.0
@@ -263,11 +267,15 @@ class FingerOracle:
                     self.branches["first_exit"] += 1
                     out.decisions[("first_exit",)] = True
                 else:
-                    entered = effect.at_threshold(effect.side, angle)
-                    rested = effect.last_stuck - effect.stuck_since
-                    b = -leaving - (entered - leaving) * math.exp(-self.forget_rate * rested)
+                    kept = self._kept(effect)
+                    if self.has_entry_load:  # what entering added, by the forces of that sample, is taken out
+                        effect.taken_out = kept * effect.entry_load
+                        b = -(1.0 - kept) * leaving
+                        self.branches["entry_load_taken_out"] += 1
+                    else:
+                        entered = effect.at_threshold(effect.side, angle)
+                        b = -leaving - (entered - leaving) * kept
                     self.branches["exit_same_side" if effect.side == direction else "exit_other_side"] += 1
-                    self.branches["exit_after_one_sample" if rested == 0.0 else "exit_with_memory"] += 1
                     out.decisions[("exit",)] = True
             elif not first:
                 self.branches["reversal_between_samples" if effect.side != direction else "keeps_moving"] += 1
@@ -285,6 +293,8 @@ class FingerOracle:
             assert effect.side is not None
             b = effect.at_threshold(effect.side, angle)
             effect.stuck_since = time
+            effect.absorbed_since = self.absorbed
+            effect.enters = True
             self.branches["enter"] += 1
             out.decisions[("enter",)] = True
         else:
@@ -292,6 +302,26 @@ class FingerOracle:
         effect.last_stuck = time
         effect.stuck = True
         return 0.0, b
+
+    def _kept(self, effect: Effect) -> float:
+        """κ: the share that the rest has left of what entering it added."""
+        if self.by_absorption:
+            absorbed = self.absorbed - effect.absorbed_since
+            self.branches["exit_with_absorption" if absorbed > 0.0 else "exit_unabsorbed"] += 1
+            return math.exp(-absorbed)
+        rested = effect.last_stuck - effect.stuck_since
+        self.branches["exit_after_one_sample" if rested == 0.0 else "exit_with_memory"] += 1
+        return math.exp(-self.forget_rate * rested)
+
+    def _increments(self, products: Places) -> Places:
+        """What the effects add to the bias: b·f, but what entry_load takes out has the forces of another sample."""
+        if self.has_entry_load:
+            for kind, at, effect in self.places:
+                product = getattr(products, kind)
+                if effect.enters:
+                    effect.entry_load = float(product[at])
+                product[at] -= effect.taken_out
+        return products
 
     def _propagate(
         self, f0: Array, F_B: Array, F_A: Array, decide: Callable[..., Any], out: Step
@@ -331,19 +361,33 @@ class FingerOracle:
         """What multiplies an F or a b: the force, or its magnitude for a bidirectional tendon."""
         return abs(force) if self.tendons[i].bidirectional else force
 
-    def _total(self, f_before_edge: Array, f_between: Array, B: Array, A: Array, joint: Array, load: Array) -> Array:
-        """Friction part of eq. (10), with the F or with the b in their place."""
-        total = np.zeros(self.n)
+    def _loads(self, f_before_edge: Array, f_between: Array) -> Places:
+        """f, what multiplies an F or a b in eq. (10): the force or its magnitude, 1, or the sum over the tendons."""
+        f = Places.zeros(self.m, self.n)
         for j in range(self.n):
             for i in range(self.m):
-                loss = 0.0
-                for upto in range(j + 1):
-                    loss += self._load(i, f_before_edge[i, upto]) * B[i, upto]
-                    loss += self._load(i, f_between[i, upto]) * A[i, upto]
-                total[j] += self.R[i, j] * loss
-            total[j] += joint[j]
-            total[j] += load[j] * sum(self._load(i, f_between[i, j]) for i in range(self.m))
-        return total
+                f.edge[i, j] = self._load(i, f_before_edge[i, j])
+                f.pulley[i, j] = self._load(i, f_between[i, j])
+            f.joint[j] = 1.0
+            f.load[j] = f.pulley[:, j].sum()
+        return f
+
+    def _total(self, products: Places) -> Array:
+        """Friction part of eq. (10), of the products F·f or b·f."""
+        return self._at_joints(products, self.R)
+
+    def _at_joints(self, products: Places, arms: Array) -> Array:
+        """[n] N·m: the tendons' losses by their arms [m, n], and what acts at the joints themselves."""
+        loss = products.loss()
+        torque = products.joint + products.load
+        for j in range(self.n):
+            torque[j] += arms[:, j] @ loss[:, j]
+        return torque
+
+    def _parts(self, products: Places, q: Array) -> Array:
+        """[n, m + 3] N·m: T by its sources: each tendon, the joint's own friction, its load friction, its cover."""
+        tendons = (self.R * products.loss()).T
+        return np.column_stack([tendons, products.joint, products.load, self._springs(q)])
 
     def _springs(self, q: Array) -> Array:
         """T_jq: the linear cover, and the cubic extension `cover_hardening`."""
@@ -353,15 +397,12 @@ class FingerOracle:
             torque[j] = joint.cover_stiffness * bend + joint.hardening * bend**3
         return torque
 
-    def _contact(self, r: Array, mean_force: float, decide: Callable[..., Any], out: Step) -> Array:
-        thresholds = self.contact_threshold + self.contact_per_force * mean_force
-        joint_contact = np.zeros(self.n, dtype=bool)
-        for j in range(self.n):
-            margin = abs(abs(r[j]) - thresholds[j])
-            out.residual_margin = min(out.residual_margin, float(margin))
-            exceeds = bool(abs(r[j]) > thresholds[j])
-            joint_contact[j] = decide(("contact", j), exceeds, [not exceeds] if margin < NEAR else [])
-        return joint_contact
+    def _contact(
+        self, r: Array, bounds: Bounds, mean_force: float, time: float, dt: float,
+        decide: Callable[..., Any], out: Step,
+    ) -> tuple[Array, Array]:  # fmt: skip
+        """Step 5: joint_contact and y, [n]."""
+        return self.detector.contact(r, bounds, mean_force, time, dt, decide, out)
 
     def _gain(self, dt: float, noise: float) -> Array:
         """Kalman gain per joint; updates P."""
@@ -376,6 +417,8 @@ class FingerOracle:
             else:
                 self.branches["gain_zero_of_zero"] += 1
             self.P[j] = (1.0 - K[j]) * self.P[j]
+        # all joints have one K: one start, one drift, one noise
+        self.absorbed += LARGEST_ABSORPTION if K[0] >= 1.0 else min(LARGEST_ABSORPTION, -math.log(1.0 - K[0]))
         return K
 
     def _inhibit(self, time: float) -> None:
@@ -388,13 +431,15 @@ class FingerOracle:
                 effect.stuck_since = time
                 self.branches["stuck_in_contact"] += 1
 
-    def _count_place(self, effect: Effect, direction: int, angle: float) -> None:
+    def _count_place(self, effect: Effect, direction: int, speed: float, angle: float) -> None:
         if direction != 0:
             symmetric = all(law.positive == law.negative for law in effect.laws)
             side = "positive" if direction > 0 else "negative"
             self.branches[f"{'symmetric' if symmetric else 'asymmetric'}_{side}"] += 1
             if effect.threshold == 0.0:
                 self.branches["moves_above_zero_threshold"] += 1
+        if self.hysteresis > 0.0 and (speed > effect.threshold) != (direction != 0):
+            self.branches["hysteresis_keeps_moving" if direction else "hysteresis_stays_stuck"] += 1
         if len(effect.angles) > 1:
             inside = effect.angles[0] < angle < effect.angles[-1]
             place = "inside" if inside else ("below" if angle <= effect.angles[0] else "above")

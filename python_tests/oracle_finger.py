@@ -10,6 +10,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
 MAGNITUDES = ("static", "coulomb", "stribeck_velocity", "viscous")
 
 
@@ -38,6 +42,16 @@ class Effect:
     stuck: bool | None = None  # None before the first sample
     stuck_since: float = math.nan
     last_stuck: float = math.nan
+    absorbed_since: float = 0.0  # Λ_since: Λ when the effect came to rest
+    entry_load: float = 0.0  # e: the product b·f that it added on coming to rest
+    enters: bool = False  # of the present sample alone, like
+    taken_out: float = 0.0  # κ·e
+
+    def limit(self, hysteresis: float) -> float:
+        """The |v| above which the effect moves at this sample."""
+        if self.stuck is None:
+            return self.threshold
+        return (1.0 + hysteresis if self.stuck else 1.0 - hysteresis) * self.threshold
 
     def value(self, side: int, speed: float, angle: float) -> float:
         """F(side * speed); the laws' values are interpolated over the angle, constant outside."""
@@ -76,6 +90,32 @@ class Joint:
     hardening: float = 0.0
 
 
+@dataclass
+class Places:
+    """One number per place of friction, 0 where there is none.
+
+    edge [m, n]: F_B before joint j; pulley [m, n]: F_A of joint j; joint [n]: T_jv0; load [n]: T_jvf.
+    """
+
+    edge: Array
+    pulley: Array
+    joint: Array
+    load: Array
+
+    @classmethod
+    def zeros(cls, m: int, n: int) -> Places:
+        return cls(np.zeros((m, n)), np.zeros((m, n)), np.zeros(n), np.zeros(n))
+
+    def __mul__(self, other: Places) -> Places:
+        return Places(
+            self.edge * other.edge, self.pulley * other.pulley, self.joint * other.joint, self.load * other.load
+        )
+
+    def loss(self) -> Array:
+        """[m, n] N: Σ_{j'≤j} (edge + pulley), for products with the forces: L_ij."""
+        return np.asarray(np.cumsum(self.edge + self.pulley, axis=1))
+
+
 def given(table: Mapping[str, Any] | None, key: str, default: Any) -> Any:
     """The entry, or the default when the table or the key is absent or null."""
     value = None if table is None else table.get(key)
@@ -105,3 +145,37 @@ def read_effects(entries: list[Any] | None, joints: int, threshold: float) -> li
     filled = list(entries or [])
     filled += [None] * (joints - len(filled))
     return [read_effect(entry, threshold) for entry in filled]
+
+
+def read_joints(description: Mapping[str, Any]) -> list[Joint]:
+    threshold = float(given(given(description, "velocity_threshold", {}), "joint", 0.01))
+    joints = []
+    for entry in description["joints"]:
+        cover = given(entry, "cover", {})
+        joints.append(
+            Joint(
+                cover_stiffness=float(given(cover, "stiffness", 0.0)),
+                rest_angle=float(given(cover, "rest_angle", 0.0)),
+                friction=read_effect(entry.get("friction"), threshold),
+                load_friction=read_effect(entry.get("load_friction"), threshold),
+            )
+        )
+    for extension in given(description, "extensions", []):
+        if extension["effect"] != "cover_hardening":
+            raise ValueError(f"extensions: effect {extension['effect']!r} is unknown to the oracle")
+        joints[extension["joint"] - 1].hardening += float(extension["stiffness"])
+    return joints
+
+
+def read_tendons(description: Mapping[str, Any]) -> list[Tendon]:
+    threshold = float(given(given(description, "velocity_threshold", {}), "tendon", 0.0005))
+    n = len(description["joints"])
+    return [
+        Tendon(
+            stiffness=float(entry["stiffness"]),
+            bidirectional=bool(given(entry, "bidirectional", False)),
+            pulley=read_effects(entry.get("pulley_friction"), n, threshold),
+            edge=read_effects(entry.get("edge_friction"), n, threshold),
+        )
+        for entry in description["tendons"]
+    ]

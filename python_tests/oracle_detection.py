@@ -1,0 +1,191 @@
+"""The oracle's detector: steps 4a to 7 of docs/contract-additions.md, and step 5 of contract section 5.
+
+Part of the oracle (see oracle.py): naive, for tests alone, sharing no code with the runtime. Joints are counted from 0.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from oracle_finger import given
+
+Array = NDArray[Any]
+
+NEAR = 1e-9  # contract section 5: a decision closer than this to its threshold may go either way
+FASTEST = 10.0  # the evidence of `cusum` grows at most this many seconds a second
+
+
+@dataclass
+class Bounds:
+    """Step 4a at one sample, N·m: H, J, E and u [n]; parts [n, m + 3]."""
+
+    H: Array
+    J: Array
+    E: Array
+    u: Array
+    parts: Array
+
+
+class Detector:
+    """Decides on contact. `bounds`, `contact`, `update` and `std` are called once a sample, in this order."""
+
+    def __init__(self, description: Mapping[str, Any], n: int, m: int, branches: Counter[str]) -> None:
+        self.n, self.m, self.branches = n, m, branches
+        contact = description["contact"]
+
+        def per_joint(table: Mapping[str, Any] | None, key: str) -> Array:
+            return np.array(given(table, key, [0.0] * n), dtype=float)
+
+        self.threshold = per_joint(contact, "threshold")
+        self.threshold_per_force = per_joint(contact, "threshold_per_force")
+        self.method = given(contact, "method", "threshold")
+        innovation = given(contact, "innovation", None)
+        if (self.method == "threshold") != (innovation is None):
+            raise ValueError(f"contact.innovation: required by the methods innovation and cusum alone ({self.method})")
+        self.T = float(given(innovation, "time", math.nan))
+        self.innovation_threshold = per_joint(innovation, "threshold")
+        self.innovation_per_force = per_joint(innovation, "threshold_per_force")
+        self.evidence_time = float(given(innovation, "evidence_time", math.nan))
+        self.friction_bound = given(contact, "friction_bound", None)
+        self.stuck_share = float(given(self.friction_bound, "stuck_share", 0.0))
+        self.jump_share = float(given(self.friction_bound, "jump_share", 0.0))
+        self.jump_time = float(given(self.friction_bound, "jump_time", 0.06))
+        self.uncertainty = given(contact, "uncertainty", None)
+        self.level = float(given(contact, "uncertainty_level", 3.0))
+        self.deviation = per_joint(contact, "deviation")
+        self.deviation_per_force = per_joint(contact, "deviation_per_force")
+        self.release_ratio = float(given(contact, "release_ratio", 1.0))
+        self.hold_time = float(given(contact, "hold_time", 0.0))
+        self.release_time = given(contact, "release_time", None)
+        # state
+        self.J = np.zeros(n)
+        self.filtered = np.zeros(n)  # m_j
+        self.evidence = np.zeros(n)  # g_j
+        self.in_contact = np.zeros(n, dtype=bool)  # joint_contact of the sample before
+        self.last_exceeded = np.full(n, math.nan)
+        self.contact_since: float | None = None  # time of the first sample of the present contact
+
+    def bounds(self, H: Array, parts: Array, change: Array, dt: float) -> Bounds:
+        """Step 4a. H [n]: what hides in stiction; parts [n, m + 3]: T by its sources; change [n]: T_eff − T'_eff.
+
+        change and dt are 0 at the first sample, which leaves J there at 0.
+        """
+        if self.friction_bound is None:
+            H = np.zeros(self.n)
+        else:
+            self.J = self.J * math.exp(-dt / self.jump_time) + np.abs(change)
+        if self.uncertainty is None:
+            parts = np.zeros((self.n, self.m + 3))
+        u = np.zeros(self.n)
+        for j in range(self.n):
+            for direction in self._directions(j):
+                e = sum(weight * part for weight, part in zip(direction, parts[j], strict=True))
+                u[j] += e * e
+        u = np.sqrt(u)
+        return Bounds(H, self.J.copy(), self.stuck_share * H + self.jump_share * self.J, u, parts)
+
+    def _directions(self, j: int) -> list[list[float]]:
+        if self.uncertainty is None:
+            return []
+        self.branches["uncertain_joint" if self.uncertainty[j] else "certain_joint"] += 1
+        return self.uncertainty[j] or []
+
+    def contact(
+        self, r: Array, bounds: Bounds, mean_force: float, time: float, dt: float,
+        decide: Callable[..., Any], out: Any,
+    ) -> tuple[Array, Array]:  # fmt: skip
+        """Step 5: joint_contact [n] and y [n] (0 with the method `threshold`)."""
+        y = np.zeros(self.n) if self.method == "threshold" else r - self.filtered
+        found = np.zeros(self.n, dtype=bool)
+        for j in range(self.n):
+            if self._exceeds(j, r[j], y[j], bounds, mean_force, dt, decide, out):
+                found[j] = True
+                self.last_exceeded[j] = time
+            # times are inputs: every implementation subtracts the same two numbers, so this is never "near"
+            elif self.in_contact[j] and time - self.last_exceeded[j] <= self.hold_time:
+                found[j] = True
+                self.branches["held"] += 1
+        self.in_contact = found
+        if not found.any():
+            self.contact_since = None
+        elif self.contact_since is None:
+            self.contact_since = time
+        return found, y
+
+    def _exceeds(
+        self, j: int, r: float, y: float, bounds: Bounds, mean_force: float, dt: float,
+        decide: Callable[..., Any], out: Any,
+    ) -> bool:  # fmt: skip
+        """Whether any of the method's criteria is exceeded at joint j."""
+        ratio = self.release_ratio if self.in_contact[j] else 1.0
+        without_ratio = False
+
+        def above(name: str, value: float, limit: float) -> bool:
+            nonlocal without_ratio
+            without_ratio = without_ratio or value > limit
+            margin = abs(value - ratio * limit)
+            out.residual_margin = min(out.residual_margin, margin)
+            exceeds = value > ratio * limit
+            return bool(decide((name, j), exceeds, [not exceeds] if margin < NEAR else []))
+
+        allowed = self.threshold[j] + self.threshold_per_force[j] * mean_force + bounds.E[j]
+        by_residual = above("contact", abs(r), allowed + self.level * bounds.u[j])
+        if self.method == "threshold":
+            exceeds = by_residual
+        else:
+            B = self.innovation_threshold[j] + self.innovation_per_force[j] * mean_force + bounds.E[j]
+            if self.method == "innovation":
+                by_innovation = above("innovation", abs(y), B)
+            else:
+                self._gather_evidence(j, abs(y), B, dt, decide, out)
+                by_innovation = above("cusum", self.evidence[j], self.evidence_time)
+            if by_residual != by_innovation:
+                self.branches["residual_alone" if by_residual else f"{self.method}_alone"] += 1
+            exceeds = by_residual or by_innovation
+        if exceeds and not without_ratio:
+            self.branches["release_ratio_holds"] += 1
+        return exceeds
+
+    def _gather_evidence(self, j: int, y: float, B: float, dt: float, decide: Callable[..., Any], out: Any) -> None:
+        """g_j of `cusum`, in seconds."""
+        if B == 0.0:
+            out.residual_margin = min(out.residual_margin, y)
+            growth = FASTEST if decide(("no_bound", j), y > 0.0, [not y > 0.0] if y < NEAR else []) else -1.0
+            self.branches["evidence_without_bound"] += 1
+        else:
+            growth = min(FASTEST, y / B - 1.0)
+        grown = self.evidence[j] + dt * growth
+        if grown < 0.0 < self.evidence[j]:
+            self.branches["evidence_emptied"] += 1
+        elif grown > 2.0 * self.evidence_time:
+            self.branches["evidence_full"] += 1
+        elif growth == FASTEST:
+            self.branches["evidence_fastest"] += 1
+        self.evidence[j] = min(2.0 * self.evidence_time, max(0.0, grown))
+
+    def updates(self, time: float) -> bool:
+        """Step 6: whether the bias is updated at this sample, after `contact`."""
+        if self.contact_since is None:
+            return True
+        if self.release_time is None or time - self.contact_since < self.release_time:
+            return False
+        self.branches["update_in_contact"] += 1
+        return True
+
+    def update(self, r: Array, dt: float) -> None:
+        """m_j follows r where the bias is updated."""
+        if self.method != "threshold":
+            self.filtered = self.filtered + (1.0 - math.exp(-dt / self.T)) * (r - self.filtered)
+
+    def std(self, P: Array, bounds: Bounds, mean_force: float) -> Array:
+        """Step 7, [n] N·m."""
+        free = self.deviation + self.deviation_per_force * mean_force
+        evenly = ((self.stuck_share * bounds.H) ** 2 + (self.jump_share * bounds.J) ** 2) / 3.0
+        return np.asarray(np.sqrt(P + free**2 + bounds.u**2 + evenly))
