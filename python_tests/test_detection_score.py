@@ -141,9 +141,11 @@ def test_torque_in_contact_and_residual_of_free_time() -> None:
     residual = np.where(label, 9.0, 0.002)[:, None] * np.where(draw.random((len(TIME), 2)) < 0.5, 1.0, -1.0)
     residual[60:70] = 9.0  # the grace after the first event
     residual[0] = np.nan
-    summary = summarise(score_detection(TIME, label, flags(), Signals(residual, y, x)))
+    told = Signals(residual, y, x, deviation=np.full_like(y, 0.5 * np.quantile(np.abs(y - x)[label], 0.9)))
+    summary = summarise(score_detection(TIME, label, flags(), told))
     assert [each.value for each in summary.free_rms] == pytest.approx([0.002] * 2)
-    assert summary.contact is not None
+    assert summary.contact is not None and summary.contact.within is not None
+    assert np.mean([each.value for each in summary.contact.within]) == pytest.approx(0.9, abs=0.003)
     for j in range(2):
         slope, offset = np.polyfit(x[label, j], y[label, j], 1)
         left = y[label, j] - slope * x[label, j] - offset
@@ -161,7 +163,7 @@ def test_a_joint_without_load_has_no_correlation() -> None:
     contact = summarise(score_detection(TIME, flags((1.0, 2.0)), flags(), Signals(zero, zero + 0.1, zero))).contact
     assert contact is not None
     assert math.isnan(contact.correlation[0].value) and math.isnan(contact.slope[0].value)
-    assert contact.rms[0].value == pytest.approx(0.1)
+    assert contact.rms[0].value == pytest.approx(0.1) and contact.within is None
     assert math.isnan(contact.rms[0].low)  # one event says nothing of their spread
 
 

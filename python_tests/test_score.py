@@ -180,8 +180,9 @@ def test_an_fmu_scores_the_same_without_a_roc(call: Call, pushes: Table) -> None
     plain = report_of(call("score", INDEX, recording, "-o", "s.json"))
     assert packed["roc"]["points"] is None and "FINGER.json" in packed["roc"]["absent"]
     assert plain["roc"]["absent"] is None
+    # the residual of an FMU is got from its outputs
     for key in set(plain) - {"model", "roc"}:
-        assert packed[key] == plain[key], key
+        close_to(packed[key], plain[key], key, tolerance=1e-3 if key.startswith(("free_rms", "recordings")) else 0.0)
 
 
 def test_the_same_seed_gives_the_same_bytes(call: Call, pushes: Table) -> None:
@@ -310,15 +311,15 @@ def test_every_option_is_on_the_page_and_its_example_is_what_comes_out(call: Cal
         close_to(report[key], value, key)
 
 
-def close_to(found: Any, shown: Any, key: str) -> None:
-    """The page rounds to three digits."""
+def close_to(found: Any, shown: Any, key: str, tolerance: float = 6e-3) -> None:
+    """By default within what the page rounds to three digits."""
     if isinstance(shown, dict):
         for name, value in shown.items():
-            close_to(found[name], value, f"{key}.{name}")
+            close_to(found[name], value, f"{key}.{name}", tolerance)
     elif isinstance(shown, list):
         for each, value in zip(found, shown, strict=True):
-            close_to(each, value, key)
+            close_to(each, value, key, tolerance)
     elif isinstance(shown, float):
-        assert found == pytest.approx(shown, rel=6e-3, abs=1e-9), key
+        assert found == pytest.approx(shown, rel=tolerance, abs=1e-12), key
     else:
         assert found == shown, key

@@ -63,7 +63,14 @@ class Track:
         return self.recording.groups.get("external_torque")
 
     def score(self) -> DetectionScore:
-        signals = Signals(self.residual, self.outputs["compensated_torque"], self.external, self.force)
+        outputs = self.outputs
+        signals = Signals(
+            residual=self.residual,
+            compensated=outputs["compensated_torque"],
+            external=self.external,
+            force=self.force,
+            deviation=outputs.get("compensated_torque_std"),
+        )
         return score_detection(self.recording.time, self.label, self.alarm, signals)
 
     def decisions(self) -> DetectionScore:

@@ -31,13 +31,15 @@ class Signals:
     """What else is known of each sample; None: not known.
 
     residual: [N, n] N·m before the bias update, NaN where there is none. compensated: [N, n] N·m, the estimate of the
-    external torque. external: [N, n] N·m of a reference sensor. force: [N] N, sensed.
+    external torque; deviation: [N, n] N·m, its standard deviation as told. external: [N, n] N·m of a reference sensor.
+    force: [N] N, sensed.
     """
 
     residual: Numbers | None = None
     compensated: Numbers | None = None
     external: Numbers | None = None
     force: Numbers | None = None
+    deviation: Numbers | None = None
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,8 @@ class FreeBlocks:
 class ContactSums:
     """Sums over the samples of [e] events with a reference sensor; x: reference, y: compensated torque, N·m.
 
-    samples: [e]. The others [e, n]: of (y − x)², x, y, x², y², x·y.
+    samples: [e]. The others [e, n]: of (y − x)², x, y, x², y², x·y; how many samples are `within` two of the standard
+    deviations that are told of y, NaN without these.
     """
 
     samples: Numbers
@@ -98,6 +101,7 @@ class ContactSums:
     xx: Numbers
     yy: Numbers
     xy: Numbers
+    within: Numbers
 
 
 @dataclass(frozen=True)
@@ -243,7 +247,10 @@ def _contact_sums(spans: Spans, given: Signals) -> ContactSums | None:
     x, y = given.external, given.compensated
     if x is None or y is None:
         return None
-    columns = ((y - x) ** 2, x, y, x * x, y * y, x * y)
+    within = (
+        np.full_like(x, math.nan) if given.deviation is None else (np.abs(y - x) <= 2 * given.deviation).astype(float)
+    )
+    columns = ((y - x) ** 2, x, y, x * x, y * y, x * y, within)
     sums = [
         np.array([values[first : last + 1].sum(axis=0) for first, last in spans]).reshape(len(spans), x.shape[1])
         for values in columns

@@ -20,11 +20,15 @@ FACTORS = tuple(2.0 ** (k / 4) for k in range(-8, 13))  # on the thresholds: 0.2
 
 @dataclass(frozen=True)
 class ContactError:
-    """Of the compensated torque against the reference during events, by joint [n]. rms in N·m."""
+    """Of the compensated torque against the reference during events, by joint [n]. rms in N·m.
+
+    within: share of the samples within two of the standard deviations that are told, None without these.
+    """
 
     rms: list[Estimate]
     correlation: list[Estimate]
     slope: list[Estimate]
+    within: list[Estimate] | None
 
 
 @dataclass(frozen=True)
@@ -106,7 +110,7 @@ def _mean(values: Numbers, seed: int) -> Estimate:
     """Where all are 0, resampling sees nothing else: no interval."""
     if not values.any():
         return Estimate(0.0 if len(values) else math.nan)
-    return of_sums(np.column_stack([np.ones(len(values)), values]), lambda sums: sums[:, 1:] / sums[:, :1], seed)[0]
+    return of_sums(np.column_stack([np.ones(len(values)), values]), _ratio, seed)[0]
 
 
 def _alarm_share(free: FreeBlocks, seed: int) -> Estimate:
@@ -115,13 +119,17 @@ def _alarm_share(free: FreeBlocks, seed: int) -> Estimate:
         return Estimate(math.nan)
     if not free.alarm_seconds.any():
         return Estimate(0.0, 0.0, share(0, len(free.seconds)).high)
-    return of_sums(np.column_stack([free.seconds, free.alarm_seconds]), lambda sums: sums[:, 1:] / sums[:, :1], seed)[0]
+    return of_sums(np.column_stack([free.seconds, free.alarm_seconds]), _ratio, seed)[0]
 
 
 def _free_rms(free: FreeBlocks, seed: int) -> list[Estimate]:
     if not free.samples.sum():
         return [Estimate(math.nan)] * free.squares.shape[1]
     return of_sums(np.column_stack([free.samples, free.squares]), _root_mean, seed)
+
+
+def _ratio(sums: Numbers) -> Numbers:
+    return np.asarray(sums[:, 1:] / sums[:, :1])
 
 
 def _root_mean(sums: Numbers) -> Numbers:
@@ -133,10 +141,13 @@ def _contact_error(sums: ContactSums | None, seed: int) -> ContactError | None:
     if sums is None or not len(sums.samples):
         return None
     moments = np.hstack([sums.samples[:, None], sums.x, sums.y, sums.xx, sums.yy, sums.xy])
+    told = ~np.isnan(sums.within).any(axis=1)
+    within = np.column_stack([sums.samples, sums.within])[told]
     return ContactError(
         rms=of_sums(np.column_stack([sums.samples, sums.errors]), _root_mean, seed),
         correlation=of_sums(moments, lambda drawn: _regression(drawn)[0], seed),
         slope=of_sums(moments, lambda drawn: _regression(drawn)[1], seed),
+        within=of_sums(within, _ratio, seed) if len(within) else None,
     )
 
 

@@ -128,6 +128,7 @@ def _summary(found: Summary) -> dict[str, Any]:
         "contact_torque_rms_error_interval": None if contact is None else [_interval(each) for each in contact.rms],
         "contact_torque_correlation": None if contact is None else _estimates(contact.correlation),
         "contact_torque_slope": None if contact is None else _estimates(contact.slope),
+        "contact_torque_within_two_std": None if contact is None else _estimates(contact.within),
     }
 
 

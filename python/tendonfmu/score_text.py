@@ -25,6 +25,9 @@ def tables(scored: Scored) -> Iterator[tuple[str, Row, list[Row]]]:
             [_estimate(each) for each in found.contact.correlation],
             [_estimate(each) for each in found.contact.slope],
         ]
+        if found.contact.within is not None:
+            headings.append("within\n2 std, %")
+            columns.append([_estimate(each, 100.0) for each in found.contact.within])
     if found.external_at_alarm is not None:
         headings.append("at the alarm: median\n|external|, mN·m")
         columns.append([_estimate(each, 1e3) for each in found.external_at_alarm])
