@@ -20,7 +20,7 @@ pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not insta
 
 from command import Answer, Call
 from tendonfmu.cli import main
-from tendonfmu.detection_run import read_subject, run_track, scaled_detection
+from tendonfmu.detection_run import read_subject, residual_of, run_track, scaled_detection
 from tendonfmu.figure_data import contact_thresholds
 from tendonfmu.native import Finger
 from tendonfmu.recording import read_recording
@@ -132,10 +132,12 @@ def test_the_residual_is_what_the_decision_was_made_of(path: Path) -> None:
     subject = read_subject(INDEX)
     track = run_track(subject, read_recording(path), 1, None)
     threshold = contact_thresholds(subject.finger, track.recording.groups["tendon_force"])
-    known = ~np.isnan(track.residual)
-    assert known[1:].all() and not known[0].any()
-    above = np.abs(track.residual)[known] > threshold[known]
-    assert (above != track.outputs["joint_contact"][known]).mean() < 1e-5 < above.mean()
+    from_outputs = residual_of(subject.finger.data, track.recording, track.outputs, 1)  # as of an FMU
+    for residual in (track.residual, from_outputs):
+        known = ~np.isnan(residual)
+        assert known[1:].all() and not known[0].any()
+        above = np.abs(residual)[known] > threshold[known]
+        assert (above != track.outputs["joint_contact"][known]).mean() < 1e-5 < above.mean()
 
 
 def test_labels_force_and_recordings_without_a_reference(call: Call, pushes: Table) -> None:
