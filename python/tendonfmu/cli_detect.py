@@ -41,9 +41,10 @@ def score(
 ) -> None:
     """Measure contact detection against labels: events found and missed, false alarms, delay, torque; a ROC.
 
-    An event is a labelled contact; labels closer than 100 ms are one. It is found if an alarm begins in it and the
-    200 ms before its onset were silent. An alarm that begins neither in an event nor in the 100 ms after one is false.
-    Everything has its 95 % interval. Several recordings are pooled, and each is listed.
+    An event is a labelled contact; labels closer than 100 ms are one.
+    It is found if an alarm begins in it and the 200 ms before it were silent.
+    An alarm that begins in no event, nor in the 100 ms after one, is false.
+    Everything has its 95 % interval; several recordings are pooled.
     """
     from tendonfmu.fit_files import write_text
     from tendonfmu.score_report import build_report, report_text
