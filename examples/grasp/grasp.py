@@ -129,8 +129,14 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, help="CSV of every step")
     given = parser.parse_args()
     task = Task(compensated=not given.without, pretension=given.pretension, speed=given.speed)
+    for file in (given.hand, given.model):
+        if not file.is_file():
+            parser.error(f"{file}: no such file; README.md says how it is built")
     begin = time.perf_counter()
-    table, loop = run(given.hand, given.model, task)
+    try:
+        table, loop = run(given.hand, given.model, task)
+    except KeyError as missing:
+        parser.error(f"no variable {missing}: expected FMUs of rig.json and of a description of the same finger")
     wall = time.perf_counter() - begin
     for name, value in measures(table, loop).items():
         print(f"{name:>16} {value:8.3f} {'s' if name.endswith(('_at', 'delay')) else 'N'}")

@@ -1,6 +1,6 @@
-"""Draws grasp.png: the grasp of grasp.py with compensation and without.
+"""Draws docs/figures/grasp.png: the grasp of grasp.py with compensation and without.
 
-python make_figure.py TendonFinger.fmu friction.fmu [-o grasp.png]
+python make_figure.py TendonFinger.fmu friction.fmu [-o FIGURE.png]
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ import argparse
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
 from controller import Array, Task
 from grasp import run
 from matplotlib.axes import Axes
@@ -17,6 +16,7 @@ from matplotlib.figure import Figure
 
 from tendonfmu.plot_style import BLUE, DARK, GREEN, GREY, VERMILION, clean, save
 
+FIGURE = Path(__file__).resolve().parents[2] / "docs" / "figures" / "grasp.png"
 Table = Mapping[str, Array]
 JOINT = 2  # mcp_flexion
 BEFORE, AFTER = 0.05, 0.25  # s, about the touch
@@ -41,36 +41,35 @@ def draw_torque(axes: Axes, table: Table) -> None:
     axes.set_xlabel("time (s)", fontsize=12)
 
 
-def draw(tables: Mapping[str, Table], stopped: Mapping[str, float], touched: float, target: Path) -> None:
+def draw_contact(axes: Axes, tables: Mapping[str, Table], stopped: Mapping[str, float]) -> None:
+    """The force about the touch, a dot where each way stops."""
+    draw_force(axes, tables)
+    touched = float(tables[WITH]["time"][tables[WITH]["force"] > 0.0][0])
+    dots, highest = [], 0.0
+    for (name, table), colour in zip(tables.items(), (BLUE, VERMILION), strict=True):
+        stop = table["force"][table["time"] <= stopped[name]][-1]
+        dots += axes.plot(stopped[name], stop, "o", color=colour, markersize=7, label=f"stop, {name}")
+        highest = max(highest, float(table["force"][table["time"] < touched + AFTER].max()))
+    axes.set_xlim(touched - BEFORE, touched + AFTER)
+    axes.set_ylim(0.0, 1.1 * highest)
+    axes.legend(handles=dots, loc="lower right", fontsize=9, frameon=False)
+    axes.set_title("first contact", fontsize=12, loc="left")
+
+
+def draw(tables: Mapping[str, Table], stopped: Mapping[str, float], target: Path) -> None:
     figure = Figure(figsize=(13, 7.2), layout="constrained")
-    grid = figure.subplots(2, 2, sharex="col", gridspec_kw={"width_ratios": [3, 1]})
-    for force, torque in grid.T:
-        draw_force(force, tables)
+    ((force, contact), torques) = figure.subplots(2, 2, sharex="col", gridspec_kw={"width_ratios": [3, 1]})
+    draw_force(force, tables)
+    draw_contact(contact, tables, stopped)
+    for torque in torques:
         draw_torque(torque, tables[WITH])
-        for axes in (force, torque):
-            clean(axes)
-    near = grid[0, 1]
-    near.set_xlim(touched - BEFORE, touched + AFTER)
-    for (name, time), colour in zip(stopped.items(), (BLUE, VERMILION), strict=True):
-        near.axvline(time, color=colour, linewidth=1.0, linestyle=":")
-        near.annotate(
-            f" stop,\n {name}", (time, 0.0), xytext=(0, 2), textcoords="offset points", color=colour, fontsize=9
-        )
-    table = tables[WITH]
-    shown = np.abs(table["time"] - touched - (AFTER - BEFORE) / 2) < (AFTER + BEFORE) / 2
-    near.set_ylim(
-        0.0,
-        1.1 * max(float(each["force"][: len(shown)][shown[: len(each["force"])]].max()) for each in tables.values()),
-    )
-    for axes in grid[:, 0]:
+    for axes in (force, contact, *torques):
+        clean(axes)
+    for axes in (force, torques[0]):
         axes.legend(loc="upper left", fontsize=10, frameon=False)
-        axes.set_xlim(0.0, table["time"][-1])
-    grid[0, 0].set_title(
-        "closes, pauses, opens, closes; stops at the contact; holds a force while the plate moves by 3 mm",
-        fontsize=12,
-        loc="left",
-    )
-    near.set_title("first contact", fontsize=12, loc="left")
+        axes.set_xlim(0.0, tables[WITH]["time"][-1])
+    title = "closes, pauses, opens, closes; stops at the contact; holds a force while the plate moves by ±3 mm"
+    force.set_title(title, fontsize=12, loc="left")
     save(figure, target, 110)
 
 
@@ -78,17 +77,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("hand", type=Path)
     parser.add_argument("model", type=Path)
-    parser.add_argument("-o", "--output", type=Path, default=Path("grasp.png"))
+    parser.add_argument("-o", "--output", type=Path, default=FIGURE)
     given = parser.parse_args()
     runs = {name: run(given.hand, given.model, Task(compensated=name == WITH)) for name in (WITH, WITHOUT)}
-    table = runs[WITH][0]
-    touched = float(table["time"][table["force"] > 0.0][0])
-    draw(
-        {name: table for name, (table, _) in runs.items()},
-        {name: loop.stopped_at for name, (_, loop) in runs.items()},
-        touched,
-        given.output,
-    )
+    tables = {name: table for name, (table, _) in runs.items()}
+    draw(tables, {name: loop.stopped_at for name, (_, loop) in runs.items()}, given.output)
 
 
 if __name__ == "__main__":

@@ -100,10 +100,11 @@ def compared(pool: ProcessPoolExecutor, fmus: Fmus, tasks: Sequence[Task]) -> li
 def held(pool: ProcessPoolExecutor, fmus: Fmus, best: Best) -> None:
     names = ("compensated", "raw", "raw, offset in hindsight")
     tasks = [replace(best["steady", p], forces=FORCES) for p in PRETENSIONS]
-    head("pretension N", "force from", *(f"{force:g} N: mean, rms" for force in FORCES))
+    head("pretension N", "force from", "stop, peak N", *(f"{force:g} N: mean, rms" for force in FORCES))
     for task, three in zip(tasks, compared(pool, fmus, tasks), strict=True):
         for name, found in zip(names, three, strict=True):
-            row(f"{task.pretension:g}", name, *errors(found, FORCES))
+            first = f"{found['stop_force']:.2f}, {found['peak_force']:.2f}"
+            row(f"{task.pretension:g}", name, first, *errors(found, FORCES))
 
     base = best["steady", PRETENSIONS[0]]
     head("gains", "force from", *(f"{force:g} N: mean, rms" for force in base.forces))
