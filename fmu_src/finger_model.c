@@ -151,7 +151,8 @@ tendonfmu_outputs variables_outputs(const variables* v) {
                              .joint_speed = v->number[GROUP_JOINT_SPEED],
                              .joint_contact = v->flag[GROUP_JOINT_CONTACT],
                              .contact = v->flag[GROUP_CONTACT],
-                             .slack = v->flag[GROUP_SLACK]};
+                             .slack = v->flag[GROUP_SLACK],
+                             .compensated_torque_std = v->number[GROUP_COMPENSATED_TORQUE_STD]};
 }
 
 void model_fetch_outputs(const model* m, variables* values) {

@@ -32,6 +32,10 @@ static int find_for_derivative(component* c, fmi2ValueReference reference, varia
                                       : "not an unknown: derivatives are those of the Real outputs");
     return -1;
   }
+  if (found->group->discrete) {
+    fail_at(c, function, found, "discrete: it has no derivative");
+    return -1;
+  }
   return 0;
 }
 

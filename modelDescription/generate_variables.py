@@ -44,6 +44,7 @@ typedef struct variable_group {{
   variable_causality causality;
   const char* unit; /* "" for Integer and Boolean */
   double minimum, maximum, start;
+  int discrete; /* it has no derivative */
 }} variable_group;
 
 static const variable_group variable_groups[GROUP_COUNT] = {{
@@ -88,7 +89,7 @@ def row(group: dict[str, Any]) -> str:
     numbers = ", ".join(repr(float(group.get(key, 0.0))) for key in ("min", "max", "start"))
     return (
         f'    {{"{group["name"]}", {group["base"]}u, VARIABLE_{group["type"].upper()}, SIZE_{group["size"].upper()}, '
-        f'CAUSALITY_{group["causality"].upper()}, "{unit}", {numbers}}},'
+        f'CAUSALITY_{group["causality"].upper()}, "{unit}", {numbers}, {int(group["variability"] == "discrete")}}},'
     )
 
 

@@ -47,18 +47,23 @@ nb::object as_array(std::vector<Number> values, std::vector<std::size_t> shape) 
 }
 
 struct OutputRows {
-  std::vector<double> numbers[6];
+  std::vector<double> numbers[6], detection[5], parts;
   std::vector<unsigned char> flags[3];
 
-  OutputRows(std::size_t samples, std::size_t n, std::size_t m) {
+  OutputRows(std::size_t samples, std::size_t n, std::size_t m, bool with_parts) {
     for (auto& row : numbers) row.resize(samples * n);
+    for (auto& row : detection) row.resize(samples * n);
+    if (with_parts) parts.resize(samples * n * (m + 3));
     flags[0].resize(samples * n);
     flags[1].resize(samples);
     flags[2].resize(samples * m);
   }
   tendonfmu_outputs view() {
-    return {numbers[0].data(), numbers[1].data(), numbers[2].data(), numbers[3].data(), numbers[4].data(),
-            numbers[5].data(), flags[0].data(),   flags[1].data(),   flags[2].data()};
+    return {numbers[0].data(),   numbers[1].data(),   numbers[2].data(),
+            numbers[3].data(),   numbers[4].data(),   numbers[5].data(),
+            flags[0].data(),     flags[1].data(),     flags[2].data(),
+            detection[0].data(), detection[1].data(), detection[2].data(),
+            detection[3].data(), detection[4].data(), parts.empty() ? nullptr : parts.data()};
   }
 };
 
@@ -111,12 +116,12 @@ class Finger {
   void restore_state(const nb::bytes& bytes) { check(tendonfmu_restore_state(handle_, bytes.data(), bytes.size())); }
 
   nb::tuple run(const Times& time, const std::optional<Rows>& force, const std::optional<Rows>& position,
-                const std::optional<Rows>& angle, const std::optional<Rows>& velocity) {
+                const std::optional<Rows>& angle, const std::optional<Rows>& velocity, bool with_parts) {
     const std::size_t samples = time.shape(0), n = joints(), m = tendons();
     const tendonfmu_inputs inputs = {
         rows(force, samples, m, "tendon_force"), rows(position, samples, m, "tendon_position"),
         rows(angle, samples, n, "joint_position"), rows(velocity, samples, n, "joint_velocity")};
-    OutputRows outputs(samples, n, m);
+    OutputRows outputs(samples, n, m, with_parts);
     const tendonfmu_outputs view = outputs.view();
     std::size_t done = 0;
     tendonfmu_status status;
@@ -131,6 +136,8 @@ class Finger {
     arrays.append(as_array(std::move(outputs.flags[0]), {samples, n}));
     arrays.append(as_array(std::move(outputs.flags[1]), {samples}));
     arrays.append(as_array(std::move(outputs.flags[2]), {samples, m}));
+    for (auto& row : outputs.detection) arrays.append(as_array(std::move(row), {samples, n}));
+    if (with_parts) arrays.append(as_array(std::move(outputs.parts), {samples, n, m + 3}));
     return nb::tuple(arrays);
   }
 
@@ -195,6 +202,6 @@ NB_MODULE(_native, m) {
       .def("save_state", &Finger::save_state)
       .def("restore_state", &Finger::restore_state)
       .def("run", &Finger::run, nb::arg("time"), nb::arg("tendon_force").none(), nb::arg("tendon_position").none(),
-           nb::arg("joint_position").none(), nb::arg("joint_velocity").none())
+           nb::arg("joint_position").none(), nb::arg("joint_velocity").none(), nb::arg("with_parts"))
       .def("directional_derivative", &Finger::directional_derivative);
 }

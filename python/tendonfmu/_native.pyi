@@ -34,6 +34,7 @@ class Finger:
         tendon_position: NDArray[np.float64] | None,
         joint_position: NDArray[np.float64] | None,
         joint_velocity: NDArray[np.float64] | None,
+        with_parts: bool,
     ) -> tuple[NDArray[np.float64], ...]: ...
     def directional_derivative(
         self, force: Sequence[float], position: Sequence[float], angle: Sequence[float], velocity: Sequence[float]

@@ -83,7 +83,7 @@ def dependencies(structure: Structure) -> Dependencies:
         "contact": [_inputs(structure, everything, set(range(m)))],
         "slack": [_slack(structure, i) for i in range(m)],
     }
-    for name in ("compensated_torque", "friction_torque", "bias_torque", "joint_contact"):
+    for name in ("compensated_torque", "compensated_torque_std", "friction_torque", "bias_torque", "joint_contact"):
         result[name] = by_joint
     return result
 

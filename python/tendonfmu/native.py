@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from tendonfmu import _native
 from tendonfmu.errors import InputError
-from tendonfmu.signals import FLAGS, INPUTS, NUMBERS
+from tendonfmu.signals import DETECTION, FLAGS, INPUTS, NUMBERS
 
 Array = NDArray[Any]
 
@@ -144,12 +144,14 @@ class Finger:
         with _refusals():
             self._finger.restore_state(state)
 
-    def run(self, recording: Mapping[str, Array]) -> dict[str, Array]:
+    def run(self, recording: Mapping[str, Array], parts: bool = False) -> dict[str, Array]:
         """Takes all samples of a recording in one call and returns all outputs of contract section 4.
 
         recording: `time` [N] (s), `tendon_force` and `tendon_position` [N, m], `joint_position` and `joint_velocity`
             [N, n]; those that the kinematics source does not use may be left out.
-        Returns [N, n], `slack` [N, m], `contact` [N]; flags are bool.
+        parts: with `friction_parts` [N, n, m + 3], N·m, what makes the friction of each joint (needs contact.uncertainty).
+        Returns [N, n], `slack` [N, m], `contact` [N]; flags are bool. Beyond section 4, as docs/contract-additions.md
+        has them: `compensated_torque_std`, `residual`, `innovation`, `stuck_friction`, `friction_jump`, N·m.
         A later call goes on where this one ended.
         """
         inputs = [
@@ -157,8 +159,9 @@ class Finger:
             for name in INPUTS
         ]
         with _refusals():
-            arrays = self._finger.run(np.ascontiguousarray(recording["time"], dtype=np.float64), *inputs)
-        outputs: dict[str, Array] = dict(zip((*NUMBERS, *FLAGS), arrays, strict=True))
+            arrays = self._finger.run(np.ascontiguousarray(recording["time"], dtype=np.float64), *inputs, parts)
+        names = (*NUMBERS, *FLAGS, *DETECTION, *(("friction_parts",) if parts else ()))
+        outputs: dict[str, Array] = dict(zip(names, arrays, strict=True))
         return outputs | {name: outputs[name].astype(bool) for name in FLAGS}
 
     def directional_derivative(self, direction: Mapping[str, Array]) -> dict[str, Array]:

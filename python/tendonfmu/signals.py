@@ -6,6 +6,9 @@ INPUTS = ("tendon_force", "tendon_position", "joint_position", "joint_velocity")
 NUMBERS = ("compensated_torque", "joint_torque", "friction_torque", "bias_torque", "joint_angle", "joint_speed")
 FLAGS = ("joint_contact", "contact", "slack")
 
+# beyond the contract (docs/contract-additions.md); the FMU has the first one only
+DETECTION = ("compensated_torque_std", "residual", "innovation", "stuck_friction", "friction_jump")
+
 # inputs that a kinematics source uses
 INPUTS_OF_SOURCE = {
     1: ("tendon_force", "tendon_position"),

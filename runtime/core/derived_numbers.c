@@ -116,7 +116,39 @@ static void derive_finger(derivation* d, const model_item* item) {
       break;
     case ITEM_CONTACT_THRESHOLD: memcpy(to->contact_threshold, values, bytes); break;
     case ITEM_CONTACT_PER_FORCE: memcpy(to->contact_per_force, values, bytes); break;
+    case ITEM_HYSTERESIS: settings->hysteresis = values[0]; break;
     default: break; /* extensions read their parameters where they are */
+  }
+}
+
+/* directions lie side by side, so that all of them are summed at once */
+static void derive_direction(derivation* d, const model_item* item) {
+  double* to = d->finger->derived.direction + (size_t)item->joint * item->count * MODEL_MAX_DIRECTIONS + item->point;
+  for (uint32_t i = 0; i < item->count; ++i) {
+    to[i * MODEL_MAX_DIRECTIONS] = d->values[item->first + i];
+  }
+}
+
+static void derive_detection(derivation* d, const model_item* item) {
+  derived_numbers* to = &d->finger->derived;
+  finger_settings* settings = &to->settings;
+  const double* values = d->values + item->first;
+  const size_t bytes = item->count * sizeof(double);
+  switch (item->kind) {
+    case ITEM_INNOVATION_TIME: settings->innovation_time = values[0]; break;
+    case ITEM_INNOVATION_THRESHOLD: memcpy(to->innovation_threshold, values, bytes); break;
+    case ITEM_INNOVATION_PER_FORCE: memcpy(to->innovation_per_force, values, bytes); break;
+    case ITEM_EVIDENCE_TIME: settings->evidence_time = values[0]; break;
+    case ITEM_STUCK_SHARE: settings->stuck_share = values[0]; break;
+    case ITEM_JUMP_SHARE: settings->jump_share = values[0]; break;
+    case ITEM_JUMP_TIME: settings->jump_rate = bounded_inverse(values[0]); break;
+    case ITEM_UNCERTAINTY: derive_direction(d, item); break;
+    case ITEM_UNCERTAINTY_LEVEL: settings->uncertainty_level = values[0]; break;
+    case ITEM_DEVIATION: memcpy(to->deviation, values, bytes); break;
+    case ITEM_DEVIATION_PER_FORCE: memcpy(to->deviation_per_force, values, bytes); break;
+    case ITEM_RELEASE_RATIO: settings->release_ratio = values[0]; break;
+    case ITEM_HOLD_TIME: settings->hold_time = values[0]; break;
+    default: settings->release_time = values[0]; break;
   }
 }
 
@@ -126,8 +158,10 @@ static int derive_item(void* context, const model_item* item) {
     derive_joint(d, item);
   } else if (item->kind <= ITEM_EDGE_FRICTION) {
     derive_tendon(d, item);
-  } else {
+  } else if (item->kind <= ITEM_HYSTERESIS || item->kind >= ITEM_EXTENSION) {
     derive_finger(d, item);
+  } else {
+    derive_detection(d, item);
   }
   return 0;
 }
@@ -168,17 +202,31 @@ static void derive_flags(tendonfmu_finger* f) {
   }
 }
 
+void forget_views(tendonfmu_finger* finger) {
+  for (size_t k = 0; k < finger->slots / 4; ++k) {
+    finger->scratch.view[k].key[0] = -1.0;
+  }
+}
+
 void derive_numbers(tendonfmu_finger* finger, int routing_changed) {
   /* record 0 and 1 stay zero: edges without friction */
   derivation d = {.finger = finger, .values = finger->parameters, .next_record = 2};
-  finger->derived.settings = (finger_settings){.initial_variance = -1.0, .noise_time = -1.0};
+  const uint32_t options = finger->shape.options;
+  finger->derived.settings = (finger_settings){.initial_variance = -1.0,
+                                               .noise_time = -1.0,
+                                               .evidence_time = -1.0,
+                                               .release_ratio = 1.0,
+                                               .release_time = -1.0,
+                                               .forgets_by_absorption = (options & MODEL_FORGETS_BY_ABSORPTION) != 0,
+                                               .remembers_entry_load = (options & MODEL_REMEMBERS_ENTRY_LOAD) != 0,
+                                               .bounds_friction = (options & MODEL_HAS_FRICTION_BOUND) != 0,
+                                               .knows_uncertainty = (options & MODEL_HAS_UNCERTAINTY) != 0,
+                                               .uses_innovation = (options & MODEL_DETECTS_BY_INNOVATION) != 0};
   clear_grids(finger);
   model_visit(&finger->shape, derive_item, &d);
   derive_flags(finger);
   if (routing_changed) {
     derive_routing(finger);
   }
-  for (size_t k = 0; k < finger->slots / 4; ++k) {
-    finger->scratch.view[k].key[0] = -1.0;
-  }
+  forget_views(finger);
 }

@@ -8,4 +8,7 @@
  * R⁺ is only computed again where `routing_changed`. */
 void derive_numbers(tendonfmu_finger* finger, int routing_changed);
 
+/* Makes the next sample look at all laws anew. */
+void forget_views(tendonfmu_finger* finger);
+
 #endif

@@ -62,17 +62,27 @@ static void lay_out_derived(tendonfmu_finger* f, cursor* c) {
   d->contact_threshold = take_numbers(c, joints);
   d->contact_per_force = take_numbers(c, joints);
   d->initial_torque = take_numbers(c, joints);
+  d->innovation_threshold = take_numbers(c, joints);
+  d->innovation_per_force = take_numbers(c, joints);
+  d->deviation = take_numbers(c, joints);
+  d->deviation_per_force = take_numbers(c, joints);
+  d->direction = take_numbers(c, model_direction_count(&f->shape) ? n * (f->tendons + MODEL_DIRECTION_SHARES) * 4 : 0);
 }
 
 static void lay_out_state(tendonfmu_finger* f, cursor* c) {
   finger_state* s = &f->remembered;
   const size_t joints = f->joint_lanes, tendons = f->tendon_lanes, slots = f->slots;
-  f->state_count = STATE_SCALARS + 9 * joints + 2 * tendons + 6 * slots + f->shape.extension_memory;
+  const size_t entries = f->shape.options & MODEL_REMEMBERS_ENTRY_LOAD ? slots : 0;
+  const size_t parts = f->shape.options & MODEL_HAS_UNCERTAINTY ? f->joints * tendons + 3 * joints : 0;
+  f->state_count =
+      STATE_SCALARS + 17 * joints + 2 * tendons + 6 * slots + 2 * entries + parts + f->shape.extension_memory;
   f->state = take_numbers(c, f->state_count);
   double* run = f->state;
   s->scalar = part(&run, STATE_SCALARS);
-  double** const joint_rows[] = {&s->angle, &s->speed,         &s->torque,   &s->friction, &s->compensated,
-                                 &s->bias,  &s->joint_contact, &s->variance, &s->gain};
+  double** const joint_rows[] = {
+      &s->angle,          &s->speed,         &s->torque,   &s->friction,    &s->compensated,   &s->bias,
+      &s->joint_contact,  &s->variance,      &s->gain,     &s->residual,    &s->innovation,    &s->tracked,
+      &s->stuck_friction, &s->friction_jump, &s->evidence, &s->exceeded_at, &s->total_variance};
   for (size_t i = 0; i < sizeof joint_rows / sizeof joint_rows[0]; ++i) {
     *joint_rows[i] = part(&run, joints);
   }
@@ -82,6 +92,9 @@ static void lay_out_state(tendonfmu_finger* f, cursor* c) {
   for (size_t i = 0; i < sizeof slot_rows / sizeof slot_rows[0]; ++i) {
     *slot_rows[i] = part(&run, slots);
   }
+  s->entry_edge = part(&run, entries);
+  s->entry_pulley = part(&run, entries);
+  s->part = part(&run, parts);
   s->extension = run;
 }
 
@@ -89,8 +102,10 @@ static void lay_out_scratch(tendonfmu_finger* f, cursor* c) {
   finger_scratch* s = &f->scratch;
   const size_t matrix = f->joints * f->tendon_lanes;
   double** const tendon_rows[] = {&s->force, &s->position, &s->slack};
-  double** const joint_rows[] = {&s->angle,          &s->torque,        &s->friction,   &s->bias_step, &s->load,
-                                 &s->joint_friction, &s->load_friction, &s->joint_bias, &s->load_bias};
+  double** const joint_rows[] = {&s->angle,     &s->torque,         &s->friction,      &s->bias_step,
+                                 &s->load,      &s->joint_friction, &s->load_friction, &s->joint_bias,
+                                 &s->load_bias, &s->stuck_friction, &s->uncertainty};
+  double** const slot_rows[] = {&s->edge_kept, &s->pulley_kept, &s->edge_stuck, &s->pulley_stuck};
   double** const matrices[] = {&s->edge, &s->pulley, &s->edge_bias, &s->pulley_bias, &s->force_at, &s->force_between};
   for (size_t i = 0; i < sizeof tendon_rows / sizeof tendon_rows[0]; ++i) {
     *tendon_rows[i] = take_numbers(c, f->tendon_lanes);
@@ -101,6 +116,10 @@ static void lay_out_scratch(tendonfmu_finger* f, cursor* c) {
   for (size_t i = 0; i < sizeof matrices / sizeof matrices[0]; ++i) {
     *matrices[i] = take_numbers(c, matrix);
   }
+  for (size_t i = 0; i < sizeof slot_rows / sizeof slot_rows[0]; ++i) {
+    *slot_rows[i] = take_numbers(c, f->slots);
+  }
+  s->part = take_numbers(c, matrix + 3 * f->joint_lanes);
   s->velocity = take_numbers(c, f->slots);
   s->view = take(c, f->slots / 4 * sizeof *s->view);
 }

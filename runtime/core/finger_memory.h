@@ -22,6 +22,15 @@ typedef struct finger_settings {
   double initial_variance; /* < 0: from the noise at the first sample */
   double noise_time;       /* < 0: noise per sample */
   int has_initial_torque;
+  double hysteresis;
+  int forgets_by_absorption, remembers_entry_load;
+  /* the detector */
+  int bounds_friction, knows_uncertainty, uses_innovation;
+  double innovation_time;
+  double evidence_time;                      /* < 0: not by CUSUM */
+  double stuck_share, jump_share, jump_rate; /* jump_rate: 1/T_J, 1/s */
+  double uncertainty_level, release_ratio, hold_time;
+  double release_time; /* < 0: never */
 } finger_settings;
 
 /* All that follows from the parameters; filled in one place, derived_numbers.c. Arrays of [n × M] have a row a joint.
@@ -40,28 +49,40 @@ typedef struct derived_numbers {
   uint32_t* edge_record;  /* [n × M] first record of the edge; 0 holds zeros for edges without friction */
   double* joint_law;      /* [N × LAW_NUMBERS] T_jv0 */
   double* load_law;       /* [N × LAW_NUMBERS] T_jvf */
-  double *cover_stiffness, *cover_rest;          /* [N] */
-  double *contact_threshold, *contact_per_force; /* [N] */
-  double* initial_torque;                        /* [N] */
+  double *cover_stiffness, *cover_rest;                /* [N] */
+  double *contact_threshold, *contact_per_force;       /* [N] */
+  double* initial_torque;                              /* [N] */
+  double *innovation_threshold, *innovation_per_force; /* [N] */
+  double *deviation, *deviation_per_force;             /* [N] */
+  double* direction; /* [n × (m + 3) × 4] relative errors, the directions of a joint side by side */
 } derived_numbers;
 
 /* What the finger remembers from sample to sample, with the outputs of the last one: one plain run of doubles. */
 enum {
-  STATE_INITIALISED,   /* 0 or 1 */
-  STATE_SOURCE,        /* kinematics source 1, 2, 3 */
-  STATE_TIME,          /* s */
-  STATE_FIRST_SAMPLE,  /* 1 while the last sample is the first */
-  STATE_VELOCITY_GAIN, /* ∂v_k/∂q_k of the last sample, 1/s */
-  STATE_CONTACT,       /* 0 or 1 */
-  STATE_SCALARS = 8    /* the rest is 0 and keeps the rows aligned */
+  STATE_INITIALISED,     /* 0 or 1 */
+  STATE_SOURCE,          /* kinematics source 1, 2, 3 */
+  STATE_TIME,            /* s */
+  STATE_FIRST_SAMPLE,    /* 1 while the last sample is the first */
+  STATE_VELOCITY_GAIN,   /* ∂v_k/∂q_k of the last sample, 1/s */
+  STATE_CONTACT,         /* 0 or 1 */
+  STATE_CONTACT_SINCE,   /* s, first sample of the contact that lasts */
+  STATE_ABSORBED,        /* Λ: Σ −ln(1 − K) over the updates of the bias */
+  STATE_ABSORBED_BEFORE, /* the same before the last sample's update */
+  STATE_SCALARS = 12     /* the rest is 0 and keeps the rows aligned */
 };
 
 typedef struct finger_state {
   double* scalar; /* [STATE_SCALARS] */
   /* [N] per joint */
   double *angle, *speed, *torque, *friction, *compensated, *bias, *joint_contact;
-  double* variance; /* P, (N·m)² */
-  double* gain;     /* K; 0 in contact */
+  double* variance;                       /* P, (N·m)² */
+  double* gain;                           /* K; 0 where the bias is not updated */
+  double *residual, *innovation;          /* r before the update, y = r − m */
+  double* tracked;                        /* m, what the innovation is taken from */
+  double *stuck_friction, *friction_jump; /* H, J */
+  double* evidence;                       /* g of the CUSUM, s */
+  double* exceeded_at;                    /* s, last sample at which the joint exceeded; read in contact only */
+  double* total_variance;                 /* square of compensated_torque_std */
   /* [M] per tendon */
   double *force, *slack;
   /* [n × M + N] per slot, fig. 5 */
@@ -70,7 +91,10 @@ typedef struct finger_state {
   double* side_before;              /* side before the last sample */
   double* event;                    /* of the last sample: 1 came to rest, −1 began to move, 0 neither */
   double *stuck_since, *last_stuck; /* s */
-  double* extension;                /* as the extensions ask for */
+  double *entry_edge,
+      *entry_pulley; /* e, as the effects came to rest: N; of joints T_jv0 and T_jvf·Σ f_B, N·m; with entry_load only */
+  double* part;      /* [n × M + 3N] torques of tendons; T_jv0, T_jvf·Σ f_B, T_jq; with uncertainty only */
+  double* extension; /* as the extensions ask for */
 } finger_state;
 
 /* The laws of four neighbouring slots as they look at present: on the side to which each lane moves, and between the
@@ -99,6 +123,11 @@ typedef struct finger_scratch {
   double* slack;      /* [M] */
   double *torque, *friction, *bias_step, *load;                    /* [N] τ, T, Δb, Σ f_B */
   double *joint_friction, *load_friction, *joint_bias, *load_bias; /* [N] T_jv0, T_jvf and their b */
+  double *edge_kept, *pulley_kept;      /* [n × M + N] −κ·e of an effect that leaves rest; with entry_load only */
+  double *edge_stuck, *pulley_stuck;    /* [n × M + N] |F| where the effect sticks, 0 elsewhere; joints T_jv0, T_jvf */
+  double *stuck_friction, *uncertainty; /* [N] H, u */
+  double* part;                         /* as in the state */
+  double start_above[2], stop_below[2]; /* speeds of tendons, joints at which an effect begins to move, comes to rest */
 } finger_scratch;
 
 typedef struct step_kernel step_kernel;
@@ -119,6 +148,16 @@ struct tendonfmu_finger {
   void* allocation; /* of tendonfmu_create(), NULL in the caller's memory */
   char error[ERROR_BYTES];
 };
+
+/* Exponent of forgetting of a slot at the last sample: exp(−this) of what it brought along when it came to rest counted
+ * when it began to move. */
+static inline double rest_exponent(const tendonfmu_finger* finger, size_t slot) {
+  const finger_state* s = &finger->remembered;
+  const double since = s->stuck_since[slot];
+  return finger->derived.settings.forgets_by_absorption
+             ? s->scalar[STATE_ABSORBED_BEFORE] - since
+             : finger->derived.settings.forget_rate * (s->last_stuck[slot] - since);
+}
 
 /* Bytes needed for a finger of a checked image header. */
 size_t finger_memory_size(const model_shape* shape);

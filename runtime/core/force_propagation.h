@@ -5,9 +5,25 @@
 
 #include "slot_view.h"
 
+/* the speeds at which effects begin to move and come to rest: v_min, apart by the hysteresis after the first sample */
+HOT_INLINE void speed_thresholds(tendonfmu_finger* f, int first) {
+  const finger_settings* settings = &f->derived.settings;
+  const double width = first ? 0.0 : settings->hysteresis;
+  f->scratch.start_above[0] = (1.0 + width) * settings->tendon_threshold;
+  f->scratch.stop_below[0] = (1.0 - width) * settings->tendon_threshold;
+  f->scratch.start_above[1] = (1.0 + width) * settings->joint_threshold;
+  f->scratch.stop_below[1] = (1.0 - width) * settings->joint_threshold;
+}
+
 /* lanes that moved at the last sample */
 HOT_INLINE quad_mask moved_before(const tendonfmu_finger* f, size_t slot) {
   return quad_greater(quad_load(f->remembered.moving + slot), quad_set(0.5));
+}
+
+/* lanes that move at this one; kind 0: tendons, 1: joints */
+HOT_INLINE quad_mask moves_at(const tendonfmu_finger* f, size_t slot, int kind, quad speed) {
+  const quad start = quad_set(f->scratch.start_above[kind]), stop = quad_set(f->scratch.stop_below[kind]);
+  return quad_greater(speed, quad_select(moved_before(f, slot), stop, start));
 }
 
 /* one bit a lane: it comes to rest or begins to move */
@@ -47,7 +63,8 @@ HOT_INLINE double angle_before(const double* angle, size_t j) {
 HOT_INLINE const slot_view* view_at(tendonfmu_finger* f, size_t slot, quad velocity, quad_mask moving, double angle) {
   slot_view* view = f->scratch.view + slot / 4;
   const int moves = quad_mask_bits(moving), known = (int)view->key[0];
-  const int negative = known < 0 ? negative_bits(velocity) : (negative_bits(velocity) & moves) | (known & ~moves);
+  const int resting = known < 0 ? negative_bits(quad_load(f->remembered.side + slot)) : known;
+  const int negative = (negative_bits(velocity) & moves) | (resting & ~moves);
   const quad q = quad_set(angle);
   const quad_mask inside = quad_both(quad_at_least(q, quad_load(view->low)), quad_greater(quad_load(view->high), q));
   if (negative != known || quad_mask_bits(inside) != 15) {
@@ -61,33 +78,50 @@ HOT_INLINE quad when_moving(quad_mask moving, quad magnitude, quad velocity) {
   return quad_keep(moving, quad_with_sign(magnitude, velocity));
 }
 
+/* |F| of the lanes that stick, which is what stiction can hold */
+HOT_INLINE void keep_stuck(double* to, quad_mask moving, quad magnitude) {
+  quad_store(to, quad_drop(moving, magnitude));
+}
+
 /* F_B and F_A of every tendon, T_jv0 and T_jvf of every joint, at the velocities in scratch; returns whether any slot
  * comes to rest or begins to move */
 HOT_INLINE int friction_values(tendonfmu_finger* f) {
   const finger_scratch* s = &f->scratch;
   const size_t lanes = f->tendon_lanes, joint_row = f->joints * lanes;
+  const int bounds = f->derived.settings.bounds_friction;
   int transitions = 0;
-  quad threshold = quad_set(f->derived.settings.tendon_threshold);
   for (size_t j = 0; j < f->joints; ++j) {
     const double before = angle_before(s->angle, j);
     for (size_t at = j * lanes; at < (j + 1) * lanes; at += 4) {
       const quad v = quad_load(s->velocity + at), speed = quad_abs(v);
-      const quad_mask moving = quad_greater(speed, threshold);
+      const quad_mask moving = moves_at(f, at, 0, speed);
       const slot_view* view = view_at(f, at, v, moving, before);
-      quad_store(s->edge + at, when_moving(moving, edges_magnitude(view, quad_set(before), speed), v));
+      const quad edge = edges_magnitude(view, quad_set(before), speed);
+      quad_store(s->edge + at, when_moving(moving, edge, v));
+      if (bounds) {
+        keep_stuck(s->edge_stuck + at, moving, edge);
+      }
       if (j > 0) { /* before the first joint there is no pulley */
-        quad_store(s->pulley + at, when_moving(moving, laws_magnitude(view->other, speed), v));
+        const quad pulley = laws_magnitude(view->other, speed);
+        quad_store(s->pulley + at, when_moving(moving, pulley, v));
+        if (bounds) {
+          keep_stuck(s->pulley_stuck + at, moving, pulley);
+        }
       }
       transitions |= transition_bits(f, at, moving);
     }
   }
-  threshold = quad_set(f->derived.settings.joint_threshold);
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     const quad v = quad_load(s->velocity + joint_row + j), speed = quad_abs(v);
-    const quad_mask moving = quad_greater(speed, threshold);
+    const quad_mask moving = moves_at(f, joint_row + j, 1, speed);
     const slot_view* view = view_at(f, joint_row + j, v, moving, 0.0);
-    quad_store(s->joint_friction + j, when_moving(moving, laws_magnitude(view->below, speed), v));
-    quad_store(s->load_friction + j, when_moving(moving, laws_magnitude(view->other, speed), v));
+    const quad own = laws_magnitude(view->below, speed), load = laws_magnitude(view->other, speed);
+    quad_store(s->joint_friction + j, when_moving(moving, own, v));
+    quad_store(s->load_friction + j, when_moving(moving, load, v));
+    if (bounds) {
+      keep_stuck(s->edge_stuck + joint_row + j, moving, own);
+      keep_stuck(s->pulley_stuck + joint_row + j, moving, load);
+    }
     transitions |= transition_bits(f, joint_row + j, moving);
   }
   return transitions != 0;

@@ -65,12 +65,24 @@ static const uint32_t* walk_tendon(walk* w, uint32_t tendon, const uint32_t* wor
   return word;
 }
 
+uint32_t model_direction_count(const model_shape* shape) {
+  return (shape->options & MODEL_UNCERTAINTY_DIRECTIONS) >> 10;
+}
+
+typedef struct item_size {
+  model_item_kind kind;
+  uint32_t count;
+} item_size;
+
+static void emit_all(walk* w, const item_size* items, size_t count) {
+  for (size_t i = 0; i < count; ++i) {
+    emit(w, (model_item){.kind = items[i].kind}, items[i].count);
+  }
+}
+
 static void walk_finger(walk* w) {
   const uint32_t n = w->shape->joints, options = w->shape->options;
-  const struct {
-    model_item_kind kind;
-    uint32_t count;
-  } items[] = {
+  const item_size items[] = {
       {ITEM_TENDON_THRESHOLD, 1},
       {ITEM_JOINT_THRESHOLD, 1},
       {ITEM_FILTER_CUTOFF, 1},
@@ -83,10 +95,42 @@ static void walk_finger(walk* w) {
       {ITEM_NOISE_TIME, options & MODEL_HAS_NOISE_TIME ? 1 : 0},
       {ITEM_CONTACT_THRESHOLD, n},
       {ITEM_CONTACT_PER_FORCE, n},
+      {ITEM_HYSTERESIS, options & MODEL_HAS_HYSTERESIS ? 1 : 0},
   };
-  for (size_t i = 0; i < sizeof items / sizeof items[0]; ++i) {
-    emit(w, (model_item){.kind = items[i].kind}, items[i].count);
+  emit_all(w, items, sizeof items / sizeof items[0]);
+}
+
+/* what is beyond the contract's section 5: docs/contract-additions.md */
+static void walk_detection(walk* w) {
+  const uint32_t n = w->shape->joints, options = w->shape->options;
+  const uint32_t innovation = options & MODEL_DETECTS_BY_INNOVATION ? 1 : 0;
+  const uint32_t bound = options & MODEL_HAS_FRICTION_BOUND ? 1 : 0, deviation = options & MODEL_HAS_DEVIATION ? n : 0;
+  const uint32_t release = options & MODEL_HAS_RELEASE ? 1 : 0;
+  const item_size before[] = {
+      {ITEM_INNOVATION_TIME, innovation},
+      {ITEM_INNOVATION_THRESHOLD, n * innovation},
+      {ITEM_INNOVATION_PER_FORCE, n * innovation},
+      {ITEM_EVIDENCE_TIME, options & MODEL_DETECTS_BY_CUSUM ? 1 : 0},
+      {ITEM_STUCK_SHARE, bound},
+      {ITEM_JUMP_SHARE, bound},
+      {ITEM_JUMP_TIME, bound},
+  };
+  const item_size after[] = {
+      {ITEM_UNCERTAINTY_LEVEL, options & MODEL_HAS_UNCERTAINTY ? 1 : 0},
+      {ITEM_DEVIATION, deviation},
+      {ITEM_DEVIATION_PER_FORCE, deviation},
+      {ITEM_RELEASE_RATIO, release},
+      {ITEM_HOLD_TIME, release},
+      {ITEM_RELEASE_TIME, options & MODEL_HAS_RELEASE_TIME ? 1 : 0},
+  };
+  emit_all(w, before, sizeof before / sizeof before[0]);
+  for (uint32_t j = 0; j < n; ++j) {
+    for (uint32_t d = 0; d < model_direction_count(w->shape); ++d) {
+      emit(w, (model_item){.kind = ITEM_UNCERTAINTY, .joint = j, .point = d},
+           w->shape->tendons + MODEL_DIRECTION_SHARES);
+    }
   }
+  emit_all(w, after, sizeof after / sizeof after[0]);
 }
 
 static void walk_extensions(walk* w) {
@@ -105,6 +149,7 @@ static uint32_t run_walk(walk* w) {
     word = walk_tendon(w, i, word);
   }
   walk_finger(w);
+  walk_detection(w);
   walk_extensions(w);
   return w->next;
 }
@@ -152,6 +197,14 @@ static uint64_t values_offset(const model_shape* shape) {
   return (unpadded_size(shape) + 7u) & ~(uint64_t)7u;
 }
 
+/* −1 where one option needs another that is missing */
+static int check_options(const model_shape* shape) {
+  const uint32_t options = shape->options, directions = model_direction_count(shape);
+  const int cusum = (options & MODEL_DETECTS_BY_CUSUM) != 0, innovation = (options & MODEL_DETECTS_BY_INNOVATION) != 0;
+  const int uncertain = (options & MODEL_HAS_UNCERTAINTY) != 0;
+  return directions > MODEL_MAX_DIRECTIONS || (directions && !uncertain) || (cusum && !innovation) ? -1 : 0;
+}
+
 static int read_counts(const void* image, size_t image_size, model_shape* shape, message_line message) {
   const unsigned char* bytes = image;
   if (!image || image_size < MODEL_HEADER_BYTES || memcmp(bytes, magic, sizeof magic) != 0) {
@@ -185,7 +238,10 @@ static int read_counts(const void* image, size_t image_size, model_shape* shape,
     return refuse_value(message, "model image: extensions", shape->extension_count, "at most 64");
   }
   if (shape->options & ~(uint32_t)MODEL_OPTION_BITS) {
-    return refuse_value(message, "model image: option bits", shape->options, "0 to 7");
+    return refuse_value(message, "model image: option bits", shape->options, "0 to 65535");
+  }
+  if (check_options(shape)) {
+    return refuse_value(message, "model image: option bits", shape->options, "ones that go together");
   }
   if (values_offset(shape) + 8u * (uint64_t)shape->parameter_count != image_size) {
     return refuse(message, "model image whose counts do not add up to its size");

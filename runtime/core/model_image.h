@@ -35,10 +35,28 @@ enum {
   MODEL_MAX_POINTS = 256,
   MODEL_MAX_EXTENSIONS = 64,
   MODEL_HEADER_BYTES = 56,
-  MODEL_EXTENSION_WORDS = 4
+  MODEL_EXTENSION_WORDS = 4,
+  MODEL_MAX_DIRECTIONS = 4,  /* of uncertainty, a joint */
+  MODEL_DIRECTION_SHARES = 3 /* of a direction, beyond one a tendon */
 };
 
-enum { MODEL_HAS_INITIAL_VARIANCE = 1, MODEL_HAS_INITIAL_TORQUE = 2, MODEL_HAS_NOISE_TIME = 4, MODEL_OPTION_BITS = 7 };
+enum {
+  MODEL_HAS_INITIAL_VARIANCE = 1,
+  MODEL_HAS_INITIAL_TORQUE = 2,
+  MODEL_HAS_NOISE_TIME = 4,
+  MODEL_HAS_HYSTERESIS = 8,
+  MODEL_FORGETS_BY_ABSORPTION = 16,
+  MODEL_REMEMBERS_ENTRY_LOAD = 32,
+  MODEL_DETECTS_BY_INNOVATION = 64, /* methods "innovation" and "cusum" */
+  MODEL_DETECTS_BY_CUSUM = 128,     /* beside the bit before */
+  MODEL_HAS_FRICTION_BOUND = 256,
+  MODEL_HAS_UNCERTAINTY = 512,
+  MODEL_UNCERTAINTY_DIRECTIONS = 7 << 10, /* three bits: the largest number of directions of a joint, 0..4 */
+  MODEL_HAS_DEVIATION = 1 << 13,
+  MODEL_HAS_RELEASE = 1 << 14,
+  MODEL_HAS_RELEASE_TIME = 1 << 15,
+  MODEL_OPTION_BITS = (1 << 16) - 1
+};
 
 #define MODEL_EDGE_HAS_ANGLES 0x80000000u
 
@@ -76,9 +94,24 @@ typedef enum model_item_kind {
   ITEM_FORGET_RATE,
   ITEM_INITIAL_TORQUE, /* n */
   ITEM_NOISE_TIME,
-  ITEM_CONTACT_THRESHOLD, /* n */
-  ITEM_CONTACT_PER_FORCE, /* n */
-  ITEM_EXTENSION          /* as many as the effect has */
+  ITEM_CONTACT_THRESHOLD,    /* n */
+  ITEM_CONTACT_PER_FORCE,    /* n */
+  ITEM_HYSTERESIS,           /* velocity_threshold.hysteresis */
+  ITEM_INNOVATION_TIME,      /* contact.… from here on */
+  ITEM_INNOVATION_THRESHOLD, /* n */
+  ITEM_INNOVATION_PER_FORCE, /* n */
+  ITEM_EVIDENCE_TIME,
+  ITEM_STUCK_SHARE,
+  ITEM_JUMP_SHARE,
+  ITEM_JUMP_TIME,
+  ITEM_UNCERTAINTY, /* m + 3, one direction (`point`) of one joint */
+  ITEM_UNCERTAINTY_LEVEL,
+  ITEM_DEVIATION,           /* n */
+  ITEM_DEVIATION_PER_FORCE, /* n */
+  ITEM_RELEASE_RATIO,
+  ITEM_HOLD_TIME,
+  ITEM_RELEASE_TIME,
+  ITEM_EXTENSION /* as many as the effect has */
 } model_item_kind;
 
 typedef struct model_item {
@@ -86,7 +119,7 @@ typedef struct model_item {
   uint32_t first, count; /* parameter indices first .. first + count − 1 */
   uint32_t joint;        /* 0-based; of pulleys and edges: the position in the list */
   uint32_t tendon;       /* 0-based */
-  uint32_t point;        /* working point, 0-based */
+  uint32_t point;        /* working point or direction, 0-based */
   int has_angles;        /* the edge is a list of working points */
   law_kind law;          /* of laws */
   uint32_t extension;    /* 0-based */
@@ -95,6 +128,9 @@ typedef struct model_item {
 
 /* Calls visit for each item in order; stops at the first result other than 0 and returns it. */
 int model_visit(const model_shape* shape, int (*visit)(void* context, const model_item* item), void* context);
+
+/* Directions of uncertainty that every joint has room for; joints with fewer have zeros there. */
+uint32_t model_direction_count(const model_shape* shape);
 
 /* Numbers of a law of this kind: 0, 4 or 8. */
 uint32_t model_law_count(law_kind kind);

@@ -182,8 +182,7 @@ static double read_jump(const tendonfmu_finger* f, const place_laws* p, paramete
     return 0.0;
   }
   if (s->event[p->slot] < 0.0) {
-    const double rested = s->last_stuck[p->slot] - s->stuck_since[p->slot];
-    kept = before == 0.0 ? 0.0 : -law_exponential(f->derived.settings.forget_rate * rested);
+    kept = before == 0.0 ? 0.0 : -law_exponential(rest_exponent(f, p->slot));
     const double factor = -(1.0 + kept) * now;
     jump = factor * add_magnitude(p, now < 0.0, p->threshold, factor, d->bias, &d->bias_count);
   }

@@ -71,13 +71,42 @@ static void path_of_finger(message_line path, const model_item* item, uint32_t o
       [ITEM_NOISE_TIME] = "bias.noise_time",
       [ITEM_CONTACT_THRESHOLD] = "contact.threshold",
       [ITEM_CONTACT_PER_FORCE] = "contact.threshold_per_force",
+      [ITEM_HYSTERESIS] = "velocity_threshold.hysteresis",
+      [ITEM_INNOVATION_TIME] = "contact.innovation.time",
+      [ITEM_INNOVATION_THRESHOLD] = "contact.innovation.threshold",
+      [ITEM_INNOVATION_PER_FORCE] = "contact.innovation.threshold_per_force",
+      [ITEM_EVIDENCE_TIME] = "contact.innovation.evidence_time",
+      [ITEM_STUCK_SHARE] = "contact.friction_bound.stuck_share",
+      [ITEM_JUMP_SHARE] = "contact.friction_bound.jump_share",
+      [ITEM_JUMP_TIME] = "contact.friction_bound.jump_time",
+      [ITEM_UNCERTAINTY_LEVEL] = "contact.uncertainty_level",
+      [ITEM_DEVIATION] = "contact.deviation",
+      [ITEM_DEVIATION_PER_FORCE] = "contact.deviation_per_force",
+      [ITEM_RELEASE_RATIO] = "contact.release_ratio",
+      [ITEM_HOLD_TIME] = "contact.hold_time",
+      [ITEM_RELEASE_TIME] = "contact.release_time",
   };
-  if (item->kind == ITEM_INITIAL_TORQUE || item->kind == ITEM_CONTACT_THRESHOLD ||
-      item->kind == ITEM_CONTACT_PER_FORCE) {
-    path_index(path, names[item->kind], offset);
-  } else {
-    message_text(path, names[item->kind]);
+  switch (item->kind) {
+    case ITEM_INITIAL_TORQUE:
+    case ITEM_CONTACT_THRESHOLD:
+    case ITEM_CONTACT_PER_FORCE:
+    case ITEM_INNOVATION_THRESHOLD:
+    case ITEM_INNOVATION_PER_FORCE:
+    case ITEM_DEVIATION:
+    case ITEM_DEVIATION_PER_FORCE: path_index(path, names[item->kind], offset); break;
+    default: message_text(path, names[item->kind]); break;
   }
+}
+
+/* contact.uncertainty[joint,direction,share]: FMI's structured names have one bracket an array */
+static void path_of_direction(message_line path, const model_item* item, uint32_t offset) {
+  message_text(path, "contact.uncertainty[");
+  message_count(path, item->joint + 1);
+  message_text(path, ",");
+  message_count(path, item->point + 1);
+  message_text(path, ",");
+  message_count(path, offset + 1);
+  message_text(path, "]");
 }
 
 void parameter_path(const model_item* item, uint32_t index, char* path) {
@@ -88,6 +117,8 @@ void parameter_path(const model_item* item, uint32_t index, char* path) {
     path_of_joint(line, item, offset);
   } else if (item->kind <= ITEM_EDGE_FRICTION) {
     path_of_tendon(line, item, offset);
+  } else if (item->kind == ITEM_UNCERTAINTY) {
+    path_of_direction(line, item, offset);
   } else if (item->kind < ITEM_EXTENSION) {
     path_of_finger(line, item, offset);
   } else {
@@ -156,14 +187,36 @@ static parameter_range range_of_effect(const model_item* item, uint32_t offset) 
 
 parameter_range parameter_range_of(const model_item* item, uint32_t index) {
   static const parameter_range ranges[] = {
-      [ITEM_STIFFNESS] = {"N/m", 0.0, 1e12, 1, 0},           [ITEM_MOMENT_ARMS] = {"m", -1e3, 1e3, 0, 0},
-      [ITEM_EDGE_ANGLES] = {"rad", -1e6, 1e6, 0, 0},         [ITEM_TENDON_THRESHOLD] = {"m/s", 0.0, LARGE, 0, 1},
-      [ITEM_JOINT_THRESHOLD] = {"rad/s", 0.0, LARGE, 0, 1},  [ITEM_FILTER_CUTOFF] = {"Hz", 0.0, LARGE, 0, 1},
-      [ITEM_DRIFT_VARIANCE] = {"N2.m2/s", 0.0, LARGE, 0, 1}, [ITEM_NOISE_STD] = {"N.m", 0.0, LARGE, 0, 1},
-      [ITEM_NOISE_STD_PER_FORCE] = {"m", 0.0, LARGE, 0, 1},  [ITEM_INITIAL_VARIANCE] = {"N2.m2", 0.0, LARGE, 0, 0},
-      [ITEM_FORGET_RATE] = {"1/s", 0.0, LARGE, 0, 1},        [ITEM_INITIAL_TORQUE] = {"N.m", -LARGE, LARGE, 0, 0},
-      [ITEM_NOISE_TIME] = {"s", 0.0, LARGE, 0, 1},           [ITEM_CONTACT_THRESHOLD] = {"N.m", 0.0, LARGE, 0, 1},
+      [ITEM_STIFFNESS] = {"N/m", 0.0, 1e12, 1, 0},
+      [ITEM_MOMENT_ARMS] = {"m", -1e3, 1e3, 0, 0},
+      [ITEM_EDGE_ANGLES] = {"rad", -1e6, 1e6, 0, 0},
+      [ITEM_TENDON_THRESHOLD] = {"m/s", 0.0, LARGE, 0, 1},
+      [ITEM_JOINT_THRESHOLD] = {"rad/s", 0.0, LARGE, 0, 1},
+      [ITEM_FILTER_CUTOFF] = {"Hz", 0.0, LARGE, 0, 1},
+      [ITEM_DRIFT_VARIANCE] = {"N2.m2/s", 0.0, LARGE, 0, 1},
+      [ITEM_NOISE_STD] = {"N.m", 0.0, LARGE, 0, 1},
+      [ITEM_NOISE_STD_PER_FORCE] = {"m", 0.0, LARGE, 0, 1},
+      [ITEM_INITIAL_VARIANCE] = {"N2.m2", 0.0, LARGE, 0, 0},
+      [ITEM_FORGET_RATE] = {"1/s", 0.0, LARGE, 0, 1},
+      [ITEM_INITIAL_TORQUE] = {"N.m", -LARGE, LARGE, 0, 0},
+      [ITEM_NOISE_TIME] = {"s", 0.0, LARGE, 0, 1},
+      [ITEM_CONTACT_THRESHOLD] = {"N.m", 0.0, LARGE, 0, 1},
       [ITEM_CONTACT_PER_FORCE] = {"m", 0.0, LARGE, 0, 1},
+      [ITEM_HYSTERESIS] = {"1", 0.0, 1.0, 0, 1},
+      [ITEM_INNOVATION_TIME] = {"s", 0.0, LARGE, 1, 1},
+      [ITEM_INNOVATION_THRESHOLD] = {"N.m", 0.0, LARGE, 0, 1},
+      [ITEM_INNOVATION_PER_FORCE] = {"m", 0.0, LARGE, 0, 1},
+      [ITEM_EVIDENCE_TIME] = {"s", 0.0, LARGE, 1, 1},
+      [ITEM_STUCK_SHARE] = {"1", 0.0, 10.0, 0, 1},
+      [ITEM_JUMP_SHARE] = {"1", 0.0, 10.0, 0, 1},
+      [ITEM_JUMP_TIME] = {"s", 0.0, LARGE, 1, 1},
+      [ITEM_UNCERTAINTY] = {"1", -LARGE, LARGE, 0, 1},
+      [ITEM_UNCERTAINTY_LEVEL] = {"1", 0.0, 100.0, 0, 1},
+      [ITEM_DEVIATION] = {"N.m", 0.0, LARGE, 0, 1},
+      [ITEM_DEVIATION_PER_FORCE] = {"m", 0.0, LARGE, 0, 1},
+      [ITEM_RELEASE_RATIO] = {"1", 0.0, 1.0, 1, 1},
+      [ITEM_HOLD_TIME] = {"s", 0.0, LARGE, 0, 1},
+      [ITEM_RELEASE_TIME] = {"s", 0.0, LARGE, 0, 1},
   };
   const uint32_t offset = index - item->first;
   switch (item->kind) {

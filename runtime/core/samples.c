@@ -99,6 +99,27 @@ static void give_flags(unsigned char* to, const double* from, size_t count, size
   }
 }
 
+static void give_deviations(double* to, const double* variance, size_t count, size_t row) {
+  for (size_t j = 0; to && j < count; ++j) {
+    to[row * count + j] = sqrt(variance[j]);
+  }
+}
+
+/* the lanes of a finger without gaps: m tendons, then T_jv0, T_jvf·Σ f_B, T_jq of each joint */
+static void give_parts(double* to, const tendonfmu_finger* f, size_t row) {
+  const size_t n = f->joints, m = f->tendons, width = m + MODEL_DIRECTION_SHARES;
+  const double* part = f->derived.settings.knows_uncertainty ? f->remembered.part : NULL;
+  for (size_t j = 0; to && j < n; ++j) {
+    double* place = to + (row * n + j) * width;
+    for (size_t i = 0; i < m; ++i) {
+      place[i] = part ? part[j * f->tendon_lanes + i] : 0.0;
+    }
+    for (size_t k = 0; k < MODEL_DIRECTION_SHARES; ++k) {
+      place[m + k] = part ? part[n * f->tendon_lanes + k * f->joint_lanes + j] : 0.0;
+    }
+  }
+}
+
 void samples_give_outputs(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs, size_t row) {
   const finger_state* s = &finger->remembered;
   const size_t n = finger->joints;
@@ -111,6 +132,12 @@ void samples_give_outputs(const tendonfmu_finger* finger, const tendonfmu_output
   give_flags(outputs->joint_contact, s->joint_contact, n, row);
   give_flags(outputs->contact, s->scalar + STATE_CONTACT, 1, row);
   give_flags(outputs->slack, s->slack, finger->tendons, row);
+  give_deviations(outputs->compensated_torque_std, s->total_variance, n, row);
+  give_numbers(outputs->residual, s->residual, n, row);
+  give_numbers(outputs->innovation, s->innovation, n, row);
+  give_numbers(outputs->stuck_friction, s->stuck_friction, n, row);
+  give_numbers(outputs->friction_jump, s->friction_jump, n, row);
+  give_parts(outputs->friction_parts, finger, row);
 }
 
 static const double* row_of(const double* values, size_t row, size_t count) {

@@ -98,5 +98,6 @@ int restore_state(tendonfmu_finger* finger, const void* bytes, message_line mess
     memcpy(finger->parameters, finger->candidate, p * sizeof(double));
     derive_numbers(finger, 1);
   }
+  forget_views(finger); /* they follow the side of the last moving sample, which is another one now */
   return 0;
 }

@@ -85,6 +85,7 @@ HOT_INLINE int all_finite(const tendonfmu_finger* f) {
   for (size_t j = 0; j < f->joints; ++j) {
     probe += 0.0 * (s->torque[j] - s->friction[j] - s->bias_step[j] - f->remembered.bias[j]);
     probe += 0.0 * s->angle[j] + 0.0 * joint_velocity[j];
+    probe += 0.0 * (s->stuck_friction[j] + s->uncertainty[j]);
   }
   return probe == 0.0;
 }
@@ -96,10 +97,23 @@ HOT_INLINE void copy_row(double* to, const double* from, size_t lanes) {
 }
 
 /* T_eff = b_eff + T with b_eff already stepped */
-HOT_INLINE void effective_friction(tendonfmu_finger* f) {
-  const finger_state* s = &f->remembered;
+HOT_INLINE void effective_friction(tendonfmu_finger* f, double* total) {
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
-    quad_store(s->friction + j, quad_add(quad_load(s->bias + j), quad_load(f->scratch.friction + j)));
+    quad_store(total + j, quad_add(quad_load(f->remembered.bias + j), quad_load(f->scratch.friction + j)));
+  }
+}
+
+/* what it leaves of the measured torque, and how it has jumped */
+HOT_INLINE void leave_residual(tendonfmu_finger* f, double step) {
+  const finger_state* s = &f->remembered;
+  double* total = f->scratch.friction;
+  effective_friction(f, total);
+  if (f->derived.settings.bounds_friction) {
+    remember_jumps(f, total, s->friction, step);
+  }
+  copy_row(s->friction, total, f->joint_lanes);
+  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+    quad_store(s->residual + j, quad_sub(quad_load(s->torque + j), quad_load(s->friction + j)));
   }
 }
 
@@ -117,6 +131,12 @@ HOT_INLINE void remember_sample(tendonfmu_finger* f, double time, double velocit
   copy_row(s->torque, f->scratch.torque, f->joint_lanes);
   copy_row(s->force, f->scratch.force, f->tendon_lanes);
   copy_row(s->slack, f->scratch.slack, f->tendon_lanes);
+  if (f->derived.settings.bounds_friction) {
+    copy_row(s->stuck_friction, f->scratch.stuck_friction, f->joint_lanes);
+  }
+  if (f->derived.settings.knows_uncertainty) {
+    copy_row(s->part, f->scratch.part, f->joints * f->tendon_lanes + 3 * f->joint_lanes);
+  }
   remember_extensions(f);
   s->scalar[STATE_TIME] = time;
   s->scalar[STATE_VELOCITY_GAIN] = velocity_gain;
@@ -130,14 +150,15 @@ HOT_INLINE void begin_tracking(tendonfmu_finger* f, double time, double mean_for
       settings->initial_variance >= 0.0 ? settings->initial_variance : noise_variance(settings, mean_force, 1.0);
   for (size_t slot = 0; slot < f->slots; ++slot) {
     s->event[slot] = 0.0;
-    s->stuck_since[slot] = s->last_stuck[slot] = time;
+    s->last_stuck[slot] = time;
+    s->stuck_since[slot] = settings->forgets_by_absorption ? 0.0 : time;
   }
   for (size_t j = 0; j < f->joints; ++j) {
     s->bias[j] = settings->has_initial_torque ? f->derived.initial_torque[j] : s->torque[j] - f->scratch.friction[j];
     s->variance[j] = variance;
     s->gain[j] = s->joint_contact[j] = 0.0;
   }
-  effective_friction(f);
+  effective_friction(f, s->friction);
   if (!settings->has_initial_torque) {
     copy_row(s->friction, s->torque, f->joint_lanes); /* to the last bit */
   }
@@ -155,15 +176,19 @@ HOT_INLINE void track_sample(tendonfmu_finger* f, double time, double step, doub
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     quad_store(s->bias + j, quad_add(quad_load(s->bias + j), quad_load(f->scratch.bias_step + j)));
   }
-  effective_friction(f);
-  const int contact = detect_contact(f, mean_force);
-  if (contact) {
+  leave_residual(f, step);
+  const int contact = detect_contact(f, mean_force, time, step);
+  s->scalar[STATE_ABSORBED_BEFORE] = s->scalar[STATE_ABSORBED];
+  if (bias_is_updated(f, contact, time)) {
+    track_bias(f, step, noise_variance(settings, mean_force, scale));
+    if (settings->uses_innovation) {
+      follow_residual(f, step);
+    }
+  } else {
     restart_rest(f, time);
     for (size_t j = 0; j < f->joint_lanes; ++j) {
       s->gain[j] = 0.0;
     }
-  } else {
-    track_bias(f, step, noise_variance(settings, mean_force, scale));
   }
   s->scalar[STATE_FIRST_SAMPLE] = 0.0;
   s->scalar[STATE_CONTACT] = contact ? 1.0 : 0.0;
@@ -179,11 +204,13 @@ static sample_result take_sample(tendonfmu_finger* f, double time) {
     return SAMPLE_OUT_OF_RANGE;
   }
   const double velocity_gain = find_kinematics(f, step);
+  speed_thresholds(f, first);
   const int transitions = friction_values(f);
   total_friction(f);
   add_extension_torques(f);
   measured_torques(f);
   const double mean_force = mean_tendon_force(f);
+  bound_friction(f);
   if (transitions && !first) {
     bias_steps(f);
   } else {
@@ -204,6 +231,7 @@ static sample_result take_sample(tendonfmu_finger* f, double time) {
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     quad_store(s->compensated + j, quad_sub(quad_load(s->torque + j), quad_load(s->friction + j)));
   }
+  estimate_variance(f, mean_force);
   return SAMPLE_TAKEN;
 }
 

@@ -22,10 +22,10 @@ json_node json_node::find(const std::string& path) const {
   json_node node = *this;
   std::size_t from = 0;
   while (from < path.size()) {
-    if (path[from] == '[') {
-      const std::size_t end = path.find(']', from);
+    if (path[from] == '[' || path[from] == ',') {
+      const std::size_t end = path.find_first_of(",]", from + 1);
       node = node.element(std::stoul(path.substr(from + 1, end - from - 1)) - 1);
-      from = end + 1;
+      from = path[end] == ']' ? end + 1 : end;
       continue;
     }
     from += path[from] == '.';

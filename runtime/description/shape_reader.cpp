@@ -1,5 +1,6 @@
 #include "shape_reader.h"
 
+#include <algorithm>
 #include <cstring>
 #include <string>
 
@@ -164,23 +165,117 @@ void check_settings(const json_node& document, const char* name, const std::vect
   }
 }
 
+/* `bit` where any of the keys is there */
+std::uint32_t given(const json_node& parent, const std::vector<std::string>& keys, unsigned bit) {
+  for (const std::string& key : keys) {
+    if (!parent.member(key).absent()) {
+      return bit;
+    }
+  }
+  return 0u;
+}
+
+/* position of a word among those allowed; the first one where it is left out */
+std::size_t word_of(const json_node& node, const std::vector<std::string>& words) {
+  std::string list;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    list += (list.empty() ? "\"" : ", \"") + words[i] + "\"";
+    if (node.value() == words[i]) {
+      return i;
+    }
+  }
+  if (!node.absent()) {
+    node.refuse("one of " + list);
+  }
+  return 0;
+}
+
 std::uint32_t read_bias_options(const json_node& bias, std::uint32_t joints) {
   const json_node torque = bias.member("initial_torque");
   if (!torque.absent()) {
     torque.expect_list(joints, joints, "numbers in N.m, one per joint");
   }
-  return (bias.member("initial_variance").absent() ? 0u : unsigned{MODEL_HAS_INITIAL_VARIANCE}) |
-         (torque.absent() ? 0u : unsigned{MODEL_HAS_INITIAL_TORQUE}) |
-         (bias.member("noise_time").absent() ? 0u : unsigned{MODEL_HAS_NOISE_TIME});
+  const json_node entry_load = bias.member("entry_load");
+  return given(bias, {"initial_variance"}, MODEL_HAS_INITIAL_VARIANCE) |
+         given(bias, {"initial_torque"}, MODEL_HAS_INITIAL_TORQUE) | given(bias, {"noise_time"}, MODEL_HAS_NOISE_TIME) |
+         (word_of(bias.member("forgetting"), {"time", "absorption"}) ? unsigned{MODEL_FORGETS_BY_ABSORPTION} : 0u) |
+         (!entry_load.absent() && entry_load.boolean() ? unsigned{MODEL_REMEMBERS_ENTRY_LOAD} : 0u);
 }
 
-void check_contact(const json_node& contact, std::uint32_t joints) {
-  contact.expect_keys({"threshold", "threshold_per_force"});
-  contact.member("threshold").expect_list(joints, joints, "numbers in N.m, one per joint");
-  const json_node per_force = contact.member("threshold_per_force");
-  if (!per_force.absent()) {
-    per_force.expect_list(joints, joints, "numbers in N.m per N, one per joint");
+/* a list that may be left out */
+void check_optional_list(const json_node& list, std::uint32_t size, const std::string& meaning) {
+  if (!list.absent()) {
+    list.expect_list(size, size, meaning);
   }
+}
+
+/* the thresholds of the residual, or of the innovation */
+void check_thresholds(const json_node& parent, std::uint32_t joints) {
+  parent.member("threshold").expect_list(joints, joints, "numbers in N.m, one per joint");
+  check_optional_list(parent.member("threshold_per_force"), joints, "numbers in N.m per N, one per joint");
+}
+
+std::uint32_t read_method(const json_node& contact, std::uint32_t joints) {
+  const std::size_t method = word_of(contact.member("method"), {"threshold", "innovation", "cusum"});
+  const json_node innovation = contact.member("innovation");
+  if (method == 0) {
+    if (!innovation.absent()) {
+      throw description_error(innovation.path() + ": not allowed with contact.method \"threshold\"");
+    }
+    return 0u;
+  }
+  innovation.expect_keys({"time", "threshold", "threshold_per_force", "evidence_time"});
+  check_thresholds(innovation, joints);
+  if (method == 1) {
+    expect_none(innovation, {"evidence_time"}, "contact.method \"innovation\"; it belongs to \"cusum\"");
+    return MODEL_DETECTS_BY_INNOVATION;
+  }
+  return unsigned{MODEL_DETECTS_BY_INNOVATION} | unsigned{MODEL_DETECTS_BY_CUSUM};
+}
+
+std::uint32_t read_uncertainty(const json_node& contact, std::uint32_t joints, std::uint32_t tendons) {
+  const json_node uncertainty = contact.member("uncertainty");
+  std::uint32_t most = 0;
+  if (uncertainty.absent()) {
+    const json_node level = contact.member("uncertainty_level");
+    if (!level.absent()) {
+      throw description_error(level.path() + ": not allowed without contact.uncertainty");
+    }
+    return 0u;
+  }
+  uncertainty.expect_list(joints, joints, "lists of directions, one per joint");
+  for (std::uint32_t j = 0; j < joints; ++j) {
+    const json_node directions = uncertainty.element(j);
+    if (directions.absent()) {
+      continue;
+    }
+    directions.expect_list(0, MODEL_MAX_DIRECTIONS, "directions");
+    for (std::size_t d = 0; d < directions.size(); ++d) {
+      const std::uint32_t shares = tendons + MODEL_DIRECTION_SHARES;
+      directions.element(d).expect_list(shares, shares,
+                                        "relative errors: of the tendons, joint friction, load friction, cover");
+    }
+    most = std::max(most, static_cast<std::uint32_t>(directions.size()));
+  }
+  return unsigned{MODEL_HAS_UNCERTAINTY} | most << 10;
+}
+
+std::uint32_t read_contact_options(const json_node& contact, std::uint32_t joints, std::uint32_t tendons) {
+  contact.expect_keys({"threshold", "threshold_per_force", "method", "innovation", "friction_bound", "uncertainty",
+                       "uncertainty_level", "deviation", "deviation_per_force", "release_ratio", "hold_time",
+                       "release_time"});
+  check_thresholds(contact, joints);
+  const json_node bound = contact.member("friction_bound");
+  if (!bound.absent()) {
+    bound.expect_keys({"stuck_share", "jump_share", "jump_time"});
+  }
+  check_optional_list(contact.member("deviation"), joints, "numbers in N.m, one per joint");
+  check_optional_list(contact.member("deviation_per_force"), joints, "numbers in N.m per N, one per joint");
+  return read_method(contact, joints) | read_uncertainty(contact, joints, tendons) |
+         given(contact, {"friction_bound"}, MODEL_HAS_FRICTION_BOUND) |
+         given(contact, {"deviation", "deviation_per_force"}, MODEL_HAS_DEVIATION) |
+         given(contact, {"release_ratio", "hold_time"}, MODEL_HAS_RELEASE) |
+         given(contact, {"release_time"}, MODEL_HAS_RELEASE_TIME);
 }
 
 const effect_type* read_effect_name(const json_node& node) {
@@ -240,10 +335,10 @@ void check_top(const json_node& document) {
     format.refuse("\"" + std::string(format_name) + "\"");
   }
   check_name(document.member("name"));
-  check_settings(document, "velocity_threshold", {"tendon", "joint"});
+  check_settings(document, "velocity_threshold", {"tendon", "joint", "hysteresis"});
   check_settings(document, "bias",
                  {"drift_variance", "noise_std", "noise_std_per_force", "initial_variance", "forget_rate",
-                  "initial_torque", "noise_time"});
+                  "initial_torque", "noise_time", "forgetting", "entry_load"});
 }
 
 }  // namespace
@@ -262,8 +357,9 @@ finger_shape read_shape(const json_node& document) {
   for (std::size_t i = 0; i < tendons.size(); ++i) {
     read_tendon(tendons.element(i), finger.shape.joints, finger.words);
   }
-  finger.shape.options = read_bias_options(document.member("bias"), finger.shape.joints);
-  check_contact(document.member("contact"), finger.shape.joints);
+  finger.shape.options = read_bias_options(document.member("bias"), finger.shape.joints) |
+                         read_contact_options(document.member("contact"), finger.shape.joints, finger.shape.tendons) |
+                         given(document.member("velocity_threshold"), {"hysteresis"}, MODEL_HAS_HYSTERESIS);
   read_extensions(document.member("extensions"), finger);
   finger.shape.word_count = static_cast<std::uint32_t>(finger.words.size());
   finger.shape.words = finger.words.data();

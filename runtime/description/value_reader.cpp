@@ -22,7 +22,18 @@ std::optional<double> default_value(const model_item& item, std::uint32_t offset
     case ITEM_NOISE_STD: return 0.01;
     case ITEM_NOISE_STD_PER_FORCE: return 0.0;
     case ITEM_FORGET_RATE: return 5.0;
-    case ITEM_CONTACT_PER_FORCE: return 0.0;
+    case ITEM_CONTACT_PER_FORCE:
+    case ITEM_HYSTERESIS:
+    case ITEM_INNOVATION_PER_FORCE:
+    case ITEM_STUCK_SHARE:
+    case ITEM_JUMP_SHARE:
+    case ITEM_DEVIATION:
+    case ITEM_DEVIATION_PER_FORCE:
+    case ITEM_HOLD_TIME:
+    case ITEM_UNCERTAINTY: return 0.0; /* joints with fewer directions than others */
+    case ITEM_JUMP_TIME: return 0.06;
+    case ITEM_UNCERTAINTY_LEVEL: return 3.0;
+    case ITEM_RELEASE_RATIO: return 1.0;
     case ITEM_EXTENSION:
       return item.effect->parameters[offset].required
                  ? std::nullopt

@@ -108,6 +108,13 @@ typedef struct tendonfmu_outputs {
   unsigned char* joint_contact; /* [n] */
   unsigned char* contact;       /* [1] any of joint_contact */
   unsigned char* slack;         /* [m] a modelled tendon force came out negative */
+  /* docs/contract-additions.md */
+  double* compensated_torque_std; /* [n] N·m   standard deviation of compensated_torque */
+  double* residual;               /* [n] N·m   τ − T_eff before the bias is updated */
+  double* innovation;             /* [n] N·m   what the residual has of late beyond its slow part; 0 by "threshold" */
+  double* stuck_friction;         /* [n] N·m   H, what stiction can hold; 0 without contact.friction_bound */
+  double* friction_jump;          /* [n] N·m   J, how the modelled friction has jumped of late; 0 without it */
+  double* friction_parts; /* [n × (m + 3)] N·m  by tendons, T_jv0, T_jvf·Σ f_B, T_jq; with contact.uncertainty */
 } tendonfmu_outputs;
 
 /* Chooses where joint angles and velocities come from. Default 1. Before tendonfmu_initialise() only. */
@@ -124,7 +131,8 @@ tendonfmu_status tendonfmu_step(tendonfmu_finger* finger, double time, const ten
 /* Takes `samples` samples in one call: initialises with the first where the finger is not initialised yet.
  *   time          [samples] s, increasing
  *   inputs        arrays of [samples × m] and [samples × n]
- *   outputs       arrays of [samples × n], [samples × m], contact [samples]; NULL arrays are not wanted
+ *   outputs       arrays of [samples × n], [samples × m], contact [samples], friction_parts [samples × n ×
+ *                 (m + 3)]; NULL arrays are not wanted
  *   done          receives the number of samples taken (may be NULL); on an error it is the row that was refused,
  *                 and the outputs of the rows before it are written */
 tendonfmu_status tendonfmu_run(tendonfmu_finger* finger, size_t samples, const double* time,
@@ -143,7 +151,8 @@ int tendonfmu_is_initialised(const tendonfmu_finger* finger);
  * remembered is held fixed, branch decisions are frozen. The parameters are those in force: take it before you write
  * others.
  *   direction     derivatives of the inputs: [m], [m], [n], [n]; a NULL array stands for zeros
- *   derivative    receives derivatives of the six real outputs, each [n] or NULL; the flags are left alone
+ *   derivative    receives derivatives of the six outputs by name up to joint_speed, each [n] or NULL; all
+ *                 others are left alone
  * TENDONFMU_WRONG_ORDER before the initialisation. */
 tendonfmu_status tendonfmu_get_directional_derivative(tendonfmu_finger* finger, const tendonfmu_inputs* direction,
                                                       const tendonfmu_outputs* derivative);
