@@ -1,4 +1,4 @@
-"""Seeded random fingers and recordings that take every branch of contract section 5.
+"""Seeded random fingers and recordings that take every branch of contract section 5 and of its additions for detection.
 
 The recordings are not a simulation: motions and forces are chosen so that the rules are exercised
 (jumps, slow reversals, rests held to the last bit, pushes, slack), and they share no code with any law.
@@ -244,8 +244,8 @@ def random_recording(
     for held in np.flatnonzero(rest):  # a rest is held to the last bit, also by the sensors
         if held > 0 and rest[held - 1]:
             position[held], measured_angle[held] = position[held - 1], measured_angle[held - 1]
-            # with v_min = 0 a compensated step would leave the direction of motion to rounding
-            if rng.random() < 0.9 or thresholds.get("tendon") == 0.0:
+            # where everything above 0 moves, a compensated step would leave the direction of motion to rounding
+            if rng.random() < 0.9 or thresholds.get("tendon") == 0.0 or thresholds.get("hysteresis") == 1.0:
                 force[held] = force[held - 1]
             else:  # a force step at rest, without a change of the angle
                 position[held] = position[held - 1] + (force[held] - force[held - 1]) / k
@@ -258,10 +258,97 @@ def random_recording(
     }
 
 
-def random_case(seed: int, samples: int = SAMPLES) -> tuple[Description, Recording]:
-    """A finger and its recording; about a third begin under load, with `bias.initial_torque` near it."""
+def random_innovation(rng: np.random.Generator, method: str, scale: Array, bounded: bool) -> Description:
+    """`contact.innovation`; bounded: a friction bound keeps B above 0 where the threshold is 0."""
+    n = len(scale)
+    innovation: Description = {
+        "time": float(10.0 ** rng.uniform(-2.0, -0.5)),
+        "threshold": (scale * 10.0 ** rng.uniform(-1.2, 0.2, n)).tolist(),
+    }
+    if rng.random() < 0.4:
+        innovation["threshold_per_force"] = rng.uniform(0.0, 1e-3, n).tolist()
+    elif rng.random() < 0.6 and not bounded:
+        innovation["threshold"][int(rng.integers(0, n))] = 0.0
+    if method == "cusum":
+        innovation["evidence_time"] = float(10.0 ** rng.uniform(-2.5, -1.0))
+    return innovation
+
+
+def random_directions(rng: np.random.Generator, n: int, m: int) -> list[Any]:
+    """`contact.uncertainty`: up to 4 directions of relative errors a joint, null for some."""
+    directions: list[Any] = []
+    for _ in range(n):
+        count = int(rng.integers(0, 5))
+        errors = rng.normal(0.0, 0.1, (count, m + 3)) * (rng.random((count, m + 3)) < 0.7)
+        directions.append(None if rng.random() < 0.2 else errors.tolist())
+    return directions
+
+
+def random_release(rng: np.random.Generator) -> Description:
+    """How a contact ends; a key left out, null or at its least for some."""
+    keys: Description = {}
+    if rng.random() < 0.5:
+        keys["release_ratio"] = 1.0 if rng.random() < 0.1 else rng.uniform(0.2, 0.95)
+    if rng.random() < 0.5:
+        keys["hold_time"] = 0.0 if rng.random() < 0.1 else float(10.0 ** rng.uniform(-2.5, -1.0))
+    if rng.random() < 0.6:
+        keys["release_time"] = (
+            None if rng.random() < 0.1 else 0.0 if rng.random() < 0.15 else float(10.0 ** rng.uniform(-2.5, -0.7))
+        )
+    return keys
+
+
+def random_detection(seed: int, finger: Description) -> Description:
+    """The finger with any subset of the optional keys of docs/contract-additions.md."""
+    rng = np.random.default_rng([seed, 4])
+    R = np.array([tendon["moment_arms"] for tendon in finger["tendons"]])
+    m, n = R.shape
+    scale = friction_scale(R) * (1.0 + 0.3 * n)
+    contact = finger["contact"] | random_release(rng)
+    if rng.random() < 0.5:
+        contact["friction_bound"] = {}
+        for key, most in (("stuck_share", 1.0), ("jump_share", 0.5), ("jump_time", 0.2)):
+            if rng.random() < 0.8:
+                contact["friction_bound"][key] = rng.uniform(0.01, most)
+    method = str(rng.choice(["threshold", "innovation", "cusum"], p=[0.3, 0.35, 0.35]))
+    if method != "threshold" or rng.random() < 0.5:
+        contact["method"] = method
+    if method != "threshold":
+        contact["innovation"] = random_innovation(rng, method, scale, "friction_bound" in contact)
+    if rng.random() < 0.5:
+        contact["uncertainty"] = random_directions(rng, n, m)
+        if rng.random() < 0.5:
+            contact["uncertainty_level"] = 0.0 if rng.random() < 0.2 else rng.uniform(0.5, 4.0)
+    if rng.random() < 0.5:
+        contact["deviation"] = (scale * rng.uniform(0.0, 0.2, n)).tolist()
+    if rng.random() < 0.5:
+        contact["deviation_per_force"] = rng.uniform(0.0, 1e-3, n).tolist()
+    # bounds make contact rarer; some of it shall remain
+    wide = ("friction_bound" in contact) + ("uncertainty" in contact)
+    contact["threshold"] = (np.array(contact["threshold"]) * 0.7**wide).tolist()
+    finger = finger | {"contact": contact}
+    bias = dict(finger.get("bias", {}))
+    if rng.random() < 0.6:
+        bias["entry_load"] = bool(rng.random() < 0.8)
+    if rng.random() < 0.6:
+        bias["forgetting"] = "absorption" if rng.random() < 0.8 else "time"
+    if bias:
+        finger["bias"] = bias
+    if rng.random() < 0.6:
+        hysteresis = float(rng.choice([0.0, rng.uniform(0.05, 0.95), 1.0], p=[0.1, 0.65, 0.25]))
+        finger["velocity_threshold"] = finger.get("velocity_threshold", {}) | {"hysteresis": hysteresis}
+    return finger
+
+
+def random_case(seed: int, samples: int = SAMPLES, detection: bool = False) -> tuple[Description, Recording]:
+    """A finger and its recording; about a third begin under load, with `bias.initial_torque` near it.
+
+    detection: with any subset of the keys of docs/contract-additions.md.
+    """
     rng = np.random.default_rng([seed, 3])
     description = random_finger(seed)
+    if detection:
+        description = random_detection(seed, description)
     recording = random_recording(description, seed, samples)
     if rng.random() < 0.3:
         R = np.array([tendon["moment_arms"] for tendon in description["tendons"]])

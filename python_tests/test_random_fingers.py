@@ -1,4 +1,4 @@
-"""The random fingers take every branch of contract section 5; every runner agrees with the oracle on them."""
+"""The random fingers take every branch of contract section 5 and its additions; every runner agrees with the oracle."""
 
 from __future__ import annotations
 
@@ -12,10 +12,12 @@ import pytest
 import agreement
 import oracle
 from random_fingers import Description, Recording, random_case
-from runners import ORACLE, RUNNERS, Runner
+from runners import ORACLE, RUNNERS, Runner, core_detects
 
 FINGERS = 50
 SOURCES = (1, 2, 3)
+DETECTION_FINGERS = range(100, 136)  # with a subset of the keys of docs/contract-additions.md each
+DETECTION_SAMPLES = 250
 
 # Every branch of section 5 as the oracle counts them; a new one there must be added here.
 BRANCHES = {
@@ -54,6 +56,27 @@ BRANCHES = {
     "gain_zero_of_zero",
 }
 
+# The same of docs/contract-additions.md.
+DETECTION_BRANCHES = {
+    "hysteresis_keeps_moving",
+    "hysteresis_stays_stuck",
+    "entry_load_taken_out",
+    "exit_with_absorption",
+    "exit_unabsorbed",
+    "uncertain_joint",
+    "certain_joint",
+    "innovation_alone",
+    "cusum_alone",
+    "residual_alone",
+    "evidence_without_bound",
+    "evidence_emptied",
+    "evidence_fastest",
+    "evidence_full",
+    "release_ratio_holds",
+    "held",
+    "update_in_contact",
+}
+
 
 @functools.cache
 def case(seed: int) -> tuple[Description, Recording]:
@@ -63,6 +86,16 @@ def case(seed: int) -> tuple[Description, Recording]:
 @functools.cache
 def oracle_run(seed: int, source: int) -> oracle.Result:
     return oracle.run(*case(seed), source)
+
+
+@functools.cache
+def detection_case(seed: int) -> tuple[Description, Recording]:
+    return random_case(seed, DETECTION_SAMPLES, detection=True)
+
+
+@functools.cache
+def detection_oracle_run(seed: int) -> oracle.Result:
+    return oracle.run(*detection_case(seed), 1 + seed % 3)
 
 
 def test_fifty_fingers_take_every_branch() -> None:
@@ -136,6 +169,69 @@ def test_agrees_with_the_oracle_on_fifty_fingers(runner: Runner) -> None:
     left_out = sum(len(each.left_out) for each in results)
     samples = sum(each.samples for each in results)
     print(f"{runner.name}: {samples} samples, {left_out} left out, worst {max(each.worst for each in results):.3g}")
+
+
+# --- the keys of docs/contract-additions.md
+
+
+def test_detection_fingers_take_every_branch() -> None:
+    branches: Counter[str] = Counter()
+    for seed in DETECTION_FINGERS:
+        branches += detection_oracle_run(seed).branches
+    rare = {name: branches[name] for name in DETECTION_BRANCHES if branches[name] < 10}
+    assert not rare
+    assert set(branches) - BRANCHES == DETECTION_BRANCHES
+
+
+def test_detection_fingers_have_every_key() -> None:
+    seen: Counter[str] = Counter()
+    for seed in DETECTION_FINGERS:
+        description = detection_case(seed)[0]
+        contact = description["contact"]
+        places = {
+            "velocity_threshold": description.get("velocity_threshold", {}),
+            "bias": description.get("bias", {}),
+            "contact": contact,
+            "innovation": contact.get("innovation", {}),
+            "friction_bound": contact.get("friction_bound", {}),
+        }
+        for place, keys in places.items():
+            seen.update(f"{place}.{key}" for key in keys)
+        seen["release_time 0"] += contact.get("release_time") == 0.0
+        seen["release_time null"] += "release_time" in contact and contact["release_time"] is None
+        seen["uncertainty null"] += None in contact.get("uncertainty", [])
+        for directions in contact.get("uncertainty", []):
+            seen[f"{len(directions or [])} directions"] += 1
+        seen["no method"] += "method" not in contact
+        seen["full hysteresis"] += places["velocity_threshold"].get("hysteresis") == 1.0
+    expected = {
+        "velocity_threshold.hysteresis", "bias.forgetting", "bias.entry_load", "contact.method", "contact.innovation",
+        "innovation.time", "innovation.threshold", "innovation.threshold_per_force", "innovation.evidence_time",
+        "contact.friction_bound", "friction_bound.stuck_share", "friction_bound.jump_share", "friction_bound.jump_time",
+        "contact.uncertainty", "contact.uncertainty_level", "contact.deviation", "contact.deviation_per_force",
+        "contact.release_ratio", "contact.hold_time", "contact.release_time", "release_time 0", "release_time null",
+        "uncertainty null", "no method", "full hysteresis", *(f"{k} directions" for k in range(5)),
+    }  # fmt: skip
+    assert not [name for name in expected if not seen[name]]
+
+
+@pytest.mark.parametrize("runner", [each for each in RUNNERS if each is not ORACLE], ids=lambda runner: runner.name)
+def test_agrees_with_the_oracle_on_detection(runner: Runner) -> None:
+    core_detects()
+    results = []
+    wrong = []
+    for seed in DETECTION_FINGERS:
+        description, recording = detection_case(seed)
+        source = 1 + seed % 3
+        outputs = runner(description, recording, source)
+        given = agreement.DETECTION_OUTPUTS[:1] if runner.name == "fmu" else agreement.DETECTION_OUTPUTS
+        assert set(given) <= set(outputs)
+        found = agreement.agree_with_oracle(description, recording, source, outputs, detection_oracle_run(seed))
+        results.append(found)
+        if not found.agrees:
+            wrong.append(f"finger {seed}, source {source}: {found}")
+    assert not wrong, "\n".join(wrong[:10])
+    assert agreement.few_left_out(results)
 
 
 # --- the agreement rule itself
