@@ -14,7 +14,7 @@ import math
 import shutil
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import fmpy
@@ -119,6 +119,11 @@ def measures(table: dict[str, Array], loop: Loop) -> dict[str, float]:
     return {name: float(value) for name, value in found.items()}
 
 
+def show(found: Mapping[str, float]) -> None:
+    for name, value in found.items():
+        print(f"{name:>16} {value:8.3f} {'s' if name.endswith(('_at', 'delay')) else 'N'}")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("hand", type=Path, help="FMU of rig.json")
@@ -138,8 +143,7 @@ def main() -> None:
     except KeyError as missing:
         parser.error(f"no variable {missing}: expected FMUs of rig.json and of a description of the same finger")
     wall = time.perf_counter() - begin
-    for name, value in measures(table, loop).items():
-        print(f"{name:>16} {value:8.3f} {'s' if name.endswith(('_at', 'delay')) else 'N'}")
+    show(measures(table, loop))
     print(f"{'steps':>16} {len(table['time']):8} in {wall:.1f} s")
     if given.output:
         with given.output.open("w", newline="", encoding="utf-8") as file:

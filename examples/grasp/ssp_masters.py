@@ -16,7 +16,7 @@ from typing import Protocol
 import fmpy
 import numpy as np
 from controller import STEP, Array, Loop, Task
-from grasp import RECORDED, TRUTH, measures, record
+from grasp import RECORDED, TRUTH, measures, record, show
 
 from tendonfmu.ssp import FRICTION_FMU
 
@@ -133,10 +133,12 @@ def main(arguments: list[str]) -> int:
     if not 1 <= len(arguments) <= 2 or (arguments[1:] and arguments[1] not in MASTERS):
         print("usage: ssp_masters.py GRASP.ssp [ecos or libcosim]", file=sys.stderr)
         return 2
+    if not Path(arguments[0]).is_file():
+        print(f"ssp_masters.py: {arguments[0]}: no such file; make_ssp.py makes it", file=sys.stderr)
+        return 2
     name = arguments[1] if len(arguments) > 1 else "ecos"
     table, loop = run(name, Path(arguments[0]), Task())
-    for measure, value in measures(table, loop).items():
-        print(f"{measure:>16} {value:8.3f}")
+    show(measures(table, loop))
     return 0
 
 
