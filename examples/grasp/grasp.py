@@ -80,10 +80,12 @@ def run(hand: Path, model: Path, task: Task) -> tuple[dict[str, Array], Loop]:
     for each in (plant, friction):
         each.fmu.exitInitializationMode()
     rows: list[list[float]] = []
-    now = 0.0
+    now, told = 0.0, ""
     while not loop.done(now):
         friction.set(friction.inputs, plant.get(friction.inputs))
-        friction.set(Loop.THRESHOLDS, loop.thresholds)
+        if loop.phase != told:
+            friction.set(Loop.THRESHOLDS, loop.thresholds)
+            told = loop.phase
         friction.fmu.doStep(now, STEP)
         plant.fmu.doStep(now, STEP)
         now = STEP * (len(rows) + 1)

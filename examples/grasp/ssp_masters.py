@@ -116,9 +116,11 @@ def run(master_name: str, package: Path, task: Task) -> tuple[dict[str, Array], 
     master = MASTERS[master_name](package)
     loop = Loop(task, start_values(package, Loop.ARMS), start_values(package, Loop.THRESHOLDS))
     rows: list[list[float]] = []
-    now = 0.0
+    now, told = 0.0, ""
     while not loop.done(now):
-        master.set("friction", Loop.THRESHOLDS, loop.thresholds)
+        if loop.phase != told:
+            master.set("friction", Loop.THRESHOLDS, loop.thresholds)
+            told = loop.phase
         master.step()
         now = STEP * (len(rows) + 1)
         sample = master.get("friction", Loop.FRICTION)
