@@ -138,8 +138,8 @@ def residual_of(
     """[N, n] r of contract section 5, step 5, N·m, NaN for the first sample.
 
     What the update took from it is in the bias: r = compensated + (b − b before), wherever the bias did not jump by
-    itself. Where it did, at the start and end of stiction, the gain is that of the sample before in the same state of
-    contact: r = compensated/(1 − K).
+    itself. Where it did, at the start and end of stiction, r = compensated/(1 − K) with the gain between those of the
+    samples around it, in contact that of the last such sample.
     """
     whole = slice(0, len(recording))
     jumps = model_alone(data, [recording.arrays()], [whole], len(recording), kinematics).jump
@@ -151,17 +151,25 @@ def residual_of(
         gain = np.sum(residual * moved, axis=1) / power
         gain[jumped] = np.nan
         contact = np.asarray(outputs["contact"]).ravel().astype(bool)
-        before = np.where(contact, _last_known(gain, contact, 0.0), _last_known(gain, ~contact, np.nan))
-        residual[jumped] = (left / (1 - before[:, None]))[jumped]
+        near = np.where(contact, _last_known(gain, contact), _between_known(gain, ~contact))
+        residual[jumped] = (left / (1 - near[:, None]))[jumped]
     residual[~np.isfinite(residual)] = np.nan
     return np.asarray(residual)
 
 
-def _last_known(values: Numbers, chosen: Flags, first: float) -> Numbers:
-    """[N] the last finite value among the chosen up to each sample."""
+def _last_known(values: Numbers, chosen: Flags) -> Numbers:
+    """[N] the last finite value among the chosen up to each sample; 0 before any."""
     known = chosen & np.isfinite(values)
     index = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))
-    return np.where(index >= 0, values[index], first)
+    return np.where(index >= 0, values[index], 0.0)
+
+
+def _between_known(values: Numbers, chosen: Flags) -> Numbers:
+    """[N] interpolated between the finite values among the chosen; NaN without any."""
+    known = np.flatnonzero(chosen & np.isfinite(values))
+    if not len(known):
+        return np.full(len(values), np.nan)
+    return np.asarray(np.interp(np.arange(len(values)), known, values[known]))
 
 
 # --- other thresholds -------------------------------------------------------------------------------------------------
