@@ -36,7 +36,7 @@ from detection_cases import (
     pushes_of,
     read_truth,
     recording_file,
-    resting,
+    states,
     takes,
     training_file,
 )
@@ -47,12 +47,10 @@ from numpy.typing import NDArray
 from tendonfmu.recording import Recording, read_recording
 from tendonfmu.whole_file import whole_file
 
-WINDOWS = (
-    0.04,
-    0.1,
-    0.3,
-)  # s after the onset at which the matched detector decides; 0.3 s: all pushes are held so long
+WINDOWS = (0.04, 0.3)  # s from the onset until the matched detector decides; every push is held for 0.3 s
+STATES = ("rest", "motion", "setting off")  # as `states` counts them
 KINDS = ("theory", "torque_known", "effect_known")
+Row = dict[str, Any]  # of a detector on a recording
 
 
 class Hand:
@@ -103,42 +101,43 @@ def rivals(hand: Hand, product: dict[str, Any]) -> list[Detector]:
     return tuned
 
 
-def run(hand: Hand, detectors: Sequence[Detector]) -> list[Outcome]:
-    """Every detector over every recording with pushes and without."""
+def run(hand: Hand, detectors: Sequence[Detector], kept: Path | None = None) -> list[Outcome]:
+    """Every detector over every recording with pushes and without. kept: file with what has been run before."""
+    rows: dict[str, list[Row]] = {}
+    if kept is not None and kept.exists():
+        rows = json.loads(kept.read_text(encoding="utf-8"))
     outcomes = [Outcome(detector.name) for detector in detectors]
-    for kind in (*TWINS, "free"):
-        for take in hand.takes(kind):
+    for take in (take for kind in (*TWINS, "free") for take in hand.takes(kind)):
+        if take.name not in rows:
             recording = hand.recording(take)
-            for detector, outcome in zip(detectors, outcomes, strict=True):
-                _add(outcome, detector, take, recording)
-            say(f"{take.name}: {len(detectors)} detectors")
+            rows[take.name] = [_row(detector, recording) for detector in detectors]
+            if kept is not None:
+                _kept(kept, json.dumps(rows))
+            say(f"{take.name}: {', '.join(detector.name for detector in detectors)}")
+        for outcome, row in zip(outcomes, rows[take.name], strict=True):
+            _add(outcome, take, row)
     return outcomes
 
 
-def _add(outcome: Outcome, detector: Detector, take: Take, recording: Recording) -> None:
+def _row(detector: Detector, recording: Recording) -> Row:
     score = detector.score(recording)
-    outcome.found += [float(event.found) for event in score.events]
-    outcome.delay += [event.delay for event in score.events]
+    return {
+        "found": [float(event.found) for event in score.events],
+        "delay": [event.delay for event in score.events],
+        "seconds": score.free_seconds,
+        "alarms": len(score.false_alarms),
+        "alarm_seconds": score.free_alarm_share * score.free_seconds,
+    }
+
+
+def _add(outcome: Outcome, take: Take, row: Row) -> None:
+    outcome.found += row["found"]
+    outcome.delay += row["delay"]
     place = outcome.between if take.kind in TWINS else outcome.free
     free = place.setdefault(take.pretension, Free())
-    free.seconds += score.free_seconds
-    free.alarms += len(score.false_alarms)
-    free.alarm_seconds += score.free_alarm_share * score.free_seconds
-
-
-def run_rivals(hand: Hand, detectors: Sequence[Detector]) -> list[Outcome]:
-    """From the folder where they have run before."""
-    file = hand.folder / "rival_outcomes.json"
-    if not file.exists():
-        _kept(file, json.dumps([asdict(outcome) for outcome in run(hand, detectors)]))
-    return [_outcome(each) for each in json.loads(file.read_text(encoding="utf-8"))]
-
-
-def _outcome(image: dict[str, Any]) -> Outcome:
-    by_pretension = {
-        key: {float(pretension): Free(**free) for pretension, free in image[key].items()} for key in ("free", "between")
-    }
-    return Outcome(**image | by_pretension)
+    free.seconds += row["seconds"]
+    free.alarms += row["alarms"]
+    free.alarm_seconds += row["alarm_seconds"]
 
 
 # --- the reference ----------------------------------------------------------------------------------------------------
@@ -162,24 +161,23 @@ def run_matched(hand: Hand, reference: Detector, pushes: Sequence[Push]) -> list
     if not file.exists():
         found = {_matched_name(kind, after): np.zeros(len(pushes)) for after in WINDOWS for kind in KINDS}
         for pretension in PRETENSIONS:
-            quiet = [_quiet(hand, reference, take) for take in takes("free", pretension, hand.parts)]
-            mine = [push for push in pushes if push.pretension == pretension]
-            asked = [
-                each
-                for kind in TWINS
-                for take in takes(kind, pretension, hand.parts)
-                for each in _asked(hand, reference, take, [push for push in mine if _of(push, take)])
-            ]
-            for rest in (True, False):
-                free = [matched.Quiet(residual, still == rest) for residual, still in quiet]
-                own = [each for each, push in zip(asked, mine, strict=True) if (push.posture == "rest") == rest]
-                chosen = [push.pretension == pretension and (push.posture == "rest") == rest for push in pushes]
-                for after in WINDOWS:
-                    answer = matched.answer(free, own, after)
+            free = [_free_means(hand, reference, take) for take in takes("free", pretension, hand.parts)]
+            pushed = [take for kind in TWINS for take in takes(kind, pretension, hand.parts)]
+            asked = [each for take in pushed for each in _asked(hand, reference, take, pushes)]
+            mine = np.flatnonzero([push.pretension == pretension for push in pushes])
+            for after in WINDOWS:
+                quiet = [_states(hand, reference, take, after) for take in takes("free", pretension, hand.parts)]
+                busy = np.concatenate([_states_at(hand, reference, take, pushes, after) for take in pushed])
+                for state, says in enumerate(STATES):
+                    own = np.flatnonzero(busy == state)
+                    if not len(own):
+                        continue
+                    known = [matched.Quiet(each, still == state) for each, still in zip(free, quiet, strict=True)]
+                    answer = matched.answer(known, [asked[k] for k in own], after)
                     for kind in KINDS:
-                        found[_matched_name(kind, after)][chosen] = getattr(answer, kind)
-                    state = f"{pretension:g} N, {'rest' if rest else 'motion'}, {1e3 * after:.0f} ms"
-                    say(f"matched detector, {state}: limit of {answer.limit:.1f} standard deviations")
+                        found[_matched_name(kind, after)][mine[own]] = getattr(answer, kind)
+                    what = f"{pretension:g} N, {1e3 * after:.0f} ms, {says}, {len(own)} pushes"
+                    say(f"matched detector, {what}: limit of {answer.limit:.1f} standard deviations")
         _kept(file, json.dumps({name: values.tolist() for name, values in found.items()}))
     return [Outcome(name, values) for name, values in json.loads(file.read_text(encoding="utf-8")).items()]
 
@@ -192,16 +190,27 @@ def _of(push: Push, take: Take) -> bool:
     return (push.kind, push.pretension, push.part) == (take.kind, take.pretension, take.part)
 
 
-def _rate(recording: Recording) -> float:
-    return 1.0 / float(np.median(np.diff(recording.time)))
+def _rate(time: Numbers) -> float:
+    return 1.0 / float(np.median(np.diff(time)))
 
 
-def _quiet(hand: Hand, reference: Detector, take: Take) -> tuple[Numbers, NDArray[np.bool_]]:
-    """Means of the residual [N, n], and whether the finger rests [N]."""
-    recording, truth = hand.recording(take), read_truth(hand.folder, take)
-    residual = matched.means(reference.residual(reference.inputs(recording)), _rate(recording))
-    still = resting(truth["joint_velocity"], _rate(recording), reference.description)
-    return residual, matched.means(still[:, None].astype(float), _rate(recording))[:, 0] == 1.0
+def _free_means(hand: Hand, reference: Detector, take: Take) -> Numbers:
+    recording = hand.recording(take)
+    return matched.means(reference.residual(reference.inputs(recording)), _rate(recording.time))
+
+
+def _states(hand: Hand, reference: Detector, take: Take, after: float) -> NDArray[np.int64]:
+    """[N] of every mean: the state at its middle."""
+    truth = read_truth(hand.folder, take)
+    rate, threshold = _rate(truth["time"]), float(reference.description["velocity_threshold"]["joint"])
+    size = round(matched.STEP * rate)
+    return states(truth["joint_velocity"], rate, threshold, after)[size // 2 :: size]
+
+
+def _states_at(hand: Hand, reference: Detector, take: Take, pushes: Sequence[Push], after: float) -> NDArray[np.int64]:
+    """[k] at the onsets of a recording's pushes, had there been none."""
+    found = _states(hand, reference, take.twin, after)
+    return found[[int(push.onset / matched.STEP) for push in pushes if _of(push, take)]]
 
 
 def _asked(hand: Hand, reference: Detector, take: Take, pushes: Sequence[Push]) -> list[matched.Asked]:
@@ -214,11 +223,11 @@ def _asked(hand: Hand, reference: Detector, take: Take, pushes: Sequence[Push]) 
         return matched.cut(signals, pushed.time, push.onset, max(WINDOWS))
 
     asked = []
-    for push in pushes:
+    for push in (push for push in pushes if _of(push, take)):
         begin = np.searchsorted(pushed.time, push.onset - 0.5)
         own = np.where((pushed.time >= push.onset - 0.1)[:, None], torque, 0.0)  # nothing of the push before
         filtered = np.zeros_like(torque)
-        part = slice(int(begin), int(begin) + round(1.5 * _rate(pushed)))
+        part = slice(int(begin), int(begin) + round(1.5 * _rate(pushed.time)))
         filtered[part] = passed(own[part])
         asked.append(matched.Asked(cut(filtered, push), cut(with_push - without, push), cut(with_push, push)))
     return asked
@@ -234,7 +243,7 @@ def campaign(folder: Path, fingers: Sequence[Detector], parts: int = PARTS) -> C
     fitted = Detector("fitted", json.loads(fitted_file(folder).read_text(encoding="utf-8")))
     described = Detector("description", json.loads(FINGER.read_text(encoding="utf-8")))
     pushes = hand.pushes()
-    others = run_rivals(hand, rivals(hand, fitted.description))
+    others = run(hand, rivals(hand, fitted.description), folder / "rival_outcomes.json")
     best = run_matched(hand, fitted, pushes)
     products = run(hand, [described, fitted, *fingers])
     detailed = [*(each.name for each in (*products, others[-1])), _matched_name("effect_known", max(WINDOWS))]

@@ -1,11 +1,11 @@
 """Recordings of the detection campaign: a virtual hand that moves and rests, pushed and left alone, and what is true.
 
 The rig is examples/rigs/index_finger.json. Its strokes come in stretches of 6 to 13 s, with all joints at rest between
-them; a push begins anywhere within its slot of 6 s, whatever the finger does then. Each pretension has, of other seeds
-each, three recordings of 10 min with 100 pushes whose force is uniform in its logarithm, so that there are many light
-ones, two with 100 pushes whose force is uniform, so that there are many firm ones, and three without any. Every
-pushed recording has a *twin*: the same motion and the same sensor noise without the pushes. What differs between the
-two is what a push does to the signals.
+them; a push begins anywhere within its slot of 6 s, whatever the finger does then. Each pretension has recordings of
+10 min, of other seeds each: three with 100 *light* pushes, 0.1 to 2 N, uniform in the logarithm, anywhere on the
+finger; two with 100 *firm* ones, uniform in the force; two with 100 *strong* ones, 1 to 2 N on the fingertip, since at
+high pretension few others reach several times the residual; and three *free* of pushes. Every pushed recording has a
+*twin*: the same motion and the same sensor noise without the pushes. What differs between the two is what a push does.
 
 Everything is kept in a folder under its name, and what is there is not made again.
 """
@@ -46,27 +46,28 @@ RIG = ROOT / "examples" / "rigs" / "index_finger.json"
 FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
 
 PRETENSIONS = (10.0, 20.0, 40.0)  # N: trained at the first, on average
-PARTS = 3  # recordings of each kind and pretension,
-FIRM_PARTS = 2  # but no more with firm pushes
+PARTS = 3  # recordings of each kind and pretension
+FEWER = {"firm": 2, "strong": 2}  # but no more of these, and of their twins
 DURATION = 600.0  # s, of one
 PUSHES = 100  # in one
 TRAINING_DURATION = 400.0  # s
 
 STRETCH, STILL = (6.0, 13.0), (0.7, 2.0)  # s: strokes with the rest at both ends; that rest
-FORCE = (0.1, 2.0)  # N, uniform in its logarithm or itself
+FORCE = {"light": (0.1, 2.0), "firm": (0.1, 2.0), "strong": (1.0, 2.0)}  # N
 RISE, HOLD = (0.01, 0.05), (0.3, 1.0)  # s; a fall is drawn like a rise
 EARLIEST, LATEST = 0.5, 4.4  # s into a push's slot that it begins
 LEAST_FORCE = 0.01  # N, from which the label says contact: a push is labelled within its first 5 ms
 NEAR = 0.15  # s between the onset and a joint's turning round,
 LONGEST_TURN = 0.5  # s, which begins and ends with motion and takes no longer than this
+SETTLED = 0.3  # s after a joint has set off
 LOOK_BACK = 0.05  # s before the push in which a finger at rest does not move
-TWINS = {"light": "twin", "firm": "firm_twin"}
+TWINS = {"light": "twin", "firm": "firm_twin", "strong": "strong_twin"}
 _MOTION, _PUSH, _NOISE, _FORCES = range(4)  # what a seed is of
 
 
 @dataclass(frozen=True)
 class Take:
-    """One recording. kind: "light" or "firm" pushes, one of their `TWINS`, or "free". pretension: N. part: from 1."""
+    """One recording. kind: of pushes, a key of `TWINS`; one of these, or "free". pretension: N. part: from 1."""
 
     kind: str
     pretension: float
@@ -82,7 +83,7 @@ class Take:
 
     def seed(self, what: int) -> int:
         """A twin has the seeds of its pushes."""
-        kind = {"free": 1, "firm": 2, "firm_twin": 2}.get(self.kind, 0)
+        kind = {"free": 1, "firm": 2, "strong": 3}.get(self.kind.removesuffix("_twin"), 0)
         return 100_000 + 1000 * round(self.pretension) + 100 * kind + 10 * self.part + what
 
 
@@ -113,7 +114,7 @@ class Push:
 
 
 def takes(kind: str, pretension: float, parts: int = PARTS) -> list[Take]:
-    count = min(parts, FIRM_PARTS) if kind in ("firm", TWINS["firm"]) else parts
+    count = min(parts, FEWER.get(kind.removesuffix("_twin"), parts))
     return [Take(kind, pretension, part) for part in range(1, count + 1)]
 
 
@@ -153,11 +154,14 @@ def motion_table(base: Mapping[str, Any], seed: int, duration: float) -> Table:
 def _placed(pushes: list[dict[str, Any]], take: Take) -> list[dict[str, Any]]:
     """Pushes of the rig's recipe, each in its slot and with a force of its own."""
     draws, slot = Draws(take.seed(_FORCES), 3), DURATION / PUSHES
-    low, high = (math.log(force) for force in FORCE)
+    low, high = FORCE[take.kind]
     placed = []
     for k, push in enumerate(pushes):
         start = k * slot + draws.between(EARLIEST, LATEST)
-        force = math.exp(draws.between(low, high)) if take.kind == "light" else draws.between(*FORCE)
+        if take.kind == "light":
+            force = math.exp(draws.between(math.log(low), math.log(high)))
+        else:
+            force = draws.between(low, high)
         placed.append(push | {"start": start, "force": force})
     return placed
 
@@ -180,7 +184,8 @@ def write_rig(folder: Path, take: Take) -> Path:
     }
     file = folder / f"{take.name}.json"
     if take.kind in TWINS:
-        recipe = {"count": PUSHES, "seed": take.seed(_PUSH), "rise": RISE, "hold": HOLD, "where": "anywhere"}
+        where = "tip" if take.kind == "strong" else "anywhere"
+        recipe = {"count": PUSHES, "seed": take.seed(_PUSH), "rise": RISE, "hold": HOLD, "where": where}
         file.write_text(json.dumps(rig | {"pushes": recipe | {"gap": [0.0, 0.0]}}), encoding="utf-8")
         rig["pushes"] = _placed(list(read_rig(file).expanded["pushes"]), take)
     file.write_text(json.dumps(rig), encoding="utf-8")
@@ -286,11 +291,18 @@ def tendon_velocity(arms: Numbers, joint_velocity: Numbers) -> Numbers:
     return np.asarray(np.flip(np.cumsum(np.flip(parts, axis=-1), axis=-1), axis=-1))
 
 
-def resting(joint_velocity: Numbers, rate: float, description: Mapping[str, Any]) -> Flags:
-    """[N] no joint moved faster than the description's threshold in the `LOOK_BACK` before, [N, n] rad/s."""
-    still = np.all(np.abs(joint_velocity) <= description["velocity_threshold"]["joint"], axis=1)
-    moved = np.maximum.accumulate(np.where(still, -1, np.arange(len(still))))
-    return np.asarray(np.arange(len(still)) - moved > round(LOOK_BACK * rate))
+def states(joint_velocity: Numbers, rate: float, threshold: float, after: float) -> NDArray[np.int64]:
+    """[N] at each sample: 0 no joint moves then, nor sets off from `SETTLED` s before until `after` s later; 1 joints
+    move, none sets off; 2 one does. joint_velocity: [N, n] rad/s without any push.
+    """
+    moving = np.abs(joint_velocity) > threshold
+    begins = np.any(moving[1:] & ~moving[:-1], axis=1)
+    count = np.concatenate([[0], np.cumsum(np.concatenate([[False], begins]))])  # set off before each sample
+    index = np.arange(len(moving))
+    first = np.maximum(index - round(SETTLED * rate), 0)
+    last = np.minimum(index + round(after * rate), len(moving) - 1)
+    setting_off = count[last + 1] > count[first]
+    return np.where(setting_off, 2, np.where(moving.any(axis=1), 1, 0))
 
 
 def _posture(pushed: Numbers, free: Numbers, start: int, rate: float, threshold: float) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from detection_cases import Push
+from detection_cases import TWINS, Push
 from numpy.typing import NDArray
 
 from tendonfmu.score_intervals import Estimate, quantile, rate, share
@@ -75,7 +75,7 @@ def size_of(push: Push, free_rms: Sequence[float]) -> float:
 
 def report(campaign: Campaign) -> str:
     """All tables."""
-    parts = [_cases(campaign)]
+    parts = [_cases(campaign), "**In short**\n\n" + _summary(campaign)]
     for pretension in campaign.pretensions:
         parts.append(f"**{pretension:g} N: found, by size of the push**\n\n" + _by_size(campaign, pretension))
     parts.append("**False alarms in 10 min, part of the free time in alarm**\n\n" + _false_alarms(campaign))
@@ -95,9 +95,41 @@ def _cases(campaign: Campaign) -> str:
         postures = [sum(push.posture == posture for push in chosen) for posture in POSTURES]
         rms = ", ".join(f"{1e3 * value:.2g}" for value in campaign.free_rms[pretension])
         stuck, stays = sum(push.stuck for push in chosen), sum(push.stays for push in chosen)
-        rows.append([f"{pretension:g} N", *map(str, (len(chosen), *postures, stuck, stays)), rms])
-    head = ["pretension", "pushes", *POSTURES, "all stuck", "below break-away", "free residual's rms, mN·m"]
+        kinds = " + ".join(str(sum(push.kind == kind for push in chosen)) for kind in TWINS)
+        rows.append([f"{pretension:g} N", kinds, *map(str, (*postures, stuck, stays)), rms])
+    head = [
+        "pretension",
+        "pushes, " + " + ".join(TWINS),
+        *POSTURES,
+        "all stuck",
+        "below break-away",
+        "free residual's rms, mN·m",
+    ]
     return f"Sizes in multiples of the free residual's rms of {campaign.reference}.\n\n" + _table(head, rows)
+
+
+def _summary(campaign: Campaign) -> str:
+    """The largest pushes by pretension, the next sizes and the false alarms of all pretensions together."""
+    sizes = campaign.sizes
+    everywhere = np.ones(len(sizes), dtype=bool)
+    rows = []
+    for outcome in campaign.outcomes:
+        cells = [outcome.name]
+        for pretension in campaign.pretensions:
+            chosen = np.array([push.pretension == pretension for push in campaign.pushes])
+            cells.append(_shares(campaign, outcome, chosen)[-1])
+        cells += _shares(campaign, outcome, everywhere)[-2:-4:-1]
+        for where in (outcome.free, outcome.between):
+            alarms, seconds = sum(free.alarms for free in where.values()), sum(free.seconds for free in where.values())
+            cells.append(_interval(rate(alarms, seconds / 60.0 / MINUTES), 1, 1) if seconds else "–")
+        known = (np.array(outcome.found) == 1) & (sizes >= SIZES[-1][0])
+        delay = np.array(outcome.delay)[known] if outcome.delay else np.zeros(0)
+        cells.append(_interval(quantile(delay, 0.5, SEED), 1e3, 0) if len(delay) else "–")
+        rows.append(cells)
+    head = [f"{_size_name(SIZES[-1])}, {pretension:g} N" for pretension in campaign.pretensions]
+    head += [_size_name(SIZES[-2]), _size_name(SIZES[-3])]
+    head += ["false alarms in 10 min, free", "between pushes", f"median delay of {_size_name(SIZES[-1])}, ms"]
+    return _table(["", *head], rows)
 
 
 def _by_size(campaign: Campaign, pretension: float) -> str:

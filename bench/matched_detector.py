@@ -1,9 +1,10 @@
 """The best that a detector could do with a given residual: one that knows each push beforehand.
 
-Of every push it knows when it comes and what it does to the residual of all joints; the only question is whether it is
-there. The free residual is taken as a Gaussian process, coloured, stationary while the finger rests and stationary
-while it moves, with the covariances C of the free recordings of the same pretension over windows of all joints at
-100 Hz (means of 10 ms), from 0.1 s before the onset to some time after it. The likelihood ratio is then linear in the
+Of every push it knows when it comes, what it does to the residual of all joints, and how the finger would have moved;
+the only question is whether it is there. The free residual is taken as a Gaussian process, coloured, and stationary in
+each of three states: at rest, in motion, and while a joint sets off, which is where models of friction fail most. The
+covariances C are those of the free recordings of the same pretension, over windows of all joints at 100 Hz (means of
+10 ms), from 0.1 s before the onset to some time after it. The likelihood ratio is then linear in the
 residual x: wᵀ x with C w = s, s the known signal, and it passes a threshold u with probability Φ(d − u),
 d² = sᵀ C⁻¹ s (Kay, *Fundamentals of Statistical Signal Processing: Detection Theory*, 1998, sect. 4.4).
 
@@ -19,7 +20,7 @@ It is given three ways:
 
 A detector that must find out when, where and in which direction somebody pushes asks all these questions at once, at
 the same rate of false alarms. Where free residuals have outliers, as here, one that is not linear, or that knows more
-of the motion than whether there is any, can do better than the last two.
+of the motion than these states, can still do better than the last two.
 """
 
 from __future__ import annotations
