@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
 from tendonfmu.recording import Recording
-from tendonfmu.signals import FLAGS, INPUTS, INPUTS_OF_SOURCE, NUMBERS
+from tendonfmu.signals import FLAGS, INPUTS, INPUTS_OF_SOURCE, NUMBERS, OPTIONAL_NUMBERS
 
 Progress = Callable[[int], None]
 
@@ -103,7 +103,8 @@ class _Run:
         if description.fmiVersion != "2.0" or description.coSimulation is None:
             raise InputError(f"{path}: FMI {description.fmiVersion}; expected an FMI 2.0 co-simulation FMU")
         self._all = {variable.name: variable for variable in description.modelVariables}
-        self.variables = Variables({group: self._group(group) for group in (*NUMBERS, *FLAGS)})
+        self._numbers = (*NUMBERS, *(group for group in OPTIONAL_NUMBERS if f"{group}[1]" in self._all))
+        self.variables = Variables({group: self._group(group) for group in (*self._numbers, *FLAGS)})
         self._inputs = {group: self._group(group) for group in INPUTS}
         self._slave = FMU2Slave(
             guid=description.guid,
@@ -172,14 +173,14 @@ class _Run:
                 self._slave.terminate()
         finally:
             self._slave.freeInstance()
-        return {"time": recording.time, **self._columns(NUMBERS, numbers), **self._columns(FLAGS, flags)}
+        return {"time": recording.time, **self._columns(self._numbers, numbers), **self._columns(FLAGS, flags)}
 
     def _step(
         self, recording: Recording, groups: tuple[str, ...], progress: Progress | None
     ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
         slave, component = self._slave, self._slave.component
         set_vr = _references([vr for group in groups for vr in self._inputs[group]])
-        get_vr = _references([vr for group in NUMBERS for vr in self.variables.references[group]])
+        get_vr = _references([vr for group in self._numbers for vr in self.variables.references[group]])
         flag_vr = _references([vr for group in FLAGS for vr in self.variables.references[group]])
         samples = np.ascontiguousarray(np.hstack([recording.groups[group] for group in groups]))
         numbers = np.empty((len(recording), len(get_vr)))

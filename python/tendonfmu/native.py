@@ -159,7 +159,8 @@ class Finger:
             for name in INPUTS
         ]
         with _refusals():
-            arrays = self._finger.run(np.ascontiguousarray(recording["time"], dtype=np.float64), *inputs, parts)
+            time = np.ascontiguousarray(recording["time"], dtype=np.float64)
+            arrays = self._finger.run(time, *inputs, with_parts=parts)
         names = (*NUMBERS, *FLAGS, *DETECTION, *(("friction_parts",) if parts else ()))
         outputs: dict[str, Array] = dict(zip(names, arrays, strict=True))
         return outputs | {name: outputs[name].astype(bool) for name in FLAGS}

@@ -7,6 +7,7 @@ NUMBERS = ("compensated_torque", "joint_torque", "friction_torque", "bias_torque
 FLAGS = ("joint_contact", "contact", "slack")
 
 # beyond the contract (docs/contract-additions.md); the FMU has the first one only
+OPTIONAL_NUMBERS = ("compensated_torque_std",)  # FMUs of before have none
 DETECTION = ("compensated_torque_std", "residual", "innovation", "stuck_friction", "friction_jump")
 
 # inputs that a kinematics source uses
