@@ -149,7 +149,7 @@ class Finger:
 
         recording: `time` [N] (s), `tendon_force` and `tendon_position` [N, m], `joint_position` and `joint_velocity`
             [N, n]; those that the kinematics source does not use may be left out.
-        parts: with `friction_parts` [N, n, m + 3], N·m, what makes the friction of each joint (needs contact.uncertainty).
+        parts: with `friction_parts` [N, n, m + 3], N·m, what makes each joint's friction (needs contact.uncertainty).
         Returns [N, n], `slack` [N, m], `contact` [N]; flags are bool. Beyond section 4, as docs/contract-additions.md
         has them: `compensated_torque_std`, `residual`, `innovation`, `stuck_friction`, `friction_jump`, N·m.
         A later call goes on where this one ended.
@@ -160,7 +160,7 @@ class Finger:
         ]
         with _refusals():
             time = np.ascontiguousarray(recording["time"], dtype=np.float64)
-            arrays = self._finger.run(time, *inputs, with_parts=parts)
+            arrays = self._finger.run(time, inputs[0], inputs[1], inputs[2], inputs[3], parts)
         names = (*NUMBERS, *FLAGS, *DETECTION, *(("friction_parts",) if parts else ()))
         outputs: dict[str, Array] = dict(zip(names, arrays, strict=True))
         return outputs | {name: outputs[name].astype(bool) for name in FLAGS}
