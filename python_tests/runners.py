@@ -57,28 +57,12 @@ def product(module: str) -> Any:
         pytest.skip(f"SKIPPED: the product is not built ({missing})")
 
 
-def core_detects() -> None:
-    """Skips while the installed core does not know the keys of docs/contract-additions.md."""
-    description = {
-        "format": "tendonfmu-finger-1",
-        "name": "probe",
-        "joints": [{"name": "j"}],
-        "tendons": [{"name": "t", "stiffness": 1.0, "moment_arms": [1.0]}],
-        "velocity_threshold": {"hysteresis": 0.5},
-        "contact": {"threshold": [1.0]},
-    }
-    try:
-        product("native").image_from_json(json.dumps(description))
-    except ValueError as refused:
-        if "hysteresis" in str(refused):
-            pytest.skip(f"SKIPPED: the installed core has no detection keys yet ({refused})")
-
-
 def run_native(
     description: Mapping[str, Any], recording: Mapping[str, NDArray[Any]], kinematics_source: int
 ) -> Outputs:
     """The batch run of the C interface, through the one module that binds it."""
-    outputs: Outputs = product("native").run_recording(description, recording, kinematics_source)
+    finger = product("native").Finger.from_description(description, kinematics_source)
+    outputs: Outputs = finger.run(recording, parts=True)
     return outputs
 
 
@@ -88,7 +72,7 @@ def run_plain_kernel(
     """The same on the kernel in plain C, which any machine can run."""
     finger = product("native").Finger.from_description(description, kinematics_source)
     finger.kernel = "plain"
-    outputs: Outputs = finger.run(recording)
+    outputs: Outputs = finger.run(recording, parts=True)
     return outputs
 
 
@@ -105,7 +89,7 @@ def run_single_steps(
             state = finger.save_state()
             finger = native.Finger.from_description(description)
             finger.restore_state(state)
-        rows.append(finger.run({name: np.asarray(array)[k : k + 1] for name, array in recording.items()}))
+        rows.append(finger.run({name: np.asarray(array)[k : k + 1] for name, array in recording.items()}, parts=True))
     return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
 
 
