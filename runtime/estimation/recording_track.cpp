@@ -5,6 +5,10 @@
 
 #include "refusal.h"
 
+extern "C" {
+#include "bytes.h"
+}
+
 namespace tendonfmu::estimation {
 
 /* --- a finger without contact ---------------------------------------------------------------------------------------
