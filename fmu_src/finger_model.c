@@ -75,6 +75,10 @@ size_t model_tendon_count(const model* m) {
   return tendonfmu_tendon_count(m->finger);
 }
 
+int model_has_links(const model* m) {
+  return tendonfmu_has_links(m->finger);
+}
+
 const char* model_last_error(const model* m) {
   return tendonfmu_last_error(m->finger);
 }
@@ -152,12 +156,21 @@ tendonfmu_outputs variables_outputs(const variables* v) {
                              .joint_contact = v->flag[GROUP_JOINT_CONTACT],
                              .contact = v->flag[GROUP_CONTACT],
                              .slack = v->flag[GROUP_SLACK],
-                             .compensated_torque_std = v->number[GROUP_COMPENSATED_TORQUE_STD]};
+                             .compensated_torque_std = v->number[GROUP_COMPENSATED_TORQUE_STD],
+                             .fingertip_force = v->number[GROUP_FINGERTIP_FORCE],
+                             .fingertip_force_observable = v->flag[GROUP_FINGERTIP_FORCE_OBSERVABLE],
+                             .fingertip_force_misfit = v->number[GROUP_FINGERTIP_FORCE_MISFIT]};
 }
 
 void model_fetch_outputs(const model* m, variables* values) {
-  const tendonfmu_outputs outputs = variables_outputs(values);
+  tendonfmu_outputs outputs = variables_outputs(values);
+  double* link = values->number[GROUP_CONTACT_LINK];
+  int contact_link = 0;
+  outputs.contact_link = link ? &contact_link : NULL;
   tendonfmu_get_outputs(m->finger, &outputs);
+  if (link) {
+    *link = contact_link; /* the block of variables holds numbers of one type */
+  }
 }
 
 /* --- samples -------------------------------------------------------------------------------------------------------

@@ -36,10 +36,11 @@ fmi2Status fmi2GetInteger(fmi2Component instance, const fmi2ValueReference vr[],
     return fmi2Error;
   }
   for (size_t i = 0; i < nvr; ++i) {
-    if (find_of_type(c, CALL_GET_INTEGER, VARIABLE_INTEGER, vr[i], &found)) {
+    if (find_of_type(c, CALL_GET_INTEGER, VARIABLE_INTEGER, vr[i], &found) ||
+        update_outputs(c, CALL_GET_INTEGER, &found)) {
       return fmi2Error;
     }
-    value[i] = (fmi2Integer)*variables_number(&c->values, &found); /* there are no Integer outputs */
+    value[i] = (fmi2Integer)*variables_number(&c->values, &found);
   }
   return fmi2OK;
 }

@@ -29,6 +29,9 @@ void model_guid(const void* resource, size_t size, char guid[39]);
 size_t model_joint_count(const model* m);
 size_t model_tendon_count(const model* m);
 
+/* Whether there are the groups of the table that need links. */
+int model_has_links(const model* m);
+
 /* One line about the last call that failed. */
 const char* model_last_error(const model* m);
 

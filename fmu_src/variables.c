@@ -4,6 +4,9 @@
 #include <string.h>
 
 size_t variables_group_count(const variables* v, const variable_group* group) {
+  if (group->needs == NEEDS_LINKS && !v->has_links) {
+    return 0;
+  }
   switch (group->size) {
     case SIZE_JOINTS: return v->joints;
     case SIZE_TENDONS: return v->tendons;
@@ -14,7 +17,7 @@ size_t variables_group_count(const variables* v, const variable_group* group) {
 
 /* Groups that live in the block of numbers: all but Boolean outputs. */
 static int has_numbers(const variable_group* group) {
-  return group->type == VARIABLE_REAL || group->causality == CAUSALITY_PARAMETER;
+  return group->type != VARIABLE_BOOLEAN || group->causality == CAUSALITY_PARAMETER;
 }
 
 /* Numbers of all groups of one causality. */
@@ -32,8 +35,9 @@ static size_t number_count(const variables* v, variable_causality causality) {
 static double* share_out(variables* v, variable_causality causality, double* block) {
   for (int g = 0; g < GROUP_COUNT; ++g) {
     if (has_numbers(&variable_groups[g]) && variable_groups[g].causality == causality) {
-      v->number[g] = block;
-      block += variables_group_count(v, &variable_groups[g]);
+      const size_t count = variables_group_count(v, &variable_groups[g]);
+      v->number[g] = count ? block : NULL;
+      block += count;
     }
   }
   return block;
@@ -43,8 +47,9 @@ static size_t share_out_flags(variables* v, unsigned char* block) {
   size_t used = 0;
   for (int g = 0; g < GROUP_COUNT; ++g) {
     if (!has_numbers(&variable_groups[g])) {
-      v->flag[g] = block ? block + used : NULL;
-      used += variables_group_count(v, &variable_groups[g]);
+      const size_t count = variables_group_count(v, &variable_groups[g]);
+      v->flag[g] = block && count ? block + used : NULL;
+      used += count;
     }
   }
   return used;
@@ -55,6 +60,7 @@ int variables_create(variables* v, const model* m) {
   v->joints = model_joint_count(m);
   v->tendons = model_tendon_count(m);
   v->parameter_count = model_parameter_count(m);
+  v->has_links = model_has_links(m);
   v->input_count = number_count(v, CAUSALITY_INPUT);
   v->output_count = number_count(v, CAUSALITY_OUTPUT);
   const size_t settings = number_count(v, CAUSALITY_PARAMETER);

@@ -11,10 +11,11 @@
 /* Arrays of n joints, m tendons, p parameters. All memory is taken by variables_create(). */
 typedef struct variables {
   size_t joints, tendons, parameter_count;
+  int has_links;
   double* numbers;                  /* one block: what the pointers below point into */
   unsigned char* flags;             /* likewise */
-  size_t input_count, output_count; /* Real inputs stand first in the block, then Real outputs, then settings */
-  double* number[GROUP_COUNT];      /* Real inputs and outputs, and parameters of any type, by group; NULL for others */
+  size_t input_count, output_count; /* inputs stand first in the block, then Real and Integer outputs, then settings */
+  double* number[GROUP_COUNT];      /* inputs, Real and Integer outputs, and parameters, by group; NULL for others */
   unsigned char* flag[GROUP_COUNT]; /* Boolean outputs by group, NULL for others */
   double* parameters;               /* [p] by path, as the importer wants them; the model may not have them yet */
   int parameters_pending;           /* they may differ from those of the model */
@@ -37,7 +38,7 @@ void variables_start(variables* v, const model* m);
 /* Settings to those of the model. */
 void variables_fetch_settings(variables* v, const model* m);
 
-/* Elements of a group. */
+/* Elements of a group; 0 where the model does not have what it needs. */
 size_t variables_group_count(const variables* v, const variable_group* group);
 
 /* 0 when there is such a variable. `last` is the one found before, or zeros: neighbours are found fast. */

@@ -16,6 +16,7 @@ from typing import Any
 
 FMI_TYPES = ("Real", "Integer", "Boolean", "String")
 SIZES = ("scalar", "joints", "tendons", "vector")
+NEEDS = ("nothing", "links")  # of the description: a group is there only where it has this
 MAX_GROUP = 100  # value references that a group may take up
 
 HEADER = """\
@@ -34,6 +35,8 @@ typedef enum variable_group_id {{
 
 typedef enum variable_type {{ VARIABLE_REAL, VARIABLE_INTEGER, VARIABLE_BOOLEAN, VARIABLE_STRING }} variable_type;
 typedef enum variable_size {{ SIZE_SCALAR, SIZE_JOINTS, SIZE_TENDONS, SIZE_VECTOR }} variable_size;
+/* What the model must have for the group to exist. */
+typedef enum variable_needs {{ NEEDS_NOTHING, NEEDS_LINKS }} variable_needs;
 typedef enum variable_causality {{ CAUSALITY_INPUT, CAUSALITY_OUTPUT, CAUSALITY_PARAMETER }} variable_causality;
 
 typedef struct variable_group {{
@@ -45,6 +48,7 @@ typedef struct variable_group {{
   const char* unit; /* "" for Integer and Boolean */
   double minimum, maximum, start;
   int discrete; /* it has no derivative */
+  variable_needs needs;
 }} variable_group;
 
 static const variable_group variable_groups[GROUP_COUNT] = {{
@@ -75,6 +79,8 @@ def check(table: dict[str, Any]) -> None:
         name, base = group["name"], group["base"]
         if group["type"] not in FMI_TYPES or group["size"] not in SIZES:
             raise ValueError(f"{name}: expected type in {FMI_TYPES} and size in {SIZES}")
+        if group.get("needs", "nothing") not in NEEDS:
+            raise ValueError(f"{name}: expected needs in {NEEDS}")
         if base < last + MAX_GROUP:
             raise ValueError(f"{name}: base {base}, expected at least {last + MAX_GROUP}")
         if group["type"] == "Real" and group["unit"] not in table["units"]:
@@ -89,7 +95,8 @@ def row(group: dict[str, Any]) -> str:
     numbers = ", ".join(repr(float(group.get(key, 0.0))) for key in ("min", "max", "start"))
     return (
         f'    {{"{group["name"]}", {group["base"]}u, VARIABLE_{group["type"].upper()}, SIZE_{group["size"].upper()}, '
-        f'CAUSALITY_{group["causality"].upper()}, "{unit}", {numbers}, {int(group["variability"] == "discrete")}}},'
+        f'CAUSALITY_{group["causality"].upper()}, "{unit}", {numbers}, {int(group["variability"] == "discrete")}, '
+        f"NEEDS_{group.get('needs', 'nothing').upper()}}},"
     )
 
 

@@ -85,6 +85,11 @@ size_t model_tendon_count(const model* m) {
   return m->tendons;
 }
 
+int model_has_links(const model* m) {
+  (void)m; /* no group of its table needs any */
+  return 0;
+}
+
 const char* model_last_error(const model* m) {
   return m->error;
 }

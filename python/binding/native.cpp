@@ -48,22 +48,33 @@ nb::object as_array(std::vector<Number> values, std::vector<std::size_t> shape) 
 
 struct OutputRows {
   std::vector<double> numbers[6], detection[5], parts;
-  std::vector<unsigned char> flags[3];
+  std::vector<unsigned char> flags[3], observable;
+  std::vector<double> tip_force, misfit; /* these and what follows: of fingers with links */
+  std::vector<int> contact_link;
 
-  OutputRows(std::size_t samples, std::size_t n, std::size_t m, bool with_parts) {
+  OutputRows(std::size_t samples, std::size_t n, std::size_t m, bool with_parts, bool with_place) {
     for (auto& row : numbers) row.resize(samples * n);
     for (auto& row : detection) row.resize(samples * n);
     if (with_parts) parts.resize(samples * n * (m + 3));
     flags[0].resize(samples * n);
     flags[1].resize(samples);
     flags[2].resize(samples * m);
+    if (with_place) {
+      tip_force.resize(samples * 3);
+      observable.resize(samples);
+      misfit.resize(samples);
+      contact_link.resize(samples);
+    }
+  }
+  template <typename Number>
+  static Number* wanted(std::vector<Number>& rows) {
+    return rows.empty() ? nullptr : rows.data();
   }
   tendonfmu_outputs view() {
-    return {numbers[0].data(),   numbers[1].data(),   numbers[2].data(),
-            numbers[3].data(),   numbers[4].data(),   numbers[5].data(),
-            flags[0].data(),     flags[1].data(),     flags[2].data(),
-            detection[0].data(), detection[1].data(), detection[2].data(),
-            detection[3].data(), detection[4].data(), parts.empty() ? nullptr : parts.data()};
+    return {numbers[0].data(),   numbers[1].data(),   numbers[2].data(),   numbers[3].data(),   numbers[4].data(),
+            numbers[5].data(),   flags[0].data(),     flags[1].data(),     flags[2].data(),     detection[0].data(),
+            detection[1].data(), detection[2].data(), detection[3].data(), detection[4].data(), wanted(parts),
+            wanted(tip_force),   wanted(observable),  wanted(misfit),      wanted(contact_link)};
   }
 };
 
@@ -80,6 +91,7 @@ class Finger {
 
   std::size_t joints() const { return tendonfmu_joint_count(handle_); }
   std::size_t tendons() const { return tendonfmu_tendon_count(handle_); }
+  bool has_links() const { return tendonfmu_has_links(handle_) != 0; }
   std::size_t parameter_count() const { return tendonfmu_parameter_count(handle_); }
   std::string kernel() const { return tendonfmu_get_kernel(handle_); }
   void set_kernel(const std::string& name) { check(tendonfmu_set_kernel(handle_, name.c_str())); }
@@ -121,7 +133,7 @@ class Finger {
     const tendonfmu_inputs inputs = {
         rows(force, samples, m, "tendon_force"), rows(position, samples, m, "tendon_position"),
         rows(angle, samples, n, "joint_position"), rows(velocity, samples, n, "joint_velocity")};
-    OutputRows outputs(samples, n, m, with_parts);
+    OutputRows outputs(samples, n, m, with_parts, has_links());
     const tendonfmu_outputs view = outputs.view();
     std::size_t done = 0;
     tendonfmu_status status;
@@ -138,6 +150,12 @@ class Finger {
     arrays.append(as_array(std::move(outputs.flags[2]), {samples, m}));
     for (auto& row : outputs.detection) arrays.append(as_array(std::move(row), {samples, n}));
     if (with_parts) arrays.append(as_array(std::move(outputs.parts), {samples, n, m + 3}));
+    if (has_links()) {
+      arrays.append(as_array(std::move(outputs.tip_force), {samples, std::size_t{3}}));
+      arrays.append(as_array(std::move(outputs.observable), {samples}));
+      arrays.append(as_array(std::move(outputs.misfit), {samples}));
+      arrays.append(as_array(std::move(outputs.contact_link), {samples}));
+    }
     return nb::tuple(arrays);
   }
 
@@ -190,6 +208,7 @@ NB_MODULE(_native, m) {
       .def(nb::init<const nb::bytes&>())
       .def_prop_ro("joints", &Finger::joints)
       .def_prop_ro("tendons", &Finger::tendons)
+      .def_prop_ro("has_links", &Finger::has_links)
       .def_prop_ro("parameter_count", &Finger::parameter_count)
       .def_prop_rw("kernel", &Finger::kernel, &Finger::set_kernel)
       .def_prop_rw("kinematics_source", &Finger::source, &Finger::set_source)

@@ -16,6 +16,7 @@ import numpy as np
 
 from tendonfmu import native
 from tendonfmu.description import FingerDescription
+from tendonfmu.signals import PLACE
 
 # Of an extension's torque; an effect that is not named here may use both.
 ANGLE_ONLY = frozenset({"cover_hardening"})
@@ -83,6 +84,10 @@ def dependencies(structure: Structure) -> Dependencies:
         "contact": [_inputs(structure, everything, set(range(m)))],
         "slack": [_slack(structure, i) for i in range(m)],
     }
+    if structure.data.get("links") is not None:
+        everything.add(Motion(angles=set(range(n))))  # they turn the force at the tip
+        place = _inputs(structure, everything, set(range(m)))
+        result |= {name: [place] * (3 if name == "fingertip_force" else 1) for name in PLACE}
     for name in ("compensated_torque", "compensated_torque_std", "friction_torque", "bias_torque", "joint_contact"):
         result[name] = by_joint
     return result

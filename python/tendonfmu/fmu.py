@@ -17,21 +17,29 @@ from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
 from tendonfmu.recording import Recording
-from tendonfmu.signals import FLAGS, INPUTS, INPUTS_OF_SOURCE, NUMBERS, OPTIONAL_NUMBERS
+from tendonfmu.signals import FLAGS, INPUTS, INPUTS_OF_SOURCE, NUMBERS, OPTIONAL_NUMBERS, PLACE
 
 Progress = Callable[[int], None]
 
 
 @dataclass(frozen=True)
 class Variables:
-    """Value references of one FMU: group -> references in the order of their index."""
+    """Variables of one FMU: group -> name -> value reference, in the order of their index.
 
-    references: Mapping[str, list[int]]
+    types: group -> FMI type.
+    """
 
-    def names(self, group: str) -> list[str]:
-        """`contact`, or `slack[1]`, `slack[2]`, ..."""
-        count = len(self.references[group])
-        return [group] if group == "contact" else [f"{group}[{i}]" for i in range(1, count + 1)]
+    references: Mapping[str, Mapping[str, int]]
+    types: Mapping[str, str]
+
+    def of_type(self, kind: str) -> dict[str, int]:
+        """Name -> value reference of all groups of an FMI type."""
+        return {
+            name: reference
+            for group, names in self.references.items()
+            if self.types[group] == kind
+            for name, reference in names.items()
+        }
 
     @property
     def joints(self) -> int:
@@ -103,8 +111,11 @@ class _Run:
         if description.fmiVersion != "2.0" or description.coSimulation is None:
             raise InputError(f"{path}: FMI {description.fmiVersion}; expected an FMI 2.0 co-simulation FMU")
         self._all = {variable.name: variable for variable in description.modelVariables}
-        self._numbers = (*NUMBERS, *(group for group in OPTIONAL_NUMBERS if f"{group}[1]" in self._all))
-        self.variables = Variables({group: self._group(group) for group in (*self._numbers, *FLAGS)})
+        missing = {group for group in (*OPTIONAL_NUMBERS, *PLACE) if not self._has(group)}
+        present = [group for group in (*NUMBERS, *OPTIONAL_NUMBERS, *FLAGS, *PLACE) if group not in missing]
+        outputs = {group: self._group(group) for group in present}
+        types = {group: str(self._all[next(iter(names))].type) for group, names in outputs.items()}
+        self.variables = Variables(outputs, types)
         self._inputs = {group: self._group(group) for group in INPUTS}
         self._slave = FMU2Slave(
             guid=description.guid,
@@ -113,16 +124,19 @@ class _Run:
             instanceName=description.modelName,
         )
 
-    def _group(self, group: str) -> list[int]:
+    def _has(self, group: str) -> bool:
+        return group in self._all or f"{group}[1]" in self._all
+
+    def _group(self, group: str) -> dict[str, int]:
         if group in self._all:
-            return [self._all[group].valueReference]
+            return {group: self._all[group].valueReference}
         found = {}
         for name, variable in self._all.items():
             if match := re.fullmatch(rf"{group}\[(\d+)\]", name):
                 found[int(match[1])] = variable.valueReference
         if not found:
             raise InputError(f"{self.path}: no variable {group}[1]; expected a friction FMU of `tendonfmu build`")
-        return [found[i] for i in sorted(found)]
+        return {f"{group}[{i}]": found[i] for i in sorted(found)}
 
     @contextmanager
     def _refusals(self) -> Iterator[None]:
@@ -169,22 +183,24 @@ class _Run:
         try:
             with self._refusals():
                 self._initialise(float(recording.time[0]), source)
-                numbers, flags = self._step(recording, INPUTS_OF_SOURCE[source], progress)
+                columns = self._step(recording, INPUTS_OF_SOURCE[source], progress)
                 self._slave.terminate()
         finally:
             self._slave.freeInstance()
-        return {"time": recording.time, **self._columns(self._numbers, numbers), **self._columns(FLAGS, flags)}
+        ordered = (name for names in self.variables.references.values() for name in names)
+        return {"time": recording.time, **{name: columns[name] for name in ordered}}
 
     def _step(
         self, recording: Recording, groups: tuple[str, ...], progress: Progress | None
-    ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    ) -> dict[str, NDArray[Any]]:
         slave, component = self._slave, self._slave.component
-        set_vr = _references([vr for group in groups for vr in self._inputs[group]])
-        get_vr = _references([vr for group in self._numbers for vr in self.variables.references[group]])
-        flag_vr = _references([vr for group in FLAGS for vr in self.variables.references[group]])
+        set_vr = _references([vr for group in groups for vr in self._inputs[group].values()])
+        kinds = ("Real", "Boolean", "Integer")
+        get_vr, flag_vr, whole_vr = (_references(list(self.variables.of_type(kind).values())) for kind in kinds)
         samples = np.ascontiguousarray(np.hstack([recording.groups[group] for group in groups]))
         numbers = np.empty((len(recording), len(get_vr)))
         flags = np.empty((len(recording), len(flag_vr)), dtype=np.int32)
+        whole = np.empty((len(recording), len(whole_vr)), dtype=np.int32)
         times = recording.time.tolist()
         steps = np.diff(recording.time).tolist()
         steps.append(steps[-1] if steps else 1e-3)
@@ -198,16 +214,17 @@ class _Run:
             slave.fmi2DoStep(component, time, step, 1)
             slave.fmi2GetReal(component, get_vr, len(get_vr), _row(numbers, k))
             slave.fmi2GetBoolean(component, flag_vr, len(flag_vr), _row(flags, k))
+            if len(whole_vr):
+                slave.fmi2GetInteger(component, whole_vr, len(whole_vr), _row(whole, k))
             if progress and (k + 1) % 500 == 0:
                 progress(k + 1)
         if progress:
             progress(len(times))
-        return numbers, flags
-
-    def _columns(self, groups: tuple[str, ...], rows: NDArray[Any]) -> dict[str, NDArray[Any]]:
-        names = [name for group in groups for name in self.variables.names(group)]
-        flags = groups is FLAGS
-        return {name: rows[:, i].astype(bool) if flags else rows[:, i] for i, name in enumerate(names)}
+        return {
+            name: rows[:, i]
+            for kind, rows in zip(kinds, (numbers, flags.astype(bool), whole), strict=True)
+            for i, name in enumerate(self.variables.of_type(kind))
+        }
 
 
 def _references(values: list[int]) -> Any:

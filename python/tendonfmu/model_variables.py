@@ -37,10 +37,11 @@ def describe_model(description: FingerDescription, table: VariableTable) -> dict
     """
     finger = native.Finger(description.image)
     sizes = group_sizes(finger.joints, finger.tendons)
-    variables = [variable for group in table.data["groups"] for variable in elements(group, sizes)]
+    groups = present_groups(table, {"links"} if description.data.get("links") is not None else set())
+    variables = [variable for group in groups for variable in elements(group, sizes)]
     variables += _parameters(finger.parameters(), table)
     index = {variable["name"]: k for k, variable in enumerate(variables, start=1)}
-    outputs = list(_outputs(table, sizes, index, dependencies(structure_of(description))))
+    outputs = list(_outputs(groups, sizes, index, dependencies(structure_of(description))))
     return {
         "name": NOT_IN_XML.sub("?", description.name),
         "description": f"Friction compensation of the tendon-driven finger {NOT_IN_XML.sub('?', description.name)}: "
@@ -62,6 +63,11 @@ def counted(number: int, noun: str) -> str:
 def group_sizes(joints: int, tendons: int) -> dict[str, int]:
     """Elements of a group by its `size` in the table."""
     return {"scalar": 1, "joints": joints, "tendons": tendons, "vector": 3}
+
+
+def present_groups(table: VariableTable, has: set[str]) -> list[Mapping[str, Any]]:
+    """The table's groups that a model has, given what it `has` of what they need."""
+    return [group for group in table.data["groups"] if group.get("needs") is None or group["needs"] in has]
 
 
 def units_of(variables: list[dict[str, Any]], table: VariableTable) -> dict[str, Any]:
@@ -113,10 +119,10 @@ def parameter_description(path: str, table: VariableTable) -> str:
 
 
 def _outputs(
-    table: VariableTable, sizes: Mapping[str, int], index: Mapping[str, int], structure: Dependencies
+    present: list[Mapping[str, Any]], sizes: Mapping[str, int], index: Mapping[str, int], structure: Dependencies
 ) -> Iterator[dict[str, Any]]:
-    groups = {group["name"]: group for group in table.data["groups"]}
-    for group in table.data["groups"]:
+    groups = {group["name"]: group for group in present}
+    for group in present:
         if group["causality"] != "output":
             continue
         for name, inputs in zip(_names(group, sizes), structure[group["name"]], strict=True):

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from tendonfmu import _native
 from tendonfmu.errors import InputError
-from tendonfmu.signals import DETECTION, FLAGS, INPUTS, NUMBERS
+from tendonfmu.signals import DETECTION, FLAGS, INPUTS, NUMBERS, PLACE
 
 Array = NDArray[Any]
 
@@ -89,6 +89,11 @@ class Finger:
         return self._finger.tendons
 
     @property
+    def has_links(self) -> bool:
+        """Whether the description has link geometry."""
+        return self._finger.has_links
+
+    @property
     def kernel(self) -> str:
         """Instruction set of the step: "plain", "sse2" or "avx2"; all give the same bits."""
         return self._finger.kernel
@@ -151,7 +156,9 @@ class Finger:
             [N, n]; those that the kinematics source does not use may be left out.
         parts: with `friction_parts` [N, n, m + 3], N·m, what makes each joint's friction (needs contact.uncertainty).
         Returns [N, n], `slack` [N, m], `contact` [N]; flags are bool. Beyond section 4, as docs/contract-additions.md
-        has them: `compensated_torque_std`, `residual`, `innovation`, `stuck_friction`, `friction_jump`, N·m.
+        has them: `compensated_torque_std`, `residual`, `innovation`, `stuck_friction`, `friction_jump`, N·m. With
+        links also `fingertip_force` [N, 3] (N, base frame), `fingertip_force_observable`, `fingertip_force_misfit` and
+        `contact_link` [N].
         A later call goes on where this one ended.
         """
         inputs = [
@@ -161,9 +168,11 @@ class Finger:
         with _refusals():
             time = np.ascontiguousarray(recording["time"], dtype=np.float64)
             arrays = self._finger.run(time, inputs[0], inputs[1], inputs[2], inputs[3], parts)
-        names = (*NUMBERS, *FLAGS, *DETECTION, *(("friction_parts",) if parts else ()))
+        optional = (*(("friction_parts",) if parts else ()), *(PLACE if self.has_links else ()))
+        names = (*NUMBERS, *FLAGS, *DETECTION, *optional)
         outputs: dict[str, Array] = dict(zip(names, arrays, strict=True))
-        return outputs | {name: outputs[name].astype(bool) for name in FLAGS}
+        flags = (name for name in outputs if outputs[name].dtype == np.uint8)
+        return outputs | {name: outputs[name].astype(bool) for name in flags}
 
     def directional_derivative(self, direction: Mapping[str, Array]) -> dict[str, Array]:
         """Derivative of the last sample's outputs [n] along a direction of its inputs (missing ones count as zero)."""

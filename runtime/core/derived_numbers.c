@@ -152,6 +152,22 @@ static void derive_detection(derivation* d, const model_item* item) {
   }
 }
 
+static void derive_link(derivation* d, const model_item* item) {
+  const link_geometry* to = &d->finger->derived.links;
+  const double* values = d->values + item->first;
+  switch (item->kind) {
+    case ITEM_LINK_AXIS:
+      memcpy(to->axis + 3 * item->joint, values, 3 * sizeof *values);
+      make_unit(to->axis + 3 * item->joint);
+      break;
+    case ITEM_LINK_OFFSET: memcpy(to->offset + 3 * item->joint, values, 3 * sizeof *values); break;
+    default: /* the tip is the last one */
+      memcpy(to->tip, values, 3 * sizeof *values);
+      find_least_links(to, d->finger->joints, d->finger->derived.least_link);
+      break;
+  }
+}
+
 static int derive_item(void* context, const model_item* item) {
   derivation* d = context;
   if (item->kind <= ITEM_LOAD_FRICTION) {
@@ -160,6 +176,8 @@ static int derive_item(void* context, const model_item* item) {
     derive_tendon(d, item);
   } else if (item->kind <= ITEM_HYSTERESIS || item->kind >= ITEM_EXTENSION) {
     derive_finger(d, item);
+  } else if (item->kind >= ITEM_LINK_AXIS) {
+    derive_link(d, item);
   } else {
     derive_detection(d, item);
   }

@@ -159,6 +159,10 @@ size_t tendonfmu_tendon_count(const tendonfmu_finger* finger) {
   return finger ? finger->tendons : 0;
 }
 
+int tendonfmu_has_links(const tendonfmu_finger* finger) {
+  return finger && (finger->shape.options & MODEL_HAS_LINKS) != 0;
+}
+
 /* --- samples --------------------------------------------------------------------------------------------------------
  */
 

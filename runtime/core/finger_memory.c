@@ -66,6 +66,11 @@ static void lay_out_derived(tendonfmu_finger* f, cursor* c) {
   d->innovation_per_force = take_numbers(c, joints);
   d->deviation = take_numbers(c, joints);
   d->deviation_per_force = take_numbers(c, joints);
+  const size_t links = f->shape.options & MODEL_HAS_LINKS ? n : 0;
+  d->links.axis = take_numbers(c, 3 * links);
+  d->links.offset = take_numbers(c, 3 * links);
+  d->links.tip = take_numbers(c, links ? 3 : 0);
+  d->least_link = take(c, links * sizeof(int));
   d->direction = take_numbers(c, model_direction_count(&f->shape) ? n * (f->tendons + MODEL_DIRECTION_SHARES) * 4 : 0);
 }
 

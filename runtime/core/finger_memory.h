@@ -9,6 +9,7 @@
 #define TENDONFMU_FINGER_MEMORY_H
 
 #include "friction_law.h"
+#include "link_geometry.h"
 #include "model_image.h"
 #include "tendonfmu.h"
 
@@ -54,7 +55,9 @@ typedef struct derived_numbers {
   double* initial_torque;                              /* [N] */
   double *innovation_threshold, *innovation_per_force; /* [N] */
   double *deviation, *deviation_per_force;             /* [N] */
-  double* direction; /* [n × (m + 3) × 4] relative errors, the directions of a joint side by side */
+  double* direction;   /* [n × (m + 3) × 4] relative errors, the directions of a joint side by side */
+  link_geometry links; /* arrays NULL without links */
+  int* least_link;     /* [n] of find_least_links() */
 } derived_numbers;
 
 /* What the finger remembers from sample to sample, with the outputs of the last one: one plain run of doubles. */

@@ -133,6 +133,15 @@ static void walk_detection(walk* w) {
   emit_all(w, after, sizeof after / sizeof after[0]);
 }
 
+static void walk_links(walk* w) {
+  const uint32_t space = w->shape->options & MODEL_HAS_LINKS ? 3 : 0;
+  for (uint32_t j = 0; j < w->shape->joints; ++j) {
+    emit(w, (model_item){.kind = ITEM_LINK_AXIS, .joint = j}, space);
+    emit(w, (model_item){.kind = ITEM_LINK_OFFSET, .joint = j}, space);
+  }
+  emit(w, (model_item){.kind = ITEM_TIP}, space);
+}
+
 static void walk_extensions(walk* w) {
   for (uint32_t i = 0; i < w->shape->extension_count; ++i) {
     const uint32_t* row = w->shape->extensions + i * MODEL_EXTENSION_WORDS;
@@ -150,6 +159,7 @@ static uint32_t run_walk(walk* w) {
   }
   walk_finger(w);
   walk_detection(w);
+  walk_links(w);
   walk_extensions(w);
   return w->next;
 }
@@ -238,7 +248,7 @@ static int read_counts(const void* image, size_t image_size, model_shape* shape,
     return refuse_value(message, "model image: extensions", shape->extension_count, "at most 64");
   }
   if (shape->options & ~(uint32_t)MODEL_OPTION_BITS) {
-    return refuse_value(message, "model image: option bits", shape->options, "0 to 65535");
+    return refuse_value(message, "model image: option bits", shape->options, "0 to 131071");
   }
   if (check_options(shape)) {
     return refuse_value(message, "model image: option bits", shape->options, "ones that go together");

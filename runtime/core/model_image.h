@@ -55,7 +55,8 @@ enum {
   MODEL_HAS_DEVIATION = 1 << 13,
   MODEL_HAS_RELEASE = 1 << 14,
   MODEL_HAS_RELEASE_TIME = 1 << 15,
-  MODEL_OPTION_BITS = (1 << 16) - 1
+  MODEL_HAS_LINKS = 1 << 16,
+  MODEL_OPTION_BITS = (1 << 17) - 1
 };
 
 #define MODEL_EDGE_HAS_ANGLES 0x80000000u
@@ -111,7 +112,10 @@ typedef enum model_item_kind {
   ITEM_RELEASE_RATIO,
   ITEM_HOLD_TIME,
   ITEM_RELEASE_TIME,
-  ITEM_EXTENSION /* as many as the effect has */
+  ITEM_LINK_AXIS,   /* 3, of one joint */
+  ITEM_LINK_OFFSET, /* 3, of one joint */
+  ITEM_TIP,         /* 3 */
+  ITEM_EXTENSION    /* as many as the effect has */
 } model_item_kind;
 
 typedef struct model_item {

@@ -109,6 +109,13 @@ static void path_of_direction(message_line path, const model_item* item, uint32_
   message_text(path, "]");
 }
 
+static void path_of_link(message_line path, const model_item* item, uint32_t offset) {
+  if (item->kind != ITEM_TIP) {
+    path_index(path, "links", item->joint);
+  }
+  path_index(path, item->kind == ITEM_TIP ? "tip" : item->kind == ITEM_LINK_AXIS ? ".axis" : ".offset", offset);
+}
+
 void parameter_path(const model_item* item, uint32_t index, char* path) {
   const message_line line = {path, PARAMETER_PATH_BYTES};
   const uint32_t offset = index - item->first;
@@ -119,6 +126,8 @@ void parameter_path(const model_item* item, uint32_t index, char* path) {
     path_of_tendon(line, item, offset);
   } else if (item->kind == ITEM_UNCERTAINTY) {
     path_of_direction(line, item, offset);
+  } else if (item->kind >= ITEM_LINK_AXIS && item->kind <= ITEM_TIP) {
+    path_of_link(line, item, offset);
   } else if (item->kind < ITEM_EXTENSION) {
     path_of_finger(line, item, offset);
   } else {
@@ -217,6 +226,9 @@ parameter_range parameter_range_of(const model_item* item, uint32_t index) {
       [ITEM_RELEASE_RATIO] = {"1", 0.0, 1.0, 1, 1},
       [ITEM_HOLD_TIME] = {"s", 0.0, LARGE, 0, 1},
       [ITEM_RELEASE_TIME] = {"s", 0.0, LARGE, 0, 1},
+      [ITEM_LINK_AXIS] = {"1", -1e6, 1e6, 0, 0},
+      [ITEM_LINK_OFFSET] = {"m", -10.0, 10.0, 0, 0},
+      [ITEM_TIP] = {"m", -10.0, 10.0, 0, 0},
   };
   const uint32_t offset = index - item->first;
   switch (item->kind) {
@@ -304,12 +316,26 @@ static int check_angles(const check* c, const model_item* item) {
   return 0;
 }
 
+static int check_axis(const check* c, const model_item* item) {
+  const double* axis = c->values + item->first;
+  if (axis[0] != 0.0 || axis[1] != 0.0 || axis[2] != 0.0) {
+    return 0;
+  }
+  say_value(c->message, item, item->first, axis[0]);
+  message_text(c->message, ": expected an axis whose three numbers are not all 0");
+  return -1;
+}
+
 static int check_relation(void* context, const model_item* item) {
   const check* c = context;
   if (item->law != LAW_ABSENT) {
     return check_law(c, item);
   }
-  return item->kind == ITEM_EDGE_ANGLES ? check_angles(c, item) : 0;
+  switch (item->kind) {
+    case ITEM_EDGE_ANGLES: return check_angles(c, item);
+    case ITEM_LINK_AXIS: return check_axis(c, item);
+    default: return 0;
+  }
 }
 
 typedef struct routing {

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "contact_place.h"
 #include "kernel_choice.h"
 
 static const double largest_time = 1e15; /* s */
@@ -120,6 +121,22 @@ static void give_parts(double* to, const tendonfmu_finger* f, size_t row) {
   }
 }
 
+static void give_place(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs, size_t row) {
+  if (!outputs->fingertip_force && !outputs->fingertip_force_observable && !outputs->fingertip_force_misfit &&
+      !outputs->contact_link) {
+    return;
+  }
+  const contact_place place = find_contact_place(finger);
+  give_numbers(outputs->fingertip_force, place.tip.force, 3, row);
+  give_numbers(outputs->fingertip_force_misfit, &place.tip.misfit, 1, row);
+  if (outputs->fingertip_force_observable) {
+    outputs->fingertip_force_observable[row] = place.tip.observable != 0;
+  }
+  if (outputs->contact_link) {
+    outputs->contact_link[row] = place.link;
+  }
+}
+
 void samples_give_outputs(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs, size_t row) {
   const finger_state* s = &finger->remembered;
   const size_t n = finger->joints;
@@ -138,6 +155,7 @@ void samples_give_outputs(const tendonfmu_finger* finger, const tendonfmu_output
   give_numbers(outputs->stuck_friction, s->stuck_friction, n, row);
   give_numbers(outputs->friction_jump, s->friction_jump, n, row);
   give_parts(outputs->friction_parts, finger, row);
+  give_place(finger, outputs, row);
 }
 
 static const double* row_of(const double* values, size_t row, size_t count) {

@@ -316,6 +316,24 @@ void read_extension(const json_node& extension, std::uint32_t joints, std::vecto
   table.insert(table.end(), {effect->id, read_effect_joint(extension.member("joint"), joints), 0u, 0u});
 }
 
+std::uint32_t read_links(const json_node& document, std::uint32_t joints) {
+  const json_node links = document.member("links"), tip = document.member("tip");
+  if (links.absent()) {
+    if (!tip.absent()) {
+      throw description_error(tip.path() + ": not allowed without links");
+    }
+    return 0u;
+  }
+  links.expect_list(joints, joints, "links, one per joint");
+  for (std::uint32_t j = 0; j < joints; ++j) {
+    const json_node link = links.element(j).expect_keys({"axis", "offset"});
+    link.member("axis").expect_list(3, 3, "numbers, the direction of the joint's axis");
+    check_optional_list(link.member("offset"), 3, "numbers in m");
+  }
+  tip.expect_list(3, 3, "numbers in m, the fingertip in the last link's frame");
+  return MODEL_HAS_LINKS;
+}
+
 void read_extensions(const json_node& list, finger_shape& finger) {
   if (list.absent()) {
     return;
@@ -329,7 +347,7 @@ void read_extensions(const json_node& list, finger_shape& finger) {
 
 void check_top(const json_node& document) {
   document.expect_keys({"format", "name", "joints", "tendons", "velocity_threshold", "velocity_filter_cutoff", "bias",
-                        "contact", "extensions"});
+                        "contact", "extensions", "links", "tip"});
   const json_node format = document.member("format");
   if (format.absent() || format.value() != format_name) {
     format.refuse("\"" + std::string(format_name) + "\"");
@@ -359,7 +377,8 @@ finger_shape read_shape(const json_node& document) {
   }
   finger.shape.options = read_bias_options(document.member("bias"), finger.shape.joints) |
                          read_contact_options(document.member("contact"), finger.shape.joints, finger.shape.tendons) |
-                         given(document.member("velocity_threshold"), {"hysteresis"}, MODEL_HAS_HYSTERESIS);
+                         given(document.member("velocity_threshold"), {"hysteresis"}, MODEL_HAS_HYSTERESIS) |
+                         read_links(document, finger.shape.joints);
   read_extensions(document.member("extensions"), finger);
   finger.shape.word_count = static_cast<std::uint32_t>(finger.words.size());
   finger.shape.words = finger.words.data();

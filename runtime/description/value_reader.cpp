@@ -30,6 +30,7 @@ std::optional<double> default_value(const model_item& item, std::uint32_t offset
     case ITEM_DEVIATION:
     case ITEM_DEVIATION_PER_FORCE:
     case ITEM_HOLD_TIME:
+    case ITEM_LINK_OFFSET:
     case ITEM_UNCERTAINTY: return 0.0; /* joints with fewer directions than others */
     case ITEM_JUMP_TIME: return 0.06;
     case ITEM_UNCERTAINTY_LEVEL: return 3.0;

@@ -83,6 +83,9 @@ tendonfmu_status tendonfmu_image_guid(const void* image, size_t image_size, unsi
 size_t tendonfmu_joint_count(const tendonfmu_finger* finger);
 size_t tendonfmu_tendon_count(const tendonfmu_finger* finger);
 
+/* 1 when the description has links, so that outputs from fingertip_force on mean something. */
+int tendonfmu_has_links(const tendonfmu_finger* finger);
+
 /* One line about the last call that failed on this finger, "" when none has. Valid until the next call. */
 const char* tendonfmu_last_error(const tendonfmu_finger* finger);
 
@@ -115,6 +118,11 @@ typedef struct tendonfmu_outputs {
   double* stuck_friction;         /* [n] N·m   H, what stiction can hold; 0 without contact.friction_bound */
   double* friction_jump;          /* [n] N·m   J, how the modelled friction has jumped of late; 0 without it */
   double* friction_parts; /* [n × (m + 3)] N·m  by tendons, T_jv0, T_jvf·Σ f_B, T_jq; with contact.uncertainty */
+  /* of fingers with links; computed when one of them is asked for */
+  double* fingertip_force;                   /* [3] N     on the tip from outside, base frame */
+  unsigned char* fingertip_force_observable; /* [1]       all three directions of it follow from the torques */
+  double* fingertip_force_misfit;            /* [1]       χ² per degree of freedom of one force at the tip */
+  int* contact_link;                         /* [1]       contact on this link or beyond; 0 none, −1 not observable */
 } tendonfmu_outputs;
 
 /* Chooses where joint angles and velocities come from. Default 1. Before tendonfmu_initialise() only. */
@@ -131,8 +139,8 @@ tendonfmu_status tendonfmu_step(tendonfmu_finger* finger, double time, const ten
 /* Takes `samples` samples in one call: initialises with the first where the finger is not initialised yet.
  *   time          [samples] s, increasing
  *   inputs        arrays of [samples × m] and [samples × n]
- *   outputs       arrays of [samples × n], [samples × m], contact [samples], friction_parts [samples × n ×
- *                 (m + 3)]; NULL arrays are not wanted
+ *   outputs       arrays of [samples × n], [samples × m], contact and others of [1] [samples], friction_parts
+ *                 [samples × n × (m + 3)], fingertip_force [samples × 3]; NULL arrays are not wanted
  *   done          receives the number of samples taken (may be NULL); on an error it is the row that was refused,
  *                 and the outputs of the rows before it are written */
 tendonfmu_status tendonfmu_run(tendonfmu_finger* finger, size_t samples, const double* time,
