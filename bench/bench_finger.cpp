@@ -72,9 +72,22 @@ Recording record(int joints, int tendons, std::size_t samples, const std::functi
   return r;
 }
 
+// what `tendonfmu tune` and `fit` write: innovation, bounds, four directions of uncertainty a joint, releases
+std::string detection_keys(int joints, int tendons, bool by_cusum) {
+  const auto per_joint = [joints](const char* value) { return list(joints, [=](int) { return std::string(value); }); };
+  const std::string direction = list(tendons + 3, [](int i) { return number(0.01 * (1 + i % 3)); });
+  const std::string directions = list(4, [&](int) { return direction; });
+  return std::string(R"(, "method": ")") + (by_cusum ? "cusum" : "innovation") + R"(", "innovation": {"time": 0.05, )" +
+         R"("threshold": )" + per_joint("5") + R"(, "threshold_per_force": )" + per_joint("0.001") +
+         (by_cusum ? R"(, "evidence_time": 0.01)" : "") + R"(}, "friction_bound": {"stuck_share": 0.4, )" +
+         R"("jump_share": 0.6}, "uncertainty": )" + list(joints, [&](int) { return directions; }) +
+         R"(, "deviation": )" + per_joint("0.002") + R"(, "release_ratio": 0.7, "hold_time": 0.05, "release_time": 2)";
+}
+
 }  // namespace
 
-std::string description(int joints, int tendons, int points) {
+std::string description(int joints, int tendons, int points, Detection detection) {
+  const bool everything = detection == Detection::everything;
   return R"({"format": "tendonfmu-finger-1", "name": "bench", "joints": )" +
          list(joints,
               [&](int j) {
@@ -82,7 +95,12 @@ std::string description(int joints, int tendons, int points) {
                        R"(, "load_friction": )" + law(1e-4, 0.1, j + 3) + "}";
               }) +
          R"(, "tendons": )" + list(tendons, [&](int i) { return tendon(i, joints, points); }) +
-         R"(, "contact": {"threshold": )" + list(joints, [](int) { return std::string("5"); }) + "}}";
+         R"(, "contact": {"threshold": )" + list(joints, [](int) { return std::string("5"); }) +
+         (detection == Detection::paper ? "" : detection_keys(joints, tendons, everything)) + "}" +
+         (everything ? R"(, "velocity_threshold": {"hysteresis": 0.3}, "bias": {"forgetting": "absorption", )"
+                       R"("entry_load": true})"
+                     : "") +
+         "}";
 }
 
 std::vector<unsigned char> image(const std::string& json) {

@@ -8,8 +8,11 @@
 
 namespace bench_finger {
 
+// Which keys of docs/contract-additions.md a description has.
+enum class Detection { paper, innovation, everything };
+
 // A description with n joints, m tendons and `points` working points at every edge, all laws different.
-std::string description(int joints, int tendons, int points);
+std::string description(int joints, int tendons, int points, Detection detection = Detection::paper);
 
 std::vector<unsigned char> image(const std::string& json);
 
