@@ -46,7 +46,7 @@ ONLY = {
 }
 COMMANDS = {"cli.py", "cli_detect.py"}  # what a user may call
 # those that draw, and what they share
-DRAWING = {"fit_plots.py", "plot_style.py", "plots.py", "score_plots.py"}
+DRAWING = {"fit_plots.py", "plot_style.py", "plots.py", "score_plots.py", "tune_plots.py"}
 
 
 def imports_of(tree: ast.AST) -> Iterator[str]:

@@ -19,7 +19,77 @@ Kinematics = Annotated[
 
 def register(app: typer.Typer) -> None:
     """Adds the commands, in the order of the help page."""
+    app.command()(tune)
     app.command()(score)
+
+
+def tune(
+    finger: Annotated[Path, typer.Argument(metavar="FINGER.json", help="finger description, fitted")],
+    recordings: Annotated[
+        list[Path], typer.Argument(metavar="RECORDING", help="free motion at several pretensions, .csv or .parquet")
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="TUNED.json", help="description to write")],
+    false_alarms_per_hour: Annotated[
+        float, typer.Option(min=1e-3, max=3600.0, metavar="RATE", help="at most, in free motion like the recorded one")
+    ] = 6.0,
+    confidence: Annotated[float, typer.Option(min=0.5, max=0.9999, help="that the rate is at most that")] = 0.9,
+    method: Annotated[
+        str, typer.Option(metavar="innovation|cusum|threshold", help="contact.method; threshold is the paper's")
+    ] = "innovation",
+    bias_time: Annotated[
+        float | None,
+        typer.Option(min=1e-3, max=1e4, metavar="SECONDS", help="time constant of the bias \\[default: as it is]"),
+    ] = None,
+    report: Annotated[Path | None, typer.Option(metavar="R.json", help="everything that is known of it")] = None,
+    figures: Annotated[Path | None, typer.Option(metavar="DIR", help="folder for figures")] = None,
+    kinematics: Kinematics = 1,
+    progress: Annotated[
+        bool | None, typer.Option("--progress/--no-progress", help="progress bar; by default on a terminal")
+    ] = None,
+) -> None:
+    """Choose what decides on contact, from free motion, for a stated rate of false alarms.
+
+    Noise and drift of the bias, bounds of the detection and the standard deviation of the estimated torque. Exit 1, and
+    no file, when there is too little free motion for the rate: it says how much more is needed.
+    """
+    import warnings
+
+    from tendonfmu.detection_tuning import ContactTuning, NotEnough, TuneWarning
+    from tendonfmu.fit_files import check_outputs, write_text
+    from tendonfmu.tune_report import build_report, report_text
+    from tendonfmu.tune_text import lines, tables
+
+    check_outputs(output, report, figures, [finger, *recordings])
+    with progress_bar(progress) as bar:
+        task = bar.add_task("bounds", total=None)
+        tuning = ContactTuning(
+            finger,
+            false_alarms_per_hour=false_alarms_per_hour,
+            confidence=confidence,
+            method=method,
+            bias_time=bias_time,
+            kinematics=kinematics,
+            progress=lambda done, total: bar.update(task, completed=done, total=total),
+        )
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", TuneWarning)  # said below, a line each
+                tuning.tune(list(recordings))
+        except NotEnough as refused:
+            say(f"tendonfmu: {refused}")
+            raise typer.Exit(1) from None
+    for sentence in tuning.warnings_:
+        say(f"tendonfmu: warning: {sentence}")
+    write_text(output, tuning.description_text())
+    if report is not None:
+        write_text(report, report_text(build_report(tuning)))
+    print_tables(tables(tuning), lines(tuning), left="joint")
+    say(f"{output}: {tuning.method}, tuned on {60 * tuning.hours_:.1f} min of free motion")
+    if figures is not None:
+        from tendonfmu.tune_figures import write_figures
+
+        for path, what in write_figures(tuning, figures).items():
+            say(f"{path}: {what}")
 
 
 def score(
