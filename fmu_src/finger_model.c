@@ -158,6 +158,7 @@ tendonfmu_outputs variables_outputs(const variables* v) {
                              .slack = v->flag[GROUP_SLACK],
                              .compensated_torque_std = v->number[GROUP_COMPENSATED_TORQUE_STD],
                              .fingertip_force = v->number[GROUP_FINGERTIP_FORCE],
+                             .fingertip_force_std = v->number[GROUP_FINGERTIP_FORCE_STD],
                              .fingertip_force_observable = v->flag[GROUP_FINGERTIP_FORCE_OBSERVABLE],
                              .fingertip_force_misfit = v->number[GROUP_FINGERTIP_FORCE_MISFIT]};
 }

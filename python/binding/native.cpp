@@ -49,7 +49,7 @@ nb::object as_array(std::vector<Number> values, std::vector<std::size_t> shape) 
 struct OutputRows {
   std::vector<double> numbers[6], detection[5], parts;
   std::vector<unsigned char> flags[3], observable;
-  std::vector<double> tip_force, misfit; /* these and what follows: of fingers with links */
+  std::vector<double> tip_force, tip_std, misfit; /* these and what follows: of fingers with links */
   std::vector<int> contact_link;
 
   OutputRows(std::size_t samples, std::size_t n, std::size_t m, bool with_parts, bool with_place) {
@@ -61,6 +61,7 @@ struct OutputRows {
     flags[2].resize(samples * m);
     if (with_place) {
       tip_force.resize(samples * 3);
+      tip_std.resize(samples * 3);
       observable.resize(samples);
       misfit.resize(samples);
       contact_link.resize(samples);
@@ -74,7 +75,7 @@ struct OutputRows {
     return {numbers[0].data(),   numbers[1].data(),   numbers[2].data(),   numbers[3].data(),   numbers[4].data(),
             numbers[5].data(),   flags[0].data(),     flags[1].data(),     flags[2].data(),     detection[0].data(),
             detection[1].data(), detection[2].data(), detection[3].data(), detection[4].data(), wanted(parts),
-            wanted(tip_force),   wanted(observable),  wanted(misfit),      wanted(contact_link)};
+            wanted(tip_force),   wanted(tip_std),     wanted(observable),  wanted(misfit),      wanted(contact_link)};
   }
 };
 
@@ -152,6 +153,7 @@ class Finger {
     if (with_parts) arrays.append(as_array(std::move(outputs.parts), {samples, n, m + 3}));
     if (has_links()) {
       arrays.append(as_array(std::move(outputs.tip_force), {samples, std::size_t{3}}));
+      arrays.append(as_array(std::move(outputs.tip_std), {samples, std::size_t{3}}));
       arrays.append(as_array(std::move(outputs.observable), {samples}));
       arrays.append(as_array(std::move(outputs.misfit), {samples}));
       arrays.append(as_array(std::move(outputs.contact_link), {samples}));

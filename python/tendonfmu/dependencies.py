@@ -21,6 +21,8 @@ from tendonfmu.signals import PLACE
 # Of an extension's torque; an effect that is not named here may use both.
 ANGLE_ONLY = frozenset({"cover_hardening"})
 
+VECTORS = frozenset({"fingertip_force", "fingertip_force_std"})
+
 Dependencies = dict[str, list[dict[str, list[int]]]]
 
 
@@ -87,7 +89,7 @@ def dependencies(structure: Structure) -> Dependencies:
     if structure.data.get("links") is not None:
         everything.add(Motion(angles=set(range(n))))  # they turn the force at the tip
         place = _inputs(structure, everything, set(range(m)))
-        result |= {name: [place] * (3 if name == "fingertip_force" else 1) for name in PLACE}
+        result |= {name: [place] * (3 if name in VECTORS else 1) for name in PLACE}
     for name in ("compensated_torque", "compensated_torque_std", "friction_torque", "bias_torque", "joint_contact"):
         result[name] = by_joint
     return result

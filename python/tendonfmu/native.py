@@ -157,8 +157,8 @@ class Finger:
         parts: with `friction_parts` [N, n, m + 3], N·m, what makes each joint's friction (needs contact.uncertainty).
         Returns [N, n], `slack` [N, m], `contact` [N]; flags are bool. Beyond section 4, as docs/contract-additions.md
         has them: `compensated_torque_std`, `residual`, `innovation`, `stuck_friction`, `friction_jump`, N·m. With
-        links also `fingertip_force` [N, 3] (N, base frame), `fingertip_force_observable`, `fingertip_force_misfit` and
-        `contact_link` [N].
+        links also `fingertip_force` and `fingertip_force_std` [N, 3] (N, base frame), and [N]
+        `fingertip_force_observable`, `fingertip_force_misfit`, `contact_link`.
         A later call goes on where this one ended.
         """
         inputs = [

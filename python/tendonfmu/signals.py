@@ -11,7 +11,13 @@ OPTIONAL_NUMBERS = ("compensated_torque_std",)  # FMUs of before have none
 DETECTION = ("compensated_torque_std", "residual", "innovation", "stuck_friction", "friction_jump")
 
 # of fingers with links, and of their FMUs
-PLACE = ("fingertip_force", "fingertip_force_observable", "fingertip_force_misfit", "contact_link")
+PLACE = (
+    "fingertip_force",
+    "fingertip_force_std",
+    "fingertip_force_observable",
+    "fingertip_force_misfit",
+    "contact_link",
+)
 
 # inputs that a kinematics source uses
 INPUTS_OF_SOURCE = {

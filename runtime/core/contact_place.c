@@ -6,7 +6,7 @@
 
 static const double told_share = 0.01;    /* of the largest eigenvalue: a tenth of the standard deviation's inverse */
 static const double turning_share = 1e-8; /* above it a force along the direction turns joints at all */
-static const double stands_out = 3.0;     /* standard deviations */
+static const double stands_out = 5.0;     /* standard deviations */
 static const double largest_misfit = 1e12;
 
 enum { MAX_SWEEPS = 30 };
@@ -98,9 +98,9 @@ static double least_sum(const problem* p, const double force[3]) {
 
 tip_force find_tip_force(size_t joints, const double* lever, const double* torque, const double* deviation) {
   const problem p = pose(joints, lever, torque, deviation);
-  tip_force found = {{0.0, 0.0, 0.0}, 0.0, 0};
+  tip_force found = {.observable = 0};
   spectrum s;
-  double pull[3], best[3] = {0.0, 0.0, 0.0};
+  double pull[3], best[3] = {0.0, 0.0, 0.0}, variance[3] = {0.0, 0.0, 0.0};
   int told = 0;
   size_t turning = 0;
   sum_up(&p, &s, pull);
@@ -118,9 +118,13 @@ tip_force find_tip_force(size_t joints, const double* lever, const double* torqu
     for (int i = 0; i < 3; ++i) {
       best[i] += along * e[i];
       found.force[i] += tells ? along * e[i] : 0.0;
+      variance[i] += tells ? e[i] * e[i] * (largest / value) : 0.0; /* a share, so that it stays finite */
     }
   }
   found.observable = told == 3;
+  for (int i = 0; deviation && i < 3; ++i) {
+    found.deviation[i] = told ? p.smallest * sqrt(variance[i]) / sqrt(largest) : 0.0;
+  }
   if (deviation && joints > turning) {
     found.misfit = fmin(largest_misfit, least_sum(&p, best) / (double)(joints - turning));
   }

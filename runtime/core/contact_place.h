@@ -6,9 +6,10 @@
 #include "finger_memory.h"
 
 typedef struct tip_force {
-  double force[3]; /* N, base frame; 0 along what the torques do not tell */
-  double misfit;   /* χ² per degree of freedom; 0 where nothing can contradict */
-  int observable;  /* the torques tell all three directions */
+  double force[3];     /* N, base frame; 0 along what the torques do not tell */
+  double deviation[3]; /* N, standard deviation of these; 0 where the torques' are not known */
+  double misfit;       /* χ² per degree of freedom; 0 where nothing can contradict */
+  int observable;      /* the torques tell all three directions */
 } tip_force;
 
 /* The force at the tip that explains the torques best.

@@ -122,12 +122,13 @@ static void give_parts(double* to, const tendonfmu_finger* f, size_t row) {
 }
 
 static void give_place(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs, size_t row) {
-  if (!outputs->fingertip_force && !outputs->fingertip_force_observable && !outputs->fingertip_force_misfit &&
-      !outputs->contact_link) {
+  if (!outputs->fingertip_force && !outputs->fingertip_force_std && !outputs->fingertip_force_observable &&
+      !outputs->fingertip_force_misfit && !outputs->contact_link) {
     return;
   }
   const contact_place place = find_contact_place(finger);
   give_numbers(outputs->fingertip_force, place.tip.force, 3, row);
+  give_numbers(outputs->fingertip_force_std, place.tip.deviation, 3, row);
   give_numbers(outputs->fingertip_force_misfit, &place.tip.misfit, 1, row);
   if (outputs->fingertip_force_observable) {
     outputs->fingertip_force_observable[row] = place.tip.observable != 0;

@@ -120,6 +120,7 @@ typedef struct tendonfmu_outputs {
   double* friction_parts; /* [n × (m + 3)] N·m  by tendons, T_jv0, T_jvf·Σ f_B, T_jq; with contact.uncertainty */
   /* of fingers with links; computed when one of them is asked for */
   double* fingertip_force;                   /* [3] N     on the tip from outside, base frame */
+  double* fingertip_force_std;               /* [3] N     its standard deviation; 0 without contact.deviation */
   unsigned char* fingertip_force_observable; /* [1]       all three directions of it follow from the torques */
   double* fingertip_force_misfit;            /* [1]       χ² per degree of freedom of one force at the tip */
   int* contact_link;                         /* [1]       contact on this link or beyond; 0 none, −1 not observable */
@@ -140,7 +141,7 @@ tendonfmu_status tendonfmu_step(tendonfmu_finger* finger, double time, const ten
  *   time          [samples] s, increasing
  *   inputs        arrays of [samples × m] and [samples × n]
  *   outputs       arrays of [samples × n], [samples × m], contact and others of [1] [samples], friction_parts
- *                 [samples × n × (m + 3)], fingertip_force [samples × 3]; NULL arrays are not wanted
+ *                 [samples × n × (m + 3)], fingertip_force and its std [samples × 3]; NULL arrays are not wanted
  *   done          receives the number of samples taken (may be NULL); on an error it is the row that was refused,
  *                 and the outputs of the rows before it are written */
 tendonfmu_status tendonfmu_run(tendonfmu_finger* finger, size_t samples, const double* time,

@@ -237,6 +237,7 @@ TEST(TipForce, SidewaysIsNotObservableInAPlane) {
   EXPECT_NEAR(found.force[0], force[0], 1e-6); /* what is in the plane is found, nothing is made up across it */
   EXPECT_NEAR(found.force[1], 0.0, 1e-12);
   EXPECT_NEAR(found.force[2], force[2], 1e-6);
+  EXPECT_EQ(found.deviation[0] + found.deviation[1] + found.deviation[2], 0.0); /* not known */
 }
 
 TEST(TipForce, AlongAStretchedFingerIsNotObservable) {
@@ -279,11 +280,34 @@ TEST(TipForce, StaysFiniteAtTheEdgesOfDoubles) {
         deviation[1] *= 1e12;
         const tip_force found = find_tip_force(4, lever.data(), torque.data(), deviation.data());
         for (const double x : found.force) EXPECT_TRUE(std::isfinite(x));
+        for (const double x : found.deviation) EXPECT_TRUE(std::isfinite(x));
         EXPECT_TRUE(std::isfinite(found.misfit));
         EXPECT_LE(found.misfit, 1e12);
       }
     }
   }
+}
+
+TEST(TipForce, SpreadsAsItsDeviationSays) {
+  Draws draws;
+  const std::vector<double> lever = draws.numbers(15, 0.05), deviation = draws.deviations(5);
+  const Three force = {0.3, -0.8, 0.5};
+  double squares[3] = {}, said[3] = {};
+  const int trials = 20000;
+  for (int trial = 0; trial < trials; ++trial) {
+    std::vector<double> torque;
+    for (std::size_t j = 0; j < 5; ++j) {
+      torque.push_back(draws.number(deviation[j]) - dot({lever[3 * j], lever[3 * j + 1], lever[3 * j + 2]}, force));
+    }
+    const tip_force found = find_tip_force(5, lever.data(), torque.data(), deviation.data());
+    ASSERT_TRUE(found.observable);
+    for (int k = 0; k < 3; ++k) {
+      squares[k] += (found.force[k] - force[k]) * (found.force[k] - force[k]) / trials;
+      said[k] = found.deviation[k];
+    }
+  }
+  for (int k = 0; k < 3; ++k)
+    EXPECT_NEAR(std::sqrt(squares[k]) / said[k], 1.0, 0.02); /* four of its own 1/√(2·trials) */
 }
 
 /* What is claimed: contact is on the link that is named, or beyond. */
@@ -306,7 +330,7 @@ TEST(ContactLink, NeverLiesBeyondTheForce) {
 TEST(ContactLink, ForcesThatTorquesCannotTellNameALesserLink) {
   const Chain chain = index_finger();
   const std::vector<int> least = Placed(chain).least();
-  const std::vector<double> deviation(4, 1e-3), angle = {0.1, 0.5, 0.6, 0.4};
+  const std::vector<double> deviation(4, 5e-4), angle = {0.1, 0.5, 0.6, 0.4};
   const auto named = [&](std::size_t link, const Three& point, const Three& force) {
     return find_contact_link(4, least.data(), chain.torques(link, point, force, angle).data(), deviation.data());
   };
@@ -325,7 +349,7 @@ TEST(ContactLink, NeedsTheDeviations) {
   const std::vector<double> torque = {1.0, 1.0};
   const std::vector<int> least = {1, 2};
   EXPECT_EQ(find_contact_link(2, least.data(), torque.data(), nullptr), -1);
-  const std::vector<double> large = {0.2, 0.34}, larger = {0.34, 0.34};
+  const std::vector<double> large = {0.19, 0.21}, larger = {0.21, 0.21};
   EXPECT_EQ(find_contact_link(2, least.data(), torque.data(), large.data()), 1);
   EXPECT_EQ(find_contact_link(2, least.data(), torque.data(), larger.data()), -1);
 }
