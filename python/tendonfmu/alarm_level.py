@@ -186,4 +186,6 @@ def _joins(present: list[int], cell: int) -> int:
     k = bisect_left(present, cell)
     before = k > 0 and cell - present[k - 1] <= _APART
     after = k < len(present) and present[k] - cell <= _APART
+    if before and after and present[k] - present[k - 1] <= _APART:
+        return 0
     return 1 - int(before) - int(after)
