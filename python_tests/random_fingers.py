@@ -303,8 +303,8 @@ def random_detection(seed: int, finger: Description) -> Description:
     rng = np.random.default_rng([seed, 4])
     R = np.array([tendon["moment_arms"] for tendon in finger["tendons"]])
     m, n = R.shape
-    scale = friction_scale(R) * (1.0 + 0.3 * n)
-    contact = finger["contact"] | random_release(rng)
+    scale: Array = friction_scale(R) * (1.0 + 0.3 * n)
+    contact: Description = finger["contact"] | random_release(rng)
     if rng.random() < 0.5:
         contact["friction_bound"] = {}
         for key, most in (("stuck_share", 1.0), ("jump_share", 0.5), ("jump_time", 0.2)):
@@ -320,9 +320,9 @@ def random_detection(seed: int, finger: Description) -> Description:
         if rng.random() < 0.5:
             contact["uncertainty_level"] = 0.0 if rng.random() < 0.2 else rng.uniform(0.5, 4.0)
     if rng.random() < 0.5:
-        contact["deviation"] = (scale * rng.uniform(0.0, 0.2, n)).tolist()
+        contact["deviation"] = np.asarray(scale * rng.uniform(0.0, 0.2, n)).tolist()
     if rng.random() < 0.5:
-        contact["deviation_per_force"] = rng.uniform(0.0, 1e-3, n).tolist()
+        contact["deviation_per_force"] = np.asarray(rng.uniform(0.0, 1e-3, n)).tolist()
     # bounds make contact rarer; some of it shall remain
     wide = ("friction_bound" in contact) + ("uncertainty" in contact)
     contact["threshold"] = (np.array(contact["threshold"]) * 0.7**wide).tolist()
