@@ -344,6 +344,10 @@ def fit(
     ] = None,
     tolerance: Annotated[float, typer.Option(min=1e-9, max=0.5, help="last step in standard errors (batch)")] = 0.3,
     drift: Annotated[float, typer.Option(min=0.0, max=1.0, help="relative variance of the numbers per s (ekf)")] = 0.0,
+    uncertainty: Annotated[
+        bool,
+        typer.Option("--uncertainty/--no-uncertainty", help="write what is not known of the friction, for detection"),
+    ] = True,
     resume: Annotated[
         Path | None, typer.Option(metavar="FITTED.unfinished.json", help="go on from an interrupted fit")
     ] = None,
@@ -379,6 +383,7 @@ def fit(
             max_passes=passes,
             tolerance=tolerance,
             parameter_drift=drift,
+            uncertainty=uncertainty,
             start=resume,
             progress=fit_bar(bar),
         )

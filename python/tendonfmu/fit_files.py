@@ -76,6 +76,19 @@ def with_values(structure: Structure, values: Numbers) -> FingerDescription:
         raise InputError(f"{structure.start.path}: the fitted description is refused: {refused}") from None
 
 
+def with_uncertainty(
+    finger: FingerDescription, directions: Sequence[Sequence[Sequence[float]]], level: float | None
+) -> FingerDescription:
+    """The description with `contact.uncertainty`, and `contact.uncertainty_level` where one was given.
+
+    directions: by joint, up to four of m + 3 numbers each.
+    """
+    contact = {**finger.data["contact"], "uncertainty": directions}
+    data = {**finger.data, "contact": contact if level is None else {**contact, "uncertainty_level": level}}
+    text = description_text(data).encode()
+    return FingerDescription(finger.path, text, data, native.image_from_json(text))
+
+
 def description_text(data: Mapping[str, Any]) -> str:
     """JSON as a person would lay it out: a law, or a list of numbers, on one line."""
     return _laid_out(data, "") + "\n"

@@ -39,7 +39,8 @@ class Outcome:
     """A finished fit.
 
     names: [u] "path.role" of the unknowns. covariance: [u, u] of them. innovations: [N, n] standardised, of each
-    recording, NaN where not trained on. training, comparisons: judged recordings.
+    recording, NaN where not trained on. training, comparisons: judged recordings. uncertainty: of the modelled friction
+    torque, None where not asked for.
     """
 
     fitted: FingerDescription
@@ -52,6 +53,7 @@ class Outcome:
     innovations: Sequence[Numbers]
     training: Sequence[Evaluation]
     comparisons: Sequence[Evaluation]
+    uncertainty: Mapping[str, Any] | None
 
 
 def build_report(found: Outcome) -> dict[str, Any]:
@@ -80,6 +82,7 @@ def build_report(found: Outcome) -> dict[str, Any]:
             "comparisons": [_comparison(each) for each in found.comparisons],
         },
         "innovations": {"nis": consistency(found.innovations), "whiteness": whiteness(found.innovations)},
+        "uncertainty": found.uncertainty,
     }
     return {key: _finite(value) for key, value in report.items()}
 

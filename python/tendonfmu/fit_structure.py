@@ -33,7 +33,8 @@ _INDEX = re.compile(r"\[(\d+)\]")
 
 @dataclass(frozen=True)
 class Structure:
-    """What is fitted. start: the description that the fit begins with, laws expanded or tied, shared values made equal.
+    """What is fitted. start: the description that the fit begins with, laws expanded or tied, shared values made equal,
+    without `contact.uncertainty`.
 
     numbers: those estimated, in the order of identifiability.unknowns, `bias.initial_torque` last. group: [p] of all
     parameters of the description in canonical order, −1 fixed, equal numbers share one value. scale: [p] expected
@@ -62,7 +63,7 @@ class Choice:
 
 def build_structure(finger: FingerDescription, choice: Choice) -> Structure:
     """Raises InputError where a pattern matches nothing, nothing is left to estimate, or shared laws differ in kind."""
-    data = with_sides(finger.data, choice.sides)
+    data = _without_uncertainty(with_sides(finger.data, choice.sides))
     numbers = _all_numbers(data)
     if not numbers:
         raise InputError(f"{finger.path}: nothing to estimate: no friction, cover or extension; expected at least one")
@@ -84,6 +85,14 @@ def build_structure(finger: FingerDescription, choice: Choice) -> Structure:
         scale=_scales(paths, chosen, choice.scale),
         index=index,
     )
+
+
+def _without_uncertainty(data: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Directions of uncertainty tell of numbers that are about to change."""
+    contact = data.get("contact") or {}
+    if contact.get("uncertainty") is None:
+        return data
+    return {**data, "contact": {key: value for key, value in contact.items() if not key.startswith("uncertainty")}}
 
 
 def values_of(structure: Structure, finger: FingerDescription) -> list[Unknown]:

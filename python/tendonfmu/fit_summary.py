@@ -63,6 +63,28 @@ class Doubt:
 
 
 @dataclass(frozen=True)
+class Told:
+    """A standard deviation in mN·m; the error in predicting it, rms and 99 % quantile, as shares, None where it is 0."""
+
+    std: float
+    error: float | None
+    worst: float | None
+
+
+@dataclass(frozen=True)
+class UncertaintyRow:
+    """What is not known of a joint's modelled friction torque. captured: share of the variance in the directions before
+    what they leave out is put back. sets: training, held-out data, more load; None without data.
+    """
+
+    joint: str
+    inflation: float
+    directions: int
+    captured: float
+    sets: list[Told | None]
+
+
+@dataclass(frozen=True)
 class NumberGroup:
     """All estimated numbers of one joint or tendon: (path without it, entry of the report)."""
 
@@ -82,6 +104,7 @@ class Summary:
     doubts: list[Doubt]
     groups: list[NumberGroup]
     consistency: list[str]
+    uncertainty: list[UncertaintyRow]
 
 
 def summarise(picture: FitPicture) -> Summary:
@@ -96,6 +119,7 @@ def summarise(picture: FitPicture) -> Summary:
         doubts=_doubts(report),
         groups=_groups(picture),
         consistency=_consistency(picture),
+        uncertainty=_uncertainty(picture),
     )
 
 
@@ -285,6 +309,30 @@ def _consistency(picture: FitPicture) -> list[str]:
             "has a shape in time that the model lacks, and the standard errors count each sample as new."
         )
     return sentences
+
+
+def _uncertainty(picture: FitPicture) -> list[UncertaintyRow]:
+    """A row per joint; none where it was not asked for."""
+    found = picture.report.get("uncertainty")
+    if not found:
+        return []
+    sets = [found[name] for name in ("train", "held_out", "loaded")]
+    return [
+        UncertaintyRow(
+            joint=joint,
+            inflation=found["inflation"][j],
+            directions=found["directions"][j],
+            captured=found["captured"][j],
+            sets=[
+                _told(each["std"][j], each["error_rms"][j], each["error_worst"][j]) if each else None for each in sets
+            ],
+        )
+        for j, joint in enumerate(picture.joint_names)
+    ]
+
+
+def _told(std: float, error: float, worst: float) -> Told:
+    return Told(1e3 * std, error / std if std else None, worst / std if std else None)
 
 
 # --- numbers ----------------------------------------------------------------------------------------------------------

@@ -91,6 +91,8 @@ def lines(fit: FrictionFit) -> Iterator[str]:
             f"innovations: NIS {innovations['nis']['mean']:.3g} ({low:.3f} to {high:.3f} where the noise settings "
             f"hold), autocorrelation at lag one {lags}"
         )
+    if report["uncertainty"]:
+        yield _uncertainty(report["uncertainty"])
     for cause, count in Counter(number.cause for number in numbers if number.cause).most_common():
         yield f"  {count} not identified: {CAUSES[cause]}"
         several = [number for number in numbers if number.cause == cause]
@@ -98,3 +100,14 @@ def lines(fit: FrictionFit) -> Iterator[str]:
             yield f"    {number.number.path}: {number.advice}"
         if count > EXAMPLES:
             yield f"    ... and {count - EXAMPLES} more; all of them in --report"
+
+
+def _uncertainty(found: Mapping[str, Any]) -> str:
+    std, error = found["train"]["std"], found["train"]["error_rms"]
+    size = ", ".join(_milli(value) for value in std)
+    times = ", ".join(f"{value:.3g}" for value in found["inflation"])
+    left = ", ".join(f"{100 * e / s:.0f}" if s else "-" for e, s in zip(error, std, strict=True))
+    return (
+        f"uncertainty of the modelled friction torque: {size} mN·m rms, the residuals counting as {times} times the "
+        f"noise settings; contact.uncertainty tells it within {left} % rms"
+    )

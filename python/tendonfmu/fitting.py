@@ -27,7 +27,14 @@ from tendonfmu.coverage import EffectCoverage, coverage_of, with_laws_of
 from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.errors import InputError
 from tendonfmu.fit_evaluation import Evaluation, evaluate, model_over, residuals
-from tendonfmu.fit_files import Unfinished, check_given_once, description_text, resumed_start, with_values
+from tendonfmu.fit_files import (
+    Unfinished,
+    check_given_once,
+    description_text,
+    resumed_start,
+    with_uncertainty,
+    with_values,
+)
 from tendonfmu.fit_methods import Interrupted, Learned, Watch, learn_batch, learn_ekf, unknown_names
 from tendonfmu.fit_picture import FitPicture, FitSeries
 from tendonfmu.fit_recordings import (
@@ -42,6 +49,7 @@ from tendonfmu.fit_recordings import (
 from tendonfmu.fit_report import Outcome, Run, build_report
 from tendonfmu.fit_residuals import bias_settings
 from tendonfmu.fit_structure import Choice, build_structure
+from tendonfmu.fit_uncertainty import parameter_uncertainty
 from tendonfmu.fit_verdicts import Fitted, Knowledge, judge_numbers
 from tendonfmu.recording import Recording, read_recording
 
@@ -72,6 +80,7 @@ class FrictionFit:
         expected magnitudes other than the description's own values.
     max_passes: over the data, at most; None: 60 of "batch", 2 of "ekf". tolerance (length of the last step in standard
         errors), threads (0: all cores): of "batch".
+    uncertainty: whether the fitted description says what is not known of its friction (`contact.uncertainty`).
     parameter_drift: of the filter, relative variance per s with which the parameters may wander.
     start: file of an interrupted fit to go on from. progress: called with a `fit_methods.Progress`; False stops.
 
@@ -96,6 +105,7 @@ class FrictionFit:
         max_passes: int | None = None,
         tolerance: float = 0.3,
         threads: int = 0,
+        uncertainty: bool = True,
         parameter_drift: float = 0.0,
         start: str | os.PathLike[str] | None = None,
         progress: Callable[[Any], bool | None] | None = None,
@@ -114,6 +124,7 @@ class FrictionFit:
         self.max_passes = max_passes
         self.tolerance = tolerance
         self.threads = threads
+        self.uncertainty = uncertainty
         self.parameter_drift = parameter_drift
         self.start = start
         self.progress = progress
@@ -269,6 +280,7 @@ class FrictionFit:
         start, fitted = self.start_.data, self.description_.data
         self.training_ = [evaluate(start, fitted, each) for each in self.recordings_]
         self.comparisons_ = [evaluate(start, fitted, each) for each in compared]
+        uncertainty = self._tell_uncertainty(learned) if self.uncertainty else None
         self.converged_, self.n_iter_, self.cost_ = learned.converged, learned.iterations, learned.cost
         slack = np.concatenate([each.model.slack[each.recording.train] for each in self.training_])
         self.warnings_ = [*found, *slack_sentences(slack, self.description_), *_fit_sentences(learned, self.numbers_)]
@@ -286,6 +298,7 @@ class FrictionFit:
                 innovations=innovations,
                 training=self.training_,
                 comparisons=self.comparisons_,
+                uncertainty=uncertainty,
             )
         )
         self.warnings_ += _noise_sentences(self.report_["innovations"])
@@ -293,6 +306,13 @@ class FrictionFit:
         self.finished_ = True
         for sentence in self.warnings_:
             warnings.warn(sentence, FitWarning, stacklevel=3)
+
+    def _tell_uncertainty(self, learned: Learned) -> dict[str, Any]:
+        """Writes `contact.uncertainty` into the fitted description; returns what the report says of it."""
+        found = parameter_uncertainty(self.structure_, learned, self.description_.data, self.training_)
+        level = (_read_finger(self.finger).data["contact"] or {}).get("uncertainty_level")
+        self.description_ = with_uncertainty(self.description_, found.directions, level)
+        return found.entry
 
     def _knowledge(self, learned: Learned) -> Knowledge:
         return Knowledge(

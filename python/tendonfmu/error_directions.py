@@ -1,0 +1,91 @@
+"""A few relative errors of the parts of a torque that give its standard deviation.
+
+A direction w stands for an error Σ_i w_i φ_i of a torque with the parts φ; several independent ones give the standard
+deviation (Σ_d (w_d·φ)²)^½.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+Numbers = NDArray[np.float64]
+
+MOST = 4  # directions; docs/contract-additions.md
+_UNSEEN = 1e-12  # of the largest second moment: a combination of parts that the motion does not show
+_NOTHING = 1e-12  # of the variance: a direction that says no more is left out
+_ROUNDS = 40  # of the least squares
+
+
+def predicted(parts: Numbers, directions: Numbers) -> Numbers:
+    """[K] standard deviation of torques with parts [K, q], by directions [d, q]."""
+    return np.asarray(np.sqrt(np.sum((parts @ directions.T) ** 2, axis=1)))
+
+
+def few_directions(parts: Numbers, slopes: Numbers, most: int = MOST) -> tuple[Numbers, float]:
+    """Directions [d, q], d at most `most`, and the share of the mean variance in the leading ones.
+
+    parts: [K, q] N·m. slopes: [K, u] N·m, of torques by independent unknowns of variance 1: variance Σ_u slopes².
+
+    slopes is regressed on the parts (slopes ≈ parts·A); the leading eigenvectors of A Aᵀ in the metric of the parts'
+    second moment are the directions that carry most of the mean variance. What they leave out (later eigenvectors, and
+    what is no combination of parts, such as working points) is put back: scaled to the mean variance, they are moved by
+    least squares until what they predict comes as near to each sample's standard deviation as they can.
+    """
+    std = np.sqrt(np.sum(slopes**2, axis=1))
+    variance = float(np.mean(std**2))
+    moment, axes = np.linalg.eigh(parts.T @ parts / len(parts))
+    seen = moment > _UNSEEN * max(float(moment[-1]), 1e-300)
+    if not variance > 0 or not seen.any():
+        return np.zeros((0, parts.shape[1])), 1.0
+    white = axes[:, seen] / np.sqrt(moment[seen])  # [q, r]: parts·white has the second moment 1
+    shown = parts @ white
+    own, leading = _leading(shown.T @ slopes / len(parts), most)
+    captured = float(np.sum(own)) / variance
+    start = leading * np.sqrt(own / max(captured, 1e-300))
+    turned = _principal(_matched(shown, start.T, std))
+    found = turned[np.sum(turned**2, axis=1) > _NOTHING * variance] @ white.T
+    return found * _signs(found), min(captured, 1.0)
+
+
+def _leading(regression: Numbers, most: int) -> tuple[Numbers, Numbers]:
+    """The largest eigenvalues [d] of A Aᵀ and their vectors [r, d], for A [r, u]."""
+    values, vectors = np.linalg.eigh(regression @ regression.T)
+    chosen = np.argsort(-values)[:most]
+    return np.maximum(values[chosen], 0.0), vectors[:, chosen]
+
+
+def _matched(shown: Numbers, start: Numbers, std: Numbers) -> Numbers:
+    """[d, r] that predict std [K] best, in the sense of least squares. start: [d, r]."""
+    size = max(float(np.sqrt(np.mean(std**2))), 1e-300)
+    small = 1e-9 * size  # where all parts are zero the root has no slope
+
+    def project(flat: Numbers) -> tuple[Numbers, Numbers]:
+        each = shown @ flat.reshape(start.shape).T
+        return each, np.sqrt(np.sum(each**2, axis=1) + small**2)
+
+    def error(flat: Numbers) -> Numbers:
+        return (project(flat)[1] - std) / size
+
+    def slope(flat: Numbers) -> Numbers:
+        each, total = project(flat)
+        share = each / (total * size)[:, None]
+        return (share[:, :, None] * shown[:, None, :]).reshape(len(shown), -1)
+
+    if len(shown) < start.size:
+        return start
+    found = least_squares(error, start.ravel(), slope, method="lm", max_nfev=_ROUNDS)
+    return np.asarray(found.x.reshape(start.shape))
+
+
+def _principal(directions: Numbers) -> Numbers:
+    """The same predictions by orthogonal directions, the largest first: any rotation among them predicts the same."""
+    _, size, axes = np.linalg.svd(directions, full_matrices=False)
+    return np.asarray(size[:, None] * axes)
+
+
+def _signs(directions: Numbers) -> Numbers:
+    """[d, 1] so that the largest number of each is positive; an error and its opposite are the same."""
+    largest = np.argmax(np.abs(directions), axis=1)
+    return np.asarray(np.where(directions[np.arange(len(directions)), largest] < 0, -1.0, 1.0)[:, None])
