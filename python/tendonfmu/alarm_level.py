@@ -23,6 +23,7 @@ Index = NDArray[np.int64]
 
 CELL = 0.02  # s
 _APART = round(MERGED / CELL)  # cells; alarms closer than that are one
+_LONG = round(1.0 / CELL)  # cells that an alarm may last on average: one that lasts for minutes is few alarms, too
 _FAR = 10**9  # cells between parts: their alarms are never one
 WINDOW = 10.0  # s over which a mean force is taken to say at which pretension a cell is
 SAME = 1.2  # factor between mean forces of one group
@@ -149,7 +150,7 @@ def alarms_above(order: Index, above: NDArray[np.bool_]) -> int:
 
 
 def level_for(statistic: Numbers, order: Index, allowed: int, others: Index | None = None) -> float:
-    """The least level that no more than `allowed` alarms exceed, here and at every higher one.
+    """The least level that no more than `allowed` alarms exceed, here and at every higher one, none for long.
 
     statistic: [c] of each cell. order: [c]. others: cells that are in alarm anyway.
     """
@@ -157,13 +158,13 @@ def level_for(statistic: Numbers, order: Index, allowed: int, others: Index | No
     alarms = count_alarms(np.array(present, dtype=np.int64))
     if alarms > allowed:
         return math.inf
-    known = set(present)
+    known, longest = set(present), len(present) + (allowed + 1) * _LONG
     for k in _descending(statistic):
         cell = int(order[k])
         if cell in known:
             continue
         alarms += _joins(present, cell)
-        if alarms > allowed:
+        if alarms > allowed or len(present) >= longest:
             return float(statistic[k])
         insort(present, cell)
         known.add(cell)

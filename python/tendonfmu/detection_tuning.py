@@ -43,7 +43,7 @@ METHODS = ("innovation", "cusum", "threshold")
 INNOVATION_TIME = 0.05  # s, T
 JUMP_TIME = 0.06  # s, T_J
 EVIDENCE_TIME = 0.02  # s, τ_e
-RELEASE = {"release_ratio": 0.7, "hold_time": 0.05, "release_time": 3.0}  # 1, s, s
+RELEASE = {"release_ratio": 1.0, "hold_time": 0.05, "release_time": 2.0}  # 1, s, s
 _STEP, _STEPS = 1.05, 12  # by which the level is raised, and how often, until the running finger keeps the rate
 _DIGITS = 6
 
