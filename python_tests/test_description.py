@@ -59,6 +59,8 @@ def with_everything() -> dict[str, Any]:
     description["velocity_threshold"] = {"tendon": 0.0005, "joint": 0.01}
     description["velocity_filter_cutoff"] = 20.0
     description["extensions"] = [{"effect": "cover_hardening", "joint": 2, "stiffness": 0.1}]
+    description["links"] = [{"axis": [0.0, 0.0, 2.0]}, {"axis": [0.0, 1.0, 0.0], "offset": [0.04, 0.0, 0.0]}]
+    description["tip"] = [0.02, 0.0, 0.0]
     description["joints"][0]["load_friction"] = {"static": 1e-4, "coulomb": 8e-5, "stribeck_velocity": 0.1}
     return description
 
