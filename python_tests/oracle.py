@@ -387,15 +387,17 @@ class FingerOracle:
     def _parts(self, products: Places, q: Array) -> Array:
         """[n, m + 3] N·m: T by its sources: each tendon, the joint's own friction, its load friction, its cover."""
         tendons = (self.R * products.loss()).T
-        return np.column_stack([tendons, products.joint, products.load, self._springs(q)])
+        return np.column_stack([tendons, products.joint, products.load, self._covers(q)])
+
+    def _covers(self, q: Array) -> Array:
+        """T_jq, [n] N·m."""
+        return np.array([joint.cover_stiffness * (q[j] - joint.rest_angle) for j, joint in enumerate(self.joints)])
 
     def _springs(self, q: Array) -> Array:
-        """T_jq: the linear cover, and the cubic extension `cover_hardening`."""
-        torque = np.zeros(self.n)
-        for j, joint in enumerate(self.joints):
-            bend = q[j] - joint.rest_angle
-            torque[j] = joint.cover_stiffness * bend + joint.hardening * bend**3
-        return torque
+        """T_jq and the cubic extension `cover_hardening`."""
+        return self._covers(q) + np.array(
+            [each.hardening * (q[j] - each.rest_angle) ** 3 for j, each in enumerate(self.joints)]
+        )
 
     def _contact(
         self, r: Array, bounds: Bounds, mean_force: float, time: float, dt: float,

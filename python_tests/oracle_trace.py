@@ -67,6 +67,8 @@ class Recorder(oracle.FingerOracle):
 
     def __init__(self, description: Mapping[str, Any], kinematics_source: int) -> None:
         super().__init__(without_contact(description), kinematics_source)
+        if self.has_entry_load:
+            raise ValueError("bias.entry_load: b then belongs to the loads of two samples, which no Course tells")
         self.rows: dict[int, list[tuple[float, ...]]] = {}
         self.totals: list[Array] = []
         self.residuals: list[Array] = []  # r of step 5, from the second sample on
@@ -84,11 +86,13 @@ class Recorder(oracle.FingerOracle):
         decide: Callable[..., Any], out: oracle.Step,
     ) -> tuple[float, float]:  # fmt: skip
         stuck, side, since, last = effect.stuck, effect.side, effect.stuck_since, effect.last_stuck
+        absorbed = self.absorbed - effect.absorbed_since
         F, b = super()._take_effect(effect, v, angle, time, first, key, decide, out)
         direction = out.decisions[key]
         of_side = {1: 0.0, -1: 0.0}
         if not first and direction != 0 and stuck:
-            memory = 0.0 if side is None else math.exp(-self.forget_rate * (last - since))
+            forgotten = absorbed if self.by_absorption else self.forget_rate * (last - since)
+            memory = 0.0 if side is None else math.exp(-forgotten)
             of_side[direction] -= 1.0 - memory
             if side is not None:
                 of_side[side] -= memory

@@ -337,6 +337,13 @@ def random_detection(seed: int, finger: Description) -> Description:
     if rng.random() < 0.6:
         hysteresis = float(rng.choice([0.0, rng.uniform(0.05, 0.95), 1.0], p=[0.1, 0.65, 0.25]))
         finger["velocity_threshold"] = finger.get("velocity_threshold", {}) | {"hysteresis": hysteresis}
+    if rng.random() < 0.3:
+        hardening = {
+            "effect": "cover_hardening",
+            "joint": int(rng.integers(1, n + 1)),
+            "stiffness": rng.uniform(0.0, 0.1),
+        }
+        finger["extensions"] = [hardening]
     return finger
 
 

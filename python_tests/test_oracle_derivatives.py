@@ -9,6 +9,7 @@ import numpy as np
 import oracle_derivatives
 from analytic_cases import ARM, LAW, finger, one_edge, recording
 from random_fingers import random_case
+from tendonfmu import native
 
 # A central difference of torques near 0.1 N·m over 1e-3 N rounds at 1e-13; Richardson leaves about as much.
 CLOSE = 1e-9
@@ -67,3 +68,26 @@ def test_random_fingers_have_derivatives_that_predict() -> None:
                 scale = np.abs(found["friction_torque", name]).max() + 1e-6
                 np.testing.assert_allclose(total, found["joint_torque", name], atol=1e-6 * scale)
                 assert errors["friction_torque", name].max() < 1e-2 * scale
+
+
+def test_the_core_has_the_oracles_derivatives() -> None:
+    """Fingers with the keys of docs/contract-additions.md, while they rest, stop and leave, in and out of contact."""
+    compared = 0
+    for seed in range(500, 510):
+        description, inputs = random_case(seed, samples=80, detection=True)
+        k = 20 + 5 * (seed - 500)
+        source = 1 + seed % 3
+        found, errors = oracle_derivatives.derivatives(description, inputs, source, k)
+        finger = native.Finger.from_description(description, source)
+        finger.run({name: series[: k + 1] for name, series in inputs.items()})
+        for name in oracle_derivatives.STEPS:
+            for column, unit in enumerate(np.eye(inputs[name].shape[1])):
+                slopes = finger.directional_derivative({name: unit})
+                for output in oracle_derivatives.OUTPUTS:
+                    scale = np.abs(found[output, name]).max() + 1e-6
+                    error = errors[output, name][:, column]
+                    known = error < 1e-5 * scale  # else there is a kink within the step
+                    difference = np.abs(slopes[output] - found[output, name][:, column])
+                    assert (difference < 10.0 * error + 1e-6 * scale)[known].all(), (seed, output, name, column)
+                    compared += int(known.sum())
+    assert compared > 1500, compared

@@ -202,6 +202,7 @@ def test_detection_fingers_have_every_key() -> None:
         seen["uncertainty null"] += None in contact.get("uncertainty", [])
         for directions in contact.get("uncertainty", []):
             seen[f"{len(directions or [])} directions"] += 1
+        seen["extension"] += bool(description.get("extensions"))
         seen["no method"] += "method" not in contact
         seen["full hysteresis"] += places["velocity_threshold"].get("hysteresis") == 1.0
     expected = {
@@ -210,7 +211,7 @@ def test_detection_fingers_have_every_key() -> None:
         "contact.friction_bound", "friction_bound.stuck_share", "friction_bound.jump_share", "friction_bound.jump_time",
         "contact.uncertainty", "contact.uncertainty_level", "contact.deviation", "contact.deviation_per_force",
         "contact.release_ratio", "contact.hold_time", "contact.release_time", "release_time 0", "release_time null",
-        "uncertainty null", "no method", "full hysteresis", *(f"{k} directions" for k in range(5)),
+        "uncertainty null", "extension", "no method", "full hysteresis", *(f"{k} directions" for k in range(5)),
     }  # fmt: skip
     assert not [name for name in expected if not seen[name]]
 
