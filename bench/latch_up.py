@@ -65,7 +65,7 @@ def _trial(
 # --- alarms that do not end -------------------------------------------------------------------------------------------
 
 
-def release_time(seeds: Iterable[int] = SEEDS) -> Trial:
+def release_time(seeds: Iterable[int] = SEEDS, duration: float = 60.0) -> Trial:
     units = {
         "friction 50 % wrong, then stiffer: longest alarm of 50 s": SECOND,
         "… time in alarm": SHARE,
@@ -78,8 +78,8 @@ def release_time(seeds: Iterable[int] = SEEDS) -> Trial:
     settings["2 s, release_ratio 0.5"] = {"contact.release_time": 2.0, "contact.release_ratio": 0.5}
 
     def measure(seed: int, keys: Keys) -> Measures:
-        wrong = contact.stuck(contact.wrong_friction(seed).run(keys)["contact"])
-        step = contact.stuck(contact.sensor_step(seed).run(keys)["contact"])
+        wrong = contact.stuck(contact.wrong_friction(seed, duration).run(keys)["contact"])
+        step = contact.stuck(contact.sensor_step(seed, duration).run(keys)["contact"])
         push = contact.lost(contact.held_push(seed).run(keys)["contact"])
         return dict(zip(units, (*wrong, step[0], *push), strict=True))
 
@@ -176,6 +176,8 @@ def entry_load(seeds: Iterable[int] = SEEDS, duration: float = 100.0) -> Trial:
     units = {
         "in contact, co-contraction noise for 100 s: what the bias gains": MILLI,
         "free, the same noise: rms of the residual": MILLI,
+        "pull changes in rests of 0.2 s, friction with it as the finger moves off: rms in 0.2 s after": MILLI,
+        "… friction with it at once": MILLI,
     }
     entry: Keys = {"bias.entry_load": True}
     settings = {
@@ -187,7 +189,9 @@ def entry_load(seeds: Iterable[int] = SEEDS, duration: float = 100.0) -> Trial:
 
     def measure(seed: int, keys: Keys) -> Measures:
         held, free = bias.flicker(seed, 0.3, duration), bias.flicker(seed, 0.0, duration)
-        return dict(zip(units, (bias.pumped(held, keys), bias.residual_rms(free, keys)), strict=True))
+        rates = {"bias.forget_rate": 5.0} | keys
+        rests = [bias.after_rests(bias.stiffened(seed, follows), rates) for follows in (False, True)]
+        return dict(zip(units, (bias.pumped(held, keys), bias.residual_rms(free, keys), *rests), strict=True))
 
     return _trial("`bias.entry_load`", units, settings, measure, seeds)
 
@@ -229,7 +233,8 @@ def forgetting(absorbable: bool, seeds: Iterable[int] = range(5), lengths: Seque
     def measure(seed: int, keys: Keys) -> Measures:
         made = {}
         for name, drift in zip(names, bias.DRIFTS, strict=True):
-            of = [bias.after_rests(bias.rests(seed, length, drift, absorbable), drift, keys) for length in lengths]
+            spread = {"bias.drift_variance": drift} | keys
+            of = [bias.after_rests(bias.rests(seed, length, drift, absorbable), spread) for length in lengths]
             made[name] = float(np.sqrt(np.mean(np.square(of))))
         return made
 

@@ -87,6 +87,23 @@ def residual_rms(take: Take, keys: Keys) -> float:
     return float(np.sqrt(np.mean(residual**2)))
 
 
+def stiffened(seed: int, follows: bool, rest: float = 0.2, count: int = 20) -> tuple[Take, Numbers]:
+    """Strokes of 0.5 s, always the same way; in the middle of the rests between the pull changes between 20 and 60 N.
+
+    follows: the torque of friction at rest does so at once, and the bias filter sees it; else as the finger moves off.
+    """
+    random = np.random.default_rng([seed, 10])
+    moved, rested = round(0.5 * RATE), round(rest * RATE)
+    stroke = np.arange(count * (moved + rested)) // (moved + rested)
+    phase = np.arange(len(stroke)) % (moved + rested) - moved  # from 0 on: at rest
+    later = (stroke + (phase >= rested // 2)) % 2
+    pull = np.where(later, PULL, 20.0)
+    held = pull if follows else np.where(phase >= 0, np.where(stroke % 2, PULL, 20.0), pull)
+    velocity, time = np.where(phase >= 0, 0.0, 0.3), times(len(stroke) * STEP)
+    torque = friction(held) + NOISE * random.standard_normal(len(time))
+    return Take(time, np.cumsum(velocity) * STEP, velocity, pull, torque), np.arange(1, count) * (moved + rested)
+
+
 # --- a load just after the start, and a wrong start ----------------------------------------------------------------
 
 
@@ -149,9 +166,9 @@ def rests(seed: int, rest: float, drift: float, absorbable: bool, count: int = 1
     return Take(time, np.cumsum(speed) * STEP, speed, np.full(len(time), PULL), torque), np.array(exits)
 
 
-def after_rests(made: tuple[Take, Numbers], drift: float, keys: Keys) -> float:
+def after_rests(made: tuple[Take, Numbers], keys: Keys) -> float:
     """N·m, rms of the residual in the WINDOW after the rests."""
     take, exits = made
-    residual = take.run({**SILENT, "bias.drift_variance": drift, **keys})["residual"]
+    residual = take.run({**SILENT, **keys})["residual"]
     chosen = (exits[:, None] + np.arange(round(WINDOW * RATE))).astype(int)
     return float(np.sqrt(np.mean(residual[chosen] ** 2)))
