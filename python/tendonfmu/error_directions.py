@@ -20,7 +20,12 @@ _ROUNDS = 40  # of the least squares
 
 def predicted(parts: Numbers, directions: Numbers) -> Numbers:
     """[K] standard deviation of torques with parts [K, q], by directions [d, q]."""
-    return np.asarray(np.sqrt(np.sum((parts @ directions.T) ** 2, axis=1)))
+    return np.asarray(np.sqrt(squares(parts @ directions.T)))
+
+
+def squares(rows: Numbers) -> Numbers:
+    """[K] sum of the squares of each row, without a copy of them."""
+    return np.asarray(np.einsum("ku,ku->k", rows, rows))
 
 
 def few_directions(parts: Numbers, slopes: Numbers, most: int = MOST) -> tuple[Numbers, float]:
@@ -33,7 +38,7 @@ def few_directions(parts: Numbers, slopes: Numbers, most: int = MOST) -> tuple[N
     what is no combination of parts, such as working points) is put back: scaled to the mean variance, they are moved by
     least squares until what they predict comes as near to each sample's standard deviation as they can.
     """
-    std = np.sqrt(np.sum(slopes**2, axis=1))
+    std = np.sqrt(squares(slopes))
     variance = float(np.mean(std**2))
     moment, axes = np.linalg.eigh(parts.T @ parts / len(parts))
     seen = moment > _UNSEEN * max(float(moment[-1]), 1e-300)
@@ -63,7 +68,7 @@ def _matched(shown: Numbers, start: Numbers, std: Numbers) -> Numbers:
 
     def project(flat: Numbers) -> tuple[Numbers, Numbers]:
         each = shown @ flat.reshape(start.shape).T
-        return each, np.sqrt(np.sum(each**2, axis=1) + small**2)
+        return each, np.sqrt(squares(each) + small**2)
 
     def error(flat: Numbers) -> Numbers:
         return (project(flat)[1] - std) / size

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu import native
-from tendonfmu.error_directions import few_directions, predicted
+from tendonfmu.error_directions import few_directions, predicted, squares
 from tendonfmu.estimation import Estimator
 from tendonfmu.fit_evaluation import Evaluation
 from tendonfmu.fit_methods import Learned
@@ -31,9 +31,10 @@ LOAD = 4.0  # times the recorded forces: the directions are to hold at other pre
 WORST = 0.99  # quantile of the error that is stated
 ROLES = ("train", "held_out")  # of samples
 DIGITS = 6  # of a written number
-_SAMPLES, _SIZE = 1500, 3_000_000  # looked at; times joints and unknowns, at most
-_CHUNK = 1_000_000  # numbers of a Jacobian at a time
+_SAMPLES, _SIZE = 1000, 2_000_000  # looked at; times joints and unknowns, at most
+_CHUNK = 500_000  # numbers of a Jacobian at a time
 _STEP = 0.01  # s between samples that are looked at one by one; no result depends on it
+_ROUNDING = 1e-9  # of a variance: keeps a covariance with rounding errors positive
 _NEVER = 1e9  # N·m; no contact threshold is ever passed
 
 
@@ -64,14 +65,10 @@ class Known:
     factor: Numbers
     share: Numbers
 
-    def variance(self, slopes: Numbers, inflation: float) -> Numbers:
-        """[K] (N·m)² of torques with slopes [K, u] by the columns of F, when the data know so many times less. The
-        prior, which is no measurement, stays.
-        """
-        return np.asarray(slopes**2 @ self.growth(inflation))
-
     def growth(self, inflation: float) -> Numbers:
-        """[u] of the variance along each column of F."""
+        """[u] of the variance along each column of F, when the data know so many times less. The prior, which is no
+        measurement, stays.
+        """
         return np.asarray(1 / (1 - (1 - 1 / inflation) * self.share))
 
 
@@ -120,15 +117,14 @@ def parameter_uncertainty(
 def _of_joint(seen: Mapping[str, Seen], known: Known, scores: Numbers) -> JointUncertainty:
     """seen: [K, m + 3] and [K, u] of the joint."""
     inflation = inflation_of(seen["train"].slopes, known, scores)
-    std = {which: np.sqrt(known.variance(each.slopes, inflation)) for which, each in seen.items()}
-    size = {which: _rms(values) or 1.0 for which, values in std.items()}
+    growth = np.sqrt(known.growth(inflation))
+    slopes = {which: each.slopes * growth for which, each in seen.items()}
+    std = {which: np.sqrt(squares(each)) for which, each in slopes.items()}
     # so that the larger torques under more load do not count for more
-    pooled = [
-        Seen(each.parts / size[which], each.slopes / size[which]) for which, each in seen.items() if which != "held_out"
-    ]
+    size = {which: _rms(std[which]) or 1.0 for which in ("train", "loaded")}
     directions, captured = few_directions(
-        np.concatenate([each.parts for each in pooled]),
-        np.concatenate([each.slopes for each in pooled]) * np.sqrt(known.growth(inflation)),
+        np.concatenate([seen[which].parts / size[which] for which in size]),
+        np.concatenate([slopes[which] / size[which] for which in size]),
     )
     written = [[float(f"{value:.{DIGITS}g}") for value in row] for row in directions.tolist()]
     stated = {}
@@ -150,8 +146,9 @@ def _stated(joints: Sequence[JointUncertainty], which: str) -> dict[str, list[fl
 def known_of(covariance: Numbers, information: Numbers) -> Known:
     """covariance: [u, u], prior included; information: [u, u] of the data alone."""
     scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    spread, axes = np.linalg.eigh(covariance / np.outer(scale, scale))  # correlations: units do not matter
-    root = scale[:, None] * axes * np.sqrt(np.maximum(spread, 0.0))
+    correlation = covariance / np.outer(scale, scale)  # units do not matter to it
+    correlation[np.diag_indices_from(correlation)] += _ROUNDING
+    root = scale[:, None] * np.linalg.cholesky(correlation)
     share, turn = np.linalg.eigh(root.T @ information @ root)
     return Known(root @ turn, np.clip(share, 0.0, 1.0))
 
@@ -165,7 +162,7 @@ def inflation_of(slopes: Numbers, known: Known, scores: Numbers) -> float:
     if len(scores) < 2:
         return 1.0
     found = float(np.sum((slopes @ scores.T) ** 2)) * len(scores) / (len(scores) - 1)
-    assumed = float(np.sum(slopes**2 @ known.share))
+    assumed = float(np.sum(squares(slopes * np.sqrt(known.share))))
     return found / assumed if assumed > 0 and found > 0 else 1.0
 
 
