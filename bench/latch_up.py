@@ -76,6 +76,7 @@ def release_time(seeds: Iterable[int] = SEEDS, duration: float = 60.0) -> Trial:
     settings: dict[str, Keys] = {PAPER: {}}
     settings |= {f"{seconds} s": {"contact.release_time": float(seconds)} for seconds in (1, 2, 5)}
     settings["2 s, release_ratio 0.5"] = {"contact.release_time": 2.0, "contact.release_ratio": 0.5}
+    settings["2 s, hold_time 50 ms"] = {"contact.release_time": 2.0, "contact.hold_time": 0.05}
 
     def measure(seed: int, keys: Keys) -> Measures:
         wrong = contact.stuck(contact.wrong_friction(seed, duration).run(keys)["contact"])
