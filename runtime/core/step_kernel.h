@@ -106,12 +106,10 @@ HOT_INLINE void effective_friction(tendonfmu_finger* f, double* total) {
 /* what it leaves of the measured torque, and how it has jumped */
 HOT_INLINE void leave_residual(tendonfmu_finger* f, double step) {
   const finger_state* s = &f->remembered;
-  double* total = f->scratch.friction;
-  effective_friction(f, total);
   if (f->derived.settings.bounds_friction) {
-    remember_jumps(f, total, s->friction, step);
+    remember_jumps(f, s->friction, step);
   }
-  copy_row(s->friction, total, f->joint_lanes);
+  effective_friction(f, s->friction); /* scratch.friction remains T: the estimation reads it */
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     quad_store(s->residual + j, quad_sub(quad_load(s->torque + j), quad_load(s->friction + j)));
   }
