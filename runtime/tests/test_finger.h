@@ -96,8 +96,17 @@ struct Outputs {
     slack.assign(samples * tendons, 9);
   }
   tendonfmu_outputs view() {
-    return {compensated.data(), torque.data(),        friction.data(), bias.data(), angle.data(),
-            speed.data(),       joint_contact.data(), contact.data(),  slack.data()};
+    tendonfmu_outputs outputs = {};
+    outputs.compensated_torque = compensated.data();
+    outputs.joint_torque = torque.data();
+    outputs.friction_torque = friction.data();
+    outputs.bias_torque = bias.data();
+    outputs.joint_angle = angle.data();
+    outputs.joint_speed = speed.data();
+    outputs.joint_contact = joint_contact.data();
+    outputs.contact = contact.data();
+    outputs.slack = slack.data();
+    return outputs;
   }
   bool operator==(const Outputs& o) const {
     return compensated == o.compensated && torque == o.torque && friction == o.friction && bias == o.bias &&
