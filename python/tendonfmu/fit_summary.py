@@ -64,7 +64,7 @@ class Doubt:
 
 @dataclass(frozen=True)
 class Told:
-    """A standard deviation in mN·m; the error in predicting it, rms and 99 % quantile, as shares, None where it is 0."""
+    """A standard deviation in mN·m; rms and 99 % quantile of the error in telling it, as shares: None where it is 0."""
 
     std: float
     error: float | None

@@ -69,7 +69,7 @@ class Known:
         """[u] of the variance along each column of F, when the data know so many times less. The prior, which is no
         measurement, stays.
         """
-        return np.asarray(1 / (1 - (1 - 1 / inflation) * self.share))
+        return np.asarray(1 / (1 - self.share + self.share / inflation))
 
 
 @dataclass(frozen=True)

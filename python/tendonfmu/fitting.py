@@ -280,7 +280,8 @@ class FrictionFit:
         start, fitted = self.start_.data, self.description_.data
         self.training_ = [evaluate(start, fitted, each) for each in self.recordings_]
         self.comparisons_ = [evaluate(start, fitted, each) for each in compared]
-        uncertainty = self._tell_uncertainty(learned) if self.uncertainty else None
+        told = self.uncertainty and bool(np.isfinite(learned.covariance).all())
+        uncertainty = self._tell_uncertainty(learned) if told else None
         self.converged_, self.n_iter_, self.cost_ = learned.converged, learned.iterations, learned.cost
         slack = np.concatenate([each.model.slack[each.recording.train] for each in self.training_])
         self.warnings_ = [*found, *slack_sentences(slack, self.description_), *_fit_sentences(learned, self.numbers_)]
