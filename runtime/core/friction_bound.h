@@ -87,12 +87,13 @@ HOT_INLINE void bound_friction(tendonfmu_finger* f) {
   }
 }
 
-/* J: how much the modelled torque has jumped of late; friction is T_eff before this sample's update of the bias, and
- * `before` the output of the sample before */
-HOT_INLINE void remember_jumps(tendonfmu_finger* f, const double* friction, const double* before, double step) {
+/* J: how much the modelled torque has jumped of late: from `before`, the output of the sample before, to T_eff ahead of
+ * this sample's update of the bias */
+HOT_INLINE void remember_jumps(tendonfmu_finger* f, const double* before, double step) {
   const quad kept = exp_of_minus(quad_set(f->derived.settings.jump_rate * step));
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
-    const quad jump = quad_abs(quad_sub(quad_load(friction + j), quad_load(before + j)));
+    const quad friction = quad_add(quad_load(f->remembered.bias + j), quad_load(f->scratch.friction + j));
+    const quad jump = quad_abs(quad_sub(friction, quad_load(before + j)));
     double* sum = f->remembered.friction_jump + j;
     quad_store(sum, quad_add(quad_mul(quad_load(sum), kept), jump));
   }
