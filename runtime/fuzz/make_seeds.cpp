@@ -28,6 +28,16 @@ void write(const std::filesystem::path& path, const std::string& bytes) {
   }
 }
 
+// the same, with link geometry and what is known of its torques
+std::string placed_finger() {
+  nlohmann::json finger = nlohmann::json::parse(least_finger);
+  const std::size_t joints = finger.at("joints").size();
+  finger["links"] = nlohmann::json(joints, nlohmann::json{{"axis", {0.0, 1.0, 0.5}}, {"offset", {0.04, 0.0, 0.0}}});
+  finger["tip"] = {0.02, 0.0, 0.0};
+  finger["contact"]["deviation"] = std::vector<double>(joints, 0.002);
+  return finger.dump();
+}
+
 // all keys and texts of a description
 void collect(const nlohmann::json& value, std::set<std::string>& words) {
   if (value.is_string()) {
@@ -77,7 +87,7 @@ int main(int count, char** arguments) {
     std::fprintf(stderr, "usage: make_seeds FOLDER DOCUMENT.json...\n");
     return 2;
   }
-  std::vector<std::string> fingers = {test_finger::json, least_finger};
+  std::vector<std::string> fingers = {test_finger::json, least_finger, placed_finger()};
   for (int i = 2; i < count; ++i) {
     std::ifstream file(arguments[i], std::ios::binary);
     fingers.emplace_back(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());

@@ -27,35 +27,48 @@ inline Bytes saved(const tendonfmu_finger* finger) {
   return bytes;
 }
 
-// Room for outputs of some samples; a check that the real ones are finite and the flags 0 or 1.
+// Room for outputs of some samples; a check that the real ones are finite, the flags 0 or 1, the link one of the
+// finger.
 struct Outputs {
-  std::size_t joints, tendons;
+  std::size_t samples, joints, tendons;
+  int last_link;
   std::vector<double> real;
   std::vector<unsigned char> flags;
+  std::vector<int> links;
 
-  Outputs(const tendonfmu_finger* finger, std::size_t samples)
-      : joints(samples * tendonfmu_joint_count(finger)),
+  Outputs(const tendonfmu_finger* finger, std::size_t count)
+      : samples(count),
+        joints(samples * tendonfmu_joint_count(finger)),
         tendons(samples * tendonfmu_tendon_count(finger)),
-        real(6 * joints),
-        flags(joints + samples + tendons) {}
+        last_link(static_cast<int>(tendonfmu_joint_count(finger))),
+        real(11 * joints + 7 * samples),
+        flags(joints + 2 * samples + tendons),
+        links(samples) {}
 
   tendonfmu_outputs view() {
+    tendonfmu_outputs v = {};
     double* r = real.data();
-    unsigned char* f = flags.data();
-    return {r,
-            r + joints,
-            r + 2 * joints,
-            r + 3 * joints,
-            r + 4 * joints,
-            r + 5 * joints,
-            f,
-            f + joints,
-            f + (flags.size() - tendons)};
+    for (double** row :
+         {&v.compensated_torque, &v.joint_torque, &v.friction_torque, &v.bias_torque, &v.joint_angle, &v.joint_speed,
+          &v.compensated_torque_std, &v.residual, &v.innovation, &v.stuck_friction, &v.friction_jump}) {
+      *row = r;
+      r += joints;
+    }
+    v.fingertip_force = r;
+    v.fingertip_force_std = r + 3 * samples;
+    v.fingertip_force_misfit = r + 6 * samples;
+    v.joint_contact = flags.data();
+    v.contact = v.joint_contact + joints;
+    v.fingertip_force_observable = v.contact + samples;
+    v.slack = v.fingertip_force_observable + samples;
+    v.contact_link = links.data();
+    return v;
   }
 
   void check() const {
     for (const double x : real) PROMISE(std::isfinite(x));
     for (const unsigned char f : flags) PROMISE(f <= 1);
+    for (const int link : links) PROMISE(link >= -1 && link <= last_link);
   }
 };
 
