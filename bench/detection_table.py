@@ -80,7 +80,7 @@ def report(campaign: Campaign) -> str:
         parts.append(f"**{pretension:g} N: found, by size of the push**\n\n" + _by_size(campaign, pretension))
     parts.append("**False alarms in 10 min, part of the free time in alarm**\n\n" + _false_alarms(campaign))
     parts.append("**Delay, ms: median, and 90 % of the found pushes within**\n\n" + _delays(campaign))
-    for outcome in campaign.outcomes:
+    for outcome in (each for each in campaign.outcomes if each.name in campaign.detailed):
         parts.append(
             f"**{outcome.name}: by posture and stiction, all pretensions**\n\n" + _by_posture(campaign, outcome)
         )
