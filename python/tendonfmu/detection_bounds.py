@@ -32,7 +32,8 @@ _LEAST = 0.02  # of a signal's rms; a base is never smaller
 WORTH_STUCK, WORTH_JUMP = 0.25, 5.0  # parts of H and J that stand in the way of a push, see `Search.in_the_way`
 _EVERY = 10  # every so many'th cell for the mean logarithm
 _FACTORS = (0.9, 1.1)
-_ROUNDS = 4  # over all joints
+_NEAR = 0.4  # of a bound
+_FEW_ROUNDS, _ROUNDS = 2, 4  # over all joints: of every pair of shares, and of the best one
 
 
 @dataclass(frozen=True)
@@ -172,7 +173,7 @@ def choose(
 ) -> list[Choice]:
     """The best bound of every subset of cells [c], with at most `allowed` alarms in each.
 
-    Shares on a coarse grid first, then around the best of each subset; then the bases of single joints.
+    Shares on a coarse grid first, then around the best of each subset, the bases of single joints fitted to each.
     """
     best: list[Choice | None] = [None] * len(subsets)
 
@@ -180,6 +181,7 @@ def choose(
         over = search.excess(*pair)
         for k, (subset, most) in enumerate(zip(subsets, allowed, strict=True)):
             found = _best_tail(search, pair, over[subset], subset, most)
+            found = _refined(search, found, over[subset], subset, most, _FEW_ROUNDS)
             before = best[k]
             tried = [*(before.tried if before else []), Tried(*pair, found.mean_log)]
             better = before is None or found.mean_log < before.mean_log
@@ -196,14 +198,15 @@ def choose(
         for pair in sorted(around):
             consider(pair)
         seen |= around
-    chosen = [each for each in best if each is not None]
-    return [_refined(search, *each) for each in zip(chosen, subsets, allowed, strict=True)]
+    done = zip([each for each in best if each is not None], subsets, allowed, strict=True)
+    return [_refined_whole(search, *each) for each in done]
 
 
 def choose_at(search: Search, pair: tuple[float, float], subset: Flags, allowed: int) -> Choice:
     """The best bound of a subset of cells with given shares."""
-    found = _best_tail(search, pair, search.excess(*pair)[subset], subset, allowed)
-    return _refined(search, found, subset, allowed)
+    return _refined_whole(
+        search, _best_tail(search, pair, search.excess(*pair)[subset], subset, allowed), subset, allowed
+    )
 
 
 def _neighbours(bound: Bound, part: float) -> set[tuple[float, float]]:
@@ -228,24 +231,34 @@ def _best_tail(search: Search, pair: tuple[float, float], over: Signal, subset: 
 
 def _at_level(search: Search, shape: Bound, over: Signal, subset: Flags, allowed: int) -> tuple[Bound, float]:
     """A shape at the least level with the allowed alarms, and the mean logarithm of what it finds."""
-    cells = search.cells
-    level = level_for(statistic(over, shape, cells.force[subset]), cells.order[subset], allowed)
-    bound = shape.scaled(max(level, 1e-6))
+    level = level_for(statistic(over, shape, search.cells.force[subset]), search.cells.order[subset], allowed)
+    return _worth(search, shape.scaled(max(level, 1e-6)), subset)
+
+
+def _worth(search: Search, bound: Bound, subset: Flags) -> tuple[Bound, float]:
     rows = np.flatnonzero(subset)[::_EVERY]
     return bound, float(np.mean(np.log(least_load(search.in_the_way(bound, rows)))))
 
 
-def _refined(search: Search, choice: Choice, subset: Flags, allowed: int) -> Choice:
-    """The bases of single joints raised or lowered as long as that finds lighter pushes."""
+def _refined_whole(search: Search, choice: Choice, subset: Flags, allowed: int) -> Choice:
     over = search.excess(choice.bound.stuck_share, choice.bound.jump_share)[subset]
+    return _refined(search, choice, over, subset, allowed, _ROUNDS)
+
+
+def _refined(search: Search, choice: Choice, over: Signal, subset: Flags, allowed: int, rounds: int) -> Choice:
+    """The bases of single joints raised or lowered as long as that finds lighter pushes."""
     best = choice
-    for _ in range(_ROUNDS):
+    # what is far below the bound stays below all those near it
+    near = np.flatnonzero(statistic(over, choice.bound, search.cells.force[subset]) > _NEAR)
+    over, force, order = over[near], search.cells.force[subset][near], search.cells.order[subset][near]
+    for _ in range(rounds):
         before = best.mean_log
         for j, factor in product(range(over.shape[1]), _FACTORS):
             scale = np.ones(over.shape[1])
             scale[j] = factor
             shape = replace(best.bound, base=scale * best.bound.base, per_force=scale * best.bound.per_force)
-            bound, worth = _at_level(search, shape, over, subset, allowed)
+            level = level_for(statistic(over, shape, force), order, allowed)
+            bound, worth = _worth(search, shape.scaled(max(level, 1e-6)), subset)
             if worth < best.mean_log:
                 best = replace(best, bound=bound, mean_log=worth)
         if before - best.mean_log < 1e-3:

@@ -285,6 +285,7 @@ class ContactTuning:
                 **({"evidence_time": self.evidence_time} if self.method == "cusum" else {}),
             }
             contact["friction_bound"] = {
+                **(contact.get("friction_bound") or {}),
                 "stuck_share": fast.stuck_share,
                 "jump_share": fast.jump_share,
                 "jump_time": self.jump_time,

@@ -171,11 +171,12 @@ def _is_uncertain(data: Mapping[str, Any]) -> bool:
 def _open_loop(data: Mapping[str, Any], clock: Clock) -> dict[str, Any]:
     """The description that computes all that decides on contact, and never decides for it."""
     never = [NEVER] * len(data["joints"])
+    given = data["contact"].get("friction_bound") or {}
     contact: dict[str, Any] = {
         "method": "innovation",
         "threshold": never,
         "innovation": {"time": clock.innovation, "threshold": never},
-        "friction_bound": {"stuck_share": 0.0, "jump_share": 0.0, "jump_time": clock.jump},
+        "friction_bound": {**given, "stuck_share": 0.0, "jump_share": 0.0, "jump_time": clock.jump},
     }
     if _is_uncertain(data):
         contact["uncertainty"] = data["contact"]["uncertainty"]
