@@ -67,13 +67,20 @@ def ramp_tables(rows: Sequence[Row]) -> list[str]:
                     details.append([*first, *_load_line(own)])
     head = ["finger", "state", "pretension, N", "rise, s"]
     found = [*head, *(f"{force:g} N" for force in FORCES), "all, %"]
-    where = "found,force at alarm N,torque mN·m,held %,reaches %,absorbed %,missed,reaches %,absorbed %,in the output %"
+    where = (
+        "found,as it goes,force at alarm N,torque mN·m,held %,reaches %,absorbed %,missed,reaches %,absorbed %,left %"
+    )
     return [*table(found, sizes, 2), "", *table([*head, *where.split(",")], details, 2), "", *text]
 
 
 def _load_line(own: Sequence[Row]) -> list[str]:
     found, missed = [row for row in own if row["found"]], [row for row in own if not row["found"]]
-    shown = [str(len(found)), _middle(found, "force_at"), _middle(found, "torque_at", 1e3, ".1f")]
+    shown = [
+        str(len(found)),
+        str(sum(row["released"] for row in own)),
+        _middle(found, "force_at"),
+        _middle(found, "torque_at", 1e3, ".1f"),
+    ]
     shown += [_middle(found, name, 100, ".0f") for name in ("held", "reach", "absorbed")]
     return [*shown, str(len(missed)), *(_middle(missed, name, 100, ".0f") for name in ("reach", "absorbed", "left"))]
 

@@ -24,6 +24,7 @@ from detection_cases import tendon_velocity
 from detection_limit_cases import (
     AFTER,
     DISTURBED,
+    FALL,
     LEAST_FORCE,
     LONGEST,
     MOVE,
@@ -90,12 +91,18 @@ def run_slots(folder: Path, cases: Iterable[Case], subjects: Sequence[Subject]) 
 
 
 def _pushed(subject: Subject, arrays: Arrays, twin: Arrays | None, slot: Slot) -> Row:
-    """twin: the same slot without the push. by_chance: found there. lead_alarms: that begin before the push."""
-    out, label = subject.run(arrays), arrays["contact_force"] >= LEAST_FORCE
+    """twin: the same slot without the push. by_chance: found there. lead_alarms: that begin before the push.
+    released: an alarm begins as it goes.
+    """
+    out, time = subject.run(arrays), arrays["time"]
+    # a load that goes is a change too: an alarm of the release has not found the push
+    label = (arrays["contact_force"] >= LEAST_FORCE) & (time <= slot.top + 1e-9)
     score = score_detection(arrays["time"], label, out["contact"].ravel())
     event = score.events[0]
     lead = [begin for begin, _end in score.false_alarms if slot.begin + MOVE <= begin < slot.push]
-    row: Row = {"found": event.found, "silent": event.silent, "delay": event.delay, "lead_alarms": len(lead)}
+    begins = [float(time[begin]) for begin, _ in stretches(time, out["contact"].ravel())]
+    row: Row = {"released": any(slot.top + 1e-9 < begin <= slot.top + FALL + 0.1 for begin in begins)}
+    row |= {"found": event.found, "silent": event.silent, "delay": event.delay, "lead_alarms": len(lead)}
     if twin is None:
         return row
     alone = subject.run(twin)
@@ -229,6 +236,7 @@ DISTURBANCES = (
     Disturbance(
         "all positions 1 mm and back in 10 s", DISTURBED, DISTURBED + LONGEST, _with("tendon_position", _shift)
     ),
+    Disturbance("wrist turns throughout", 0.0, 0.0, lambda arrays, _tendon: arrays, kind="wrist"),
 )
 
 
