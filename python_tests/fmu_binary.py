@@ -126,6 +126,10 @@ class UnpackedFmu:
     def names(self, causality: str, kind: str = "Real") -> list[str]:
         return [name for name, v in self.variables.items() if v.causality == causality and v.type == kind]
 
+    def with_derivatives(self) -> list[str]:
+        """The Real outputs but for discrete ones."""
+        return [name for name in self.names("output") if self.variables[name].variability == "continuous"]
+
     @property
     def location(self) -> bytes:
         return (self.folder / "resources").as_uri().encode()

@@ -203,6 +203,7 @@ def columns_of_section_4(joints: int, tendons: int) -> list[str]:
         "bias_torque",
         "joint_angle",
         "joint_speed",
+        "compensated_torque_std",
         "joint_contact",
     )
     names = [f"{name}[{j}]" for name in per_joint for j in range(1, joints + 1)]
