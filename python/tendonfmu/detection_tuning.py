@@ -203,7 +203,9 @@ class ContactTuning:
 
     def _run(self, parts: Sequence[FreePart]) -> None:
         """The bias, and runs with it: residuals depend on the bias, its noise on the residuals."""
-        clock = Clock(self.innovation_time, self.jump_time)
+        given = self.start_.data["contact"].get("friction_bound") or {}
+        own = given.get("jump_time") if self.method == "threshold" else None  # whose friction bound stays as it is
+        clock = Clock(self.innovation_time, self.jump_time if own is None else float(own))
         time = wanted_time(self.start_.data, parts, self.bias_time)
         data = self.start_.data
         for _ in range(2):
