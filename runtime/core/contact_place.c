@@ -8,6 +8,7 @@ static const double told_share = 0.01;    /* of the largest eigenvalue: a tenth 
 static const double turning_share = 1e-8; /* above it a force along the direction turns joints at all */
 static const double stands_out = 5.0;     /* standard deviations */
 static const double largest_misfit = 1e12;
+static const double largest_torque = 1e30; /* N·m, far beyond what inputs make; a restored state may hold any */
 
 enum { MAX_SWEEPS = 30 };
 
@@ -153,14 +154,17 @@ static const double* find_deviations(const tendonfmu_finger* f, double* deviatio
 contact_place find_contact_place(const tendonfmu_finger* finger) {
   const finger_state* s = &finger->remembered;
   const size_t n = finger->joints;
-  double lever[3 * MODEL_MAX_JOINTS], room[MODEL_MAX_JOINTS];
+  double lever[3 * MODEL_MAX_JOINTS], room[MODEL_MAX_JOINTS] = {0.0}, torque[MODEL_MAX_JOINTS] = {0.0};
   contact_place found = {.link = 0};
   if (finger->shape.options & MODEL_HAS_LINKS) {
     const double* deviation = find_deviations(finger, room);
     find_tip_levers(&finger->derived.links, n, s->angle, lever);
-    found.tip = find_tip_force(n, lever, s->compensated, deviation);
+    for (size_t j = 0; j < n; ++j) {
+      torque[j] = fmax(-largest_torque, fmin(largest_torque, s->compensated[j]));
+    }
+    found.tip = find_tip_force(n, lever, torque, deviation);
     if (s->scalar[STATE_CONTACT] != 0.0) {
-      found.link = find_contact_link(n, finger->derived.least_link, s->compensated, deviation);
+      found.link = find_contact_link(n, finger->derived.least_link, torque, deviation);
     }
   }
   return found;

@@ -20,7 +20,7 @@ const char* const one_joint = R"({"format": "tendonfmu-finger-1", "name": "one",
   "joints": [{"friction": {"static": 0.004, "coulomb": 0.003, "stribeck_velocity": 0.1}}],
   "tendons": [{"stiffness": 4000, "moment_arms": [0.01]}],
   "bias": {"noise_time": 0.01, "noise_std": 0, "initial_variance": 0, "initial_torque": [0.1]},
-  "contact": {"threshold": [0.03]}})";
+  "contact": {"threshold": [0.03], "deviation": [0.002]}, "links": [{"axis": [0, 1, 0.5]}], "tip": [0.04, 0, 0]})";
 
 class Session {
  public:
