@@ -4,9 +4,10 @@
 
 #include <math.h>
 
-static const double told_share = 0.01;    /* of the largest eigenvalue: a tenth of the standard deviation's inverse */
-static const double turning_share = 1e-8; /* above it a force along the direction turns joints at all */
-static const double stands_out = 5.0;     /* standard deviations */
+static const double told_share = 0.01;     /* of the largest eigenvalue: a tenth of the standard deviation's inverse */
+static const double least_square = 1e-200; /* of levers: below it a quotient by it may overflow */
+static const double turning_share = 1e-8;  /* above it a force along the direction turns joints at all */
+static const double stands_out = 5.0;      /* standard deviations */
 static const double largest_misfit = 1e12;
 static const double largest_torque = 1e30; /* N·m, far beyond what inputs make; a restored state may hold any */
 
@@ -109,7 +110,7 @@ tip_force find_tip_force(size_t joints, const double* lever, const double* torqu
   const double largest = fmax(s.matrix[0][0], fmax(s.matrix[1][1], s.matrix[2][2]));
   for (int k = 0; k < 3; ++k) {
     const double value = s.matrix[k][k], *e = s.direction[k];
-    if (!(value > 0.0 && value >= turning_share * largest)) {
+    if (!(value > least_square && value >= turning_share * largest)) {
       continue;
     }
     const double along = (e[0] * pull[0] + e[1] * pull[1] + e[2] * pull[2]) / value;

@@ -4,6 +4,7 @@
 #define TENDONFMU_FRICTION_BOUND_H
 
 #include "force_propagation.h"
+#include "kernel_choice.h"
 
 #include <math.h>
 
@@ -95,7 +96,8 @@ HOT_INLINE void remember_jumps(tendonfmu_finger* f, const double* before, double
     const quad friction = quad_add(quad_load(f->remembered.bias + j), quad_load(f->scratch.friction + j));
     const quad jump = quad_abs(quad_sub(friction, quad_load(before + j)));
     double* sum = f->remembered.friction_jump + j;
-    quad_store(sum, quad_add(quad_mul(quad_load(sum), kept), jump));
+    const quad larger = quad_add(quad_mul(quad_load(sum), kept), jump);
+    quad_store(sum, quad_min(larger, quad_set(LARGEST_SUM))); /* however many jumps pile up */
   }
 }
 

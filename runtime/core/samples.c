@@ -8,8 +8,6 @@
 #include "contact_place.h"
 #include "kernel_choice.h"
 
-static const double largest_time = 1e15; /* s */
-
 typedef struct input_row {
   const char* name;
   const char* unit;
@@ -36,7 +34,7 @@ static size_t used_rows(const tendonfmu_finger* f, const tendonfmu_inputs* input
 static int check_time(const tendonfmu_finger* f, double time, message_line message) {
   const int initialised = f->remembered.scalar[STATE_INITIALISED] != 0.0;
   const double before = f->remembered.scalar[STATE_TIME];
-  if (fabs(time) <= largest_time && (!initialised || time >= before)) {
+  if (fabs(time) <= LARGEST_TIME && (!initialised || time >= before)) {
     return 0;
   }
   message_start(message, "time = ");

@@ -77,15 +77,16 @@ HOT_INLINE double mean_tendon_force(const tendonfmu_finger* f) {
   return quad_sum(sum) / (double)f->tendons;
 }
 
-/* 0 when anything that is about to be remembered is not finite */
+/* 0 when anything that is about to be remembered is not finite, or its square would not be */
 HOT_INLINE int all_finite(const tendonfmu_finger* f) {
   const finger_scratch* s = &f->scratch;
   const double* joint_velocity = s->velocity + f->joints * f->tendon_lanes;
   double probe = 0.0; /* stays 0 unless something is infinite or NaN */
   for (size_t j = 0; j < f->joints; ++j) {
-    probe += 0.0 * (s->torque[j] - s->friction[j] - s->bias_step[j] - f->remembered.bias[j]);
+    const double sum = fabs(s->torque[j]) + fabs(s->friction[j]) + fabs(s->bias_step[j]) + fabs(f->remembered.bias[j]) +
+                       s->stuck_friction[j] + s->uncertainty[j];
+    probe += 0.0 * (1e160 * sum); /* infinite above 1.8e148 */
     probe += 0.0 * s->angle[j] + 0.0 * joint_velocity[j];
-    probe += 0.0 * (s->stuck_friction[j] + s->uncertainty[j]);
   }
   return probe == 0.0;
 }
