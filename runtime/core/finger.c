@@ -207,6 +207,7 @@ static tendonfmu_status take(tendonfmu_finger* finger, double time, const tendon
       message_start(error_line(finger), "the sample at time ");
       message_number(error_line(finger), time);
       message_text(error_line(finger), " s overflows: expected forces and velocities whose torques are finite");
+      forget_views(finger); /* they follow its velocities, which nothing else remembers */
       break;
     default: return TENDONFMU_OK;
   }
