@@ -2,11 +2,12 @@
 
 #include "saved_state.h"
 
-#include <math.h>
+#include <float.h>
 #include <string.h>
 
 #include "bytes.h"
 #include "derived_numbers.h"
+#include "kernel_choice.h"
 #include "parameters.h"
 
 enum { HEADER_BYTES = 40, HASHED_FROM = 32, STATE_VERSION = 1 };
@@ -35,33 +36,122 @@ static int refuse(message_line message, const char* reason) {
   return -1;
 }
 
-static int is_flag(double x) {
-  return x == 0.0 || x == 1.0;
+/* Which lanes of a row stand for something; the others hold 0 unless the row says otherwise. */
+typedef enum row_kind { ROW_OF_JOINTS, ROW_OF_TENDONS, ROW_OF_SLOTS, ROW_WITHOUT_LANES } row_kind;
+
+/* What may stand in a row of the remembered numbers. */
+typedef struct row_rule {
+  const double* row;
+  size_t count;
+  row_kind kind;
+  double low, high;
+  int whole;       /* whole numbers only */
+  int spare_lanes; /* in lanes that stand for nothing, too: they are tracked along */
+} row_rule;
+
+static int is_in_use(const tendonfmu_finger* f, row_kind kind, size_t i) {
+  const size_t joint_row = f->joints * f->tendon_lanes;
+  switch (kind) {
+    case ROW_OF_JOINTS: return i < f->joints;
+    case ROW_OF_TENDONS: return i < f->tendons;
+    case ROW_OF_SLOTS: return i < joint_row ? i % f->tendon_lanes < f->tendons : i - joint_row < f->joints;
+    default: return 1;
+  }
 }
 
-static int is_sign(double x) {
-  return x == -1.0 || x == 0.0 || x == 1.0;
+static int row_is_sound(const tendonfmu_finger* f, const unsigned char* state, const row_rule* rule) {
+  const unsigned char* from = state + 8 * (size_t)(rule->row - f->state);
+  for (size_t i = 0; i < rule->count; ++i, from += 8) {
+    const int tied = !rule->spare_lanes && !is_in_use(f, rule->kind, i);
+    const double value = load_f64(from), low = tied ? 0.0 : rule->low, high = tied ? 0.0 : rule->high;
+    if (!(value >= low && value <= high) || (rule->whole && value != (double)(int)value)) {
+      return 0; /* NaN is neither */
+    }
+  }
+  return 1;
 }
 
-/* 1 when the number at `bytes` may stand at `index` of the remembered numbers */
-static int number_is_sound(const tendonfmu_finger* f, size_t index, double value) {
+static int rows_are_sound(const tendonfmu_finger* f, const unsigned char* state, const row_rule* rules, size_t count) {
+  for (size_t k = 0; k < count; ++k) {
+    if (!row_is_sound(f, state, rules + k)) {
+      return 0;
+    }
+  }
+  return 1;
+}
+
+static int scalars_are_sound(const tendonfmu_finger* f, const unsigned char* state) {
+  const double* s = f->remembered.scalar;
+  const row_rule rules[] = {
+      {s + STATE_INITIALISED, 1, ROW_WITHOUT_LANES, 0.0, 1.0, 1, 0},
+      {s + STATE_SOURCE, 1, ROW_WITHOUT_LANES, 1.0, 3.0, 1, 0},
+      {s + STATE_TIME, 1, ROW_WITHOUT_LANES, -LARGEST_TIME, LARGEST_TIME, 0, 0},
+      {s + STATE_FIRST_SAMPLE, 1, ROW_WITHOUT_LANES, 0.0, 1.0, 1, 0},
+      {s + STATE_VELOCITY_GAIN, 1, ROW_WITHOUT_LANES, 0.0, DBL_MAX, 0, 0},
+      {s + STATE_CONTACT, 1, ROW_WITHOUT_LANES, 0.0, 1.0, 1, 0},
+      {s + STATE_CONTACT_SINCE, 1, ROW_WITHOUT_LANES, -LARGEST_TIME, LARGEST_TIME, 0, 0},
+      {s + STATE_ABSORBED, 2, ROW_WITHOUT_LANES, 0.0, LARGEST_SQUARE, 0, 0}, /* and the one before */
+      {s + STATE_ABSORBED_BEFORE + 1, STATE_SCALARS - STATE_ABSORBED_BEFORE - 1, ROW_WITHOUT_LANES, 0.0, 0.0, 0, 0},
+  };
+  return rows_are_sound(f, state, rules, sizeof rules / sizeof rules[0]);
+}
+
+static int joints_are_sound(const tendonfmu_finger* f, const unsigned char* state) {
   const finger_state* s = &f->remembered;
-  const size_t moving = (size_t)(s->moving - f->state), side = (size_t)(s->side - f->state);
-  const size_t since = (size_t)(s->stuck_since - f->state), contact = (size_t)(s->joint_contact - f->state);
-  const size_t slack = (size_t)(s->slack - f->state);
-  if (!isfinite(value)) {
+  const double* const any[] = {s->angle, s->speed,    s->torque,     s->friction, s->compensated,
+                               s->bias,  s->residual, s->innovation, s->tracked};
+  const size_t n = f->joint_lanes;
+  const row_rule rules[] = {
+      {s->joint_contact, n, ROW_OF_JOINTS, 0.0, 1.0, 1, 0},
+      {s->variance, n, ROW_OF_JOINTS, 0.0, LARGEST_SQUARE, 0, 1},
+      {s->gain, n, ROW_OF_JOINTS, 0.0, 1.0, 0, 1},
+      {s->stuck_friction, n, ROW_OF_JOINTS, 0.0, LARGEST_SUM, 0, 0},
+      {s->friction_jump, n, ROW_OF_JOINTS, 0.0, LARGEST_SUM, 0, 0},
+      {s->evidence, n, ROW_OF_JOINTS, 0.0, LARGEST_TIME, 0, 0},
+      {s->exceeded_at, n, ROW_OF_JOINTS, -LARGEST_TIME, LARGEST_TIME, 0, 0},
+      {s->total_variance, n, ROW_OF_JOINTS, 0.0, DBL_MAX, 0, 1},
+  };
+  for (size_t k = 0; k < sizeof any / sizeof any[0]; ++k) {
+    const row_rule rule = {any[k], n, ROW_OF_JOINTS, -DBL_MAX, DBL_MAX, 0, 0};
+    if (!row_is_sound(f, state, &rule)) {
+      return 0;
+    }
+  }
+  return rows_are_sound(f, state, rules, sizeof rules / sizeof rules[0]);
+}
+
+static int slots_are_sound(const tendonfmu_finger* f, const unsigned char* state) {
+  const finger_state* s = &f->remembered;
+  const size_t slots = f->slots, lanes = f->tendon_lanes, rest = (size_t)(f->state + f->state_count - s->entry_edge);
+  const int absorbs = f->derived.settings.forgets_by_absorption;
+  const row_rule rules[] = {
+      {s->force, lanes, ROW_OF_TENDONS, -DBL_MAX, DBL_MAX, 0, 0},
+      {s->slack, lanes, ROW_OF_TENDONS, 0.0, 1.0, 1, 0},
+      {s->moving, slots, ROW_OF_SLOTS, 0.0, 1.0, 1, 0},
+      {s->side, slots, ROW_OF_SLOTS, -1.0, 1.0, 1, 0},
+      {s->side_before, slots, ROW_OF_SLOTS, -1.0, 1.0, 1, 0},
+      {s->event, slots, ROW_OF_SLOTS, -1.0, 1.0, 1, 0},
+      {s->stuck_since, slots, ROW_OF_SLOTS, absorbs ? 0.0 : -LARGEST_TIME, absorbs ? LARGEST_SQUARE : LARGEST_TIME, 0,
+       1},
+      {s->last_stuck, slots, ROW_OF_SLOTS, -LARGEST_TIME, LARGEST_TIME, 0, 1},
+      {s->entry_edge, rest, ROW_WITHOUT_LANES, -DBL_MAX, DBL_MAX, 0, 0}, /* entries, parts, extensions */
+  };
+  return rows_are_sound(f, state, rules, sizeof rules / sizeof rules[0]);
+}
+
+/* nothing has rested for less than no time: exponents of forgetting are not negative */
+static int rests_are_sound(const tendonfmu_finger* f, const unsigned char* state) {
+  const finger_state* s = &f->remembered;
+  const double absorbed = load_f64(state + 8 * STATE_ABSORBED_BEFORE);
+  if (load_f64(state + 8 * STATE_ABSORBED) < absorbed) {
     return 0;
   }
-  if (index == STATE_SOURCE) {
-    return value == 1.0 || value == 2.0 || value == 3.0;
-  }
-  if (index == STATE_INITIALISED || index == STATE_FIRST_SAMPLE || index == STATE_CONTACT ||
-      (index >= moving && index < side) || (index >= contact && index < contact + f->joint_lanes) ||
-      (index >= slack && index < moving)) {
-    return is_flag(value);
-  }
-  if (index >= side && index < since) {
-    return is_sign(value);
+  for (size_t i = 0; i < f->slots; ++i) {
+    const double since = load_f64(state + 8 * ((size_t)(s->stuck_since - f->state) + i));
+    const double until = load_f64(state + 8 * ((size_t)(s->last_stuck - f->state) + i));
+    if (since > (f->derived.settings.forgets_by_absorption ? absorbed : until)) {
+      return 0;
+    }
   }
   return 1;
 }
@@ -77,10 +167,10 @@ static int check_bytes(tendonfmu_finger* f, const unsigned char* from, message_l
   if (load_u64(from + 24) != hash_bytes(from + HASHED_FROM, size - HASHED_FROM, 0)) {
     return refuse(message, "damaged saved state: its checksum does not match");
   }
-  for (size_t i = 0; i < f->state_count; ++i) {
-    if (!number_is_sound(f, i, load_f64(from + HEADER_BYTES + 8 * (p + i)))) {
-      return refuse(message, "damaged saved state: a number in it cannot be");
-    }
+  const unsigned char* state = from + HEADER_BYTES + 8 * p;
+  if (!scalars_are_sound(f, state) || !joints_are_sound(f, state) || !slots_are_sound(f, state) ||
+      !rests_are_sound(f, state)) {
+    return refuse(message, "damaged saved state: a number in it cannot be");
   }
   load_doubles(f->candidate, from + HEADER_BYTES, p);
   const int same = memcmp(f->candidate, f->parameters, p * sizeof(double)) == 0;
