@@ -35,6 +35,26 @@ inline const char* const json = R"({
   "contact": {"threshold": [0.04, 0.04], "threshold_per_force": [1e-4, 1e-4]},
   "extensions": [{"effect": "cover_hardening", "joint": 1, "stiffness": 0.01}]})";
 
+// The same with every key of docs/contract-additions.md. Two joints in contact by turns, released after a while; what
+// is not known of the friction differs between them.
+inline std::string every_key() {
+  std::string text = json;
+  const auto put = [&](const std::string& after, const std::string& added) {
+    text.insert(text.find(after) + after.size(), added);
+  };
+  put("\"velocity_threshold\": {", "\"hysteresis\": 0.3, ");
+  put("\"bias\": {", "\"forgetting\": \"absorption\", \"entry_load\": true, ");
+  put("\"contact\": {", R"("method": "cusum",
+    "innovation": {"time": 0.4, "threshold": [0.03, 0.03], "threshold_per_force": [1e-4, 1e-4], "evidence_time": 0.01},
+    "friction_bound": {"stuck_share": 0.4, "jump_share": 0.5, "jump_time": 0.05},
+    "uncertainty": [[[0.1, 0.05, -0.1, 0.2, 0.3, 0.1], [0, 0.1, 0, 0, 0, 0.2]], [[0.1, 0.1, 0.1, 0.1, 0, 0]]],
+    "uncertainty_level": 2, "deviation": [0.002, 0.003], "deviation_per_force": [1e-5, 2e-5],
+    "release_ratio": 0.6, "hold_time": 0.02, "release_time": 0.15, )");
+  put("\"name\": \"test\",", R"("links": [{"axis": [0, 0, 2]}, {"axis": [0, 1, 0.2], "offset": [0.05, 0, 0]}],
+    "tip": [0.03, 0, 0.004],)");
+  return text;
+}
+
 constexpr std::size_t joints = 2, tendons = 3;
 
 inline std::vector<unsigned char> image(const std::string& text = json) {
@@ -87,10 +107,20 @@ struct Motion {
 // Room for the outputs of a run.
 struct Outputs {
   std::vector<double> compensated, torque, friction, bias, angle, speed;
-  std::vector<unsigned char> joint_contact, contact, slack;
+  std::vector<double> deviation, residual, innovation, stuck, jump, parts, tip_force, tip_std, misfit;
+  std::vector<unsigned char> joint_contact, contact, slack, observable;
+  std::vector<int> link;
 
   explicit Outputs(std::size_t samples) {
-    for (auto* row : {&compensated, &torque, &friction, &bias, &angle, &speed}) row->assign(samples * joints, NAN);
+    for (auto* row :
+         {&compensated, &torque, &friction, &bias, &angle, &speed, &deviation, &residual, &innovation, &stuck, &jump}) {
+      row->assign(samples * joints, NAN);
+    }
+    parts.assign(samples * joints * (tendons + 3), NAN);
+    for (auto* row : {&tip_force, &tip_std}) row->assign(samples * 3, NAN);
+    misfit.assign(samples, NAN);
+    observable.assign(samples, 9);
+    link.assign(samples, -9);
     joint_contact.assign(samples * joints, 9);
     contact.assign(samples, 9);
     slack.assign(samples * tendons, 9);
@@ -106,12 +136,25 @@ struct Outputs {
     outputs.joint_contact = joint_contact.data();
     outputs.contact = contact.data();
     outputs.slack = slack.data();
+    outputs.compensated_torque_std = deviation.data();
+    outputs.residual = residual.data();
+    outputs.innovation = innovation.data();
+    outputs.stuck_friction = stuck.data();
+    outputs.friction_jump = jump.data();
+    outputs.friction_parts = parts.data();
+    outputs.fingertip_force = tip_force.data();
+    outputs.fingertip_force_std = tip_std.data();
+    outputs.fingertip_force_observable = observable.data();
+    outputs.fingertip_force_misfit = misfit.data();
+    outputs.contact_link = link.data();
     return outputs;
   }
   bool operator==(const Outputs& o) const {
     return compensated == o.compensated && torque == o.torque && friction == o.friction && bias == o.bias &&
            angle == o.angle && speed == o.speed && joint_contact == o.joint_contact && contact == o.contact &&
-           slack == o.slack;
+           slack == o.slack && deviation == o.deviation && residual == o.residual && innovation == o.innovation &&
+           stuck == o.stuck && jump == o.jump && parts == o.parts && tip_force == o.tip_force && tip_std == o.tip_std &&
+           misfit == o.misfit && observable == o.observable && link == o.link;
   }
 };
 
