@@ -15,6 +15,13 @@ from tendonfmu import native
 from tendonfmu.errors import InputError
 
 FORMAT = "tendonfmu-finger-1"
+_OTHER_FORMATS = {
+    "tendonfmu-rig-": "a rig",
+    "tendonfmu-fit-": "of a fit",
+    "tendonfmu-tune-": "report of a tuning",
+    "tendonfmu-score-": "report of a score",
+    "tendonfmu-excitation-": "report of a plan",
+}
 Law = Mapping[str, Any]
 
 
@@ -115,10 +122,9 @@ def _check_format(path: Path, text: bytes) -> None:
         found = data.get("format")
         if found is None:
             raise InputError(f'{path}: format: missing; expected "{FORMAT}"')
-        if isinstance(found, str) and found.startswith("tendonfmu-rig-"):
-            raise InputError(f'{path}: format = "{found}": a rig; expected a finger description, "{FORMAT}"')
-        if isinstance(found, str) and found.startswith("tendonfmu-fit-"):
-            raise InputError(f'{path}: format = "{found}": of a fit; expected a finger description, "{FORMAT}"')
+        for prefix, what in _OTHER_FORMATS.items():
+            if isinstance(found, str) and found.startswith(prefix):
+                raise InputError(f'{path}: format = "{found}": {what}; expected a finger description, "{FORMAT}"')
 
 
 def laws(data: Mapping[str, Any]) -> Iterator[tuple[str, Law]]:
