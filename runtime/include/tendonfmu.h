@@ -17,7 +17,8 @@
  *              says why in one line in tendonfmu_last_error().
  *   Host       Floating-point mode, locale, signals and working directory are neither changed nor relied on.
  *
- * The equations are those of the paper; the sample semantics those of docs/model.md. */
+ * The equations are those of the paper; the sample semantics those of docs/model.md and, where a description has keys
+ * for detection, docs/contract-additions.md. */
 #ifndef TENDONFMU_H
 #define TENDONFMU_H
 
@@ -100,7 +101,8 @@ typedef struct tendonfmu_inputs {
   const double* joint_velocity;  /* [n] rad/s */
 } tendonfmu_inputs;
 
-/* Outputs of one sample, or of many. A NULL array is not wanted. Flags are 0 or 1. */
+/* Outputs of one sample, or of many. A NULL array is not wanted. Flags are 0 or 1. Begin with = {0} and set what is
+ * wanted by name: later versions add arrays at the end, so a program is compiled with the header of its library. */
 typedef struct tendonfmu_outputs {
   double* compensated_torque;   /* [n] N·m   τ − T_eff */
   double* joint_torque;         /* [n] N·m   τ = Rᵀ f0 (eq. 3) */
