@@ -188,9 +188,10 @@ class Session {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
-  static const Bytes images[] = {test_finger::image(), test_finger::image(one_joint)};
+  static const Bytes images[] = {test_finger::image(), test_finger::image(one_joint),
+                                 test_finger::image(test_finger::every_key())};
   FuzzedDataProvider data(bytes, size);
-  Session session(data, data.PickValueInArray({&images[0], &images[1]})[0]);
+  Session session(data, data.PickValueInArray({&images[0], &images[1], &images[2]})[0]);
   while (data.remaining_bytes() > 0) session.call();
   return 0;
 }

@@ -20,7 +20,9 @@ const double odd_numbers[] = {0.0, -0.0, 5e-324, 1e-308, 1e-12, 1.0, -1.0, 1e9, 
 
 /* in place, so that the lengths still agree */
 void change_a_word(std::uint8_t* data, std::size_t size, std::mt19937& random) {
-  if (random() % 2) {
+  if (random() % 8 == 0) { /* an option */
+    store_u32(data + 40, load_u32(data + 40) ^ 1u << random() % 18);
+  } else if (random() % 2) {
     std::uint8_t* word = data + 32 + 4 * (random() % ((size - 32) / 4));
     const std::uint32_t odd = odd_words[random() % (sizeof odd_words / sizeof *odd_words)];
     store_u32(word, random() % 2 ? odd : load_u32(word) + (random() % 2 ? 1 : 0xffffffffu));

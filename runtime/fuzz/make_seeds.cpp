@@ -87,7 +87,7 @@ int main(int count, char** arguments) {
     std::fprintf(stderr, "usage: make_seeds FOLDER DOCUMENT.json...\n");
     return 2;
   }
-  std::vector<std::string> fingers = {test_finger::json, least_finger, placed_finger()};
+  std::vector<std::string> fingers = {test_finger::json, least_finger, placed_finger(), test_finger::every_key()};
   for (int i = 2; i < count; ++i) {
     std::ifstream file(arguments[i], std::ios::binary);
     fingers.emplace_back(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
@@ -100,7 +100,8 @@ int main(int count, char** arguments) {
   for (unsigned seed = 0; seed < 40; ++seed) {
     write(folder / "corpus" / "fuzz_calls" / ("calls" + std::to_string(seed)), any_bytes(seed, 100 * (seed + 1)));
   }
-  std::set<std::string> words = {"null", "true", "\"positive\":", "\"negative\":", "\"noise_time\":", "1e999"};
+  std::set<std::string> words = {"\"innovation\"", "\"time\"",      "\"threshold\"",   "null", "true",
+                                 "\"positive\":",  "\"negative\":", "\"noise_time\":", "1e999"};
   for (std::size_t i = 0; i < fingers.size(); ++i) {
     const std::string name = "finger" + std::to_string(i);
     const auto document = nlohmann::json::parse(fingers[i]);

@@ -41,7 +41,7 @@ struct Outputs {
         joints(samples * tendonfmu_joint_count(finger)),
         tendons(samples * tendonfmu_tendon_count(finger)),
         last_link(static_cast<int>(tendonfmu_joint_count(finger))),
-        real(11 * joints + 7 * samples),
+        real(11 * joints + 7 * samples + joints * (tendonfmu_tendon_count(finger) + 3)),
         flags(joints + 2 * samples + tendons),
         links(samples) {}
 
@@ -57,6 +57,7 @@ struct Outputs {
     v.fingertip_force = r;
     v.fingertip_force_std = r + 3 * samples;
     v.fingertip_force_misfit = r + 6 * samples;
+    v.friction_parts = r + 7 * samples;
     v.joint_contact = flags.data();
     v.contact = v.joint_contact + joints;
     v.fingertip_force_observable = v.contact + samples;
