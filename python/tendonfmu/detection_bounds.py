@@ -21,11 +21,8 @@ from tendonfmu.free_motion import FreeRun, Signal
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-COARSE = (0.0, 0.4, 0.8)  # c_H that are tried first
-# c_J: a push makes the model jump, and above 0.6 hides itself: on the virtual hand 1.0 missed 5 of 145 firm pushes, 0.4
-# and 0.6 none, at the same rate of false alarms
-COARSE_JUMPS = (0.0, 0.3, 0.6)
-FINER = 2  # times half the step, around the best
+# (c_H, c_J) that are tried. A push makes the model jump and ends stiction, and hides behind large shares: docs/tune.md
+SHARES = ((0.4, 0.4),)
 TAILS = (4.0, 16.0)  # times the wished rate: how far out the tails are that shape a bound
 COMPARED = 12  # alarms at which bounds are compared, if fewer are allowed: single extremes say little of a shape
 _LEAST = 0.02  # of a signal's rms; a base is never smaller
@@ -173,7 +170,7 @@ def choose(
 ) -> list[Choice]:
     """The best bound of every subset of cells [c], with at most `allowed` alarms in each.
 
-    Shares on a coarse grid first, then around the best of each subset, the bases of single joints fitted to each.
+    The bases of single joints are fitted to each pair of shares.
     """
     best: list[Choice | None] = [None] * len(subsets)
 
@@ -189,15 +186,8 @@ def choose(
         if tick is not None:
             tick()
 
-    for pair in product(COARSE, COARSE_JUMPS):
+    for pair in SHARES:
         consider(pair)
-    halves, seen = 1.0, set(product(COARSE, COARSE_JUMPS))
-    for _ in range(FINER):
-        halves /= 2
-        around = {near for each in best if each is not None for near in _neighbours(each.bound, halves)} - seen
-        for pair in sorted(around):
-            consider(pair)
-        seen |= around
     done = zip([each for each in best if each is not None], subsets, allowed, strict=True)
     return [_refined_whole(search, *each) for each in done]
 
@@ -207,14 +197,6 @@ def choose_at(search: Search, pair: tuple[float, float], subset: Flags, allowed:
     return _refined_whole(
         search, _best_tail(search, pair, search.excess(*pair)[subset], subset, allowed), subset, allowed
     )
-
-
-def _neighbours(bound: Bound, part: float) -> set[tuple[float, float]]:
-    """Shares around those of a bound, at a part of the coarse steps."""
-    stuck, jump = part * (COARSE[1] - COARSE[0]), part * (COARSE_JUMPS[1] - COARSE_JUMPS[0])
-    near = product((-stuck, 0.0, stuck), (-jump, 0.0, jump))
-    pairs = {(round(bound.stuck_share + a, 6), round(bound.jump_share + b, 6)) for a, b in near}
-    return {pair for pair in pairs if min(pair) >= 0 and pair[1] <= COARSE_JUMPS[-1]}
 
 
 def _best_tail(search: Search, pair: tuple[float, float], over: Signal, subset: Flags, allowed: int) -> Choice:

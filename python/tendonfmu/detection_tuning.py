@@ -42,6 +42,7 @@ Finger = str | os.PathLike[str] | Mapping[str, Any] | FingerDescription
 METHODS = ("innovation", "cusum", "threshold")
 INNOVATION_TIME = 0.05  # s, T
 JUMP_TIME = 0.06  # s, T_J
+STUCK_TIME = 0.25  # s, T_H
 EVIDENCE_TIME = 0.02  # s, τ_e
 RELEASE = {"release_ratio": 1.0, "hold_time": 0.05, "release_time": 2.0}  # 1, s, s
 _STEP, _STEPS = 1.05, 12  # by which the level is raised, and how often, until the running finger keeps the rate
@@ -80,7 +81,7 @@ class ContactTuning:
     method: "innovation", "cusum" or "threshold" (contact.method).
     bias_time: s, time constant of the bias; None: as in the description, at the recordings' mean force.
     kinematics: 1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
-    innovation_time, jump_time, evidence_time: s, written as such. progress: called with (steps done, all).
+    innovation_time, jump_time, stuck_time, evidence_time: s, written as such. progress: called with (steps done, all).
 
     After `tune`: description_ (tuned), bias_, lines_, levels_, bounds_ (by "innovation" and "residual"), deviation_,
     cells_, runs_, pretensions_, held_out_ (alarms, 1/h upper limit), loop_ (alarms of the finger as it runs), allowed_,
@@ -98,6 +99,7 @@ class ContactTuning:
         kinematics: int = 1,
         innovation_time: float = INNOVATION_TIME,
         jump_time: float = JUMP_TIME,
+        stuck_time: float = STUCK_TIME,
         evidence_time: float = EVIDENCE_TIME,
         progress: Callable[[int, int], None] | None = None,
     ) -> None:
@@ -109,6 +111,7 @@ class ContactTuning:
         self.kinematics = kinematics
         self.innovation_time = innovation_time
         self.jump_time = jump_time
+        self.stuck_time = stuck_time
         self.evidence_time = evidence_time
         self.progress = progress
 
@@ -154,6 +157,7 @@ class ContactTuning:
             (self.kinematics in (1, 2, 3), "kinematics", "1, 2 or 3"),
             (0 < self.innovation_time <= 100, "innovation_time", "above 0 and at most 100 s"),
             (0 < self.jump_time <= 100, "jump_time", "above 0 and at most 100 s"),
+            (0 <= self.stuck_time <= 100, "stuck_time", "0 to 100 s"),
             (0 < self.evidence_time <= 100, "evidence_time", "above 0 and at most 100 s"),
         )
         for sound, name, expectation in checks:
@@ -204,8 +208,10 @@ class ContactTuning:
     def _run(self, parts: Sequence[FreePart]) -> None:
         """The bias, and runs with it: residuals depend on the bias, its noise on the residuals."""
         given = self.start_.data["contact"].get("friction_bound") or {}
-        own = given.get("jump_time") if self.method == "threshold" else None  # whose friction bound stays as it is
-        clock = Clock(self.innovation_time, self.jump_time if own is None else float(own))
+        jump, stuck = self.jump_time, self.stuck_time
+        if self.method == "threshold":  # whose friction bound stays as it is
+            jump, stuck = float(given.get("jump_time") or jump), float(given.get("stuck_time") or 0.0)
+        clock = Clock(self.innovation_time, jump, stuck)
         time = wanted_time(self.start_.data, parts, self.bias_time)
         data = self.start_.data
         for _ in range(2):
@@ -289,6 +295,7 @@ class ContactTuning:
             contact["friction_bound"] = {
                 **(contact.get("friction_bound") or {}),
                 "stuck_share": fast.stuck_share,
+                "stuck_time": self.stuck_time,
                 "jump_share": fast.jump_share,
                 "jump_time": self.jump_time,
             }

@@ -69,10 +69,11 @@ class FreeRun:
 
 @dataclass(frozen=True)
 class Clock:
-    """Time constants of what is computed: innovation T and jump T_J, s."""
+    """Time constants of what is computed: innovation T, jump T_J and stuck T_H, s."""
 
     innovation: float
     jump: float
+    stuck: float
 
 
 # --- recordings -------------------------------------------------------------------------------------------------------
@@ -176,7 +177,13 @@ def _open_loop(data: Mapping[str, Any], clock: Clock) -> dict[str, Any]:
         "method": "innovation",
         "threshold": never,
         "innovation": {"time": clock.innovation, "threshold": never},
-        "friction_bound": {**given, "stuck_share": 0.0, "jump_share": 0.0, "jump_time": clock.jump},
+        "friction_bound": {
+            **given,
+            "stuck_share": 0.0,
+            "jump_share": 0.0,
+            "jump_time": clock.jump,
+            "stuck_time": clock.stuck,
+        },
     }
     if _is_uncertain(data):
         contact["uncertainty"] = data["contact"]["uncertainty"]

@@ -142,6 +142,7 @@ static void derive_detection(derivation* d, const model_item* item) {
     case ITEM_STUCK_SHARE: settings->stuck_share = values[0]; break;
     case ITEM_JUMP_SHARE: settings->jump_share = values[0]; break;
     case ITEM_JUMP_TIME: settings->jump_rate = bounded_inverse(values[0]); break;
+    case ITEM_STUCK_TIME: settings->stuck_rate = values[0] > 0.0 ? bounded_inverse(values[0]) : -1.0; break;
     case ITEM_UNCERTAINTY: derive_direction(d, item); break;
     case ITEM_UNCERTAINTY_LEVEL: settings->uncertainty_level = values[0]; break;
     case ITEM_DEVIATION: memcpy(to->deviation, values, bytes); break;

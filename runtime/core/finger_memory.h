@@ -15,6 +15,11 @@
 
 enum { ERROR_BYTES = 400 };
 
+/* What is remembered stays so small that a square of it, and a sum of some squares, is finite: sums of torques (N·m)
+ * and squares. */
+#define LARGEST_SUM    1e150
+#define LARGEST_SQUARE 1e300
+
 /* Numbers of the description that are neither per joint nor per tendon. */
 typedef struct finger_settings {
   double tendon_threshold, joint_threshold; /* v_min: m/s, rad/s */
@@ -30,6 +35,7 @@ typedef struct finger_settings {
   double innovation_time;
   double evidence_time;                      /* < 0: not by CUSUM */
   double stuck_share, jump_share, jump_rate; /* jump_rate: 1/T_J, 1/s */
+  double stuck_rate;                         /* 1/T_H, 1/s; < 0: H is that of the sample */
   double uncertainty_level, release_ratio, hold_time;
   double release_time; /* < 0: never */
 } finger_settings;

@@ -4,7 +4,6 @@
 #define TENDONFMU_FRICTION_BOUND_H
 
 #include "force_propagation.h"
-#include "kernel_choice.h"
 
 #include <math.h>
 
@@ -85,6 +84,18 @@ HOT_INLINE void bound_friction(tendonfmu_finger* f) {
   if (f->derived.settings.knows_uncertainty) {
     torque_parts(f);
     parameter_uncertainty(f);
+  }
+}
+
+/* H: what sticks now, or what is left of what stuck a while ago: real friction goes on turning over for some tens of
+ * milliseconds after the model has let go */
+HOT_INLINE void remember_stuck(tendonfmu_finger* f, double step) {
+  const double rate = f->derived.settings.stuck_rate;
+  const quad kept = rate < 0.0 ? quad_set(0.0) : exp_of_minus(quad_set(rate * step));
+  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+    double* stuck = f->remembered.stuck_friction + j;
+    const quad now = quad_load(f->scratch.stuck_friction + j), left = quad_mul(quad_load(stuck), kept);
+    quad_store(stuck, quad_select(quad_greater(left, now), left, now));
   }
 }
 

@@ -9,11 +9,6 @@
 
 #define LARGEST_TIME 1e15 /* s */
 
-/* What is remembered stays so small that a square of it, and a sum of some squares, is finite: sums of torques (N·m)
- * and squares. */
-#define LARGEST_SUM    1e150
-#define LARGEST_SQUARE 1e300
-
 typedef enum sample_result { SAMPLE_TAKEN, SAMPLE_OUT_OF_RANGE, SAMPLE_OVERFLOWS } sample_result;
 
 struct step_kernel {

@@ -114,6 +114,7 @@ static void walk_detection(walk* w) {
       {ITEM_STUCK_SHARE, bound},
       {ITEM_JUMP_SHARE, bound},
       {ITEM_JUMP_TIME, bound},
+      {ITEM_STUCK_TIME, bound},
   };
   const item_size after[] = {
       {ITEM_UNCERTAINTY_LEVEL, options & MODEL_HAS_UNCERTAINTY ? 1 : 0},

@@ -105,6 +105,7 @@ typedef enum model_item_kind {
   ITEM_STUCK_SHARE,
   ITEM_JUMP_SHARE,
   ITEM_JUMP_TIME,
+  ITEM_STUCK_TIME,
   ITEM_UNCERTAINTY, /* m + 3, one direction (`point`) of one joint */
   ITEM_UNCERTAINTY_LEVEL,
   ITEM_DEVIATION,           /* n */

@@ -267,7 +267,7 @@ std::uint32_t read_contact_options(const json_node& contact, std::uint32_t joint
   check_thresholds(contact, joints);
   const json_node bound = contact.member("friction_bound");
   if (!bound.absent()) {
-    bound.expect_keys({"stuck_share", "jump_share", "jump_time"});
+    bound.expect_keys({"stuck_share", "stuck_time", "jump_share", "jump_time"});
   }
   check_optional_list(contact.member("deviation"), joints, "numbers in N.m, one per joint");
   check_optional_list(contact.member("deviation_per_force"), joints, "numbers in N.m per N, one per joint");

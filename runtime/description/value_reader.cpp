@@ -26,6 +26,7 @@ std::optional<double> default_value(const model_item& item, std::uint32_t offset
     case ITEM_HYSTERESIS:
     case ITEM_INNOVATION_PER_FORCE:
     case ITEM_STUCK_SHARE:
+    case ITEM_STUCK_TIME:
     case ITEM_JUMP_SHARE:
     case ITEM_DEVIATION:
     case ITEM_DEVIATION_PER_FORCE:
