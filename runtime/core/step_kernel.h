@@ -131,7 +131,7 @@ HOT_INLINE void remember_sample(tendonfmu_finger* f, double time, double velocit
   copy_row(s->force, f->scratch.force, f->tendon_lanes);
   copy_row(s->slack, f->scratch.slack, f->tendon_lanes);
   if (f->derived.settings.bounds_friction) {
-    remember_stuck(f, time - s->scalar[STATE_TIME]);
+    remember_stuck(f, is_first(f) ? 0.0 : time - s->scalar[STATE_TIME]);
   }
   if (f->derived.settings.knows_uncertainty) {
     copy_row(s->part, f->scratch.part, f->joints * f->tendon_lanes + 3 * f->joint_lanes);

@@ -46,7 +46,7 @@ inline std::string every_key() {
   put("\"bias\": {", "\"forgetting\": \"absorption\", \"entry_load\": true, ");
   put("\"contact\": {", R"("method": "cusum",
     "innovation": {"time": 0.4, "threshold": [0.03, 0.03], "threshold_per_force": [1e-4, 1e-4], "evidence_time": 0.01},
-    "friction_bound": {"stuck_share": 0.4, "jump_share": 0.5, "jump_time": 0.05},
+    "friction_bound": {"stuck_share": 0.4, "stuck_time": 0.03, "jump_share": 0.5, "jump_time": 0.05},
     "uncertainty": [[[0.1, 0.05, -0.1, 0.2, 0.3, 0.1], [0, 0.1, 0, 0, 0, 0.2]], [[0.1, 0.1, 0.1, 0.1, 0, 0]]],
     "uncertainty_level": 2, "deviation": [0.002, 0.003], "deviation_per_force": [1e-5, 2e-5],
     "release_ratio": 0.6, "hold_time": 0.02, "release_time": 0.15, )");
