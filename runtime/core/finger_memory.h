@@ -134,7 +134,7 @@ typedef struct finger_scratch {
   double *joint_friction, *load_friction, *joint_bias, *load_bias; /* [N] T_jv0, T_jvf and their b */
   double *edge_kept, *pulley_kept;      /* [n × M + N] −κ·e of an effect that leaves rest; with entry_load only */
   double *edge_stuck, *pulley_stuck;    /* [n × M + N] |F| where the effect sticks, 0 elsewhere; joints T_jv0, T_jvf */
-  double *stuck_friction, *uncertainty; /* [N] H, u */
+  double *stuck_friction, *uncertainty; /* [N] H of what sticks now, u */
   double* part;                         /* as in the state */
   double start_above[2], stop_below[2]; /* speeds of tendons, joints at which an effect begins to move, comes to rest */
 } finger_scratch;
