@@ -32,7 +32,7 @@ from tendonfmu.alarm_level import (
 )
 from tendonfmu.cli import main
 from tendonfmu.detection_bounds import SHARES, Bound, search_for
-from tendonfmu.detection_tuning import RELEASE, ContactTuning
+from tendonfmu.detection_tuning import RELEASE, RELEASE_TIME, ContactTuning
 from tendonfmu.errors import InputError
 from tendonfmu.fit_residuals import BiasSettings, track
 from tendonfmu.free_motion import FreePart, FreeRun
@@ -235,7 +235,7 @@ def test_the_demo_tuned_and_drawn(tuned: tuple[Path, str, str]) -> None:
     }
     contact = after["contact"]
     assert contact == report["contact"] and contact["method"] == "innovation"
-    assert {key: contact[key] for key in RELEASE} == RELEASE
+    assert {key: contact[key] for key in RELEASE} == RELEASE and contact["release_time"] == RELEASE_TIME
     assert report["closed_loop"]["limit"] <= WISHED and report["held_out"]["limit"] <= WISHED
     assert [round(each["mean_force"]) for each in report["pretensions"]] == [10, 40]
     assert "as it runs" in out and "at most" in out

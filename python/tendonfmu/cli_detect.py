@@ -40,6 +40,10 @@ def tune(
         float | None,
         typer.Option(min=1e-3, max=1e4, metavar="SECONDS", help="time constant of the bias \\[default: as it is]"),
     ] = None,
+    release_time: Annotated[
+        float,
+        typer.Option(min=0.0, metavar="SECONDS", help="in contact until the bias learns again; inf: never"),
+    ] = 2.0,
     report: Annotated[Path | None, typer.Option(metavar="R.json", help="everything that is known of it")] = None,
     figures: Annotated[Path | None, typer.Option(metavar="DIR", help="folder for figures")] = None,
     kinematics: Kinematics = 1,
@@ -68,6 +72,7 @@ def tune(
             confidence=confidence,
             method=method,
             bias_time=bias_time,
+            release_time=release_time,
             kinematics=kinematics,
             progress=lambda done, total: bar.update(task, completed=done, total=total),
         )

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import math
 import os
 import warnings
 from collections.abc import Callable, Mapping, Sequence
@@ -44,7 +45,8 @@ INNOVATION_TIME = 0.05  # s, T
 JUMP_TIME = 0.06  # s, T_J
 STUCK_TIME = 0.25  # s, T_H
 EVIDENCE_TIME = 0.02  # s, τ_e
-RELEASE = {"release_ratio": 1.0, "hold_time": 0.05, "release_time": 2.0}  # 1, s, s
+RELEASE = {"release_ratio": 1.0, "hold_time": 0.05}  # 1, s
+RELEASE_TIME = 2.0  # s
 _STEP, _STEPS = 1.05, 12  # by which the level is raised, and how often, until the running finger keeps the rate
 _DIGITS = 6
 
@@ -80,6 +82,7 @@ class ContactTuning:
         that, with this confidence.
     method: "innovation", "cusum" or "threshold" (contact.method).
     bias_time: s, time constant of the bias; None: as in the description, at the recordings' mean force.
+    release_time: s in contact after which the bias learns again; math.inf: never.
     kinematics: 1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
     innovation_time, jump_time, stuck_time, evidence_time: s, written as such. progress: called with (steps done, all).
 
@@ -96,6 +99,7 @@ class ContactTuning:
         confidence: float = 0.9,
         method: str = "innovation",
         bias_time: float | None = None,
+        release_time: float = RELEASE_TIME,
         kinematics: int = 1,
         innovation_time: float = INNOVATION_TIME,
         jump_time: float = JUMP_TIME,
@@ -108,6 +112,7 @@ class ContactTuning:
         self.confidence = confidence
         self.method = method
         self.bias_time = bias_time
+        self.release_time = release_time
         self.kinematics = kinematics
         self.innovation_time = innovation_time
         self.jump_time = jump_time
@@ -154,6 +159,7 @@ class ContactTuning:
             (0 < self.false_alarms_per_hour <= 3600, "false_alarms_per_hour", "above 0 and at most 3600, 1/h"),
             (0.5 <= self.confidence < 1, "confidence", "from 0.5 to below 1"),
             (self.bias_time is None or 1e-3 <= self.bias_time <= 1e4, "bias_time", "from 0.001 to 10000 s"),
+            (0 <= self.release_time <= 1e9 or self.release_time == math.inf, "release_time", "0 to 1e9 s, or inf"),
             (self.kinematics in (1, 2, 3), "kinematics", "1, 2 or 3"),
             (0 < self.innovation_time <= 100, "innovation_time", "above 0 and at most 100 s"),
             (0 < self.jump_time <= 100, "jump_time", "above 0 and at most 100 s"),
@@ -304,6 +310,9 @@ class ContactTuning:
             "deviation_per_force": _rounded(self.deviation_.per_force),
             **RELEASE,
         }
+        contact.pop("release_time", None)
+        if math.isfinite(self.release_time):
+            contact["release_time"] = self.release_time
         return {**data, "contact": contact}
 
     # --- what it is worth ---------------------------------------------------------------------------------------------

@@ -51,7 +51,7 @@ def lines(scored: Scored) -> Iterator[str]:
     if shown and found.free_minutes:
         factors = ", ".join(f"{point.factor:g}" for point in shown)
         some = ", ".join(f"{point.found}" for point in shown)
-        per_hour = ", ".join(f"{point.false_alarms_per_hour.value:.3g}" for point in shown)
+        per_hour = ", ".join(_short(point.false_alarms_per_hour.value) for point in shown)
         hit = f"{some} of {found.events} found, " if found.events else ""
         yield f"thresholds × {factors}: {hit}{per_hour} false alarms per hour"
     if scored.no_roc:
@@ -97,3 +97,7 @@ def _number(value: float, factor: float) -> str:
     if abs(scaled) >= 99.95:
         return f"{scaled:.0f}"
     return f"{scaled:.1f}" if abs(scaled) >= 9.995 else f"{scaled:.2f}"
+
+
+def _short(value: float) -> str:
+    return f"{value:.0f}" if value >= 100 else f"{value:.3g}"

@@ -220,9 +220,14 @@ std::uint32_t read_method(const json_node& contact, std::uint32_t joints) {
   const json_node innovation = contact.member("innovation");
   if (method == 0) {
     if (!innovation.absent()) {
-      throw description_error(innovation.path() + ": not allowed with contact.method \"threshold\"");
+      throw description_error(
+          innovation.path() +
+          ": not allowed with contact.method \"threshold\"; it belongs to \"innovation\" and \"cusum\"");
     }
     return 0u;
+  }
+  if (innovation.absent()) {
+    innovation.refuse("an object with time and threshold, which contact.method needs");
   }
   innovation.expect_keys({"time", "threshold", "threshold_per_force", "evidence_time"});
   check_thresholds(innovation, joints);
