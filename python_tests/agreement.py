@@ -85,7 +85,7 @@ def tolerance(reference: Mapping[str, Array], name: str) -> Array:
 def excess(reference: Mapping[str, Array], candidate: Mapping[str, Array]) -> dict[str, Array]:
     """Per output: |difference| / tolerance, [N, columns]; infinite for NaN and unequal Booleans."""
     found = {}
-    optional = tuple(name for name in DETECTION_OUTPUTS if name in candidate)
+    optional = tuple(name for name in DETECTION_OUTPUTS if name in candidate and name in reference)
     for name in REAL_OUTPUTS + optional + BOOLEAN_OUTPUTS:
         expected, got = np.asarray(reference[name]), np.asarray(candidate[name])
         if name == "contact":
