@@ -30,7 +30,7 @@ def fit(recordings: list[Recording]) -> dict[str, Any]:
 
     What the fit warns of (residuals that are not white) is shown on standard error.
     """
-    finger: dict[str, Any] = json.loads(FrictionFit(START).fit(recordings).description_text())
+    finger: dict[str, Any] = json.loads(FrictionFit(START, uncertainty=False).fit(recordings).description_text())
     edge = finger["tendons"][0]["edge_friction"][0]
     for law in (finger["joints"][0]["friction"], edge["positive"], edge["negative"]):
         law |= {"static": round(law["static"], DIGITS), "coulomb": round(law["coulomb"], DIGITS)}

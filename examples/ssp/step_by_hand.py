@@ -121,7 +121,7 @@ def read_arguments(arguments: list[str]) -> tuple[Path, int]:
 
 def show(table: dict[str, NDArray[Any]]) -> None:
     """A row each tenth of a second; of contact, whether the friction FMU detects one and whether there is one."""
-    joints = sum(name.startswith("friction.compensated_torque") for name in table)
+    joints = sum(name.startswith("friction.compensated_torque[") for name in table)
     heads = [f"joint {j}: compensated, true external mN·m" for j in range(1, joints + 1)]
     print("   ".join(["time s", "contact: detected, true", *heads]))
     for k in range(99, len(table["time"]), 100):
