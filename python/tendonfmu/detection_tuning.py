@@ -9,7 +9,6 @@ on, and again with the tuned finger as it will run.
 
 from __future__ import annotations
 
-import inspect
 import json
 import math
 import os
@@ -25,6 +24,7 @@ from numpy.typing import NDArray
 
 from tendonfmu import native
 from tendonfmu.alarm_level import alarms_above, allowed_alarms, cells_of, least_hours, rate_limit
+from tendonfmu.constructor_arguments import ConstructorArguments
 from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.detection_bounds import Bound, Search, search_for
 from tendonfmu.errors import InputError
@@ -74,7 +74,7 @@ class Pretension:
     limit: float
 
 
-class ContactTuning:
+class ContactTuning(ConstructorArguments):
     """Chooses what decides on contact from recordings of free motion.
 
     finger: description: its file, parsed JSON, or as `read_finger` gives it.
@@ -119,19 +119,6 @@ class ContactTuning:
         self.stuck_time = stuck_time
         self.evidence_time = evidence_time
         self.progress = progress
-
-    def get_params(self, deep: bool = True) -> dict[str, Any]:
-        """Constructor arguments by name."""
-        return {name: getattr(self, name) for name in list(inspect.signature(type(self).__init__).parameters)[1:]}
-
-    def set_params(self, **params: Any) -> ContactTuning:
-        """Changes constructor arguments; raises ValueError for a name that is none."""
-        known = self.get_params()
-        for name, value in params.items():
-            if name not in known:
-                raise ValueError(f"no parameter {name!r}; expected one of {', '.join(known)}")
-            setattr(self, name, value)
-        return self
 
     def tune(self, recordings: Source | Sequence[Source]) -> ContactTuning:
         """Learns from recordings of free motion. Raises InputError: contact in them, or not sound; NotEnough."""

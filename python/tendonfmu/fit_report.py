@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from tendonfmu import native
 from tendonfmu.description import FingerDescription
+from tendonfmu.finite_numbers import finite
 from tendonfmu.fit_evaluation import Evaluation, residual_entry
 from tendonfmu.fit_residuals import consistency, whiteness
 from tendonfmu.fit_verdicts import Fitted
@@ -84,7 +84,7 @@ def build_report(found: Outcome) -> dict[str, Any]:
         "innovations": {"nis": consistency(found.innovations), "whiteness": whiteness(found.innovations)},
         "uncertainty": found.uncertainty,
     }
-    return {key: _finite(value) for key, value in report.items()}
+    return {key: finite(value) for key, value in report.items()}
 
 
 def report_text(report: Mapping[str, Any]) -> str:
@@ -130,13 +130,3 @@ def _correlation(covariance: Numbers) -> list[list[float]]:
     error = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     matrix = covariance / np.outer(error, error)
     return [[float(f"{value:.4g}") for value in row] for row in matrix.tolist()]
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {key: _finite(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(each) for each in value]
-    return value

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu import native
+from tendonfmu.constructor_arguments import ConstructorArguments
 from tendonfmu.coverage import EffectCoverage, coverage_of, with_laws_of
 from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.errors import InputError
@@ -66,7 +67,7 @@ class FitWarning(UserWarning):
     """Something about the recordings or the fit that a user should know; also in `FrictionFit.warnings_`."""
 
 
-class FrictionFit:
+class FrictionFit(ConstructorArguments):
     """Estimates the numbers of a finger description (paper, sections V and VI).
 
     finger: description: its file, parsed JSON, or as `read_finger` gives it. What is absent there stays absent.
@@ -128,19 +129,6 @@ class FrictionFit:
         self.parameter_drift = parameter_drift
         self.start = start
         self.progress = progress
-
-    def get_params(self, deep: bool = True) -> dict[str, Any]:
-        """Constructor arguments by name."""
-        return {name: getattr(self, name) for name in list(inspect.signature(type(self).__init__).parameters)[1:]}
-
-    def set_params(self, **params: Any) -> FrictionFit:
-        """Changes constructor arguments; raises ValueError for a name that is none."""
-        known = self.get_params()
-        for name, value in params.items():
-            if name not in known:
-                raise ValueError(f"no parameter {name!r}; expected one of {', '.join(known)}")
-            setattr(self, name, value)
-        return self
 
     def __repr__(self) -> str:
         defaults = inspect.signature(type(self).__init__).parameters

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from tendonfmu.detection_run import Subject, Track
 from tendonfmu.detection_score import GRACE, MERGED, SILENT, DetectionScore, Event
 from tendonfmu.detection_summary import RocPoint, Summary
+from tendonfmu.finite_numbers import finite
 from tendonfmu.score_intervals import CONFIDENCE, Estimate
 
 FORMAT = "tendonfmu-score-1"
@@ -56,7 +57,7 @@ def build_report(scored: Scored) -> dict[str, Any]:
         },
         "recordings": [_recording(*each) for each in zip(scored.tracks, scored.scores, scored.summaries, strict=True)],
     }
-    return {key: _finite(value) for key, value in report.items()}
+    return {key: finite(value) for key, value in report.items()}
 
 
 def report_text(report: Mapping[str, Any]) -> str:
@@ -192,13 +193,3 @@ def _interval(found: Estimate) -> list[float] | None:
 
 def _numbers(values: NDArray[np.float64] | None) -> list[float] | None:
     return None if values is None else [float(value) for value in values]
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {key: _finite(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(each) for each in value]
-    return value

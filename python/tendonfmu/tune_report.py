@@ -11,6 +11,7 @@ import numpy as np
 
 from tendonfmu.alarm_level import rate_limit
 from tendonfmu.detection_tuning import ContactTuning
+from tendonfmu.finite_numbers import finite
 from tendonfmu.score_intervals import rate
 from tendonfmu.tuned_loop import LoopAlarms
 
@@ -43,7 +44,7 @@ def build_report(tuning: ContactTuning) -> dict[str, Any]:
         "tried": _tried(tuning),
         "seconds": tuning.seconds_,
     }
-    return {key: _finite(value) for key, value in found.items()}
+    return {key: finite(value) for key, value in found.items()}
 
 
 def report_text(report: Mapping[str, Any]) -> str:
@@ -132,13 +133,3 @@ def _tried(tuning: ContactTuning) -> list[dict[str, Any]]:
         {"stuck_share": each.stuck_share, "jump_share": each.jump_share, "least_load": math.exp(each.mean_log)}
         for each in ordered
     ]
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {key: _finite(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(each) for each in value]
-    return value
