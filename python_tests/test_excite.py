@@ -18,10 +18,10 @@ from tendonfmu import native
 from tendonfmu.balance import balanced_forces, moment_arms, pretension_vector
 from tendonfmu.coverage import effect_coverage, joint_coverage
 from tendonfmu.description import estimated_numbers
-from tendonfmu.effects import effects, working_point_weights
 from tendonfmu.errors import InputError
 from tendonfmu.excitation import ACCELERATION, Excitation, Plan, plan_excitation
 from tendonfmu.excite import as_array, find_pretensions, find_ranges, read_subject
+from tendonfmu.friction_places import effects, working_point_weights
 from tendonfmu.identifiability import unknowns
 from tendonfmu.quintic import evaluate
 from tendonfmu.tables import read_table

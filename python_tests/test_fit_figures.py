@@ -15,7 +15,6 @@ pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not insta
 
 from fit_pictures import index_finger, internal_values, made_up_picture, made_up_unknowns
 from tendonfmu import fit_law_figures, native
-from tendonfmu.effects import Effect, effects
 from tendonfmu.fit_error_figures import correlation, correlation_sheet, error_sheet, relative_error, strongest_pairs
 from tendonfmu.fit_figures import SHOWN, fit_sheets, residual_sheets, rms, torque_sheets
 from tendonfmu.fit_law_figures import law_sheets
@@ -23,6 +22,7 @@ from tendonfmu.fit_laws import CONFIDENCE, LawBands
 from tendonfmu.fit_picture import FitPicture
 from tendonfmu.fit_plots import STYLES, draw_panel, png, size_of, write_sheet
 from tendonfmu.fit_sheet import Curve, MatrixPanel, Panel, Sheet
+from tendonfmu.friction_places import Effect, effects
 
 MM, PERCENT, MILLI = 1e3, 1e2, 1e3
 

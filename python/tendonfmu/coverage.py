@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.effects import Effect, effects, sliding_velocity, velocity_threshold, working_point_weights
 from tendonfmu.excitation import SLOW, Excitation, Stroke
+from tendonfmu.friction_places import Effect, effects, sliding_velocity, velocity_threshold, working_point_weights
 
 Numbers = NDArray[np.float64]
 

@@ -7,10 +7,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.effects import Effect, effects, sliding_velocity, velocity_threshold
 from tendonfmu.fit_laws import LawBands, LawCurve, asymmetric, numbers_of
 from tendonfmu.fit_picture import FitPicture
 from tendonfmu.fit_sheet import Band, Curve, Panel, Sheet
+from tendonfmu.friction_places import Effect, effects, sliding_velocity, velocity_threshold
 
 Numbers = NDArray[np.float64]
 

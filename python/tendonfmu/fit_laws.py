@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.description import Law
-from tendonfmu.effects import Effect
 from tendonfmu.fit_picture import FitPicture
+from tendonfmu.friction_places import Effect
 from tendonfmu.native import Finger
 
 Numbers = NDArray[np.float64]

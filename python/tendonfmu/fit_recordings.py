@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from tendonfmu.balance import moment_arms
 from tendonfmu.description import FingerDescription
-from tendonfmu.effects import DEFAULT_THRESHOLD
 from tendonfmu.errors import InputError
 from tendonfmu.fit_residuals import Model, model_alone
+from tendonfmu.friction_places import DEFAULT_THRESHOLD
 from tendonfmu.recording import Recording, check_times
 from tendonfmu.recording_faults import (
     SETTLING,

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from tendonfmu import native
 from tendonfmu.description import FingerDescription, sides
-from tendonfmu.effects import effects
 from tendonfmu.errors import InputError
+from tendonfmu.friction_places import effects
 from tendonfmu.identifiability import Unknown, unknowns
 
 MAGNITUDES = ("static", "coulomb", "stribeck_velocity", "viscous")

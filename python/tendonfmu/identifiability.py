@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from tendonfmu import native
 from tendonfmu.balance import friction_probe
-from tendonfmu.effects import Effect, effects, working_point_weights
+from tendonfmu.friction_places import Effect, effects, working_point_weights
 
 Numbers = NDArray[np.float64]
 Progress = Callable[[int, int], None]
