@@ -1,47 +1,89 @@
-/* A term beyond the paper: one file each, one row each in effect_table.c. It gives its value and its derivatives, says
- * which parameters it has and how much it remembers, and the finger does the rest. */
+/* A term beyond the paper: one file each, one row each in effect_table.c (docs/extensions.md has the text they follow).
+ *
+ * A term acts in one of three ways: on the signals before the joint angles are known, on the friction values of some
+ * places, or as a torque. It says what it remembers and which numbers it has; the finger does the rest.
+ *
+ * Order within a sample: advance() computes what the effect will remember, from what the sample before left; then its
+ * other calls read that. It becomes the finger's memory only when the sample is accepted, and derivatives asked for
+ * afterwards read the same memory: whatever they need of the sample before must be in it. */
 #ifndef TENDONFMU_EFFECT_H
 #define TENDONFMU_EFFECT_H
 
 #include <stddef.h>
 #include <stdint.h>
 
-enum { EFFECT_MAX_PARAMETERS = 8 };
+enum { EFFECT_MAX_PARAMETERS = 4, EFFECT_NOWHERE = 0xffffffffu, EFFECT_ALL_JOINTS = 16 };
+
+typedef enum place_need { PLACE_REFUSED, PLACE_OPTIONAL, PLACE_REQUIRED } place_need;
+
+typedef enum place_rule {
+  PLACES_AS_SAID,      /* each key by its own need */
+  PLACES_EXACTLY_ONE,  /* joint or tendon, not both */
+  PLACES_AT_MOST_ONE,  /* joint, tendon or neither */
+  PLACES_NOT_LAST_JOINT
+} place_rule;
 
 typedef struct effect_parameter {
   const char* name;
   const char* unit;
+  const char* unit_at_joint; /* where it differs there; NULL: the same */
   double minimum, maximum;
   int above_minimum;
   double missing_value; /* taken where the description leaves the key out */
   int required;         /* 1: it must not be left out */
+  double scale;         /* expected magnitude where nothing is known, for the estimation */
 } effect_parameter;
 
-/* What an effect at a joint sees of one sample. */
+/* Where a row of the description's extensions acts; 0-based, EFFECT_NOWHERE where the key is absent. */
+typedef struct effect_place {
+  uint32_t joint, tendon;
+} effect_place;
+
+/* What an effect sees of a finger and one sample. Rows of [n × lanes] have a row a joint. */
 typedef struct effect_sample {
-  double joint_angle;    /* q_j, rad */
-  double joint_velocity; /* rad/s */
-  double rest_angle;     /* of the joint's cover, rad; 0 without one */
+  size_t joints, tendons, lanes;
+  int first;          /* 1: the first sample */
+  int source;         /* kinematics source 1, 2, 3 */
+  double time, step;  /* s; step is meaningless at the first sample */
+  const double* angle;           /* [n] rad */
+  const double* velocity;        /* [n] rad/s */
+  const double* tendon_velocity; /* [n × lanes] ẋ_ij, m/s */
+  const double* force;           /* [m] f0, N */
+  const double* moment_arm;      /* [n × lanes] r_ij, m */
+  const double* rest_angle;      /* [n] of the covers, rad; 0 without one */
+  const double* axis_cosine;     /* [n × n] of the angle between the axes of two joints; 1 without links */
+  double tendon_threshold, joint_threshold; /* v_min: m/s, rad/s */
 } effect_sample;
 
-typedef struct effect_torque {
-  double value;       /* N·m, added to T_j of eq. (10) */
-  double by_angle;    /* N·m/rad */
-  double by_velocity; /* N·m·s/rad */
-  double by_parameter[EFFECT_MAX_PARAMETERS];
-} effect_torque;
+/* A direction in the space of what a torque depends on: for derivatives. NULL: 0. */
+typedef struct effect_direction {
+  const double *angle, *velocity, *force; /* [n], [n], [m] */
+} effect_direction;
 
 typedef struct effect_type {
   const char* name; /* as in contract section 7 */
   uint32_t id;      /* in the model image; never reused */
+  place_need joint, tendon;
+  place_rule rule;
+  int once; /* 1: at most once a place */
   uint32_t parameter_count;
   const effect_parameter* parameters;
-  /* Numbers that the effect remembers, by its parameters: part of the finger's state block. */
-  size_t (*state_count)(const double* parameters);
-  /* Torque at its joint, with slopes; memory [state_count] as the sample before left it. */
-  effect_torque (*torque)(const double* parameters, const effect_sample* sample, const double* memory);
-  /* Brings the memory up to this sample, once it is accepted; NULL where there is none. */
-  void (*remember)(const double* parameters, const effect_sample* sample, double* memory);
+
+  /* Numbers that it remembers on a finger of n joints and m tendons, part of the finger's state block; NULL: none. */
+  size_t (*state_count)(size_t joints, size_t tendons, effect_place place);
+  /* after ← what it remembers once this sample is accepted; NULL with no memory. Torques only: called when the
+   * kinematics are known. */
+  void (*advance)(effect_place place, const double* parameters, const effect_sample* sample, const double* before,
+                  double* after);
+
+  /* --- a torque, linear in its parameters ---------------------------------------------------------------------------
+   * adds to torque [n], N·m; with the parameters replaced by a unit vector it is the derivative by one of them. */
+  void (*torque)(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
+                 double* torque);
+  /* adds its derivative along a direction; the memory is held fixed except for what it says of this sample */
+  void (*slope)(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
+                const effect_direction* direction, double* slope);
+  /* largest depends: on which inputs of which joints its torque at joint j depends is worked out from slope() */
 } effect_type;
 
 /* Row by id or name; NULL when there is none. */

@@ -1,0 +1,200 @@
+"""What a diagnosis found: everything that its report, page, figures and printed lines show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Numbers = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A value with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Where:
+    """An effect at a place. joint, tendon: from 1, None where it has none."""
+
+    effect: str
+    joint: int | None = None
+    tendon: int | None = None
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """The residual over a cause's own coordinate, before and after the model is extended by it.
+
+    joint: from 1, whose residual it is. label, unit: of the coordinate. coordinate: [K] centres of bins of equal
+    count. before, after: [K] mean residual, N·m; before_std, after_std: [K] standard error of that mean, N·m.
+    """
+
+    joint: int
+    label: str
+    unit: str
+    coordinate: Numbers
+    before: Numbers
+    after: Numbers
+    before_std: Numbers
+    after_std: Numbers
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A cause that was found.
+
+    p_value: family-wise, over all effects and places that were tested. gain: of this cause alone on held-out data,
+    1 − rms with / rms without, the other causes kept. share: of the residual's variance that it explains.
+    parameters: its numbers in the extended description by path, with units as (value, unit).
+    size: in plain words with physical units. shape: non-linear numbers that were chosen.
+    """
+
+    where: Where
+    title: str
+    explanation: str
+    p_value: float
+    gain: Interval
+    share: float
+    confusable_with: tuple[Where, ...]
+    parameters: Mapping[str, tuple[float, str]]
+    size: str
+    evidence: tuple[Evidence, ...] = ()
+    first_gain: Interval | None = None  # alone, against the nominal model
+
+
+@dataclass(frozen=True)
+class Invisible:
+    """An effect that these data cannot show: share of its variance that survives the refit of the nominal model."""
+
+    where: Where
+    title: str
+    surviving_share: float
+    experiment: str
+
+
+@dataclass(frozen=True)
+class Event:
+    """A stretch of the recordings that no friction explains (contact, a stall): left out of the fit."""
+
+    recording: str
+    start: float  # s
+    end: float  # s
+    joints: tuple[int, ...]
+    peak: float  # N·m
+    description: str
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """What no effect explains.
+
+    share: of the residual variance above the noise floor. interval: of it. where: joint → share.
+    """
+
+    share: float
+    description: str
+    by_joint: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class ModelErrors:
+    """rms of r of contract section 5, step 5, per joint, N·m; signals for the figures. path: of the description."""
+
+    train_rms: tuple[float, ...]
+    test_rms: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class ResidualView:
+    """One picture of the residual of the refitted nominal model at one joint.
+
+    kind: "time", "angle", "velocity", "tendon_force", "load", "travel", "spectrum", "autocorrelation".
+    x: [K]; before, after: [K] (spectrum: N²m²/Hz; else N·m or 1). unit: of x. before_std [K]: scatter within the bin.
+    """
+
+    joint: int
+    kind: str
+    label: str
+    unit: str
+    x: Numbers
+    before: Numbers
+    after: Numbers
+    before_std: Numbers | None = None
+
+
+@dataclass(frozen=True)
+class DetectionGain:
+    """What the extended model means for contact detection on labelled recordings, at thresholds tuned alike."""
+
+    events: int
+    found_before: int
+    found_after: int
+    false_alarms_before: int
+    false_alarms_after: int
+    median_delay_before: float | None  # s
+    median_delay_after: float | None  # s
+    thresholds_before: tuple[float, ...]  # N·m
+    thresholds_after: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A further experiment, from a menu, chosen by computation.
+
+    sentence: which motion, load or pretension would tell. separates: what from what; makes_visible: what it shows.
+    distance: expected distance of the predictions over the noise (1: as large as the noise). motion: options of
+    `tendonfmu excite` and the rig that make it.
+    """
+
+    sentence: str
+    separates: tuple[tuple[Where, Where], ...] = ()
+    makes_visible: tuple[Where, ...] = ()
+    distance: float = 0.0
+    motion: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The result of `diagnosis.diagnose`.
+
+    verdict: "adequate", "explained", "partly explained" or "unexplained". recordings, tests: names of the files.
+    nominal_data, extended_data: the fitted descriptions. noise_floor: N·m per joint, None where there is no repeat to
+    take it from. ceiling: per joint, share of the residual variance that a flexible learner predicts on unseen blocks.
+    gain: over all joints on the test data; held_out: whether those are blocks of the training recordings.
+    """
+
+    finger: str
+    verdict: str
+    recordings: tuple[str, ...]
+    tests: tuple[str, ...]
+    held_out: bool
+    seconds: float
+    seed: int
+    nominal: ModelErrors
+    extended: ModelErrors
+    bias_only_rms: tuple[float, ...]
+    noise_floor: tuple[float, ...]
+    floor_source: str  # "repeats of the motion", "white part of the residual"
+    ceiling: tuple[float, ...]
+    gain: Interval
+    causes: tuple[Cause, ...]
+    invisible: tuple[Invisible, ...]
+    events: tuple[Event, ...]
+    unexplained: Unexplained
+    experiment: Experiment
+    views: tuple[ResidualView, ...]
+    whiteness: tuple[tuple[float, float], ...]  # per joint: lag-one autocorrelation before, after
+    detection: DetectionGain | None
+    nominal_data: Mapping[str, Any]
+    extended_data: Mapping[str, Any]
+    warnings: tuple[str, ...] = ()
+    tested: int = 0  # effects at places
