@@ -17,9 +17,9 @@ enum { EFFECT_MAX_PARAMETERS = 4, EFFECT_NOWHERE = 0xffffffffu, EFFECT_ALL_JOINT
 typedef enum place_need { PLACE_REFUSED, PLACE_OPTIONAL, PLACE_REQUIRED } place_need;
 
 typedef enum place_rule {
-  PLACES_AS_SAID,      /* each key by its own need */
-  PLACES_EXACTLY_ONE,  /* joint or tendon, not both */
-  PLACES_AT_MOST_ONE,  /* joint, tendon or neither */
+  PLACES_AS_SAID,     /* each key by its own need */
+  PLACES_EXACTLY_ONE, /* joint or tendon, not both */
+  PLACES_AT_MOST_ONE, /* joint, tendon or neither */
   PLACES_NOT_LAST_JOINT
 } place_rule;
 
@@ -42,16 +42,16 @@ typedef struct effect_place {
 /* What an effect sees of a finger and one sample. Rows of [n × lanes] have a row a joint. */
 typedef struct effect_sample {
   size_t joints, tendons, lanes;
-  int first;          /* 1: the first sample */
-  int source;         /* kinematics source 1, 2, 3 */
-  double time, step;  /* s; step is meaningless at the first sample */
-  const double* angle;           /* [n] rad */
-  const double* velocity;        /* [n] rad/s */
-  const double* tendon_velocity; /* [n × lanes] ẋ_ij, m/s */
-  const double* force;           /* [m] f0, N */
-  const double* moment_arm;      /* [n × lanes] r_ij, m */
-  const double* rest_angle;      /* [n] of the covers, rad; 0 without one */
-  const double* axis_cosine;     /* [n × n] of the angle between the axes of two joints; 1 without links */
+  int first;                                /* 1: the first sample */
+  int source;                               /* kinematics source 1, 2, 3 */
+  double time, step;                        /* s; step is meaningless at the first sample */
+  const double* angle;                      /* [n] rad */
+  const double* velocity;                   /* [n] rad/s */
+  const double* tendon_velocity;            /* [n × lanes] ẋ_ij, m/s */
+  const double* force;                      /* [m] f0, N */
+  const double* moment_arm;                 /* [n × lanes] r_ij, m */
+  const double* rest_angle;                 /* [n] of the covers, rad; 0 without one */
+  const double* axis_cosine;                /* [n × n] of the angle between the axes of two joints; 1 without links */
   double tendon_threshold, joint_threshold; /* v_min: m/s, rad/s */
 } effect_sample;
 
@@ -60,9 +60,32 @@ typedef struct effect_direction {
   const double *angle, *velocity, *force; /* [n], [n], [m] */
 } effect_direction;
 
+/* The signals of a sample while they are brought in order: rows that an effect may change. */
+typedef struct effect_signals {
+  size_t joints, tendons;
+  int first, source;
+  int late; /* 0: before the joint angles are known (source 1) or taken as given; 1: after */
+  double time;
+  double *force, *position;        /* [m] f0, x0 */
+  double *angle, *velocity;        /* [n]; velocity with source 3 only */
+  const double* inverse_stiffness; /* [m] 1/k, m/N */
+} effect_signals;
+
+/* What an effect makes of the friction at one place: F = share·|F(v)| where it slides at all times, else factor times
+ * what fig. 5 gives. */
+typedef struct effect_grip {
+  int slides;         /* 1: never sticks */
+  double value;       /* share or factor */
+  double by_velocity; /* s/m or s/rad */
+  double by_parameter[EFFECT_MAX_PARAMETERS];
+} effect_grip;
+
+typedef enum effect_kind { EFFECT_TORQUE, EFFECT_FRICTION, EFFECT_SIGNAL } effect_kind;
+
 typedef struct effect_type {
   const char* name; /* as in contract section 7 */
   uint32_t id;      /* in the model image; never reused */
+  effect_kind kind;
   place_need joint, tendon;
   place_rule rule;
   int once; /* 1: at most once a place */
@@ -71,19 +94,33 @@ typedef struct effect_type {
 
   /* Numbers that it remembers on a finger of n joints and m tendons, part of the finger's state block; NULL: none. */
   size_t (*state_count)(size_t joints, size_t tendons, effect_place place);
-  /* after ← what it remembers once this sample is accepted; NULL with no memory. Torques only: called when the
+  /* after ← what it remembers once this sample is accepted; NULL with no memory, and of signals. Called when the
    * kinematics are known. */
   void (*advance)(effect_place place, const double* parameters, const effect_sample* sample, const double* before,
                   double* after);
 
-  /* --- a torque, linear in its parameters ---------------------------------------------------------------------------
-   * adds to torque [n], N·m; with the parameters replaced by a unit vector it is the derivative by one of them. */
+  /* --- EFFECT_TORQUE: linear in its parameters ----------------------------------------------------------------------
+   * torque() adds to torque [n], N·m; with the parameters replaced by a unit vector it is the derivative by one. */
   void (*torque)(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                  double* torque);
   /* adds its derivative along a direction; the memory is held fixed except for what it says of this sample */
   void (*slope)(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                 const effect_direction* direction, double* slope);
-  /* largest depends: on which inputs of which joints its torque at joint j depends is worked out from slope() */
+
+  /* --- EFFECT_FRICTION ----------------------------------------------------------------------------------------------
+   * member: which of the velocities of its place: 0 of a joint, the joint (0-based) of a tendon's or a finger's */
+  effect_grip (*grip)(effect_place place, const double* parameters, const double* memory, size_t member);
+
+  /* --- EFFECT_SIGNAL ------------------------------------------------------------------------------------------------
+   * Changes signals, twice a sample (late 0, then 1), and fills after from before; */
+  void (*signal)(effect_place place, const double* parameters, effect_signals* signals, const double* before,
+                 double* after);
+  /* adds the derivative of what it made of them by parameter k; */
+  void (*signal_slope)(effect_place place, const double* parameters, uint32_t k, const double* memory,
+                       effect_signals* derivative);
+  /* turns a direction of what it was given into that of what it made of it. */
+  void (*signal_pass)(effect_place place, const double* parameters, const double* memory, const double* force,
+                      effect_signals* direction);
 } effect_type;
 
 /* Row by id or name; NULL when there is none. */
