@@ -1,34 +1,41 @@
 #include "floating_point.h"
 
 #include "cover_hardening.h"
-#include "effect.h"
 
-/* T = k3·(q − rest)³: the cubic part of the plastic cover's spring, beside the linear T_jq of eq. (8). */
+#include "effect_parts.h"
 
-static const effect_parameter parameters[] = {
-    {.name = "stiffness", .unit = "N.m/rad3", .minimum = -1e9, .maximum = 1e9, .required = 1},
+/* T_j = stiffness·(q_j − rest)³: the cubic part of the plastic cover's spring, beside the linear T_jq of eq. (8). */
+
+static const effect_parameter numbers[] = {
+    {.name = "stiffness",
+     .unit = "N.m/rad3",
+     .minimum = -EFFECT_LARGE,
+     .maximum = EFFECT_LARGE,
+     .required = 1,
+     .scale = 0.05},
 };
 
-static size_t state_count(const double* values) {
-  (void)values;
-  return 0;
-}
-
-static effect_torque torque(const double* values, const effect_sample* sample, const double* memory) {
+static void torque(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
+                   double* torque) {
   (void)memory;
-  const double bend = sample->joint_angle - sample->rest_angle;
-  return (effect_torque){
-      .value = values[0] * bend * bend * bend,
-      .by_angle = 3.0 * values[0] * bend * bend,
-      .by_parameter = {bend * bend * bend},
-  };
+  const double bend = sample->angle[place.joint] - sample->rest_angle[place.joint];
+  torque[place.joint] += parameters[0] * bend * bend * bend;
 }
 
-const effect_type cover_hardening = {
+static void slope(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
+                  const effect_direction* direction, double* slope) {
+  (void)memory;
+  const double bend = sample->angle[place.joint] - sample->rest_angle[place.joint];
+  slope[place.joint] += 3.0 * parameters[0] * bend * bend * along(direction->angle, place.joint);
+}
+
+const effect_type effect_cover_hardening = {
     .name = "cover_hardening",
     .id = 1,
+    .kind = EFFECT_TORQUE,
+    .joint = PLACE_REQUIRED,
     .parameter_count = 1,
-    .parameters = parameters,
-    .state_count = state_count,
+    .parameters = numbers,
     .torque = torque,
+    .slope = slope,
 };

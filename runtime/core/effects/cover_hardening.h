@@ -3,6 +3,6 @@
 
 #include "effect.h"
 
-extern const effect_type cover_hardening;
+extern const effect_type effect_cover_hardening;
 
 #endif

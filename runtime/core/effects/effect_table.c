@@ -2,8 +2,30 @@
 
 #include "cover_hardening.h"
 #include "effect.h"
+#include "force_gain.h"
+#include "force_offset.h"
+#include "gravity.h"
+#include "inertia.h"
+#include "joint_coupling.h"
+#include "load_friction.h"
+#include "moment_arm.h"
+#include "moment_arm_variation.h"
+#include "preload_friction.h"
+#include "pulley_eccentricity.h"
 
-static const effect_type* const table[] = {&cover_hardening};
+static const effect_type* const table[] = {
+    &effect_cover_hardening,
+    &effect_gravity,
+    &effect_inertia,
+    &effect_joint_coupling,
+    &effect_preload_friction,
+    &effect_load_friction,
+    &effect_force_gain,
+    &effect_force_offset,
+    &effect_moment_arm,
+    &effect_moment_arm_variation,
+    &effect_pulley_eccentricity,
+};
 
 const effect_type* effect_at(size_t position) {
   return position < sizeof table / sizeof table[0] ? table[position] : NULL;

@@ -1,0 +1,30 @@
+/* What several terms have in common. */
+#ifndef TENDONFMU_EFFECT_PARTS_H
+#define TENDONFMU_EFFECT_PARTS_H
+
+#include "effect.h"
+
+#define EFFECT_LARGE 1e9 /* limit of numbers that have no other */
+
+/* component of a direction's row; 0 where there is none */
+static inline double along(const double* row, size_t i) {
+  return row ? row[i] : 0.0;
+}
+
+/* r_ij */
+static inline double arm_at(const effect_sample* sample, size_t joint, size_t tendon) {
+  return sample->moment_arm[joint * sample->lanes + tendon];
+}
+
+/* sign of a velocity where it moves, else the one that was held before; 0 as long as it never moved */
+static inline double held_side(const effect_sample* sample, double velocity, double threshold, const double* before) {
+  if (velocity > threshold) {
+    return 1.0;
+  }
+  if (velocity < -threshold) {
+    return -1.0;
+  }
+  return sample->first ? 0.0 : *before;
+}
+
+#endif

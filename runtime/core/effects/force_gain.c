@@ -1,0 +1,46 @@
+#include "floating_point.h"
+
+#include "force_gain.h"
+
+#include "effect_parts.h"
+
+/* The true force of a tendon is (1 + correction)·f0: T_j = −correction·r_ij·f0 at every joint. */
+
+static const effect_parameter numbers[] = {
+    {.name = "correction",
+     .unit = "1",
+     .minimum = -1.0,
+     .maximum = EFFECT_LARGE,
+     .above_minimum = 1,
+     .required = 1,
+     .scale = 0.05},
+};
+
+static void add_to_joints(effect_place place, const effect_sample* sample, double force, double* torque) {
+  for (size_t j = 0; j < sample->joints; ++j) {
+    torque[j] -= arm_at(sample, j, place.tendon) * force;
+  }
+}
+
+static void torque(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
+                   double* torque) {
+  (void)memory;
+  add_to_joints(place, sample, parameters[0] * sample->force[place.tendon], torque);
+}
+
+static void slope(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
+                  const effect_direction* direction, double* slope) {
+  (void)memory;
+  add_to_joints(place, sample, parameters[0] * along(direction->force, place.tendon), slope);
+}
+
+const effect_type effect_force_gain = {
+    .name = "force_gain",
+    .id = 7,
+    .kind = EFFECT_TORQUE,
+    .tendon = PLACE_REQUIRED,
+    .parameter_count = 1,
+    .parameters = numbers,
+    .torque = torque,
+    .slope = slope,
+};

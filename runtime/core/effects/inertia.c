@@ -1,0 +1,61 @@
+#include "floating_point.h"
+
+#include "inertia.h"
+
+#include "effect_parts.h"
+
+/* T_j = inertia·a, a the backward difference of the joint's velocity; 0 at the first sample. */
+
+static const effect_parameter numbers[] = {
+    {.name = "inertia",
+     .unit = "kg.m2",
+     .minimum = -EFFECT_LARGE,
+     .maximum = EFFECT_LARGE,
+     .required = 1,
+     .scale = 1e-5},
+};
+
+enum { VELOCITY, ACCELERATION, STEP, NUMBERS_REMEMBERED }; /* STEP: 0 at the first sample */
+
+static size_t state_count(size_t joints, size_t tendons, effect_place place) {
+  (void)joints;
+  (void)tendons;
+  (void)place;
+  return NUMBERS_REMEMBERED;
+}
+
+static void advance(effect_place place, const double* parameters, const effect_sample* sample, const double* before,
+                    double* after) {
+  (void)parameters;
+  const double velocity = sample->velocity[place.joint];
+  after[ACCELERATION] = sample->first ? 0.0 : (velocity - before[VELOCITY]) / sample->step;
+  after[STEP] = sample->first ? 0.0 : sample->step;
+  after[VELOCITY] = velocity;
+}
+
+static void torque(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
+                   double* torque) {
+  (void)sample;
+  torque[place.joint] += parameters[0] * memory[ACCELERATION];
+}
+
+static void slope(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
+                  const effect_direction* direction, double* slope) {
+  (void)sample;
+  if (memory[STEP] > 0.0) {
+    slope[place.joint] += parameters[0] * along(direction->velocity, place.joint) / memory[STEP];
+  }
+}
+
+const effect_type effect_inertia = {
+    .name = "inertia",
+    .id = 3,
+    .kind = EFFECT_TORQUE,
+    .joint = PLACE_REQUIRED,
+    .parameter_count = 1,
+    .parameters = numbers,
+    .state_count = state_count,
+    .advance = advance,
+    .torque = torque,
+    .slope = slope,
+};

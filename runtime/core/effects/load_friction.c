@@ -1,0 +1,52 @@
+#include "floating_point.h"
+
+#include "load_friction.h"
+
+#include <math.h>
+
+#include "effect_parts.h"
+
+/* T_j = coulomb·|f0|·s: Coulomb friction in a joint that grows with the force of one tendon, s the sign of the joint's
+ * velocity when it last moved. */
+
+static const effect_parameter numbers[] = {
+    {.name = "coulomb", .unit = "m", .minimum = -EFFECT_LARGE, .maximum = EFFECT_LARGE, .required = 1, .scale = 1e-4},
+};
+
+static size_t state_count(size_t joints, size_t tendons, effect_place place) {
+  (void)joints;
+  (void)tendons;
+  (void)place;
+  return 1;
+}
+
+static void advance(effect_place place, const double* parameters, const effect_sample* sample, const double* before,
+                    double* after) {
+  (void)parameters;
+  after[0] = held_side(sample, sample->velocity[place.joint], sample->joint_threshold, before);
+}
+
+static void torque(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
+                   double* torque) {
+  torque[place.joint] += parameters[0] * memory[0] * fabs(sample->force[place.tendon]);
+}
+
+static void slope(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
+                  const effect_direction* direction, double* slope) {
+  const double change = along(direction->force, place.tendon);
+  slope[place.joint] += parameters[0] * memory[0] * (sample->force[place.tendon] < 0.0 ? -change : change);
+}
+
+const effect_type effect_load_friction = {
+    .name = "load_friction",
+    .id = 6,
+    .kind = EFFECT_TORQUE,
+    .joint = PLACE_REQUIRED,
+    .tendon = PLACE_REQUIRED,
+    .parameter_count = 1,
+    .parameters = numbers,
+    .state_count = state_count,
+    .advance = advance,
+    .torque = torque,
+    .slope = slope,
+};

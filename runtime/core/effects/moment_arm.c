@@ -1,0 +1,41 @@
+#include "floating_point.h"
+
+#include "moment_arm.h"
+
+#include "effect_parts.h"
+
+/* The true moment arm is r_ij + correction: T_j = −correction·f0. Joint angles still come from the described arms. */
+
+static const effect_parameter numbers[] = {
+    {.name = "correction",
+     .unit = "m",
+     .minimum = -EFFECT_LARGE,
+     .maximum = EFFECT_LARGE,
+     .required = 1,
+     .scale = 5e-4},
+};
+
+static void torque(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
+                   double* torque) {
+  (void)memory;
+  torque[place.joint] -= parameters[0] * sample->force[place.tendon];
+}
+
+static void slope(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
+                  const effect_direction* direction, double* slope) {
+  (void)sample;
+  (void)memory;
+  slope[place.joint] -= parameters[0] * along(direction->force, place.tendon);
+}
+
+const effect_type effect_moment_arm = {
+    .name = "moment_arm",
+    .id = 9,
+    .kind = EFFECT_TORQUE,
+    .joint = PLACE_REQUIRED,
+    .tendon = PLACE_REQUIRED,
+    .parameter_count = 1,
+    .parameters = numbers,
+    .torque = torque,
+    .slope = slope,
+};

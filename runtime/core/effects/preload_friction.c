@@ -1,0 +1,67 @@
+#include "floating_point.h"
+
+#include "preload_friction.h"
+
+#include "effect_parts.h"
+
+/* Friction of a tendon that does not scale with its force (a tight sheath, a seal): before joint j' the tendon loses
+ * coulomb·s, s the sign of ẋ_ij' when it last moved, so T_j = r_ij·coulomb·s for all j >= j'. Without a joint, before
+ * every joint that the tendon reaches; where no moment arm is left ẋ is 0 and so is s. */
+
+static const effect_parameter numbers[] = {
+    {.name = "coulomb", .unit = "N", .minimum = -EFFECT_LARGE, .maximum = EFFECT_LARGE, .required = 1, .scale = 0.2},
+};
+
+static size_t state_count(size_t joints, size_t tendons, effect_place place) {
+  (void)tendons;
+  return place.joint == EFFECT_NOWHERE ? joints : 1;
+}
+
+/* the first joint before which there is friction */
+static size_t from_joint(effect_place place) {
+  return place.joint == EFFECT_NOWHERE ? 0 : place.joint;
+}
+
+static void advance(effect_place place, const double* parameters, const effect_sample* sample, const double* before,
+                    double* after) {
+  (void)parameters;
+  const size_t from = from_joint(place), count = state_count(sample->joints, sample->tendons, place);
+  for (size_t k = 0; k < count; ++k) {
+    const double velocity = sample->tendon_velocity[(from + k) * sample->lanes + place.tendon];
+    after[k] = held_side(sample, velocity, sample->tendon_threshold, before + k);
+  }
+}
+
+static void torque(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
+                   double* torque) {
+  const size_t from = from_joint(place), count = state_count(sample->joints, sample->tendons, place);
+  double lost = 0.0;
+  for (size_t j = from; j < sample->joints; ++j) {
+    lost += j - from < count ? memory[j - from] : 0.0;
+    torque[j] += arm_at(sample, j, place.tendon) * parameters[0] * lost;
+  }
+}
+
+static void slope(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
+                  const effect_direction* direction, double* slope) {
+  (void)place; /* constant but for its sign */
+  (void)parameters;
+  (void)sample;
+  (void)memory;
+  (void)direction;
+  (void)slope;
+}
+
+const effect_type effect_preload_friction = {
+    .name = "preload_friction",
+    .id = 5,
+    .kind = EFFECT_TORQUE,
+    .joint = PLACE_OPTIONAL,
+    .tendon = PLACE_REQUIRED,
+    .parameter_count = 1,
+    .parameters = numbers,
+    .state_count = state_count,
+    .advance = advance,
+    .torque = torque,
+    .slope = slope,
+};
