@@ -1,0 +1,260 @@
+"""Recordings and models as a diagnosis sees them: averaged over short blocks of time.
+
+The estimator's model of a joint is y_k = T_k + b_k + e_k with b_k = b_{k−1} + Δb_k + w_k (runtime/include/
+tendonfmu_estimation.h). With G_k = T_k + Σ Δb up to k, y − G is a slow bias plus noise. G and its derivatives by the
+numbers of the description are all that is looked at here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.balance import moment_arms
+from tendonfmu.estimation import Estimator
+from tendonfmu.fit_recordings import FitRecording
+from tendonfmu.friction_places import DEFAULT_THRESHOLD
+
+Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Array = NDArray[Any]
+
+SHORTEST_STEP = 0.01  # s, of a block
+MOST_BLOCKS = 20_000
+_ELEMENTS = 2_000_000  # derivatives in memory at a time
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A stretch of a recording without a gap, cut into blocks of equally many samples.
+
+    recording: its number, from 0. part: its samples there. first, count: its blocks in the whole; samples: of a block.
+    """
+
+    recording: int
+    part: slice
+    first: int
+    count: int
+    samples: int
+
+    @property
+    def blocks(self) -> slice:
+        return slice(self.first, self.first + self.count)
+
+    def mean(self, values: Array) -> Array:
+        """[count, ...] of values [samples of the part or as many as the blocks have, ...]."""
+        whole = values[: self.count * self.samples]
+        return np.asarray(whole.reshape(self.count, self.samples, *whole.shape[1:]).mean(axis=1))
+
+
+@dataclass(frozen=True)
+class Grid:
+    """All segments, one after another. step: s, of a block. The estimator's recordings are the segments."""
+
+    segments: tuple[Segment, ...]
+    step: float
+
+    @property
+    def blocks(self) -> int:
+        return sum(segment.count for segment in self.segments)
+
+
+@dataclass(frozen=True)
+class Series:
+    """All recordings one after another, block means; B blocks, n joints, m tendons.
+
+    time: [B] s, centre. recording: [B] from 0; segment: [B] stretch without a gap, from 0. target: [B, n] y − G, N·m.
+    used: [B] whether all its samples may be learned from. step: s. angle [B, n] rad, velocity [B, n] rad/s,
+    acceleration [B, n] rad/s², force [B, m] N, tendon_velocity [B, m, n] m/s (ẋ_ij), travel [B, n] rad since the joint
+    last turned round.
+    """
+
+    time: Numbers
+    recording: NDArray[np.int64]
+    segment: NDArray[np.int64]
+    target: Numbers
+    used: Flags
+    step: float
+    angle: Numbers
+    velocity: Numbers
+    acceleration: Numbers
+    force: Numbers
+    tendon_velocity: Numbers
+    travel: Numbers
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Derivatives of G [B, n, c], averaged like the series; names [c]."""
+
+    values: Array
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A candidate at a place with one choice of its non-linear numbers: columns first .. first + count − 1 of a bank.
+
+    effect, joint, tendon: as in the report. sign: expected of the magnitudes, 0 either. shape: the choice. origin:
+    whatever made it (the candidate), for the caller.
+    """
+
+    effect: str
+    joint: int | None
+    tendon: int | None
+    sign: int
+    shape: Mapping[str, float]
+    first: int
+    count: int
+    origin: Any = None
+
+    @property
+    def place(self) -> tuple[str, int | None, int | None]:
+        return self.effect, self.joint, self.tendon
+
+
+@dataclass(frozen=True)
+class Bank:
+    """Columns of all that may be missing."""
+
+    columns: Columns
+    trials: tuple[Trial, ...]
+
+
+def make_grid(recordings: Sequence[FitRecording]) -> Grid:
+    """Blocks of about 10 ms, longer where there would be very many, never shorter than a sample."""
+    duration = sum(recording.duration for recording in recordings)
+    step = max(SHORTEST_STEP, duration / MOST_BLOCKS)
+    segments, first = [], 0
+    for number, recording in enumerate(recordings):
+        samples = max(1, round(step / float(np.median(np.diff(recording.time)))))
+        for part in recording.parts:
+            count = (part.stop - part.start) // samples
+            if count and recording.train[part].any():
+                segments.append(Segment(number, part, first, count, samples))
+                first += count
+    return Grid(tuple(segments), step)
+
+
+def estimator_over(
+    image: bytes, group: Array | None, scale: Array | None, recordings: Sequence[FitRecording], grid: Grid
+) -> Estimator:
+    """With the grid's segments as its recordings."""
+    estimator = Estimator(image, group, scale)
+    for segment in grid.segments:
+        recording = recordings[segment.recording]
+        external = recording.external
+        estimator.add_recording(
+            recording.arrays(segment.part),
+            recording.kinematics,
+            None if external is None else np.ascontiguousarray(external[segment.part]),
+            np.ascontiguousarray(recording.train[segment.part]),
+        )
+    return estimator
+
+
+def block_model(
+    estimator: Estimator, z: Numbers, grid: Grid, dtype: type[np.floating[Any]] = np.float64
+) -> tuple[Numbers, Array]:
+    """G [B, n] and its derivatives [B, n, u] (of dtype) by the estimator's unknowns at z; both block means."""
+    joints, unknowns = estimator.joints, len(estimator.unknowns)
+    torque = np.empty((grid.blocks, joints))
+    derivatives = np.empty((grid.blocks, joints, unknowns), dtype=dtype)
+    for number, segment in enumerate(grid.segments):
+        carried, carried_derivative = np.zeros(joints), np.zeros((joints, unknowns))
+        for blocks, samples in _chunks(segment, joints * max(unknowns, 1)):
+            found = estimator.jacobian(number, z, samples.start, samples.stop)
+            torque[blocks], carried = _averaged(found[0], found[1], segment.samples, carried)
+            derivatives[blocks], carried_derivative = _averaged(found[2], found[3], segment.samples, carried_derivative)
+    return torque, derivatives
+
+
+def _chunks(segment: Segment, width: int) -> Iterator[tuple[slice, slice]]:
+    """Blocks in the whole, and samples of the segment, of chunks of bounded size."""
+    blocks = max(1, _ELEMENTS // (width * segment.samples))
+    for begin in range(0, segment.count, blocks):
+        end = min(begin + blocks, segment.count)
+        yield slice(segment.first + begin, segment.first + end), slice(begin * segment.samples, end * segment.samples)
+
+
+def _averaged(torque: Array, jump: Array, samples: int, carried: Array) -> tuple[Array, Array]:
+    """Block means of torque + Σ jump [K, ...], and the sum of all jumps so far; arrays [K·samples, ...]."""
+    shape = (len(torque) // samples, samples, *torque.shape[1:])
+    mean = torque.reshape(shape).mean(axis=1)
+    if not jump.any():
+        return np.asarray(mean + carried), carried
+    jumps = jump.reshape(shape)
+    total = jumps.sum(axis=1)
+    # a jump at sample k of a block counts from there to its end
+    weight = (samples - np.arange(samples)) / samples
+    inside = np.tensordot(jumps, weight, axes=(1, 0))
+    summed = np.cumsum(total, axis=0)
+    return np.asarray(mean + inside + carried + summed - total), np.asarray(carried + summed[-1])
+
+
+# --- the series -------------------------------------------------------------------------------------------------------
+
+
+def make_series(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, torque: Numbers) -> Series:
+    """torque: [B, n] G of the description `data`. The angles and velocities are those the model uses."""
+    whole = [recordings[segment.recording] for segment in grid.segments]
+    pieces = list(zip(grid.segments, whole, strict=True))
+    threshold = _joint_threshold(data)
+
+    def gathered(values: Sequence[Array]) -> Array:
+        found = [segment.mean(each[segment.part]) for segment, each in zip(grid.segments, values, strict=True)]
+        return np.concatenate(found)
+
+    angle = gathered([each.model.joint_angle for each in whole])
+    velocity = gathered([each.model.joint_speed for each in whole])
+    arms = moment_arms(data)
+    return Series(
+        time=gathered([each.time for each in whole]),
+        recording=np.concatenate([np.full(segment.count, segment.recording) for segment in grid.segments]),
+        segment=np.concatenate([np.full(segment.count, k) for k, segment in enumerate(grid.segments)]),
+        target=gathered([each.target for each in whole]) - torque,
+        used=np.concatenate([segment.mean(each.train[segment.part]) == 1.0 for segment, each in pieces]),
+        step=grid.step,
+        angle=angle,
+        velocity=velocity,
+        acceleration=np.concatenate([_slope(velocity[segment.blocks], grid.step) for segment in grid.segments]),
+        force=gathered([each.recording.groups["tendon_force"] for each in whole]),
+        tendon_velocity=_tendon_velocity(arms, velocity),
+        travel=np.concatenate(
+            [_travel(each.model.joint_angle, each.model.joint_speed, threshold, segment) for segment, each in pieces]
+        ),
+    )
+
+
+def _joint_threshold(data: Mapping[str, Any]) -> float:
+    given = (data.get("velocity_threshold") or {}).get("joint")
+    return DEFAULT_THRESHOLD["joint"] if given is None else float(given)
+
+
+def _slope(values: Numbers, step: float) -> Numbers:
+    return np.gradient(values, step, axis=0) if len(values) > 1 else np.zeros_like(values)
+
+
+def _tendon_velocity(arms: Numbers, velocity: Numbers) -> Numbers:
+    """[B, m, n] ẋ_ij = Σ_{j'≥j} r_ij' q̇_j' (eq. 5). arms: [m, n]."""
+    products = velocity[:, None, :] * arms[None]
+    return np.asarray(np.cumsum(products[:, :, ::-1], axis=2)[:, :, ::-1])
+
+
+def _travel(angle: Numbers, speed: Numbers, threshold: float, segment: Segment) -> Numbers:
+    """[count, n] rad since each joint last turned round; speeds below the threshold turn nothing."""
+    angle, speed = angle[segment.part], speed[segment.part]
+    found = np.empty_like(angle)
+    for j in range(angle.shape[1]):
+        moving = np.abs(speed[:, j]) > threshold
+        last = np.maximum.accumulate(np.where(moving, np.arange(len(angle)), 0))
+        side = np.sign(speed[last, j])
+        turned = np.flatnonzero(np.diff(side, prepend=side[0]))
+        start = np.zeros(len(angle), dtype=np.int64)
+        start[turned] = turned
+        found[:, j] = np.abs(angle[:, j] - angle[np.maximum.accumulate(start), j])
+    return segment.mean(found)
