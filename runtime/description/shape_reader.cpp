@@ -1,10 +1,10 @@
 #include "shape_reader.h"
 
 #include <algorithm>
-#include <cstring>
 #include <string>
 
 #include "description_error.h"
+#include "extension_reader.h"
 
 namespace tendonfmu {
 namespace {
@@ -16,33 +16,6 @@ const std::vector<std::string> side_keys = {"static", "coulomb", "stribeck_veloc
 const std::vector<std::string> law_keys = {"static", "coulomb", "stribeck_velocity", "viscous", "positive", "negative"};
 const std::vector<std::string> edge_keys = {"static", "coulomb", "stribeck_velocity", "viscous", "positive", "negative",
                                             "angles", "laws"};
-
-/* Effects of docs/model.md that a description may one day name; the core's table says which ones it has. */
-const char* const planned_effects[] = {"viscous_friction",
-                                       "stribeck",
-                                       "asymmetric_friction",
-                                       "edge_friction",
-                                       "pulley_friction",
-                                       "joint_friction",
-                                       "joint_load_friction",
-                                       "preload_friction",
-                                       "load_friction",
-                                       "cover_stiffness",
-                                       "gravity",
-                                       "inertia",
-                                       "presliding",
-                                       "friction_drift",
-                                       "force_gain",
-                                       "force_offset",
-                                       "time_delay",
-                                       "moment_arm",
-                                       "moment_arm_variation",
-                                       "pulley_eccentricity",
-                                       "tendon_nonlinearity",
-                                       "joint_coupling",
-                                       "backlash",
-                                       "contact",
-                                       "unknown"};
 
 /* names become file names and XML attributes */
 void check_name(const json_node& node) {
@@ -283,44 +256,6 @@ std::uint32_t read_contact_options(const json_node& contact, std::uint32_t joint
          given(contact, {"release_time"}, MODEL_HAS_RELEASE_TIME);
 }
 
-const effect_type* read_effect_name(const json_node& node) {
-  const std::string name = node.text();
-  std::string known;
-  for (std::size_t i = 0; effect_at(i); ++i) {
-    if (name == effect_at(i)->name) {
-      return effect_at(i);
-    }
-    known += (known.empty() ? "" : ", ") + std::string(effect_at(i)->name);
-  }
-  for (const char* planned : planned_effects) {
-    if (name == planned) {
-      throw description_error(node.path() + " = \"" + name +
-                              "\": an effect that this version has no extension for; expected one of " + known);
-    }
-  }
-  node.refuse("one of " + known);
-}
-
-std::uint32_t read_effect_joint(const json_node& node, std::uint32_t joints) {
-  const bool whole = node.value().is_number() && node.value().get<double>() >= 1.0 &&
-                     node.value().get<double>() <= joints &&
-                     node.value().get<double>() == static_cast<std::uint32_t>(node.value().get<double>());
-  if (!whole) {
-    node.refuse("a joint from 1 to " + std::to_string(joints));
-  }
-  return node.value().get<std::uint32_t>();
-}
-
-void read_extension(const json_node& extension, std::uint32_t joints, std::vector<std::uint32_t>& table) {
-  const effect_type* effect = read_effect_name(extension.expect_object().member("effect"));
-  std::vector<std::string> keys = {"effect", "joint"};
-  for (std::uint32_t i = 0; i < effect->parameter_count; ++i) {
-    keys.emplace_back(effect->parameters[i].name);
-  }
-  extension.expect_keys(keys);
-  table.insert(table.end(), {effect->id, read_effect_joint(extension.member("joint"), joints), 0u, 0u});
-}
-
 std::uint32_t read_links(const json_node& document, std::uint32_t joints) {
   const json_node links = document.member("links"), tip = document.member("tip");
   if (links.absent()) {
@@ -337,17 +272,6 @@ std::uint32_t read_links(const json_node& document, std::uint32_t joints) {
   }
   tip.expect_list(3, 3, "numbers in m, the fingertip in the last link's frame");
   return MODEL_HAS_LINKS;
-}
-
-void read_extensions(const json_node& list, finger_shape& finger) {
-  if (list.absent()) {
-    return;
-  }
-  list.expect_list(0, MODEL_MAX_EXTENSIONS, "extensions");
-  for (std::size_t i = 0; i < list.size(); ++i) {
-    read_extension(list.element(i), finger.shape.joints, finger.extensions);
-  }
-  finger.shape.extension_count = static_cast<std::uint32_t>(list.size());
 }
 
 void check_top(const json_node& document) {
@@ -384,7 +308,8 @@ finger_shape read_shape(const json_node& document) {
                          read_contact_options(document.member("contact"), finger.shape.joints, finger.shape.tendons) |
                          given(document.member("velocity_threshold"), {"hysteresis"}, MODEL_HAS_HYSTERESIS) |
                          read_links(document, finger.shape.joints);
-  read_extensions(document.member("extensions"), finger);
+  read_extensions(document.member("extensions"), finger.shape.joints, finger.shape.tendons, finger.extensions);
+  finger.shape.extension_count = static_cast<std::uint32_t>(finger.extensions.size() / MODEL_EXTENSION_WORDS);
   finger.shape.word_count = static_cast<std::uint32_t>(finger.words.size());
   finger.shape.words = finger.words.data();
   finger.shape.extensions = finger.extensions.data();
