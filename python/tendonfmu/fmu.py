@@ -201,21 +201,22 @@ class _Run:
         numbers = np.empty((len(recording), len(get_vr)))
         flags = np.empty((len(recording), len(flag_vr)), dtype=np.int32)
         whole = np.empty((len(recording), len(whole_vr)), dtype=np.int32)
+        inputs, real, boolean, integer = (_rows(table) for table in (samples, numbers, flags, whole))
         times = recording.time.tolist()
         steps = np.diff(recording.time).tolist()
         steps.append(steps[-1] if steps else 1e-3)
 
         self._at = f"{recording.path}: row 1"
-        slave.fmi2SetReal(component, set_vr, len(set_vr), _row(samples, 0))
+        slave.fmi2SetReal(component, set_vr, len(set_vr), inputs(0))
         slave.exitInitializationMode()
         for k, (time, step) in enumerate(zip(times, steps, strict=True)):
             self._at = f"{recording.path}: row {k + 1}"
-            slave.fmi2SetReal(component, set_vr, len(set_vr), _row(samples, k))
+            slave.fmi2SetReal(component, set_vr, len(set_vr), inputs(k))
             slave.fmi2DoStep(component, time, step, 1)
-            slave.fmi2GetReal(component, get_vr, len(get_vr), _row(numbers, k))
-            slave.fmi2GetBoolean(component, flag_vr, len(flag_vr), _row(flags, k))
+            slave.fmi2GetReal(component, get_vr, len(get_vr), real(k))
+            slave.fmi2GetBoolean(component, flag_vr, len(flag_vr), boolean(k))
             if len(whole_vr):
-                slave.fmi2GetInteger(component, whole_vr, len(whole_vr), _row(whole, k))
+                slave.fmi2GetInteger(component, whole_vr, len(whole_vr), integer(k))
             if progress and (k + 1) % 500 == 0:
                 progress(k + 1)
         if progress:
@@ -231,7 +232,8 @@ def _references(values: list[int]) -> Any:
     return (ctypes.c_uint * len(values))(*values)
 
 
-def _row(rows: NDArray[Any], k: int) -> Any:
-    """Row k where it stands, as FMI's array of numbers."""
-    kind = ctypes.c_double if rows.dtype == np.float64 else ctypes.c_int
-    return ctypes.cast(rows.ctypes.data + k * rows.strides[0], ctypes.POINTER(kind))
+def _rows(rows: NDArray[Any]) -> Callable[[int], Any]:
+    """k -> row k where it stands, as FMI's array of numbers."""
+    row = (ctypes.c_double if rows.dtype == np.float64 else ctypes.c_int) * rows.shape[1]
+    first, stride = rows.ctypes.data, rows.strides[0]
+    return lambda k: row.from_address(first + k * stride)

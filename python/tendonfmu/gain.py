@@ -1,0 +1,237 @@
+"""What an extension is worth: both FMUs run over data that neither was fitted to, and their residuals compared.
+
+An FMU has r of contract section 5, step 5, among its outputs only after the update, as compensated_torque = (1 − K)·r.
+So the core runs over the same samples beside it: where all outputs of both agree, its r is that of the FMU. A known
+external torque, labelled contact and gaps need the bias filter over y − T (`fit_residuals.track`), with the T that the
+FMU put out; in a recording without them that is r of the core again, and both are compared.
+"""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu import native
+from tendonfmu.diagnosis_result import Interval, ModelErrors
+from tendonfmu.errors import InputError
+from tendonfmu.fit_evaluation import residuals
+from tendonfmu.fit_files import description_text
+from tendonfmu.fit_recordings import FitRecording
+from tendonfmu.fit_residuals import Model, bias_settings, model_alone, rms
+from tendonfmu.fmu import run_fmu
+from tendonfmu.gain_interval import Blocks, blocks_of, gain_interval
+from tendonfmu.packaging import build_fmu
+from tendonfmu.signals import NUMBERS
+
+Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Data = Mapping[str, Any]
+
+AGREEMENT = 1e-9  # of the largest value of an output's series, contract section 5
+_NEVER = 1e9  # N·m; no contact threshold is ever passed
+_THRESHOLD = re.compile(r"contact\.(innovation\.)?threshold\[")
+_TINY = 1e-12  # N·m, as in contract section 5
+
+
+@dataclass(frozen=True)
+class Gain:
+    """nominal, extended: rms per joint on the samples trained on, and on those of the test.
+
+    value: 1 − rms_extended/rms_nominal over all joints on the test. causes: of each cause alone, the others kept, [k].
+    alone: of each cause alone against the nominal model, [k]. blocks: of how many seconds-long blocks of the test the
+    intervals are. held_out: the test is held-out blocks of the training recordings. agreement: largest difference
+    between an FMU's outputs and the core's, in units of the output's largest value.
+    """
+
+    nominal: ModelErrors
+    extended: ModelErrors
+    bias_only_rms: tuple[float, ...]
+    value: Interval
+    causes: tuple[Interval, ...]
+    alone: tuple[Interval, ...]
+    blocks: int
+    held_out: bool
+    agreement: float
+
+
+def measure_gain(
+    nominal: Data,
+    extended: Data,
+    training: Sequence[FitRecording],
+    tests: Sequence[FitRecording] = (),
+    *,
+    without: Sequence[Data] = (),
+    alone: Sequence[Data] = (),
+    seed: int = 0,
+) -> Gain:
+    """nominal, extended: fitted descriptions with the same `bias`. tests: recordings that nothing was fitted to; where
+    there are none, the samples `held_out` of the training recordings. without, alone: of `extension_fit.ExtensionFit`.
+
+    The FMUs of nominal and extended are run; the models of single causes by the core alone. Raises InputError where
+    there is nothing to test on, or the FMU does not agree with the core.
+    """
+    test = _Test.of(training, tests)
+    if bias_settings(nominal) != bias_settings(extended):
+        raise InputError("bias: not the same in both descriptions; expected equal settings, or rms tells nothing")
+    runs = {name: [run_both(data, each) for each in test.recordings] for name, data in _both(nominal, extended)}
+    left = {name: [run.residual for run in found] for name, found in runs.items()}
+    before, after = test.squares(left["nominal"]), test.squares(left["extended"])
+    return Gain(
+        nominal=ModelErrors(test.trained(nominal, left["nominal"]), test.tested(left["nominal"])),
+        extended=ModelErrors(test.trained(extended, left["extended"]), test.tested(left["extended"])),
+        bias_only_rms=test.tested([residuals(extended, each, None).residual for each in test.recordings]),
+        value=gain_interval(before, after, seed),
+        causes=tuple(gain_interval(test.squares_of(data, before, nominal), after, seed) for data in without),
+        alone=tuple(gain_interval(before, test.squares_of(data, after, extended), seed) for data in alone),
+        blocks=len(before),
+        held_out=test.held_out,
+        agreement=max(run.agreement for found in runs.values() for run in found),
+    )
+
+
+def residual_of(data: Data, recording: FitRecording) -> Numbers:
+    """[N, n] r of contract section 5, step 5, N·m, by the core alone: of the whole recording, whose friction remembers
+    across gaps as an FMU does, while the bias begins anew after them; NaN where there is none.
+    """
+    return residuals(data, recording, _core_model(data, recording)).residual
+
+
+# --- an FMU and the core side by side ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class BothRun:
+    """residual: [N, n] r, N·m. agreement: largest difference of the outputs of FMU and core, in units of the output's
+    largest value; where the recording is one piece of free motion, that of r, too.
+    """
+
+    residual: Numbers
+    agreement: float
+
+
+def run_both(data: Data, recording: FitRecording) -> BothRun:
+    """Packs the FMU of a description, runs it over a recording without contact detection, and takes r from its T.
+
+    Raises InputError where FMU and core do not agree.
+    """
+    outputs = _fmu_outputs(data, recording)
+    core = native.Finger.from_description(_without_contact(data), recording.kinematics)
+    beside = core.run(recording.recording.arrays())
+    agreement = max(_difference(outputs[name], beside[name]) for name in NUMBERS)
+    model = _core_model(data, recording)
+    torque = outputs["friction_torque"] - outputs["bias_torque"]
+    size = float(np.abs(outputs["friction_torque"]).max()) + float(np.abs(outputs["bias_torque"]).max())
+    agreement = max(agreement, float(np.abs(torque - model.torque).max()) / max(size, _TINY))
+    left = residuals(data, recording, replace(model, torque=torque)).residual
+    if _one_piece(recording):
+        agreement = max(agreement, float(np.abs(left[1:] - beside["residual"][1:]).max()) / max(size, _TINY))
+    if not agreement <= AGREEMENT:
+        raise InputError(
+            f"{recording.path}: the FMU's outputs and the core's differ by {agreement:.3g} of their largest value; "
+            f"expected at most {AGREEMENT:g}"
+        )
+    return BothRun(left, agreement)
+
+
+def _fmu_outputs(data: Data, recording: FitRecording) -> dict[str, Numbers]:
+    """[N, n] by group, of the FMU as packed, its contact thresholds out of reach by start values."""
+    out_of_reach = {
+        parameter.path: min(_NEVER, parameter.maximum)
+        for parameter in native.Finger.from_description(data).parameters()
+        if _THRESHOLD.match(parameter.path)
+    }
+    with tempfile.TemporaryDirectory(prefix="tendonfmu-") as folder:
+        file = Path(folder) / "finger.json"
+        file.write_text(description_text(data), encoding="utf-8")
+        fmu = build_fmu(file, file.with_suffix(".fmu"))
+        columns = run_fmu(fmu, recording.recording, kinematics_source=recording.kinematics, parameters=out_of_reach)
+    return {
+        name: np.column_stack([columns[f"{name}[{j}]"] for j in range(1, len(data["joints"]) + 1)]) for name in NUMBERS
+    }
+
+
+def _without_contact(data: Data) -> dict[str, Any]:
+    return {**data, "contact": {"threshold": [_NEVER] * len(data["joints"])}}
+
+
+def _core_model(data: Data, recording: FitRecording) -> Model:
+    samples = len(recording.time)
+    return model_alone(data, [recording.recording.arrays()], [slice(0, samples)], samples, recording.kinematics)
+
+
+def _one_piece(recording: FitRecording) -> bool:
+    """Whether the bias filter of the FMU sees what a judgement of the fit sees."""
+    return len(recording.parts) == 1 and recording.external is None and bool(recording.tracked.all())
+
+
+def _difference(mine: Numbers, other: Numbers) -> float:
+    """Largest difference in units of the largest value."""
+    return float(np.abs(mine - other).max()) / max(float(np.abs(other).max()), _TINY)
+
+
+# --- the samples of the test ------------------------------------------------------------------------------------------
+
+
+def _both(nominal: Data, extended: Data) -> list[tuple[str, Data]]:
+    return [("nominal", nominal), ("extended", extended)]
+
+
+@dataclass(frozen=True)
+class _Test:
+    """Recordings with the samples that are tested on, and their blocks."""
+
+    training: Sequence[FitRecording]
+    recordings: Sequence[FitRecording]
+    masks: Sequence[Flags]
+    blocks: Sequence[Blocks]
+    held_out: bool
+
+    @classmethod
+    def of(cls, training: Sequence[FitRecording], tests: Sequence[FitRecording]) -> _Test:
+        held_out = not tests
+        recordings = training if held_out else tests
+        masks = [_judged(each, each.held_out if held_out else each.tracked) for each in recordings]
+        if not any(mask.any() for mask in masks):
+            raise InputError(
+                "no data to measure the gain on: expected test recordings, or a held-out part of the others"
+            )
+        blocks = [blocks_of(each.time, mask) for each, mask in zip(recordings, masks, strict=True)]
+        return cls(training, recordings, masks, blocks, held_out)
+
+    def squares(self, left: Sequence[Numbers]) -> Numbers:
+        """[B] sums of squares over all joints of the residuals [N, n] of the recordings, by block."""
+        return np.concatenate(
+            [block.sums(np.sum(each**2, axis=1)) for block, each in zip(self.blocks, left, strict=True)]
+        )
+
+    def squares_of(self, data: Data, known: Numbers, of: Data) -> Numbers:
+        """The same of a description, by the core; `known` where it is the one that they are known of."""
+        return known if data is of else self.squares([residual_of(data, each) for each in self.recordings])
+
+    def tested(self, left: Sequence[Numbers]) -> tuple[float, ...]:
+        return _pooled(left, self.masks)
+
+    def trained(self, data: Data, left: Sequence[Numbers]) -> tuple[float, ...]:
+        """left: of the recordings tested on, which are those trained on where blocks were held out."""
+        found = left if self.held_out else [residual_of(data, each) for each in self.training]
+        return _pooled(found, [_judged(each, each.train) for each in self.training])
+
+
+def _judged(recording: FitRecording, chosen: Flags) -> Flags:
+    """[N] without the samples that have no residual: the first of each part, and those before the bias has begun."""
+    judged = np.zeros(len(recording.time), dtype=bool)
+    for part in recording.parts:
+        if recording.tracked[part].any():
+            judged[part.start + int(np.argmax(recording.tracked[part])) + 1 : part.stop] = True
+    return chosen & judged
+
+
+def _pooled(left: Sequence[Numbers], masks: Sequence[Flags]) -> tuple[float, ...]:
+    return tuple(rms(np.concatenate(left), np.concatenate(masks)))
