@@ -221,9 +221,10 @@ class _Run:
                 progress(k + 1)
         if progress:
             progress(len(times))
+        tables: tuple[NDArray[Any], ...] = (numbers, flags.astype(bool), whole)
         return {
-            name: rows[:, i]
-            for kind, rows in zip(kinds, (numbers, flags.astype(bool), whole), strict=True)
+            name: table[:, i]
+            for kind, table in zip(kinds, tables, strict=True)
             for i, name in enumerate(self.variables.of_type(kind))
         }
 
