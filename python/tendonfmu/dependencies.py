@@ -8,7 +8,8 @@ contact elsewhere stops the bias of a joint makes no dependency.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,10 +17,12 @@ import numpy as np
 
 from tendonfmu import native
 from tendonfmu.description import FingerDescription
+from tendonfmu.extensions import extension_rows
 from tendonfmu.signals import PLACE
 
-# Of an extension's torque; an effect that is not named here may use both.
-ANGLE_ONLY = frozenset({"cover_hardening"})
+# Extensions whose torque at their joint follows from its angle, or from its velocity.
+BY_OWN_ANGLE = frozenset({"cover_hardening", "moment_arm_variation", "pulley_eccentricity"})
+BY_OWN_VELOCITY = frozenset({"inertia", "load_friction"})
 
 VECTORS = frozenset({"fingertip_force", "fingertip_force_std"})
 
@@ -122,15 +125,56 @@ def _torque(structure: Structure, j: int) -> Motion:
     for kind in ("friction", "load_friction"):
         if joint.get(kind) is not None:
             motion.velocities.add(j)
-    for extension in structure.data.get("extensions") or []:
-        if extension["joint"] == j + 1:
-            motion.add(Motion({j}, set() if extension["effect"] in ANGLE_ONLY else {j}))
+    for extension in extension_rows(structure.data):
+        motion.add(_extension(structure, extension, j))
     for i in range(structure.tendons):
         if structure.passes[i, j]:  # losses up to this joint's pulley, over the moment arm (eq. 10)
             motion.add(_along_tendon(structure, i, j, j))
         if joint.get("load_friction") is not None:  # f_B before this joint's pulley, in Σ f_B
             motion.add(_along_tendon(structure, i, j, j - 1))
     return motion
+
+
+def _extension(structure: Structure, extension: Mapping[str, Any], j: int) -> Motion:
+    """What the torque of an extension at joint j follows from, beside the forces and numbers.
+
+    Effects that are not named here change signals or friction: what comes out depends on the same inputs as before
+    (of a delay on those of earlier samples, and on the present ones as soon as its number is 0).
+    """
+    effect, place, tendon = extension["effect"], (extension.get("joint") or 0) - 1, (extension.get("tendon") or 0) - 1
+    if effect == "gravity":
+        return _weight(structure, place, j)
+    if effect == "joint_coupling":
+        return Motion(angles={place, place + 1}) if j in (place, place + 1) else Motion()
+    if effect == "preload_friction":  # the sides to which the tendon moves before joint `place`, or before each
+        first = max(place, 0)
+        felt = structure.passes[tendon, j] and j >= first
+        return Motion(velocities={k for k in range(first, structure.joints) if felt and structure.passes[tendon, k]})
+    if place == j:
+        return Motion({j} if effect in BY_OWN_ANGLE else set(), {j} if effect in BY_OWN_VELOCITY else set())
+    return Motion()
+
+
+def _weight(structure: Structure, link: int, j: int) -> Motion:
+    """The angles that turn a link, where joint j feels its weight."""
+    turning = {k for k in range(link + 1) if _axis_cosine(structure, k, link) != 0.0}
+    return Motion(angles=turning if j in turning else set())
+
+
+def _axis_cosine(structure: Structure, joint: int, other: int) -> float:
+    """Cosine of the angle between two axes, 1 without links; rounded as in the runtime, whose 0 is no dependency."""
+    links = structure.data.get("links")
+    if links is None:
+        return 1.0
+    a, b = (_unit(links[k]["axis"]) for k in (joint, other))
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _unit(axis: Sequence[float]) -> list[float]:
+    largest = max(abs(float(x)) for x in axis)
+    x, y, z = (float(number) / largest for number in axis)
+    length = math.sqrt(x * x + y * y + z * z)
+    return [x / length, y / length, z / length]
 
 
 def _along_tendon(structure: Structure, i: int, last_edge: int, last_pulley: int) -> Motion:

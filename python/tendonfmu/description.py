@@ -6,6 +6,7 @@ What a description may hold is decided by the native reader alone; `schema/finge
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import Any
 
 from tendonfmu import native
 from tendonfmu.errors import InputError
+from tendonfmu.extensions import extension_numbers, extension_rows
 
 FORMAT = "tendonfmu-finger-1"
 _OTHER_FORMATS = {
@@ -66,7 +68,8 @@ class Counts:
     """What a finger is, in numbers.
 
     moment_arms, stiffness: least and largest magnitude in m and N/m, moment arms of 0 left out.
-    laws: by kind, each working point counted; an asymmetric law counts once. parameters: all numbers of the FMU.
+    laws: by kind, each working point counted; an asymmetric law counts once. extensions: their effects, in order.
+    parameters: all numbers of the FMU.
     estimated_numbers: those that a fit estimates, the biases included (see `estimated_numbers()`).
     """
 
@@ -154,9 +157,7 @@ def estimated_numbers(data: Mapping[str, Any]) -> dict[str, int]:
     for kind, law in laws(data):
         counts[kind] += sum(_numbers_of_side(side) for side in sides(law))
     counts["cover"] = sum(1 for joint in data["joints"] if (joint.get("cover") or {}).get("stiffness"))
-    counts["extensions"] = sum(
-        len(extension.keys() - {"effect", "joint"}) for extension in data.get("extensions") or []
-    )
+    counts["extensions"] = sum(1 for _ in extension_numbers(data))
     counts["bias"] = len(data["joints"])
     return counts
 
@@ -200,7 +201,7 @@ def count(description: FingerDescription) -> Counts:
         laws={kind: sum(1 for k, _ in found if k == kind) for kind in kinds},
         asymmetric_laws=sum(1 for _, law in found if len(sides(law)) == 2),
         covers=sum(1 for joint in data["joints"] if joint.get("cover") is not None),
-        extensions=[extension["effect"] for extension in data.get("extensions") or []],
+        extensions=[row["effect"] for row in extension_rows(data)],
         parameters=len(parameters),
         tunable_parameters=sum(1 for parameter in parameters if parameter.tunable),
         estimated_numbers=estimated_numbers(data),
@@ -225,5 +226,6 @@ def _summary_lines(counts: Counts) -> list[str]:
         f"estimated numbers  {sum(counts.estimated_numbers.values())}: {estimated}",
     ]
     if counts.extensions:
-        lines.insert(-2, f"extensions         {len(counts.extensions)}: {', '.join(counts.extensions)}")
+        by_effect = ", ".join(f"{number} {effect}" for effect, number in Counter(counts.extensions).items())
+        lines.insert(-2, f"extensions         {len(counts.extensions)}: {by_effect}")
     return lines

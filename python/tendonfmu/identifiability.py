@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from tendonfmu import native
 from tendonfmu.balance import friction_probe
+from tendonfmu.extensions import extension_numbers
 from tendonfmu.friction_places import Effect, effects, working_point_weights
 
 Numbers = NDArray[np.float64]
@@ -32,7 +33,8 @@ class Unknown:
     """A number to be estimated.
 
     path: as in the description. value: SI. effect: of which it is, if any; point: which of its laws, from 0.
-    with_path: what moves by the same amount (static where it equals coulomb).
+    with_path: what moves by the same amount (static where it equals coulomb). size: expected magnitude, where the
+    value may be 0.
     """
 
     path: str
@@ -40,6 +42,7 @@ class Unknown:
     effect: Effect | None = None
     point: int = 0
     with_path: str | None = None
+    size: float = 1.0
 
     @property
     def key(self) -> str:
@@ -50,7 +53,7 @@ class Unknown:
     def reference(self) -> float:
         """Size to which steps and errors are related: the value, or where that is 0 the static friction of its law."""
         if self.value or self.effect is None:
-            return abs(self.value) or 1.0
+            return abs(self.value) or self.size
         law = self.effect.laws[self.point]
         return float(law.get(self.path.split(".")[-2], law)["static"]) or 1.0
 
@@ -62,9 +65,7 @@ def unknowns(data: Mapping[str, Any]) -> list[Unknown]:
         stiffness = (joint.get("cover") or {}).get("stiffness")
         if stiffness:
             found.append(Unknown(f"joints[{j}].cover.stiffness", float(stiffness)))
-    for k, extension in enumerate(data.get("extensions") or [], start=1):
-        for key in extension.keys() - {"effect", "joint"}:
-            found.append(Unknown(f"extensions[{k}].{key}", float(extension[key])))
+    found.extend(Unknown(number.path, number.value, size=number.magnitude) for number in extension_numbers(data))
     return found
 
 
@@ -137,8 +138,9 @@ def _joint_of(number: Unknown) -> int | None:
 
 
 def _sign(number: Unknown) -> int:
-    """Coulomb friction may not exceed the static one, so it steps down where it can."""
-    return -1 if number.key == "coulomb" and number.with_path is None and number.value > 0 else 1
+    """Coulomb friction may not exceed the static one, so it steps down where it can; a delay not its limit."""
+    down = number.key == "delay" or (number.key == "coulomb" and number.with_path is None)
+    return -1 if down and number.value > 0 else 1
 
 
 class _Run:

@@ -11,6 +11,7 @@ from typing import Any
 from tendonfmu import native
 from tendonfmu.dependencies import Dependencies, dependencies, structure_of
 from tendonfmu.description import FingerDescription
+from tendonfmu.extensions import extension_rows, place_of
 
 # What XML 1.0 cannot hold, even escaped.
 NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -39,9 +40,10 @@ def describe_model(description: FingerDescription, table: VariableTable) -> dict
     sizes = group_sizes(finger.joints, finger.tendons)
     groups = present_groups(table, {"links"} if description.data.get("links") is not None else set())
     variables = [variable for group in groups for variable in elements(group, sizes)]
-    variables += _parameters(finger.parameters(), table)
+    variables += _parameters(finger.parameters(), table, description.data)
     index = {variable["name"]: k for k, variable in enumerate(variables, start=1)}
-    outputs = list(_outputs(groups, sizes, index, dependencies(structure_of(description))))
+    late = any(row["effect"] == "time_delay" for row in extension_rows(description.data))
+    outputs = list(_outputs(groups, sizes, index, dependencies(structure_of(description)), late))
     return {
         "name": NOT_IN_XML.sub("?", description.name),
         "description": f"Friction compensation of the tendon-driven finger {NOT_IN_XML.sub('?', description.name)}: "
@@ -90,8 +92,11 @@ def elements(group: Mapping[str, Any], sizes: Mapping[str, int]) -> Iterator[dic
         yield {**given, **where, "name": name, "vr": group["base"] + i, "description": text}
 
 
-def _parameters(parameters: list[native.Parameter], table: VariableTable) -> Iterator[dict[str, Any]]:
+def _parameters(
+    parameters: list[native.Parameter], table: VariableTable, data: Mapping[str, Any]
+) -> Iterator[dict[str, Any]]:
     settings = table.data["parameters"]
+    effects = {f"extensions[{k}]": place_of(row) for k, row in enumerate(extension_rows(data), start=1)}
     for k, parameter in enumerate(parameters):
         yield {
             "name": parameter.path,
@@ -100,7 +105,7 @@ def _parameters(parameters: list[native.Parameter], table: VariableTable) -> Ite
             "causality": settings["causality"],
             "variability": "tunable" if parameter.tunable else "fixed",
             "initial": settings["initial"],
-            "description": parameter_description(parameter.path, table),
+            "description": parameter_description(parameter.path, table) + effects.get(parameter.path.split(".")[0], ""),
             "unit": parameter.unit,
             "min": parameter.minimum,
             "max": parameter.maximum,
@@ -119,15 +124,20 @@ def parameter_description(path: str, table: VariableTable) -> str:
 
 
 def _outputs(
-    present: list[Mapping[str, Any]], sizes: Mapping[str, int], index: Mapping[str, int], structure: Dependencies
+    present: list[Mapping[str, Any]],
+    sizes: Mapping[str, int],
+    index: Mapping[str, int],
+    structure: Dependencies,
+    late: bool,
 ) -> Iterator[dict[str, Any]]:
+    """late: forces may be those of earlier samples, so that no dependency is by a fixed factor."""
     groups = {group["name"]: group for group in present}
     for group in present:
         if group["causality"] != "output":
             continue
         for name, inputs in zip(_names(group, sizes), structure[group["name"]], strict=True):
             known = {
-                index[_names(groups[of], sizes)[i]]: group["dependencies"][of]["kind"]
+                index[_names(groups[of], sizes)[i]]: "dependent" if late else group["dependencies"][of]["kind"]
                 for of, elements in inputs.items()
                 for i in elements
             }

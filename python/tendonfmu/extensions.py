@@ -1,0 +1,54 @@
+"""The numbers of `extensions` (docs/extensions.md): their names, and how large each is expected to be."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+# By effect, in the order of the FMU's parameters: magnitudes that matter on a hand of human size, SI units.
+MAGNITUDES: Mapping[str, Mapping[str, float]] = {
+    "cover_hardening": {"stiffness": 0.05},
+    "gravity": {"sine": 0.005, "cosine": 0.005},
+    "inertia": {"inertia": 1e-5},
+    "joint_coupling": {"stiffness": 0.02},
+    "preload_friction": {"coulomb": 0.2},
+    "load_friction": {"coulomb": 1e-4},
+    "force_gain": {"correction": 0.05},
+    "force_offset": {"correction": 0.5},
+    "moment_arm": {"correction": 5e-4},
+    "moment_arm_variation": {"slope": 5e-4},
+    "pulley_eccentricity": {"sine": 5e-4, "cosine": 5e-4},
+    "presliding": {"displacement": 1e-4},
+    "friction_drift": {"amplitude": 0.3, "time_constant": 100.0},
+    "tendon_nonlinearity": {"hardening": 1e5},
+    "backlash": {"width": 1e-4},
+    "time_delay": {"delay": 2e-3},
+}
+
+
+@dataclass(frozen=True)
+class ExtensionNumber:
+    """A number of an extension. path: as in the description. value: SI. magnitude: expected of such a number."""
+
+    path: str
+    value: float
+    magnitude: float
+
+
+def extension_rows(data: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """The extensions of a valid description; [] without the key."""
+    return list(data.get("extensions") or [])
+
+
+def extension_numbers(data: Mapping[str, Any]) -> Iterator[ExtensionNumber]:
+    """All numbers of the extensions of a valid description, in the order of the FMU's parameters; left out: 0."""
+    for k, row in enumerate(extension_rows(data), start=1):
+        for name, magnitude in MAGNITUDES[row["effect"]].items():
+            yield ExtensionNumber(f"extensions[{k}].{name}", float(row.get(name) or 0.0), magnitude)
+
+
+def place_of(row: Mapping[str, Any]) -> str:
+    """`, of load_friction at joint 2, tendon 1`: which effect an extension is, as an appendix to a text."""
+    where = ", ".join(f"{key} {row[key]}" for key in ("joint", "tendon") if row.get(key) is not None)
+    return f", of {row['effect']}" + (f" at {where}" if where else "")
