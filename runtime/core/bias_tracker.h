@@ -3,6 +3,7 @@
 #ifndef TENDONFMU_BIAS_TRACKER_H
 #define TENDONFMU_BIAS_TRACKER_H
 
+#include "extensions.h"
 #include "force_propagation.h"
 
 #include <math.h>
@@ -180,6 +181,9 @@ COLD_STATIC void bias_steps(tendonfmu_finger* f) {
   }
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     jump_joints(f, j, quad_set(settings->joint_threshold));
+  }
+  if (f->extensions.friction) {
+    grip_jumps(f);
   }
   sum_bias_jumps(f);
 }

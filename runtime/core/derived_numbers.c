@@ -5,6 +5,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "extensions.h"
 #include "pseudo_inverse.h"
 
 static const double two_pi = 6.28318530717958647692;
@@ -247,5 +248,6 @@ void derive_numbers(tendonfmu_finger* finger, int routing_changed) {
   if (routing_changed) {
     derive_routing(finger);
   }
+  find_extensions(finger);
   forget_views(finger);
 }

@@ -35,28 +35,37 @@ typedef struct linearisation {
   dual bias_step[MODEL_MAX_JOINTS]; /* Δb */
   double torque_slope[MODEL_MAX_JOINTS];
   double mean_force, mean_force_slope;
+  int gripped; /* extensions act on friction */
 } linearisation;
 
 static double seed(const double* direction, size_t i) {
   return direction ? direction[i] : 0.0;
 }
 
-static void linearise_kinematics(linearisation* l, const tendonfmu_inputs* direction) {
-  const tendonfmu_finger* f = l->finger;
-  const finger_state* s = &f->remembered;
-  const int source = (int)s->scalar[STATE_SOURCE];
-  for (size_t j = 0; j < f->joints; ++j) {
-    double angle = seed(direction->joint_position, j);
-    if (source == TENDONFMU_TENDON_POSITIONS) {
-      angle = 0.0;
-      for (size_t i = 0; i < f->tendons; ++i) {
-        const double stretch = seed(direction->tendon_force, i) * f->derived.inverse_stiffness[i];
-        angle += f->derived.inverse_routing[j * f->tendon_lanes + i] * (seed(direction->tendon_position, i) - stretch);
-      }
-    }
-    const double speed = source == TENDONFMU_JOINT_VELOCITIES ? seed(direction->joint_velocity, j)
-                                                              : s->scalar[STATE_VELOCITY_GAIN] * angle;
-    l->angle[j] = (dual){s->angle[j], angle};
+/* the inputs' direction as the model sees it: past what the extensions make of the signals */
+static void input_direction(const tendonfmu_finger* f, const tendonfmu_inputs* direction, signal_derivative* d) {
+  memset(d, 0, sizeof *d);
+  const int source = (int)f->remembered.scalar[STATE_SOURCE];
+  for (size_t i = 0; i < f->tendons; ++i) {
+    d->force[i] = seed(direction->tendon_force, i);
+    d->position[i] = source == TENDONFMU_TENDON_POSITIONS ? seed(direction->tendon_position, i) : 0.0;
+  }
+  for (size_t j = 0; j < f->joints && source != TENDONFMU_TENDON_POSITIONS; ++j) {
+    d->angle[j] = seed(direction->joint_position, j);
+    d->velocity[j] = seed(direction->joint_velocity, j);
+  }
+  pass_signals(f, d, 0);
+  angles_along(f, d);
+  pass_signals(f, d, 1);
+}
+
+/* angle and velocity along a direction of the signals */
+static void linearise_kinematics(linearisation* l, const signal_derivative* d) {
+  const finger_state* s = &l->finger->remembered;
+  const int given = (int)s->scalar[STATE_SOURCE] == TENDONFMU_JOINT_VELOCITIES;
+  for (size_t j = 0; j < l->finger->joints; ++j) {
+    const double speed = given ? d->velocity[j] : s->scalar[STATE_VELOCITY_GAIN] * d->angle[j];
+    l->angle[j] = (dual){s->angle[j], d->angle[j]};
     l->speed[j] = (dual){s->speed[j], speed};
   }
 }
@@ -96,12 +105,20 @@ static dual magnitude_at(const effect_laws* laws, int negative, dual speed) {
 }
 
 /* F at the present velocity: 0 where the effect sticks */
-static dual friction_at(const linearisation* l, const effect_laws* laws, size_t slot, dual velocity) {
-  if (l->finger->remembered.moving[slot] == 0.0) {
+static dual friction_at(const linearisation* l, const effect_laws* laws, size_t slot, double threshold, dual velocity) {
+  const finger_state* s = &l->finger->remembered;
+  const slot_grip grip = l->gripped ? slot_grip_of(l->finger, slot) : (slot_grip){.value = 1.0, .bias = 1.0};
+  if (grip.slides) {
+    const dual share = {grip.value, grip.by_velocity * velocity.slope};
+    const double sign = velocity.value < 0.0 ? -1.0 : 1.0;
+    const int negative = sliding_side(velocity.value, threshold, s->side[slot]);
+    return product(share, magnitude_at(laws, negative, scaled(sign, velocity)));
+  }
+  if (s->moving[slot] == 0.0) {
     return (dual){0.0, 0.0};
   }
-  const double side = l->finger->remembered.side[slot];
-  return scaled(side, magnitude_at(laws, side < 0.0, scaled(side, velocity)));
+  const double side = s->side[slot];
+  return scaled(grip.value * side, magnitude_at(laws, side < 0.0, scaled(side, velocity)));
 }
 
 /* b of fig. 5 at the last sample */
@@ -112,11 +129,12 @@ static dual bias_at(const linearisation* l, const effect_laws* laws, size_t slot
   if (s->event[slot] == 0.0) {
     return (dual){0.0, 0.0};
   }
-  const dual friction_before = scaled(before, magnitude_at(laws, before < 0.0, speed));
+  const double grip = l->gripped ? slot_grip_of(l->finger, slot).bias : 1.0;
+  const dual friction_before = scaled(grip * before, magnitude_at(laws, before < 0.0, speed));
   if (s->event[slot] > 0.0) {
     return friction_before;
   }
-  const dual friction_now = scaled(now, magnitude_at(laws, now < 0.0, speed));
+  const dual friction_now = scaled(grip * now, magnitude_at(laws, now < 0.0, speed));
   const double kept = before == 0.0 ? 0.0 : law_exponential(rest_exponent(l->finger, slot));
   if (l->finger->derived.settings.remembers_entry_load) {
     return scaled(kept - 1.0, friction_now); /* the rest of it, −κ·e, is remembered */
@@ -152,7 +170,7 @@ static void linearise_tendon(linearisation* l, size_t i, double force_slope) {
   for (size_t j = 0; j < f->joints; ++j) {
     const size_t slot = j * lanes + i;
     const effect_laws edge = edge_laws(l, j, i);
-    const dual edge_loss = product(acts, friction_at(l, &edge, slot, velocity[j]));
+    const dual edge_loss = product(acts, friction_at(l, &edge, slot, threshold, velocity[j]));
     jumped = sum(jumped, product(acts, bias_at(l, &edge, slot, threshold)));
     lost = sum(lost, edge_loss);
     force = difference(force, edge_loss);
@@ -160,7 +178,7 @@ static void linearise_tendon(linearisation* l, size_t i, double force_slope) {
     l->load[j] = sum(l->load[j], acts);
     if (j + 1 < f->joints) {
       const effect_laws pulley = {.below = f->derived.pulley_law + (slot + lanes) * LAW_NUMBERS};
-      const dual pulley_loss = product(acts, friction_at(l, &pulley, slot + lanes, velocity[j + 1]));
+      const dual pulley_loss = product(acts, friction_at(l, &pulley, slot + lanes, threshold, velocity[j + 1]));
       jumped = sum(jumped, product(acts, bias_at(l, &pulley, slot + lanes, threshold)));
       lost = sum(lost, pulley_loss);
       force = difference(force, pulley_loss);
@@ -182,25 +200,42 @@ static void linearise_joints(linearisation* l) {
   for (size_t j = 0; j < f->joints; ++j) {
     const effect_laws own = {.below = f->derived.joint_law + j * LAW_NUMBERS};
     const effect_laws loaded = {.below = f->derived.load_law + j * LAW_NUMBERS};
-    const dual own_friction = friction_at(l, &own, joint_row + j, l->speed[j]);
-    const dual load_friction = friction_at(l, &loaded, joint_row + j, l->speed[j]);
+    const dual own_friction = friction_at(l, &own, joint_row + j, threshold, l->speed[j]);
+    const dual load_friction = friction_at(l, &loaded, joint_row + j, threshold, l->speed[j]);
     const dual own_bias = bias_at(l, &own, joint_row + j, threshold);
     const dual load_bias = bias_at(l, &loaded, joint_row + j, threshold);
     const dual cover = scaled(f->derived.cover_stiffness[j], l->angle[j]);
     l->friction[j] = sum(l->friction[j], sum(own_friction, sum(product(load_friction, l->load[j]), cover)));
     l->bias_step[j] = sum(l->bias_step[j], sum(own_bias, product(load_bias, l->load[j])));
   }
-  for (uint32_t i = 0; i < f->shape.extension_count; ++i) {
-    size_t j;
-    const effect_torque torque = extension_torque(f, i, &j);
-    l->friction[j].slope += torque.by_angle * l->angle[j].slope + torque.by_velocity * l->speed[j].slope;
+}
+
+/* what the torque rows add */
+static void linearise_extensions(linearisation* l, const double* force) {
+  const tendonfmu_finger* f = l->finger;
+  double angle[MODEL_MAX_JOINTS], velocity[MODEL_MAX_JOINTS], slope[MODEL_MAX_JOINTS] = {0.0};
+  if (!f->extensions.torques) {
+    return;
+  }
+  for (size_t j = 0; j < f->joints; ++j) {
+    angle[j] = l->angle[j].slope;
+    velocity[j] = l->speed[j].slope;
+  }
+  const effect_sample sample = remembered_sample(f);
+  const effect_direction direction = {angle, velocity, force};
+  for (size_t r = 0; r < f->extensions.torques; ++r) {
+    const extension_row* row = torque_row(f, r);
+    row->effect->slope(row->place, row->parameters, &sample, row->memory, &direction, slope);
+  }
+  for (size_t j = 0; j < f->joints; ++j) {
+    l->friction[j].slope += slope[j];
   }
 }
 
-static void linearise_forces(linearisation* l, const tendonfmu_inputs* direction) {
+static void linearise_forces(linearisation* l, const double* direction) {
   const tendonfmu_finger* f = l->finger;
   for (size_t i = 0; i < f->tendons; ++i) {
-    const double force = f->remembered.force[i], slope = seed(direction->tendon_force, i);
+    const double force = f->remembered.force[i], slope = direction[i];
     l->mean_force += fabs(force) / (double)f->tendons;
     l->mean_force_slope += (force < 0.0 ? -slope : slope) / (double)f->tendons;
     for (size_t j = 0; j < f->joints; ++j) {
@@ -247,13 +282,34 @@ static void write_joint(const linearisation* l, size_t j, const tendonfmu_output
   write_slope(derivative->joint_speed, j, l->speed[j].slope);
 }
 
+static void linearise_torques(linearisation* l, const double* force) {
+  linearise_forces(l, force);
+  linearise_joints(l);
+  linearise_extensions(l, force);
+}
+
 void directional_derivative(const tendonfmu_finger* finger, const tendonfmu_inputs* direction,
                             const tendonfmu_outputs* derivative) {
-  linearisation l = {.finger = finger};
-  linearise_kinematics(&l, direction);
-  linearise_forces(&l, direction);
-  linearise_joints(&l);
+  linearisation l = {.finger = finger, .gripped = finger->extensions.friction > 0};
+  signal_derivative signals;
+  input_direction(finger, direction, &signals);
+  linearise_kinematics(&l, &signals);
+  linearise_torques(&l, signals.force);
   for (size_t j = 0; j < finger->joints; ++j) {
     write_joint(&l, j, derivative);
+  }
+}
+
+void torque_along(const tendonfmu_finger* finger, const double* angle, const double* speed, const double* force,
+                  double* torque, double* jump) {
+  linearisation l = {.finger = finger, .gripped = finger->extensions.friction > 0};
+  for (size_t j = 0; j < finger->joints; ++j) {
+    l.angle[j] = (dual){finger->remembered.angle[j], angle[j]};
+    l.speed[j] = (dual){finger->remembered.speed[j], speed[j]};
+  }
+  linearise_torques(&l, force);
+  for (size_t j = 0; j < finger->joints; ++j) {
+    torque[j] = l.friction[j].slope - l.torque_slope[j];
+    jump[j] = l.bias_step[j].slope;
   }
 }

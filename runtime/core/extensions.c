@@ -2,66 +2,394 @@
 
 #include "extensions.h"
 
-/* One row of the table, with where its parameters and its memory are. */
-typedef struct extension {
-  const effect_type* effect;
-  size_t joint;
+#include <math.h>
+#include <string.h>
+
+#include "slot_view.h"
+
+/* --- the table ------------------------------------------------------------------------------------------------------
+ */
+
+typedef struct row_search {
+  tendonfmu_finger* finger;
+  effect_kind kind;
+  size_t found;
   const double* parameters;
-  double* memory;
-} extension;
+  size_t memory; /* before the row, numbers */
+} row_search;
 
-static extension extension_begin(const tendonfmu_finger* f) {
-  const double* parameters = f->parameters + f->shape.parameter_count;
+static void note_row(row_search* search, uint32_t index, uint32_t first_parameter) {
+  tendonfmu_finger* f = search->finger;
+  const uint32_t* words = f->shape.extensions + (size_t)index * MODEL_EXTENSION_WORDS;
+  const effect_type* effect = effect_by_id(words[0]);
+  const effect_place place = model_extension_place(&f->shape, index);
+  const size_t all = model_extension_memory(effect, &f->shape, place);
+  const size_t own = effect->state_count ? effect->state_count(f->joints, f->tendons, place) : 0;
+  if (effect->kind == search->kind) {
+    double *memory = f->remembered.extension + search->memory, *next = f->scratch.extension + search->memory;
+    f->extensions.row[search->found++] = (extension_row){.effect = effect,
+                                                         .place = place,
+                                                         .index = index,
+                                                         .first_parameter = first_parameter,
+                                                         .parameters = f->parameters + first_parameter,
+                                                         .memory = memory,
+                                                         .next = next,
+                                                         .memory_count = own,
+                                                         .slopes = memory + own,
+                                                         .next_slopes = next + own};
+  }
+  search->memory += all;
+}
+
+static size_t note_kind(tendonfmu_finger* f, effect_kind kind, size_t begin) {
+  row_search search = {.finger = f, .kind = kind, .found = begin};
+  uint32_t parameter = f->shape.parameter_count;
+  for (uint32_t i = f->shape.extension_count; i-- > 0;) {
+    parameter -= effect_by_id(f->shape.extensions[(size_t)i * MODEL_EXTENSION_WORDS])->parameter_count;
+  }
   for (uint32_t i = 0; i < f->shape.extension_count; ++i) {
-    parameters -= effect_by_id(f->shape.extensions[i * MODEL_EXTENSION_WORDS])->parameter_count;
+    note_row(&search, i, parameter);
+    parameter += effect_by_id(f->shape.extensions[(size_t)i * MODEL_EXTENSION_WORDS])->parameter_count;
   }
-  return (extension){.parameters = parameters, .memory = f->remembered.extension};
+  return search.found - begin;
 }
 
-/* moves to row i; rows are visited in order */
-static void extension_at(const tendonfmu_finger* f, uint32_t i, extension* e) {
-  const uint32_t* row = f->shape.extensions + (size_t)i * MODEL_EXTENSION_WORDS;
-  if (e->effect) {
-    e->memory += e->effect->state_count(e->parameters);
-    e->parameters += e->effect->parameter_count;
-  }
-  e->effect = effect_by_id(row[0]);
-  e->joint = row[1] - 1;
-}
-
-static effect_sample sample_at(const tendonfmu_finger* f, size_t joint, const double* angle, const double* velocity) {
-  return (effect_sample){
-      .joint_angle = angle[joint], .joint_velocity = velocity[joint], .rest_angle = f->derived.cover_rest[joint]};
-}
-
-void add_extension_torques(tendonfmu_finger* finger) {
-  const double* velocity = finger->scratch.velocity + finger->joints * finger->tendon_lanes;
-  extension e = extension_begin(finger);
-  for (uint32_t i = 0; i < finger->shape.extension_count; ++i) {
-    extension_at(finger, i, &e);
-    const effect_sample sample = sample_at(finger, e.joint, finger->scratch.angle, velocity);
-    finger->scratch.friction[e.joint] += e.effect->torque(e.parameters, &sample, e.memory).value;
-  }
-}
-
-void remember_extensions(tendonfmu_finger* finger) {
-  const double* velocity = finger->scratch.velocity + finger->joints * finger->tendon_lanes;
-  extension e = extension_begin(finger);
-  for (uint32_t i = 0; i < finger->shape.extension_count; ++i) {
-    extension_at(finger, i, &e);
-    if (e.effect->remember) {
-      const effect_sample sample = sample_at(finger, e.joint, finger->scratch.angle, velocity);
-      e.effect->remember(e.parameters, &sample, e.memory);
+static void find_axis_cosines(tendonfmu_finger* f) {
+  const int linked = (f->shape.options & MODEL_HAS_LINKS) != 0;
+  const double* axis = f->derived.links.axis; /* unit vectors */
+  for (size_t j = 0; j < f->joints; ++j) {
+    for (size_t k = 0; k < f->joints; ++k) {
+      const double *a = axis + 3 * j, *b = axis + 3 * k;
+      f->derived.axis_cosine[j * f->joints + k] = linked ? a[0] * b[0] + a[1] * b[1] + a[2] * b[2] : 1.0;
     }
   }
 }
 
-effect_torque extension_torque(const tendonfmu_finger* finger, size_t extension_index, size_t* joint) {
-  extension e = extension_begin(finger);
-  for (uint32_t i = 0; i <= extension_index; ++i) {
-    extension_at(finger, i, &e);
+void find_extensions(tendonfmu_finger* f) {
+  if (!f->shape.extension_count) {
+    return;
   }
-  const effect_sample sample = sample_at(finger, e.joint, finger->remembered.angle, finger->remembered.speed);
-  *joint = e.joint;
-  return e.effect->torque(e.parameters, &sample, e.memory);
+  f->extensions.signals = note_kind(f, EFFECT_SIGNAL, 0);
+  f->extensions.friction = note_kind(f, EFFECT_FRICTION, f->extensions.signals);
+  f->extensions.torques = note_kind(f, EFFECT_TORQUE, f->extensions.signals + f->extensions.friction);
+  find_axis_cosines(f);
+}
+
+const extension_row* extension_of(const tendonfmu_finger* f, uint32_t index) {
+  const extension_row* row = f->extensions.row;
+  while (row->index != index) {
+    ++row;
+  }
+  return row;
+}
+
+/* --- signals --------------------------------------------------------------------------------------------------------
+ */
+
+static effect_signals signal_direction(const tendonfmu_finger* f, signal_derivative* d) {
+  return (effect_signals){.joints = f->joints,
+                          .tendons = f->tendons,
+                          .source = (int)f->remembered.scalar[STATE_SOURCE],
+                          .force = d->force,
+                          .position = d->position,
+                          .angle = d->angle,
+                          .velocity = d->velocity,
+                          .inverse_stiffness = f->derived.inverse_stiffness};
+}
+
+void angles_along(const tendonfmu_finger* f, signal_derivative* d) {
+  if ((int)f->remembered.scalar[STATE_SOURCE] != TENDONFMU_TENDON_POSITIONS) {
+    return;
+  }
+  for (size_t j = 0; j < f->joints; ++j) {
+    for (size_t i = 0; i < f->tendons; ++i) {
+      const double stretch = d->force[i] * f->derived.inverse_stiffness[i];
+      d->angle[j] += f->derived.inverse_routing[j * f->tendon_lanes + i] * (d->position[i] - stretch);
+    }
+  }
+}
+
+void shape_signals(tendonfmu_finger* f, double time, int late) {
+  const finger_scratch* s = &f->scratch;
+  effect_signals signals = {.joints = f->joints,
+                            .tendons = f->tendons,
+                            .first = f->remembered.scalar[STATE_INITIALISED] == 0.0,
+                            .source = (int)f->remembered.scalar[STATE_SOURCE],
+                            .late = late,
+                            .time = time,
+                            .force = s->force,
+                            .position = s->position,
+                            .angle = s->angle,
+                            .velocity = s->velocity + f->joints * f->tendon_lanes,
+                            .inverse_stiffness = f->derived.inverse_stiffness};
+  for (size_t n = 0; n < f->extensions.signals; ++n) {
+    const extension_row* row = signal_row(f, n);
+    row->effect->signal(row->place, row->parameters, &signals, row->memory, row->next);
+  }
+}
+
+static const double* memory_of(const extension_row* row, int in_step) {
+  return in_step ? row->next : row->memory;
+}
+
+void derive_signals(const tendonfmu_finger* f, size_t n, uint32_t k, int in_step, signal_derivative* d) {
+  memset(d, 0, sizeof *d);
+  effect_signals direction = signal_direction(f, d);
+  for (direction.late = 0; direction.late < 2; ++direction.late) {
+    for (size_t r = direction.late ? 0 : n; r < f->extensions.signals; ++r) {
+      const extension_row* row = signal_row(f, r);
+      if (r == n) {
+        row->effect->signal_slope(row->place, row->parameters, k, memory_of(row, in_step), &direction);
+      } else {
+        row->effect->signal_pass(row->place, row->parameters, memory_of(row, in_step), &direction);
+      }
+    }
+    if (!direction.late) {
+      angles_along(f, d);
+    }
+  }
+}
+
+void pass_signals(const tendonfmu_finger* f, signal_derivative* d, int late) {
+  effect_signals direction = signal_direction(f, d);
+  direction.late = late;
+  for (size_t r = 0; r < f->extensions.signals; ++r) {
+    const extension_row* row = signal_row(f, r);
+    row->effect->signal_pass(row->place, row->parameters, row->memory, &direction);
+  }
+}
+
+void follow_signals(tendonfmu_finger* f, double step, double velocity_gain) {
+  const size_t n = f->joints;
+  const int first = f->remembered.scalar[STATE_INITIALISED] == 0.0;
+  const int given = (int)f->remembered.scalar[STATE_SOURCE] == TENDONFMU_JOINT_VELOCITIES;
+  const double share = velocity_gain * step;
+  signal_derivative d;
+  for (size_t r = 0; r < f->extensions.signals; ++r) {
+    const extension_row* row = signal_row(f, r);
+    for (uint32_t k = 0; k < row->effect->parameter_count; ++k) {
+      const double* before = row->slopes + 2 * n * k;
+      double* next = row->next_slopes + 2 * n * k;
+      derive_signals(f, r, k, 1, &d);
+      for (size_t j = 0; j < n; ++j) {
+        const double filtered = before[n + j] + velocity_gain * (d.angle[j] - before[j]) - share * before[n + j];
+        next[j] = d.angle[j];
+        next[n + j] = given ? d.velocity[j] : first ? 0.0 : filtered;
+      }
+    }
+  }
+}
+
+/* --- what the others remember ---------------------------------------------------------------------------------------
+ */
+
+void advance_extensions(tendonfmu_finger* f, double time, double step) {
+  const finger_scratch* s = &f->scratch;
+  f->scratch.sample = (effect_sample){.joints = f->joints,
+                                      .tendons = f->tendons,
+                                      .lanes = f->tendon_lanes,
+                                      .first = f->remembered.scalar[STATE_INITIALISED] == 0.0,
+                                      .source = (int)f->remembered.scalar[STATE_SOURCE],
+                                      .time = time,
+                                      .step = step,
+                                      .angle = s->angle,
+                                      .velocity = s->velocity + f->joints * f->tendon_lanes,
+                                      .tendon_velocity = s->velocity,
+                                      .force = s->force,
+                                      .moment_arm = f->derived.moment_arm,
+                                      .rest_angle = f->derived.cover_rest,
+                                      .axis_cosine = f->derived.axis_cosine,
+                                      .tendon_threshold = f->derived.settings.tendon_threshold,
+                                      .joint_threshold = f->derived.settings.joint_threshold};
+  for (size_t r = f->extensions.signals; r < f->shape.extension_count; ++r) {
+    const extension_row* row = f->extensions.row + r;
+    if (row->effect->advance) {
+      row->effect->advance(row->place, row->parameters, &s->sample, row->memory, row->next);
+    }
+  }
+}
+
+effect_sample remembered_sample(const tendonfmu_finger* f) {
+  effect_sample sample = {.joints = f->joints,
+                          .tendons = f->tendons,
+                          .lanes = f->tendon_lanes,
+                          .first = f->remembered.scalar[STATE_FIRST_SAMPLE] != 0.0,
+                          .source = (int)f->remembered.scalar[STATE_SOURCE],
+                          .time = f->remembered.scalar[STATE_TIME],
+                          .angle = f->remembered.angle,
+                          .velocity = f->remembered.speed,
+                          .force = f->remembered.force,
+                          .moment_arm = f->derived.moment_arm,
+                          .rest_angle = f->derived.cover_rest,
+                          .axis_cosine = f->derived.axis_cosine,
+                          .tendon_threshold = f->derived.settings.tendon_threshold,
+                          .joint_threshold = f->derived.settings.joint_threshold};
+  return sample;
+}
+
+/* --- friction -------------------------------------------------------------------------------------------------------
+ */
+
+size_t friction_members(const tendonfmu_finger* f, effect_place place) {
+  if (place.joint != EFFECT_NOWHERE) {
+    return 1;
+  }
+  return place.tendon != EFFECT_NOWHERE ? f->joints : f->joints * (f->tendons + 1);
+}
+
+size_t friction_slot(const tendonfmu_finger* f, effect_place place, size_t k) {
+  const size_t lanes = f->tendon_lanes;
+  if (place.joint != EFFECT_NOWHERE) {
+    return f->joints * lanes + place.joint;
+  }
+  if (place.tendon != EFFECT_NOWHERE) {
+    return k * lanes + place.tendon;
+  }
+  return k < f->joints * f->tendons ? k / f->tendons * lanes + k % f->tendons : f->joints * (lanes - f->tendons) + k;
+}
+
+size_t friction_member(effect_place place, size_t k) {
+  return place.tendon != EFFECT_NOWHERE ? k : 0;
+}
+
+static void add_grip(slot_grip* to, const effect_grip* grip) {
+  to->by_velocity = to->by_velocity * grip->value + to->value * grip->by_velocity;
+  to->value *= grip->value;
+  to->slides |= grip->slides;
+  to->bias *= grip->slides ? 0.0 : grip->value;
+}
+
+slot_grip slot_grip_of(const tendonfmu_finger* f, size_t slot) {
+  slot_grip found = {.value = 1.0, .bias = 1.0};
+  for (size_t r = 0; r < f->extensions.friction; ++r) {
+    const extension_row* row = friction_row(f, r);
+    const size_t members = friction_members(f, row->place);
+    for (size_t k = 0; k < members; ++k) {
+      if (friction_slot(f, row->place, k) == slot) {
+        const effect_grip grip =
+            row->effect->grip(row->place, row->parameters, row->memory, friction_member(row->place, k));
+        add_grip(&found, &grip);
+      }
+    }
+  }
+  return found;
+}
+
+/* into scratch, for every slot of the sample being taken */
+static void find_grips(tendonfmu_finger* f) {
+  finger_scratch* s = &f->scratch;
+  for (size_t slot = 0; slot < f->slots; ++slot) {
+    s->grip[slot] = s->bias_grip[slot] = 1.0;
+    s->slides[slot] = 0.0;
+  }
+  for (size_t r = 0; r < f->extensions.friction; ++r) {
+    const extension_row* row = friction_row(f, r);
+    const size_t members = friction_members(f, row->place);
+    for (size_t k = 0; k < members; ++k) {
+      const size_t slot = friction_slot(f, row->place, k);
+      const effect_grip grip =
+          row->effect->grip(row->place, row->parameters, row->next, friction_member(row->place, k));
+      s->grip[slot] *= grip.value;
+      s->bias_grip[slot] *= grip.slides ? 0.0 : grip.value;
+      s->slides[slot] = grip.slides ? 1.0 : s->slides[slot];
+    }
+  }
+}
+
+static double magnitude(const double* law, int negative, double speed) {
+  return law_with_slopes(law + negative * LAW_SIDE_NUMBERS, speed).value;
+}
+
+/* |F_B| with its working points */
+static double edge_magnitude(const tendonfmu_finger* f, size_t slot, int negative, double speed) {
+  const size_t j = slot / f->tendon_lanes;
+  const double angle = j ? f->scratch.angle[j - 1] : 0.0;
+  const size_t record = f->derived.edge_record[slot] + slot_segment(f, j, slot % f->tendon_lanes, angle);
+  const double* segment = f->derived.edge_segment + 2 * record;
+  const double below = magnitude(f->derived.edge_law + record * LAW_NUMBERS, negative, speed);
+  if (segment[1] == 0.0) {
+    return below;
+  }
+  const double above = magnitude(f->derived.edge_law + (record + 1) * LAW_NUMBERS, negative, speed);
+  return below + (angle - segment[0]) * segment[1] * (above - below);
+}
+
+/* the two friction values of a slot, where they stand in scratch */
+typedef struct slot_values {
+  double *friction[2], *stuck[2];
+} slot_values;
+
+static slot_values values_of(const tendonfmu_finger* f, size_t slot) {
+  const finger_scratch* s = &f->scratch;
+  const size_t joint_row = f->joints * f->tendon_lanes;
+  double *stuck = s->edge_stuck + slot, *other_stuck = s->pulley_stuck + slot;
+  if (slot >= joint_row) {
+    return (slot_values){{s->joint_friction + slot - joint_row, s->load_friction + slot - joint_row},
+                         {stuck, other_stuck}};
+  }
+  return (slot_values){{s->edge + slot, slot >= f->tendon_lanes ? s->pulley + slot : NULL}, {stuck, other_stuck}};
+}
+
+static void slide(tendonfmu_finger* f, size_t slot, const slot_values* at) {
+  const derived_numbers* d = &f->derived;
+  const size_t joint_row = f->joints * f->tendon_lanes;
+  const double v = f->scratch.velocity[slot], share = f->scratch.grip[slot], speed = fabs(v);
+  const double threshold = slot < joint_row ? d->settings.tendon_threshold : d->settings.joint_threshold;
+  const int negative = sliding_side(v, threshold, f->remembered.side[slot]);
+  if (slot < joint_row) {
+    *at->friction[0] = share * edge_magnitude(f, slot, negative, speed);
+    if (at->friction[1]) {
+      *at->friction[1] = share * magnitude(d->pulley_law + slot * LAW_NUMBERS, negative, speed);
+    }
+  } else {
+    const size_t law = (slot - joint_row) * LAW_NUMBERS;
+    *at->friction[0] = share * magnitude(d->joint_law + law, negative, speed);
+    *at->friction[1] = share * magnitude(d->load_law + law, negative, speed);
+  }
+  *at->stuck[0] = *at->stuck[1] = 0.0;
+}
+
+void grip_friction(tendonfmu_finger* f) {
+  const finger_scratch* s = &f->scratch;
+  find_grips(f);
+  for (size_t slot = 0; slot < f->slots; ++slot) {
+    const slot_values at = values_of(f, slot);
+    if (s->slides[slot] != 0.0) {
+      slide(f, slot, &at);
+    } else if (s->grip[slot] != 1.0) {
+      for (int k = 0; k < 2; ++k) {
+        if (at.friction[k]) {
+          *at.friction[k] *= s->grip[slot];
+          *at.stuck[k] *= s->grip[slot];
+        }
+      }
+    }
+  }
+}
+
+void grip_jumps(tendonfmu_finger* f) {
+  const finger_scratch* s = &f->scratch;
+  const size_t joint_row = f->joints * f->tendon_lanes;
+  for (size_t slot = 0; slot < joint_row; ++slot) {
+    s->edge_bias[slot] *= s->bias_grip[slot];
+    s->pulley_bias[slot] *= s->bias_grip[slot];
+  }
+  for (size_t j = 0; j < f->joints; ++j) {
+    s->joint_bias[j] *= s->bias_grip[joint_row + j];
+    s->load_bias[j] *= s->bias_grip[joint_row + j];
+  }
+}
+
+/* --- torques --------------------------------------------------------------------------------------------------------
+ */
+
+void add_extension_torques(tendonfmu_finger* f) {
+  for (size_t r = 0; r < f->extensions.torques; ++r) {
+    const extension_row* row = torque_row(f, r);
+    row->effect->torque(row->place, row->parameters, &f->scratch.sample, row->next, f->scratch.friction);
+  }
+}
+
+void remember_extensions(tendonfmu_finger* f) {
+  memcpy(f->remembered.extension, f->scratch.extension, f->shape.extension_memory * sizeof(double));
 }

@@ -1,16 +1,91 @@
-/* The effects beyond the paper that a finger carries: their torques, their memory. */
+/* The effects beyond the paper that a finger carries: what they remember, what they do to signals, friction and torques
+ * of a sample (docs/extensions.md). */
 #ifndef TENDONFMU_EXTENSIONS_H
 #define TENDONFMU_EXTENSIONS_H
 
 #include "finger_memory.h"
 
-/* Adds the torque of every extension to T of its joint, in scratch. */
+/* Fills the table of rows and the cosines between the axes; whenever numbers were derived anew. */
+void find_extensions(tendonfmu_finger* finger);
+
+/* The n-th row of a part of the table. */
+static inline const extension_row* signal_row(const tendonfmu_finger* finger, size_t n) {
+  return finger->extensions.row + n;
+}
+static inline const extension_row* friction_row(const tendonfmu_finger* finger, size_t n) {
+  return finger->extensions.row + finger->extensions.signals + n;
+}
+static inline const extension_row* torque_row(const tendonfmu_finger* finger, size_t n) {
+  return finger->extensions.row + finger->extensions.signals + finger->extensions.friction + n;
+}
+
+/* Row of the extension `index` of the description. */
+const extension_row* extension_of(const tendonfmu_finger* finger, uint32_t index);
+
+/* Slots of a friction row: its member k slides with slot friction_slot(k), k < friction_members(). A row everywhere has
+ * the slots of all tendons, then those of all joints. */
+size_t friction_members(const tendonfmu_finger* finger, effect_place place);
+size_t friction_slot(const tendonfmu_finger* finger, effect_place place, size_t k);
+/* The member as effect_type.grip() counts it. */
+size_t friction_member(effect_place place, size_t k);
+
+/* What all friction rows together make of a slot, from the memory: F = value·|F(v)| where it slides, else value·F; b is
+ * multiplied by bias. */
+typedef struct slot_grip {
+  int slides;
+  double value, by_velocity, bias;
+} slot_grip;
+slot_grip slot_grip_of(const tendonfmu_finger* finger, size_t slot);
+
+/* Side of the law of a slot that never sticks: 1 where it is the one for v < 0. */
+static inline int sliding_side(double velocity, double threshold, double side) {
+  return velocity > threshold ? 0 : velocity < -threshold ? 1 : side < 0.0;
+}
+
+/* --- a step, in this order ---------------------------------------------------------------------------------------- */
+
+/* Signals in scratch, before the joint angles are known (late 0) and after (late 1); time of the sample, s. */
+void shape_signals(tendonfmu_finger* finger, double time, int late);
+
+/* ∂q and ∂q̇ by the numbers of the signal rows; the velocities are known. velocity_gain: ∂q̇/∂q of this sample. */
+void follow_signals(tendonfmu_finger* finger, double step, double velocity_gain);
+
+/* What every other effect will remember; angles, velocities and forces are known. */
+void advance_extensions(tendonfmu_finger* finger, double time, double step);
+
+/* F of every slot with a friction row, in scratch, from the laws and what the rows make of it. */
+void grip_friction(tendonfmu_finger* finger);
+
+/* b of every slot with a friction row, in scratch. */
+void grip_jumps(tendonfmu_finger* finger);
+
+/* Adds the torques to T, in scratch. */
 void add_extension_torques(tendonfmu_finger* finger);
 
-/* Brings the memory of every extension up to the sample in scratch. */
+/* The sample is accepted. */
 void remember_extensions(tendonfmu_finger* finger);
 
-/* One extension at the sample last remembered. */
-effect_torque extension_torque(const tendonfmu_finger* finger, size_t extension, size_t* joint);
+/* --- derivatives of the signals ----------------------------------------------------------------------------------- */
+
+/* A direction in the space of the signals, or what the effects make of one. */
+typedef struct signal_derivative {
+  double force[MODEL_MAX_TENDONS], position[MODEL_MAX_TENDONS], angle[MODEL_MAX_JOINTS], velocity[MODEL_MAX_JOINTS];
+} signal_derivative;
+
+/* Adds what position and force make of the joint angles, where these come from them. */
+void angles_along(const tendonfmu_finger* finger, signal_derivative* derivative);
+
+/* By number k of the n-th signal row; velocity with source 3 only. in_step: of the sample being taken, else of the one
+ * last remembered. */
+void derive_signals(const tendonfmu_finger* finger, size_t n, uint32_t k, int in_step, signal_derivative* derivative);
+
+/* Turns a direction of the inputs into that of what the signal rows made of them, at the sample last remembered; before
+ * (late 0) and after the joint angles are known. */
+void pass_signals(const tendonfmu_finger* finger, signal_derivative* derivative, int late);
+
+/* --- of the sample last remembered -------------------------------------------------------------------------------- */
+
+/* The sample as torque rows see it. */
+effect_sample remembered_sample(const tendonfmu_finger* finger);
 
 #endif

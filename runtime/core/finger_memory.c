@@ -74,6 +74,16 @@ static void lay_out_derived(tendonfmu_finger* f, cursor* c) {
   d->direction = take_numbers(c, model_direction_count(&f->shape) ? n * (f->tendons + MODEL_DIRECTION_SHARES) * 4 : 0);
 }
 
+static void lay_out_extensions(tendonfmu_finger* f, cursor* c) {
+  f->extensions.row = take(c, f->shape.extension_count * sizeof(extension_row));
+  f->derived.axis_cosine = take_numbers(c, f->shape.extension_count ? f->joints * f->joints : 0);
+  f->scratch.extension = take_numbers(c, f->shape.extension_memory);
+  const size_t slots = f->shape.extension_count ? f->slots : 0;
+  f->scratch.grip = take_numbers(c, slots);
+  f->scratch.bias_grip = take_numbers(c, slots);
+  f->scratch.slides = take_numbers(c, slots);
+}
+
 static void lay_out_state(tendonfmu_finger* f, cursor* c) {
   finger_state* s = &f->remembered;
   const size_t joints = f->joint_lanes, tendons = f->tendon_lanes, slots = f->slots;
@@ -142,6 +152,7 @@ static size_t lay_out(const model_shape* shape, tendonfmu_finger* f, unsigned ch
   lay_out_parameters(f, &c);
   lay_out_derived(f, &c);
   lay_out_state(f, &c);
+  lay_out_extensions(f, &c);
   lay_out_scratch(f, &c);
   return c.used;
 }

@@ -40,6 +40,24 @@ typedef struct finger_settings {
   double release_time; /* < 0: never */
 } finger_settings;
 
+/* One row of the description's extensions. */
+typedef struct extension_row {
+  const effect_type* effect;
+  effect_place place;
+  uint32_t index, first_parameter; /* in the description's order; among the parameters */
+  const double* parameters;
+  double *memory, *next; /* as the last sample left it; as the present one will */
+  size_t memory_count;   /* of the effect itself */
+  double* slopes; /* of signals, in memory: [parameter_count × 2n] ∂q and ∂q̇ by each number; next likewise */
+  double* next_slopes;
+} extension_row;
+
+/* The rows by what they act on, each part in the description's order: signals, friction, torques. */
+typedef struct extension_rows {
+  extension_row* row;
+  size_t signals, friction, torques; /* how many of each */
+} extension_rows;
+
 /* All that follows from the parameters; filled in one place, derived_numbers.c. Arrays of [n × M] have a row a joint.
  */
 typedef struct derived_numbers {
@@ -64,6 +82,7 @@ typedef struct derived_numbers {
   double* direction;   /* [n × (m + 3) × 4] relative errors, the directions of a joint side by side */
   link_geometry links; /* arrays NULL without links */
   int* least_link;     /* [n] of find_least_links() */
+  double* axis_cosine; /* [n × n] between the axes of two joints, 1 without links; with extensions only */
 } derived_numbers;
 
 /* What the finger remembers from sample to sample, with the outputs of the last one: one plain run of doubles. */
@@ -136,6 +155,10 @@ typedef struct finger_scratch {
   double *edge_stuck, *pulley_stuck;    /* [n × M + N] |F| where the effect sticks, 0 elsewhere; joints T_jv0, T_jvf */
   double *stuck_friction, *uncertainty; /* [N] H of what sticks now, u */
   double* part;                         /* as in the state */
+  double* extension;                    /* the memory of the extensions after this sample */
+  double *grip, *bias_grip, *slides;    /* [n × M + N] what friction rows make of F and b, 1 where a slot never sticks;
+                                           with    such rows only */
+  effect_sample sample;                 /* as the extensions see it */
   double start_above[2], stop_below[2]; /* speeds of tendons, joints at which an effect begins to move, comes to rest */
 } finger_scratch;
 
@@ -151,6 +174,7 @@ struct tendonfmu_finger {
   double *start, *parameters, *candidate; /* [p] of the image, in force, being checked */
   double* state;                          /* [state_count], what `remembered` points into */
   size_t state_count;
+  extension_rows extensions;
   derived_numbers derived;
   finger_state remembered;
   finger_scratch scratch;

@@ -143,11 +143,27 @@ static void walk_links(walk* w) {
   emit(w, (model_item){.kind = ITEM_TIP}, space);
 }
 
+static effect_place place_of(uint32_t joint, uint32_t tendon) {
+  return (effect_place){joint ? joint - 1 : EFFECT_NOWHERE, tendon ? tendon - 1 : EFFECT_NOWHERE};
+}
+
+effect_place model_extension_place(const model_shape* shape, uint32_t index) {
+  const uint32_t* row = shape->extensions + (size_t)index * MODEL_EXTENSION_WORDS;
+  return place_of(row[1], row[2]);
+}
+
+size_t model_extension_memory(const effect_type* effect, const model_shape* shape, effect_place place) {
+  const size_t slopes = effect->kind == EFFECT_SIGNAL ? 2 * (size_t)shape->joints * effect->parameter_count : 0;
+  return slopes + (effect->state_count ? effect->state_count(shape->joints, shape->tendons, place) : 0);
+}
+
 static void walk_extensions(walk* w) {
   for (uint32_t i = 0; i < w->shape->extension_count; ++i) {
     const uint32_t* row = w->shape->extensions + i * MODEL_EXTENSION_WORDS;
     const effect_type* effect = effect_by_id(row[0]);
-    emit(w, (model_item){.kind = ITEM_EXTENSION, .extension = i, .effect = effect, .joint = row[1] - 1},
+    emit(w,
+         (model_item){
+             .kind = ITEM_EXTENSION, .extension = i, .effect = effect, .place = model_extension_place(w->shape, i)},
          effect->parameter_count);
   }
 }
@@ -246,7 +262,7 @@ static int read_counts(const void* image, size_t image_size, model_shape* shape,
     return refuse_value(message, "model image: tendons", shape->tendons, "1 to 64");
   }
   if (shape->extension_count > MODEL_MAX_EXTENSIONS) {
-    return refuse_value(message, "model image: extensions", shape->extension_count, "at most 64");
+    return refuse_value(message, "model image: extensions", shape->extension_count, "at most 1024");
   }
   if (shape->options & ~(uint32_t)MODEL_OPTION_BITS) {
     return refuse_value(message, "model image: option bits", shape->options, "0 to 131071");
@@ -332,37 +348,33 @@ static int check_shape(const unsigned char* words, model_shape* shape, message_l
   return r.overrun || r.left ? refuse(message, "model image with a damaged shape: number of words") : 0;
 }
 
-/* the effects' parameters are the last ones, in the order of the table */
+static int place_is_sound(const effect_type* effect, const model_shape* shape, uint32_t joint, uint32_t tendon) {
+  const int at_joint = joint != 0, at_tendon = tendon != 0;
+  if (joint > shape->joints || tendon > shape->tendons || (effect->joint == PLACE_REFUSED && at_joint) ||
+      (effect->joint == PLACE_REQUIRED && !at_joint) || (effect->tendon == PLACE_REFUSED && at_tendon) ||
+      (effect->tendon == PLACE_REQUIRED && !at_tendon)) {
+    return 0;
+  }
+  switch (effect->rule) {
+    case PLACES_EXACTLY_ONE: return at_joint != at_tendon;
+    case PLACES_AT_MOST_ONE: return !(at_joint && at_tendon);
+    case PLACES_NOT_LAST_JOINT: return joint < shape->joints;
+    default: return 1;
+  }
+}
+
 static int check_extensions(const unsigned char* image, model_shape* shape, message_line message) {
   const unsigned char* row = image + MODEL_HEADER_BYTES + 4u * (size_t)shape->word_count;
-  uint32_t numbers = 0;
   for (uint32_t i = 0; i < shape->extension_count; ++i, row += 4 * MODEL_EXTENSION_WORDS) {
     const effect_type* effect = effect_by_id(load_u32(row));
     if (!effect) {
       return refuse_value(message, "model image: effect number", load_u32(row), "one that this version knows");
     }
-    if (load_u32(row + 4) < 1 || load_u32(row + 4) > shape->joints || load_u32(row + 8) || load_u32(row + 12)) {
-      return refuse_value(message, "model image: joint of an extension", load_u32(row + 4), "a joint of the finger");
+    const uint32_t joint = load_u32(row + 4), tendon = load_u32(row + 8);
+    if (!place_is_sound(effect, shape, joint, tendon) || load_u32(row + 12)) {
+      return refuse_value(message, "model image: joint of an extension", joint, "a place where such an effect can be");
     }
-    numbers += effect->parameter_count;
-  }
-  if (numbers > shape->parameter_count) {
-    return refuse(message, "model image with too few parameters for its extensions");
-  }
-  const unsigned char* values = image + values_offset(shape) + 8u * (size_t)(shape->parameter_count - numbers);
-  row = image + MODEL_HEADER_BYTES + 4u * (size_t)shape->word_count;
-  for (uint32_t i = 0; i < shape->extension_count; ++i, row += 4 * MODEL_EXTENSION_WORDS) {
-    const effect_type* effect = effect_by_id(load_u32(row));
-    double parameters[EFFECT_MAX_PARAMETERS];
-    load_doubles(parameters, values, effect->parameter_count);
-    for (uint32_t k = 0; k < effect->parameter_count; ++k) {
-      /* before the effect sizes its memory by them */
-      if (!(parameters[k] >= effect->parameters[k].minimum && parameters[k] <= effect->parameters[k].maximum)) {
-        return refuse_value(message, "model image: parameter out of range in extension", i + 1, "a sound one");
-      }
-    }
-    values += 8u * (size_t)effect->parameter_count;
-    shape->extension_memory += effect->state_count(parameters);
+    shape->extension_memory += model_extension_memory(effect, shape, place_of(joint, tendon));
   }
   return 0;
 }

@@ -9,10 +9,10 @@
  *          36  u32       m tendons, 1..64
  *          40  u32       option bits (MODEL_HAS_*)
  *          44  u32       w, number of shape words
- *          48  u32       e, number of extensions, 0..64
+ *          48  u32       e, number of extensions, 0..1024
  *          52  u32       p, number of parameters
  *          56  u32[w]    shape words: which friction exists (below)
- *              u32[4·e]  table of extensions: effect id, joint (1..n), 0, 0
+ *              u32[4·e]  table of extensions: effect id, joint (1..n) or 0, tendon (1..m) or 0, 0
  *              zeros up to a multiple of 8
  *              f64[p]    parameter values in canonical order (model_item)
  *
@@ -33,7 +33,7 @@ enum {
   MODEL_MAX_JOINTS = 16,
   MODEL_MAX_TENDONS = 64,
   MODEL_MAX_POINTS = 256,
-  MODEL_MAX_EXTENSIONS = 64,
+  MODEL_MAX_EXTENSIONS = 1024,
   MODEL_HEADER_BYTES = 56,
   MODEL_EXTENSION_WORDS = 4,
   MODEL_MAX_DIRECTIONS = 4,  /* of uncertainty, a joint */
@@ -128,11 +128,17 @@ typedef struct model_item {
   int has_angles;        /* the edge is a list of working points */
   law_kind law;          /* of laws */
   uint32_t extension;    /* 0-based */
+  effect_place place;    /* of an extension */
   const effect_type* effect;
 } model_item;
 
 /* Calls visit for each item in order; stops at the first result other than 0 and returns it. */
 int model_visit(const model_shape* shape, int (*visit)(void* context, const model_item* item), void* context);
+
+/* Where row `index` of the extensions acts, and how many numbers it remembers: its own, and, where it changes signals,
+ * ∂q and ∂q̇ of every joint by each of its numbers. */
+effect_place model_extension_place(const model_shape* shape, uint32_t index);
+size_t model_extension_memory(const effect_type* effect, const model_shape* shape, effect_place place);
 
 /* Directions of uncertainty that every joint has room for; joints with fewer have zeros there. */
 uint32_t model_direction_count(const model_shape* shape);

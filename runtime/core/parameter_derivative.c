@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "directional_derivative.h"
 #include "extensions.h"
 #include "slot_view.h"
 
@@ -24,14 +25,15 @@ static sizes sizes_of(const tendonfmu_finger* f) {
                  .places = places,
                  .friction = places * LAWS_OF_PLACE,
                  .bias = places * LAWS_OF_PLACE * SIDES_OF_JUMP,
-                 .plain = 2 * f->joints + EFFECT_MAX_PARAMETERS * (size_t)f->shape.extension_count};
+                 .plain = 2 * f->joints + EFFECT_MAX_PARAMETERS * f->joints * (size_t)f->shape.extension_count};
 }
 
 size_t parameter_derivative_size(const tendonfmu_finger* finger) {
   const sizes s = sizes_of(finger);
   const size_t words = 2 * (s.records + s.rows + 2 * s.joints);
   return (words + 1) / 2 * 2 * sizeof(uint32_t) + (s.friction + s.bias) * sizeof(law_term) +
-         s.plain * sizeof(plain_term) + (3 * s.places * finger->joints + 4 * finger->joints) * sizeof(double);
+         s.plain * sizeof(plain_term) +
+         (3 * s.places * finger->joints + 4 * finger->joints + 2 * s.places) * sizeof(double);
 }
 
 typedef struct law_search {
@@ -61,9 +63,8 @@ static void note_edge(law_search* search, const model_item* item) {
   }
 }
 
-static void note_plain(parameter_derivative* d, uint32_t parameter, uint32_t joint, uint32_t extension, uint32_t at) {
-  d->plain[d->plain_count++] =
-      (plain_term){.parameter = parameter, .joint = joint, .extension = extension, .position = at};
+static void note_cover(parameter_derivative* d, uint32_t parameter, uint32_t joint) {
+  d->plain[d->covers++] = (plain_term){.parameter = parameter, .joint = joint};
 }
 
 static int note_item(void* context, const model_item* item) {
@@ -78,13 +79,8 @@ static int note_item(void* context, const model_item* item) {
     case ITEM_EDGE_ANGLES: search->points = item->count; break;
     case ITEM_EDGE_FRICTION: note_edge(search, item); break;
     case ITEM_COVER:
-      note_plain(search->found, item->first, item->joint, PLAIN_COVER, 0);
-      note_plain(search->found, item->first + 1, item->joint, PLAIN_COVER, 1);
-      break;
-    case ITEM_EXTENSION:
-      for (uint32_t k = 0; k < item->count; ++k) {
-        note_plain(search->found, item->first + k, item->joint, item->extension, k);
-      }
+      note_cover(search->found, item->first, item->joint);
+      note_cover(search->found, item->first + 1, item->joint);
       break;
     default: break;
   }
@@ -108,6 +104,8 @@ void parameter_derivative_place(const tendonfmu_finger* finger, void* memory, pa
   derivative->bias_factor = take(&from, matrix);
   derivative->moved = take(&from, 2 * n * sizeof(double));
   derivative->jumped = take(&from, 2 * n * sizeof(double));
+  derivative->base = take(&from, s.places * sizeof(double));
+  derivative->jump_base = take(&from, s.places * sizeof(double));
   derivative->friction = take(&from, s.friction * sizeof(law_term));
   derivative->bias = take(&from, s.bias * sizeof(law_term));
   derivative->plain = take(&from, s.plain * sizeof(plain_term));
@@ -166,31 +164,42 @@ static double add_magnitude(const place_laws* p, int negative, double speed, dou
 
 /* F where the place moves, 0 where it sticks */
 static double read_friction(const tendonfmu_finger* f, const place_laws* p, parameter_derivative* d) {
-  if (f->remembered.moving[p->slot] == 0.0) {
-    return 0.0;
+  const double v = f->scratch.velocity[p->slot], speed = v < 0.0 ? -v : v;
+  const int gripped = f->extensions.friction > 0;
+  const double grip = gripped ? f->scratch.grip[p->slot] : 1.0;
+  if (gripped && f->scratch.slides[p->slot] != 0.0) {
+    const int negative = sliding_side(v, p->threshold, f->remembered.side[p->slot]);
+    d->base[p->place] = add_magnitude(p, negative, speed, grip, d->friction, &d->friction_count);
+  } else if (f->remembered.moving[p->slot] == 0.0) {
+    d->base[p->place] = 0.0;
+  } else {
+    const double sign = v < 0.0 ? -1.0 : 1.0;
+    d->base[p->place] = sign * add_magnitude(p, v < 0.0, speed, grip * sign, d->friction, &d->friction_count);
   }
-  const double v = f->scratch.velocity[p->slot], sign = v < 0.0 ? -1.0 : 1.0;
-  return sign * add_magnitude(p, v < 0.0, sign * v, sign, d->friction, &d->friction_count);
+  return grip * d->base[p->place];
 }
 
 /* b of fig. 5 */
 static double read_jump(const tendonfmu_finger* f, const place_laws* p, parameter_derivative* d) {
   const finger_state* s = &f->remembered;
   const double before = s->side_before[p->slot], now = s->side[p->slot];
+  const double grip = f->extensions.friction ? f->scratch.bias_grip[p->slot] : 1.0;
   double jump = 0.0, kept = 1.0;
-  if (s->event[p->slot] == 0.0) {
+  d->jump_base[p->place] = 0.0;
+  if (s->event[p->slot] == 0.0 || grip == 0.0) {
     return 0.0;
   }
   if (s->event[p->slot] < 0.0) {
     kept = before == 0.0 ? 0.0 : -law_exponential(rest_exponent(f, p->slot));
     const double factor = -(1.0 + kept) * now;
-    jump = factor * add_magnitude(p, now < 0.0, p->threshold, factor, d->bias, &d->bias_count);
+    jump = factor * add_magnitude(p, now < 0.0, p->threshold, grip * factor, d->bias, &d->bias_count);
   }
   if (before != 0.0 && kept != 0.0) {
     const double factor = kept * before;
-    jump += factor * add_magnitude(p, before < 0.0, p->threshold, factor, d->bias, &d->bias_count);
+    jump += factor * add_magnitude(p, before < 0.0, p->threshold, grip * factor, d->bias, &d->bias_count);
   }
-  return jump;
+  d->jump_base[p->place] = jump;
+  return grip * jump;
 }
 
 static place_laws edge_at(const tendonfmu_finger* f, const parameter_derivative* d, size_t i, size_t j) {
@@ -330,13 +339,119 @@ static void read_joint(const tendonfmu_finger* f, parameter_derivative* d, size_
   }
 }
 
-static void read_plain(const tendonfmu_finger* f, plain_term* term) {
-  if (term->extension == PLAIN_COVER) {
-    const double bend = f->remembered.angle[term->joint] - f->derived.cover_rest[term->joint];
-    term->slope = term->position == 0 ? bend : -f->derived.cover_stiffness[term->joint];
+static void read_covers(const tendonfmu_finger* f, parameter_derivative* d) {
+  for (size_t k = 0; k < d->covers; k += 2) {
+    const uint32_t j = d->plain[k].joint;
+    d->plain[k].slope = f->remembered.angle[j] - f->derived.cover_rest[j];
+    d->plain[k + 1].slope = -f->derived.cover_stiffness[j];
+  }
+}
+
+/* --- extensions -----------------------------------------------------------------------------------------------------
+ */
+
+static void add_plain(parameter_derivative* d, uint32_t parameter, const double* torque, const double* jump) {
+  for (size_t j = 0; j < d->joints; ++j) {
+    if (torque[j] != 0.0 || jump[j] != 0.0) {
+      d->plain[d->plain_count++] =
+          (plain_term){.parameter = parameter, .joint = (uint32_t)j, .slope = torque[j], .jump = jump[j]};
+    }
+  }
+}
+
+static void read_torque_row(const tendonfmu_finger* f, const extension_row* row, parameter_derivative* d) {
+  const effect_sample sample = remembered_sample(f);
+  for (uint32_t k = 0; k < row->effect->parameter_count; ++k) {
+    double unit[EFFECT_MAX_PARAMETERS] = {0.0}, torque[MODEL_MAX_JOINTS] = {0.0};
+    const double none[MODEL_MAX_JOINTS] = {0.0};
+    unit[k] = 1.0;
+    row->effect->torque(row->place, unit, &sample, row->memory, torque);
+    add_plain(d, row->first_parameter + k, torque, none);
+  }
+}
+
+static void read_signal_row(const tendonfmu_finger* f, size_t n, parameter_derivative* d) {
+  const extension_row* row = signal_row(f, n);
+  for (uint32_t k = 0; k < row->effect->parameter_count; ++k) {
+    double torque[MODEL_MAX_JOINTS], jump[MODEL_MAX_JOINTS];
+    const double* angle = row->slopes + 2 * f->joints * k;
+    signal_derivative signals;
+    derive_signals(f, n, k, 0, &signals);
+    torque_along(f, angle, angle + f->joints, signals.force, torque, jump);
+    add_plain(d, row->first_parameter + k, torque, jump);
+  }
+}
+
+/* what the other friction rows make of a slot */
+static double other_grips(const tendonfmu_finger* f, const extension_row* row, size_t slot, double own) {
+  if (own != 0.0) {
+    return f->scratch.grip[slot] / own;
+  }
+  double product = 1.0;
+  for (size_t r = 0; r < f->extensions.friction; ++r) {
+    const extension_row* other = friction_row(f, r);
+    const size_t members = other == row ? 0 : friction_members(f, other->place);
+    for (size_t k = 0; k < members; ++k) {
+      if (friction_slot(f, other->place, k) == slot) {
+        product *=
+            other->effect->grip(other->place, other->parameters, other->memory, friction_member(other->place, k)).value;
+      }
+    }
+  }
+  return product;
+}
+
+/* the two places whose friction slides with a slot; the second of a tendon is the pulley at the joint before */
+static void places_of_slot(const tendonfmu_finger* f, size_t slot, size_t place[2], size_t* count) {
+  const size_t n = f->joints, lanes = f->tendon_lanes;
+  if (slot >= n * lanes) {
+    place[0] = f->tendons * 2 * n + 2 * (slot - n * lanes);
+    place[1] = place[0] + 1;
+    *count = 2;
   } else {
-    size_t joint;
-    term->slope = extension_torque(f, term->extension, &joint).by_parameter[term->position];
+    place[0] = 2 * (slot % lanes * n + slot / lanes);
+    place[1] = place[0] - 1;
+    *count = slot >= lanes ? 2 : 1;
+  }
+}
+
+static void read_friction_row(const tendonfmu_finger* f, const extension_row* row, parameter_derivative* d) {
+  double torque[EFFECT_MAX_PARAMETERS][MODEL_MAX_JOINTS] = {{0.0}};
+  double jump[EFFECT_MAX_PARAMETERS][MODEL_MAX_JOINTS] = {{0.0}};
+  const size_t members = friction_members(f, row->place);
+  for (size_t member = 0; member < members; ++member) {
+    const size_t slot = friction_slot(f, row->place, member);
+    const effect_grip grip =
+        row->effect->grip(row->place, row->parameters, row->memory, friction_member(row->place, member));
+    const double others = other_grips(f, row, slot, grip.value);
+    size_t place[2], count;
+    places_of_slot(f, slot, place, &count);
+    for (size_t p = 0; p < count; ++p) {
+      const double moved = others * d->base[place[p]], jumped = others * d->jump_base[place[p]];
+      for (size_t at = place[p] * d->joints, j = 0; j < d->joints && (moved != 0.0 || jumped != 0.0); ++at, ++j) {
+        for (uint32_t k = 0; k < row->effect->parameter_count; ++k) {
+          torque[k][j] += d->torque_factor[at] * moved * grip.by_parameter[k];
+          if (d->has_jump) {
+            jump[k][j] += (d->jump_factor[at] * moved + d->bias_factor[at] * jumped) * grip.by_parameter[k];
+          }
+        }
+      }
+    }
+  }
+  for (uint32_t k = 0; k < row->effect->parameter_count; ++k) {
+    add_plain(d, row->first_parameter + k, torque[k], jump[k]);
+  }
+}
+
+static void read_extensions(const tendonfmu_finger* f, parameter_derivative* d) {
+  for (size_t n = 0; n < f->extensions.signals; ++n) {
+    read_signal_row(f, n, d);
+  }
+  for (size_t n = 0; n < f->extensions.friction; ++n) {
+    read_friction_row(f, friction_row(f, n), d);
+  }
+  for (size_t n = 0; n < f->extensions.torques; ++n) {
+    read_torque_row(f, torque_row(f, n), d);
   }
 }
 
@@ -357,7 +472,7 @@ void parameter_derivative_read(const tendonfmu_finger* finger, parameter_derivat
   for (size_t j = 0; j < finger->joints; ++j) {
     read_joint(finger, derivative, j);
   }
-  for (size_t k = 0; k < derivative->plain_count; ++k) {
-    read_plain(finger, derivative->plain + k);
-  }
+  read_covers(finger, derivative);
+  derivative->plain_count = derivative->covers;
+  read_extensions(finger, derivative);
 }

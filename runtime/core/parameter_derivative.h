@@ -25,19 +25,19 @@ typedef struct law_term {
   double slope[LAW_SIDE_NUMBERS];
 } law_term;
 
-/* Slope of T_j by a number that enters it directly: covers and extensions. */
+/* Slope of T_j (with an extension that changes forces: of T_j − τ_j) and of Δb_j by a number that enters it directly:
+ * covers and extensions. */
 typedef struct plain_term {
   uint32_t parameter, joint;
-  uint32_t extension, position; /* which extension, which of its numbers; PLAIN_COVER: 0 stiffness, 1 rest_angle */
-  double slope;
+  double slope, jump;
 } plain_term;
-
-#define PLAIN_COVER 0xffffffffu
 
 /* Room for the derivative of one sample. Place i·2n + 2j is the edge of tendon i before joint j, i·2n + 2j + 1 its
  * pulley at joint j, m·2n + 2j the friction T_jv0 and m·2n + 2j + 1 the load friction T_jvf of joint j (0-based). */
 typedef struct parameter_derivative {
-  size_t joints, tendons, places, plain_count;
+  size_t joints, tendons, places;
+  size_t plain_count; /* of the last sample */
+  size_t covers;      /* the first of them */
   /* where the laws stand among the parameters */
   uint32_t *edge_side[2], *pulley_side[2], *joint_side[2], *load_side[2]; /* [record], [n × M], [N], [N]: by sign */
   /* of the last sample */
@@ -47,6 +47,8 @@ typedef struct parameter_derivative {
   plain_term* plain;                                 /* of T alone */
   double *torque_factor, *jump_factor, *bias_factor; /* [places × n]; rows of places without a term mean nothing */
   double *moved, *jumped;                            /* [2n] F and b along the tendon being read */
+  double *base, *jump_base;                          /* [places] F and b before extensions act on friction; |F| where
+                                                        they make it slide at all times */
 } parameter_derivative;
 
 /* Bytes of memory that the derivative of this finger needs. */

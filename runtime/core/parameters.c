@@ -192,7 +192,8 @@ static parameter_range range_of_law(const model_item* item, uint32_t offset) {
 
 static parameter_range range_of_effect(const model_item* item, uint32_t offset) {
   const effect_parameter* p = &item->effect->parameters[offset];
-  return (parameter_range){p->unit, p->minimum, p->maximum, p->above_minimum, 1};
+  const int at_joint = item->place.joint != EFFECT_NOWHERE && p->unit_at_joint;
+  return (parameter_range){at_joint ? p->unit_at_joint : p->unit, p->minimum, p->maximum, p->above_minimum, 1};
 }
 
 parameter_range parameter_range_of(const model_item* item, uint32_t index) {

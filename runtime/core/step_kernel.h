@@ -38,13 +38,16 @@ HOT_INLINE int inputs_in_range(const tendonfmu_finger* f) {
 }
 
 /* joint angles and all velocities, into scratch; returns ∂v/∂q of this sample (1/s) */
-HOT_INLINE double find_kinematics(tendonfmu_finger* f, double step) {
+HOT_INLINE double find_kinematics(tendonfmu_finger* f, double time, double step) {
   const finger_scratch* s = &f->scratch;
   double* joint_velocity = s->velocity + f->joints * f->tendon_lanes;
   const int source = (int)f->remembered.scalar[STATE_SOURCE];
   double gain = 0.0;
   if (source == TENDONFMU_TENDON_POSITIONS) {
     angles_from_tendons(f, s->force, s->position, s->angle);
+  }
+  if (f->extensions.signals) {
+    shape_signals(f, time, 1);
   }
   if (source != TENDONFMU_JOINT_VELOCITIES) {
     if (is_first(f)) {
@@ -136,7 +139,9 @@ HOT_INLINE void remember_sample(tendonfmu_finger* f, double time, double velocit
   if (f->derived.settings.knows_uncertainty) {
     copy_row(s->part, f->scratch.part, f->joints * f->tendon_lanes + 3 * f->joint_lanes);
   }
-  remember_extensions(f);
+  if (f->shape.extension_count) {
+    remember_extensions(f);
+  }
   s->scalar[STATE_TIME] = time;
   s->scalar[STATE_VELOCITY_GAIN] = velocity_gain;
 }
@@ -202,9 +207,19 @@ static sample_result take_sample(tendonfmu_finger* f, double time) {
   if (!inputs_in_range(f)) {
     return SAMPLE_OUT_OF_RANGE;
   }
-  const double velocity_gain = find_kinematics(f, step);
+  if (f->extensions.signals) {
+    shape_signals(f, time, 0);
+  }
+  const double velocity_gain = find_kinematics(f, time, step);
+  if (f->shape.extension_count) {
+    follow_signals(f, step, velocity_gain);
+    advance_extensions(f, time, step);
+  }
   speed_thresholds(f, first);
   const int transitions = friction_values(f);
+  if (f->extensions.friction) {
+    grip_friction(f);
+  }
   total_friction(f);
   add_extension_torques(f);
   measured_torques(f);

@@ -41,7 +41,7 @@ class Worker {
     }
   }
 
-  SegmentSum sum(const Recording& recording, const BiasGains& gains, std::size_t segment,
+  SegmentSum sum(const Recording& recording, const SegmentStates& states, const BiasGains& gains, std::size_t segment,
                  std::atomic<std::size_t>* done, const std::atomic<bool>& stopped) {
     const std::size_t first = segment * recording.segment_length();
     const std::size_t last = std::min(first + recording.segment_length(), recording.samples());
@@ -51,7 +51,7 @@ class Worker {
     for (JointSum& joint : joints_) {
       joint.begin_segment();
     }
-    finger_.resume(recording.state(segment), numbers_);
+    finger_.resume(states[segment], numbers_);
     for (std::size_t k = first; k < last && !stopped; ++k) {
       finger_.step(k, recording.time(k), recording.inputs(k));
       take(recording, gains, k);
@@ -84,6 +84,11 @@ class Worker {
     }
     for (const Term& term : rows_.terms()) {
       add_term(term, looked_at);
+    }
+    for (const PlainTerm& term : rows_.plain_terms()) {
+      if (term.jump != 0.0) {
+        joints_[term.joint].rows.jump(columns_.unknown[static_cast<std::size_t>(term.column)], -term.jump);
+      }
     }
     if (!looked_at) {
       return;
@@ -216,6 +221,12 @@ class Pass {
         tasks_.push_back({r, s});
       }
     }
+    if (remembers_numbers(problem.finger.get())) {
+      FreeFinger finger(problem.image.data(), problem.image.size());
+      for (const Recording& recording : problem.recordings) {
+        states_.push_back(recording.states_with(&finger, numbers_));
+      }
+    }
     waiting_.resize(tasks_.size());
     const auto q = static_cast<Eigen::Index>(problem.columns.count);
     sum_ = MatrixXd::Zero(q, q);
@@ -279,13 +290,18 @@ class Pass {
     std::vector<std::thread> threads_;
   };
 
+  const SegmentStates& states(std::size_t recording) const {
+    return states_.empty() ? problem_.recordings[recording].states() : states_[recording];
+  }
+
   void work() {
     try {
       Worker worker(problem_, numbers_);
       for (std::size_t k = next_++; k < tasks_.size() && !stopped_; k = next_++) {
         const Task& task = tasks_[k];
-        auto segment = std::make_unique<SegmentSum>(
-            worker.sum(problem_.recordings[task.recording], gains_[task.recording], task.segment, &done_, stopped_));
+        auto segment =
+            std::make_unique<SegmentSum>(worker.sum(problem_.recordings[task.recording], states(task.recording),
+                                                    gains_[task.recording], task.segment, &done_, stopped_));
         const std::lock_guard<std::mutex> lock(mutex_);
         waiting_[k] = std::move(segment);
         join_waiting();
@@ -315,6 +331,7 @@ class Pass {
   const std::vector<double>& z_;
   const std::vector<double> numbers_;
   std::vector<BiasGains> gains_;
+  std::vector<SegmentStates> states_; /* empty: those kept with the recordings */
   std::vector<Task> tasks_;
   std::vector<std::unique_ptr<SegmentSum>> waiting_;
   std::vector<VectorXd> held_;

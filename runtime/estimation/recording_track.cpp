@@ -102,6 +102,10 @@ std::vector<unsigned char> FreeFinger::save() const {
   return state;
 }
 
+bool remembers_numbers(const tendonfmu_finger* finger) {
+  return finger->extensions.signals + finger->extensions.friction > 0;
+}
+
 /* --- recordings -----------------------------------------------------------------------------------------------------
  */
 
@@ -169,6 +173,18 @@ Recording::Recording(FreeFinger* finger, const RecordingArrays& a)
   if (used_count_ < 2) {
     throw refused(std::to_string(used_count_) + " samples to learn from: expected at least 2");
   }
+}
+
+SegmentStates Recording::states_with(FreeFinger* finger, const std::vector<double>& numbers) const {
+  SegmentStates states;
+  finger->begin(numbers, source_);
+  for (std::size_t k = 0; states.size() < segments(); ++k) {
+    if (k % segment_length_ == 0) {
+      states.push_back(finger->save());
+    }
+    finger->step(k, time_[k], inputs(k));
+  }
+  return states;
 }
 
 tendonfmu_inputs Recording::inputs(std::size_t row) const {

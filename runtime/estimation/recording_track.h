@@ -37,6 +37,13 @@ class FreeFinger {
   std::vector<double> free_; /* numbers with thresholds that nothing reaches */
 };
 
+/* Whether what a finger remembers depends on numbers that may be estimated: those of extensions that act on signals or
+ * on friction. The states kept with a recording, which are those of the start, are then found anew. */
+bool remembers_numbers(const tendonfmu_finger* finger);
+
+/* States at the beginnings of the segments of a recording. */
+using SegmentStates = std::vector<std::vector<unsigned char>>;
+
 /* Arrays of the caller, row-major. */
 struct RecordingArrays {
   std::size_t samples;
@@ -70,12 +77,14 @@ class Recording {
   /* Rows at which the finger's state is kept: 0, length, 2·length, … */
   std::size_t segment_length() const { return segment_length_; }
   std::size_t segments() const { return states_.size(); }
-  const std::vector<unsigned char>& state(std::size_t segment) const { return states_[segment]; }
+  const SegmentStates& states() const { return states_; }
+  /* the same with other numbers of the description */
+  SegmentStates states_with(FreeFinger* finger, const std::vector<double>& numbers) const;
 
  private:
   std::vector<double> time_, force_, position_, angle_, velocity_, external_, noise_, noise_scale_;
   std::vector<unsigned char> use_;
-  std::vector<std::vector<unsigned char>> states_;
+  SegmentStates states_;
   std::size_t joints_, tendons_, used_count_ = 0, segment_length_ = 0;
   double mean_force_ = 0.0;
   int source_;

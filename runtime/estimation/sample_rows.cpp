@@ -52,7 +52,7 @@ void SampleRows::read() {
   for (std::size_t k = 0; k < derivative_.plain_count; ++k) {
     const plain_term& term = derivative_.plain[k];
     if (unknowns_.plain(term.parameter) >= 0) {
-      plain_.push_back({unknowns_.plain(term.parameter), term.joint, term.slope});
+      plain_.push_back({unknowns_.plain(term.parameter), term.joint, term.slope, term.jump});
     }
   }
 }
@@ -80,7 +80,11 @@ void SampleRows::dense(double* torque_rows, double* jump_rows) const {
     }
   }
   for (const PlainTerm& term : plain_) {
-    torque_rows[term.joint * p + static_cast<std::size_t>(term.column)] += term.slope;
+    const std::size_t at = term.joint * p + static_cast<std::size_t>(term.column);
+    torque_rows[at] += term.slope;
+    if (jump_rows) {
+      jump_rows[at] += term.jump;
+    }
   }
 }
 

@@ -29,7 +29,7 @@ struct Term {
 struct PlainTerm {
   std::int32_t column;
   std::size_t joint;
-  double slope;
+  double slope, jump;
 };
 
 class SampleRows {

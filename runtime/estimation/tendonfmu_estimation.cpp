@@ -19,6 +19,12 @@ struct tendonfmu_estimator {
       : problem(image, size, group, scale) {}
   Problem problem;
   mutable std::string error;
+  /* of a finger that remembers_numbers(): the states of one recording at the unknowns last asked for */
+  struct {
+    std::size_t recording = 0;
+    std::vector<double> z;
+    tendonfmu::estimation::SegmentStates states;
+  } last;
 };
 
 namespace {
@@ -62,10 +68,26 @@ std::vector<double> checked(const Problem& problem, const double* z) {
   return values;
 }
 
+const SegmentStates& states_at(tendonfmu_estimator* estimator, std::size_t recording, const std::vector<double>& z,
+                               const std::vector<double>& numbers, FreeFinger* finger) {
+  const Recording& r = estimator->problem.recordings[recording];
+  if (!remembers_numbers(finger->get())) {
+    return r.states();
+  }
+  auto& last = estimator->last;
+  if (last.states.empty() || last.recording != recording || last.z != z) {
+    last.states = r.states_with(finger, numbers);
+    last.recording = recording;
+    last.z = z;
+  }
+  return last.states;
+}
+
 /* the finger over the samples of a recording from `first` on, with a call after each */
 template <typename Body>
-void replay(const Problem& problem, std::size_t recording, const std::vector<double>& z, std::size_t first,
+void replay(tendonfmu_estimator* estimator, std::size_t recording, const std::vector<double>& z, std::size_t first,
             std::size_t count, FreeFinger* finger, const Body& body) {
+  const Problem& problem = estimator->problem;
   if (recording >= problem.recordings.size()) {
     throw refused("recording " + std::to_string(recording) + ": expected below " +
                   std::to_string(problem.recordings.size()));
@@ -79,7 +101,8 @@ void replay(const Problem& problem, std::size_t recording, const std::vector<dou
     return;
   }
   const std::size_t segment = first / r.segment_length();
-  finger->resume(r.state(segment), problem.unknowns.write(z.data()));
+  const std::vector<double> numbers = problem.unknowns.write(z.data());
+  finger->resume(states_at(estimator, recording, z, numbers, finger)[segment], numbers);
   for (std::size_t k = segment * r.segment_length(); k < first + count; ++k) {
     finger->step(k, r.time(k), r.inputs(k));
     if (k >= first) {
@@ -250,7 +273,7 @@ tendonfmu_status tendonfmu_estimator_jacobian(tendonfmu_estimator* estimator, si
     FreeFinger finger(problem.image.data(), problem.image.size());
     SampleRows rows(problem.unknowns, finger.get());
     std::vector<double> by_torque(row), by_jump(row);
-    replay(problem, recording, checked(problem, z), first, count, &finger, [&](const Recording&, std::size_t k) {
+    replay(estimator, recording, checked(problem, z), first, count, &finger, [&](const Recording&, std::size_t k) {
       rows.read();
       rows.dense(by_torque.data(), by_jump.data());
       for (std::size_t j = 0; j < n; ++j) {
@@ -291,7 +314,7 @@ tendonfmu_status tendonfmu_estimator_innovations(tendonfmu_estimator* estimator,
       filters[j] = {column < 0 ? derived.initial_torque[j] : unknowns[static_cast<std::size_t>(column)], true};
     }
     const double nan = std::numeric_limits<double>::quiet_NaN();
-    replay(problem, recording, unknowns, 0, samples, &finger, [&](const Recording& r, std::size_t k) {
+    replay(estimator, recording, unknowns, 0, samples, &finger, [&](const Recording& r, std::size_t k) {
       const finger_scratch& s = finger.get()->scratch;
       const bool starts = gain[k] == 1.0 && weight[k] == 0.0;
       for (std::size_t j = 0; j < n; ++j) {

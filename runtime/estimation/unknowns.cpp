@@ -194,7 +194,9 @@ class Columns {
       }
       return role == Role::rate ? 1.0 / given(p) : given(p);
     }
-    return std::fabs(value_of(role, p, s_.finger->start));
+    const double value = std::fabs(value_of(role, p, s_.finger->start));
+    const model_item item = parameter_item(&s_.finger->shape, p);
+    return item.kind == ITEM_EXTENSION ? std::max(value, item.effect->parameters[p - item.first].scale) : value;
   }
 
   /* an unknown that starts at 0: as large as the largest of its kind */
@@ -223,7 +225,8 @@ class Columns {
       for (const std::uint32_t p : unknown->parameters) {
         const model_item item = parameter_item(&s_.finger->shape, p);
         const parameter_range range = parameter_range_of(&item, p);
-        unknown->lower = std::max(unknown->lower, range.minimum);
+        const double least = range.above_minimum ? smallest_share * unknown->scale : 0.0;
+        unknown->lower = std::max(unknown->lower, range.minimum + least);
         unknown->upper = std::min(unknown->upper, range.maximum);
       }
       return;

@@ -47,7 +47,7 @@ typedef struct effect_sample {
   double time, step;                        /* s; step is meaningless at the first sample */
   const double* angle;                      /* [n] rad */
   const double* velocity;                   /* [n] rad/s */
-  const double* tendon_velocity;            /* [n × lanes] ẋ_ij, m/s */
+  const double* tendon_velocity;            /* [n × lanes] ẋ_ij, m/s; in advance() only */
   const double* force;                      /* [m] f0, N */
   const double* moment_arm;                 /* [n × lanes] r_ij, m */
   const double* rest_angle;                 /* [n] of the covers, rad; 0 without one */
@@ -119,7 +119,7 @@ typedef struct effect_type {
   void (*signal_slope)(effect_place place, const double* parameters, uint32_t k, const double* memory,
                        effect_signals* derivative);
   /* turns a direction of what it was given into that of what it made of it. */
-  void (*signal_pass)(effect_place place, const double* parameters, const double* memory, const double* force,
+  void (*signal_pass)(effect_place place, const double* parameters, const double* memory,
                       effect_signals* direction);
 } effect_type;
 

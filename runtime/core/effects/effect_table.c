@@ -1,9 +1,11 @@
 #include <string.h>
 
+#include "backlash.h"
 #include "cover_hardening.h"
 #include "effect.h"
 #include "force_gain.h"
 #include "force_offset.h"
+#include "friction_drift.h"
 #include "gravity.h"
 #include "inertia.h"
 #include "joint_coupling.h"
@@ -11,7 +13,10 @@
 #include "moment_arm.h"
 #include "moment_arm_variation.h"
 #include "preload_friction.h"
+#include "presliding.h"
 #include "pulley_eccentricity.h"
+#include "tendon_nonlinearity.h"
+#include "time_delay.h"
 
 static const effect_type* const table[] = {
     &effect_cover_hardening,
@@ -25,6 +30,11 @@ static const effect_type* const table[] = {
     &effect_moment_arm,
     &effect_moment_arm_variation,
     &effect_pulley_eccentricity,
+    &effect_presliding,
+    &effect_friction_drift,
+    &effect_tendon_nonlinearity,
+    &effect_backlash,
+    &effect_time_delay,
 };
 
 const effect_type* effect_at(size_t position) {

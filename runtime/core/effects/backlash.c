@@ -1,0 +1,80 @@
+#include "floating_point.h"
+
+#include "backlash.h"
+
+/* Play: what is behind it follows a position at half the width (Krasnosel'skii and Pokrovskii 1989). */
+
+enum { BEHIND, BY_WIDTH, FOLLOWS, MEMORY_COUNT };
+
+static const effect_parameter parameters[] = {
+    {.name = "width",
+     .unit = "m",
+     .unit_at_joint = "rad",
+     .minimum = 0.0,
+     .maximum = 1e9,
+     .required = 1,
+     .scale = 1e-4},
+};
+
+static size_t state_count(size_t joints, size_t tendons, effect_place place) {
+  (void)joints;
+  (void)tendons;
+  (void)place;
+  return MEMORY_COUNT;
+}
+
+/* the position that has the play; NULL: not this time, or the kinematics source does not use it */
+static double* position_of(effect_place place, const effect_signals* signals) {
+  if (place.joint != EFFECT_NOWHERE) {
+    return signals->late ? signals->angle + place.joint : NULL;
+  }
+  return !signals->late && signals->source == 1 ? signals->position + place.tendon : NULL;
+}
+
+static void signal(effect_place place, const double* values, effect_signals* signals, const double* before,
+                   double* after) {
+  double* position = position_of(place, signals);
+  if (!position) {
+    return;
+  }
+  const double half = 0.5 * values[0], x = *position;
+  const int above = !signals->first && x - half > before[BEHIND], below = !signals->first && x + half < before[BEHIND];
+  after[BEHIND] = signals->first ? x : above ? x - half : below ? x + half : before[BEHIND];
+  after[BY_WIDTH] = signals->first ? 0.0 : above ? -0.5 : below ? 0.5 : before[BY_WIDTH];
+  after[FOLLOWS] = signals->first || above || below ? 1.0 : 0.0;
+  *position = after[BEHIND];
+}
+
+static void signal_slope(effect_place place, const double* values, uint32_t k, const double* memory,
+                         effect_signals* derivative) {
+  (void)values;
+  (void)k;
+  double* position = position_of(place, derivative);
+  if (position) {
+    *position += memory[BY_WIDTH];
+  }
+}
+
+static void signal_pass(effect_place place, const double* values, const double* memory, effect_signals* direction) {
+  (void)values;
+  double* position = position_of(place, direction);
+  if (position) {
+    *position *= memory[FOLLOWS];
+  }
+}
+
+const effect_type effect_backlash = {
+    .name = "backlash",
+    .id = 23,
+    .kind = EFFECT_SIGNAL,
+    .joint = PLACE_OPTIONAL,
+    .tendon = PLACE_OPTIONAL,
+    .rule = PLACES_EXACTLY_ONE,
+    .once = 1,
+    .parameter_count = 1,
+    .parameters = parameters,
+    .state_count = state_count,
+    .signal = signal,
+    .signal_slope = signal_slope,
+    .signal_pass = signal_pass,
+};

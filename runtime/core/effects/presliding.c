@@ -1,0 +1,72 @@
+#include "floating_point.h"
+
+#include "presliding.h"
+
+#include <math.h>
+
+#include "friction_law.h"
+
+/* F = ζ·|F(v)|, dζ = (s − ζ)·|dx|/displacement with s = sgn(dx), integrated exactly over each sample (Dahl 1968 with
+ * exponent 1). */
+
+/* per velocity of the place */
+enum { SHARE, BY_DISPLACEMENT, BY_VELOCITY, MEMORY_ROWS };
+
+static const effect_parameter parameters[] = {
+    {.name = "displacement",
+     .unit = "m",
+     .unit_at_joint = "rad",
+     .minimum = 0.0,
+     .maximum = 1e9,
+     .above_minimum = 1,
+     .required = 1,
+     .scale = 1e-4},
+};
+
+static size_t member_count(effect_place place, size_t joints) {
+  return place.joint != EFFECT_NOWHERE ? 1 : joints;
+}
+
+static size_t state_count(size_t joints, size_t tendons, effect_place place) {
+  (void)tendons;
+  return MEMORY_ROWS * member_count(place, joints);
+}
+
+static void advance(effect_place place, const double* values, const effect_sample* sample, const double* before,
+                    double* after) {
+  const size_t count = member_count(place, sample->joints);
+  for (size_t k = 0; k < count; ++k, before += MEMORY_ROWS, after += MEMORY_ROWS) {
+    const double v = place.joint != EFFECT_NOWHERE ? sample->velocity[place.joint]
+                                                   : sample->tendon_velocity[k * sample->lanes + place.tendon];
+    const double travel = sample->first ? 0.0 : v * sample->step, side = travel < 0.0 ? -1.0 : 1.0;
+    const double kept = law_exponential(fabs(travel) / values[0]), left = side - before[SHARE];
+    after[SHARE] = travel == 0.0 ? before[SHARE] : side - left * kept;
+    after[BY_DISPLACEMENT] = kept * (before[BY_DISPLACEMENT] - left * fabs(travel) / values[0] / values[0]);
+    after[BY_VELOCITY] = sample->first ? 0.0 : left * kept * side * sample->step / values[0];
+  }
+}
+
+static effect_grip grip(effect_place place, const double* values, const double* memory, size_t member) {
+  (void)place;
+  (void)values;
+  memory += MEMORY_ROWS * member;
+  return (effect_grip){.slides = 1,
+                       .value = memory[SHARE],
+                       .by_velocity = memory[BY_VELOCITY],
+                       .by_parameter = {memory[BY_DISPLACEMENT]}};
+}
+
+const effect_type effect_presliding = {
+    .name = "presliding",
+    .id = 20,
+    .kind = EFFECT_FRICTION,
+    .joint = PLACE_OPTIONAL,
+    .tendon = PLACE_OPTIONAL,
+    .rule = PLACES_EXACTLY_ONE,
+    .once = 1,
+    .parameter_count = 1,
+    .parameters = parameters,
+    .state_count = state_count,
+    .advance = advance,
+    .grip = grip,
+};

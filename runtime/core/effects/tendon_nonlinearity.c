@@ -1,0 +1,63 @@
+#include "floating_point.h"
+
+#include "tendon_nonlinearity.h"
+
+#include <math.h>
+
+/* A progressive spring: |f| = k e + hardening e². The position is corrected so that subtracting f/k leaves x0 − e. */
+
+enum { BY_HARDENING, BY_FORCE, MEMORY_COUNT }; /* of the correction: m³/N, m/N */
+
+static const effect_parameter parameters[] = {
+    {.name = "hardening", .unit = "N/m2", .minimum = 0.0, .maximum = 1e12, .required = 1, .scale = 1e5},
+};
+
+static size_t state_count(size_t joints, size_t tendons, effect_place place) {
+  (void)joints;
+  (void)tendons;
+  (void)place;
+  return MEMORY_COUNT;
+}
+
+static void signal(effect_place place, const double* values, effect_signals* signals, const double* before,
+                   double* after) {
+  (void)before;
+  if (signals->late || signals->source != 1) {
+    return;
+  }
+  const double force = signals->force[place.tendon], compliance = signals->inverse_stiffness[place.tendon];
+  const double pull = fabs(force) * compliance; /* f/k, m */
+  const double root = sqrt(1.0 + 4.0 * values[0] * compliance * pull);
+  const double stretch = 2.0 * pull / (1.0 + root);
+  signals->position[place.tendon] += copysign(pull - stretch, force);
+  /* 0 = k e + h e² − |f|: ∂e/∂h = −e²/(k + 2 h e), ∂e/∂|f| = 1/(k + 2 h e), and k + 2 h e = k·root */
+  after[BY_HARDENING] = copysign(stretch * stretch * compliance / root, force);
+  after[BY_FORCE] = compliance - compliance / root;
+}
+
+static void signal_slope(effect_place place, const double* values, uint32_t k, const double* memory,
+                         effect_signals* derivative) {
+  (void)values;
+  (void)k;
+  derivative->position[place.tendon] += memory[BY_HARDENING];
+}
+
+static void signal_pass(effect_place place, const double* values, const double* memory, effect_signals* direction) {
+  (void)values;
+  direction->position[place.tendon] += memory[BY_FORCE] * direction->force[place.tendon];
+}
+
+const effect_type effect_tendon_nonlinearity = {
+    .name = "tendon_nonlinearity",
+    .id = 22,
+    .kind = EFFECT_SIGNAL,
+    .joint = PLACE_REFUSED,
+    .tendon = PLACE_REQUIRED,
+    .once = 1,
+    .parameter_count = 1,
+    .parameters = parameters,
+    .state_count = state_count,
+    .signal = signal,
+    .signal_slope = signal_slope,
+    .signal_pass = signal_pass,
+};

@@ -1,0 +1,149 @@
+#include "floating_point.h"
+
+#include "time_delay.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Positions, or forces, of a while ago, from the last samples by linear interpolation. */
+
+enum { KEPT = 64 };
+
+/* memory: the newest of the kept samples, how many there are, whether they are forces, the share of this sample in what
+ * comes out; their times; slopes of the signals by the delay [width]; the samples [KEPT × width] */
+enum { NEWEST, COUNT, FORCES, SHARE, TIMES };
+
+static const effect_parameter parameters[] = {
+    {.name = "delay", .unit = "s", .minimum = -0.05, .maximum = 0.05, .required = 1, .scale = 2e-3},
+};
+
+/* room for what any kinematics source gives */
+static size_t width_of(size_t joints, size_t tendons) {
+  return tendons > 2 * joints ? tendons : 2 * joints;
+}
+
+static size_t state_count(size_t joints, size_t tendons, effect_place place) {
+  (void)place;
+  return TIMES + KEPT + (1 + KEPT) * width_of(joints, tendons);
+}
+
+/* The rows that are late. */
+typedef struct late_rows {
+  double* row[2];
+  size_t count[2];
+} late_rows;
+
+static late_rows rows_of(const double* values, const effect_signals* s) {
+  if (values[0] < 0.0) {
+    return (late_rows){{s->force, NULL}, {s->tendons, 0}};
+  }
+  if (s->source == 1) {
+    return (late_rows){{s->position, NULL}, {s->tendons, 0}};
+  }
+  return (late_rows){{s->angle, s->velocity}, {s->joints, s->source == 3 ? s->joints : 0}};
+}
+
+static size_t whole_number(double value, size_t largest) {
+  return value >= 0.0 && value <= (double)largest ? (size_t)value : 0; /* a state from outside may hold anything */
+}
+
+/* The two kept samples between which a time lies. */
+typedef struct between {
+  size_t older, newer;
+  double weight, inverse_length; /* of the newer; 1/s, 0 where it lies outside */
+  int newest;                    /* the newer one is the present sample */
+} between;
+
+static between samples_around(const double* times, size_t newest, size_t count, double wanted) {
+  size_t newer = newest;
+  for (size_t back = 1; back < count; ++back) {
+    const size_t older = (newest + KEPT - back) % KEPT;
+    if (times[older] <= wanted) {
+      const double length = times[newer] - times[older];
+      const int apart = length > 1e-300; /* so that 1/length is finite */
+      return (between){older, newer, apart ? (wanted - times[older]) / length : 1.0, apart ? 1.0 / length : 0.0,
+                       newer == newest};
+    }
+    newer = older;
+  }
+  return (between){newer, newer, 1.0, 0.0, newer == newest};
+}
+
+static void signal(effect_place place, const double* values, effect_signals* signals, const double* before,
+                   double* after) {
+  (void)place;
+  if (signals->late) {
+    return;
+  }
+  const size_t width = width_of(signals->joints, signals->tendons);
+  memcpy(after, before, state_count(signals->joints, signals->tendons, place) * sizeof(double));
+  const double forces = values[0] < 0.0 ? 1.0 : 0.0;
+  const int begins = signals->first || before[FORCES] != forces; /* or the parameter has changed its sign */
+  const size_t count_before = begins ? 0 : whole_number(before[COUNT], KEPT);
+  const size_t newest = count_before ? (whole_number(before[NEWEST], KEPT - 1) + 1) % KEPT : 0;
+  const size_t count = count_before < KEPT ? count_before + 1 : KEPT;
+  double *slopes = after + TIMES + KEPT, *kept = slopes + width, *now = kept + newest * width;
+  const late_rows rows = rows_of(values, signals);
+  after[NEWEST] = (double)newest;
+  after[COUNT] = (double)count;
+  after[FORCES] = forces;
+  after[TIMES + newest] = signals->time;
+  for (size_t r = 0, at = 0; r < 2; at += rows.count[r++]) {
+    for (size_t i = 0; i < rows.count[r]; ++i) {
+      now[at + i] = rows.row[r][i];
+    }
+  }
+  const between b = samples_around(after + TIMES, newest, count, signals->time - fabs(values[0]));
+  after[SHARE] = b.newest ? b.weight : 0.0;
+  for (size_t r = 0, at = 0; r < 2; at += rows.count[r++]) {
+    for (size_t i = 0; i < rows.count[r]; ++i) {
+      const double older = kept[b.older * width + at + i], newer = kept[b.newer * width + at + i];
+      rows.row[r][i] = newer + (1.0 - b.weight) * (older - newer);
+      slopes[at + i] = (values[0] < 0.0 ? 1.0 : -1.0) * (newer - older) * b.inverse_length;
+    }
+  }
+}
+
+static void signal_slope(effect_place place, const double* values, uint32_t k, const double* memory,
+                         effect_signals* derivative) {
+  (void)place;
+  (void)k;
+  if (derivative->late) {
+    return;
+  }
+  const double* slopes = memory + TIMES + KEPT;
+  const late_rows rows = rows_of(values, derivative);
+  for (size_t r = 0, at = 0; r < 2; at += rows.count[r++]) {
+    for (size_t i = 0; i < rows.count[r]; ++i) {
+      rows.row[r][i] += slopes[at + i];
+    }
+  }
+}
+
+static void signal_pass(effect_place place, const double* values, const double* memory, effect_signals* direction) {
+  (void)place;
+  if (direction->late) {
+    return;
+  }
+  const late_rows rows = rows_of(values, direction);
+  for (size_t r = 0; r < 2; ++r) {
+    for (size_t i = 0; i < rows.count[r]; ++i) {
+      rows.row[r][i] *= memory[SHARE];
+    }
+  }
+}
+
+const effect_type effect_time_delay = {
+    .name = "time_delay",
+    .id = 24,
+    .kind = EFFECT_SIGNAL,
+    .joint = PLACE_REFUSED,
+    .tendon = PLACE_REFUSED,
+    .once = 1,
+    .parameter_count = 1,
+    .parameters = parameters,
+    .state_count = state_count,
+    .signal = signal,
+    .signal_slope = signal_slope,
+    .signal_pass = signal_pass,
+};
