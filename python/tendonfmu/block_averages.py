@@ -1,0 +1,103 @@
+"""Averages over blocks of samples, for signals that come in stretches: of values, and of jumps added up on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.errors import InputError
+
+Numbers = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+NO_BLOCK = -1
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Which samples each block averages.
+
+    of: for each recording [N] the number of each sample's block, from 0 over all recordings; −1: in none. The samples
+    of a block follow each other and belong to one part without a gap. count: of all blocks.
+    """
+
+    of: tuple[Indices, ...]
+    count: int
+
+    def sizes(self) -> Indices:
+        """[B] samples in each block."""
+        total = np.zeros(self.count, dtype=np.int64)
+        for block in self.of:
+            total += np.bincount(block[block >= 0], minlength=self.count)
+        return total
+
+
+def regular_blocks(times: Sequence[Numbers], parts: Sequence[Sequence[slice]], length: float) -> Blocks:
+    """Blocks of the same length.
+
+    times: of each recording, [N] s. parts: its stretches without a gap; blocks count from the start of each. length: s.
+    Raises InputError for a length of 0 or less. A block that time leaves without a sample does not exist.
+    """
+    if not length > 0:
+        raise InputError(f"length of a block = {length:g} s: expected above 0")
+    found, count = [], 0
+    for time, slices in zip(times, parts, strict=True):
+        block = np.full(len(time), NO_BLOCK, dtype=np.int64)
+        for part in slices:
+            # half of a microsecond: sample times are rounded, and belong to the block that begins there
+            number = np.floor((time[part] - time[part.start] + 5e-7) / length).astype(np.int64)
+            new = np.cumsum(np.diff(number, prepend=number[0]) > 0)
+            block[part] = count + new
+            count += int(new[-1]) + 1
+        found.append(block)
+    return Blocks(tuple(found), count)
+
+
+class BlockSums:
+    """Sums over blocks, filled stretch by stretch.
+
+    sums: [B, n, c] to add to, float32 or float64. Stretches of one part come in their order, `begin` before the first:
+    jumps are added up from there.
+    """
+
+    def __init__(self, sums: NDArray[Any], mix: Any = None) -> None:
+        """mix: [u, c] sparse or dense matrix, from what is given to what is summed; None: the same."""
+        self._sums, self._mix = sums, mix
+        self._carried: Numbers | None = None
+
+    def begin(self) -> None:
+        """A new part: no jump so far."""
+        self._carried = None
+
+    def add(self, block: Indices, values: Numbers, jumps: Numbers) -> None:
+        """block: [K] of each sample. values, jumps: [K, n, u]."""
+        starts = np.flatnonzero(np.diff(block, prepend=block[0] - 1))
+        runs = np.add.reduceat(values, starts, axis=0)
+        self._add_jumps(runs, jumps, starts, np.diff(starts, append=len(block)))
+        numbers = block[starts]
+        inside = numbers >= 0
+        chosen = runs[inside]
+        if self._mix is not None:
+            rows, joints, given = chosen.shape
+            chosen = np.asarray(chosen.reshape(rows * joints, given) @ self._mix).reshape(rows, joints, -1)
+        self._sums[numbers[inside]] += chosen
+
+    def _add_jumps(self, runs: Numbers, jumps: Numbers, starts: Indices, lengths: Indices) -> None:
+        """Adds to each run what its samples have of all jumps before them, and of those at them."""
+        flat = jumps.reshape(len(jumps), -1)
+        total = runs.reshape(len(runs), -1)
+        if self._carried is not None:
+            total += lengths[:, None] * self._carried
+        rows = np.flatnonzero(flat.any(axis=1))
+        if not len(rows):
+            return
+        ends = starts + lengths
+        # of a jump at row k: all samples of later runs, and those of its own run from k on
+        share = np.clip(ends[:, None] - np.maximum(rows[None, :], starts[:, None]), 0, None).astype(np.float64)
+        total += share @ flat[rows]
+        last = flat[rows].sum(axis=0)
+        self._carried = last if self._carried is None else self._carried + last

@@ -1,0 +1,181 @@
+"""What every candidate would add to the model's torque, at every place and point of its grid, averaged over blocks.
+
+The signal is G_k = T_k + Σ Δb up to k: T of eq. (10) with all jumps of fig. 5 so far. A candidate's column is the
+derivative of G by its number at a strength of zero, or the difference that its term makes to G. All come from the C core.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.block_averages import Blocks
+from tendonfmu.derivative_passes import nominal_directions, plan_passes, run_pass
+from tendonfmu.diagnosis_span import Span, span_of
+from tendonfmu.effects import CANDIDATES, Candidate, Place, Variant
+from tendonfmu.fit_recordings import FitRecording
+from tendonfmu.fit_residuals import model_alone
+
+Numbers = NDArray[np.float64]
+Single = NDArray[np.float32]
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A candidate at one point of its grid.
+
+    shape: its non-linear numbers. columns: where its columns are in `CandidateColumns.values`. paths: the first number
+    that each moves. signs: expected of each magnitude, 0 either. expected: magnitudes of an ordinary effect. secant:
+    the column is the difference that the term makes at full strength; a magnitude of 1 is expected.
+    """
+
+    shape: Mapping[str, float]
+    columns: slice
+    paths: tuple[str, ...]
+    signs: tuple[int, ...]
+    expected: tuple[float, ...]
+    secant: bool
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A candidate at a place, with its grid."""
+
+    candidate: Candidate
+    place: Place
+    shapes: tuple[Shape, ...]
+
+    @property
+    def columns(self) -> slice:
+        """All of its columns."""
+        return slice(self.shapes[0].columns.start, self.shapes[-1].columns.stop)
+
+
+@dataclass(frozen=True)
+class CandidateColumns:
+    """Block means.
+
+    prediction: [B, n] G of the description, N·m. nominal: [B, n, u] its derivatives by what a fit of it estimates;
+    nominal_names: [u], a law's numbers as coulomb, drop, rate (1/Stribeck velocity) and viscous. values: [B, n, c] of the
+    candidates; names: [c]. proposals: which columns are whose.
+    """
+
+    prediction: Numbers
+    nominal: Single
+    nominal_names: list[str]
+    values: Single
+    names: list[str]
+    proposals: tuple[Proposal, ...]
+
+
+def candidate_columns(
+    data: Mapping[str, Any],
+    recordings: Sequence[FitRecording],
+    blocks: Blocks,
+    *,
+    candidates: Sequence[Candidate] = CANDIDATES,
+    span: Span | None = None,
+    progress: Progress | None = None,
+) -> CandidateColumns:
+    """The columns of the description and of all candidates that it lacks.
+
+    data: the fitted nominal description. recordings: made ready for it, all with the same kinematics source. span: of
+    the recordings, None: found here. progress: called with samples done and all samples, over all passes.
+    """
+    plain = without_uncertainty(data)
+    found_span = span_of(plain, recordings) if span is None else span
+    proposed = list(_proposed(plain, recordings[0].kinematics, found_span, candidates))
+    names, nominal = nominal_directions(plain)
+    variants = [variant for _, _, variants in proposed for variant in variants]
+    firsts = np.cumsum([0, *(variant.count for variant in variants)]).tolist()
+    joints, u, c = len(data["joints"]), len(names), firsts[-1]
+    passes = plan_passes(plain, [(v, u + at) for v, at in zip(variants, firsts, strict=False) if not v.secant_rows])
+    secants = [(v, u + at) for v, at in zip(variants, firsts, strict=False) if v.secant_rows]
+    sums = np.zeros((blocks.count, joints, u + c), dtype=np.float32)
+    watch = _watched(progress, recordings, len(passes) + len(secants) + 1)
+    passes[0].columns += list(enumerate(nominal))
+    for each in passes:
+        if each.columns:
+            run_pass(each.data(), each.columns, recordings, blocks, sums, watch)
+    sizes = np.maximum(blocks.sizes(), 1)
+    sums /= sizes[:, None, None].astype(np.float32)
+    prediction = block_prediction(plain, recordings, blocks)
+    watch(_samples(recordings))
+    for variant, at in secants:
+        sums[:, :, at] = block_prediction(variant.secant or {}, recordings, blocks) - prediction
+        watch(_samples(recordings))
+    proposals, labels = _labelled(proposed)
+    return CandidateColumns(prediction, sums[:, :, :u], names, sums[:, :, u:], labels, proposals)
+
+
+def without_uncertainty(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Without directions of uncertainty, which tell of the description's own numbers and grow with their count."""
+    contact = {key: value for key, value in data["contact"].items() if not key.startswith("uncertainty")}
+    return {**data, "contact": contact}
+
+
+def block_prediction(data: Mapping[str, Any], recordings: Sequence[FitRecording], blocks: Blocks) -> Numbers:
+    """[B, n] block means of G of a description, N·m."""
+    sums = np.zeros((blocks.count, len(data["joints"])))
+    for recording, block in zip(recordings, blocks.of, strict=True):
+        arrays = [recording.arrays(part) for part in recording.parts]
+        model = model_alone(data, arrays, recording.parts, len(recording.time), recording.kinematics)
+        for part in recording.parts:
+            whole = model.torque[part] + np.cumsum(model.jump[part], axis=0)
+            own = block[part]
+            for j in range(sums.shape[1]):
+                sums[:, j] += np.bincount(own[own >= 0], weights=whole[own >= 0, j], minlength=blocks.count)
+    return np.asarray(sums / np.maximum(blocks.sizes(), 1)[:, None])
+
+
+def _proposed(
+    data: Mapping[str, Any], kinematics: int, span: Span, candidates: Sequence[Candidate]
+) -> Iterator[tuple[Candidate, Place, list[Variant]]]:
+    for candidate in candidates:
+        for place in candidate.places(data, kinematics):
+            variants = candidate.variants(data, place, span)
+            if variants:
+                yield candidate, place, variants
+
+
+def _labelled(proposed: Sequence[tuple[Candidate, Place, list[Variant]]]) -> tuple[tuple[Proposal, ...], list[str]]:
+    proposals: list[Proposal] = []
+    labels: list[str] = []
+    for candidate, place, variants in proposed:
+        shapes = []
+        for variant in variants:
+            columns = slice(len(labels), len(labels) + variant.count)
+            secant = bool(variant.secant_rows)
+            expected = (1.0,) if secant else tuple(column.expected for column in variant.columns)
+            paths = ("",) if secant else variant.paths
+            shapes.append(Shape(variant.shape, columns, paths, variant.signs, expected, secant))
+            labels += [_label(candidate, place, variant, path) for path in paths]
+        proposals.append(Proposal(candidate, place, tuple(shapes)))
+    return tuple(proposals), labels
+
+
+def _label(candidate: Candidate, place: Place, variant: Variant, path: str) -> str:
+    where = [f"joint {place.joint}"] * (place.joint is not None) + [f"tendon {place.tendon}"] * (place.tendon is not None)
+    numbers = [f"{key} {value:.4g}" for key, value in variant.shape.items()]
+    return ", ".join([candidate.name, *where, *numbers, *([path] if path else [])])
+
+
+def _samples(recordings: Sequence[FitRecording]) -> int:
+    return sum(part.stop - part.start for each in recordings for part in each.parts)
+
+
+def _watched(progress: Progress | None, recordings: Sequence[FitRecording], passes: int) -> Callable[[int], None]:
+    total, done = passes * _samples(recordings), 0
+
+    def watch(samples: int) -> None:
+        nonlocal done
+        done += samples
+        if progress is not None:
+            progress(min(done, total), total)
+
+    return watch

@@ -1,0 +1,38 @@
+"""A row of the description's `extensions` as a variant: docs/extensions.md has its numbers and what they mean."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from tendonfmu.effects.candidate import Column, Data, Place, Variant
+from tendonfmu.effects.friction_law_places import next_row, row
+
+
+def row_variant(
+    data: Data,
+    effect: str,
+    place: Place,
+    shape: Mapping[str, float],
+    numbers: Mapping[str, tuple[int, float]],
+    fixed: Mapping[str, float] | None = None,
+) -> Variant:
+    """A term that is linear in its magnitudes.
+
+    numbers: name of each magnitude -> expected sign and the size of an ordinary effect. fixed: the row's other numbers.
+    """
+    path = next_row(data)
+    columns = tuple(Column({f"{path}.{name}": 1.0}, sign, size) for name, (sign, size) in numbers.items())
+    zero = dict.fromkeys(numbers, 0.0)
+    return Variant(data, shape, columns, rows=(row(effect, place, **zero, **(fixed or {})),))
+
+
+def secant_variant(
+    data: Data, effect: str, places: list[Place], shape: Mapping[str, float], number: str, sign: int, scaled: bool
+) -> Variant:
+    """A term whose torque has no useful derivative at zero: its column is the difference that it makes at full strength.
+
+    places: of its rows, all with the same number, which the shape has. scaled: whether twice the number makes about
+    twice the difference.
+    """
+    rows = tuple(row(effect, place, **{number: float(shape[number])}) for place in places)
+    return Variant(data, shape, secant_rows=rows, secant_sign=sign, scaled=(number,) if scaled else ())

@@ -1,0 +1,39 @@
+"""A spring between a joint and the next one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from tendonfmu.effects.candidate import Candidate, Data, Place, Variant, no_shape
+from tendonfmu.effects.extension_row import row_variant
+from tendonfmu.effects.friction_law_places import all_joints, without_rows
+
+NAME = "joint_coupling"
+_ORDINARY = 0.01  # N·m/rad
+
+
+def _places(data: Data, kinematics: int) -> list[Place]:
+    return without_rows(data, NAME, all_joints(data)[:-1])
+
+
+def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
+    return row_variant(data, NAME, place, shape, {"stiffness": (1, _ORDINARY)})
+
+
+CANDIDATE = Candidate(
+    name=NAME,
+    title="this joint and the next pull at each other",
+    explanation=(
+        "A spring between this joint and the next one, which pulls when their angles differ: a shared cover, a cable or a "
+        "linkage. Move one joint by hand and see whether the other one follows."
+    ),
+    sign=1,
+    excited_by="strokes of this joint and the next one by turns, so that their angles differ",
+    confused_with=("cover_stiffness", "gravity", "moment_arm"),
+    coordinate="angle",
+    unit="N.m/rad",
+    number="stiffness",
+    find_places=_places,
+    find_shapes=no_shape,
+    make=_variant,
+)

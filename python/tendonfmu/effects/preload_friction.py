@@ -1,0 +1,42 @@
+"""Friction of a tendon that does not scale with its force."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from tendonfmu.effects.candidate import Candidate, Data, Place, Variant, no_shape
+from tendonfmu.effects.extension_row import row_variant
+from tendonfmu.effects.friction_law_places import all_tendons, passes, without_rows
+
+NAME = "preload_friction"
+_ORDINARY = 0.2  # N
+
+
+def _places(data: Data, kinematics: int) -> list[Place]:
+    """Before each joint; and at all of them alike, where there are several."""
+    before = list(passes(data))
+    several = [each for each in all_tendons(data) if sum(place.tendon == each.tendon for place in before) > 1]
+    return without_rows(data, NAME, before + several)
+
+
+def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
+    return row_variant(data, NAME, place, shape, {"coulomb": (1, _ORDINARY)})
+
+
+CANDIDATE = Candidate(
+    name=NAME,
+    title="a tendon rubs however little it pulls",
+    explanation=(
+        "The tendon loses the same force at every tension, as in a seal, a tight sheath or a clamped guide. Look at "
+        "whether friction is left when the pretension is taken off."
+    ),
+    sign=1,
+    excited_by="the same strokes at pretensions as different as the hand allows, the lowest first of all",
+    confused_with=("joint_friction", "edge_friction", "pulley_friction", "load_friction"),
+    coordinate="force",
+    unit="N",
+    number="friction force",
+    find_places=_places,
+    find_shapes=no_shape,
+    make=_variant,
+)
