@@ -66,6 +66,16 @@ def test_the_radius_leaves_torques_and_angles_alone(tmp_path: Path) -> None:
     assert small["tendon_position[1]"] / 0.005 == pytest.approx(large["tendon_position[1]"] / 0.02, rel=1e-15)
 
 
+def test_a_pretension_makes_the_closing_cable_a_tendon_that_pulls(tmp_path: Path) -> None:
+    file = written(tmp_path, GOOD)
+    loop, cable = convert(file, RADIUS), convert(file, RADIUS, pretension=40.0)
+    assert cable["tendon_force[1]"] == pytest.approx(loop["tendon_force[1]"] + 40.0, rel=1e-12)
+    friction = [found["tendon_force[1]"] * RADIUS - found["external_torque[1]"] for found in (loop, cable)]
+    assert friction[1] == pytest.approx(friction[0], rel=1e-12)
+    with pytest.raises(InputError, match=r"slack at 0\.002 s; expected more than 39\.81 N"):
+        convert(file, RADIUS, pretension=39.0)
+
+
 def test_a_converted_file_is_a_recording(tmp_path: Path) -> None:
     write_table(tmp_path / "rec.csv", convert(written(tmp_path, GOOD), RADIUS))
     recording = read_recording(tmp_path / "rec.csv")

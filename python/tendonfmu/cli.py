@@ -209,6 +209,14 @@ def convert(
             min=1e-6, max=1.0, help="m; davinci: of the pulley on which the recorded torque acts \\[default: 0.005]"
         ),
     ] = None,
+    pretension: Annotated[
+        float | None,
+        typer.Option(
+            min=0.0,
+            max=1e6,
+            help="N; davinci: of the cable loop, to record its closing cable alone \\[default: 0, the net force]",
+        ),
+    ] = None,
     mass: Annotated[
         float | None,
         typer.Option(
@@ -226,7 +234,7 @@ def convert(
 
     check_format(output)
     check_output(output, file)
-    given = {"radius": radius, "mass": mass, "decimation": decimation}
+    given = {"radius": radius, "pretension": pretension, "mass": mass, "decimation": decimation}
     table = convert_file(source, file, {name: value for name, value in given.items() if value is not None})
     write_table(output, table)
     say(f"{output}: {len(table['time'])} samples, {table['time'][-1] - table['time'][0]:.3f} s")

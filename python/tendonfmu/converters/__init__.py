@@ -34,7 +34,7 @@ CONVERTERS = {
     "davinci": Source(
         "tendonfmu.converters.davinci",
         "da Vinci tool characterisation, University of Minnesota (.TXT)",
-        ("radius",),
+        ("radius", "pretension"),
     ),
     "emps": Source(
         "tendonfmu.converters.emps",

@@ -14,6 +14,11 @@ everything is positive when the motor closes against the load.
 
 With a moment arm of r, joint_torque = R^T f0 is the torque of the spindle, and joint_torque - external_torque is
 friction: it opposes the motion, positive while theta grows.
+
+The net force of a loop changes its sign where the jaw is pushed open against a light load, though both its cables pull
+all the time. With a pretension P the recording is that of the closing cable alone, an ordinary tendon:
+tendon_force[1] = P + torque / r. The opening cable pulls with P all the time, a known load: external_torque[1] =
+load + r P. Friction that grows with the load at the jaw is then friction that grows with the force of this tendon.
 """
 
 from __future__ import annotations
@@ -34,17 +39,26 @@ TORQUE = 0.000039811  # N.m a count
 RADIUS = 0.005  # m; sets the scale of force and position, no torque depends on it
 
 
-def convert(file: Path, radius: float = RADIUS) -> dict[str, NDArray[Any]]:
-    """Columns of the recording, radius in m. Raises InputError naming row and column."""
+def convert(file: Path, radius: float = RADIUS, pretension: float = 0.0) -> dict[str, NDArray[Any]]:
+    """Columns of the recording; radius in m, pretension of the opening cable in N, 0: the net force of the loop.
+
+    Raises InputError naming row and column.
+    """
     rows = _read(file)
+    force = rows[:, 2] * TORQUE / radius + pretension
+    if pretension > 0.0 and force.min() < 0.0:
+        raise InputError(
+            f"{file}: at a pretension of {pretension:g} N the closing cable is slack at {rows[force.argmin(), 0]:g} s; "
+            f"expected more than {pretension - force.min():.4g} N"
+        )
     spindle = -rows[:, 1] * (2 * math.pi / SPINDLE_COUNTS)
     jaw = rows[:, 4] * (2 * math.pi / JAW_COUNTS)
     return {
         "time": rows[:, 0],
-        "tendon_force[1]": rows[:, 2] * TORQUE / radius,
+        "tendon_force[1]": force,
         "tendon_position[1]": spindle * radius,
         "joint_position[1]": jaw,
-        "external_torque[1]": -rows[:, 5] * TORQUE,
+        "external_torque[1]": -rows[:, 5] * TORQUE + radius * pretension,
     }
 
 
