@@ -14,15 +14,19 @@ import jsonschema
 import numpy as np
 import pytest
 
+import extension_cases
 from fmu_binary import FINGER
 from random_fingers import random_finger
 from tendonfmu.description import count, read_finger
 from tendonfmu.errors import InputError
-from tendonfmu.native import NativeError, image_from_json
+from tendonfmu.extensions import MAGNITUDES, extension_numbers
+from tendonfmu.identifiability import unknowns
+from tendonfmu.native import Finger, NativeError, image_from_json
 
 INDEX_FINGER = Path(__file__).parents[1] / "examples" / "fingers" / "index_finger.json"
 SCHEMA = json.loads((files("tendonfmu") / "schema" / "finger.schema.json").read_text(encoding="utf-8"))
-VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)
+Validator = jsonschema.Draft202012Validator
+VALIDATOR = Validator(SCHEMA)
 
 # What the reader refuses and a schema cannot express: relations between values in different places.
 BEYOND_THE_SCHEMA = {
@@ -31,7 +35,10 @@ BEYOND_THE_SCHEMA = {
     "static below coulomb": r"expected at (least|most) .*(coulomb|static)",
     "angles that do not increase": r"above the angle before it",
     "routing without full column rank": r"rank",
-    "an extension at a joint that is not there": r"expected a joint from 1 to",
+    "an extension at a joint that is not there": r"expected a joint (from 1 to|with another one)",
+    "an extension at a tendon that is not there": r"expected a tendon from 1 to",
+    "a coupling at the last joint": r"since the last one has none after it",
+    "an effect twice at a place": r"expected once",
 }
 
 
@@ -97,9 +104,10 @@ def changed(description: dict[str, Any], path: tuple[Any, ...], change: Any) -> 
 CHANGES: list[Any] = ["DELETE", "ADD", None, True, "text", "", [], {}, -1, 0, 0.25, 1, 1e6, 2e9, 1e13, [0.0, 1.0]]
 
 
-def assert_agreement(description: Any, what: str) -> None:
+def assert_agreement(description: Any, what: str, part: Any = None, schema: Validator = VALIDATOR) -> None:
+    """part, schema: the only part that may be at fault, and its schema; None: the whole."""
     refused = accepted(description)
-    errors = [error.message for error in VALIDATOR.iter_errors(description)]
+    errors = [error.message for error in schema.iter_errors(description if part is None else part)]
     if refused is None:
         assert errors == [], what
     elif not errors:
@@ -137,6 +145,26 @@ def test_schema_agrees_with_the_reader_on_every_changed_value() -> None:
     assert agreed > 1500
 
 
+def test_schema_agrees_with_the_reader_on_every_changed_extension() -> None:
+    """Each row alone, with every key changed, left out or added."""
+    agreed = 0
+    by_effect = {
+        row["effect"]: Validator({"$ref": f"#/$defs/{row['effect']}", "$defs": SCHEMA["$defs"]})
+        for row in extension_cases.ROWS
+    }
+    for row in extension_cases.ROWS:
+        keys = {"joint": row.get("joint"), "tendon": row.get("tendon")} | row
+        for key in keys:
+            for change in [*CHANGES, -0.95, 0.05, 1e300]:
+                changed_row = {k: v for k, v in row.items() if k != key}
+                if change != "DELETE":
+                    changed_row[key] = change
+                description = FINGER | {"extensions": [changed_row]}
+                assert_agreement(description, f"{row} with {key} = {change!r}", changed_row, by_effect[row["effect"]])
+                agreed += 1
+    assert agreed > 1000
+
+
 def test_schema_agrees_with_the_reader_on_random_changes() -> None:
     for seed in range(50):
         rng = np.random.default_rng([seed, 9])
@@ -157,6 +185,17 @@ def test_schema_agrees_with_the_reader_on_random_changes() -> None:
         ("angles that do not increase", ("tendons", 0, "edge_friction", 1, "angles"), [0.5, 0.5]),
         ("routing without full column rank", ("tendons",), [FINGER["tendons"][1]]),
         ("an extension at a joint that is not there", ("extensions", 0, "joint"), 3),
+        (
+            "an extension at a tendon that is not there",
+            ("extensions", 0),
+            {"effect": "force_gain", "tendon": 4, "correction": 0},
+        ),
+        (
+            "a coupling at the last joint",
+            ("extensions", 0),
+            {"effect": "joint_coupling", "joint": 2, "stiffness": 1},
+        ),
+        ("an effect twice at a place", ("extensions",), [{"effect": "time_delay", "delay": 0}] * 2),
     ],
 )
 def test_the_reader_alone_refuses(what: str, path: tuple[Any, ...], change: Any) -> None:
@@ -194,6 +233,24 @@ def test_absent_friction_is_not_estimated(tmp_path: Path) -> None:
         "bias": 2,
     }
     assert counts.asymmetric_laws == 1 and counts.bidirectional_tendons == 1 and counts.working_points == 2
+
+
+def test_numbers_of_extensions_are_those_of_the_runtime() -> None:
+    """In order, with those that are left out."""
+    description = with_everything() | {"extensions": extension_cases.ROWS}
+    known = {parameter.path: parameter.start for parameter in Finger.from_description(description).parameters()}
+    listed = {number.path: number.value for number in extension_numbers(description)}
+    assert list(listed.items()) == [(path, value) for path, value in known.items() if path.startswith("extensions[")]
+    assert {row["effect"] for row in extension_cases.ROWS} == set(MAGNITUDES)
+    assert [number.path for number in unknowns(description)][-len(listed) :] == list(listed)
+
+
+def test_summary_counts_extensions(tmp_path: Path) -> None:
+    (tmp_path / "finger.json").write_text(json.dumps(FINGER | {"extensions": extension_cases.ROWS}))
+    lines = read_finger(tmp_path / "finger.json").summary()
+    found = next(line for line in lines if line.startswith("extensions "))
+    assert found.split()[:4] == ["extensions", str(len(extension_cases.ROWS)) + ":", "1", "cover_hardening,"]
+    assert "3 friction_drift" in found
 
 
 def test_summary_says_what_the_finger_is() -> None:
