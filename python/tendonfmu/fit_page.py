@@ -55,7 +55,7 @@ def write_fit_page(picture: FitPicture, folder: Path) -> dict[Path, str]:
     figures, written = [], {}
     for sheet in fit_sheets(picture):
         file = folder / f"{sheet.name}.png"
-        figures.append(_draw(sheet, file))
+        figures.append(draw_sheet(sheet, file))
         written[file] = sheet.title
     page = folder / PAGE
     text = fit_page(picture, summarise(picture), figures)
@@ -64,7 +64,8 @@ def write_fit_page(picture: FitPicture, folder: Path) -> dict[Path, str]:
     return {page: "all of it, to be read in a browser"} | written
 
 
-def _draw(sheet: Sheet, file: Path) -> PageFigure:
+def draw_sheet(sheet: Sheet, file: Path) -> PageFigure:
+    """Writes the sheet as PNG, and gives its panels as the page shows them."""
     from tendonfmu.fit_plots import STYLES, draw_panel, png, size_of, write_sheet
 
     pixels = [draw_panel(panel) for panel in sheet.panels]
@@ -79,6 +80,22 @@ def _draw(sheet: Sheet, file: Path) -> PageFigure:
 
 def fit_page(picture: FitPicture, summary: Summary, figures: list[PageFigure]) -> str:
     """HTML text of the page."""
+    by_section: dict[str, list[PageFigure]] = {}
+    for figure in figures:
+        by_section.setdefault(figure.sheet.section, []).append(figure)
+    return render(
+        "fit_report.html.jinja",
+        report=picture.report,
+        joint_names=picture.joint_names,
+        summary=summary,
+        figures=by_section,
+        pairs=strongest_pairs(picture, PAIRS),
+        options=_options(picture.report),
+    )
+
+
+def render(template: str, **content: Any) -> str:
+    """A template of the package with its content, every text escaped."""
     import jinja2
 
     environment = jinja2.Environment(
@@ -89,17 +106,7 @@ def fit_page(picture: FitPicture, summary: Summary, figures: list[PageFigure]) -
         lstrip_blocks=True,
     )
     environment.filters |= {"number": _number, "rounded": rounded, "unit": _unit}
-    by_section: dict[str, list[PageFigure]] = {}
-    for figure in figures:
-        by_section.setdefault(figure.sheet.section, []).append(figure)
-    return environment.get_template("fit_report.html.jinja").render(
-        report=picture.report,
-        joint_names=picture.joint_names,
-        summary=summary,
-        figures=by_section,
-        pairs=strongest_pairs(picture, PAIRS),
-        options=_options(picture.report),
-    )
+    return environment.get_template(template).render(**content)
 
 
 def _options(report: Mapping[str, Any]) -> dict[str, str]:

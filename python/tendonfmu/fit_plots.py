@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from io import BytesIO
 from math import ceil
 from pathlib import Path
+from textwrap import wrap
 from typing import Any, Literal
 
 import numpy as np
@@ -18,10 +19,11 @@ from matplotlib.figure import Figure
 from matplotlib.image import imsave
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
 from tendonfmu.fit_sheet import MatrixPanel, Panel, Sheet
-from tendonfmu.plot_style import BLUE, DARK, GREY, LIGHT, ORANGE, SKY, VERMILION, any_names, clean
+from tendonfmu.plot_style import BLUE, DARK, GREEN, GREY, LIGHT, ORANGE, SKY, VERMILION, any_names, clean
 from tendonfmu.whole_file import whole_file
 
 Pixels = NDArray[np.uint8]
@@ -29,7 +31,7 @@ Pixels = NDArray[np.uint8]
 SIZES = {"small": (370, 250), "medium": (560, 250), "large": (560, 400)}  # CSS pixels
 COLUMNS = {"small": 3, "medium": 2, "large": 1}
 _DPI, _CSS = 150, 100  # pixels and CSS pixels per inch of the drawing
-_LEFT, _RIGHT, _BOTTOM, _TOP = 62, 12, 44, 28  # CSS pixels
+_LEFT, _RIGHT, _BOTTOM, _TOP = 62, 18, 44, 28  # CSS pixels
 _NAMES = 215  # CSS pixels, left margin with names in it
 _TITLE, _LABEL, _NUMBER = 10.0, 8.8, 8.4  # pt
 _WIDER = 1.12  # text of panels that narrow screens shrink
@@ -75,6 +77,14 @@ STYLES = {
     "data": Style("#BDBDBD", alpha=0.6, patch=True),
     "identified": Style(BLUE, 0.0, alpha=0.7),
     "unidentified": Style(VERMILION, 0.0, filled=False),
+    "before": Style(VERMILION, 1.0, alpha=0.9),
+    "after": Style(BLUE, 1.0),
+    "before_line": Style(VERMILION, 0.9, alpha=0.45),
+    "after_line": Style(BLUE, 0.9, alpha=0.45),
+    "before_dots": Style(VERMILION, 0.0),
+    "after_dots": Style(BLUE, 0.0),
+    "before_scatter": Style(VERMILION, alpha=0.13, patch=True),
+    "floor": Style(GREEN, 0.0, filled=False),
     "positive": Style("#B2182B", patch=True),
     "uncorrelated": Style("#FFFFFF", patch=True),
     "opposed": Style("#2166AC", patch=True),
@@ -130,11 +140,14 @@ def write_sheet(sheet: Sheet, panels: list[Pixels], file: Path) -> None:
 
 def _head(sheet: Sheet, width: int) -> Pixels:
     room = width * _CSS / _DPI  # CSS pixels
+    title = wrap(sheet.title, max(int((room - 20) / 9.9), 20))
     wanted = sum(50 + 6.8 * len(meaning) for _, meaning in sheet.keys)
     rows = ceil(wanted / room)
-    figure = Figure(figsize=(width / _DPI, (36 + 20 * rows) / _CSS), facecolor="white")
+    height = 16 + 20 * (len(title) + rows)
+    figure = Figure(figsize=(width / _DPI, height / _CSS), facecolor="white")
     left = 12 / room
-    figure.text(left, 1 - 4 / (36 + 20 * rows), sheet.title, fontsize=12, fontweight="bold", color=DARK, va="top")
+    text = "\n".join(title)
+    figure.text(left, 1 - 4 / height, text, fontsize=12, fontweight="bold", color=DARK, va="top", linespacing=1.15)
     figure.legend(
         handles=[_handle(STYLES[style], meaning) for style, meaning in sheet.keys],
         loc="lower left",
@@ -190,8 +203,16 @@ def _draw_axes(axes: Axes, panel: Panel) -> None:
         style = STYLES[dots.style]
         face, edge = _face(style), style.colour
         axes.plot(dots.x, dots.y, "o", ms=2.8, color=face, markeredgecolor=edge, alpha=style.alpha, clip_on=False)
-    if panel.log_x:
-        axes.set_xscale("log")
+    for bars in panel.bars:
+        style = STYLES[bars.style]
+        lines = axes.hlines if bars.lying else axes.vlines
+        lines(bars.x, bars.low, bars.high, color=style.colour, linewidth=1.2, alpha=style.alpha)
+    for wanted, axis in ((panel.log_x, "x"), (panel.log_y, "y")):
+        if wanted:
+            axes.set(**{f"{axis}scale": "log"})
+            # without mathematics, which is not parsed (names may hold a $)
+            getattr(axes, f"{axis}axis").set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            getattr(axes, f"{axis}axis").set_minor_formatter(NullFormatter())
     if panel.line is not None:
         axes.axvline(panel.line, color=GREY, linewidth=1.0, linestyle="--")
     _scale(axes, panel)

@@ -46,13 +46,24 @@ class Dots:
 
 
 @dataclass(frozen=True)
+class Bars:
+    """Error bars: at each x from low to high, all [N]; lying: at each y = x along the other axis."""
+
+    style: str
+    x: Numbers
+    low: Numbers
+    high: Numbers
+    lying: bool = False
+
+
+@dataclass(frozen=True)
 class Panel:
     """One pair of axes.
 
     alt: what it shows, in words, for those who do not see it. note: small, at the right end of the title's line.
     stripes: shaded along x, in `stripe_style`. ticks: places and names along x. data: where samples are, bin edges
     [k + 1] and heights [k] from 0 to 1, along the bottom. rows: names of y = 0, 1, ... from the top; none: y is a
-    number. line: a marked x. height: CSS pixels, 0: the size's.
+    number. line: a marked x. log_x, log_y: logarithmic. height: CSS pixels, 0: the size's.
     """
 
     title: str
@@ -64,6 +75,7 @@ class Panel:
     curves: tuple[Curve, ...] = ()
     bands: tuple[Band, ...] = ()
     dots: tuple[Dots, ...] = ()
+    bars: tuple[Bars, ...] = ()
     stripes: tuple[Interval, ...] = ()
     stripe_style: str = "held_out"
     ticks: tuple[tuple[float, str], ...] = ()
@@ -71,6 +83,7 @@ class Panel:
     x_limits: Interval | None = None
     y_limits: Interval | None = None
     log_x: bool = False
+    log_y: bool = False
     rows: tuple[str, ...] = ()
     line: float | None = None
     height: int = 0

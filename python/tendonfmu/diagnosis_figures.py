@@ -1,0 +1,239 @@
+"""What the figures of a diagnosis show: sheets of panels (`fit_sheet.py`), ready to be drawn by `fit_plots.py`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.diagnosis_result import Cause, Diagnosis, Evidence, ResidualView
+from tendonfmu.diagnosis_text import Names, at_place, names_of, percent_interval, unit_of
+from tendonfmu.fit_sheet import Band, Bars, Curve, Dots, Panel, Sheet
+
+Numbers = NDArray[np.float64]
+TWO_SIDED = 1.96  # standard errors of a 95 % interval
+_TITLES = {
+    "time": "Over time",
+    "angle": "Over the joint angle",
+    "velocity": "Over the joint velocity",
+    "tendon_force": "Over the tendon force",
+    "load": "Over the load",
+    "travel": "Over the travel since reversal",
+    "spectrum": "Spectrum",
+    "autocorrelation": "Autocorrelation",
+}
+_BINNED = ("angle", "velocity", "tendon_force", "load", "travel")
+_BEFORE_AFTER = (("before", "nominal model, refitted"), ("after", "extended model"))
+_ROOM = 3.0  # times the largest mean: more of the scatter within bins would hide the means
+_NAME = 30  # letters of a row's name
+
+
+def diagnosis_sheets(found: Diagnosis) -> list[Sheet]:
+    """Gain by cause and error by joint, then the evidence for each cause, then the residual at each joint."""
+    names = names_of(found)
+    return [
+        _overview(found, names),
+        *(_cause_sheet(found, names, k, cause) for k, cause in enumerate(found.causes, start=1) if cause.evidence),
+        *(_joint_sheet(found, names, j, views) for j, views in _by_joint(found.views)),
+    ]
+
+
+# --- how much ---------------------------------------------------------------------------------------------------------
+
+
+def _overview(found: Diagnosis, names: Names) -> Sheet:
+    panels = [_error_panel(found, names)]
+    keys = [("before_dots", "nominal model, refitted"), ("floor", "noise floor")]
+    if found.causes:
+        keys.insert(1, ("after_dots", "extended model"))
+        panels.append(_gain_panel(found))
+    rows = max(2, *(len(panel.rows) for panel in panels))
+    panels = [replace(panel, height=110 + 26 * rows) for panel in panels]  # side by side in the sheet: as high
+    return Sheet("gain", "gain", "Error and gain on unseen data", "", tuple(keys), tuple(panels))
+
+
+def _error_panel(found: Diagnosis, names: Names) -> Panel:
+    factor, unit = unit_of(found)
+    rows = np.arange(len(found.nominal.test_rms), dtype=float)
+    dots = [
+        Dots(style, factor * np.array(values, dtype=float), rows[: len(values)])
+        for style, values in (
+            ("floor", found.noise_floor),
+            ("before_dots", found.nominal.test_rms),
+            ("after_dots", found.extended.test_rms),
+        )
+    ]
+    largest = max(float(np.nanmax(each.x, initial=0.0)) for each in dots)
+    before, after = dots[1].x, dots[2].x
+    if not found.causes:  # both are the same
+        del dots[2]
+    return Panel(
+        title="Error by joint",
+        alt="Error on unseen data by joint: nominal model, extended model and noise floor",
+        x_label=f"rms ({unit})",
+        y_label="",
+        size="medium",
+        bars=(Bars("data", rows, np.minimum(before, after), np.maximum(before, after), lying=True),),
+        dots=tuple(dots),
+        rows=tuple(_short(names.joint(j + 1)) for j in range(len(rows))),
+        x_limits=(0.0, 1.08 * largest or 1.0),
+    )
+
+
+def _gain_panel(found: Diagnosis) -> Panel:
+    gains = [cause.gain for cause in found.causes]
+    labels = [_short(f"{k}. {cause.where.effect.replace('_', ' ')}") for k, cause in enumerate(found.causes, start=1)]
+    if len(gains) > 1:
+        gains.append(found.gain)
+        labels.append("all together")
+    rows = np.arange(len(gains), dtype=float)
+    value, low, high = (100 * np.array([getattr(each, key) for each in gains]) for key in ("value", "low", "high"))
+    least = min(0.0, 1.05 * float(np.nanmin(low)))
+    return Panel(
+        title="Gain of each cause",
+        alt="Part of the error on unseen data that each cause takes away, with its 95 % interval: "
+        + "; ".join(f"{label} {percent_interval(gain)}" for label, gain in zip(labels, gains, strict=True)),
+        x_label="less error (%), with 95 % interval",
+        y_label="",
+        size="medium",
+        bars=(Bars("after", rows, low, high, lying=True),),
+        dots=(Dots("after_dots", value, rows),),
+        rows=tuple(labels),
+        x_limits=(least, 1.08 * float(np.nanmax(high)) or 1.0),
+        line=0.0 if least < 0 else None,
+    )
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= _NAME else f"{text[: _NAME - 1]}…"
+
+
+# --- evidence for a cause ---------------------------------------------------------------------------------------------
+
+
+def _cause_sheet(found: Diagnosis, names: Names, number: int, cause: Cause) -> Sheet:
+    factor, unit = unit_of(found)
+    panels = tuple(_evidence_panel(each, names, factor, unit) for each in cause.evidence)
+    return Sheet(
+        section=f"cause_{number}",
+        name=f"cause_{number}",
+        title=f"{number}. {at_place(cause.title[:1].upper() + cause.title[1:], cause.where, names)}",
+        caption="",
+        keys=(("before_dots", "without it"), ("after_dots", "with it"), ("after", "95 % interval of the mean")),
+        panels=_same_scale(panels),
+    )
+
+
+def _evidence_panel(found: Evidence, names: Names, factor: float, unit: str) -> Panel:
+    shown = (("before", found.before, found.before_std), ("after", found.after, found.after_std))
+    return Panel(
+        title=f"Residual at {names.joint(found.joint)}",
+        alt=f"Mean residual at {names.joint(found.joint)} over {found.label}, without and with this cause in the model",
+        x_label=f"{found.label} ({found.unit})",
+        y_label=f"residual ({unit})",
+        size="medium",
+        curves=tuple(Curve(f"{style}_line", found.coordinate, factor * mean) for style, mean, _ in shown),
+        bars=tuple(
+            Bars(style, found.coordinate, factor * (mean - TWO_SIDED * std), factor * (mean + TWO_SIDED * std))
+            for style, mean, std in shown
+        ),
+        dots=tuple(Dots(f"{style}_dots", found.coordinate, factor * mean) for style, mean, _ in shown),
+    )
+
+
+def _same_scale(panels: Sequence[Panel]) -> tuple[Panel, ...]:
+    """Panels to be compared: all with the limits of the widest."""
+    ends = [end for panel in panels for bars in panel.bars for end in (*bars.low, *bars.high) if math.isfinite(end)]
+    if not ends:
+        return tuple(panels)
+    margin = 0.06 * (max(ends) - min(ends)) or 1.0
+    limits = (min(ends) - margin, max(ends) + margin)
+    return tuple(replace(panel, y_limits=limits) for panel in panels)
+
+
+# --- the residual of a joint ------------------------------------------------------------------------------------------
+
+
+def _by_joint(views: Sequence[ResidualView]) -> Iterator[tuple[int, list[ResidualView]]]:
+    for joint in sorted({view.joint for view in views}):
+        yield (
+            joint,
+            sorted(
+                (view for view in views if view.joint == joint and len(view.x) > 0), key=lambda view: _order(view.kind)
+            ),
+        )
+
+
+def _order(kind: str) -> int:
+    return list(_TITLES).index(kind) if kind in _TITLES else len(_TITLES)
+
+
+def _joint_sheet(found: Diagnosis, names: Names, joint: int, views: Sequence[ResidualView]) -> Sheet:
+    factor, unit = unit_of(found)
+    if not found.causes:  # the extended model is the nominal one
+        views = [replace(view, after=np.full_like(view.after, math.nan)) for view in views]
+    limits = _shared_limits([view for view in views if view.kind in _BINNED], factor)
+    return Sheet(
+        section="views",
+        name=f"residual_{joint}",
+        title=f"Residual at {names.joint(joint)}",
+        caption="",
+        keys=(
+            *(_BEFORE_AFTER if found.causes else _BEFORE_AFTER[:1]),
+            ("before_scatter", "scatter within a bin, nominal"),
+        ),
+        panels=tuple(_view_panel(view, names, factor, unit, limits) for view in views),
+    )
+
+
+def _shared_limits(views: Sequence[ResidualView], factor: float) -> tuple[float, float] | None:
+    """Of all binned views of a joint, so that they can be compared: the means, and of the scatter what fits."""
+    means = [value for view in views for value in (*view.before, *view.after) if math.isfinite(value)]
+    if not means:
+        return None
+    mean = max(abs(value) for value in means)
+    ends = [(view.before, view.before_std) for view in views if view.before_std is not None]
+    wide = max((float(np.nanmax(np.abs(m) + s, initial=0.0)) for m, s in ends), default=0.0)
+    largest = factor * max(mean, min(wide, _ROOM * mean))
+    return (-1.12 * largest, 1.12 * largest) if largest > 0 else None
+
+
+def _view_panel(
+    view: ResidualView, names: Names, factor: float, unit: str, limits: tuple[float, float] | None
+) -> Panel:
+    title = _TITLES.get(view.kind, f"Over {view.label}")
+    panel = Panel(
+        title=title,
+        alt=f"Residual at {names.joint(view.joint)}, {title.lower()}, of the nominal and of the extended model",
+        x_label=f"{view.label} ({view.unit})" if view.unit not in ("", "1") else view.label,
+        y_label=f"residual ({unit})",
+    )
+    if view.kind == "spectrum":
+        return _spectrum(panel, view, factor, unit)
+    if view.kind == "autocorrelation":
+        curves = (Curve("start", view.x, np.zeros_like(view.x)), *_curves(view, 1.0))
+        return replace(panel, y_label="", curves=curves, y_limits=(min(-0.25, 1.1 * _least(view)), 1.05))
+    if view.kind not in _BINNED:
+        return replace(panel, curves=_curves(view, factor))
+    bands: tuple[Band, ...] = ()
+    if view.before_std is not None:
+        low, high = view.before - view.before_std, view.before + view.before_std
+        bands = (Band("before_scatter", view.x, factor * low, factor * high),)
+    return replace(panel, bands=bands, curves=_curves(view, factor), y_limits=limits)
+
+
+def _spectrum(panel: Panel, view: ResidualView, factor: float, unit: str) -> Panel:
+    shown = view.x > 0
+    curves = tuple(replace(each, x=each.x[shown], y=each.y[shown]) for each in _curves(view, factor**2))
+    return replace(panel, y_label=f"power (({unit})²/Hz)", curves=curves, log_x=True, log_y=True)
+
+
+def _curves(view: ResidualView, factor: float) -> tuple[Curve, ...]:
+    return tuple(Curve(style, view.x, factor * getattr(view, style)) for style, _ in _BEFORE_AFTER)
+
+
+def _least(view: ResidualView) -> float:
+    return float(np.nanmin([view.before, view.after]))

@@ -1,0 +1,331 @@
+"""A diagnosis in plain words: names of places, sentences for page and terminal, and the tables that are printed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from tendonfmu.diagnosis_result import Cause, Diagnosis, Interval, Invisible, Where
+from tendonfmu.fit_summary import rounded
+
+UNKNOWN = "unknown"
+NBSP = "\u00a0"
+_NUMBERS = ("No", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine", "Ten")
+_OUTSIDE = {  # that are found, but are no term of a model
+    "contact": "something touches the finger",
+    UNKNOWN: "something that is no effect on the list",
+}
+
+Row = tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Names:
+    """Of joints and tendons, as the description has them; empty where it has none."""
+
+    joints: tuple[str, ...]
+    tendons: tuple[str, ...]
+
+    def place(self, where: Where) -> str:
+        """Such as "joint 2 (pip), tendon 1 (fdp)"; empty for the whole finger."""
+        parts = (("joint", where.joint, self.joints), ("tendon", where.tendon, self.tendons))
+        return ", ".join(_numbered(kind, number, names) for kind, number, names in parts if number is not None)
+
+    def joint(self, number: int) -> str:
+        """Such as "joint 2 (pip)"."""
+        return _numbered("joint", number, self.joints)
+
+
+def _numbered(kind: str, number: int, names: Sequence[str]) -> str:
+    name = names[number - 1] if 0 < number <= len(names) else ""
+    return f"{kind} {number}" if name in ("", f"{kind} {number}", str(number)) else f"{kind} {number} ({name})"
+
+
+def names_of(found: Diagnosis) -> Names:
+    """From the fitted description."""
+    return Names(*(tuple(str(each.get("name") or "") for each in found.nominal_data[key]) for key in _KINDS))
+
+
+_KINDS = ("joints", "tendons")
+
+
+def title_of(effect: str) -> str:
+    """A few plain words for an effect of contract section 7."""
+    from tendonfmu.effects import CANDIDATES
+
+    titles = {candidate.name: candidate.title for candidate in CANDIDATES} | _OUTSIDE
+    return titles.get(effect, effect.replace("_", " "))
+
+
+def at_place(title: str, where: Where, names: Names) -> str:
+    """Such as "friction grows with the force, at joint 1 (mcp)"."""
+    place = names.place(where)
+    return f"{title}, at {place}" if place else title
+
+
+def named(found: Diagnosis) -> list[Cause]:
+    """The causes that have a name."""
+    return [cause for cause in found.causes if cause.where.effect != UNKNOWN]
+
+
+# --- numbers ----------------------------------------------------------------------------------------------------------
+
+
+def unit_of(found: Diagnosis) -> tuple[float, str]:
+    """Factor and name of the unit in which torques are told, all alike."""
+    rms = [*found.nominal.train_rms, *found.nominal.test_rms, *found.bias_only_rms]
+    largest = max((value for value in rms if math.isfinite(value)), default=0.0)
+    return (1e3, "mN·m") if largest < 2.0 else (1.0, "N·m")
+
+
+def together(values: Sequence[float]) -> float:
+    """rms over all joints of the rms of each; NaN without any."""
+    known = [value for value in values if math.isfinite(value)]
+    return math.sqrt(sum(value * value for value in known) / len(known)) if known else math.nan
+
+
+def percent(share: float) -> str:
+    """Two digits where that is enough: 31 %, 4.2 %, −0.3 %."""
+    if not math.isfinite(share):
+        return "–"
+    value = 100 * share
+    text = f"{value:.0f}" if abs(value) >= 9.95 else f"{value:.1f}"
+    text = "0" if float(text) == 0 else text.replace("-", "−")
+    return f"{text}{NBSP}%"
+
+
+def percent_interval(found: Interval) -> str:
+    """Such as "31 % (27 to 35 %)"."""
+    if not (math.isfinite(found.low) and math.isfinite(found.high)):
+        return percent(found.value)
+    return f"{percent(found.value)} ({percent(found.low).removesuffix(f'{NBSP}%')} to {percent(found.high)})"
+
+
+def probability(p_value: float) -> str:
+    """A p-value: 0.008, 3.4e-5; bounded where it is below what a computer tells."""
+    if not math.isfinite(p_value):
+        return "–"
+    if p_value < 1e-12:
+        return "< 1e-12"
+    mantissa, _, exponent = f"{p_value:.2g}".partition("e")
+    return f"{mantissa}e{int(exponent)}" if exponent else mantissa
+
+
+def magnitude(value: float, unit: str) -> str:
+    """A number of the description with its unit, as people write it."""
+    told = unit.replace(".", "·")
+    return f"{value:.4g}".replace("-", "−") + ("" if unit in ("", "1") else f"{NBSP}{told}")
+
+
+def count_of(number: int, what: str) -> str:
+    """Such as "3 causes"."""
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
+
+
+# --- sentences --------------------------------------------------------------------------------------------------------
+
+
+_HEADLINES = {  # with no cause, one, several
+    "adequate": (
+        "The model is adequate: these data show nothing that it lacks.",
+        "The model is adequate: one cause was found, but what it explains hardly matters.",
+        "The model is adequate: {many} were found, but what they explain hardly matters.",
+    ),
+    "explained": (
+        "What the model gets wrong is explained by events in the recordings, not by an effect that it lacks.",
+        "One cause explains what the model gets wrong.",
+        "{Many} together explain what the model gets wrong.",
+    ),
+    "partly explained": (
+        "What the model gets wrong is explained in part, by events in the recordings; the rest by no effect known.",
+        "One cause explains part of what the model gets wrong.",
+        "{Many} together explain part of what the model gets wrong.",
+    ),
+    "unexplained": (
+        "The model gets something wrong, and no effect that is known explains it.",
+        "One cause was found, but it explains little of what the model gets wrong.",
+        "{Many} were found, but they explain little of what the model gets wrong.",
+    ),
+}
+
+
+def headline(found: Diagnosis) -> str:
+    """The verdict, in one sentence."""
+    count = len(named(found))
+    many = f"{_NUMBERS[count] if count < len(_NUMBERS) else count} causes"
+    text = _HEADLINES[found.verdict][min(count, 2)].format(Many=many, many=many.lower())
+    if count != 1:
+        return text
+    (cause,) = named(found)
+    return f"{text[:-1]}: {at_place(cause.title, cause.where, names_of(found))}."
+
+
+def error_sentence(found: Diagnosis) -> str:
+    """Error before and after on unseen data, with the interval of the gain, beside floor and bias alone."""
+    factor, unit = unit_of(found)
+    nominal, extended = (together(each.test_rms) for each in (found.nominal, found.extended))
+    where = unseen(found)
+    if found.causes:
+        text = (
+            f"On {where} its error falls from {rounded(factor * nominal)} to {rounded(factor * extended)} {unit} rms, "
+            f"by {percent_interval(found.gain)}"
+        )
+    else:
+        text = f"On {where} its error is {rounded(factor * nominal)} {unit} rms"
+    floor, bias = together(found.noise_floor), together(found.bias_only_rms)
+    if math.isfinite(floor):
+        text += f"; the noise floor is {rounded(factor * floor)}, by {by_source(found.floor_source)}"
+    if math.isfinite(bias):
+        text += f"; the bias alone, without any friction model, would leave {rounded(factor * bias)}"
+    return f"{text}."
+
+
+def unseen(found: Diagnosis) -> str:
+    """On which data the gain was measured."""
+    if found.held_out:
+        return "parts of the recordings that were held out"
+    return "a recording that it has not seen" if len(found.tests) == 1 else "recordings that it has not seen"
+
+
+def tested_sentence(found: Diagnosis) -> str:
+    """How many were tried, and what the p-values mean."""
+    if not found.tested:
+        return ""
+    return (
+        f"{found.tested} effects at places were tested at once. A p-value says how often the strongest of them all "
+        "would look like that by chance, if nothing were missing."
+    )
+
+
+def confusion_sentence(cause: Cause, names: Names) -> str:
+    """What the data cannot tell it from; empty without any."""
+    if not cause.confusable_with:
+        return ""
+    others = [at_place(title_of(other.effect), other, names) for other in cause.confusable_with]
+    return f"These data cannot tell it from: {'; '.join(others)}."
+
+
+def unexplained_sentence(found: Diagnosis) -> str:
+    """What is left above the noise; empty where nothing is."""
+    rest = found.unexplained
+    if not math.isfinite(rest.share) or rest.share < 0.005:
+        return ""
+    text = f"{percent(rest.share)} of the residual's variance above the noise floor is explained by nothing"
+    return f"{text}: {rest.description.rstrip('.')}." if rest.description else f"{text}."
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """One effect that cannot be seen, at all its places. share: the largest that survives the refit."""
+
+    title: str
+    places: str
+    share: float
+    experiment: str
+
+
+def hidden(found: Diagnosis, names: Names) -> list[Hidden]:
+    """Effects that cannot be seen, one each: the experiment of the place that shows most."""
+    by_effect: dict[str, list[Invisible]] = {}
+    for each in found.invisible:
+        by_effect.setdefault(each.where.effect, []).append(each)
+    effects = []
+    for members in by_effect.values():
+        best = max(members, key=lambda each: each.surviving_share)
+        places = [names.place(each.where) for each in members]
+        text = "" if places == [""] else "; ".join(each or "the whole finger" for each in places)
+        if len(places) > 4:
+            text = f"{len(places)} places, such as {places[0]}"
+        effects.append(Hidden(best.title, text, best.surviving_share, best.experiment))
+    return effects
+
+
+def hidden_sentences(found: Diagnosis, names: Names, most: int = 6) -> Iterator[str]:
+    """What cannot be seen, and how it could; beyond so many the rest is counted."""
+    effects = hidden(found, names)
+    for each in effects[:most]:
+        place = f" ({each.places})" if each.places else ""
+        experiment = f" To see it: {each.experiment.rstrip('.')}." if each.experiment else ""
+        yield (
+            f"Not visible in these data: {each.title}{place}. Refitting absorbs it; {percent(each.share)} would be "
+            f"left.{experiment}"
+        )
+    if len(effects) > most:
+        yield f"{len(effects) - most} more are not visible in these data: " + "; ".join(
+            each.title for each in effects[most:]
+        )
+
+
+def by_source(source: str) -> str:
+    """After "by": where the noise floor is from."""
+    return source if source.startswith(("the ", "repeats")) else f"the {source}"
+
+
+# --- printed ----------------------------------------------------------------------------------------------------------
+
+
+def tables(found: Diagnosis) -> Iterator[tuple[str, Row, list[Row]]]:
+    """(title, headings, rows) of the causes and of the errors by joint."""
+    names = names_of(found)
+    if found.causes:
+        headings: Row = ("cause", "place", "size", "gain on unseen data", "p-value", "may also be")
+        rows: list[Row] = [
+            (
+                f"{k}. {cause.where.effect}",
+                names.place(cause.where) or "everywhere",
+                cause.size,
+                percent_interval(cause.gain),
+                probability(cause.p_value),
+                ", ".join(dict.fromkeys(other.effect for other in cause.confusable_with)) or "-",
+            )
+            for k, cause in enumerate(found.causes, start=1)
+        ]
+        yield f"{found.finger}: {found.verdict}", headings, rows
+    factor, unit = unit_of(found)
+    headings = ("joint", "bias only", "nominal", "extended", "nominal, test", "extended, test", "noise floor")
+    yield f"residual before the bias learns from it, rms in {unit}", headings, error_rows(found, names, factor)
+
+
+def error_rows(found: Diagnosis, names: Names, factor: float) -> list[Row]:
+    """By joint: bias alone, nominal and extended on training and test data, noise floor; all joints where several."""
+    columns = [
+        found.bias_only_rms,
+        found.nominal.train_rms,
+        found.extended.train_rms,
+        found.nominal.test_rms,
+        found.extended.test_rms,
+        found.noise_floor,
+    ]
+    rows = [
+        (
+            names.joint(j),
+            *(rounded(factor * values[0]) if values else "–" for values in (c[j - 1 : j] for c in columns)),
+        )
+        for j in range(1, len(found.nominal.train_rms) + 1)
+    ]
+    if len(rows) > 1:
+        rows.append(("all joints", *(rounded(factor * together(column)) for column in columns)))
+    return rows
+
+
+def lines(found: Diagnosis) -> Iterator[str]:
+    """Verdict, error, causes, what could not be told, and what to do next."""
+    names = names_of(found)
+    yield headline(found)
+    yield error_sentence(found)
+    for k, cause in enumerate(found.causes, start=1):
+        yield f"  {k}. {at_place(cause.title, cause.where, names)}: {cause.size}"
+        if confusion := confusion_sentence(cause, names):
+            yield f"     {confusion}"
+    if rest := unexplained_sentence(found):
+        yield rest
+    yield from hidden_sentences(found, names)
+    for event in found.events:
+        yield f"left out: {event.recording}, {event.start:.2f} to {event.end:.2f} s: {event.description}"
+    yield f"next: {found.experiment.sentence}"
+
+
+def parameter_rows(parameters: Mapping[str, tuple[float, str]]) -> list[tuple[str, str]]:
+    """(path, value with unit)."""
+    return [(path, magnitude(value, unit)) for path, (value, unit) in parameters.items()]

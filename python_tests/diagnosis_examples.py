@@ -1,0 +1,381 @@
+"""Diagnoses made up by hand, for tests of the report, the page and the words: the numbers look real.
+
+Every one is complete: what a page leaves out must be left out by the page, not by the example.
+"""
+
+from __future__ import annotations
+
+import copy
+import zlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.diagnosis_result import (
+    Cause,
+    DetectionGain,
+    Diagnosis,
+    Event,
+    Evidence,
+    Experiment,
+    Interval,
+    Invisible,
+    ModelErrors,
+    ResidualView,
+    Unexplained,
+    Where,
+)
+
+Numbers = NDArray[np.float64]
+Shape = Callable[[Numbers], Numbers]
+
+_LAW = {"static": 0.03, "coulomb": 0.03, "stribeck_velocity": 0.005, "viscous": 0.3}
+
+
+def finger_of(joints: Sequence[str], tendons: Sequence[str]) -> dict[str, Any]:
+    """A finger without extensions."""
+    pulleys = [*([_LAW] * (len(joints) - 1)), None]
+    arms = [[0.009 * (-1) ** (i // (j + 1)) for j in range(len(joints))] for i in range(len(tendons))]
+    return {
+        "format": "tendonfmu-finger-1",
+        "name": "index finger",
+        "joints": [{"name": name, "cover": {"stiffness": 0.02}} for name in joints],
+        "tendons": [
+            {"name": name, "stiffness": 4000.0, "moment_arms": arms[i], "pulley_friction": pulleys}
+            for i, name in enumerate(tendons)
+        ],
+        "bias": {"noise_std": 0.001},
+        "contact": {"threshold": [0.03] * len(joints)},
+        "extensions": [],
+    }
+
+
+# --- series -----------------------------------------------------------------------------------------------------------
+
+
+def _noise(name: str, size: int, scale: float) -> Numbers:
+    """The same for the same name."""
+    return np.random.default_rng(zlib.crc32(name.encode())).normal(scale=scale, size=size)
+
+
+def _coloured(name: str, size: int, scale: float, memory: float = 0.9) -> Numbers:
+    white = _noise(name, size, scale * np.sqrt(1 - memory**2))
+    series, last = np.empty(size), 0.0
+    for k, value in enumerate(white):
+        last = series[k] = memory * last + value
+    return series
+
+
+def evidence(joint: int, label: str, unit: str, span: tuple[float, float], shape: Shape) -> Evidence:
+    """shape: mean residual before (N·m) over the coordinate."""
+    bins, floor = 24, 4e-4
+    x = np.linspace(*span, bins)
+    spread = np.full(bins, floor) * (1 + 0.3 * np.abs(_noise(f"{label}{joint}spread", bins, 1.0)))
+    return Evidence(
+        joint=joint,
+        label=label,
+        unit=unit,
+        coordinate=x,
+        before=shape(x) + _noise(f"{label}{joint}before", bins, floor),
+        after=_noise(f"{label}{joint}after", bins, floor),
+        before_std=spread,
+        after_std=0.8 * spread,
+    )
+
+
+_BINNED = (
+    ("angle", "joint angle", "rad", (-0.5, 0.9)),
+    ("velocity", "joint velocity", "rad/s", (-1.1, 1.1)),
+    ("tendon_force", "mean tendon force", "N", (4.0, 24.0)),
+    ("load", "external torque", "N·m", (-0.05, 0.05)),
+    ("travel", "travel since reversal", "rad", (0.0, 0.8)),
+)
+
+
+def views_of(joint: int, size: float, shapes: Mapping[str, Shape]) -> tuple[ResidualView, ...]:
+    """All kinds of views of one joint. size: N·m of what no model explains. shapes: kind → mean residual before."""
+    time, lag, frequency = np.linspace(0.0, 60.0, 1200), np.linspace(0.0, 2.0, 101), np.geomspace(0.05, 50.0, 120)
+    before = _coloured(f"before{joint}", len(time), size)
+    if shapes:
+        before += 1.8 * size * np.sin(2.1 * time + joint) * (1 + 0.4 * np.sin(0.31 * time))
+    found = [ResidualView(joint, "time", "time", "s", time, before, _coloured(f"before{joint}", len(time), 0.9 * size))]
+    for kind, label, unit, span in _BINNED:
+        x = np.linspace(*span, 30)
+        mean = shapes.get(kind, np.zeros_like)(x) + _noise(f"{kind}{joint}", 30, 0.2 * size)
+        after, std = _noise(f"{kind}{joint}after", 30, 0.15 * size), np.full(30, 1.3 * size)
+        found.append(ResidualView(joint, kind, label, unit, x, mean, after, std))
+    power = size**2 / 50.0 * (1 + 6.0 / (1 + (frequency / 1.5) ** 2)) * np.exp(_noise(f"spectrum{joint}", 120, 0.25))
+    hump = 40.0 * np.exp(-(((np.log(frequency) - np.log(0.33)) / 0.25) ** 2)) if shapes else np.zeros_like(frequency)
+    found.append(ResidualView(joint, "spectrum", "frequency", "Hz", frequency, power * (1 + hump), power))
+    decay = np.exp(-lag / 0.12)
+    longer = 0.7 * np.cos(2.1 * lag) + 0.3 * decay if shapes else decay
+    found.append(ResidualView(joint, "autocorrelation", "lag", "s", lag, longer, decay))
+    return tuple(found)
+
+
+# --- causes -----------------------------------------------------------------------------------------------------------
+
+GRAVITY = Cause(
+    where=Where("gravity", joint=2),
+    title="weight of a link that the model leaves out",
+    explanation="The weight of the link behind this joint turns it by a torque that follows the angle. It changes when "
+    "the hand is turned over.",
+    p_value=2.1e-7,
+    gain=Interval(0.31, 0.27, 0.35),
+    share=0.48,
+    confusable_with=(Where("cover_stiffness", joint=2), Where("moment_arm", joint=2, tendon=1)),
+    parameters={"extensions[1].sine": (0.0121, "N.m"), "extensions[1].cosine": (-0.0034, "N.m")},
+    size="at most 12.6 mN·m",
+    evidence=(
+        evidence(2, "joint angle", "rad", (-0.4, 0.9), lambda q: 0.0121 * np.sin(q) - 0.0034 * np.cos(q)),
+        evidence(1, "joint angle", "rad", (-0.5, 0.8), lambda q: 0.004 * np.sin(q)),
+    ),
+    first_gain=Interval(0.24, 0.20, 0.28),
+)
+
+LOAD_FRICTION = Cause(
+    where=Where("load_friction", joint=1, tendon=3),
+    title="friction in the joint grows with the force of the tendon",
+    explanation="The joint rubs more, the harder the tendon pulls: a bearing or a pin that carries the load.",
+    p_value=3.4e-5,
+    gain=Interval(0.14, 0.11, 0.17),
+    share=0.21,
+    confusable_with=(),
+    parameters={"extensions[2].coulomb": (2.3e-4, "m")},
+    size="0.23 mN·m for each newton of tendon force",
+    evidence=(evidence(1, "tendon force", "N", (4.0, 24.0), lambda f: 2.3e-4 * (f - 11.0)),),
+    first_gain=Interval(0.12, 0.09, 0.15),
+)
+
+DRIFT = Cause(
+    where=Where("friction_drift"),
+    title="friction changes in the course of time",
+    explanation="Grease warms up, or surfaces run in: the same motion costs less torque after some minutes.",
+    p_value=8.0e-3,
+    gain=Interval(0.031, 0.012, 0.052),
+    share=0.05,
+    confusable_with=(Where("force_gain", tendon=2), Where("asymmetric_friction", joint=1)),
+    parameters={"extensions[3].amplitude": (-0.18, "1"), "extensions[3].time_constant": (22.0, "s")},
+    size="18 % less friction in the end, with a time constant of 22 s",
+    evidence=(evidence(1, "time", "s", (0.0, 60.0), lambda t: 0.0021 * (np.exp(-t / 22.0) - 0.3)),),
+    first_gain=Interval(0.02, 0.005, 0.04),
+)
+
+INVISIBLE = (
+    Invisible(
+        Where("cover_hardening", joint=1),
+        "the cover gets stiffer the more it is bent",
+        0.002,
+        "move joint 1 (mcp) over at least -0.9 to 1.2 rad",
+    ),
+    Invisible(
+        Where("tendon_nonlinearity", tendon=3),
+        "the tendon gets stiffer the more it is stretched",
+        0.006,
+        "record at a pretension of 30 N as well",
+    ),
+)
+
+STALL = Event(
+    "train_2.parquet", 17.08, 18.32, (2,), 0.083, "joint 2 stands still while its torque rises: a stall or contact"
+)
+
+EXPERIMENT = Experiment(
+    sentence="Record 60 s at a pretension of 25 N with slow strokes of joint 2 (pip) over its whole range: the weight "
+    "of a link stays, a wrong moment arm grows with the force.",
+    separates=((Where("gravity", joint=2), Where("moment_arm", joint=2, tendon=1)),),
+    makes_visible=(Where("tendon_nonlinearity", tendon=3),),
+    distance=6.4,
+    motion={"pretension": [25.0], "max_speed": 0.4, "duration": 60.0},
+)
+
+NO_EXPERIMENT = Experiment(sentence="Nothing is left to be told apart.")
+
+
+# --- whole diagnoses --------------------------------------------------------------------------------------------------
+
+
+def adequate() -> Diagnosis:
+    """Nothing is missing; one effect cannot be seen."""
+    finger = finger_of(("mcp", "pip"), ("fdp", "fds", "edc", "lumbrical"))
+    errors = ModelErrors((1.21e-3, 0.98e-3), (1.25e-3, 1.01e-3))
+    return Diagnosis(
+        finger="index finger",
+        verdict="adequate",
+        recordings=("train.parquet",),
+        tests=(),
+        held_out=True,
+        seconds=4.2,
+        seed=0,
+        nominal=errors,
+        extended=errors,
+        bias_only_rms=(14.6e-3, 9.8e-3),
+        noise_floor=(1.2e-3, 0.97e-3),
+        floor_source="white part of the residual",
+        ceiling=(0.003, 0.0),
+        gain=Interval(0.0, 0.0, 0.0),
+        causes=(),
+        invisible=INVISIBLE[:1],
+        events=(),
+        unexplained=Unexplained(0.0, "", (0.0, 0.0)),
+        experiment=replace(
+            NO_EXPERIMENT, sentence=f"{INVISIBLE[0].experiment[0].upper()}{INVISIBLE[0].experiment[1:]}."
+        ),
+        views=(*views_of(1, 1.2e-3, {}), *views_of(2, 0.98e-3, {})),
+        whiteness=((0.08, 0.08), (0.05, 0.05)),
+        detection=None,
+        nominal_data=finger,
+        extended_data=finger,
+        tested=214,
+    )
+
+
+def _extended(finger: Mapping[str, Any], causes: Sequence[Cause]) -> dict[str, Any]:
+    """With the rows of the causes."""
+    data = copy.deepcopy(dict(finger))
+    for cause in causes:
+        numbers = {path.split(".")[-1]: value for path, (value, _) in cause.parameters.items()}
+        place = {"joint": cause.where.joint, "tendon": cause.where.tendon}
+        row = {"effect": cause.where.effect, **{key: at for key, at in place.items() if at is not None}, **numbers}
+        data["extensions"].append(row)
+    return data
+
+
+def one_cause() -> Diagnosis:
+    """The weight of a link, found without a doubt."""
+    cause = replace(GRAVITY, confusable_with=())
+    found = adequate()
+    return replace(
+        found,
+        verdict="explained",
+        tests=("test.parquet",),
+        held_out=False,
+        nominal=ModelErrors((1.9e-3, 4.4e-3), (2.0e-3, 4.6e-3)),
+        extended=ModelErrors((1.22e-3, 1.0e-3), (1.27e-3, 1.04e-3)),
+        ceiling=(0.55, 0.93),
+        gain=Interval(0.673, 0.64, 0.70),
+        causes=(_alone(cause),),
+        experiment=NO_EXPERIMENT,
+        views=(
+            *views_of(1, 1.2e-3, {"angle": lambda q: 0.004 * np.sin(q)}),
+            *views_of(2, 1.0e-3, {"angle": lambda q: 0.0121 * np.sin(q) - 0.0034 * np.cos(q)}),
+        ),
+        whiteness=((0.45, 0.08), (0.91, 0.06)),
+        detection=DetectionGain(23, 15, 22, 6, 1, 0.142, 0.061, (0.021, 0.032), (0.009, 0.008)),
+        extended_data=_extended(found.nominal_data, [cause]),
+        tested=214,
+    )
+
+
+def _alone(cause: Cause) -> Cause:
+    return replace(cause, gain=Interval(0.673, 0.64, 0.70), first_gain=Interval(0.673, 0.64, 0.70), share=0.94)
+
+
+def three_causes() -> Diagnosis:
+    """Three at once, two of them with others that look the same, a stall, and a rest."""
+    found = one_cause()
+    causes = (GRAVITY, LOAD_FRICTION, DRIFT)
+    return replace(
+        found,
+        verdict="partly explained",
+        recordings=("train_1.parquet", "train_2.parquet", "train_3.parquet"),
+        nominal=ModelErrors((4.9e-3, 6.3e-3), (5.1e-3, 6.2e-3)),
+        extended=ModelErrors((2.4e-3, 2.1e-3), (2.6e-3, 2.2e-3)),
+        ceiling=(0.81, 0.92),
+        gain=Interval(0.577, 0.54, 0.61),
+        causes=causes,
+        invisible=INVISIBLE,
+        events=(STALL, replace(STALL, start=41.0, end=41.8, joints=(1, 2), peak=0.051)),
+        unexplained=Unexplained(
+            0.22, "mostly at joint 1 (mcp), at 2 to 4 Hz, while tendon 2 (fds) moves at small angles", (0.28, 0.11)
+        ),
+        experiment=EXPERIMENT,
+        views=(
+            *views_of(1, 2.4e-3, {"tendon_force": lambda f: 2.3e-4 * (f - 11.0)}),
+            *views_of(2, 2.1e-3, {"angle": lambda q: 0.0121 * np.sin(q) - 0.0034 * np.cos(q)}),
+        ),
+        whiteness=((0.94, 0.51), (0.95, 0.42)),
+        detection=None,
+        extended_data=_extended(found.nominal_data, causes),
+        warnings=(
+            "train_1.parquet: joint 2 (pip) turns round 7 times only; expected at least 10 for presliding",
+            "the bias adapts in 0.2 s: any model looks adequate to it",
+        ),
+    )
+
+
+def unexplained() -> Diagnosis:
+    """Something is there that no effect is."""
+    found = adequate()
+    return replace(
+        found,
+        verdict="unexplained",
+        nominal=ModelErrors((4.1e-3, 1.0e-3), (4.3e-3, 1.0e-3)),
+        extended=ModelErrors((4.1e-3, 1.0e-3), (4.3e-3, 1.0e-3)),
+        ceiling=(0.62, 0.01),
+        unexplained=Unexplained(
+            0.88, "at joint 1 (mcp), a line at 1.7 Hz that does not depend on the motion", (0.91, 0.02)
+        ),
+        experiment=replace(
+            NO_EXPERIMENT,
+            sentence="Hold joint 1 (mcp) still for 30 s at a pretension of 10 N: what goes on without motion is a "
+            "disturbance from outside.",
+        ),
+        views=(
+            *views_of(1, 1.5e-3, {"time": np.zeros_like}),
+            *views_of(2, 0.98e-3, {}),
+        ),
+        whiteness=((0.93, 0.93), (0.05, 0.05)),
+    )
+
+
+def many_joints() -> Diagnosis:
+    """4 joints, 8 tendons, long names, 12 recordings."""
+    joints = ("abduction", "metacarpophalangeal", "proximal interphalangeal", "distal interphalangeal")
+    tendons = tuple(f"{side} {k}" for k in range(1, 5) for side in ("flexor profundus", "extensor digitorum"))
+    found, finger = three_causes(), finger_of(joints, tendons)
+    causes = tuple(
+        replace(
+            cause,
+            where=Where("edge_friction", j, t),
+            title="a tendon rubs at an edge before a joint",
+            parameters={f"tendons[{t}].edge_friction[{j}].laws[2].coulomb": (0.021, "1")},
+            size="2.1 % of the tendon force",
+            evidence=tuple(replace(each, joint=j) for each in cause.evidence[:1]),
+        )
+        for cause, j, t in ((GRAVITY, 4, 7), (LOAD_FRICTION, 3, 2))
+    )
+    rms = (5.1e-3, 6.2e-3, 3.3e-3, 1.8e-3)
+    return replace(
+        found,
+        recordings=tuple(f"recordings_of_the_left_hand/free_motion_at_pretension_{k:02d}.parquet" for k in range(12)),
+        nominal=ModelErrors(rms, rms),
+        extended=ModelErrors(tuple(0.5 * each for each in rms), tuple(0.55 * each for each in rms)),
+        bias_only_rms=tuple(6 * each for each in rms),
+        noise_floor=tuple(0.4 * each for each in rms),
+        floor_source="repeats of the motion",
+        ceiling=(0.7, 0.8, 0.4, 0.1),
+        causes=(*causes, *found.causes),
+        unexplained=Unexplained(0.22, found.unexplained.description, (0.28, 0.11, 0.2, 0.05)),
+        views=tuple(
+            view
+            for j, size in enumerate(rms, start=1)
+            for view in views_of(j, 0.5 * size, {"angle": lambda q: 0.006 * np.sin(3 * q)})
+        ),
+        whiteness=((0.94, 0.51),) * 4,
+        nominal_data=finger,
+        extended_data=_extended(finger, found.causes),
+        tested=1873,
+    )
+
+
+ALL: dict[str, Callable[[], Diagnosis]] = {
+    "adequate": adequate,
+    "one_cause": one_cause,
+    "three_causes": three_causes,
+    "unexplained": unexplained,
+    "many_joints": many_joints,
+}
