@@ -1,0 +1,75 @@
+"""Hidden effects that are not in the list of contract section 7: the right answer is `unknown`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from friction_physics import Finger, Motion, last_true
+from matched_rig import Hand, Hidden
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+Array = NDArray[Any]
+Random = np.random.Generator
+
+
+def rubbing(hand: Hand, rng: Random) -> tuple[Hand, Hidden]:
+    """Two neighbouring tendons rub on each other before a joint: friction by their relative velocity."""
+    m, n = len(hand.truth["tendons"]), len(hand.truth["joints"])
+    i, j = int(rng.integers(m)), int(rng.integers(n))
+    other = (i + 1) % m
+
+    def change(finger: Finger, motion: Motion, magnitude: float) -> None:
+        relative = motion.tendon[:, i, j] - motion.tendon[:, other, j]
+        last = last_true(np.abs(relative) > finger.tendon_threshold)
+        sign = np.where(last >= 0, np.sign(relative[last]), 0.0)
+
+        def torque(motion: Motion, force: Array) -> Array:
+            found = np.zeros_like(motion.angle)
+            drag = magnitude * np.sqrt(np.abs(force[:, i] * force[:, other])) * sign
+            found[:, j:] = drag[:, None] * (finger.arms[i, j:] - finger.arms[other, j:])
+            return found
+
+        finger.extras.append(torque)
+
+    note = f"tendons {i + 1} and {other + 1} before joint {j + 1}"
+    return hand, Hidden("rubbing", joint=j + 1, tendon=i + 1, magnitude=0.02, note=note, finger=change)
+
+
+def periodic(hand: Hand, rng: Random) -> tuple[Hand, Hidden]:
+    """A torque that comes and goes in time alone, such as the cogging of a motor that turns by itself; half beat."""
+    j = int(rng.integers(len(hand.truth["joints"])))
+    frequency, phase = float(np.exp(rng.uniform(np.log(0.6), np.log(3.0)))), float(rng.uniform(0.0, 2.0 * np.pi))
+    beat = float(rng.uniform(0.05, 0.2)) if rng.random() < 0.5 else 0.0
+
+    def change(finger: Finger, motion: Motion, magnitude: float) -> None:
+        def torque(motion: Motion, force: Array) -> Array:
+            found = np.zeros_like(motion.angle)
+            envelope = np.cos(2.0 * np.pi * beat * motion.time)
+            found[:, j] = magnitude * envelope * np.sin(2.0 * np.pi * frequency * motion.time + phase)
+            return found
+
+        finger.extras.append(torque)
+
+    return hand, Hidden("periodic", joint=j + 1, magnitude=0.002, note=f"{frequency:.2f} Hz", finger=change)
+
+
+def ageing(hand: Hand, rng: Random) -> tuple[Hand, Hidden]:
+    """Friction that remembers for seconds how much the joint moved: it falls while it slides and heals at rest."""
+    j = int(rng.integers(len(hand.truth["joints"])))
+    memory = float(rng.uniform(2.0, 5.0))
+
+    def change(finger: Finger, motion: Motion, magnitude: float) -> None:
+        share = 1.0 - np.exp(-(motion.time[1] - motion.time[0]) / memory)
+        slides = np.minimum(np.abs(motion.velocity[:, j]) / 0.5, 1.0)
+        level = lfilter([share], [1.0, share - 1.0], slides)
+        for effect in finger.effects:
+            if effect.kind in ("joint", "load") and effect.at == (j,):
+                effect.factor = np.maximum(1.0 - magnitude * (level - level.mean()), 0.05)
+
+    return hand, Hidden("ageing", joint=j + 1, magnitude=0.5, note=f"memory {memory:.1f} s", finger=change)
+
+
+UNKNOWN: dict[str, Callable[..., tuple[Hand, Hidden]]] = {"rubbing": rubbing, "periodic": periodic, "ageing": ageing}
