@@ -131,7 +131,7 @@ const std::vector<Fault> wrong_types = {
     {"/contact", "[]", "contact = [...]: expected an object"},
     {"/contact/threshold", "0.03", "contact.threshold = 0.03: expected a list of 2 numbers in N.m, one per joint"},
     {"/contact/threshold/0", "true", "contact.threshold[1] = true: expected a number"},
-    {"/extensions", "{}", "extensions = {...}: expected a list of at most 64 extensions"},
+    {"/extensions", "{}", "extensions = {...}: expected a list of at most 1024 extensions"},
     {"/extensions/0", "\"cover_hardening\"", "extensions[1] = \"cover_hardening\": expected an object"},
     {"/extensions/0/stiffness", "\"x\"", "extensions[1].stiffness = \"x\": expected a number"},
 };
@@ -165,8 +165,16 @@ const std::vector<Fault> contradictions = {
     {"/tendons/0/edge_friction/1/static", "1",
      "tendons[1].edge_friction[2].static: not allowed beside angles and laws"},
     {"/tendons/0/edge_friction/1/negative", law, "tendons[1].edge_friction[2].negative: not allowed beside angles and"},
-    {"/extensions/0/effect", "\"gravity\"", "extensions[1].effect = \"gravity\": an effect that this version has no"},
-    {"/extensions/0/effect", "\"dragons\"", "extensions[1].effect = \"dragons\": expected one of cover_hardening"},
+    {"/extensions/0/effect", "\"gravity\"",
+     "extensions[1].stiffness: unknown key; expected one of effect, joint, sine"},
+    {"/extensions/0/effect", "\"dragons\"",
+     "extensions[1].effect = \"dragons\": expected one of cover_hardening, gravity,"},
+    {"/extensions/0/effect", "\"gravity\\u0000\"", "extensions[1].effect = \"gravity"},
+    {"/extensions/0/effect", "\"stribeck\"",
+     "extensions[1].effect = \"stribeck\": no extension: it is the numbers static and stribeck_velocity of a friction"},
+    {"/extensions/0/effect", "\"edge_friction\"",
+     "extensions[1].effect = \"edge_friction\": no extension: it is the list edge_friction of a tendon"},
+    {"/extensions/0/effect", "\"contact\"", "extensions[1].effect = \"contact\": no extension: it is something in a"},
     {"/extensions/0/joint", "3", "extensions[1].joint = 3: expected a joint from 1 to 2"},
     {"/extensions/0/joint", "0", "extensions[1].joint = 0: expected a joint from 1 to 2"},
     {"/extensions/0/joint", "-1", "extensions[1].joint = -1: expected a joint from 1 to 2"},
@@ -198,6 +206,60 @@ const std::vector<Fault> ranges = {
     {"/tendons/1/moment_arms", "[0.018, 0.008]", "tendons: moment_arms are not of full column rank"},
 };
 INSTANTIATE_TEST_SUITE_P(Ranges, Refused, testing::ValuesIn(ranges));
+
+// One extension of the small finger, which has two joints and two tendons; or several.
+const std::vector<Fault> extensions = {
+    {"/extensions/0", R"({"effect": "force_gain", "correction": 0.1})",
+     "extensions[1].tendon: missing; expected a tendon from 1 to 2"},
+    {"/extensions/0", R"({"effect": "force_gain", "tendon": 3, "correction": 0.1})",
+     "extensions[1].tendon = 3: expected a tendon from 1 to 2"},
+    {"/extensions/0", R"({"effect": "force_gain", "tendon": 1, "joint": 1, "correction": 0.1})",
+     "extensions[1].joint: unknown key; expected one of effect, tendon, correction"},
+    {"/extensions/0", R"({"effect": "force_gain", "tendon": 1, "correction": -1})",
+     "extensions[1].correction = -1: expected above -1 and at most 1e+09 1"},
+    {"/extensions/0", R"({"effect": "moment_arm", "tendon": 1, "correction": 0.1})",
+     "extensions[1].joint: missing; expected a joint from 1 to 2"},
+    {"/extensions/0", R"({"effect": "preload_friction", "joint": 1, "coulomb": 0.1})",
+     "extensions[1].tendon: missing; expected a tendon from 1 to 2"},
+    {"/extensions/0", R"({"effect": "preload_friction", "tendon": 1, "joint": 0, "coulomb": 0.1})",
+     "extensions[1].joint = 0: expected a joint from 1 to 2"},
+    {"/extensions/0", R"({"effect": "joint_coupling", "joint": 2, "stiffness": 0.1})",
+     "extensions[1].joint = 2: expected a joint from 1 to 1, since the last one has none after it"},
+    {"/extensions/0", R"({"effect": "joint_coupling", "stiffness": 0.1})",
+     "extensions[1].joint: missing; expected a joint from 1 to 1"},
+    {"/extensions/0", R"({"effect": "backlash", "width": 0.1})",
+     "extensions[1].joint: missing; expected a joint from 1 to 2, or tendon in its place"},
+    {"/extensions/0", R"({"effect": "presliding", "joint": 1, "tendon": 1, "displacement": 0.1})",
+     "extensions[1].tendon: not allowed beside joint; presliding acts at one of them"},
+    {"/extensions/0", R"({"effect": "friction_drift", "joint": 1, "tendon": 1, "amplitude": 0, "time_constant": 1})",
+     "extensions[1].tendon: not allowed beside joint"},
+    {"/extensions/0", R"({"effect": "presliding", "joint": 1, "displacement": 0})",
+     "extensions[1].displacement = 0: expected above 0 and at most 1e+09 rad"},
+    {"/extensions/0", R"({"effect": "presliding", "tendon": 1, "displacement": 0})",
+     "extensions[1].displacement = 0: expected above 0 and at most 1e+09 m"},
+    {"/extensions/0", R"({"effect": "time_delay", "tendon": 1, "delay": 0})",
+     "extensions[1].tendon: unknown key; expected one of effect, delay"},
+    {"/extensions/0", R"({"effect": "time_delay", "delay": 0.06})",
+     "extensions[1].delay = 0.06: expected -0.05 to 0.05 s"},
+    {"/extensions", R"([{"effect": "time_delay", "delay": 0}, {"effect": "time_delay", "delay": 0.01}])",
+     "extensions[2].effect = \"time_delay\": expected once, and extensions[1] is the same"},
+    {"/extensions",
+     R"([{"effect": "backlash", "tendon": 1, "width": 0}, {"effect": "backlash", "joint": 1, "width": 0},
+         {"effect": "backlash", "tendon": 1, "width": 1}])",
+     "extensions[3].effect = \"backlash\": expected once a place, and extensions[1] is the same"},
+};
+INSTANTIATE_TEST_SUITE_P(Extensions, Refused, testing::ValuesIn(extensions));
+
+TEST(Refusal, ACouplingNeedsTwoJoints) {
+  json finger = small_finger();
+  finger["joints"].erase(1);
+  finger["tendons"] = json::parse(R"([{"stiffness": 4000, "moment_arms": [0.01]}])");
+  finger["contact"] = {{"threshold", {0.1}}};
+  finger["bias"] = nullptr;
+  finger["extensions"] = json::parse(R"([{"effect": "joint_coupling", "joint": 1, "stiffness": 0.1}])");
+  EXPECT_EQ(read(finger).message,
+            "extensions[1].joint = 1: expected a joint with another one after it; the finger has one joint");
+}
 
 TEST(Refusal, FewerTendonsThanJointsCannotFixTheAngles) {
   json finger = small_finger();

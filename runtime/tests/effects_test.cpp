@@ -1,0 +1,461 @@
+// Torques beyond the paper, each by itself: values by hand, derivatives by differences, memory.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "described_finger.h"
+#include "model_inside.h"
+
+extern "C" {
+#include "floating_point.h"
+#include "sine_cosine.h"
+}
+
+namespace {
+
+constexpr std::size_t joints = 3, tendons = 2, lanes = 4;
+using PerJoint = std::array<double, joints>;
+using PerTendon = std::array<double, tendons>;
+
+// A sample of three joints and two tendons; the second tendon passes the first two joints only.
+struct Sample {
+  PerJoint angle{0.3, -0.4, 0.9}, velocity{0.5, -0.2, 0.7}, rest{0.1, 0.0, -0.2};
+  PerTendon force{20.0, 30.0};
+  std::array<double, joints * lanes> arm{0.010, -0.008, 0, 0, 0.006, -0.005, 0, 0, 0.004, 0.0, 0, 0};
+  std::array<double, joints * joints> cosine{1, 1, 1, 1, 1, 1, 1, 1, 1};
+  double time = 0.1, step = 0.01;
+  int first = 0;
+
+  // ẋ_ij = Σ_{j' >= j} r_ij'·q̇_j'
+  std::array<double, joints * lanes> tendon_velocity() const {
+    std::array<double, joints * lanes> result{};
+    for (std::size_t j = 0; j < joints; ++j) {
+      for (std::size_t k = j; k < joints; ++k) {
+        for (std::size_t i = 0; i < tendons; ++i) {
+          result[j * lanes + i] += arm[k * lanes + i] * velocity[k];
+        }
+      }
+    }
+    return result;
+  }
+};
+
+// An effect at a place, with its numbers and what it remembers.
+struct Effect {
+  const effect_type* type;
+  effect_place place;
+  std::vector<double> numbers, memory;
+
+  // from 1, as in a description; 0: nowhere
+  Effect(const char* name, std::uint32_t joint, std::uint32_t tendon, std::vector<double> values)
+      : type(effect_by_name(name)),
+        place{joint ? joint - 1 : EFFECT_NOWHERE, tendon ? tendon - 1 : EFFECT_NOWHERE},
+        numbers(std::move(values)) {
+    if (type->state_count) {
+      memory.resize(type->state_count(joints, tendons, place), 0.0);
+    }
+  }
+
+  // calls with the sample as an effect sees it
+  template <class Call>
+  static void see(const Sample& sample, Call call) {
+    const auto velocity = sample.tendon_velocity();
+    effect_sample seen{};
+    seen.joints = joints;
+    seen.tendons = tendons;
+    seen.lanes = lanes;
+    seen.first = sample.first;
+    seen.source = 3;
+    seen.time = sample.time;
+    seen.step = sample.step;
+    seen.angle = sample.angle.data();
+    seen.velocity = sample.velocity.data();
+    seen.tendon_velocity = velocity.data();
+    seen.force = sample.force.data();
+    seen.moment_arm = sample.arm.data();
+    seen.rest_angle = sample.rest.data();
+    seen.axis_cosine = sample.cosine.data();
+    seen.tendon_threshold = 0.0005;
+    seen.joint_threshold = 0.01;
+    call(&seen);
+  }
+
+  std::vector<double> advanced(const Sample& sample) const {
+    std::vector<double> after(memory.size(), std::numeric_limits<double>::quiet_NaN());
+    if (type->advance) {
+      see(sample, [&](auto* seen) { type->advance(place, numbers.data(), seen, memory.data(), after.data()); });
+    }
+    return after;
+  }
+
+  PerJoint torque(const Sample& sample, const std::vector<double>& parameters, const std::vector<double>& after) const {
+    PerJoint result{1.0, 2.0, 3.0};  // it adds
+    see(sample, [&](auto* seen) { type->torque(place, parameters.data(), seen, after.data(), result.data()); });
+    return {result[0] - 1.0, result[1] - 2.0, result[2] - 3.0};
+  }
+  PerJoint torque(const Sample& sample) const { return torque(sample, numbers, advanced(sample)); }
+
+  PerJoint accept(const Sample& sample) {
+    memory = advanced(sample);
+    return torque(sample, numbers, memory);
+  }
+
+  PerJoint slope(const Sample& sample, const Sample& direction, const std::vector<double>& after) const {
+    PerJoint result{};
+    const effect_direction along{direction.angle.data(), direction.velocity.data(), direction.force.data()};
+    see(sample, [&](auto* seen) { type->slope(place, numbers.data(), seen, after.data(), &along, result.data()); });
+    return result;
+  }
+};
+
+void expect_near(const PerJoint& found, const PerJoint& expected, double tolerance = 1e-15) {
+  for (std::size_t j = 0; j < joints; ++j) {
+    EXPECT_NEAR(found[j], expected[j], tolerance) << "joint " << j + 1;
+  }
+}
+
+// One of each, at each kind of place that it has.
+std::vector<Effect> all_torques() {
+  return {{"cover_hardening", 3, 0, {0.3}},
+          {"gravity", 3, 0, {0.02, -0.03}},
+          {"gravity", 1, 0, {0.02, -0.03}},
+          {"inertia", 2, 0, {2e-4}},
+          {"joint_coupling", 2, 0, {0.05}},
+          {"preload_friction", 0, 1, {0.4}},
+          {"preload_friction", 2, 2, {0.4}},
+          {"load_friction", 2, 1, {2e-4}},
+          {"force_gain", 0, 2, {0.07}},
+          {"force_offset", 0, 1, {-0.5}},
+          {"moment_arm", 3, 1, {6e-4}},
+          {"moment_arm_variation", 2, 2, {-4e-4}},
+          {"pulley_eccentricity", 3, 1, {5e-4, 3e-4}}};
+}
+
+// --- values
+// -----------------------------------------------------------------------------------------------------------
+
+TEST(Torque, OfSpringsAtTheCovers) {
+  const Sample s;
+  expect_near(Effect("cover_hardening", 1, 0, {0.5}).torque(s), {0.5 * 0.2 * 0.2 * 0.2, 0, 0});
+  // bends 0.2, −0.4, 1.1
+  expect_near(Effect("joint_coupling", 1, 0, {0.1}).torque(s), {0.06, -0.06, 0});
+  expect_near(Effect("joint_coupling", 2, 0, {0.1}).torque(s), {0, -0.15, 0.15});
+}
+
+TEST(Torque, OfWeightIsFeltByAllJointsBefore) {
+  Sample s;
+  const double amount = 0.02 * std::sin(0.8) - 0.03 * std::cos(0.8);
+  expect_near(Effect("gravity", 3, 0, {0.02, -0.03}).torque(s), {amount, amount, amount});
+  const double of_second = 0.02 * std::sin(-0.1);
+  expect_near(Effect("gravity", 2, 0, {0.02, 0.0}).torque(s), {of_second, of_second, 0});
+  // the second axis against the third, the first across it
+  s.cosine = {1, 0, 0, 0, 1, -1, 0, -1, 1};
+  const double turned = 0.02 * std::sin(0.4 + 0.9);
+  expect_near(Effect("gravity", 3, 0, {0.02, 0.0}).torque(s), {0, -turned, turned});
+}
+
+TEST(Torque, OfInertiaByTheVelocityBefore) {
+  Effect inertia("inertia", 2, 0, {2e-3});
+  Sample s;
+  s.first = 1;
+  expect_near(inertia.accept(s), {0, 0, 0});
+  s.first = 0;
+  s.velocity[1] = 0.3;
+  expect_near(inertia.accept(s), {0, 2e-3 * 0.5 / 0.01, 0});
+  s.step = 0.02;
+  s.velocity[1] = 0.2;
+  expect_near(inertia.accept(s), {0, -2e-3 * 0.1 / 0.02, 0});
+}
+
+TEST(Torque, OfFrictionOfATendonWithoutItsForce) {
+  // ẋ_1 = 0.0066, 0.0016, 0.0028; ẋ_2 = −0.003, 0.001, 0
+  const Sample s;
+  expect_near(Effect("preload_friction", 2, 1, {0.4}).torque(s), {0, 0.006 * 0.4, 0.004 * 0.4});
+  expect_near(Effect("preload_friction", 1, 2, {0.4}).torque(s), {0.008 * 0.4, 0.005 * 0.4, 0});
+  expect_near(Effect("preload_friction", 3, 2, {0.4}).torque(s), {0, 0, 0});
+  // before joint 1: +1, +1, +1 along the first tendon, −1, +1, 0 along the second
+  expect_near(Effect("preload_friction", 0, 1, {0.4}).torque(s), {0.01 * 0.4, 0.006 * 0.8, 0.004 * 1.2});
+  expect_near(Effect("preload_friction", 0, 2, {0.4}).torque(s), {0.008 * 0.4, 0, 0});
+}
+
+TEST(Torque, OfFrictionInAJointByOneTendonsForce) {
+  Sample s;
+  expect_near(Effect("load_friction", 2, 1, {2e-4}).torque(s), {0, -2e-4 * 20.0, 0});
+  s.force[0] = -20.0;
+  expect_near(Effect("load_friction", 1, 1, {2e-4}).torque(s), {2e-4 * 20.0, 0, 0});
+}
+
+TEST(Torque, OfForcesMeasuredWrong) {
+  const Sample s;
+  expect_near(Effect("force_gain", 0, 1, {0.05}).torque(s), {-0.010, -0.006, -0.004});
+  expect_near(Effect("force_offset", 0, 2, {0.5}).torque(s), {0.004, 0.0025, 0});
+}
+
+TEST(Torque, OfMomentArmsThatAreOthers) {
+  const Sample s;
+  expect_near(Effect("moment_arm", 3, 2, {1e-3}).torque(s), {0, 0, -0.03});
+  expect_near(Effect("moment_arm_variation", 2, 1, {1e-3}).torque(s), {0, 0.008, 0});
+  expect_near(Effect("pulley_eccentricity", 1, 2, {1e-3, 0.0}).torque(s), {-0.03 * std::sin(0.3), 0, 0});
+  expect_near(Effect("pulley_eccentricity", 1, 2, {0.0, 1e-3}).torque(s), {-0.03 * std::cos(0.3), 0, 0});
+}
+
+// --- memory
+// -----------------------------------------------------------------------------------------------------------
+
+TEST(Memory, SideStaysAtRestAndIsNoneBeforeTheFirstMotion) {
+  Sample still, there, back;
+  still.velocity = {0.005, 0.0, 0.0};  // below 0.01 rad/s; 5e-5 m/s
+  back.velocity = {-0.5, 0.0, 0.0};
+  Effect load("load_friction", 1, 1, {1e-3}), preload("preload_friction", 1, 1, {0.1});
+  Sample first = still;
+  first.first = 1;
+  for (Effect* effect : {&load, &preload}) {
+    expect_near(effect->accept(first), {0, 0, 0});
+    expect_near(effect->accept(still), {0, 0, 0});
+    const PerJoint moving = effect->accept(there);
+    EXPECT_GT(moving[0], 0.0);
+    EXPECT_EQ(effect->accept(still), moving);
+    const PerJoint other = effect->accept(back);
+    EXPECT_NEAR(other[0], -moving[0], 1e-15);
+    EXPECT_EQ(effect->accept(still), other);
+    expect_near(effect->accept(first), {0, 0, 0});  // what was before the first sample does not count
+  }
+}
+
+TEST(Memory, OnlyAcceptedSamplesChangeIt) {
+  Effect load("load_friction", 1, 1, {1e-3});
+  Sample still;
+  still.velocity = {};
+  const std::vector<double> before = load.memory;
+  EXPECT_GT(load.torque(Sample{})[0], 0.0);
+  EXPECT_EQ(load.memory, before);
+  EXPECT_EQ(load.accept(still)[0], 0.0);
+}
+
+TEST(Memory, OfPreloadFrictionIsASideForEachJointItIsBefore) {
+  const Effect everywhere("preload_friction", 0, 1, {0.4}), one("preload_friction", 2, 1, {0.4});
+  EXPECT_EQ(everywhere.memory.size(), joints);
+  EXPECT_EQ(one.memory.size(), 1u);
+  EXPECT_EQ(everywhere.advanced(Sample{}), (std::vector<double>{1, 1, 1}));
+  EXPECT_EQ(Effect("preload_friction", 0, 2, {0.4}).advanced(Sample{}), (std::vector<double>{-1, 1, 0}));
+}
+
+// --- derivatives
+// ------------------------------------------------------------------------------------------------------
+
+TEST(Slope, IsTheCentralDifferenceWithTheMemoryHeld) {
+  Sample before, direction;
+  before.first = 1;
+  before.velocity = {0.4, 0.1, -0.3};
+  direction.angle = {0.7, -1.1, 0.4};
+  direction.velocity = {-0.9, 0.3, 0.8};
+  direction.force = {1.3, -0.6};
+  const double h = 1e-5;
+  for (Effect& effect : all_torques()) {
+    SCOPED_TRACE(effect.type->name);
+    effect.accept(before);
+    PerJoint difference{}, expected{};
+    for (const double side : {1.0, -1.0}) {
+      Sample moved;
+      for (std::size_t j = 0; j < joints; ++j) {
+        moved.angle[j] += side * h * direction.angle[j];
+        moved.velocity[j] += side * h * direction.velocity[j];
+      }
+      for (std::size_t i = 0; i < tendons; ++i) {
+        moved.force[i] += side * h * direction.force[i];
+      }
+      const PerJoint torque = effect.torque(moved);
+      for (std::size_t j = 0; j < joints; ++j) {
+        difference[j] += side * torque[j] / (2.0 * h);
+      }
+    }
+    expected = effect.slope(Sample{}, direction, effect.advanced(Sample{}));
+    expect_near(difference, expected, 1e-9);
+    const bool constant = std::set<std::string>{"preload_friction", "force_offset"}.count(effect.type->name) > 0;
+    EXPECT_EQ(expected == PerJoint{}, constant);
+  }
+}
+
+TEST(Slope, OfInertiaIsZeroAtTheFirstSample) {
+  Effect inertia("inertia", 2, 0, {2e-3});
+  Sample first;
+  first.first = 1;
+  inertia.accept(first);
+  expect_near(inertia.slope(first, Sample{}, inertia.memory), {0, 0, 0});
+}
+
+TEST(Slope, OfLoadFrictionFollowsTheMagnitudeOfTheForce) {
+  Sample pushed, direction;
+  pushed.force = {-20.0, 0.0};
+  direction.force = {1.0, 1.0};
+  const Effect effect("load_friction", 1, 1, {1e-3});
+  EXPECT_EQ(effect.slope(pushed, direction, effect.advanced(pushed))[0], -1e-3);
+}
+
+TEST(Slope, WithoutADirectionIsZero) {
+  for (Effect& effect : all_torques()) {
+    PerJoint slope{};
+    const effect_direction nowhere{nullptr, nullptr, nullptr};
+    effect.accept(Sample{});
+    Effect::see(Sample{}, [&](auto* seen) {
+      effect.type->slope(effect.place, effect.numbers.data(), seen, effect.memory.data(), &nowhere, slope.data());
+    });
+    expect_near(slope, {0, 0, 0}, 0.0);
+  }
+}
+
+TEST(Torque, IsLinearInItsNumbers) {
+  Sample before;
+  before.first = 1;
+  before.velocity = {0.1, 0.4, -0.3};
+  for (Effect& effect : all_torques()) {
+    SCOPED_TRACE(effect.type->name);
+    effect.accept(before);
+    const std::vector<double> after = effect.advanced(Sample{});
+    PerJoint sum{};
+    for (std::size_t p = 0; p < effect.numbers.size(); ++p) {
+      std::vector<double> unit(effect.numbers.size(), 0.0);
+      unit[p] = 1.0;
+      const PerJoint column = effect.torque(Sample{}, unit, after);
+      EXPECT_NE(column, PerJoint{});
+      for (std::size_t j = 0; j < joints; ++j) {
+        sum[j] += effect.numbers[p] * column[j];
+      }
+    }
+    expect_near(effect.torque(Sample{}, effect.numbers, after), sum, 1e-14);
+  }
+}
+
+// --- the table
+// --------------------------------------------------------------------------------------------------------
+
+TEST(Table, HasDifferentNamesAndNumbers) {
+  std::set<std::string> names;
+  std::set<std::uint32_t> ids;
+  for (std::size_t i = 0; effect_at(i); ++i) {
+    const effect_type* effect = effect_at(i);
+    EXPECT_TRUE(names.insert(effect->name).second) << effect->name;
+    EXPECT_TRUE(ids.insert(effect->id).second) << effect->name;
+    EXPECT_EQ(effect_by_id(effect->id), effect);
+    EXPECT_EQ(effect_by_name(effect->name), effect);
+    EXPECT_LE(effect->parameter_count, std::uint32_t{EFFECT_MAX_PARAMETERS});
+    EXPECT_EQ(effect->state_count != nullptr, effect->advance || effect->kind == EFFECT_SIGNAL) << effect->name;
+    for (std::uint32_t p = 0; p < effect->parameter_count; ++p) {
+      const effect_parameter& number = effect->parameters[p];
+      EXPECT_GT(number.scale, 0.0) << effect->name << "." << number.name;
+      EXPECT_LT(number.minimum, number.maximum) << effect->name << "." << number.name;
+      EXPECT_TRUE(number.unit && *number.unit) << effect->name << "." << number.name;
+    }
+  }
+  EXPECT_GE(names.size(), 11u);
+  EXPECT_EQ(effect_by_name("dragons"), nullptr);
+  EXPECT_EQ(effect_by_id(0), nullptr);
+}
+
+TEST(Table, KeepsItsNumbers) {  // they stand in model images
+  const char* const torques[] = {
+      "cover_hardening", "gravity",      "inertia",    "joint_coupling",       "preload_friction",   "load_friction",
+      "force_gain",      "force_offset", "moment_arm", "moment_arm_variation", "pulley_eccentricity"};
+  for (std::uint32_t id = 1; id <= 11; ++id) {
+    ASSERT_NE(effect_by_id(id), nullptr) << id;
+    EXPECT_STREQ(effect_by_id(id)->name, torques[id - 1]);
+    EXPECT_EQ(effect_by_id(id)->kind, EFFECT_TORQUE);
+  }
+}
+
+// --- sine and cosine
+// --------------------------------------------------------------------------------------------------
+
+TEST(SineCosine, WithinTwoUnitsInTheLastPlaceOfOne) {
+  double worst = 0.0;
+  for (int k = -400000; k <= 400000; ++k) {
+    const double angle = k * 1.7e-5 + 1e-9 * (k % 7);
+    const sine_cosine found = sine_cosine_of(angle);
+    worst = std::fmax(worst, std::fabs(found.sine - std::sin(angle)));
+    worst = std::fmax(worst, std::fabs(found.cosine - std::cos(angle)));
+  }
+  EXPECT_LT(worst, 2.3e-16);
+  for (const double angle : {99999.9, -54321.123, 1e4 / 3.0}) {
+    EXPECT_NEAR(sine_cosine_of(angle).sine, std::sin(angle), 2.3e-16);
+    EXPECT_NEAR(sine_cosine_of(angle).cosine, std::cos(angle), 2.3e-16);
+  }
+}
+
+TEST(SineCosine, AtTheAxesAndBeyond) {
+  EXPECT_EQ(sine_cosine_of(0.0).sine, 0.0);
+  EXPECT_EQ(sine_cosine_of(0.0).cosine, 1.0);
+  EXPECT_EQ(sine_cosine_of(-0.7).sine, -sine_cosine_of(0.7).sine);
+  EXPECT_EQ(sine_cosine_of(1e300).sine, sine_cosine_of(1e5).sine);
+  EXPECT_EQ(sine_cosine_of(-1e300).cosine, sine_cosine_of(-1e5).cosine);
+}
+
+// --- in a description
+// -------------------------------------------------------------------------------------------------
+
+// All sixteen, as the rows of a model image: id, joint, tendon.
+TEST(Described, EachEffectIsARowOfTheImage) {
+  nlohmann::json finger = small_finger();
+  finger["extensions"] = nlohmann::json::parse(R"([
+    {"effect": "cover_hardening", "joint": 2, "stiffness": 0.3},
+    {"effect": "gravity", "joint": 2, "cosine": 0.01},
+    {"effect": "inertia", "joint": 1, "inertia": 1e-5},
+    {"effect": "joint_coupling", "joint": 1, "stiffness": 0.01},
+    {"effect": "preload_friction", "tendon": 2, "coulomb": 0.1},
+    {"effect": "preload_friction", "joint": 2, "tendon": 1, "coulomb": 0.1},
+    {"effect": "load_friction", "joint": 2, "tendon": 1, "coulomb": 1e-4},
+    {"effect": "force_gain", "tendon": 2, "correction": -0.1},
+    {"effect": "force_offset", "tendon": 1, "correction": 0.2},
+    {"effect": "moment_arm", "joint": 1, "tendon": 2, "correction": 1e-4},
+    {"effect": "moment_arm_variation", "joint": 2, "tendon": 2, "slope": 1e-4},
+    {"effect": "pulley_eccentricity", "joint": 2, "tendon": 1},
+    {"effect": "presliding", "joint": 1, "displacement": 0.01},
+    {"effect": "presliding", "joint": null, "tendon": 1, "displacement": 1e-4},
+    {"effect": "friction_drift", "amplitude": 0.2, "time_constant": 60},
+    {"effect": "friction_drift", "tendon": 2, "amplitude": 0.2, "time_constant": 60},
+    {"effect": "friction_drift", "tendon": 2, "amplitude": 0.2, "time_constant": 60},
+    {"effect": "tendon_nonlinearity", "tendon": 2, "hardening": 1e5},
+    {"effect": "backlash", "tendon": 2, "width": 1e-4},
+    {"effect": "backlash", "joint": 2, "width": 1e-3},
+    {"effect": "time_delay", "delay": -0.001}])");
+  const Reading reading = read(finger);
+  ASSERT_EQ(reading.message, "");
+  const Model model(reading.image);
+  ASSERT_TRUE(model.accepted) << model.message;
+  const std::vector<std::array<std::uint32_t, 3>> expected = {
+      {1, 2, 0},  {2, 2, 0},  {3, 1, 0},  {4, 1, 0},  {5, 0, 2},  {5, 2, 1},  {6, 2, 1},
+      {7, 0, 2},  {8, 0, 1},  {9, 1, 2},  {10, 2, 2}, {11, 2, 1}, {20, 1, 0}, {20, 0, 1},
+      {21, 0, 0}, {21, 0, 2}, {21, 0, 2}, {22, 0, 2}, {23, 0, 2}, {23, 2, 0}, {24, 0, 0}};
+  ASSERT_EQ(model.shape.extension_count, expected.size());
+  for (std::size_t k = 0; k < expected.size(); ++k) {
+    const std::uint32_t* row = model.shape.extensions + k * MODEL_EXTENSION_WORDS;
+    EXPECT_EQ((std::array<std::uint32_t, 3>{row[0], row[1], row[2]}), expected[k]) << "extension " << k + 1;
+    EXPECT_EQ(row[3], 0u);
+  }
+  // what is left out
+  const std::size_t last = model.values.size();
+  const std::vector<double> numbers(model.values.end() - 26, model.values.end());
+  EXPECT_EQ(numbers.front(), 0.3);
+  EXPECT_EQ(numbers[1], 0.0);   // gravity's sine
+  EXPECT_EQ(numbers[2], 0.01);  // its cosine
+  EXPECT_EQ(model.values[last - 1], -0.001);
+}
+
+TEST(Described, HasRoomForAThousandExtensions) {
+  nlohmann::json finger = small_finger();
+  const nlohmann::json one = finger["extensions"][0];
+  finger["extensions"] = nlohmann::json::array();
+  for (int k = 0; k < 1024; ++k) {
+    finger["extensions"].push_back(one);
+  }
+  EXPECT_EQ(read(finger).message, "");
+  finger["extensions"].push_back(one);
+  EXPECT_EQ(read(finger).message, "extensions has 1025 elements: expected a list of at most 1024 extensions");
+}
+
+}  // namespace
