@@ -1,11 +1,13 @@
 """What every candidate would add to the model's torque, at every place and point of its grid, averaged over blocks.
 
 The signal is G_k = T_k + Σ Δb up to k: T of eq. (10) with all jumps of fig. 5 so far. A candidate's column is the
-derivative of G by its number at a strength of zero, or the difference that its term makes to G. All come from the C core.
+derivative of G by its number at a strength of zero, or the difference that its term makes to G. All of it comes from
+the C core.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,12 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu import native
 from tendonfmu.block_averages import Blocks
 from tendonfmu.derivative_passes import nominal_directions, plan_passes, run_pass
 from tendonfmu.diagnosis_span import Span, span_of
 from tendonfmu.effects import CANDIDATES, Candidate, Place, Variant
 from tendonfmu.fit_recordings import FitRecording
-from tendonfmu.fit_residuals import model_alone
+from tendonfmu.fit_residuals import without_filter
 
 Numbers = NDArray[np.float64]
 Single = NDArray[np.float32]
@@ -61,8 +64,8 @@ class CandidateColumns:
     """Block means.
 
     prediction: [B, n] G of the description, N·m. nominal: [B, n, u] its derivatives by what a fit of it estimates;
-    nominal_names: [u], a law's numbers as coulomb, drop, rate (1/Stribeck velocity) and viscous. values: [B, n, c] of the
-    candidates; names: [c]. proposals: which columns are whose.
+    nominal_names: [u], a law's numbers as coulomb, drop, rate (1/Stribeck velocity) and viscous. values: [B, n, c] of
+    the candidates; names: [c]. proposals: which columns are whose.
     """
 
     prediction: Numbers
@@ -97,8 +100,8 @@ def candidate_columns(
     passes = plan_passes(plain, [(v, u + at) for v, at in zip(variants, firsts, strict=False) if not v.secant_rows])
     secants = [(v, u + at) for v, at in zip(variants, firsts, strict=False) if v.secant_rows]
     sums = np.zeros((blocks.count, joints, u + c), dtype=np.float32)
-    watch = _watched(progress, recordings, len(passes) + len(secants) + 1)
-    passes[0].columns += list(enumerate(nominal))
+    watch = _watched(progress, recordings, len(passes) + len(_bundles(secants)) + 1)
+    passes[0].columns[:0] = enumerate(nominal)
     for each in passes:
         if each.columns:
             run_pass(each.data(), each.columns, recordings, blocks, sums, watch)
@@ -106,8 +109,12 @@ def candidate_columns(
     sums /= sizes[:, None, None].astype(np.float32)
     prediction = block_prediction(plain, recordings, blocks)
     watch(_samples(recordings))
-    for variant, at in secants:
-        sums[:, :, at] = block_prediction(variant.secant or {}, recordings, blocks) - prediction
+    for bundle in _bundles(secants):
+        together = bundle[0][0].with_secants([variant for variant, _ in bundle])
+        change = block_prediction(together, recordings, blocks) - prediction
+        for variant, at in bundle:
+            own = slice(None) if variant.only_joint is None else variant.only_joint - 1
+            sums[:, own, at] = change[:, own]
         watch(_samples(recordings))
     proposals, labels = _labelled(proposed)
     return CandidateColumns(prediction, sums[:, :, :u], names, sums[:, :, u:], labels, proposals)
@@ -122,14 +129,17 @@ def without_uncertainty(data: Mapping[str, Any]) -> dict[str, Any]:
 def block_prediction(data: Mapping[str, Any], recordings: Sequence[FitRecording], blocks: Blocks) -> Numbers:
     """[B, n] block means of G of a description, N·m."""
     sums = np.zeros((blocks.count, len(data["joints"])))
+    # with a bias that learns nothing, T_eff is T with all jumps so far
+    finger = native.Finger(native.image_from_json(json.dumps(without_filter(data))))
     for recording, block in zip(recordings, blocks.of, strict=True):
-        arrays = [recording.arrays(part) for part in recording.parts]
-        model = model_alone(data, arrays, recording.parts, len(recording.time), recording.kinematics)
         for part in recording.parts:
-            whole = model.torque[part] + np.cumsum(model.jump[part], axis=0)
+            finger.reset()
+            finger.set_kinematics_source(recording.kinematics)
+            whole = finger.run(recording.arrays(part))["friction_torque"]
             own = block[part]
+            inside = slice(None) if own.min() >= 0 else own >= 0
             for j in range(sums.shape[1]):
-                sums[:, j] += np.bincount(own[own >= 0], weights=whole[own >= 0, j], minlength=blocks.count)
+                sums[:, j] += np.bincount(own[inside], weights=whole[inside, j], minlength=blocks.count)
     return np.asarray(sums / np.maximum(blocks.sizes(), 1)[:, None])
 
 
@@ -141,6 +151,21 @@ def _proposed(
             variants = candidate.variants(data, place, span)
             if variants:
                 yield candidate, place, variants
+
+
+def _bundles(secants: Sequence[tuple[Variant, int]]) -> list[list[tuple[Variant, int]]]:
+    """Those that share a run: terms of which each changes the torque of another joint alone."""
+    bundles: list[list[tuple[Variant, int]]] = []
+    for variant, at in secants:
+        own = variant.only_joint
+        for bundle in bundles if own is not None else []:
+            joints = {other.only_joint for other, _ in bundle}
+            if None not in joints and own not in joints:
+                bundle.append((variant, at))
+                break
+        else:
+            bundles.append([(variant, at)])
+    return bundles
 
 
 def _labelled(proposed: Sequence[tuple[Candidate, Place, list[Variant]]]) -> tuple[tuple[Proposal, ...], list[str]]:
@@ -160,7 +185,8 @@ def _labelled(proposed: Sequence[tuple[Candidate, Place, list[Variant]]]) -> tup
 
 
 def _label(candidate: Candidate, place: Place, variant: Variant, path: str) -> str:
-    where = [f"joint {place.joint}"] * (place.joint is not None) + [f"tendon {place.tendon}"] * (place.tendon is not None)
+    parts = (("joint", place.joint), ("tendon", place.tendon))
+    where = [f"{word} {number}" for word, number in parts if number is not None]
     numbers = [f"{key} {value:.4g}" for key, value in variant.shape.items()]
     return ", ".join([candidate.name, *where, *numbers, *([path] if path else [])])
 

@@ -30,7 +30,9 @@ Watch = Callable[[int], None]  # samples that were looked at since the last call
 
 MOST_ROWS = 1024  # of `extensions`; docs/extensions.md
 _MOST_NUMBERS = 1500  # of a pass: its derivatives of a stretch of samples stay in tens of megabytes
-_STRETCH, _STRETCHES = 400, 24  # samples at a time, at least; of a segment of the estimator, at most
+_BYTES = 3e7  # of derivatives at a time: more does not stay near the processor
+_STRETCH, _LONGEST = 400, 2500  # samples at a time
+_SEGMENT_SHARE = 24 * 24  # the estimator begins anew from 24 states of a recording, and runs on from there
 _TINY = 1e-3  # expected size of a law's magnitude that is 0; the estimator starts it at a millionth of that
 
 
@@ -61,7 +63,9 @@ class Pass:
         """first: place of its first column among all."""
         given = len(self.base.get("extensions") or [])
         shift = len(self.rows)
-        own = {f"extensions[{given + k}].": f"extensions[{given + shift + k}]." for k in range(1, len(variant.rows) + 1)}
+        own = {
+            f"extensions[{given + k}].": f"extensions[{given + shift + k}]." for k in range(1, len(variant.rows) + 1)
+        }
         for k, column in enumerate(variant.columns):
             moved = {_moved(path, own): share for path, share in column.numbers.items()}
             self.columns.append((first + k, moved))
@@ -95,7 +99,8 @@ def nominal_directions(data: Mapping[str, Any]) -> tuple[list[str], list[Directi
     image = native.image_from_json(json.dumps(data))
     paths = [parameter.path for parameter in native.Finger(image).parameters()]
     estimator = Estimator(image)
-    names, directions = [], []
+    names: list[str] = []
+    directions: list[Direction] = []
     for name, unknown in zip(unknown_names(estimator), estimator.unknowns, strict=True):
         if not unknown.path.startswith("bias."):
             names.append(name)
@@ -113,13 +118,11 @@ def run_pass(
 ) -> None:
     """Adds to sums [B, n, c] the sums over blocks of the derivatives of G, the torque with all jumps so far, N·m.
 
-    columns: place in `sums` and direction, in paths of `data` or of a coarser description of the same finger.
+    columns: place in `sums`, ascending, and direction, in paths of `data` or of a coarser description of the finger.
     """
     finer = [(place, _finer(data, direction)) for place, direction in columns]
     estimator, numbers = _estimator_of(data, {path for _, direction in finer for path in direction})
-    entries = [
-        (numbers[path], k, share) for k, (_, direction) in enumerate(finer) for path, share in direction.items()
-    ]
+    entries = [(numbers[path], k, share) for k, (_, direction) in enumerate(finer) for path, share in direction.items()]
     row, column, share = (np.array(part) for part in zip(*entries, strict=True))
     mix = sparse.csr_array((share, (row, column)), shape=(len(estimator.unknowns), len(finer)))
     places = np.array([place for place, _ in finer])
@@ -137,7 +140,8 @@ def run_pass(
             for begin, end, values, jumps in _stretches(estimator, recording, part):
                 target.add(shifted[begin:end], values, jumps)
                 watch(end - begin)
-            sums[first:last, :, places] += found
+            for run in np.split(np.arange(len(places)), np.flatnonzero(np.diff(places) != 1) + 1):
+                sums[first:last, :, places[run[0]] : places[run[-1]] + 1] += found[:, :, run[0] : run[-1] + 1]
 
 
 def _finer(data: Mapping[str, Any], direction: Direction) -> dict[str, float]:
@@ -150,7 +154,8 @@ def _stretches(
     """Derivatives of T and of the jumps [K, n, u], with the samples of the part from and to which they are."""
     number = estimator.add_recording(recording.arrays(part), recording.kinematics)
     samples = part.stop - part.start
-    length = max(_STRETCH, samples // (24 * _STRETCHES))
+    row = 2 * 8 * estimator.joints * len(estimator.unknowns)
+    length = max(min(int(_BYTES / row), _LONGEST), _STRETCH, samples // _SEGMENT_SHARE)
     for begin in range(0, samples, length):
         end = min(begin + length, samples)
         _, _, values, jumps = estimator.jacobian(number, estimator.start, begin, end)

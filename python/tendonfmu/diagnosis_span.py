@@ -25,8 +25,8 @@ class Span:
     """Ranges of the signals over all samples that are used.
 
     angle: [n, 2] rad, 1 % and 99 % quantiles. speed: [n] rad/s, 95 % quantile of |q̇|. tendon_speed: [m, n] m/s, the
-    same of |ẋ_ij|. position: [m, 2] m, of the joint-side tendon position x1 = R q. travel: [n] rad, tendon_travel: [m] m,
-    median distance from one reversal to the next. force: [m, 2] N. acceleration: [n] rad/s², 95 % quantile.
+    same of |ẋ_ij|. position: [m, 2] m, of the joint-side tendon position x1 = R q. travel: [n] rad, tendon_travel: [m]
+    m, median distance from one reversal to the next. force: [m, 2] N. acceleration: [n] rad/s², 95 % quantile.
     torque: [n] N·m, standard deviation of the torque to be explained. duration: s, of the longest part without a gap.
     step: s, median time from sample to sample.
     """
@@ -84,7 +84,7 @@ def _signals(recording: FitRecording, rows: NDArray[np.intp]) -> tuple[Numbers, 
 
 def _range(values: Numbers) -> Numbers:
     """[k, 2] of [N, k]."""
-    return np.quantile(values, [_OUTER, 1 - _OUTER], axis=0).T
+    return np.asarray(np.quantile(values, [_OUTER, 1 - _OUTER], axis=0)).T
 
 
 def _travels(paths: Sequence[Numbers]) -> Numbers:
@@ -107,7 +107,7 @@ def _turning_points(path: Numbers, dead: float) -> Numbers:
     thinned = path[:: max(1, len(path) // 20_000)]
     points, extreme, direction = [float(thinned[0])], float(thinned[0]), 0
     for value in thinned.tolist():
-        if direction >= 0 and value > extreme or direction <= 0 and value < extreme:
+        if (direction >= 0 and value > extreme) or (direction <= 0 and value < extreme):
             if direction == 0 and abs(value - points[0]) > dead:
                 direction = 1 if value > points[0] else -1
             if direction:

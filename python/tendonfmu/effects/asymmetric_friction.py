@@ -26,7 +26,7 @@ def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
 
 
 def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
-    """Magnitude: the difference between the directions, in shares of the law; of what viscous friction there is, too."""
+    """Magnitude: the difference between the directions, in shares of the law; of viscous friction on its own."""
     path = law_path(place, shape)
     edits = (Edit(SIDES, path),)
     split = apply_edits(data, edits, (), {})
@@ -46,8 +46,8 @@ CANDIDATE = Candidate(
     name="asymmetric_friction",
     title="friction differs between the directions",
     explanation=(
-        "Moving one way costs more than moving the other way. Look for a worn or fouled flank, a preload in a screw or "
-        "gear, a tendon that rubs at one edge in one direction only."
+        "Moving one way costs more than moving the other way. Look for a worn or fouled flank, a preload in a "
+        "screw or gear, a tendon that rubs at one edge in one direction only."
     ),
     sign=0,
     excited_by="the same strokes there and back, with pauses, at several speeds",

@@ -10,7 +10,7 @@ from tendonfmu.effects.extension_row import secant_variant
 from tendonfmu.effects.friction_law_places import all_joints, all_tendons, without_rows
 
 NAME = "backlash"
-_OF_RANGE = (0.004, 0.015, 0.05)  # widths, of the range of the position
+_OF_RANGE = (0.006, 0.03)  # widths, of the range of the position
 
 
 def _places(data: Data, kinematics: int) -> list[Place]:
@@ -27,15 +27,15 @@ def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
 
 
 def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
-    return secant_variant(data, NAME, [place], shape, "width", 1, scaled=True)
+    return secant_variant(data, NAME, place, shape, "width", scaled=True)
 
 
 CANDIDATE = Candidate(
     name=NAME,
     title="play before motion passes on",
     explanation=(
-        "After a reversal the measured position moves on for a short way before the joint follows: a loose gear, coupling "
-        "or tendon fixing. Rock the drive to and fro by a little and see whether the joint follows."
+        "After a reversal the measured position moves on for a short way before the joint follows: a loose gear, "
+        "coupling or tendon fixing. Rock the drive to and fro by a little and see whether the joint follows."
     ),
     sign=1,
     excited_by="many small reversals, with travels around the play's width",

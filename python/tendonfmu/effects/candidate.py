@@ -1,8 +1,8 @@
 """What a candidate for a cause is: where it can sit, which numbers it has, and how a description gets it.
 
-A candidate holds no formula. It says how to add its term to a finger description at a strength of zero; the columns that
-the diagnosis compares with the residual are the C core's own derivatives by the term's numbers there, or, where the
-term has no useful derivative at zero, the difference of the core's torque with and without it.
+A candidate holds no formula. It says how to add its term to a finger description at a strength of zero; the columns
+that the diagnosis compares with the residual are the C core's own derivatives by the term's numbers there, or, where
+the term has no useful derivative at zero, the difference of the core's torque with and without it.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Variant:
     rows of `extensions`. settings: numbers of laws that mean nothing at strength zero: path of the law -> Stribeck
     velocity. shape: the non-linear numbers here. columns: derivatives to take. secant_rows: where there is no
     derivative, the rows at full strength; the one column is then the difference that they make, magnitude 1.
-    scaled: keys of secant_rows that grow with the magnitude.
+    scaled: keys of secant_rows that grow with the magnitude. only_joint: whose torque alone the rows change, from 1.
     """
 
     base: Data
@@ -67,7 +67,7 @@ class Variant:
     settings: Mapping[str, float] | None = None
     secant_rows: tuple[Mapping[str, Any], ...] = ()
     scaled: tuple[str, ...] = ()
-    secant_sign: int = 1
+    only_joint: int | None = None
 
     @cached_property
     def data(self) -> dict[str, Any]:
@@ -77,7 +77,11 @@ class Variant:
     @property
     def secant(self) -> dict[str, Any] | None:
         """The description with the term, where its column is a difference of torques."""
-        return apply_edits(self.base, (), self.secant_rows, {}) if self.secant_rows else None
+        return self.with_secants([self]) if self.secant_rows else None
+
+    def with_secants(self, variants: Sequence[Variant]) -> dict[str, Any]:
+        """The description with the terms of several variants of it at full strength."""
+        return apply_edits(self.base, (), [row for variant in variants for row in variant.secant_rows], {})
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -87,7 +91,7 @@ class Variant:
     @property
     def signs(self) -> tuple[int, ...]:
         """Expected sign of each column's magnitude."""
-        return (self.secant_sign,) if self.secant_rows else tuple(column.sign for column in self.columns)
+        return (1,) if self.secant_rows else tuple(column.sign for column in self.columns)
 
     @property
     def count(self) -> int:

@@ -24,8 +24,8 @@ CANDIDATE = Candidate(
     name=NAME,
     title="the cover stiffens as it bends",
     explanation=(
-        "The spring at this joint is not linear: far from its rest angle it pulls more than in proportion, as folded "
-        "plastic or a cable near its end does. Look at the cover at both ends of the joint's range."
+        "The spring at this joint is not linear: far from its rest angle it pulls more than in proportion, as "
+        "folded plastic or a cable near its end does. Look at the cover at both ends of the joint's range."
     ),
     sign=1,
     excited_by="slow strokes of this joint up to both ends of its range",

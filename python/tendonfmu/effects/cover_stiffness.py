@@ -27,8 +27,8 @@ CANDIDATE = Candidate(
     name="cover_stiffness",
     title="a spring pulls at the joint",
     explanation=(
-        "A torque that grows with the joint's angle, as of a skin, a cover or a bundle of cables that bends with the "
-        "joint. Let the joint go without tendon forces and see where it comes to rest."
+        "A torque that grows with the joint's angle, as of a skin, a cover or a bundle of cables that bends with "
+        "the joint. Let the joint go without tendon forces and see where it comes to rest."
     ),
     sign=1,
     excited_by="slow strokes of this joint over its whole range",

@@ -1,7 +1,7 @@
 """Changes of a finger description that add a term at a strength of zero: they leave its torque as it is.
 
-Laws that are absent get all magnitudes 0; a law with two sides or with working points in place of a single one starts
-with equal sides and equal laws. Paths are those of contract section 4.
+Laws that are absent get next to no friction (the estimator takes a law without any as a mistake); a law with two sides
+or with working points in place of a single one starts with equal sides and equal laws. Paths: contract section 4.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from tendonfmu.fit_structure import MAGNITUDES, get_number, own_copy, set_number
 Data = Mapping[str, Any]
 
 ABSENT, POINTS, SIDES, COVER = "absent", "points", "sides", "cover"  # kinds of edits, in the order of their making
+_NEXT_TO_NONE = 1e-12  # of the force, or N·m
 _ORDER = (ABSENT, POINTS, SIDES, COVER)
 _LAW = re.compile(
     r"(?P<law>joints\[\d+\]\.(?:load_)?friction|tendons\[\d+\]\.(?:edge|pulley)_friction\[\d+\])"
@@ -54,7 +55,7 @@ def apply_edits(
 
 
 def _add_law(data: dict[str, Any], edit: Edit) -> None:
-    law = {"static": 0.0, "coulomb": 0.0, "stribeck_velocity": 1.0, "viscous": 0.0}
+    law = {"static": _NEXT_TO_NONE, "coulomb": _NEXT_TO_NONE, "stribeck_velocity": 1.0, "viscous": 0.0}
     matched = _TENDON_LAW.fullmatch(edit.path)
     if matched is None:
         set_number(data, edit.path, law)  # type: ignore[arg-type]

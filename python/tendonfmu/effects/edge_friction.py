@@ -53,8 +53,8 @@ CANDIDATE = Candidate(
     name="edge_friction",
     title="a tendon rubs at an edge before a joint",
     explanation=(
-        "The tendon bends over an edge or guide where the model has no friction, or where it has friction that does not "
-        "depend on how far the joint before bends the tendon. Look at the guide between the joints."
+        "The tendon bends over an edge or guide where the model has no friction, or where it has friction that "
+        "does not depend on how far the joint before bends the tendon. Look at the guide between the joints."
     ),
     sign=1,
     excited_by="strokes of this joint with the joint before at several angles, at two pretensions",

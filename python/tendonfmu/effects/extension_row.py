@@ -27,12 +27,19 @@ def row_variant(
 
 
 def secant_variant(
-    data: Data, effect: str, places: list[Place], shape: Mapping[str, float], number: str, sign: int, scaled: bool
+    data: Data,
+    effect: str,
+    place: Place,
+    shape: Mapping[str, float],
+    number: str,
+    *,
+    scaled: bool,
+    only_joint: int | None = None,
 ) -> Variant:
-    """A term whose torque has no useful derivative at zero: its column is the difference that it makes at full strength.
+    """A term whose torque has no useful derivative at zero: its column is the difference at full strength.
 
-    places: of its rows, all with the same number, which the shape has. scaled: whether twice the number makes about
-    twice the difference.
+    number: of the row, with the shape's value. scaled: whether twice the number makes about twice the difference.
+    only_joint: whose torque alone it changes.
     """
-    rows = tuple(row(effect, place, **{number: float(shape[number])}) for place in places)
-    return Variant(data, shape, secant_rows=rows, secant_sign=sign, scaled=(number,) if scaled else ())
+    rows = (row(effect, place, **{number: float(shape[number])}),)
+    return Variant(data, shape, secant_rows=rows, scaled=(number,) if scaled else (), only_joint=only_joint)

@@ -24,8 +24,8 @@ CANDIDATE = Candidate(
     name=NAME,
     title="a force sensor's gain is off",
     explanation=(
-        "The true force of this tendon is larger or smaller than the measured one by a constant factor. Hang a known "
-        "weight on the tendon and compare."
+        "The true force of this tendon is larger or smaller than the measured one by a constant factor. Hang a "
+        "known weight on the tendon and compare."
     ),
     sign=0,
     excited_by="slow changes of the pretension with the joints at rest, and motion at several tensions",

@@ -24,8 +24,8 @@ CANDIDATE = Candidate(
     name=NAME,
     title="a force sensor's zero is off",
     explanation=(
-        "The true force of this tendon is the measured one plus a constant. A constant torque looks like the bias, which "
-        "takes it up: take all load off the tendon and read the sensor."
+        "The true force of this tendon is the measured one plus a constant. A constant torque looks like the bias, "
+        "which takes it up: take all load off the tendon and read the sensor."
     ),
     sign=0,
     excited_by="nothing that moves: unload the tendon and read its sensor",

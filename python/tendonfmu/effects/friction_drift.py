@@ -32,8 +32,8 @@ CANDIDATE = Candidate(
     name=NAME,
     title="friction changes as time goes by",
     explanation=(
-        "All friction here grows or fades by a share in the course of the recording: warming up, running in, or lubricant "
-        "that is squeezed out. Compare the same motion at the start and at the end."
+        "All friction here grows or fades by a share in the course of the recording: warming up, running in, or "
+        "lubricant that is squeezed out. Compare the same motion at the start and at the end."
     ),
     sign=0,
     excited_by="the same strokes at the start and at the end of a long recording, after a rest",

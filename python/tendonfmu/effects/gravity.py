@@ -24,8 +24,8 @@ CANDIDATE = Candidate(
     name=NAME,
     title="the link's weight",
     explanation=(
-        "A torque that varies with the sine and cosine of the link's angle, at this joint and at those before it: the "
-        "weight of what this joint turns. Turn the hand and see whether it changes."
+        "A torque that varies with the sine and cosine of the link's angle, at this joint and at those before it: "
+        "the weight of what this joint turns. Turn the hand and see whether it changes."
     ),
     sign=0,
     excited_by="slow strokes over the whole range, then the same with the hand turned by 90 degrees",

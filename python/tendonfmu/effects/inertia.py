@@ -24,8 +24,8 @@ CANDIDATE = Candidate(
     name=NAME,
     title="the link's inertia",
     explanation=(
-        "A torque in proportion to the joint's acceleration: the link's mass, or a motor's that is geared to it. Negative "
-        "where a known load has too much of it taken off."
+        "A torque in proportion to the joint's acceleration: the link's mass, or a motor's that is geared to it. "
+        "Negative where a known load has too much of it taken off."
     ),
     sign=0,
     excited_by="fast starts and stops of this joint, with the same travel at different accelerations",

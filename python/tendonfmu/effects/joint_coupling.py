@@ -24,8 +24,8 @@ CANDIDATE = Candidate(
     name=NAME,
     title="this joint and the next pull at each other",
     explanation=(
-        "A spring between this joint and the next one, which pulls when their angles differ: a shared cover, a cable or a "
-        "linkage. Move one joint by hand and see whether the other one follows."
+        "A spring between this joint and the next one, which pulls when their angles differ: a shared cover, a "
+        "cable or a linkage. Move one joint by hand and see whether the other one follows."
     ),
     sign=1,
     excited_by="strokes of this joint and the next one by turns, so that their angles differ",

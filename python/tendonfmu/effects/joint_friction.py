@@ -21,8 +21,8 @@ CANDIDATE = Candidate(
     name="joint_friction",
     title="the joint itself rubs",
     explanation=(
-        "Friction in the joint that does not depend on the tendon forces, where the model has none. Look at the bearing, "
-        "at seals and at parts that rub against each other when the joint moves without load."
+        "Friction in the joint that does not depend on the tendon forces, where the model has none. Look at the "
+        "bearing, at seals and at parts that rub against each other when the joint moves without load."
     ),
     sign=1,
     excited_by="strokes of this joint at low pretension",

@@ -23,8 +23,8 @@ CANDIDATE = Candidate(
     name="joint_load_friction",
     title="the joint's friction grows with the force of all tendons",
     explanation=(
-        "The tendons press the joint's bearing together, and its friction grows with the sum of their forces; the model "
-        "has no such part. Look at the bearing and at the pretension."
+        "The tendons press the joint's bearing together, and its friction grows with the sum of their forces; the "
+        "model has no such part. Look at the bearing and at the pretension."
     ),
     sign=1,
     excited_by="strokes of this joint at two or more pretensions",

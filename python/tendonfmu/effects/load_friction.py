@@ -24,8 +24,8 @@ CANDIDATE = Candidate(
     name=NAME,
     title="friction grows with the force of a tendon",
     explanation=(
-        "Friction in the joint that the model has constant, or shares out among all tendons alike, grows with the force of "
-        "this tendon. Look at the bearing on the side of this tendon and at the pretension."
+        "Friction in the joint that the model has constant, or shares out among all tendons alike, grows with the "
+        "force of this tendon. Look at the bearing on the side of this tendon and at the pretension."
     ),
     sign=1,
     excited_by="strokes of this joint at two or more loads of this tendon",

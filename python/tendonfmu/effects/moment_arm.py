@@ -24,8 +24,8 @@ CANDIDATE = Candidate(
     name=NAME,
     title="a moment arm is off",
     explanation=(
-        "The tendon pulls at this joint with a longer or shorter lever than described. Measure the pulley's radius and add "
-        "half the tendon's thickness."
+        "The tendon pulls at this joint with a longer or shorter lever than described. Measure the pulley's radius "
+        "and add half the tendon's thickness."
     ),
     sign=0,
     excited_by="slow changes of this tendon's force with the joint at rest, at several pretensions",

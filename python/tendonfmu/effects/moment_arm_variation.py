@@ -24,8 +24,8 @@ CANDIDATE = Candidate(
     name=NAME,
     title="a moment arm changes with the angle",
     explanation=(
-        "The tendon's lever at this joint grows or shrinks as the joint bends, as where it lifts off its pulley. Watch the "
-        "tendon's line at both ends of the joint's range."
+        "The tendon's lever at this joint grows or shrinks as the joint bends, as where it lifts off its pulley. "
+        "Watch the tendon's line at both ends of the joint's range."
     ),
     sign=0,
     excited_by="slow strokes of this joint over its whole range, at two pretensions",

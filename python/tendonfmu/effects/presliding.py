@@ -47,10 +47,10 @@ def _key(place: Place) -> str:
 
 def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
     if place != EVERYWHERE:
-        return secant_variant(data, NAME, [place], shape, "displacement", 1, scaled=False)
+        return secant_variant(data, NAME, place, shape, "displacement", scaled=False, only_joint=place.joint)
     singles = [(each, shape[_key(each)]) for each in _single_places(data) if _key(each) in shape]
     rows = [
-        secant_variant(data, NAME, [each], {"displacement": value}, "displacement", 1, scaled=False).secant_rows[0]
+        secant_variant(data, NAME, each, {"displacement": value}, "displacement", scaled=False).secant_rows[0]
         for each, value in singles
     ]
     return Variant(data, shape, secant_rows=tuple(rows))
@@ -60,8 +60,8 @@ CANDIDATE = Candidate(
     name=NAME,
     title="friction builds up over a short way after each reversal",
     explanation=(
-        "After a reversal friction does not jump but grows over a short travel, because the surfaces and the tendon deform "
-        "before they slide. Look at the torque against the travel since the reversal."
+        "After a reversal friction does not jump but grows over a short travel, because the surfaces and the "
+        "tendon deform before they slide. Look at the torque against the travel since the reversal."
     ),
     sign=1,
     excited_by="many small reversals at low speed, with travels around the distance over which friction builds up",

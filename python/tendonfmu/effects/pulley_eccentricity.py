@@ -24,8 +24,8 @@ CANDIDATE = Candidate(
     name=NAME,
     title="a pulley is out of round",
     explanation=(
-        "The tendon's lever varies as a sine of the joint's angle: the pulley turns with the joint and its centre is beside "
-        "the axis. Measure the run-out of the pulley."
+        "The tendon's lever varies as a sine of the joint's angle: the pulley turns with the joint and its centre "
+        "is beside the axis. Measure the run-out of the pulley."
     ),
     sign=0,
     excited_by="slow strokes of this joint over its whole range, the wider the better, at two pretensions",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 
 from tendonfmu.effects.absent_law import absent_law
 from tendonfmu.effects.candidate import Candidate, Data, Place, Variant, no_shape
@@ -14,11 +15,11 @@ _PULLEY = {"pulley": 1.0}
 
 def _places(data: Data, kinematics: int) -> list[Place]:
     present = {(each.joint, each.tendon) for each in effects(data) if each.kind == "pulley_friction"}
-    beyond = {(place.joint, place.tendon) for place in passes(data)}
+    reached = list(passes(data))
     return [
-        Place(joint, tendon)
-        for joint, tendon in sorted(beyond)
-        if (joint + 1, tendon) in beyond and (joint, tendon) not in present
+        place
+        for place, after in pairwise(reached)
+        if place.tendon == after.tendon and (place.joint, place.tendon) not in present
     ]
 
 
@@ -30,8 +31,8 @@ CANDIDATE = Candidate(
     name="pulley_friction",
     title="a pulley turns with friction",
     explanation=(
-        "The tendon loses force at the pulley of this joint when it moves on to the joints beyond, and the model has no "
-        "friction there. Look at the pulley's bearing and at whether the tendon slides on it."
+        "The tendon loses force at the pulley of this joint when it moves on to the joints beyond, and the model "
+        "has no friction there. Look at the pulley's bearing and at whether the tendon slides on it."
     ),
     sign=1,
     excited_by="strokes of the joints beyond this one, with this joint at rest, at two pretensions",

@@ -48,8 +48,8 @@ CANDIDATE = Candidate(
     name="stribeck",
     title="friction is larger when slow",
     explanation=(
-        "Friction falls as motion gets faster, before it stays level: the lubricant film builds up. It makes slow motion "
-        "jerky. Look at slow motion for stick and slip, and at the surfaces that slide here."
+        "Friction falls as motion gets faster, before it stays level: the lubricant film builds up. It makes slow "
+        "motion jerky. Look at slow motion for stick and slip, and at the surfaces that slide here."
     ),
     sign=1,
     excited_by="slow motion: strokes at speeds from the threshold of motion up to a tenth of the usual speed",

@@ -10,7 +10,7 @@ from tendonfmu.effects.extension_row import secant_variant
 from tendonfmu.effects.friction_law_places import all_tendons, without_rows
 
 NAME = "tendon_nonlinearity"
-_SHARES = (0.2, 1.0)  # hardening·e²/(k·e) at the largest force, e = f/k
+_SHARES = (0.4,)  # hardening·e²/(k·e) at the largest force, e = f/k
 
 
 def _places(data: Data, kinematics: int) -> list[Place]:
@@ -26,15 +26,16 @@ def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
 
 
 def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
-    return secant_variant(data, NAME, [place], shape, "hardening", 1, scaled=True)
+    return secant_variant(data, NAME, place, shape, "hardening", scaled=True)
 
 
 CANDIDATE = Candidate(
     name=NAME,
     title="a tendon's spring is not linear",
     explanation=(
-        "The tendon gets stiffer as it is pulled, so the joint angles that are computed from its stretch are off, and with "
-        "them the velocity at each change of force. Pull the tendon against a stop and plot force over position."
+        "The tendon gets stiffer as it is pulled, so the joint angles that are computed from its stretch are off, "
+        "and with them the velocity at each change of force. Pull the tendon against a stop and plot force over "
+        "position."
     ),
     sign=1,
     excited_by="changes of the pretension over a wide range while the joints move, with joint encoders beside them",

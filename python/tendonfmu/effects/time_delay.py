@@ -10,7 +10,7 @@ from tendonfmu.effects.extension_row import secant_variant
 from tendonfmu.effects.friction_law_places import without_rows
 
 NAME = "time_delay"
-_DELAYS = (0.0007, 0.002, 0.006, 0.02)  # s
+_DELAYS = (0.001, 0.004, 0.015)  # s
 _LEAST_STEPS, _MOST_STEPS = 0.5, 60.0  # samples: what can be told, and what the model remembers
 
 
@@ -25,15 +25,15 @@ def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
 
 
 def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
-    return secant_variant(data, NAME, [place], shape, "delay", 1, scaled=True)
+    return secant_variant(data, NAME, place, shape, "delay", scaled=True)
 
 
 CANDIDATE = Candidate(
     name=NAME,
     title="forces and positions are not of the same time",
     explanation=(
-        "The measured forces come later than the positions, or earlier where the delay is negative: filters, bus cycles, or "
-        "clocks that differ. Look at how the two signals are sampled and filtered."
+        "The measured forces come later than the positions, or earlier where the delay is negative: filters, bus "
+        "cycles, or clocks that differ. Look at how the two signals are sampled and filtered."
     ),
     sign=0,
     excited_by="many quick reversals at different speeds",

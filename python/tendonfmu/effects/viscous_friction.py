@@ -39,8 +39,8 @@ CANDIDATE = Candidate(
     name="viscous_friction",
     title="friction grows with speed",
     explanation=(
-        "The friction law here is the same at every speed, but the measured friction rises with it, as in grease or a "
-        "seal. Look at the lubricant, at sealed bearings, and at whether it is worse when cold."
+        "The friction law here is the same at every speed, but the measured friction rises with it, as in grease "
+        "or a seal. Look at the lubricant, at sealed bearings, and at whether it is worse when cold."
     ),
     sign=1,
     excited_by="strokes at several constant speeds, from slow to as fast as the hand goes",
