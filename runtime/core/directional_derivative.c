@@ -35,7 +35,8 @@ typedef struct linearisation {
   dual bias_step[MODEL_MAX_JOINTS]; /* Δb */
   double torque_slope[MODEL_MAX_JOINTS];
   double mean_force, mean_force_slope;
-  int gripped; /* extensions act on friction */
+  int gripped;                /* extensions act on friction */
+  const double* memory_slope; /* of what the extensions remember; NULL: held fixed */
 } linearisation;
 
 static double seed(const double* direction, size_t i) {
@@ -107,34 +108,47 @@ static dual magnitude_at(const effect_laws* laws, int negative, dual speed) {
 /* F at the present velocity: 0 where the effect sticks */
 static dual friction_at(const linearisation* l, const effect_laws* laws, size_t slot, double threshold, dual velocity) {
   const finger_state* s = &l->finger->remembered;
-  const slot_grip grip = l->gripped ? slot_grip_of(l->finger, slot) : (slot_grip){.value = 1.0, .bias = 1.0};
+  slot_grip grip = {.value = 1.0, .bias = 1.0};
+  double slope = 0.0;
+  if (l->gripped) {
+    grip = slot_grip_of(l->finger, slot);
+    slope = slot_grip_slope(l->finger, slot, velocity.slope, l->memory_slope);
+  }
   if (grip.slides) {
-    const dual share = {grip.value, grip.by_velocity * velocity.slope};
     const double sign = velocity.value < 0.0 ? -1.0 : 1.0;
     const int negative = sliding_side(velocity.value, threshold, s->side[slot]);
-    return product(share, magnitude_at(laws, negative, scaled(sign, velocity)));
+    return product((dual){grip.value, slope}, magnitude_at(laws, negative, scaled(sign, velocity)));
   }
   if (s->moving[slot] == 0.0) {
     return (dual){0.0, 0.0};
   }
   const double side = s->side[slot];
-  return scaled(grip.value * side, magnitude_at(laws, side < 0.0, scaled(side, velocity)));
+  return product((dual){side * grip.value, side * slope}, magnitude_at(laws, side < 0.0, scaled(side, velocity)));
+}
+
+/* what extensions make of b; none of those that slide changes the others */
+static dual jump_grip(const linearisation* l, size_t slot, dual velocity) {
+  const slot_grip grip = l->gripped ? slot_grip_of(l->finger, slot) : (slot_grip){.value = 1.0, .bias = 1.0};
+  if (!l->gripped || grip.slides) {
+    return (dual){grip.bias, 0.0};
+  }
+  return (dual){grip.bias, slot_grip_slope(l->finger, slot, velocity.slope, l->memory_slope)};
 }
 
 /* b of fig. 5 at the last sample */
-static dual bias_at(const linearisation* l, const effect_laws* laws, size_t slot, double threshold) {
+static dual bias_at(const linearisation* l, const effect_laws* laws, size_t slot, double threshold, dual velocity) {
   const finger_state* s = &l->finger->remembered;
   const dual speed = {threshold, 0.0};
   const double before = s->side_before[slot], now = s->side[slot];
   if (s->event[slot] == 0.0) {
     return (dual){0.0, 0.0};
   }
-  const double grip = l->gripped ? slot_grip_of(l->finger, slot).bias : 1.0;
-  const dual friction_before = scaled(grip * before, magnitude_at(laws, before < 0.0, speed));
+  const dual grip = jump_grip(l, slot, velocity);
+  const dual friction_before = product(grip, scaled(before, magnitude_at(laws, before < 0.0, speed)));
   if (s->event[slot] > 0.0) {
     return friction_before;
   }
-  const dual friction_now = scaled(grip * now, magnitude_at(laws, now < 0.0, speed));
+  const dual friction_now = product(grip, scaled(now, magnitude_at(laws, now < 0.0, speed)));
   const double kept = before == 0.0 ? 0.0 : law_exponential(rest_exponent(l->finger, slot));
   if (l->finger->derived.settings.remembers_entry_load) {
     return scaled(kept - 1.0, friction_now); /* the rest of it, −κ·e, is remembered */
@@ -171,7 +185,7 @@ static void linearise_tendon(linearisation* l, size_t i, double force_slope) {
     const size_t slot = j * lanes + i;
     const effect_laws edge = edge_laws(l, j, i);
     const dual edge_loss = product(acts, friction_at(l, &edge, slot, threshold, velocity[j]));
-    jumped = sum(jumped, product(acts, bias_at(l, &edge, slot, threshold)));
+    jumped = sum(jumped, product(acts, bias_at(l, &edge, slot, threshold, velocity[j])));
     lost = sum(lost, edge_loss);
     force = difference(force, edge_loss);
     acts = acting(f, i, &force);
@@ -179,7 +193,7 @@ static void linearise_tendon(linearisation* l, size_t i, double force_slope) {
     if (j + 1 < f->joints) {
       const effect_laws pulley = {.below = f->derived.pulley_law + (slot + lanes) * LAW_NUMBERS};
       const dual pulley_loss = product(acts, friction_at(l, &pulley, slot + lanes, threshold, velocity[j + 1]));
-      jumped = sum(jumped, product(acts, bias_at(l, &pulley, slot + lanes, threshold)));
+      jumped = sum(jumped, product(acts, bias_at(l, &pulley, slot + lanes, threshold, velocity[j + 1])));
       lost = sum(lost, pulley_loss);
       force = difference(force, pulley_loss);
       acts = acting(f, i, &force);
@@ -202,8 +216,8 @@ static void linearise_joints(linearisation* l) {
     const effect_laws loaded = {.below = f->derived.load_law + j * LAW_NUMBERS};
     const dual own_friction = friction_at(l, &own, joint_row + j, threshold, l->speed[j]);
     const dual load_friction = friction_at(l, &loaded, joint_row + j, threshold, l->speed[j]);
-    const dual own_bias = bias_at(l, &own, joint_row + j, threshold);
-    const dual load_bias = bias_at(l, &loaded, joint_row + j, threshold);
+    const dual own_bias = bias_at(l, &own, joint_row + j, threshold, l->speed[j]);
+    const dual load_bias = bias_at(l, &loaded, joint_row + j, threshold, l->speed[j]);
     const dual cover = scaled(f->derived.cover_stiffness[j], l->angle[j]);
     l->friction[j] = sum(l->friction[j], sum(own_friction, sum(product(load_friction, l->load[j]), cover)));
     l->bias_step[j] = sum(l->bias_step[j], sum(own_bias, product(load_bias, l->load[j])));
@@ -222,10 +236,14 @@ static void linearise_extensions(linearisation* l, const double* force) {
     velocity[j] = l->speed[j].slope;
   }
   const effect_sample sample = remembered_sample(f);
-  const effect_direction direction = {angle, velocity, force};
+  const effect_direction direction = {.angle = angle, .velocity = velocity, .force = force};
   for (size_t r = 0; r < f->extensions.torques; ++r) {
     const extension_row* row = torque_row(f, r);
-    row->effect->slope(row->place, row->parameters, &sample, row->memory, &direction, slope);
+    if (l->memory_slope && row->effect->advance_slope) {
+      row->effect->torque(row->place, row->parameters, &sample, l->memory_slope + row->offset, slope);
+    } else {
+      row->effect->slope(row->place, row->parameters, &sample, row->memory, &direction, slope);
+    }
   }
   for (size_t j = 0; j < f->joints; ++j) {
     l->friction[j].slope += slope[j];
@@ -300,14 +318,13 @@ void directional_derivative(const tendonfmu_finger* finger, const tendonfmu_inpu
   }
 }
 
-void torque_along(const tendonfmu_finger* finger, const double* angle, const double* speed, const double* force,
-                  double* torque, double* jump) {
-  linearisation l = {.finger = finger, .gripped = finger->extensions.friction > 0};
+void torque_along(const tendonfmu_finger* finger, const state_direction* direction, double* torque, double* jump) {
+  linearisation l = {.finger = finger, .gripped = finger->extensions.friction > 0, .memory_slope = direction->memory};
   for (size_t j = 0; j < finger->joints; ++j) {
-    l.angle[j] = (dual){finger->remembered.angle[j], angle[j]};
-    l.speed[j] = (dual){finger->remembered.speed[j], speed[j]};
+    l.angle[j] = (dual){finger->remembered.angle[j], direction->angle[j]};
+    l.speed[j] = (dual){finger->remembered.speed[j], direction->speed[j]};
   }
-  linearise_torques(&l, force);
+  linearise_torques(&l, direction->force);
   for (size_t j = 0; j < finger->joints; ++j) {
     torque[j] = l.friction[j].slope - l.torque_slope[j];
     jump[j] = l.bias_step[j].slope;

@@ -8,9 +8,12 @@
 void directional_derivative(const tendonfmu_finger* finger, const tendonfmu_inputs* direction,
                             const tendonfmu_outputs* derivative);
 
-/* Of the sample last remembered, along a direction of the joint angles and velocities [n] and of the tendon forces [m]:
- * torque [n] ∂(T − τ), jump [n] ∂Δb. Velocities count for themselves: nothing of the angles' direction reaches them. */
-void torque_along(const tendonfmu_finger* finger, const double* angle, const double* speed, const double* force,
-                  double* torque, double* jump);
+/* Of the sample last remembered, along a direction of the joint angles and velocities [n], of the tendon forces [m] and
+ * of what the extensions remember [effect_memory]: torque [n] ∂(T − τ), jump [n] ∂Δb. Velocities count for themselves:
+ * nothing of the angles' direction reaches them. */
+typedef struct state_direction {
+  const double *angle, *speed, *force, *memory;
+} state_direction;
+void torque_along(const tendonfmu_finger* finger, const state_direction* direction, double* torque, double* jump);
 
 #endif

@@ -10,10 +10,13 @@
 /* --- the table ------------------------------------------------------------------------------------------------------
  */
 
+enum { SIGNAL_ORDERS = 3 };
+
 typedef struct row_search {
   tendonfmu_finger* finger;
   effect_kind kind;
-  size_t found;
+  int order;
+  size_t found, offset;
   const double* parameters;
   size_t memory; /* before the row, numbers */
 } row_search;
@@ -25,7 +28,7 @@ static void note_row(row_search* search, uint32_t index, uint32_t first_paramete
   const effect_place place = model_extension_place(&f->shape, index);
   const size_t all = model_extension_memory(effect, &f->shape, place);
   const size_t own = effect->state_count ? effect->state_count(f->joints, f->tendons, place) : 0;
-  if (effect->kind == search->kind) {
+  if (effect->kind == search->kind && effect->order == search->order) {
     double *memory = f->remembered.extension + search->memory, *next = f->scratch.extension + search->memory;
     f->extensions.row[search->found++] = (extension_row){.effect = effect,
                                                          .place = place,
@@ -35,14 +38,16 @@ static void note_row(row_search* search, uint32_t index, uint32_t first_paramete
                                                          .memory = memory,
                                                          .next = next,
                                                          .memory_count = own,
+                                                         .offset = search->offset,
                                                          .slopes = memory + own,
                                                          .next_slopes = next + own};
+    search->offset += own;
   }
   search->memory += all;
 }
 
-static size_t note_kind(tendonfmu_finger* f, effect_kind kind, size_t begin) {
-  row_search search = {.finger = f, .kind = kind, .found = begin};
+static size_t note_kind(tendonfmu_finger* f, effect_kind kind, int order, size_t begin, size_t* offset) {
+  row_search search = {.finger = f, .kind = kind, .order = order, .found = begin, .offset = *offset};
   uint32_t parameter = f->shape.parameter_count;
   for (uint32_t i = f->shape.extension_count; i-- > 0;) {
     parameter -= effect_by_id(f->shape.extensions[(size_t)i * MODEL_EXTENSION_WORDS])->parameter_count;
@@ -51,6 +56,7 @@ static size_t note_kind(tendonfmu_finger* f, effect_kind kind, size_t begin) {
     note_row(&search, i, parameter);
     parameter += effect_by_id(f->shape.extensions[(size_t)i * MODEL_EXTENSION_WORDS])->parameter_count;
   }
+  *offset = search.offset;
   return search.found - begin;
 }
 
@@ -69,9 +75,13 @@ void find_extensions(tendonfmu_finger* f) {
   if (!f->shape.extension_count) {
     return;
   }
-  f->extensions.signals = note_kind(f, EFFECT_SIGNAL, 0);
-  f->extensions.friction = note_kind(f, EFFECT_FRICTION, f->extensions.signals);
-  f->extensions.torques = note_kind(f, EFFECT_TORQUE, f->extensions.signals + f->extensions.friction);
+  size_t signals = 0, none = 0, offset = 0;
+  for (int order = 0; order < SIGNAL_ORDERS; ++order) {
+    signals += note_kind(f, EFFECT_SIGNAL, order, signals, &none);
+  }
+  f->extensions.signals = signals;
+  f->extensions.friction = note_kind(f, EFFECT_FRICTION, 0, signals, &offset);
+  f->extensions.torques = note_kind(f, EFFECT_TORQUE, 0, signals + f->extensions.friction, &offset);
   find_axis_cosines(f);
 }
 
@@ -128,13 +138,26 @@ void shape_signals(tendonfmu_finger* f, double time, int late) {
   }
 }
 
+static size_t slope_count(const tendonfmu_finger* f) {
+  return 2 * f->joints + f->tendons + f->shape.effect_memory;
+}
+
+const double* signal_slopes(const tendonfmu_finger* f, const extension_row* row, uint32_t k) {
+  return row->slopes + slope_count(f) * k;
+}
+
 static const double* memory_of(const extension_row* row, int in_step) {
   return in_step ? row->next : row->memory;
 }
 
 void derive_signals(const tendonfmu_finger* f, size_t n, uint32_t k, int in_step, signal_derivative* d) {
+  const double* before = signal_slopes(f, signal_row(f, n), k);
   memset(d, 0, sizeof *d);
   effect_signals direction = signal_direction(f, d);
+  if (in_step) {
+    direction.angle_before = before;
+    direction.position_before = before + 2 * f->joints;
+  }
   for (direction.late = 0; direction.late < 2; ++direction.late) {
     for (size_t r = direction.late ? 0 : n; r < f->extensions.signals; ++r) {
       const extension_row* row = signal_row(f, r);
@@ -168,20 +191,54 @@ void follow_signals(tendonfmu_finger* f, double step, double velocity_gain) {
   for (size_t r = 0; r < f->extensions.signals; ++r) {
     const extension_row* row = signal_row(f, r);
     for (uint32_t k = 0; k < row->effect->parameter_count; ++k) {
-      const double* before = row->slopes + 2 * n * k;
-      double* next = row->next_slopes + 2 * n * k;
+      const double* before = signal_slopes(f, row, k);
+      double* next = row->next_slopes + slope_count(f) * k;
       derive_signals(f, r, k, 1, &d);
       for (size_t j = 0; j < n; ++j) {
         const double filtered = before[n + j] + velocity_gain * (d.angle[j] - before[j]) - share * before[n + j];
         next[j] = d.angle[j];
         next[n + j] = given ? d.velocity[j] : first ? 0.0 : filtered;
       }
+      memcpy(next + 2 * n, d.position, f->tendons * sizeof(double));
     }
   }
 }
 
 /* --- what the others remember ---------------------------------------------------------------------------------------
  */
+
+/* what number k of a signal row makes of what the others remember */
+static void follow_memory(const tendonfmu_finger* f, const extension_row* signal, uint32_t k) {
+  const size_t n = f->joints, lanes = f->tendon_lanes;
+  const size_t others = 2 * n + f->tendons;
+  const double* before = signal_slopes(f, signal, k) + others;
+  double *angle = signal->next_slopes + slope_count(f) * k, *after = angle + others;
+  double tendon_velocity[MODEL_MAX_JOINTS * MODEL_MAX_TENDONS];
+  for (size_t i = 0; i < lanes; ++i) {
+    double sum = 0.0;
+    for (size_t j = n; j-- > 0;) {
+      sum += f->derived.moment_arm[j * lanes + i] * angle[n + j];
+      tendon_velocity[j * lanes + i] = sum;
+    }
+  }
+  const effect_direction direction = {.angle = angle, .velocity = angle + n, .tendon_velocity = tendon_velocity};
+  for (size_t r = f->extensions.signals; r < f->shape.extension_count; ++r) {
+    const extension_row* row = f->extensions.row + r;
+    if (row->effect->advance_slope) {
+      row->effect->advance_slope(row->place, row->parameters, &f->scratch.sample, row->memory, &direction,
+                                 before + row->offset, after + row->offset);
+    }
+  }
+}
+
+static void follow_memories(const tendonfmu_finger* f) {
+  for (size_t r = 0; r < f->extensions.signals; ++r) {
+    const extension_row* row = signal_row(f, r);
+    for (uint32_t k = 0; k < row->effect->parameter_count; ++k) {
+      follow_memory(f, row, k);
+    }
+  }
+}
 
 void advance_extensions(tendonfmu_finger* f, double time, double step) {
   const finger_scratch* s = &f->scratch;
@@ -207,6 +264,7 @@ void advance_extensions(tendonfmu_finger* f, double time, double step) {
       row->effect->advance(row->place, row->parameters, &s->sample, row->memory, row->next);
     }
   }
+  follow_memories(f);
 }
 
 effect_sample remembered_sample(const tendonfmu_finger* f) {
@@ -253,7 +311,6 @@ size_t friction_member(effect_place place, size_t k) {
 }
 
 static void add_grip(slot_grip* to, const effect_grip* grip) {
-  to->by_velocity = to->by_velocity * grip->value + to->value * grip->by_velocity;
   to->value *= grip->value;
   to->slides |= grip->slides;
   to->bias *= grip->slides ? 0.0 : grip->value;
@@ -273,6 +330,28 @@ slot_grip slot_grip_of(const tendonfmu_finger* f, size_t slot) {
     }
   }
   return found;
+}
+
+double slot_grip_slope(const tendonfmu_finger* f, size_t slot, double velocity_slope, const double* memory_slope) {
+  double value = 1.0, slope = 0.0;
+  for (size_t r = 0; r < f->extensions.friction; ++r) {
+    const extension_row* row = friction_row(f, r);
+    const size_t members = friction_members(f, row->place);
+    for (size_t k = 0; k < members; ++k) {
+      if (friction_slot(f, row->place, k) != slot) {
+        continue;
+      }
+      const size_t member = friction_member(row->place, k);
+      const effect_grip own = row->effect->grip(row->place, row->parameters, row->memory, member);
+      double own_slope = own.by_velocity * velocity_slope;
+      if (memory_slope && row->effect->advance_slope) {
+        own_slope = row->effect->grip(row->place, row->parameters, memory_slope + row->offset, member).value;
+      }
+      slope = slope * own.value + value * own_slope;
+      value *= own.value;
+    }
+  }
+  return slope;
 }
 
 /* into scratch, for every slot of the sample being taken */

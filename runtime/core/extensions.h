@@ -33,9 +33,13 @@ size_t friction_member(effect_place place, size_t k);
  * multiplied by bias. */
 typedef struct slot_grip {
   int slides;
-  double value, by_velocity, bias;
+  double value, bias;
 } slot_grip;
 slot_grip slot_grip_of(const tendonfmu_finger* finger, size_t slot);
+
+/* Derivative of its value along a direction of its velocity, and of what the effects remember [effect_memory]; NULL:
+ * what they remembered at the sample before is held fixed. */
+double slot_grip_slope(const tendonfmu_finger* finger, size_t slot, double velocity_slope, const double* memory_slope);
 
 /* Side of the law of a slot that never sticks: 1 where it is the one for v < 0. */
 static inline int sliding_side(double velocity, double threshold, double side) {
@@ -78,6 +82,9 @@ void angles_along(const tendonfmu_finger* finger, signal_derivative* derivative)
 /* By number k of the n-th signal row; velocity with source 3 only. in_step: of the sample being taken, else of the one
  * last remembered. */
 void derive_signals(const tendonfmu_finger* finger, size_t n, uint32_t k, int in_step, signal_derivative* derivative);
+
+/* By number k of a signal row, at the sample last remembered: [n] ∂q, [n] ∂q̇, [m] ∂x0, [effect_memory]. */
+const double* signal_slopes(const tendonfmu_finger* finger, const extension_row* row, uint32_t k);
 
 /* Turns a direction of the inputs into that of what the signal rows made of them, at the sample last remembered; before
  * (late 0) and after the joint angles are known. */

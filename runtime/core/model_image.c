@@ -152,9 +152,14 @@ effect_place model_extension_place(const model_shape* shape, uint32_t index) {
   return place_of(row[1], row[2]);
 }
 
+static size_t own_memory(const effect_type* effect, const model_shape* shape, effect_place place) {
+  return effect->state_count ? effect->state_count(shape->joints, shape->tendons, place) : 0;
+}
+
 size_t model_extension_memory(const effect_type* effect, const model_shape* shape, effect_place place) {
-  const size_t slopes = effect->kind == EFFECT_SIGNAL ? 2 * (size_t)shape->joints * effect->parameter_count : 0;
-  return slopes + (effect->state_count ? effect->state_count(shape->joints, shape->tendons, place) : 0);
+  const size_t slopes =
+      effect->kind == EFFECT_SIGNAL ? 2 * (size_t)shape->joints + shape->tendons + shape->effect_memory : 0;
+  return own_memory(effect, shape, place) + slopes * effect->parameter_count;
 }
 
 static void walk_extensions(walk* w) {
@@ -374,7 +379,12 @@ static int check_extensions(const unsigned char* image, model_shape* shape, mess
     if (!place_is_sound(effect, shape, joint, tendon) || load_u32(row + 12)) {
       return refuse_value(message, "model image: joint of an extension", joint, "a place where such an effect can be");
     }
-    shape->extension_memory += model_extension_memory(effect, shape, place_of(joint, tendon));
+    shape->effect_memory += effect->kind == EFFECT_SIGNAL ? 0 : own_memory(effect, shape, place_of(joint, tendon));
+  }
+  row = image + MODEL_HEADER_BYTES + 4u * (size_t)shape->word_count;
+  for (uint32_t i = 0; i < shape->extension_count; ++i, row += 4 * MODEL_EXTENSION_WORDS) {
+    const effect_place place = place_of(load_u32(row + 4), load_u32(row + 8));
+    shape->extension_memory += model_extension_memory(effect_by_id(load_u32(row)), shape, place);
   }
   return 0;
 }

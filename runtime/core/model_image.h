@@ -72,7 +72,8 @@ typedef struct model_shape {
   /* filled by model_read_header(): what the memory of a finger depends on */
   uint32_t edge_count, edge_law_count;    /* edges with friction, their laws */
   uint32_t most_points[MODEL_MAX_JOINTS]; /* largest number of working points before each joint; 0 without angles */
-  size_t extension_memory;                /* numbers that the extensions remember */
+  size_t effect_memory;                   /* numbers that extensions on friction and torques remember */
+  size_t extension_memory;                /* all that the extensions remember */
 } model_shape;
 
 /* The parameters come in items, in this order: joints, tendons, finger, extensions. */
@@ -136,7 +137,7 @@ typedef struct model_item {
 int model_visit(const model_shape* shape, int (*visit)(void* context, const model_item* item), void* context);
 
 /* Where row `index` of the extensions acts, and how many numbers it remembers: its own, and, where it changes signals,
- * ∂q and ∂q̇ of every joint by each of its numbers. */
+ * by each of its numbers ∂q and ∂q̇ of every joint, ∂x0 of every tendon and the derivative of all effect_memory. */
 effect_place model_extension_place(const model_shape* shape, uint32_t index);
 size_t model_extension_memory(const effect_type* effect, const model_shape* shape, effect_place place);
 

@@ -374,10 +374,12 @@ static void read_signal_row(const tendonfmu_finger* f, size_t n, parameter_deriv
   const extension_row* row = signal_row(f, n);
   for (uint32_t k = 0; k < row->effect->parameter_count; ++k) {
     double torque[MODEL_MAX_JOINTS], jump[MODEL_MAX_JOINTS];
-    const double* angle = row->slopes + 2 * f->joints * k;
+    const double* angle = signal_slopes(f, row, k);
     signal_derivative signals;
     derive_signals(f, n, k, 0, &signals);
-    torque_along(f, angle, angle + f->joints, signals.force, torque, jump);
+    const double* memory = angle + 2 * f->joints + f->tendons;
+    const state_direction direction = {angle, angle + f->joints, signals.force, memory};
+    torque_along(f, &direction, torque, jump);
     add_plain(d, row->first_parameter + k, torque, jump);
   }
 }

@@ -55,11 +55,14 @@ static void signal_slope(effect_place place, const double* values, uint32_t k, c
   }
 }
 
+/* inside the play it stays what it was */
 static void signal_pass(effect_place place, const double* values, const double* memory, effect_signals* direction) {
   (void)values;
   double* position = position_of(place, direction);
-  if (position) {
-    *position *= memory[FOLLOWS];
+  if (position && memory[FOLLOWS] == 0.0) {
+    const int at_joint = place.joint != EFFECT_NOWHERE;
+    const double* before = at_joint ? direction->angle_before : direction->position_before;
+    *position = before ? before[at_joint ? place.joint : place.tendon] : 0.0;
   }
 }
 
@@ -67,6 +70,7 @@ const effect_type effect_backlash = {
     .name = "backlash",
     .id = 23,
     .kind = EFFECT_SIGNAL,
+    .order = 1,
     .joint = PLACE_OPTIONAL,
     .tendon = PLACE_OPTIONAL,
     .rule = PLACES_EXACTLY_ONE,

@@ -58,6 +58,7 @@ typedef struct effect_sample {
 /* A direction in the space of what a torque depends on: for derivatives. NULL: 0. */
 typedef struct effect_direction {
   const double *angle, *velocity, *force; /* [n], [n], [m] */
+  const double* tendon_velocity;          /* [n × lanes]; in advance_slope() only */
 } effect_direction;
 
 /* The signals of a sample while they are brought in order: rows that an effect may change. */
@@ -66,9 +67,10 @@ typedef struct effect_signals {
   int first, source;
   int late; /* 0: before the joint angles are known (source 1) or taken as given; 1: after */
   double time;
-  double *force, *position;        /* [m] f0, x0 */
-  double *angle, *velocity;        /* [n]; velocity with source 3 only */
-  const double* inverse_stiffness; /* [m] 1/k, m/N */
+  double *force, *position;                     /* [m] f0, x0 */
+  double *angle, *velocity;                     /* [n]; velocity with source 3 only */
+  const double* inverse_stiffness;              /* [m] 1/k, m/N */
+  const double *position_before, *angle_before; /* of directions: what they were at the sample before; NULL: 0 */
 } effect_signals;
 
 /* What an effect makes of the friction at one place: F = share·|F(v)| where it slides at all times, else factor times
@@ -86,6 +88,7 @@ typedef struct effect_type {
   const char* name; /* as in contract section 7 */
   uint32_t id;      /* in the model image; never reused */
   effect_kind kind;
+  int order; /* of signals: rows act in the order of these, whatever theirs */
   place_need joint, tendon;
   place_rule rule;
   int once; /* 1: at most once a place */
@@ -98,6 +101,11 @@ typedef struct effect_type {
    * kinematics are known. */
   void (*advance)(effect_place place, const double* parameters, const effect_sample* sample, const double* before,
                   double* after);
+
+  /* What a change of the signals, and slope_before of what it remembered, makes of what it remembers; NULL: nothing.
+   * Its torque, or grip, must then be linear in its memory and depend on the signals through it alone. */
+  void (*advance_slope)(effect_place place, const double* parameters, const effect_sample* sample, const double* before,
+                        const effect_direction* direction, const double* slope_before, double* slope_after);
 
   /* --- EFFECT_TORQUE: linear in its parameters ----------------------------------------------------------------------
    * torque() adds to torque [n], N·m; with the parameters replaced by a unit vector it is the derivative by one. */
@@ -119,8 +127,7 @@ typedef struct effect_type {
   void (*signal_slope)(effect_place place, const double* parameters, uint32_t k, const double* memory,
                        effect_signals* derivative);
   /* turns a direction of what it was given into that of what it made of it. */
-  void (*signal_pass)(effect_place place, const double* parameters, const double* memory,
-                      effect_signals* direction);
+  void (*signal_pass)(effect_place place, const double* parameters, const double* memory, effect_signals* direction);
 } effect_type;
 
 /* Row by id or name; NULL when there is none. */

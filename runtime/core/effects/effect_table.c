@@ -15,6 +15,7 @@
 #include "preload_friction.h"
 #include "presliding.h"
 #include "pulley_eccentricity.h"
+#include "stribeck.h"
 #include "tendon_nonlinearity.h"
 #include "time_delay.h"
 
@@ -35,6 +36,7 @@ static const effect_type* const table[] = {
     &effect_tendon_nonlinearity,
     &effect_backlash,
     &effect_time_delay,
+    &effect_stribeck,
 };
 
 const effect_type* effect_at(size_t position) {

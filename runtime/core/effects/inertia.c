@@ -33,6 +33,17 @@ static void advance(effect_place place, const double* parameters, const effect_s
   after[VELOCITY] = velocity;
 }
 
+static void advance_slope(effect_place place, const double* parameters, const effect_sample* sample,
+                          const double* before, const effect_direction* direction, const double* slope_before,
+                          double* slope_after) {
+  (void)parameters;
+  (void)before;
+  const double velocity = along(direction->velocity, place.joint);
+  slope_after[ACCELERATION] = sample->first ? 0.0 : (velocity - slope_before[VELOCITY]) / sample->step;
+  slope_after[STEP] = 0.0;
+  slope_after[VELOCITY] = velocity;
+}
+
 static void torque(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                    double* torque) {
   (void)sample;
@@ -56,6 +67,7 @@ const effect_type effect_inertia = {
     .parameters = numbers,
     .state_count = state_count,
     .advance = advance,
+    .advance_slope = advance_slope,
     .torque = torque,
     .slope = slope,
 };

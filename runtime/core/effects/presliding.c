@@ -46,6 +46,22 @@ static void advance(effect_place place, const double* values, const effect_sampl
   }
 }
 
+static void advance_slope(effect_place place, const double* values, const effect_sample* sample, const double* before,
+                          const effect_direction* direction, const double* slope_before, double* slope_after) {
+  const size_t count = member_count(place, sample->joints);
+  double after[MEMORY_ROWS * EFFECT_ALL_JOINTS];
+  advance(place, values, sample, before, after);
+  for (size_t k = 0; k < count; ++k) {
+    const size_t row = MEMORY_ROWS * k, at = k * sample->lanes + place.tendon;
+    const int at_joint = place.joint != EFFECT_NOWHERE;
+    const double v = at_joint ? sample->velocity[place.joint] : sample->tendon_velocity[at];
+    const double slope = at_joint ? direction->velocity[place.joint] : direction->tendon_velocity[at];
+    const double kept = sample->first ? 1.0 : law_exponential(fabs(v * sample->step) / values[0]);
+    slope_after[row + SHARE] = kept * slope_before[row + SHARE] + after[row + BY_VELOCITY] * slope;
+    slope_after[row + BY_DISPLACEMENT] = slope_after[row + BY_VELOCITY] = 0.0; /* only the share is read */
+  }
+}
+
 static effect_grip grip(effect_place place, const double* values, const double* memory, size_t member) {
   (void)place;
   (void)values;
@@ -68,5 +84,6 @@ const effect_type effect_presliding = {
     .parameters = parameters,
     .state_count = state_count,
     .advance = advance,
+    .advance_slope = advance_slope,
     .grip = grip,
 };

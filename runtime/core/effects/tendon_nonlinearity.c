@@ -51,6 +51,7 @@ const effect_type effect_tendon_nonlinearity = {
     .name = "tendon_nonlinearity",
     .id = 22,
     .kind = EFFECT_SIGNAL,
+    .order = 2,
     .joint = PLACE_REFUSED,
     .tendon = PLACE_REQUIRED,
     .once = 1,
