@@ -7,6 +7,7 @@ the term has no useful derivative at zero, the difference of the core's torque w
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -35,12 +36,14 @@ class Column:
 
     numbers: path -> how much of it a magnitude of 1 adds. `coulomb` moves with `static` − `coulomb` held, `static` is
     that difference, as in `estimation.Unknown`. sign: the expected one of the magnitude, 0 either.
-    expected: magnitude of an ordinary effect, > 0: where a fit starts that knows nothing better.
+    expected: magnitude of an ordinary effect, > 0: where a fit starts that knows nothing better. least: that the
+    description takes of the magnitude.
     """
 
     numbers: Mapping[str, float]
     sign: int
     expected: float
+    least: float = -math.inf
 
     @property
     def path(self) -> str:
@@ -112,7 +115,7 @@ class Variant:
             return apply_edits(self.base, (), rows, {})
         result = apply_edits(self.base, self.edits, self.rows, self.settings or {})
         for column, magnitude in zip(self.columns, magnitudes, strict=True):
-            value = _present(column, float(magnitude))
+            value = max(_present(column, float(magnitude)), column.least)
             for path, share in column.numbers.items():
                 add_to_number(result, path, value * share)
         raise_to(result, self.edits, self.settings or {}, LEAST_SHARE)

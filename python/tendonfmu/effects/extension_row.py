@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from tendonfmu.effects.candidate import Column, Data, Place, Variant
@@ -15,13 +16,15 @@ def row_variant(
     shape: Mapping[str, float],
     numbers: Mapping[str, tuple[int, float]],
     fixed: Mapping[str, float] | None = None,
+    least: float = -math.inf,
 ) -> Variant:
     """A term that is linear in its magnitudes.
 
     numbers: name of each magnitude -> expected sign and the size of an ordinary effect. fixed: the row's other numbers.
+    least: that the description takes of the magnitudes.
     """
     path = next_row(data)
-    columns = tuple(Column({f"{path}.{name}": 1.0}, sign, size) for name, (sign, size) in numbers.items())
+    columns = tuple(Column({f"{path}.{name}": 1.0}, sign, size, least) for name, (sign, size) in numbers.items())
     zero = dict.fromkeys(numbers, 0.0)
     return Variant(data, shape, columns, rows=(row(effect, place, **zero, **(fixed or {})),))
 

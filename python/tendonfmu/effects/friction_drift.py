@@ -11,7 +11,7 @@ from tendonfmu.effects.friction_law_places import rubbing_joints, rubbing_tendon
 
 NAME = "friction_drift"
 _OF_DURATION = (0.08, 0.3, 1.5)  # time constants
-_ORDINARY = 0.2  # of the friction
+_ORDINARY, _LEAST = 0.2, -0.85  # of the friction
 
 
 def _places(data: Data, kinematics: int) -> list[Place]:
@@ -25,7 +25,7 @@ def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
 
 
 def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
-    return row_variant(data, NAME, place, shape, {"amplitude": (0, _ORDINARY)}, fixed=shape)
+    return row_variant(data, NAME, place, shape, {"amplitude": (0, _ORDINARY)}, shape, _LEAST)
 
 
 CANDIDATE = Candidate(
