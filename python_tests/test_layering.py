@@ -44,7 +44,7 @@ ONLY = {
     "tendonfmu._estimation": "estimation.py",
     "rich": "console.py",
 }
-COMMANDS = {"cli.py", "cli_detect.py"}  # what a user may call
+COMMANDS = {"cli.py", "cli_campaign.py", "cli_detect.py", "cli_diagnose.py"}  # what a user may call
 # those that draw, and what they share
 DRAWING = {"fit_plots.py", "plot_style.py", "plots.py", "score_plots.py", "tune_plots.py"}
 
@@ -107,6 +107,7 @@ def test_drawing_computes_nothing(module: str) -> None:
         "contextlib",
         "dataclasses",
         "math",
+        "textwrap",
         "warnings",
     }
     names = set(imports_of(ast.parse((PACKAGE / module).read_text(encoding="utf-8"))))

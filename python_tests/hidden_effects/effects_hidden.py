@@ -317,7 +317,9 @@ def placed(hand: Hand, effect: str, seed: int) -> tuple[Hand, Hidden]:
     return builder(hand, np.random.default_rng([seed, 63]))
 
 
-def hide(hand: Hand, effect: str, strength: float | None, *, seed: int, motion: int, seconds: float) -> tuple[Hand, dict[str, Any]]:  # fmt: skip
+def hide(
+    hand: Hand, effect: str, strength: float | None, *, seed: int, motion: int, seconds: float
+) -> tuple[Hand, dict[str, Any]]:
     """The hand with an effect hidden in it, and its label.
 
     strength: of the recording of `motion` that lasts `seconds` (see strength.py); None: the usual magnitude.
@@ -327,7 +329,9 @@ def hide(hand: Hand, effect: str, strength: float | None, *, seed: int, motion: 
     return scaled(hand, hidden, strength, motion=motion, seconds=seconds)
 
 
-def scaled(hand: Hand, hidden: Hidden, strength: float | None, *, motion: int, seconds: float) -> tuple[Hand, dict[str, Any]]:  # fmt: skip
+def scaled(
+    hand: Hand, hidden: Hidden, strength: float | None, *, motion: int, seconds: float
+) -> tuple[Hand, dict[str, Any]]:
     """This hidden effect added to the hand at the magnitude that has the strength by itself, and its label."""
     size, seen, best = hidden.magnitude, None, None
     for _ in range(12):

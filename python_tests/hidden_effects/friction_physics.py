@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -103,7 +104,7 @@ def build_up(velocity: Array, time: Array, distance: float) -> Array:
     starts = np.flatnonzero(np.diff(sign) != 0) + 1
     bounds = [0, *starts.tolist(), len(time)]
     zeta, value = np.zeros(len(time)), 0.0
-    for begin, end in zip(bounds[:-1], bounds[1:], strict=True):
+    for begin, end in pairwise(bounds):
         s = sign[begin]
         before = travel[begin - 1] if begin > 0 else 0.0
         if s != 0.0:
@@ -140,9 +141,7 @@ def read_law(law: Mapping[str, Any]) -> Array:
     """[2, 4] positive and negative side of a law."""
     sides = (law["positive"], law["negative"]) if "positive" in law else (law, law)
     return np.array(
-        [
-            [s["coulomb"], s["static"] - s["coulomb"], s["stribeck_velocity"], s.get("viscous", 0.0)] for s in sides
-        ]  # fmt: skip
+        [[s["coulomb"], s["static"] - s["coulomb"], s["stribeck_velocity"], s.get("viscous", 0.0)] for s in sides]
     )
 
 
@@ -189,7 +188,7 @@ def velocity_seen(effect: Effect, motion: Motion) -> Array:
 
 @dataclass
 class Values:
-    """F of one effect [N] and its bias jumps per unit of force: at enters [E], kept from them at leaves [L], at leaves."""
+    """F of one effect [N], and its bias jumps by force: entry [E], what is kept of it and what leaves anew [L]."""
 
     F: Array
     contacts: Contacts | None = None
