@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu import native
+from tendonfmu.balance import moment_arms
 from tendonfmu.description import FingerDescription
 from tendonfmu.errors import InputError
 from tendonfmu.fit_files import description_text, with_values
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 Numbers = NDArray[np.float64]
 
 BOUND = 1e-6  # of the range to a bound: a number that is as near has run into it
+NEW = 3.0  # times its start: the standard deviation of what is known of a new number before
 _SIDE = re.compile(r"\.(positive|negative)(?=\.|$)")
 _POINT = re.compile(r"\.laws\[\d+\]")
 
@@ -109,9 +111,12 @@ def fit_numbers(
     """Fits the numbers of a description to the samples of `FitRecording.train`.
 
     data: where the fit begins. given: the description that says how large numbers may be, data itself by default; a
-    number that it has and that a fit before has driven towards 0 can then come back. Raises InputError.
+    number that it has and that a fit before has driven towards 0 can then come back. The torque that is explained is
+    `FitRecording.target`, also where the recording's forces are others (`regressors.predicted_forces`: without the
+    noise, which a term that scales with the force would fit by shrinking it). Raises InputError.
     """
     origin = data if given is None else given
+    recordings = [_with_own_target(data, recording) for recording in recordings]
     structure = _with_scale(build_structure(_described(data), settings.choice), origin)
     options = {
         "prior": settings.prior,
@@ -212,6 +217,16 @@ def _fit_with(
     return fitted
 
 
+def _with_own_target(data: Mapping[str, Any], recording: FitRecording) -> FitRecording:
+    """The recording with the external torque that makes its own target of its forces."""
+    groups = recording.recording.groups
+    known = groups["tendon_force"] @ moment_arms(data) - recording.target
+    given = groups.get("external_torque", np.zeros_like(known))
+    if np.allclose(known, given, rtol=1e-9, atol=1e-9 * float(np.abs(recording.target).max(initial=0.0))):
+        return recording
+    return replace(recording, recording=replace(recording.recording, groups={**groups, "external_torque": known}))
+
+
 def _described(data: Mapping[str, Any]) -> FingerDescription:
     text = json.dumps(data).encode()
     try:
@@ -221,7 +236,9 @@ def _described(data: Mapping[str, Any]) -> FingerDescription:
 
 
 def _with_scale(structure: Structure, given: Mapping[str, Any]) -> Structure:
-    """Expected magnitudes from the given description, wherever it has the number, or the law before it was split."""
+    """Expected magnitudes from the given description, wherever it has the number, or the law before it was split; of
+    what is new some times where it starts.
+    """
     scale = structure.scale.copy()
     for number in structure.numbers:
         for path in (number.path, number.with_path):
@@ -232,6 +249,9 @@ def _with_scale(structure: Structure, given: Mapping[str, Any]) -> Structure:
                 if value:
                     scale[structure.index[path]] = abs(value)
                     break
+            else:
+                begin = _number_or_none(structure.start.data, path)
+                scale[structure.index[path]] = NEW * abs(begin) if begin else np.nan
     return replace(structure, scale=scale)
 
 
