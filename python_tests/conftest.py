@@ -16,6 +16,7 @@ import pytest
 from command import Answer, Call
 from fmu_binary import FINGER, UnpackedFmu, unpack
 from plant_fmu_rig import fmu_rig
+from real_browser import BROWSERS, find_browser
 
 
 @pytest.fixture(scope="session")
@@ -49,6 +50,15 @@ def plant_fmu_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def plant_fmu(plant_fmu_path: Path) -> UnpackedFmu:
     """The same, unpacked and loaded."""
     return unpack(plant_fmu_path, plant_fmu_path.parent / "unpacked")
+
+
+@pytest.fixture(scope="session")
+def browser() -> str:
+    """The program of a browser that is installed."""
+    found = find_browser()
+    if found is None:
+        pytest.skip(f"SKIPPED: no browser to read the page in (looked for {', '.join(BROWSERS)})")
+    return found
 
 
 @pytest.fixture

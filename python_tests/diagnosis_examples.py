@@ -192,7 +192,7 @@ EXPERIMENT = Experiment(
     motion={"pretension": [25.0], "max_speed": 0.4, "duration": 60.0},
 )
 
-NO_EXPERIMENT = Experiment(sentence="Nothing is left to be told apart.")
+NO_EXPERIMENT = Experiment(sentence="")
 
 
 # --- whole diagnoses --------------------------------------------------------------------------------------------------

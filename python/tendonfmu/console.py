@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -49,6 +49,21 @@ def progress_bar(wanted: bool | None = None) -> Progress:
         disable=not (console.is_terminal if wanted is None else wanted),
         transient=True,
     )
+
+
+def phase_bar(bar: Progress) -> Callable[[str, int, int | None], None]:
+    """Shows where something of several phases is: called with the phase in words, done, and total or None."""
+    task = bar.add_task("reading", total=None)
+    now = ""
+
+    def show(phase: str, done: int, total: int | None) -> None:
+        nonlocal now
+        if phase != now:
+            bar.reset(task, total=total)
+            now = phase
+        bar.update(task, completed=done, total=total, description=phase)
+
+    return show
 
 
 def fit_bar(bar: Progress) -> Any:

@@ -257,6 +257,11 @@ def hidden_sentences(found: Diagnosis, names: Names, most: int = 6) -> Iterator[
         )
 
 
+def next_sentence(found: Diagnosis) -> str:
+    """What to record next."""
+    return found.experiment.sentence or "No further experiment is needed: nothing is left to be told apart."
+
+
 def by_source(source: str) -> str:
     """After "by": where the noise floor is from."""
     return source if source.startswith(("the ", "repeats")) else f"the {source}"
@@ -323,7 +328,7 @@ def lines(found: Diagnosis) -> Iterator[str]:
     yield from hidden_sentences(found, names)
     for event in found.events:
         yield f"left out: {event.recording}, {event.start:.2f} to {event.end:.2f} s: {event.description}"
-    yield f"next: {found.experiment.sentence}"
+    yield f"next: {next_sentence(found)}"
 
 
 def parameter_rows(parameters: Mapping[str, tuple[float, str]]) -> list[tuple[str, str]]:

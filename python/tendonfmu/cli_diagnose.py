@@ -1,0 +1,97 @@
+"""The command about causes: `register` adds it to the program of `cli.py`, whose `excite` calls `discriminate`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperCommand
+
+from tendonfmu.console import phase_bar, print_tables, progress_bar, say
+
+
+class _SeveralTests(TyperCommand):
+    """Takes `--test A B` for `--test A --test B`."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        valued = {name for each in self.params if not getattr(each, "is_flag", False) for name in each.opts}
+        return super().parse_args(ctx, several_tests(args, valued))
+
+
+def several_tests(args: Sequence[str], valued: set[str]) -> list[str]:
+    """The arguments with `--test` before each test: once finger and a recording are given, all that follow `--test` up
+    to the next option are tests. valued: options that take a value.
+    """
+    found: list[str] = []
+    free, testing = 0, False  # arguments of no option so far; whether the next one is a test
+    rest = list(args)
+    while rest and rest[0] != "--":
+        word = rest.pop(0)
+        name, equals, _ = word.partition("=")
+        if word.startswith("-") and word != "-":
+            found.append(word)
+            if name in valued and not equals and rest:
+                found.append(rest.pop(0))
+            testing = name == "--test" and free > 1
+        elif testing:
+            found += ["--test", word]
+        else:
+            found.append(word)
+            free += 1
+    return found + rest
+
+
+def register(app: typer.Typer) -> None:
+    """Adds the command."""
+    app.command(cls=_SeveralTests)(diagnose)
+
+
+def diagnose(
+    finger: Annotated[Path, typer.Argument(metavar="FINGER.json", help="finger description, its structure as given")],
+    recordings: Annotated[list[Path], typer.Argument(metavar="RECORDING", help="free motion, .csv or .parquet")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder for page, report and model")],
+    test: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="RECORDING",
+            help="not trained on: the gain is measured here; may be repeated, or several at once after the recordings "
+            "\\[default: parts of the recordings]",
+        ),
+    ] = None,
+    kinematics: Annotated[
+        int,
+        typer.Option(
+            min=1, max=3, help="1: tendon positions, 2: measured joint positions, 3: joint positions and velocities"
+        ),
+    ] = 1,
+    seed: Annotated[int, typer.Option(min=0, max=2**53, help="of all that is drawn at random")] = 0,
+    jobs: Annotated[int, typer.Option(min=1, max=64, help="processor cores to use; the result is the same")] = 1,
+    progress: Annotated[
+        bool | None, typer.Option("--progress/--no-progress", help="progress bar; by default on a terminal")
+    ] = None,
+) -> None:
+    """Show what the model gets wrong, name the cause, extend the model by it and measure the gain.
+
+    The given structure is fitted first: a cause is what that cannot mend. DIR gets the page diagnosis.html,
+    diagnosis.json, figures, and the model with its causes, extended.json and extended.fmu.
+    """
+    from tendonfmu.diagnosis import diagnose as find
+    from tendonfmu.diagnosis_files import check_folder, write_diagnosis
+    from tendonfmu.diagnosis_text import lines, tables
+    from tendonfmu.fit_files import check_given_once
+
+    tests = test or []
+    check_folder(output, [finger, *recordings, *tests])
+    check_given_once(recordings, tests)
+    with progress_bar(progress) as bar:
+        show = phase_bar(bar)
+        found = find(finger, recordings, tests, kinematics=kinematics, seed=seed, jobs=jobs, progress=show)
+        show("writing", 0, None)
+        written = write_diagnosis(found, output)
+    for sentence in found.warnings:
+        say(f"tendonfmu: warning: {sentence}")
+    print_tables(tables(found), lines(found), left="may also be")
+    for path, what in written.items():
+        say(f"{path}: {what}")

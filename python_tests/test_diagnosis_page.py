@@ -1,0 +1,301 @@
+"""Report, words and page of a diagnosis, on made-up ones: complete, true to it, escaped; and in a real browser."""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import math
+import re
+from dataclasses import replace
+from importlib.resources import files as files_of
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
+
+import diagnosis_examples as examples
+from real_browser import Elements, framed, measure, visit
+from tendonfmu.diagnosis_page import PAGE, diagnosis_page, write_diagnosis_page
+from tendonfmu.diagnosis_report import build_report, report_text
+from tendonfmu.diagnosis_result import Diagnosis, Interval, ModelErrors, Where
+from tendonfmu.diagnosis_text import (
+    headline,
+    lines,
+    names_of,
+    percent,
+    percent_interval,
+    probability,
+    tables,
+    title_of,
+    unit_of,
+)
+
+LARGEST = 5_000_000  # bytes
+HOSTILE = "<script>alert('x')</script>&\"$\\frac{"
+SCHEMA = json.loads(files_of("tendonfmu").joinpath("schema", "diagnosis.schema.json").read_text("utf-8"))
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[Diagnosis, dict[Path, str]]:
+    """Page and figures of the example with everything in it."""
+    found = examples.three_causes()
+    return found, write_diagnosis_page(found, tmp_path_factory.mktemp("diagnosis"))
+
+
+@pytest.fixture(scope="module")
+def page(written: tuple[Diagnosis, dict[Path, str]]) -> str:
+    return next(iter(written[1])).read_text("utf-8")
+
+
+def plain(text: str) -> str:
+    """As it is read, all spaces alike."""
+    return " ".join(" ".join(Elements(text).words).replace("\u00a0", " ").split())
+
+
+def parsed(found: Diagnosis) -> Any:
+    """The report after a journey through its text."""
+    return json.loads(report_text(build_report(found, ["diagnosis.html"])))
+
+
+# --- the report -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", examples.ALL)
+def test_the_report_is_as_contract_and_schema_say(name: str) -> None:
+    found = examples.ALL[name]()
+    report = parsed(found)
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+    jsonschema.validate(report, SCHEMA)
+    assert report["format"] == "tendonfmu-diagnosis-1" and report["verdict"] == found.verdict
+    assert report["nominal"]["bias_only_rms"] == list(found.bias_only_rms)
+    assert report["extended"]["finger"] == "extended.json" and report["extended"]["fmu"] == "extended.fmu"
+    assert report["gain"] == {"value": found.gain.value, "interval": [found.gain.low, found.gain.high]}
+    assert report["next_experiment"] == found.experiment.sentence
+    assert [cause["effect"] for cause in report["causes"]] == [cause.where.effect for cause in found.causes]
+    for entry, cause in zip(report["causes"], found.causes, strict=True):
+        assert (entry["joint"], entry["tendon"]) == (cause.where.joint, cause.where.tendon)
+        assert entry["parameters"] == {path: value for path, (value, _) in cause.parameters.items()}
+        assert [each["effect"] for each in entry["confusable_with"]] == [each.effect for each in cause.confusable_with]
+
+
+def test_what_is_not_known_is_null() -> None:
+    nothing = Interval(math.nan, -math.inf, math.inf)
+    found = replace(examples.one_cause(), noise_floor=(math.nan, 1e-3), gain=nothing, ceiling=())
+    report = parsed(found)
+    jsonschema.validate(report, SCHEMA)
+    assert report["noise_floor"] == [None, 1e-3] and report["gain"] == {"value": None, "interval": [None, None]}
+    text = plain(diagnosis_page(found, []))
+    assert "nan" not in text.lower().split() and "inf" not in text.lower().split()
+
+
+def test_a_wrong_report_is_refused() -> None:
+    report = parsed(examples.three_causes())
+    for path, value in ((("verdict",), "fine"), (("causes", 0, "effect"), "magic"), (("causes", 0, "joint"), 0)):
+        spoiled = json.loads(json.dumps(report))
+        node = spoiled
+        for key in path[:-1]:
+            node = node[key]
+        node[path[-1]] = value
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate(spoiled, SCHEMA)
+
+
+# --- words ------------------------------------------------------------------------------------------------------------
+
+NAMED = "friction in the joint grows with the force of the tendon, at joint 1 (mcp), tendon 3 (edc)"
+HEADLINES = {
+    ("adequate", 0): "The model is adequate: these data show nothing that it lacks.",
+    ("adequate", 3): "The model is adequate: three causes were found, but what they explain hardly matters.",
+    ("explained", 1): f"One cause explains what the model gets wrong: {NAMED}.",
+    ("explained", 3): "Three causes together explain what the model gets wrong.",
+    ("partly explained", 1): f"One cause explains part of what the model gets wrong: {NAMED}.",
+    ("partly explained", 3): "Three causes together explain part of what the model gets wrong.",
+    ("unexplained", 0): "The model gets something wrong, and no effect that is known explains it.",
+    ("unexplained", 1): f"One cause was found, but it explains little of what the model gets wrong: {NAMED}.",
+}
+
+
+@pytest.mark.parametrize("verdict", ["adequate", "explained", "partly explained", "unexplained"])
+@pytest.mark.parametrize("count", [0, 1, 3])
+def test_every_verdict_reads_right(verdict: str, count: int) -> None:
+    """With any number of causes: headline, error, and nothing that speaks of a gain where nothing was added."""
+    full = examples.three_causes()
+    chosen = (full.causes[1],) if count == 1 else full.causes[:count]
+    found = replace(full, verdict=verdict, causes=chosen)
+    said = headline(found)
+    assert HEADLINES.get((verdict, count), said) == said
+    text = plain(diagnosis_page(found, []))
+    assert said in text and said in lines(found)
+    assert ("less error" in text) == ("its error falls from 5.68 to 2.41 mN·m rms" in text) == (count > 0)
+    assert ("its error is 5.68 mN·m rms" in text) == (count == 0)
+    assert ("What causes it" in text) == (count > 0) == ("Evidence" in text)
+    assert not re.search(r"\b(1 causes|0 causes|None|causes explains)\b", text)
+
+
+def test_an_unknown_cause_is_no_named_one() -> None:
+    full = examples.three_causes()
+    found = replace(full, causes=(replace(full.causes[0], where=Where("unknown", joint=1)), full.causes[1]))
+    assert headline(found) == f"One cause explains part of what the model gets wrong: {NAMED}."
+
+
+def test_numbers_are_told_as_people_write_them() -> None:
+    assert [percent(value).replace("\u00a0", " ") for value in (0.577, 0.042, -0.031, -1e-9, 0.0)] == [
+        "58 %",
+        "4.2 %",
+        "−3.1 %",
+        "0 %",
+        "0 %",
+    ]
+    assert percent_interval(Interval(0.31, 0.27, 0.35)).replace("\u00a0", " ") == "31 % (27 to 35 %)"
+    assert [probability(p) for p in (2.1e-7, 0.008, 1e-30, 1.0)] == ["2.1e-7", "0.008", "< 1e-12", "1"]
+    large = ModelErrors((20.0, 3.0), (25.0, 3.0))
+    assert unit_of(replace(examples.one_cause(), nominal=large)) == (1.0, "N·m")
+
+
+def test_every_effect_of_the_contract_has_a_title() -> None:
+    effects = SCHEMA["$defs"]["where"]["properties"]["effect"]["enum"]
+    assert len(effects) == 26
+    titles = {title_of(effect) for effect in effects}
+    assert len(titles) == 26 and not [title for title in titles if title in effects or "_" in title]
+
+
+def test_the_terminal_says_what_the_page_says() -> None:
+    found = examples.three_causes()
+    (causes, errors), said = list(tables(found)), "\n".join(lines(found))
+    assert [row[1] for row in causes[2]] == ["joint 2 (pip)", "joint 1 (mcp), tendon 3 (edc)", "everywhere"]
+    assert errors[2][-1] == ("all joints", "12.4", "5.64", "2.25", "5.68", "2.41", "1.09")
+    for cause in found.causes:
+        assert cause.size in said
+    assert "left out: train_2.parquet, 17.08 to 18.32 s" in said and f"next: {found.experiment.sentence}" in said
+
+
+# --- the page ---------------------------------------------------------------------------------------------------------
+
+
+def test_files_are_written_and_named(written: tuple[Diagnosis, dict[Path, str]]) -> None:
+    files = written[1]
+    folder = next(iter(files)).parent
+    assert {file.name for file in folder.iterdir()} == {file.name for file in files}
+    wanted = {PAGE, "gain.png", "cause_1.png", "cause_2.png", "cause_3.png", "residual_1.png", "residual_2.png"}
+    assert {file.name for file in files} == wanted
+    assert 200_000 < (folder / PAGE).stat().st_size < LARGEST
+    for file in files:
+        if file.suffix == ".png":
+            image = imread(file)[:, :, :3]
+            assert min(image.shape[:2]) > 300 and 0.005 < np.mean(image < 0.98) < 0.6, file.name
+
+
+def test_nothing_is_needed_from_elsewhere(page: str) -> None:
+    elements = Elements(page)
+    assert not {name for name, _ in elements.tags} & {"script", "iframe", "object", "embed", "base", "form"}
+    for tag, attributes in elements.tags:
+        assert not [name for name in attributes if name.startswith("on")], tag
+        for name in ("src", "href"):
+            address = attributes.get(name)
+            assert address is None or address.startswith(("data:", "#")), (tag, address)
+    assert not re.search(r"url\(|@import|https?://", page)
+    ids = {attributes["id"] for _, attributes in elements.tags if "id" in attributes}
+    targets = {(attributes["href"] or "").removeprefix("#") for attributes in elements.all("a")}
+    assert len(targets) == 9 and targets <= ids
+
+
+def test_images_are_whole_and_described(page: str) -> None:
+    images = Elements(page).all("img")
+    assert len(images) == 2 + 4 + 2 * 8  # error and gain; evidence; eight views of each joint
+    for image in images:
+        source, alt = image["src"] or "", image["alt"] or ""
+        assert base64.b64decode(source.removeprefix("data:image/png;base64,"))[:8] == b"\x89PNG\r\n\x1a\n"
+        assert len(alt) > 40
+    assert len({image["alt"] for image in images}) == len(images)
+
+
+def test_the_first_screen_says_it_all(written: tuple[Diagnosis, dict[Path, str]], page: str) -> None:
+    """Verdict, each cause with place and size, error before and after, what could not be told, what to do next."""
+    found, first = written[0], plain(page.split("<nav")[0])
+    names = names_of(found)
+    assert headline(found) in first and "5.68 → 2.41 mN·m" in first and "95 % interval 54 to 61 %" in first
+    for cause in found.causes:
+        title = cause.title[0].upper() + cause.title[1:]
+        assert (
+            f"{title}" in first and cause.size in first and names.place(cause.where) in first.replace("Joint", "joint")
+        )
+        assert percent_interval(cause.gain).replace("\u00a0", " ") in first
+        for other in cause.confusable_with:
+            assert f"{title_of(other.effect)}, at {names.place(other)}" in first
+    for each in found.invisible:
+        assert each.title in first and each.experiment in first
+    assert found.unexplained.description in first and "22 % of the residual's variance" in first
+    assert found.experiment.sentence in first and "--discriminate" in first
+    assert all(warning in first for warning in found.warnings)
+
+
+def test_the_tables_hold_the_numbers(written: tuple[Diagnosis, dict[Path, str]], page: str) -> None:
+    text = plain(page.split("<nav")[1])
+    assert "joint 2 (pip) 9.80 6.30 2.10 6.20 2.20 0.970 92 % 0.95 0.42" in text
+    assert "train_2.parquet 17.08 18.32 joint 2 (pip) 83.0" in text
+    assert "extensions[1].sine 0.0121 N·m" in text and "extensions[1].cosine −0.0034 N·m" in text
+    assert "214 effects at places were tested at once" in text and "Seed 0." in text
+
+
+def test_detection_gain_is_told_where_there_is_one() -> None:
+    text = plain(diagnosis_page(examples.one_cause(), []))
+    assert "of 23 labelled contacts nominal extended found 15 22 false alarms 6 1 median delay 142 ms 61 ms" in text
+    assert "labelled contacts" not in plain(diagnosis_page(examples.adequate(), []))
+
+
+def test_many_effects_that_cannot_be_seen_are_counted() -> None:
+    one = examples.INVISIBLE[0]
+    places = tuple(replace(one, where=Where("cover_hardening", joint=1 + k % 2)) for k in range(6))
+    others = tuple(replace(one, where=Where(name), title=name) for name in "abcdefg")
+    text = plain(diagnosis_page(replace(examples.adequate(), invisible=places + others), []))
+    assert "6 places, such as joint 1 (mcp)" in text and "2 more are not visible in these data: f; g" in text
+
+
+def test_names_and_warnings_are_escaped() -> None:
+    found = examples.three_causes()
+    nominal = json.loads(json.dumps(found.nominal_data))
+    nominal["joints"][1]["name"] = nominal["tendons"][2]["name"] = HOSTILE
+    cause = replace(found.causes[0], title=HOSTILE, size=HOSTILE, explanation=HOSTILE)
+    hostile = replace(
+        found, finger=HOSTILE, warnings=(HOSTILE,), recordings=(HOSTILE,), causes=(cause,), nominal_data=nominal
+    )
+    text = diagnosis_page(hostile, [])
+    assert "<script" not in text and text.count("&lt;script&gt;") >= 8
+    assert HOSTILE in html.unescape(text)
+
+
+# --- in a real browser ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_a_browser_shows_it_at_any_width(browser: str, page: str, tmp_path: Path, width: int) -> None:
+    """All figures there, nothing wider than the page, nothing asked for from elsewhere."""
+    found = measure(browser, tmp_path, page, width)
+    assert found["width"] == width and found["scroll"] == width and found["out"] == []
+    assert [address for address in found["requests"] if not address.startswith("data:")] == []
+    assert len(found["images"]) == 22 and found["font"] >= 15
+    for natural, shown in found["images"]:
+        assert natural > 500 and 300 < shown <= width
+
+
+def test_a_browser_has_nothing_to_complain_of(
+    browser: str, written: tuple[Diagnosis, dict[Path, str]], page: str, tmp_path: Path
+) -> None:
+    """And there is ink in every part of it."""
+    shot = tmp_path / "shot.png"
+    done = visit(browser, framed(tmp_path, page, 1280, False), "--window-size=1280,2400", f"--screenshot={shot}")
+    assert "CONSOLE" not in done.stderr
+    image = imread(shot)[:2400, :1280, :3]
+    bands = [np.mean(part < 0.8) for part in np.array_split(image, 8)]
+    assert all(0.003 < share < 0.5 for share in bands), bands
+
+
+def test_a_request_would_be_seen(browser: str, tmp_path: Path) -> None:
+    wanting = "<!DOCTYPE html><img src='http://localhost:9/picture.png' alt=''>"
+    assert measure(browser, tmp_path, wanting, 390)["requests"] == ["http://localhost:9/picture.png"]
