@@ -84,7 +84,7 @@ def _signals(recording: FitRecording, rows: NDArray[np.intp]) -> tuple[Numbers, 
 
 def _range(values: Numbers) -> Numbers:
     """[k, 2] of [N, k]."""
-    return np.asarray(np.quantile(values, [_OUTER, 1 - _OUTER], axis=0)).T
+    return np.asarray(np.quantile(values, [_OUTER, 1 - _OUTER], axis=0).T)
 
 
 def _travels(paths: Sequence[Numbers]) -> Numbers:

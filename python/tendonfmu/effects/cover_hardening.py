@@ -9,7 +9,6 @@ from tendonfmu.effects.extension_row import row_variant
 from tendonfmu.effects.friction_law_places import all_joints, without_rows
 
 NAME = "cover_hardening"
-_ORDINARY = 0.01  # N·m/rad³
 
 
 def _places(data: Data, kinematics: int) -> list[Place]:
@@ -17,7 +16,7 @@ def _places(data: Data, kinematics: int) -> list[Place]:
 
 
 def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
-    return row_variant(data, NAME, place, shape, {"stiffness": (1, _ORDINARY)})
+    return row_variant(data, NAME, place, shape, {"stiffness": 1})
 
 
 CANDIDATE = Candidate(

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 from tendonfmu.effects.candidate import Column, Data, Place, Variant
 from tendonfmu.effects.friction_law_places import next_row, row
+from tendonfmu.extensions import MAGNITUDES
 
 
 def row_variant(
@@ -14,17 +15,18 @@ def row_variant(
     effect: str,
     place: Place,
     shape: Mapping[str, float],
-    numbers: Mapping[str, tuple[int, float]],
+    numbers: Mapping[str, int],
     fixed: Mapping[str, float] | None = None,
     least: float = -math.inf,
 ) -> Variant:
     """A term that is linear in its magnitudes.
 
-    numbers: name of each magnitude -> expected sign and the size of an ordinary effect. fixed: the row's other numbers.
-    least: that the description takes of the magnitudes.
+    numbers: name of each magnitude -> expected sign. fixed: the row's other numbers. least: that the description takes
+    of the magnitudes.
     """
     path = next_row(data)
-    columns = tuple(Column({f"{path}.{name}": 1.0}, sign, size, least) for name, (sign, size) in numbers.items())
+    sizes = MAGNITUDES[effect]
+    columns = tuple(Column({f"{path}.{name}": 1.0}, sign, sizes[name], least) for name, sign in numbers.items())
     zero = dict.fromkeys(numbers, 0.0)
     return Variant(data, shape, columns, rows=(row(effect, place, **zero, **(fixed or {})),))
 

@@ -25,7 +25,7 @@ def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
 
 
 def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
-    return row_variant(data, NAME, place, shape, {"amplitude": (0, _ORDINARY)}, shape, _LEAST)
+    return row_variant(data, NAME, place, shape, {"amplitude": 0}, shape, _LEAST)
 
 
 CANDIDATE = Candidate(

@@ -9,7 +9,6 @@ from tendonfmu.effects.extension_row import row_variant
 from tendonfmu.effects.friction_law_places import passes, without_rows
 
 NAME = "load_friction"
-_ORDINARY = 2e-4  # m
 
 
 def _places(data: Data, kinematics: int) -> list[Place]:
@@ -17,7 +16,7 @@ def _places(data: Data, kinematics: int) -> list[Place]:
 
 
 def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
-    return row_variant(data, NAME, place, shape, {"coulomb": (1, _ORDINARY)})
+    return row_variant(data, NAME, place, shape, {"coulomb": 1})
 
 
 CANDIDATE = Candidate(

@@ -9,7 +9,6 @@ from tendonfmu.effects.extension_row import row_variant
 from tendonfmu.effects.friction_law_places import all_tendons, passes, without_rows
 
 NAME = "preload_friction"
-_ORDINARY = 0.2  # N
 
 
 def _places(data: Data, kinematics: int) -> list[Place]:
@@ -20,7 +19,7 @@ def _places(data: Data, kinematics: int) -> list[Place]:
 
 
 def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
-    return row_variant(data, NAME, place, shape, {"coulomb": (1, _ORDINARY)})
+    return row_variant(data, NAME, place, shape, {"coulomb": 1})
 
 
 CANDIDATE = Candidate(

@@ -53,7 +53,7 @@ def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
         least = _LEAST * velocity_threshold(data, effect)
         grid = sorted({max(float(fast) * share, least, 1e-9) for share in _OF_SPEED})
         shapes += [{**kind_shape(effect), "stribeck_velocity": velocity} for velocity in grid]
-        if _can_rise(data, effect):
+        if _can_rise(data, effect) and effect == laws_at(data, place)[0]:
             shapes += [{"rises": 1.0, "stribeck_velocity": velocity} for velocity in grid]
     return shapes
 
@@ -61,7 +61,7 @@ def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
 def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
     if shape.get("rises"):
         velocity = {"stribeck_velocity": float(shape["stribeck_velocity"])}
-        return row_variant(data, NAME, place, shape, {"amplitude": (-1, _EXPECTED)}, velocity, _LEAST_AMPLITUDE)
+        return row_variant(data, NAME, place, shape, {"amplitude": -1}, velocity, _LEAST_AMPLITUDE)
     path = law_path(place, shape)
     effect = next(each for each in laws_at(data, place) if each.path == path)
     coulomb = max(each for each, _, _ in all_sides(data, effect)) or 1e-6
@@ -72,12 +72,12 @@ def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
 
 CANDIDATE = Candidate(
     name="stribeck",
-    title="friction is larger when slow",
+    title="friction is different when slow",
     explanation=(
-        "Friction falls as motion gets faster, before it stays level: the lubricant film builds up. It makes slow "
-        "motion jerky. Look at slow motion for stick and slip, and at the surfaces that slide here."
+        "Friction falls as motion gets faster, before it stays level: the lubricant film builds up, and slow motion is "
+        "jerky. Or it rises from standstill, as in rolling screws. Look at slow motion for stick and slip."
     ),
-    sign=1,
+    sign=0,
     excited_by="slow motion: strokes at speeds from the threshold of motion up to a tenth of the usual speed",
     confused_with=("presliding", "viscous_friction", "time_delay", "backlash"),
     coordinate="velocity",
