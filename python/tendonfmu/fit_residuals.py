@@ -32,7 +32,8 @@ _BIAS = {"noise_std": 0.01, "noise_std_per_force": 0.0, "drift_variance": 1e-6} 
 class Model:
     """A finger without bias filter over a recording, NaN (False) outside the parts.
 
-    torque: [N, n] T of eq. (10), N·m. jump: [N, n] Δb, N·m. joint_angle, joint_speed: [N, n] as used. slack: [N, m].
+    torque: [N, n] T of eq. (10), N·m, less `delayed_torque`, so that measured τ − torque is what the bias sees. jump:
+    [N, n] Δb, N·m. joint_angle, joint_speed: [N, n] as used. slack: [N, m].
     """
 
     torque: Numbers
@@ -55,10 +56,23 @@ def model_alone(
         probe.restore_state(start)
         found = probe.run(given)
         bias = found["bias_torque"]
-        torque[part], jump[part] = found["friction_torque"] - bias, np.diff(bias, axis=0, prepend=bias[:1])
+        torque[part] = found["friction_torque"] - bias - delayed_torque(data, given, found["joint_torque"])
+        jump[part] = np.diff(bias, axis=0, prepend=bias[:1])
         angle[part], speed[part] = found["joint_angle"], found["joint_speed"]
         slack[part] = found["slack"]
     return Model(torque, jump, angle, speed, slack)
+
+
+def delayed_torque(data: Mapping[str, Any], arrays: Mapping[str, Numbers], torque: Numbers) -> Numbers | float:
+    """[N, n] N·m: τ of the forces in use less that of the measured ones; 0 unless a `time_delay` below 0 delays forces.
+
+    torque: [N, n] τ in use.
+    """
+    rows = data.get("extensions") or []
+    if not any(row["effect"] == "time_delay" and row["delay"] < 0 for row in rows):
+        return 0.0
+    arms = np.array([tendon["moment_arms"] for tendon in data["tendons"]], dtype=float)
+    return np.asarray(torque - arrays["tendon_force"] @ arms)
 
 
 def without_filter(data: Mapping[str, Any]) -> dict[str, Any]:

@@ -24,7 +24,7 @@ from tendonfmu.errors import InputError
 from tendonfmu.fit_evaluation import residuals
 from tendonfmu.fit_files import description_text
 from tendonfmu.fit_recordings import FitRecording
-from tendonfmu.fit_residuals import Model, bias_settings, model_alone, rms
+from tendonfmu.fit_residuals import Model, bias_settings, delayed_torque, model_alone, rms
 from tendonfmu.fmu import run_fmu
 from tendonfmu.gain_interval import Blocks, blocks_of, gain_interval
 from tendonfmu.packaging import build_fmu
@@ -127,10 +127,11 @@ def run_both(data: Data, recording: FitRecording) -> BothRun:
     agreement = max(_difference(outputs[name], beside[name]) for name in NUMBERS)
     model = _core_model(data, recording)
     torque = outputs["friction_torque"] - outputs["bias_torque"]
+    torque = torque - delayed_torque(data, recording.recording.groups, outputs["joint_torque"])
     size = float(np.abs(outputs["friction_torque"]).max()) + float(np.abs(outputs["bias_torque"]).max())
     agreement = max(agreement, float(np.abs(torque - model.torque).max()) / max(size, _TINY))
     left = residuals(data, recording, replace(model, torque=torque)).residual
-    if _one_piece(recording):
+    if _one_piece(data, recording):
         agreement = max(agreement, float(np.abs(left[1:] - beside["residual"][1:]).max()) / max(size, _TINY))
     if not agreement <= AGREEMENT:
         raise InputError(
@@ -166,9 +167,12 @@ def _core_model(data: Data, recording: FitRecording) -> Model:
     return model_alone(data, [recording.recording.arrays()], [slice(0, samples)], samples, recording.kinematics)
 
 
-def _one_piece(recording: FitRecording) -> bool:
-    """Whether the bias filter of the FMU sees what a judgement of the fit sees."""
-    return len(recording.parts) == 1 and recording.external is None and bool(recording.tracked.all())
+def _one_piece(data: Data, recording: FitRecording) -> bool:
+    """Whether the bias filter of the FMU sees what a judgement of the fit sees: all of it, and the same mean force."""
+    rows = data.get("extensions") or []
+    delayed = any(row["effect"] == "time_delay" and row["delay"] < 0 for row in rows)
+    same_noise = not (delayed and bias_settings(data).per_force)
+    return len(recording.parts) == 1 and recording.external is None and bool(recording.tracked.all()) and same_noise
 
 
 def _difference(mine: Numbers, other: Numbers) -> float:
