@@ -29,6 +29,8 @@ ROWS: list[dict[str, Any]] = [
     {"effect": "backlash", "joint": 2, "width": 0.02},
     {"effect": "backlash", "tendon": 1, "width": 2e-4},
     {"effect": "time_delay", "delay": 0.0013},
+    {"effect": "stribeck", "joint": 1, "amplitude": -0.4, "stribeck_velocity": 0.3},
+    {"effect": "stribeck", "tendon": 2, "amplitude": 0.4, "stribeck_velocity": 0.004},
 ]
 
 

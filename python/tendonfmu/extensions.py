@@ -24,6 +24,7 @@ MAGNITUDES: Mapping[str, Mapping[str, float]] = {
     "tendon_nonlinearity": {"hardening": 1e5},
     "backlash": {"width": 1e-4},
     "time_delay": {"delay": 2e-3},
+    "stribeck": {"amplitude": 0.3, "stribeck_velocity": 0.01},
 }
 
 

@@ -14,7 +14,6 @@ struct elsewhere {
 };
 const elsewhere no_extensions[] = {
     {"viscous_friction", "it is the number viscous of a friction law"},
-    {"stribeck", "it is the numbers static and stribeck_velocity of a friction law"},
     {"asymmetric_friction", "it is a friction law with positive and negative"},
     {"edge_friction", "it is the list edge_friction of a tendon"},
     {"pulley_friction", "it is the list pulley_friction of a tendon"},

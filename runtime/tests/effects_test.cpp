@@ -7,6 +7,7 @@
 #include <limits>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "described_finger.h"
@@ -94,6 +95,14 @@ struct Effect {
     return after;
   }
 
+  static effect_direction along_of(const Sample& direction) {
+    effect_direction along{};
+    along.angle = direction.angle.data();
+    along.velocity = direction.velocity.data();
+    along.force = direction.force.data();
+    return along;
+  }
+
   PerJoint torque(const Sample& sample, const std::vector<double>& parameters, const std::vector<double>& after) const {
     PerJoint result{1.0, 2.0, 3.0};  // it adds
     see(sample, [&](auto* seen) { type->torque(place, parameters.data(), seen, after.data(), result.data()); });
@@ -108,7 +117,7 @@ struct Effect {
 
   PerJoint slope(const Sample& sample, const Sample& direction, const std::vector<double>& after) const {
     PerJoint result{};
-    const effect_direction along{direction.angle.data(), direction.velocity.data(), direction.force.data()};
+    const effect_direction along = along_of(direction);
     see(sample, [&](auto* seen) { type->slope(place, numbers.data(), seen, after.data(), &along, result.data()); });
     return result;
   }
@@ -290,6 +299,26 @@ TEST(Slope, OfInertiaIsZeroAtTheFirstSample) {
   expect_near(inertia.slope(first, Sample{}, inertia.memory), {0, 0, 0});
 }
 
+TEST(Slope, OfInertiaFollowsTheVelocityBeforeToo) {
+  Effect inertia("inertia", 2, 0, {2e-3});
+  Sample first, second, first_direction, second_direction;
+  first.first = 1;
+  first_direction.velocity[1] = 0.3;
+  second_direction.velocity[1] = -0.5;
+  std::vector<double> slopes(inertia.memory.size(), 0.0);
+  for (const auto& [sample, direction] : {std::pair{&first, &first_direction}, {&second, &second_direction}}) {
+    std::vector<double> next(slopes.size());
+    const effect_direction along = Effect::along_of(*direction);
+    Effect::see(*sample, [&](auto* seen) {
+      inertia.type->advance_slope(inertia.place, inertia.numbers.data(), seen, inertia.memory.data(), &along,
+                                  slopes.data(), next.data());
+    });
+    inertia.accept(*sample);
+    slopes = next;
+  }
+  expect_near(inertia.torque(second, inertia.numbers, slopes), {0, 2e-3 * (-0.5 - 0.3) / 0.01, 0});
+}
+
 TEST(Slope, OfLoadFrictionFollowsTheMagnitudeOfTheForce) {
   Sample pushed, direction;
   pushed.force = {-20.0, 0.0};
@@ -301,7 +330,7 @@ TEST(Slope, OfLoadFrictionFollowsTheMagnitudeOfTheForce) {
 TEST(Slope, WithoutADirectionIsZero) {
   for (Effect& effect : all_torques()) {
     PerJoint slope{};
-    const effect_direction nowhere{nullptr, nullptr, nullptr};
+    const effect_direction nowhere{};
     effect.accept(Sample{});
     Effect::see(Sample{}, [&](auto* seen) {
       effect.type->slope(effect.place, effect.numbers.data(), seen, effect.memory.data(), &nowhere, slope.data());
@@ -398,7 +427,7 @@ TEST(SineCosine, AtTheAxesAndBeyond) {
 // --- in a description
 // -------------------------------------------------------------------------------------------------
 
-// All sixteen, as the rows of a model image: id, joint, tendon.
+// All seventeen, as the rows of a model image: id, joint, tendon.
 TEST(Described, EachEffectIsARowOfTheImage) {
   nlohmann::json finger = small_finger();
   finger["extensions"] = nlohmann::json::parse(R"([
@@ -422,15 +451,16 @@ TEST(Described, EachEffectIsARowOfTheImage) {
     {"effect": "tendon_nonlinearity", "tendon": 2, "hardening": 1e5},
     {"effect": "backlash", "tendon": 2, "width": 1e-4},
     {"effect": "backlash", "joint": 2, "width": 1e-3},
+    {"effect": "stribeck", "tendon": 2, "amplitude": -0.5, "stribeck_velocity": 0.01},
     {"effect": "time_delay", "delay": -0.001}])");
   const Reading reading = read(finger);
   ASSERT_EQ(reading.message, "");
   const Model model(reading.image);
   ASSERT_TRUE(model.accepted) << model.message;
   const std::vector<std::array<std::uint32_t, 3>> expected = {
-      {1, 2, 0},  {2, 2, 0},  {3, 1, 0},  {4, 1, 0},  {5, 0, 2},  {5, 2, 1},  {6, 2, 1},
-      {7, 0, 2},  {8, 0, 1},  {9, 1, 2},  {10, 2, 2}, {11, 2, 1}, {20, 1, 0}, {20, 0, 1},
-      {21, 0, 0}, {21, 0, 2}, {21, 0, 2}, {22, 0, 2}, {23, 0, 2}, {23, 2, 0}, {24, 0, 0}};
+      {1, 2, 0},  {2, 2, 0},  {3, 1, 0},  {4, 1, 0},  {5, 0, 2},  {5, 2, 1},  {6, 2, 1},  {7, 0, 2},
+      {8, 0, 1},  {9, 1, 2},  {10, 2, 2}, {11, 2, 1}, {20, 1, 0}, {20, 0, 1}, {21, 0, 0}, {21, 0, 2},
+      {21, 0, 2}, {22, 0, 2}, {23, 0, 2}, {23, 2, 0}, {25, 0, 2}, {24, 0, 0}};
   ASSERT_EQ(model.shape.extension_count, expected.size());
   for (std::size_t k = 0; k < expected.size(); ++k) {
     const std::uint32_t* row = model.shape.extensions + k * MODEL_EXTENSION_WORDS;
@@ -439,7 +469,7 @@ TEST(Described, EachEffectIsARowOfTheImage) {
   }
   // what is left out
   const std::size_t last = model.values.size();
-  const std::vector<double> numbers(model.values.end() - 26, model.values.end());
+  const std::vector<double> numbers(model.values.end() - 28, model.values.end());
   EXPECT_EQ(numbers.front(), 0.3);
   EXPECT_EQ(numbers[1], 0.0);   // gravity's sine
   EXPECT_EQ(numbers[2], 0.01);  // its cosine
