@@ -14,7 +14,7 @@ from typing import Annotated
 
 import typer
 
-from tendonfmu import cli_detect
+from tendonfmu import cli_campaign, cli_detect, cli_diagnose
 from tendonfmu.console import fit_bar, print_tables, progress_bar, say
 from tendonfmu.errors import InputError
 
@@ -242,6 +242,7 @@ def convert(
 
 @app.command()
 def excite(
+    context: typer.Context,
     finger: Annotated[Path, typer.Argument(metavar="FINGER.json|RIG.json", help="finger description, or rig of one")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="MOTION.csv", help="motion, .csv or .parquet")],
     duration: Annotated[
@@ -270,8 +271,15 @@ def excite(
     report: Annotated[
         Path | None, typer.Option(metavar="R.json", help="everything that is known of the motion")
     ] = None,
+    discriminate: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="the next experiment of a diagnosis instead; with --rate alone"),
+    ] = None,
 ) -> None:
     """Plan a training motion, and say what it excites and which parameters it cannot identify."""
+    if discriminate is not None:
+        cli_diagnose.discriminate(context, finger, discriminate, output, rate)
+        return
     import json
     import shlex
 
@@ -420,7 +428,9 @@ def fit(
             say(f"{path}: {what}")
 
 
+cli_diagnose.register(app)
 cli_detect.register(app)
+cli_campaign.register(app)
 
 
 @app.command()

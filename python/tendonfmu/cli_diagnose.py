@@ -10,6 +10,7 @@ import typer
 from typer.core import TyperCommand
 
 from tendonfmu.console import phase_bar, print_tables, progress_bar, say
+from tendonfmu.errors import InputError
 
 
 class _SeveralTests(TyperCommand):
@@ -95,3 +96,26 @@ def diagnose(
     print_tables(tables(found), lines(found), left="may also be")
     for path, what in written.items():
         say(f"{path}: {what}")
+
+
+def discriminate(context: typer.Context, finger: Path, folder: Path, output: Path, rate: float) -> None:
+    """`tendonfmu excite FINGER --discriminate DIR -o MOTION`: the motion that a diagnosis asked for."""
+    from tendonfmu.discrimination import discriminating_motion
+    from tendonfmu.excite import read_subject
+    from tendonfmu.rig import description_files, is_rig
+    from tendonfmu.tables import check_format, write_table
+    from tendonfmu.whole_file import check_output
+
+    own = {"finger", "output", "rate", "discriminate"}
+    for each in context.command.params:
+        source = context.get_parameter_source(str(each.name))
+        if each.name not in own and source is not None and source.name == "COMMANDLINE":
+            raise InputError(f"{each.opts[0]}: with --discriminate {folder}; expected no option but --rate beside it")
+    check_format(output)
+    check_output(output, *(description_files(finger) if is_rig(finger) else [finger]))
+    subject = read_subject(finger)
+    found = discriminating_motion(folder, subject.finger.data, limits=subject.limits, rate=rate)
+    columns = found.columns()
+    write_table(output, columns)
+    print_tables((), found.lines(), left="")
+    say(f"{output}: {len(columns['time'])} rows, {columns['time'][-1]:g} s")

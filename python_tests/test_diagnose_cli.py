@@ -1,0 +1,176 @@
+"""The command `tendonfmu diagnose` as a user calls it, and `excite --discriminate`."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from importlib.resources import files as files_of
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
+
+import diagnosis_examples as examples
+from command import Call
+from tendonfmu import diagnosis
+from tendonfmu.cli_diagnose import several_tests
+from tendonfmu.diagnosis_files import write_diagnosis
+from tendonfmu.diagnosis_result import Diagnosis
+from tendonfmu.effects import CANDIDATES
+from tendonfmu.errors import InputError
+
+PAGE = (Path(__file__).resolve().parents[1] / "docs" / "diagnose.md").read_text(encoding="utf-8")
+NAMED = {"diagnosis.html", "diagnosis.json", "extended.json", "extended.fmu", "nominal.json"}
+
+Called = list[tuple[Any, ...]]
+
+
+@pytest.fixture
+def answering(monkeypatch: pytest.MonkeyPatch) -> Callable[[Diagnosis], Called]:
+    """Puts a diagnosis in the place of the computation; gives what it was asked."""
+
+    def put(found: Diagnosis) -> Called:
+        asked: Called = []
+
+        def answer(finger: Path, recordings: Sequence[Path], tests: Sequence[Path], **options: Any) -> Diagnosis:
+            options["progress"]("fitting", 1, 2)
+            asked.append((finger.name, [each.name for each in recordings], [each.name for each in tests], options))
+            return found
+
+        monkeypatch.setattr(diagnosis, "diagnose", answer)
+        return asked
+
+    return put
+
+
+def brief(found: Diagnosis) -> Diagnosis:
+    """Without what takes long to draw."""
+    return replace(found, views=found.views[:1])
+
+
+def files_in(folder: Path) -> set[str]:
+    return {file.name for file in folder.iterdir()}
+
+
+def test_it_writes_everything(call: Call, answering: Callable[[Diagnosis], Called]) -> None:
+    found = examples.three_causes()
+    asked = answering(found)
+    words = "diagnose f.json a.csv b.csv --test c.csv d.csv -o new/out --seed 3 --kinematics 3 --jobs 2"
+    answer = call(*words.split())
+    assert answer.status == 0
+    finger, recordings, tests, options = asked[0]
+    assert (finger, recordings, tests) == ("f.json", ["a.csv", "b.csv"], ["c.csv", "d.csv"])
+    assert (options["seed"], options["kinematics"], options["jobs"]) == (3, 3, 2)
+    report = json.loads(Path("new/out/diagnosis.json").read_text(encoding="utf-8"))
+    jsonschema.validate(report, json.loads(files_of("tendonfmu").joinpath("schema/diagnosis.schema.json").read_text()))
+    assert set(report["files"]) == files_in(Path("new/out")) >= NAMED
+    assert files_in(Path("new")) == {"out"}  # nothing is left beside it
+    assert [line for line in answer.err.splitlines() if line.startswith("tendonfmu: warning: ")] == [
+        f"tendonfmu: warning: {sentence}" for sentence in found.warnings
+    ]
+    assert "Three causes together explain part of what the model gets wrong." in answer.out
+    assert "new/out/diagnosis.html: all of it, to be read in a browser" in answer.err
+    assert json.loads(Path("new/out/extended.json").read_text()) == found.extended_data
+    for name in ("extended.json", "nominal.json"):
+        assert call("check", f"new/out/{name}").status == 0
+
+
+def test_an_earlier_diagnosis_is_replaced_and_nothing_else(
+    call: Call, answering: Callable[[Diagnosis], Called]
+) -> None:
+    answering(brief(examples.three_causes()))
+    assert call("diagnose", "f.json", "a.csv", "-o", "out").status == 0
+    Path("out/notes.png").write_text("mine")
+    answering(brief(examples.adequate()))
+    assert call("diagnose", "f.json", "a.csv", "-o", "out").status == 0
+    report = json.loads(Path("out/diagnosis.json").read_text(encoding="utf-8"))
+    assert report["verdict"] == "adequate" and report["causes"] == []
+    assert files_in(Path("out")) == {*report["files"], "notes.png"} and "cause_1.png" not in report["files"]
+
+
+def test_the_same_diagnosis_gives_the_same_files(tmp_path: Path) -> None:
+    found = brief(examples.one_cause())
+    for name in ("one", "two"):
+        write_diagnosis(found, tmp_path / name)
+    for name in files_in(tmp_path / "one"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), name
+
+
+def test_what_fails_leaves_the_folder_as_it_was(tmp_path: Path) -> None:
+    write_diagnosis(brief(examples.adequate()), tmp_path / "out")
+    before = {file.name: file.read_bytes() for file in (tmp_path / "out").iterdir()}
+    broken = replace(brief(examples.three_causes()), extended_data={"format": "tendonfmu-finger-1", "name": "broken"})
+    with pytest.raises(InputError, match="joints"):
+        write_diagnosis(broken, tmp_path / "out")
+    assert {file.name: file.read_bytes() for file in (tmp_path / "out").iterdir()} == before
+    assert files_in(tmp_path) == {"out"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("f.json", "a.csv", "-o", "f.json"), "f.json: a file; expected a folder"),
+        (("out/extended.json", "a.csv", "-o", "out"), "out/extended.json: the same file as the input"),
+        (("f.json", "a.csv", "./a.csv", "-o", "new"), "a.csv: given twice; expected each recording once"),
+        (("f.json", "a.csv", "--test", "a.csv", "-o", "new"), "a.csv: compared with, but trained on as well"),
+        (("f.json", "-o", "new"), "RECORDING"),
+        (("f.json", "a.csv"), "-o"),
+        (("f.json", "a.csv", "-o", "new", "--kinematics", "4"), "--kinematics"),
+        (("f.json", "a.csv", "-o", "new", "--jobs", "0"), "--jobs"),
+        (("nothing.json", "a.csv", "-o", "new"), "nothing.json: No such file"),
+        (("finger.json", "nothing.csv", "-o", "new"), "nothing.csv"),
+    ],
+)
+def test_bad_usage_is_one_line(call: Call, tmp_path: Path, arguments: tuple[str, ...], words: str) -> None:
+    (tmp_path / "out").mkdir()
+    for name in ("f.json", "a.csv", "out/extended.json"):
+        (tmp_path / name).write_text("{}")
+    (tmp_path / "finger.json").write_text(json.dumps(examples.adequate().nominal_data))
+    answer = call("diagnose", *arguments)
+    assert answer.status == 2 and words in answer.err and answer.err.count("\n") == 1 and answer.out == ""
+    assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize(
+    ("given", "read"),
+    [
+        ("f a --test b c -o d", "f a --test b --test c -o d"),
+        ("f a --test=b c --seed 1 e", "f a --test=b --test c --seed 1 e"),
+        ("--test b f a", "--test b f a"),
+        ("f --test b a", "f --test b a"),
+        ("-o d f a --test b -- c", "-o d f a --test b -- c"),
+        ("f a --test b --test c d", "f a --test b --test c --test d"),
+        ("f a --test", "f a --test"),
+    ],
+)
+def test_several_tests_after_the_recordings(given: str, read: str) -> None:
+    assert several_tests(given.split(), {"--test", "-o", "--seed"}) == read.split()
+
+
+def test_options_and_effects_are_on_the_page(call: Call) -> None:
+    shown = call("diagnose", "--help").out
+    options = set(re.findall(r"--[a-z][a-z-]+", shown)) - {"--help"}
+    assert len(options) > 5
+    assert {option for option in options if option not in PAGE} == {"--output"}
+    rows = [f"| `{each.name}` | {each.title} | {each.excited_by} |" for each in CANDIDATES]
+    missing = [row for row in rows if row not in PAGE]
+    assert missing == [], "docs/diagnose.md, The effects: \n" + "\n".join(rows)
+
+
+# --- the next experiment ----------------------------------------------------------------------------------------------
+
+
+def test_a_motion_that_discriminates_takes_no_plan_of_its_own(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "finger.json").write_text(json.dumps(examples.adequate().nominal_data))
+    answer = call("excite", "finger.json", "--discriminate", "out", "-o", "m.csv", "--duration", "60")
+    assert answer.status == 2 and "--duration: with --discriminate out" in answer.err
+    answer = call("excite", "finger.json", "--discriminate", "out", "-o", "m.csv")
+    assert answer.status == 2 and "diagnosis.json" in answer.err and answer.err.count("\n") == 1
+    write_diagnosis(replace(brief(examples.adequate()), experiment=examples.NO_EXPERIMENT), tmp_path / "out")
+    answer = call("excite", "finger.json", "--discriminate", "out", "-o", "m.csv")
+    assert answer.status == 2 and "no further experiment" in answer.err and not Path("m.csv").exists()
