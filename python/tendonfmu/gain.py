@@ -1,9 +1,10 @@
 """What an extension is worth: both FMUs run over data that neither was fitted to, and their residuals compared.
 
 An FMU has r of contract section 5, step 5, among its outputs only after the update, as compensated_torque = (1 − K)·r.
-So the core runs over the same samples beside it: where all outputs of both agree, its r is that of the FMU. A known
-external torque, labelled contact and gaps need the bias filter over y − T (`fit_residuals.track`), with the T that the
-FMU put out; in a recording without them that is r of the core again, and both are compared.
+So the core runs over the same samples beside it: where all outputs of both agree, its r is that of the FMU, and tells
+how the bias jumped. A known external torque, labelled contact and gaps need the bias filter once more, over y − T
+(`fit_residuals.track`), with the T that the FMU put out; in a recording without them that is r of the core again, and
+both are compared.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from __future__ import annotations
 import re
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ from tendonfmu.errors import InputError
 from tendonfmu.fit_evaluation import residuals
 from tendonfmu.fit_files import description_text
 from tendonfmu.fit_recordings import FitRecording
-from tendonfmu.fit_residuals import Model, bias_settings, delayed_torque, model_alone, rms
+from tendonfmu.fit_residuals import Model, bias_settings, delayed_torque, rms
 from tendonfmu.fmu import run_fmu
 from tendonfmu.gain_interval import Blocks, blocks_of, gain_interval
 from tendonfmu.packaging import build_fmu
@@ -100,7 +101,7 @@ def residual_of(data: Data, recording: FitRecording) -> Numbers:
     """[N, n] r of contract section 5, step 5, N·m, by the core alone: of the whole recording, whose friction remembers
     across gaps as an FMU does, while the bias begins anew after them; NaN where there is none.
     """
-    return residuals(data, recording, _core_model(data, recording)).residual
+    return residuals(data, recording, _model(data, recording, _core_outputs(data, recording))).residual
 
 
 # --- an FMU and the core side by side ---------------------------------------------------------------------------------
@@ -121,17 +122,11 @@ def run_both(data: Data, recording: FitRecording) -> BothRun:
 
     Raises InputError where FMU and core do not agree.
     """
-    outputs = _fmu_outputs(data, recording)
-    core = native.Finger.from_description(_without_contact(data), recording.kinematics)
-    beside = core.run(recording.recording.arrays())
+    outputs, beside = _fmu_outputs(data, recording), _core_outputs(data, recording)
     agreement = max(_difference(outputs[name], beside[name]) for name in NUMBERS)
-    model = _core_model(data, recording)
-    torque = outputs["friction_torque"] - outputs["bias_torque"]
-    torque = torque - delayed_torque(data, recording.recording.groups, outputs["joint_torque"])
-    size = float(np.abs(outputs["friction_torque"]).max()) + float(np.abs(outputs["bias_torque"]).max())
-    agreement = max(agreement, float(np.abs(torque - model.torque).max()) / max(size, _TINY))
-    left = residuals(data, recording, replace(model, torque=torque)).residual
+    left = residuals(data, recording, _model(data, recording, {**beside, **outputs})).residual
     if _one_piece(data, recording):
+        size = max(float(np.abs(beside["friction_torque"]).max()), float(np.abs(beside["joint_torque"]).max()))
         agreement = max(agreement, float(np.abs(left[1:] - beside["residual"][1:]).max()) / max(size, _TINY))
     if not agreement <= AGREEMENT:
         raise InputError(
@@ -158,13 +153,25 @@ def _fmu_outputs(data: Data, recording: FitRecording) -> dict[str, Numbers]:
     }
 
 
-def _without_contact(data: Data) -> dict[str, Any]:
-    return {**data, "contact": {"threshold": [_NEVER] * len(data["joints"])}}
+def _core_outputs(data: Data, recording: FitRecording) -> dict[str, Any]:
+    """Of `native.Finger.run`, without contact detection."""
+    free = {**data, "contact": {"threshold": [_NEVER] * len(data["joints"])}}
+    return native.Finger.from_description(free, recording.kinematics).run(recording.recording.arrays())
 
 
-def _core_model(data: Data, recording: FitRecording) -> Model:
-    samples = len(recording.time)
-    return model_alone(data, [recording.recording.arrays()], [slice(0, samples)], samples, recording.kinematics)
+def _model(data: Data, recording: FitRecording, outputs: Mapping[str, Any]) -> Model:
+    """T and Δb of a run: the bias moves by Δb and by what the update takes from r, which is r − compensated_torque."""
+    bias = outputs["bias_torque"]
+    torque = outputs["friction_torque"] - bias
+    jump = np.diff(bias, axis=0, prepend=bias[:1]) - (outputs["residual"] - outputs["compensated_torque"])
+    jump[0] = 0.0
+    return Model(
+        torque=torque - delayed_torque(data, recording.recording.groups, outputs["joint_torque"]),
+        jump=jump,
+        joint_angle=outputs["joint_angle"],
+        joint_speed=outputs["joint_speed"],
+        slack=outputs["slack"],
+    )
 
 
 def _one_piece(data: Data, recording: FitRecording) -> bool:
