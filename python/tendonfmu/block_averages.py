@@ -60,8 +60,8 @@ def regular_blocks(times: Sequence[Numbers], parts: Sequence[Sequence[slice]], l
 class BlockSums:
     """Sums over blocks, filled stretch by stretch.
 
-    sums: [B, n, c] to add to, float32 or float64. Stretches of one part come in their order, `begin` before the first:
-    jumps are added up from there.
+    sums: [B, n, c] to add to, float32 or float64. The stretches are those of one part, in their order: jumps are added
+    up from its start.
     """
 
     def __init__(self, sums: NDArray[Any], mix: Any = None) -> None:
@@ -69,21 +69,17 @@ class BlockSums:
         self._sums, self._mix = sums, mix
         self._carried: Numbers | None = None
 
-    def begin(self) -> None:
-        """A new part: no jump so far."""
-        self._carried = None
-
-    def add(self, block: Indices, values: Numbers, jumps: Numbers) -> None:
-        """block: [K] of each sample. values, jumps: [K, n, u]."""
+    def add(self, block: Indices, values: Numbers, jumps: Numbers | None) -> None:
+        """block: [K] of each sample. values, jumps: [K, n, u]; None: no jump in the whole part."""
         starts = np.flatnonzero(np.diff(block, prepend=block[0] - 1))
         runs = np.add.reduceat(values, starts, axis=0)
-        self._add_jumps(runs, jumps, starts, np.diff(starts, append=len(block)))
+        if jumps is not None:
+            self._add_jumps(runs, jumps, starts, np.diff(starts, append=len(block)))
         numbers = block[starts]
         inside = numbers >= 0
         chosen = runs[inside]
         if self._mix is not None:
-            rows, joints, given = chosen.shape
-            chosen = np.asarray(chosen.reshape(rows * joints, given) @ self._mix).reshape(rows, joints, -1)
+            chosen = mixed(chosen, self._mix)
         self._sums[numbers[inside]] += chosen
 
     def _add_jumps(self, runs: Numbers, jumps: Numbers, starts: Indices, lengths: Indices) -> None:
@@ -101,3 +97,9 @@ class BlockSums:
         total += share @ flat[rows]
         last = flat[rows].sum(axis=0)
         self._carried = last if self._carried is None else self._carried + last
+
+
+def mixed(values: Numbers, mix: Any) -> Numbers:
+    """[K, n, c] of [K, n, u] by a matrix [u, c], sparse or dense."""
+    rows, joints, given = values.shape
+    return np.asarray(values.reshape(rows * joints, given) @ mix).reshape(rows, joints, -1)

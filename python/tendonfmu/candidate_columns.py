@@ -16,16 +16,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu import native
+from tendonfmu.balance import moment_arms
 from tendonfmu.block_averages import Blocks
 from tendonfmu.derivative_passes import nominal_directions, plan_passes, run_pass
 from tendonfmu.diagnosis_span import Span, span_of
 from tendonfmu.effects import CANDIDATES, Candidate, Place, Variant
 from tendonfmu.fit_recordings import FitRecording
-from tendonfmu.fit_residuals import without_filter
 
 Numbers = NDArray[np.float64]
 Single = NDArray[np.float32]
 Progress = Callable[[int, int], None]
+
+_NEVER = 1e9  # N·m; no contact threshold is ever passed
+_STRETCH = 4000  # samples of a run at a time: what a run returns stays near the processor
 
 
 @dataclass(frozen=True)
@@ -127,20 +130,40 @@ def without_uncertainty(data: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def block_prediction(data: Mapping[str, Any], recordings: Sequence[FitRecording], blocks: Blocks) -> Numbers:
-    """[B, n] block means of G of a description, N·m."""
+    """[B, n] block means of G of a description, N·m, less the torque of the forces in use beyond the measured ones.
+
+    The latter is 0 but for forces that the description delays (`time_delay` below 0).
+    """
     sums = np.zeros((blocks.count, len(data["joints"])))
-    # with a bias that learns nothing, T_eff is T with all jumps so far
-    finger = native.Finger(native.image_from_json(json.dumps(without_filter(data))))
+    finger, arms = native.Finger(native.image_from_json(json.dumps(_learning_nothing(data)))), moment_arms(data)
     for recording, block in zip(recordings, blocks.of, strict=True):
         for part in recording.parts:
             finger.reset()
             finger.set_kinematics_source(recording.kinematics)
-            whole = finger.run(recording.arrays(part))["friction_torque"]
-            own = block[part]
-            inside = slice(None) if own.min() >= 0 else own >= 0
-            for j in range(sums.shape[1]):
-                sums[:, j] += np.bincount(own[inside], weights=whole[inside, j], minlength=blocks.count)
+            for begin in range(part.start, part.stop, _STRETCH):
+                rows = slice(begin, min(begin + _STRETCH, part.stop))
+                arrays = recording.arrays(rows)
+                # τ − T_eff, and T_eff is T with all jumps so far where the bias learns nothing
+                whole = arrays["tendon_force"] @ arms - finger.run(arrays)["compensated_torque"]
+                _add_up(sums, block[rows], whole)
     return np.asarray(sums / np.maximum(blocks.sizes(), 1)[:, None])
+
+
+def _add_up(sums: Numbers, block: NDArray[np.int64], values: Numbers) -> None:
+    inside = block >= 0
+    if inside.any():
+        first, own = int(block[inside][0]), block[inside]
+        for j in range(sums.shape[1]):
+            found = np.bincount(own - first, weights=values[inside, j])
+            sums[first : first + len(found), j] += found
+
+
+def _learning_nothing(data: Mapping[str, Any]) -> dict[str, Any]:
+    """The description whose bias moves by the jumps alone, and that never sees contact."""
+    kept = {key: value for key, value in (data.get("bias") or {}).items() if key in ("forget_rate", "entry_load")}
+    joints = len(data["joints"])
+    still = {**kept, "drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": [0.0] * joints}
+    return {**data, "bias": still, "contact": {"threshold": [_NEVER] * joints}}
 
 
 def _proposed(
