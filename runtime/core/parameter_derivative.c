@@ -135,7 +135,9 @@ typedef struct place_laws {
   double threshold;            /* v_min */
   const double *below, *above; /* packed laws; above NULL: no working points */
   const uint32_t *below_side[2], *above_side[2];
-  double weight; /* of the working point above */
+  double weight;       /* of the working point above */
+  const double* entry; /* e as it came to rest, with entry_load */
+  double acting;       /* what multiplies F and b there now */
 } place_laws;
 
 static void add_side(law_term* to, size_t* count, uint32_t place, uint32_t side, double speed, const law_slopes* s,
@@ -179,25 +181,49 @@ static double read_friction(const tendonfmu_finger* f, const place_laws* p, para
   return grip * d->base[p->place];
 }
 
-/* b of fig. 5 */
+/* b of fig. 5 where a place comes to rest */
+static double read_stop(const place_laws* p, double side, double grip, parameter_derivative* d) {
+  return side * add_magnitude(p, side < 0.0, p->threshold, grip * side, d->bias, &d->bias_count);
+}
+
+/* With entry_load, −κ·e where it leaves rest: e was side·|F|·(what acted then), and depends on the law as F does. What
+ * acted then is held fixed: differs from the rest of this file, which carries forces along. */
+static void read_kept_entry(const place_laws* p, double side, double kept, parameter_derivative* d) {
+  const size_t first = d->bias_count;
+  const double held = side * add_magnitude(p, side < 0.0, p->threshold, side, d->bias, &d->bias_count);
+  const double share = held * p->acting != 0.0 ? -kept * *p->entry / (held * p->acting) : 0.0;
+  for (size_t k = first; k < d->bias_count; ++k) {
+    for (int number = 0; number < LAW_SIDE_NUMBERS; ++number) {
+      d->bias[k].slope[number] *= share;
+    }
+  }
+}
+
+/* b of fig. 5 where it leaves rest; what entry_load keeps apart is in the slopes alone, as it moves no force */
+static double read_start(const tendonfmu_finger* f, const place_laws* p, double before, double now, double grip,
+                         parameter_derivative* d) {
+  const double kept = before == 0.0 ? 0.0 : law_exponential(rest_exponent(f, p->slot));
+  const int keeps_entry = f->derived.settings.remembers_entry_load && before != 0.0;
+  const double factor = -(1.0 - kept) * now;
+  double jump = factor * add_magnitude(p, now < 0.0, p->threshold, grip * factor, d->bias, &d->bias_count);
+  if (keeps_entry) {
+    read_kept_entry(p, before, kept, d);
+  } else if (kept != 0.0) {
+    const double back = -kept * before;
+    jump += back * add_magnitude(p, before < 0.0, p->threshold, grip * back, d->bias, &d->bias_count);
+  }
+  return jump;
+}
+
 static double read_jump(const tendonfmu_finger* f, const place_laws* p, parameter_derivative* d) {
   const finger_state* s = &f->remembered;
-  const double before = s->side_before[p->slot], now = s->side[p->slot];
+  const double before = s->side_before[p->slot], now = s->side[p->slot], event = s->event[p->slot];
   const double grip = f->extensions.friction ? f->scratch.bias_grip[p->slot] : 1.0;
-  double jump = 0.0, kept = 1.0;
   d->jump_base[p->place] = 0.0;
-  if (s->event[p->slot] == 0.0 || grip == 0.0) {
+  if (event == 0.0 || grip == 0.0 || (event > 0.0 && before == 0.0)) {
     return 0.0;
   }
-  if (s->event[p->slot] < 0.0) {
-    kept = before == 0.0 ? 0.0 : -law_exponential(rest_exponent(f, p->slot));
-    const double factor = -(1.0 + kept) * now;
-    jump = factor * add_magnitude(p, now < 0.0, p->threshold, grip * factor, d->bias, &d->bias_count);
-  }
-  if (before != 0.0 && kept != 0.0) {
-    const double factor = kept * before;
-    jump += factor * add_magnitude(p, before < 0.0, p->threshold, grip * factor, d->bias, &d->bias_count);
-  }
+  const double jump = event > 0.0 ? read_stop(p, before, grip, d) : read_start(f, p, before, now, grip, d);
   d->jump_base[p->place] = jump;
   return grip * jump;
 }
@@ -212,7 +238,9 @@ static place_laws edge_at(const tendonfmu_finger* f, const parameter_derivative*
                   .threshold = f->derived.settings.tendon_threshold,
                   .below = f->derived.edge_law + record * LAW_NUMBERS,
                   .above = segment[1] != 0.0 ? f->derived.edge_law + (record + 1) * LAW_NUMBERS : NULL,
-                  .weight = (angle - segment[0]) * segment[1]};
+                  .weight = (angle - segment[0]) * segment[1],
+                  .entry = f->remembered.entry_edge + slot,
+                  .acting = f->scratch.force_at[slot]};
   for (int negative = 0; negative < 2; ++negative) {
     p.below_side[negative] = d->edge_side[negative] + record;
     p.above_side[negative] = d->edge_side[negative] + record + (p.above != NULL);
@@ -302,8 +330,10 @@ static void read_tendon(const tendonfmu_finger* f, parameter_derivative* d, size
       d->jumped[2 * j] = read_jump(f, &edge, d);
     }
     if (j + 1 < n && d->pulley_side[0][behind] != NO_LAW) {
-      const place_laws pulley = single_law(edge.place + 1, behind, f->derived.settings.tendon_threshold,
-                                           f->derived.pulley_law + behind * LAW_NUMBERS, d->pulley_side, behind);
+      place_laws pulley = single_law(edge.place + 1, behind, f->derived.settings.tendon_threshold,
+                                     f->derived.pulley_law + behind * LAW_NUMBERS, d->pulley_side, behind);
+      pulley.entry = f->remembered.entry_pulley + behind;
+      pulley.acting = f->scratch.force_between[edge.slot];
       present[2 * j + 1] = 1;
       d->moved[2 * j + 1] = read_friction(f, &pulley, d);
       d->jumped[2 * j + 1] = read_jump(f, &pulley, d);
@@ -329,7 +359,9 @@ static void read_joint(const tendonfmu_finger* f, parameter_derivative* d, size_
     if (side[0][j] == NO_LAW) {
       continue;
     }
-    const place_laws own = single_law(place + (uint32_t)loaded, slot, threshold, laws + j * LAW_NUMBERS, side, j);
+    place_laws own = single_law(place + (uint32_t)loaded, slot, threshold, laws + j * LAW_NUMBERS, side, j);
+    own.entry = (loaded ? f->remembered.entry_pulley : f->remembered.entry_edge) + slot;
+    own.acting = loaded ? load : 1.0;
     read_friction(f, &own, d);
     read_jump(f, &own, d);
     for (size_t other = 0; other < n; ++other) {

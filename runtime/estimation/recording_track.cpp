@@ -5,37 +5,14 @@
 
 #include "refusal.h"
 
-extern "C" {
-#include "bytes.h"
-}
-
 namespace tendonfmu::estimation {
 
 /* --- a finger without contact ---------------------------------------------------------------------------------------
  */
 
-namespace {
-
-/* The same finger without entry_load: its memory of earlier loads would have to be differentiated, too. What an effect
- * takes out then belongs to the load at which it leaves rest, as in the paper. */
-std::vector<unsigned char> without_entry_load(const void* image, std::size_t image_size) {
-  constexpr std::size_t checksum = 24, hashed = 32, options = 40;
-  const auto* begin = static_cast<const unsigned char*>(image);
-  std::vector<unsigned char> bytes(begin, begin + image_size);
-  model_shape shape;
-  if (model_read_header(bytes.data(), bytes.size(), &shape, message_line{nullptr, 0}) == 0) {
-    store_u32(bytes.data() + options, shape.options & ~std::uint32_t{MODEL_REMEMBERS_ENTRY_LOAD});
-    store_u64(bytes.data() + checksum, hash_bytes(bytes.data() + hashed, bytes.size() - hashed, 0));
-  }
-  return bytes; /* one that is damaged is refused by tendonfmu_create() */
-}
-
-}  // namespace
-
 FreeFinger::FreeFinger(const void* image, std::size_t image_size) {
   char message[ERROR_BYTES] = "";
-  const std::vector<unsigned char> bytes = without_entry_load(image, image_size);
-  finger_.reset(tendonfmu_create(bytes.data(), bytes.size(), message, sizeof message));
+  finger_.reset(tendonfmu_create(image, image_size, message, sizeof message));
   if (!finger_) {
     throw refused(message);
   }
@@ -103,7 +80,7 @@ std::vector<unsigned char> FreeFinger::save() const {
 }
 
 bool remembers_numbers(const tendonfmu_finger* finger) {
-  return finger->extensions.signals + finger->extensions.friction > 0;
+  return finger->extensions.signals + finger->extensions.friction > 0 || finger->derived.settings.remembers_entry_load;
 }
 
 /* --- recordings -----------------------------------------------------------------------------------------------------

@@ -38,7 +38,8 @@ class FreeFinger {
 };
 
 /* Whether what a finger remembers depends on numbers that may be estimated: those of extensions that act on signals or
- * on friction. The states kept with a recording, which are those of the start, are then found anew. */
+ * on friction, and the loads of entry_load. The states kept with a recording, which are those of the start, are then
+ * found anew. */
 bool remembers_numbers(const tendonfmu_finger* finger);
 
 /* States at the beginnings of the segments of a recording. */
