@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import signal
 
 from tendonfmu.converters import convert_file
 from tendonfmu.converters.emps import DECIMATION, MASS
@@ -54,3 +55,14 @@ def force_and_error(finger: Mapping[str, Any], recording: Recording) -> tuple[Ar
 def relative(error: Array, force: Array) -> float:
     """100·||y − ŷ||/||y||, %."""
     return 100 * float(np.linalg.norm(error) / np.linalg.norm(force))
+
+
+def relative_as_published(finger: Mapping[str, Any], recording: Recording) -> float:
+    """%; the model at the recording's full rate, then force and what is missed of it decimated alike.
+
+    The published way: the columns of the regression, the velocity's sign among them, are decimated by a Chebyshev
+    filter. 50 ms at each end, where filters swing in, are left out.
+    """
+    force, missed = force_and_error(finger, recording)
+    inside = slice(50, -50)
+    return relative(*(np.asarray(signal.decimate(series[inside], DECIMATION)) for series in (missed, force)))

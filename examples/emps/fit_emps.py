@@ -26,8 +26,9 @@ from emps_recordings import (
     force_and_error,
     read_emps,
     relative,
+    relative_as_published,
 )
-from scipy import io, optimize, signal
+from scipy import io, optimize
 
 from tendonfmu.converters.emps import DECIMATION, MASS
 from tendonfmu.fitting import FitWarning, FrictionFit
@@ -82,14 +83,8 @@ def error(model: Model, file: Path, decimation: int = DECIMATION) -> float:
 
 
 def error_as_published(model: Model, file: Path) -> float:
-    """%; the model at the file's full rate, then force and what is missed of it decimated alike.
-
-    The published way: the columns of the regression, the velocity's sign among them, are decimated by a Chebyshev
-    filter. 50 ms at each end, where filters swing in, are left out.
-    """
-    force, missed = force_and_error(model.finger, read_emps(file, model.mass, decimation=1))
-    inside = slice(50, -50)
-    return relative(*(signal.decimate(series[inside], DECIMATION) for series in (missed, force)))
+    """%; the published way, of the model at the file's full rate."""
+    return relative_as_published(model.finger, read_emps(file, model.mass, decimation=1))
 
 
 def print_table(published: dict[str, float], rows: dict[str, tuple[Model, float, float]]) -> None:

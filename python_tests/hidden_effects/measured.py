@@ -230,7 +230,7 @@ EFFECTS = {
         ("joint_friction", "preload_friction"),
         coulomb,
         0.05,
-        free=lambda machine: free_of_friction(free_of_delay(machine)),
+        free=free_of_coulomb,
     ),
     "gain": Effect(("force_gain", "moment_arm"), gain, 0.02, both=True, most=0.5),
     "delay": Effect(("time_delay",), delay, 0.002, both=True, most=0.05, free=free_of_delay),
