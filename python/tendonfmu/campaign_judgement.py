@@ -18,9 +18,9 @@ def judge(case: Case, found: Diagnosis) -> dict[str, Any]:
     detected: something is reported to be missing. in_set: the true effect is a reported cause or in the confusion set
     of one. first: it is the first cause. set_size: effects of the set that has it, or of the first cause. place: of
     the named effect, joint and tendon are the true ones. both, exactly: all that is hidden, and nothing else.
-    not_visible: the effect is listed as such, and not as a cause; experiment: with one. unknown: the verdict leaves something
-    unexplained, or the first cause's own set says unknown. wrong_name: an effect is named that is not there, and the
-    verdict calls everything explained.
+    not_visible: the effect is listed as such, and not as a cause; experiment: with one. unknown: the verdict leaves
+    something unexplained, or the first cause's own set says unknown. wrong_name: an effect is named that is not
+    there, and the verdict calls everything explained.
     """
     causes = [cause for cause in found.causes if cause.where.effect not in ("contact", "unknown")]
     row: dict[str, Any] = {

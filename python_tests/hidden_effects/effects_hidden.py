@@ -17,7 +17,7 @@ import numpy as np
 from friction_physics import Effect, Finger, Motion, last_true
 from hidden_sensors import SENSORS
 from hidden_unknown import UNKNOWN
-from matched_rig import Description, Hand, Hidden, record
+from matched_rig import Description, Hand, Hidden, Unreachable, record
 from numpy.typing import NDArray
 from strength import look, residual, surviving
 
@@ -26,10 +26,6 @@ Random = np.random.Generator
 Builder = Callable[[Hand, Random], tuple[Hand, Hidden]]
 CLOSE = 0.05  # in its logarithm, of the strength asked for
 STILL_CLOSE = 0.3  # the same where sticking and sliding make strength a rough function of the magnitude
-
-
-class Unreachable(ValueError):
-    """No sound magnitude has the strength asked for."""
 
 
 def edited(hand: Hand, change: Callable[[Description], None]) -> Hand:

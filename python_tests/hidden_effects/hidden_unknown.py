@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from friction_physics import Finger, Motion, last_true
-from matched_rig import Hand, Hidden
+from matched_rig import Hand, Hidden, Unreachable
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
@@ -57,19 +57,25 @@ def periodic(hand: Hand, rng: Random) -> tuple[Hand, Hidden]:
 
 
 def ageing(hand: Hand, rng: Random) -> tuple[Hand, Hidden]:
-    """Friction that remembers for seconds how much the joint moved: it falls while it slides and heals at rest."""
-    j = int(rng.integers(len(hand.truth["joints"])))
+    """Friction of a tendon that remembers for seconds how much it slid: it falls while it slides and heals at rest."""
+    rubbing = [i for i, each in enumerate(hand.truth["tendons"]) if any(law for law in each["edge_friction"])]
+    if not rubbing:
+        raise Unreachable("ageing: no tendon has an edge that rubs")
+    i = rubbing[int(rng.integers(len(rubbing)))]
     memory = float(rng.uniform(2.0, 5.0))
 
     def change(finger: Finger, motion: Motion, magnitude: float) -> None:
         share = 1.0 - np.exp(-(motion.time[1] - motion.time[0]) / memory)
-        slides = np.minimum(np.abs(motion.velocity[:, j]) / 0.5, 1.0)
+        slides = np.minimum(np.abs(motion.tendon[:, i, 0]) / 0.005, 1.0)
         level = lfilter([share], [1.0, share - 1.0], slides)
+        factor = 1.0 - magnitude * (level - level.mean())
+        if factor.min() < 0.02:
+            raise Unreachable("ageing: friction would turn round")
         for effect in finger.effects:
-            if effect.kind in ("joint", "load") and effect.at == (j,):
-                effect.factor = np.maximum(1.0 - magnitude * (level - level.mean()), 0.05)
+            if effect.kind in ("edge", "pulley") and effect.at[0] == i:
+                effect.factor = factor
 
-    return hand, Hidden("ageing", joint=j + 1, magnitude=0.5, note=f"memory {memory:.1f} s", finger=change)
+    return hand, Hidden("ageing", tendon=i + 1, magnitude=0.5, note=f"memory {memory:.1f} s", finger=change)
 
 
 UNKNOWN: dict[str, Callable[..., tuple[Hand, Hidden]]] = {"rubbing": rubbing, "periodic": periodic, "ageing": ageing}

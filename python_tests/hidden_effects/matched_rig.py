@@ -34,6 +34,10 @@ ITERATIONS = 60  # of the balance, at most: it contracts by some tenths of the f
 BALANCED = 1e-9  # N
 
 
+class Unreachable(ValueError):
+    """No sound magnitude of an effect has the strength asked for, or this finger has no place for it."""
+
+
 @dataclass(frozen=True)
 class Noise:
     """What no model explains. std N·m and correlation time s of the coloured torque noise; wander N·m/√s of the bias
@@ -79,6 +83,7 @@ class Hand:
     source: int = 2
     rate: float = 1000.0
     level: float = 18.0  # N, mean pretension
+    tension_time: float = 1.5  # s in which the pretension changes
     noise: Noise = field(default_factory=Noise)
     hidden: tuple[Hidden, ...] = ()
 
@@ -154,9 +159,7 @@ def random_truth(rng: np.random.Generator, joints: int, presliding: bool) -> Des
         "tendons": [{"name": f"tendon_{i + 1}", **each} for i, each in enumerate(tendons)],
         "velocity_threshold": {"tendon": 0.0004, "joint": 0.04},
         "velocity_filter_cutoff": 20.0,
-        "bias": {
-            "drift_variance": 1e-6, "noise_std": 0.002, "initial_variance": 1e-4, "forget_rate": 0.0, "entry_load": True,
-        },
+        "bias": {"initial_variance": 1e-4, "forget_rate": 0.0, "entry_load": True},
         "contact": {"threshold": [1.0] * joints},
         "extensions": [],
     }  # fmt: skip
@@ -212,7 +215,7 @@ def random_hand(
     noise = Noise(std=float(rng.uniform(0.0015, 0.003)), time=float(rng.uniform(0.01, 0.03)))
     noise = replace(noise, wander=noise.wander * wander)
     truth["bias"] |= {"noise_std": noise.std, "drift_variance": max(noise.wander, 3e-4) ** 2}
-    return Hand(truth, off_start(rng, truth), source, rate, float(rng.uniform(14.0, 24.0)), noise)
+    return Hand(truth, off_start(rng, truth), source, rate, float(rng.uniform(14.0, 24.0)), noise=noise)
 
 
 def coloured(rng: np.random.Generator, samples: int, width: int, step: float, noise: Noise) -> Array:
@@ -265,7 +268,7 @@ def record(
     rng = np.random.default_rng([seed, 62])
     samples, step = len(motion.time), 1.0 / hand.rate
     noise = QUIET if quiet else hand.noise
-    pretensions = pretension(rng, motion.time, finger.arms, level * hand.level)
+    pretensions = pretension(rng, motion.time, finger.arms, level * hand.level, hand.tension_time)
     walk = noise.wander * np.sqrt(step) * np.cumsum(rng.standard_normal((samples, finger.joints)), axis=0)
     disturbance = coloured(rng, samples, finger.joints, step, noise)
     load = disturbance + walk + (0.0 if external is None else external)

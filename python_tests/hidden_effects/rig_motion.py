@@ -17,7 +17,7 @@ REST = (0.05, 0.8)  # s, of every third stroke or so
 
 
 def strokes(rng: np.random.Generator, time: Array, speed: float = 1.0) -> Array:
-    """[N] one joint's angle: strokes of least jerk between random angles, some with a rest after, begun at rest at 0."""
+    """[N] one joint's angle: strokes of least jerk between random angles, a rest after some; it begins at rest at 0."""
     angle = np.zeros(len(time))
     now, at = time[0] + rng.uniform(0.1, 0.4), 0.0
     while now < time[-1]:
@@ -59,17 +59,18 @@ def pulling_null_vector(arms: Array) -> Array | None:
     return found.x[:tendons] if found.success and found.x[-1] > 0.3 else None
 
 
-def pretension(rng: np.random.Generator, time: Array, arms: Array, level: float) -> Array:
+def pretension(rng: np.random.Generator, time: Array, arms: Array, level: float, knots: float) -> Array:
     """[N, m] N: varying forces without torque: `level` times 0.5 to 2, and a quarter of it between the tendons.
 
-    Within a second or so: what comes from wrong forces or arms would otherwise look like a slow bias.
+    knots: s in which they change. Where that is several seconds, what comes from wrong forces or arms looks like a
+    slow bias.
     """
     base = pulling_null_vector(arms)
     assert base is not None
     left, _, _ = np.linalg.svd(arms)
     others = left[:, arms.shape[1] :]
-    common = level * 2.0 ** wandering(rng, time, 1.5)
+    common = level * 2.0 ** wandering(rng, time, knots)
     force = common[:, None] * base
     for k in range(others.shape[1]):
-        force = force + (0.25 * level * wandering(rng, time, 1.0))[:, None] * others[:, k]
+        force = force + (0.25 * level * wandering(rng, time, knots / 1.5))[:, None] * others[:, k]
     return force
