@@ -1,0 +1,141 @@
+"""How much of a residual could be explained at all, and where that part lives.
+
+Two looks: a flexible learner on everything that is known of the motion and its past (remainder_learner.py), and steady
+oscillations in time (spectral_line.py). Both have a calibrated null, family-wise over all joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+
+from tendonfmu import remainder_learner as learner
+from tendonfmu.remainder_features import Features, features
+from tendonfmu.remainder_text import described
+from tendonfmu.spectral_line import Line, find_lines
+
+if TYPE_CHECKING:
+    from tendonfmu.diagnosis_series import Series
+
+Numbers = NDArray[np.float64]
+
+LEVEL = 0.005  # of a wrong "unknown", family-wise
+TRIED = 8  # choices of columns whose prediction is tried
+LEAST_SHARE = 0.02  # of the residual's variance: what is less is not worth a word
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One part of the remainder.
+
+    joint: from 1. group: key of GROUPS or "line". subject: "joint 2", "tendons 1 and 3", or "".
+    """
+
+    joint: int
+    group: str
+    subject: str
+    p_value: float
+    line: Line | None = None
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What is explainable of a residual [B, n].
+
+    share: per joint, of its variance that is predicted on unseen blocks (below 0: worse than nothing). interval: 95 %
+    of it. p_value: of there being nothing, family-wise over joints, groups and frequencies. unknown: whether there is
+    something for certain and worth a word. prediction: [B, n] N·m, 0 where not used. findings: significant ones, the
+    best first.
+    """
+
+    share: tuple[float, ...]
+    interval: tuple[tuple[float, float], ...]
+    p_value: float
+    unknown: bool
+    description: str
+    prediction: Numbers
+    findings: tuple[Finding, ...]
+
+
+def measure_remainder(
+    series: Series, residual: Numbers, nuisance: Sequence[Numbers], *, seed: int = 0, level: float = LEVEL
+) -> Remainder:
+    """residual: [B, n] N·m. nuisance: per joint, columns [B, p] whose span was taken from its residual (bias splines,
+    derivatives of the nominal model); columns of the learner get the same. Blocks that are not used are left out."""
+    plan = learner.layout(series)
+    joints = residual.shape[1]
+    if plan.blocks < learner.FEWEST_BLOCKS:
+        nothing = ((0.0, 0.0),) * joints
+        return Remainder((0.0,) * joints, nothing, 1.0, False, "", np.zeros_like(residual), ())
+    with threadpool_limits(limits=1):
+        seen = _rows_of(features(series, seed=seed), plan)
+        learned = [_learned(residual[:, j], nuisance[j], seen, plan) for j in range(joints)]
+        null = learner.null_surprises([skill for each in learned for skill in each.skills], plan.blocks, seed)
+    prediction = np.zeros_like(residual)
+    prediction[plan.rows] = np.stack([each.values for each in learned], axis=1)
+    findings = [_finding(number + 1, each, null) for number, each in enumerate(learned)]
+    lines, waves = [], np.zeros_like(residual)
+    for joint in range(joints):
+        found, waves[:, joint] = find_lines(series, residual[:, joint] - prediction[:, joint], level=level / joints)
+        lines += [Finding(joint + 1, "line", "", min(1.0, joints * each.p_value), each) for each in found]
+    p_value = min(each.p_value for each in [*findings, *lines])
+    findings = sorted([each for each in [*findings, *lines] if each.p_value <= level], key=lambda each: each.p_value)
+    prediction += waves
+    share, interval = _shares(residual, prediction, plan)
+    clear = [each for each in findings if interval[each.joint - 1][0] > 0.0 and share[each.joint - 1] >= LEAST_SHARE]
+    text = described(series, residual, prediction, clear, share) if clear else ""
+    return Remainder(share, interval, p_value, bool(clear), text, prediction, tuple(findings))
+
+
+def _rows_of(all_rows: Features, plan: learner.Layout) -> Features:
+    return Features(all_rows.values[plan.rows], all_rows.group, all_rows.subject)
+
+
+@dataclass(frozen=True)
+class _Learned:
+    """Of one joint. values: [U] N·m, predicted. named: choice that predicts best of those that have a name."""
+
+    skills: list[learner.Skill]
+    values: Numbers
+    named: learner.Choice
+
+
+def _learned(residual: Numbers, nuisance: Numbers, seen: Features, plan: learner.Layout) -> _Learned:
+    ready = learner.prepared(residual[plan.rows], nuisance[plan.rows], seen, plan)
+    order = learner.ranked(ready, seen)
+    everything = next(choice for choice in order if not choice.group)
+    single = [choice for choice in order if choice.group][:TRIED]
+    best = learner.Choice("", "", np.unique(np.concatenate([choice.columns for choice in single[: TRIED // 2]])))
+    guess = learner.predicted(ready, [*single, everything, best], seen, plan)
+    explained = guess.goal if max(guess.gains) > 0.0 else np.zeros_like(guess.goal)
+    gain = dict(zip(range(len(single)), guess.gains, strict=False))
+    plain = [number for number in gain if single[number].group != "interaction"] or list(gain)
+    named = single[max(plain, key=lambda number: gain[number])]
+    return _Learned(learner.skills(ready, order, explained, plan), guess.values, named)
+
+
+def _finding(joint: int, learned: _Learned, null: Numbers) -> Finding:
+    best = max((skill.surprise for skill in learned.skills), default=0.0)
+    p_value = float(1 + np.sum(null >= best)) / (1 + len(null))
+    return Finding(joint, learned.named.group, learned.named.subject, p_value)
+
+
+def _shares(
+    residual: Numbers, prediction: Numbers, plan: learner.Layout
+) -> tuple[tuple[float, ...], tuple[tuple[float, float], ...]]:
+    """1 − variance left over variance, per joint, with the interval of a ratio over blocks."""
+    share, interval = [], []
+    for joint in range(residual.shape[1]):
+        before, guess = residual[plan.rows, joint], prediction[plan.rows, joint]
+        whole = np.bincount(plan.block, before**2)
+        gain = np.bincount(plan.block, 2.0 * before * guess - guess**2)
+        ratio = float(gain.sum() / max(whole.sum(), 1e-300))
+        error = float(np.sqrt(np.sum((gain - ratio * whole) ** 2)) / max(whole.sum(), 1e-300))
+        share.append(ratio)
+        interval.append((ratio - 1.96 * error, ratio + 1.96 * error))
+    return tuple(share), tuple(interval)

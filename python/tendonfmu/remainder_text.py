@@ -1,0 +1,78 @@
+"""The remainder in plain words: which joint, what it follows, at which angles, when, how fast."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import welch
+
+from tendonfmu.remainder_features import GROUPS
+
+if TYPE_CHECKING:
+    from tendonfmu.diagnosis_series import Series
+    from tendonfmu.remainder import Finding
+
+Numbers = NDArray[np.float64]
+
+CONCENTRATED = 1.6  # times as much of the prediction's power as of the time
+
+
+def described(
+    series: Series, residual: Numbers, prediction: Numbers, findings: Sequence[Finding], share: Sequence[float]
+) -> str:
+    """One sentence for each joint that has findings, those of the greatest share first."""
+    joints = sorted({finding.joint for finding in findings}, key=lambda joint: -share[joint - 1])
+    sentences = []
+    for joint in joints:
+        own = [finding for finding in findings if finding.joint == joint]
+        what = " and ".join(dict.fromkeys(_what(finding) for finding in own[:3]))
+        rms = float(np.sqrt(np.mean(prediction[series.used, joint - 1] ** 2)))
+        where = _where(series, prediction[:, joint - 1], joint, own)
+        sentences.append(
+            f"Joint {joint}: {100.0 * share[joint - 1]:.0f} % of what is left ({1000.0 * rms:.2g} mN·m rms) follows "
+            f"{what}{where}."
+        )
+    return " ".join(sentences)
+
+
+def _what(finding: Finding) -> str:
+    if finding.line is not None:
+        size = 1000.0 * finding.line.amplitude
+        return f"a steady oscillation at {finding.line.frequency:.3g} Hz of {size:.2g} mN·m, whatever the motion"
+    subject = f", {finding.subject}" if finding.subject else ""
+    return f"{GROUPS[finding.group]}{subject}"
+
+
+def _where(series: Series, part: Numbers, joint: int, findings: Sequence[Finding]) -> str:
+    """Where and when most of it is, as far as it is not everywhere."""
+    used = series.used
+    power = part[used] ** 2
+    if all(finding.line is not None for finding in findings) or not power.sum():
+        return ""
+    notes = []
+    angles = _stretch(series.angle[used, joint - 1], power)
+    if angles:
+        notes.append(f"mostly at angles of joint {joint} from {angles[0]:.2f} to {angles[1]:.2f} rad")
+    times = _stretch(series.time[used], power) if len(np.unique(series.recording)) == 1 else None
+    if times:
+        notes.append(f"mostly from {times[0]:.0f} to {times[1]:.0f} s")
+    frequency, density = welch(np.where(used, part, 0.0), 1.0 / series.step, nperseg=min(len(part), 1024))
+    total = np.cumsum(density)
+    notes.append(f"half of it below {frequency[np.searchsorted(total, 0.5 * total[-1])]:.2g} Hz")
+    return " (" + ", ".join(notes) + ")"
+
+
+def _stretch(coordinate: Numbers, power: Numbers) -> tuple[float, float] | None:
+    """The third of the time, by the coordinate, with most of the power; None if that is not much more than a third."""
+    order = np.argsort(coordinate)
+    summed = np.concatenate([[0.0], np.cumsum(power[order])]) / power.sum()
+    width = len(order) // 3
+    inside = summed[width:] - summed[:-width]
+    start = int(np.argmax(inside))
+    if inside[start] < CONCENTRATED / 3.0:
+        return None
+    chosen = coordinate[order[start : start + width]]
+    return float(chosen[0]), float(chosen[-1])
