@@ -65,7 +65,6 @@ const effect_type effect_stribeck = {
     .joint = PLACE_OPTIONAL,
     .tendon = PLACE_OPTIONAL,
     .rule = PLACES_EXACTLY_ONE,
-    .once = 1,
     .parameter_count = 2,
     .parameters = parameters,
     .state_count = state_count,
