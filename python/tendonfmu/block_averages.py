@@ -69,17 +69,17 @@ class BlockSums:
         self._sums, self._mix = sums, mix
         self._carried: Numbers | None = None
 
-    def add(self, block: Indices, values: Numbers, jumps: Numbers | None) -> None:
-        """block: [K] of each sample. values, jumps: [K, n, u]; None: no jump in the whole part."""
+    def add(self, block: Indices, values: Numbers, jumps: Numbers) -> None:
+        """block: [K] of each sample. values, jumps: [K, n, u]."""
         starts = np.flatnonzero(np.diff(block, prepend=block[0] - 1))
         runs = np.add.reduceat(values, starts, axis=0)
-        if jumps is not None:
-            self._add_jumps(runs, jumps, starts, np.diff(starts, append=len(block)))
+        self._add_jumps(runs, jumps, starts, np.diff(starts, append=len(block)))
         numbers = block[starts]
         inside = numbers >= 0
         chosen = runs[inside]
         if self._mix is not None:
-            chosen = mixed(chosen, self._mix)
+            rows, joints, given = chosen.shape
+            chosen = np.asarray(chosen.reshape(rows * joints, given) @ self._mix).reshape(rows, joints, -1)
         self._sums[numbers[inside]] += chosen
 
     def _add_jumps(self, runs: Numbers, jumps: Numbers, starts: Indices, lengths: Indices) -> None:
@@ -97,9 +97,3 @@ class BlockSums:
         total += share @ flat[rows]
         last = flat[rows].sum(axis=0)
         self._carried = last if self._carried is None else self._carried + last
-
-
-def mixed(values: Numbers, mix: Any) -> Numbers:
-    """[K, n, c] of [K, n, u] by a matrix [u, c], sparse or dense."""
-    rows, joints, given = values.shape
-    return np.asarray(values.reshape(rows * joints, given) @ mix).reshape(rows, joints, -1)

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from tendonfmu import native
-from tendonfmu.block_averages import Blocks, BlockSums, mixed
-from tendonfmu.diagnosis_series import held_at_rest
+from tendonfmu.block_averages import Blocks, BlockSums
 from tendonfmu.effects.candidate import Variant
 from tendonfmu.effects.description_edit import Edit, apply_edits, data_number, finer_paths, is_law_number
 from tendonfmu.estimation import Estimator
@@ -26,8 +25,7 @@ from tendonfmu.fit_recordings import FitRecording
 
 Numbers = NDArray[np.float64]
 Single = NDArray[np.float32]
-Indices = NDArray[np.int64]
-Stretch = tuple[int, Numbers, Any]  # first sample; derivatives of T and of the jumps there [K, n, u], None: no jumps
+Stretch = tuple[int, Numbers, Numbers]  # first sample; derivatives of T and of the jumps there, [K, n, u]
 Direction = Mapping[str, float]  # path -> how much of it; of a description that may be coarser than the merged one
 Watch = Callable[[int], None]  # samples that were looked at since the last call
 
@@ -130,7 +128,6 @@ def run_pass(
     mix = sparse.csr_array((share, (row, column)), shape=(len(estimator.unknowns), len(finer)))
     places = np.array([place for place, _ in finer])
     joints = len(data["joints"])
-    entry_load = bool((data.get("bias") or {}).get("entry_load"))
     for recording, block in zip(recordings, blocks.of, strict=True):
         for part in recording.parts:
             own = block[part]
@@ -140,25 +137,11 @@ def run_pass(
             first, last = int(inside[0]), int(inside[-1]) + 1
             found = np.zeros((last - first, joints, len(finer)), dtype=np.float32)
             shifted = np.where(own >= 0, own - first, own)
-            stretches = _stretches(estimator, recording, part, watch)
-            _sum_up(found, shifted, _held(stretches, mix) if entry_load else stretches, None if entry_load else mix)
+            target = BlockSums(found, mix)
+            for begin, values, jumps in _stretches(estimator, recording, part, watch):
+                target.add(shifted[begin : begin + len(values)], values, jumps)
             for run in np.split(np.arange(len(places)), np.flatnonzero(np.diff(places) != 1) + 1):
                 sums[first:last, :, places[run[0]] : places[run[-1]] + 1] += found[:, :, run[0] : run[-1] + 1]
-
-
-def _sum_up(sums: Single, block: Indices, stretches: Iterator[Stretch], mix: Any) -> None:
-    target = BlockSums(sums, mix)
-    for begin, values, jumps in stretches:
-        target.add(block[begin : begin + len(values)], values, jumps)
-
-
-def _held(stretches: Iterator[Stretch], mix: Any) -> Iterator[Stretch]:
-    """With `bias.entry_load`, which the estimator does not know: leaving rest takes out what entering it put in."""
-    held: Numbers | None = None
-    for begin, values, jumps in stretches:
-        torque, entered = mixed(values, mix), mixed(jumps, mix)
-        found, held = held_at_rest(torque, entered, np.zeros_like(torque[0]) if held is None else held)
-        yield begin, found, None
 
 
 def _finer(data: Mapping[str, Any], direction: Direction) -> dict[str, float]:

@@ -10,7 +10,7 @@ from tendonfmu.effects.extension_row import row_variant
 from tendonfmu.effects.friction_law_places import rubbing_joints, rubbing_tendons, without_rows
 
 NAME = "friction_drift"
-_OF_DURATION = (0.08, 0.3, 1.5)  # time constants
+_OF_DURATION = (0.1, 0.6)  # time constants
 _ORDINARY, _LEAST = 0.2, -0.85  # of the friction
 
 
