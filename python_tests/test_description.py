@@ -277,3 +277,14 @@ def test_a_refusal_is_one_line_with_file_and_key(tmp_path: Path, content: bytes 
         read_finger(path)
     message = str(refused.value)
     assert message.startswith(f"{path}: ") and expected in message and "\n" not in message
+
+
+def test_numbers_are_named_after_what_they_belong_to() -> None:
+    found = {number.path: f"{number.kind}.{number.key}" for number in unknowns(with_everything())}
+    assert found["joints[1].friction.coulomb"] == "friction.coulomb"
+    assert {kind for path, kind in found.items() if "edge_friction" in path and path.endswith("coulomb")} == {
+        "edge_friction.coulomb"
+    }
+    assert found["joints[1].load_friction.coulomb"] == "load_friction.coulomb"
+    assert found["joints[2].cover.stiffness"] == "cover.stiffness"
+    assert found["extensions[1].stiffness"] == "extensions.cover_hardening.stiffness"

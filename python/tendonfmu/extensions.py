@@ -32,6 +32,7 @@ MAGNITUDES: Mapping[str, Mapping[str, float]] = {
 class ExtensionNumber:
     """A number of an extension. path: as in the description. value: SI. magnitude: expected of such a number."""
 
+    effect: str
     path: str
     value: float
     magnitude: float
@@ -46,7 +47,7 @@ def extension_numbers(data: Mapping[str, Any]) -> Iterator[ExtensionNumber]:
     """All numbers of the extensions of a valid description, in the order of the FMU's parameters; left out: 0."""
     for k, row in enumerate(extension_rows(data), start=1):
         for name, magnitude in MAGNITUDES[row["effect"]].items():
-            yield ExtensionNumber(f"extensions[{k}].{name}", float(row.get(name) or 0.0), magnitude)
+            yield ExtensionNumber(row["effect"], f"extensions[{k}].{name}", float(row.get(name) or 0.0), magnitude)
 
 
 def place_of(row: Mapping[str, Any]) -> str:

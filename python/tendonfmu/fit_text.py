@@ -62,13 +62,8 @@ def _kinds(numbers: Sequence[Fitted]) -> Iterator[Row]:
 
 
 def _kind(number: Fitted) -> str:
-    if number.number.effect is not None:
-        return f"{number.number.effect.kind}.{number.number.key}"
-    return (
-        number.number.path.split("[")[0]
-        if number.number.path.startswith("bias")
-        else (".".join(number.number.path.split(".")[-2:]))
-    )
+    path = number.number.path
+    return path.split("[")[0] if path.startswith("bias") else f"{number.number.kind}.{number.number.key}"
 
 
 def lines(fit: FrictionFit) -> Iterator[str]:

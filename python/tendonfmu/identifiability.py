@@ -33,8 +33,8 @@ class Unknown:
     """A number to be estimated.
 
     path: as in the description. value: SI. effect: of which it is, if any; point: which of its laws, from 0.
-    with_path: what moves by the same amount (static where it equals coulomb). size: expected magnitude, where the
-    value may be 0.
+    with_path: what moves by the same amount (static where it equals coulomb). extension: name of the effect whose
+    number it is in `extensions`. size: expected magnitude, where the value may be 0.
     """
 
     path: str
@@ -42,7 +42,17 @@ class Unknown:
     effect: Effect | None = None
     point: int = 0
     with_path: str | None = None
+    extension: str | None = None
     size: float = 1.0
+
+    @property
+    def kind(self) -> str:
+        """Of what it is a number: edge_friction, cover, bias, extensions.gravity."""
+        if self.effect is not None:
+            return self.effect.kind
+        if self.extension is not None:
+            return f"extensions.{self.extension}"
+        return self.path.rsplit(".", 1)[0].rsplit(".", 1)[-1].split("[")[0]
 
     @property
     def key(self) -> str:
@@ -65,7 +75,8 @@ def unknowns(data: Mapping[str, Any]) -> list[Unknown]:
         stiffness = (joint.get("cover") or {}).get("stiffness")
         if stiffness:
             found.append(Unknown(f"joints[{j}].cover.stiffness", float(stiffness)))
-    found.extend(Unknown(number.path, number.value, size=number.magnitude) for number in extension_numbers(data))
+    for number in extension_numbers(data):
+        found.append(Unknown(number.path, number.value, extension=number.effect, size=number.magnitude))
     return found
 
 

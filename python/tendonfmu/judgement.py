@@ -160,9 +160,7 @@ def counts_by_kind(verdicts: Sequence[Verdict]) -> dict[tuple[str, str], tuple[i
     """(kind, key) -> (numbers, identifiable, within `LIMIT` with all else known)."""
     result: dict[tuple[str, str], tuple[int, int, int]] = {}
     for verdict in verdicts:
-        effect = verdict.number.effect
-        kind = effect.kind if effect is not None else verdict.number.path.split(".")[-2].split("[")[0]
-        place = (kind, verdict.number.key)
+        place = (verdict.number.kind, verdict.number.key)
         total, known, alone = result.get(place, (0, 0, 0))
         result[place] = (total + 1, known + verdict.identifiable, alone + (verdict.error_alone <= LIMIT))
     return result
