@@ -79,7 +79,9 @@ class BlockSums:
         chosen = runs[inside]
         if self._mix is not None:
             rows, joints, given = chosen.shape
-            chosen = np.asarray(chosen.reshape(rows * joints, given) @ self._mix).reshape(rows, joints, -1)
+            chosen = np.asarray(chosen.reshape(rows * joints, given) @ self._mix).reshape(
+                rows, joints, self._mix.shape[1]
+            )
         self._sums[numbers[inside]] += chosen
 
     def _add_jumps(self, runs: Numbers, jumps: Numbers, starts: Indices, lengths: Indices) -> None:

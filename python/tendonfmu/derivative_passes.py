@@ -34,7 +34,7 @@ _MOST_NUMBERS = 1500  # of a pass: its derivatives of a stretch of samples stay 
 _BYTES = 3e7  # of derivatives at a time: more does not stay near the processor
 _STRETCH, _LONGEST = 400, 2500  # samples at a time
 _SEGMENT_SHARE = 24 * 24  # the estimator begins anew from 24 states of a recording, and runs on from there
-_TINY = 1e-3  # expected size of a law's magnitude that is 0; the estimator starts it at a millionth of that
+_TINY = 1e-9  # expected size of a magnitude of a law that is 0: the estimator starts it at a millionth of that
 
 
 @dataclass
