@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.diagnosis_result import Cause, Diagnosis, Evidence, ResidualView
 from tendonfmu.diagnosis_text import Names, at_place, names_of, percent_interval, unit_of
-from tendonfmu.fit_sheet import Band, Bars, Curve, Dots, Panel, Sheet
+from tendonfmu.fit_sheet import Band, Bars, Curve, Dots, Panel, Sheet, Size
 
 Numbers = NDArray[np.float64]
 TWO_SIDED = 1.96  # standard errors of a 95 % interval
@@ -29,6 +29,7 @@ _BINNED = ("angle", "velocity", "tendon_force", "load", "travel")
 _BEFORE_AFTER = (("before", "nominal model, refitted"), ("after", "extended model"))
 _ROOM = 3.0  # times the largest mean: more of the scatter within bins would hide the means
 _NAME = 30  # letters of a row's name
+_NARROW = 20  # letters that leave room in a small panel
 
 
 def diagnosis_sheets(found: Diagnosis) -> list[Sheet]:
@@ -51,7 +52,9 @@ def _overview(found: Diagnosis, names: Names) -> Sheet:
         keys.insert(1, ("after_dots", "extended model"))
         panels.append(_gain_panel(found))
     rows = max(2, *(len(panel.rows) for panel in panels))
-    panels = [replace(panel, height=110 + 26 * rows) for panel in panels]  # side by side in the sheet: as high
+    long = max(len(name) for panel in panels for name in panel.rows) > _NARROW
+    size: Size = "medium" if long else "small"
+    panels = [replace(panel, size=size, height=110 + 26 * rows) for panel in panels]  # side by side: as high
     return Sheet("gain", "gain", "Error and gain on unseen data", "", tuple(keys), tuple(panels))
 
 
@@ -75,7 +78,6 @@ def _error_panel(found: Diagnosis, names: Names) -> Panel:
         alt="Error on unseen data by joint: nominal model, extended model and noise floor",
         x_label=f"rms ({unit})",
         y_label="",
-        size="medium",
         bars=(Bars("data", rows, np.minimum(before, after), np.maximum(before, after), lying=True),),
         dots=tuple(dots),
         rows=tuple(_short(names.joint(j + 1)) for j in range(len(rows))),
@@ -96,9 +98,8 @@ def _gain_panel(found: Diagnosis) -> Panel:
         title="Gain of each cause",
         alt="Part of the error on unseen data that each cause takes away, with its 95 % interval: "
         + "; ".join(f"{label} {percent_interval(gain)}" for label, gain in zip(labels, gains, strict=True)),
-        x_label="less error (%), with 95 % interval",
+        x_label="less error (%), 95 % interval",
         y_label="",
-        size="medium",
         bars=(Bars("after", rows, low, high, lying=True),),
         dots=(Dots("after_dots", value, rows),),
         rows=tuple(labels),

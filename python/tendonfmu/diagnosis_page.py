@@ -106,7 +106,6 @@ def _first_screen(found: Diagnosis, names: Names) -> dict[str, Any]:
         "untold": list(_untold(found, names)),
         "next": next_sentence(found),
         "experiment": list(_experiment(found, names)),
-        "command": "tendonfmu excite FINGER.json --discriminate DIR -o motion.csv" if found.experiment.motion else "",
         "floor": by_source(found.floor_source),
     }
 

@@ -32,7 +32,7 @@ SIZES = {"small": (370, 250), "medium": (560, 250), "large": (560, 400)}  # CSS 
 COLUMNS = {"small": 3, "medium": 2, "large": 1}
 _DPI, _CSS = 150, 100  # pixels and CSS pixels per inch of the drawing
 _LEFT, _RIGHT, _BOTTOM, _TOP = 62, 18, 44, 28  # CSS pixels
-_NAMES = 215  # CSS pixels, left margin with names in it
+_NAMES = 215.0  # CSS pixels, widest left margin with names in it
 _TITLE, _LABEL, _NUMBER = 10.0, 8.8, 8.4  # pt
 _WIDER = 1.12  # text of panels that narrow screens shrink
 
@@ -97,8 +97,9 @@ def draw_panel(panel: Panel | MatrixPanel) -> Pixels:
     """[height, width, 3] the panel alone."""
     width, height = size_of(panel)
     figure = Figure(figsize=(width / _CSS, height / _CSS), facecolor="white")
-    left = _NAMES if isinstance(panel, MatrixPanel) or panel.rows else _LEFT
-    right = 2 * _RIGHT if left == _NAMES else _RIGHT
+    named = isinstance(panel, MatrixPanel) or bool(panel.rows)
+    left = _room_for_names(panel) if named else _LEFT
+    right = 2 * _RIGHT if named else _RIGHT
     box = (left / width, _BOTTOM / height, 1 - (left + right) / width, 1 - (_BOTTOM + _TOP) / height)
     axes = figure.add_axes(box)
     if isinstance(panel, MatrixPanel):
@@ -106,6 +107,13 @@ def draw_panel(panel: Panel | MatrixPanel) -> Pixels:
     else:
         _draw_axes(axes, panel)
     return _pixels(figure)
+
+
+def _room_for_names(panel: Panel | MatrixPanel) -> float:
+    """CSS pixels, as much as the longest needs."""
+    if isinstance(panel, MatrixPanel):
+        return _NAMES
+    return min(_NAMES, 18 + 6.4 * _enlarged(panel) * max(len(name) for name in panel.rows))
 
 
 def size_of(panel: Panel | MatrixPanel) -> tuple[int, int]:
