@@ -146,8 +146,7 @@ std::vector<Effect> all_torques() {
           {"pulley_eccentricity", 3, 1, {5e-4, 3e-4}}};
 }
 
-// --- values
-// -----------------------------------------------------------------------------------------------------------
+// --- values ----------------------------------------------------------------------------------------------------------
 
 TEST(Torque, OfSpringsAtTheCovers) {
   const Sample s;
@@ -214,8 +213,7 @@ TEST(Torque, OfMomentArmsThatAreOthers) {
   expect_near(Effect("pulley_eccentricity", 1, 2, {0.0, 1e-3}).torque(s), {-0.03 * std::cos(0.3), 0, 0});
 }
 
-// --- memory
-// -----------------------------------------------------------------------------------------------------------
+// --- memory ----------------------------------------------------------------------------------------------------------
 
 TEST(Memory, SideStaysAtRestAndIsNoneBeforeTheFirstMotion) {
   Sample still, there, back;
@@ -255,8 +253,7 @@ TEST(Memory, OfPreloadFrictionIsASideForEachJointItIsBefore) {
   EXPECT_EQ(Effect("preload_friction", 0, 2, {0.4}).advanced(Sample{}), (std::vector<double>{-1, 1, 0}));
 }
 
-// --- derivatives
-// ------------------------------------------------------------------------------------------------------
+// --- derivatives -----------------------------------------------------------------------------------------------------
 
 TEST(Slope, IsTheCentralDifferenceWithTheMemoryHeld) {
   Sample before, direction;
@@ -361,8 +358,62 @@ TEST(Torque, IsLinearInItsNumbers) {
   }
 }
 
-// --- the table
-// --------------------------------------------------------------------------------------------------------
+// --- friction --------------------------------------------------------------------------------------------------------
+
+effect_grip grip_of(const Effect& effect) {
+  return effect.type->grip(effect.place, effect.numbers.data(), effect.memory.data(), 0);
+}
+
+TEST(Friction, DriftsFromTheFirstSample) {
+  Effect drift("friction_drift", 0, 0, {0.4, 5.0});
+  Sample first, later;
+  first.first = 1;
+  first.time = -2.0;
+  later.time = 1.5;
+  drift.memory = drift.advanced(first);
+  EXPECT_EQ(grip_of(drift).value, 1.0);
+  EXPECT_EQ(grip_of(drift).by_parameter[1], 0.0);
+  drift.memory = drift.advanced(later);
+  EXPECT_EQ(grip_of(drift).slides, 0);
+  // the numbers as they were, and another time constant after the sample
+  for (const double constant : {5.0, 0.3}) {
+    drift.numbers[1] = constant;
+    const double left = std::exp(-3.5 / constant);
+    EXPECT_NEAR(grip_of(drift).value, 1.0 + 0.4 * (1.0 - left), 1e-15);
+    EXPECT_NEAR(grip_of(drift).by_parameter[0], 1.0 - left, 1e-15);
+    EXPECT_NEAR(grip_of(drift).by_parameter[1], -0.4 * left * 3.5 / (constant * constant), 1e-15);
+  }
+  drift.numbers[1] = 1e-300;
+  EXPECT_EQ(grip_of(drift).value, 1.4);
+  EXPECT_EQ(grip_of(drift).by_parameter[1], 0.0);
+}
+
+TEST(Friction, NearStandstillDiffersByStribeck) {
+  Effect near("stribeck", 2, 0, {-0.5, 0.1});
+  near.memory = near.advanced(Sample{});
+  const double share = std::exp(-2.0);  // −0.2 rad/s
+  EXPECT_NEAR(grip_of(near).value, 1.0 - 0.5 * share, 1e-15);
+  EXPECT_NEAR(grip_of(near).by_velocity, -0.5 * share / 0.1, 1e-14);
+  EXPECT_NEAR(grip_of(near).by_parameter[0], share, 1e-15);
+  EXPECT_NEAR(grip_of(near).by_parameter[1], -0.5 * share * 0.2 / 0.01, 1e-14);
+}
+
+TEST(Friction, BuildsUpOverADistance) {
+  Effect presliding("presliding", 1, 0, {0.01});
+  Sample first, later;
+  first.first = 1;
+  presliding.memory = presliding.advanced(first);
+  EXPECT_EQ(grip_of(presliding).value, 0.0);
+  EXPECT_EQ(grip_of(presliding).slides, 1);
+  presliding.memory = presliding.advanced(later);  // 0.005 rad
+  EXPECT_NEAR(grip_of(presliding).value, 1.0 - std::exp(-0.5), 1e-15);
+  later.velocity[0] = -1.0;  // 0.01 rad back
+  const double before = grip_of(presliding).value;
+  presliding.memory = presliding.advanced(later);
+  EXPECT_NEAR(grip_of(presliding).value, -1.0 + (1.0 + before) * std::exp(-1.0), 1e-15);
+}
+
+// --- the table -------------------------------------------------------------------------------------------------------
 
 TEST(Table, HasDifferentNamesAndNumbers) {
   std::set<std::string> names;
@@ -398,8 +449,7 @@ TEST(Table, KeepsItsNumbers) {  // they stand in model images
   }
 }
 
-// --- sine and cosine
-// --------------------------------------------------------------------------------------------------
+// --- sine and cosine -------------------------------------------------------------------------------------------------
 
 TEST(SineCosine, WithinTwoUnitsInTheLastPlaceOfOne) {
   double worst = 0.0;
@@ -424,8 +474,7 @@ TEST(SineCosine, AtTheAxesAndBeyond) {
   EXPECT_EQ(sine_cosine_of(-1e300).cosine, sine_cosine_of(-1e5).cosine);
 }
 
-// --- in a description
-// -------------------------------------------------------------------------------------------------
+// --- in a description ------------------------------------------------------------------------------------------------
 
 // All seventeen, as the rows of a model image: id, joint, tendon.
 TEST(Described, EachEffectIsARowOfTheImage) {

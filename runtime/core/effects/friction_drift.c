@@ -7,7 +7,8 @@
 /* F × (1 + amplitude·(1 − exp(−(t − t_0)/time_constant))): run-in, warming up. */
 
 enum { AMPLITUDE, TIME_CONSTANT };
-enum { FIRST_TIME, ELAPSED, MEMORY_COUNT };
+/* what has come of it, 1 − e^−age, and how fast it comes with age, −age·e^−age, for the time constant it was told */
+enum { FIRST_TIME, ELAPSED, TOLD_CONSTANT, COME, BY_AGE, MEMORY_COUNT };
 
 static const effect_parameter parameters[] = {
     {.name = "amplitude", .unit = "1", .minimum = -0.9, .maximum = 1e9, .required = 1, .scale = 0.3},
@@ -27,22 +28,31 @@ static size_t state_count(size_t joints, size_t tendons, effect_place place) {
   return MEMORY_COUNT;
 }
 
+static void come_so_far(double elapsed, double time_constant, double* come, double* by_age) {
+  const double age = elapsed > 0.0 ? elapsed / time_constant : 0.0;
+  *come = law_one_minus_exponential(age);
+  *by_age = age < 700.0 ? -age * law_exponential(age) : 0.0; /* beyond it may be infinite times 0 */
+}
+
 static void advance(effect_place place, const double* values, const effect_sample* sample, const double* before,
                     double* after) {
   (void)place;
-  (void)values;
   after[FIRST_TIME] = sample->first ? sample->time : before[FIRST_TIME];
   after[ELAPSED] = sample->time - after[FIRST_TIME];
+  after[TOLD_CONSTANT] = values[TIME_CONSTANT];
+  come_so_far(after[ELAPSED], values[TIME_CONSTANT], after + COME, after + BY_AGE);
 }
 
+/* of every velocity of its place the same, so the exponentials are remembered; the number may have changed since */
 static effect_grip grip(effect_place place, const double* values, const double* memory, size_t member) {
   (void)place;
   (void)member;
-  const double elapsed = memory[ELAPSED] > 0.0 ? memory[ELAPSED] : 0.0, age = elapsed / values[TIME_CONSTANT];
-  const double come = law_one_minus_exponential(age);
-  /* age² e^−age stays finite; an age that is not has come to its end */
-  const double by_time = age < 700.0 ? -values[AMPLITUDE] * law_exponential(age) * age / values[TIME_CONSTANT] : 0.0;
-  return (effect_grip){.value = 1.0 + values[AMPLITUDE] * come, .by_parameter = {come, by_time}};
+  double come = memory[COME], by_age = memory[BY_AGE];
+  if (memory[TOLD_CONSTANT] != values[TIME_CONSTANT]) {
+    come_so_far(memory[ELAPSED], values[TIME_CONSTANT], &come, &by_age);
+  }
+  return (effect_grip){.value = 1.0 + values[AMPLITUDE] * come,
+                       .by_parameter = {come, values[AMPLITUDE] * by_age / values[TIME_CONSTANT]}};
 }
 
 const effect_type effect_friction_drift = {
