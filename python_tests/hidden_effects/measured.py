@@ -92,8 +92,8 @@ def gain(machine: Machine, columns: Columns, magnitude: float) -> Columns:
 
 
 def delay(machine: Machine, columns: Columns, magnitude: float) -> Columns:
-    """Forces are recorded so many seconds late."""
-    when = columns["time"] - magnitude
+    """Motion and known load are recorded so many seconds late, told from the forces, which then seem early."""
+    when = columns["time"] + magnitude
     return columns | {FORCE: np.interp(when, columns["time"], columns[FORCE])}
 
 
@@ -233,7 +233,7 @@ EFFECTS = {
         free=free_of_coulomb,
     ),
     "gain": Effect(("force_gain", "moment_arm"), gain, 0.02, both=True, most=0.5),
-    "delay": Effect(("time_delay",), delay, 0.002, both=True, most=0.05, free=free_of_delay),
+    "delay": Effect(("time_delay",), delay, 0.002, most=0.05, free=free_of_delay),
     "spring": Effect(("cover_stiffness",), spring, 0.05, free=free_of_spring),
     "growing": Effect(GROWING, growing, 0.02, free=free_of_growth),
 }
