@@ -113,11 +113,11 @@ def cluster(address: str | None, workers: int) -> Iterator[Any]:
         with client:
             yield client
         return
-    # one thread of linear algebra per worker, and no dashboard: it would take a port
+    # one thread of linear algebra per worker; a port of its own, so that two campaigns do not meet
     limits = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     with (
         dask.config.set({"distributed.nanny.pre-spawn-environ": limits}),
-        library.LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None) as here,
+        library.LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0") as here,
         library.Client(here) as client,
     ):
         yield client

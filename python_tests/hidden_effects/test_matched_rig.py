@@ -79,11 +79,10 @@ def test_the_row_of_the_extension_explains_the_effect(effect: str) -> None:
     before = left_by_the_core(hand.truth, hand, made)
     data = copy.deepcopy(hand.truth)
     place = {key: label[key] for key in ("joint", "tendon") if label[key] is not None}
-    left = [
-        left_by_the_core(data | {"extensions": [{"effect": effect, **place, number: sign * label["magnitude"]}]}, hand, made)
-        for sign in (1.0, -1.0)
-    ]  # fmt: skip
-    power = [np.sum(each**2) for each in left]
+    power = []
+    for sign in (1.0, -1.0):
+        row = {"effect": effect, **place, number: sign * label["magnitude"]}
+        power.append(np.sum(left_by_the_core(data | {"extensions": [row]}, hand, made) ** 2))
     assert np.abs(before).max() > 1e-4
     assert min(power) < rest**2 * np.sum(before**2)
 

@@ -1,0 +1,210 @@
+"""Campaigns: cases read and refused, run once and resumed, judged, and counted."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tendonfmu import campaign as campaigns
+from tendonfmu.campaign import collect, run_campaign, still_to_do
+from tendonfmu.campaign_cases import Case, Truth, made, read_cases
+from tendonfmu.campaign_judgement import judge
+from tendonfmu.campaign_rates import markdown, mean, rate, rates
+from tendonfmu.diagnosis_result import (
+    Cause,
+    Diagnosis,
+    Experiment,
+    Interval,
+    Invisible,
+    ModelErrors,
+    Unexplained,
+    Where,
+)
+from tendonfmu.errors import InputError
+
+ERRORS = ModelErrors((0.002,), (0.002,))
+
+
+def cause(effect: str, joint: int | None = 1, others: tuple[Where, ...] = ()) -> Cause:
+    where = Where(effect, joint, None)
+    return Cause(where, "", "", 1e-4, Interval(0.1, 0.05, 0.15), 0.5, others, {}, "")
+
+
+def diagnosis(*causes: Cause, verdict: str = "explained", invisible: tuple[Invisible, ...] = ()) -> Diagnosis:
+    return Diagnosis(
+        "finger", verdict, ("r",), (), True, 1.0, 0, ERRORS, ERRORS, (0.1,), (0.002,), "", (0.0,),
+        Interval(0.1, 0.05, 0.15), causes, invisible, (), Unexplained(0.0, ""), Experiment(""), (), (), None, {}, {},
+    )  # fmt: skip
+
+
+def case(group: str, *truth: Truth) -> Case:
+    return Case("a", group, Path(), truth=truth)
+
+
+def written(folder: Path, *cases: dict[str, Any]) -> Path:
+    file = folder / "cases.json"
+    file.write_text(json.dumps({"format": "tendonfmu-campaign-1", "cases": list(cases)}), encoding="utf-8")
+    return file
+
+
+GOOD = {"name": "a", "group": "null", "finger": "f.json", "recordings": ["r.csv"]}
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"name": "../a"}, "cases[1].name"),
+        ({"group": "some"}, "cases[1].group"),
+        ({"recordings": []}, "cases[1].recordings"),
+        ({"recordings": "r.csv"}, "cases[1].recordings"),
+        ({"kinematics": 4}, "cases[1].kinematics"),
+        ({"truth": [{"effect": "gravity"}]}, "expected 0 effects for the group null"),
+        ({"group": "double", "truth": [{"effect": "gravity"}]}, "expected 2 effects"),
+        ({"group": "single", "truth": [{"effect": "gravity", "joint": 0}]}, "cases[1].truth[1].joint = 0"),
+        ({"facts": {"strength": [1]}}, "cases[1].facts.strength"),
+        ({"wrong": 1}, "cases[1].wrong"),
+        ({"maker": "cases:make"}, "cases[1].maker"),
+        ({"arguments": {"seed": 1}}, "cases[1].arguments"),
+    ],
+)
+def test_bad_cases_are_refused_by_path(tmp_path: Path, change: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError) as refused:
+        read_cases(written(tmp_path, GOOD | change))
+    assert message in str(refused.value) and "expected" in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_names_are_unique(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"cases\[2\].name"):
+        read_cases(written(tmp_path, GOOD, GOOD))
+
+
+def test_a_maker_writes_the_files_of_its_case(tmp_path: Path) -> None:
+    (tmp_path / "maker.py").write_text(
+        "def make(folder, size):\n"
+        "    (folder / 'f.json').write_text('{}')\n"
+        "    return {'finger': 'f.json', 'recordings': ['r.csv'], 'facts': {'size': size},\n"
+        "            'truth': [{'effect': 'gravity', 'joint': 2}]}\n",
+        encoding="utf-8",
+    )
+    listed = read_cases(
+        written(tmp_path, {"name": "a", "group": "single", "maker": "maker.py:make", "arguments": {"size": 3}})
+    )
+    folder = tmp_path / "here"
+    folder.mkdir()
+    found = made(listed[0], folder)
+    assert found.finger == folder / "f.json" and (folder / "f.json").is_file()
+    assert found.truth == (Truth("gravity", 2),) and found.facts == {"size": 3.0}
+    with pytest.raises(InputError, match="no function"):
+        made(Case("a", "null", tmp_path, maker="maker.py:other"), folder)
+
+
+def test_a_campaign_is_resumed_and_survives_a_case_that_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ran: list[str] = []
+
+    def run(case: Case) -> dict[str, Any]:
+        ran.append(case.name)
+        error = "ValueError: bad" if case.name == "b" else ""
+        row = judge(case, diagnosis()) | {"name": case.name, "group": "null", "rig": "", "seed": 0, "error": error}
+        return row | {"gain": math.nan}
+
+    monkeypatch.setattr(campaigns, "run_case", run)
+    cases = read_cases(written(tmp_path, *({**GOOD, "name": name} for name in "abc")))
+    output = tmp_path / "out"
+    assert run_campaign(cases[:2], output, None) == 2
+    assert [each.name for each in still_to_do(cases, output)] == ["c"]
+    assert run_campaign(cases, output, None) == 1
+    assert [each.name for each in still_to_do(cases, output, failed_again=True)] == ["b"]
+    assert run_campaign(cases, output, None, failed_again=True, stop_after=0.0) == 0
+    assert ran == ["a", "b", "c"]
+    rows = collect(cases, output)
+    assert [row["name"] for row in rows] == ["a", "b", "c"] and rows[0]["gain"] is None
+    assert (output / "campaign.parquet").is_file()
+    assert [(each.hits, each.cases) for each in rates(rows)[:1]] == [(0, 2)]
+    assert "1 of 3 cases ended in an error" in markdown(rows)
+
+
+def test_workers_of_dask_write_the_rows(tmp_path: Path) -> None:
+    """Real worker processes; their case fails at once, for its recording is not there, and says so."""
+    pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")
+    cases = read_cases(written(tmp_path, {**GOOD, "name": "a"}, {**GOOD, "name": "b"}))
+    with campaigns.cluster(None, 1) as client:
+        assert run_campaign(cases, tmp_path / "out", client) == 2
+    rows = collect(cases, tmp_path / "out")
+    assert [row["name"] for row in rows] == ["a", "b"]
+    assert all("f.json" in row["error"] and row["seconds"] >= 0 for row in rows)
+
+
+# --- judging ----------------------------------------------------------------------------------------------------------
+
+
+def test_a_cause_where_nothing_is_hidden_is_false() -> None:
+    assert judge(case("null"), diagnosis(verdict="adequate"))["cause_count"] == 0
+    row = judge(case("null"), diagnosis(cause("gravity")))
+    assert row["cause_count"] == 1 and row["detected"]
+
+
+def test_one_effect_named_first_in_a_set_or_not_at_all() -> None:
+    truth = Truth("gravity", 1)
+    row = judge(case("single", truth), diagnosis(cause("gravity")))
+    assert (row["in_set"], row["first"], row["set_size"], row["place"]) == (True, True, 1, True)
+    row = judge(case("single", truth), diagnosis(cause("gravity", joint=2)))
+    assert (row["in_set"], row["place"]) == (True, False)
+    others = (Where("gravity", 1), Where("cover_stiffness", 1), Where("gravity", 2))
+    row = judge(case("single", truth), diagnosis(cause("joint_coupling", others=others)))
+    assert (row["in_set"], row["first"], row["set_size"], row["place"]) == (True, False, 3, True)
+    row = judge(case("single", truth), diagnosis(cause("inertia")))
+    assert (row["detected"], row["in_set"], row["first"], row["place"]) == (True, False, False, None)
+    row = judge(case("single", truth), diagnosis(verdict="unexplained"))
+    assert (row["detected"], row["in_set"], row["unknown"]) == (True, False, True)
+
+
+def test_two_effects_found_and_nothing_else() -> None:
+    truth = (Truth("gravity", 1), Truth("inertia", 1))
+    assert judge(case("double", *truth), diagnosis(cause("inertia"), cause("gravity")))["exactly"]
+    row = judge(case("double", *truth), diagnosis(cause("inertia"), cause("gravity"), cause("stribeck")))
+    assert row["both"] and not row["exactly"]
+    assert not judge(case("double", *truth), diagnosis(cause("inertia")))["both"]
+
+
+def test_absorbed_is_not_visible_with_an_experiment() -> None:
+    truth = Truth("force_offset", None, 2)
+    listed = (Invisible(Where("force_offset", None, 2), "", 0.001, "change the pretension"),)
+    row = judge(case("absorbed", truth), diagnosis(verdict="adequate", invisible=listed))
+    assert row["not_visible"] and row["experiment"]
+    assert not judge(case("absorbed", truth), diagnosis(verdict="adequate"))["not_visible"]
+    silent = (Invisible(Where("force_offset", None, 2), "", 0.001, ""),)
+    assert not judge(case("absorbed", truth), diagnosis(invisible=silent))["experiment"]
+
+
+def test_unknown_is_said_or_a_name_is_wrong() -> None:
+    truth = Truth("unknown")
+    row = judge(case("unknown", truth), diagnosis(cause("gravity")))
+    assert row["wrong_name"] and not row["unknown"]
+    row = judge(case("unknown", truth), diagnosis(cause("gravity"), verdict="partly explained"))
+    assert not row["wrong_name"] and row["unknown"]
+    row = judge(case("unknown", truth), diagnosis(cause("gravity", others=(Where("unknown"),))))
+    assert not row["wrong_name"] and row["unknown"]
+
+
+# --- counting ---------------------------------------------------------------------------------------------------------
+
+
+def test_rates_have_exact_intervals() -> None:
+    found = rate("x", "", [{"a": k < 3} for k in range(10)], lambda row: row["a"])
+    assert (found.hits, found.cases) == (3, 10)
+    assert (found.low, found.high) == (pytest.approx(0.0667, abs=1e-4), pytest.approx(0.6525, abs=1e-4))
+    assert rate("x", "", [], lambda row: True).cells()[3] == "0"
+    assert mean("x", "", [1.0, 2.0, 3.0]).value == 2.0
+
+
+def test_the_gain_is_covered_where_the_interval_has_the_true_one() -> None:
+    base = judge(case("single", Truth("gravity", 1)), diagnosis(cause("gravity")))
+    rows = [base | {"group": "single", "error": "", "strength": 0.1, "true_gain": true} for true in (0.1, 0.149, 0.2)]
+    line = next(each for each in rates(rows) if "covers" in each.what)
+    assert (line.hits, line.cases) == (2, 3)
+    first = next(each for each in rates(rows) if each.what == "one effect at 0.1: true cause first")
+    assert (first.hits, first.cases) == (3, 3)
