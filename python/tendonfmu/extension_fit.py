@@ -303,4 +303,5 @@ def _vanished(model: FittedModel, paths: Sequence[str], without: FittedModel | N
     gone = all(abs(model.values[path]) <= BOUND * max(model.errors.get(path, 0.0), 1e-300) for path in own)
     if without is None:
         return bool(own) and gone
-    return (bool(own) and gone) or 2 * (without.cost - model.cost) <= max(len(own), 1)
+    more = max(len(model.values) - len(without.values), 1)
+    return (bool(own) and gone) or 2 * (without.cost - model.cost) <= more

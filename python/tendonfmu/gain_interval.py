@@ -22,6 +22,7 @@ Flags = NDArray[np.bool_]
 BLOCK = 2.0  # s; longer than residuals of a fitted finger are correlated
 LEVEL = 0.95
 FEWEST = 3  # blocks; of fewer no interval can be said
+_FEW, _SHORTEST = 6, 0.5  # blocks that there ought to be; s, of a block
 _RESAMPLES = 4000
 _MOST = 400  # blocks; more are put together
 _LEAST_PLAIN = 12  # blocks; of fewer the resamples' own errors are too rough to divide by: Student's t instead
@@ -41,13 +42,16 @@ class Blocks:
 
 
 def blocks_of(time: Numbers, chosen: Flags, length: float = BLOCK) -> Blocks:
-    """Cuts the chosen samples into blocks of about `length` s each, none across a stretch that is not chosen.
+    """Cuts the chosen samples into blocks of about `length` s each, none across a stretch that is not chosen; of few
+    seconds into shorter ones.
 
     time: [N] s. A stretch of less than half a block is one of its own only where it has no neighbour: it joins the
     block before.
     """
     index = np.full(len(time), -1, dtype=np.intp)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(np.int8), [0]])))
+    chosen_seconds = sum(float(time[end - 1] - time[begin]) for begin, end in zip(edges[::2], edges[1::2], strict=True))
+    length = min(length, max(chosen_seconds / _FEW, _SHORTEST))
     count = 0
     for begin, end in zip(edges[::2], edges[1::2], strict=True):
         span = float(time[end - 1] - time[begin])
