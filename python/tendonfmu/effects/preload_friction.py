@@ -6,16 +6,17 @@ from collections.abc import Mapping
 
 from tendonfmu.effects.candidate import Candidate, Data, Place, Variant, no_shape
 from tendonfmu.effects.extension_row import row_variant
-from tendonfmu.effects.friction_law_places import all_tendons, passes, without_rows
+from tendonfmu.effects.friction_law_places import passes, row_places, without_rows
 
 NAME = "preload_friction"
 
 
 def _places(data: Data, kinematics: int) -> list[Place]:
-    """Before each joint; and at all of them alike, where there are several."""
-    before = list(passes(data))
-    several = [each for each in all_tendons(data) if sum(place.tendon == each.tendon for place in before) > 1]
-    return without_rows(data, NAME, before + several)
+    """Before each joint that the tendon reaches; not where a row says that it rubs before all of them."""
+    everywhere = row_places(data, NAME)
+    return [
+        place for place in without_rows(data, NAME, list(passes(data))) if Place(tendon=place.tendon) not in everywhere
+    ]
 
 
 def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
