@@ -254,7 +254,7 @@ def test_many_effects_that_cannot_be_seen_are_counted() -> None:
     places = tuple(replace(one, where=Where("cover_hardening", joint=1 + k % 2)) for k in range(6))
     others = tuple(replace(one, where=Where(name), title=name) for name in "abcdefg")
     text = plain(diagnosis_page(replace(examples.adequate(), invisible=places + others), []))
-    assert "6 places, such as joint 1 (mcp)" in text and "2 more are not visible in these data: f; g" in text
+    assert ", at 6 places, such as joint 1 (mcp). Refitting absorbs it" in text and "2 more are not visible in these data: f; g" in text
 
 
 def test_names_and_warnings_are_escaped() -> None:

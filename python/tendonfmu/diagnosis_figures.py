@@ -163,7 +163,8 @@ def _by_joint(views: Sequence[ResidualView]) -> Iterator[tuple[int, list[Residua
         yield (
             joint,
             sorted(
-                (view for view in views if view.joint == joint and len(view.x) > 0), key=lambda view: _order(view.kind)
+                (view for view in views if view.joint == joint and np.isfinite(view.before).any()),
+                key=lambda view: _order(view.kind),
             ),
         )
 

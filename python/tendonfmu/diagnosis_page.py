@@ -41,6 +41,7 @@ from tendonfmu.fit_summary import rounded
 from tendonfmu.whole_file import whole_file
 
 PAGE = "diagnosis.html"
+_MOST = 4  # pairs that are listed
 _TONES = {"adequate": "good", "explained": "good", "partly explained": "", "unexplained": "bad"}
 
 
@@ -139,13 +140,16 @@ def _untold(found: Diagnosis, names: Names) -> Iterator[str]:
 
 def _experiment(found: Diagnosis, names: Names) -> Iterator[str]:
     plan = found.experiment
-    for one, other in plan.separates:
+    for one, other in plan.separates[:_MOST]:
         first, second = (at_place(title_of(each.effect), each, names) for each in (one, other))
         yield f"Tells apart: {first}; and {second}."
-    for where in plan.makes_visible:
-        yield f"Makes visible: {at_place(title_of(where.effect), where, names)}."
+    if len(plan.separates) > _MOST:
+        yield f"And {count_of(len(plan.separates) - _MOST, 'more pair')}."
+    if plan.makes_visible:
+        titles = dict.fromkeys(title_of(where.effect) for where in plan.makes_visible)
+        yield f"Makes visible: {'; '.join(titles)}."
     if plan.distance > 0:
-        yield f"What they predict then differs by {plan.distance:.2g} times the noise."
+        yield f"What is to be told apart then differs by {plan.distance:.2g} times the noise or more."
 
 
 # --- tables -----------------------------------------------------------------------------------------------------------

@@ -17,6 +17,7 @@ _OUTSIDE = {  # that are found, but are no term of a model
     UNKNOWN: "something that is no effect on the list",
 }
 
+_MOST_PLACES = 4  # that are listed
 Row = tuple[str, ...]
 
 
@@ -235,7 +236,7 @@ def hidden(found: Diagnosis, names: Names) -> list[Hidden]:
         best = max(members, key=lambda each: each.surviving_share)
         places = [names.place(each.where) for each in members]
         text = "" if places == [""] else "; ".join(each or "the whole finger" for each in places)
-        if len(places) > 4:
+        if len(places) > _MOST_PLACES:
             text = f"{len(places)} places, such as {places[0]}"
         effects.append(Hidden(best.title, text, best.surviving_share, best.experiment))
     return effects
@@ -245,7 +246,7 @@ def hidden_sentences(found: Diagnosis, names: Names, most: int = 6) -> Iterator[
     """What cannot be seen, and how it could; beyond so many the rest is counted."""
     effects = hidden(found, names)
     for each in effects[:most]:
-        place = f" ({each.places})" if each.places else ""
+        place = f", at {each.places}" if each.places else ""
         experiment = f" To see it: {each.experiment.rstrip('.')}." if each.experiment else ""
         yield (
             f"Not visible in these data: {each.title}{place}. Refitting absorbs it; {percent(each.share)} would be "
@@ -259,7 +260,8 @@ def hidden_sentences(found: Diagnosis, names: Names, most: int = 6) -> Iterator[
 
 def next_sentence(found: Diagnosis) -> str:
     """What to record next."""
-    return found.experiment.sentence or "No further experiment is needed: nothing is left to be told apart."
+    sentence = found.experiment.sentence.rstrip(".")
+    return f"{sentence}." if sentence else "No further experiment is needed: nothing is left to be told apart."
 
 
 def by_source(source: str) -> str:
