@@ -208,7 +208,10 @@ def tensions(data: Data, entry: Entry) -> Iterator[Entry]:
 
 def loads(data: Data, entry: Entry, recorded: Recorded) -> Iterator[Entry]:
     """The entry with a known load at the joints, on one side and on the other."""
-    largest = known_load(data, entry.sections[0].pretension, recorded.torque)
+    first = entry.sections[0]
+    own = first.pretension * pretension_vector(data)
+    least = own if first.lowest is None else np.minimum(own, first.lowest)
+    largest = known_load(data, least, recorded.torque)
     if not largest.any():
         return
     sides = [sign * largest for _ in range(_ALTERNATIONS) for sign in (1.0, -1.0)]
@@ -224,18 +227,19 @@ def loads(data: Data, entry: Entry, recorded: Recorded) -> Iterator[Entry]:
     )
 
 
-def known_load(data: Data, pretension: float, torque: Numbers) -> Numbers:
-    """[n] N·m that leaves every pulling tendon taut at a pretension (N), on either side. torque: [n] N·m, of a finger
-    that holds no pretension, whose loops carry any load.
+def known_load(data: Data, tension: Numbers, torque: Numbers) -> Numbers:
+    """[n] N·m that leaves every pulling tendon taut at tensions (N, [m]), on either side. torque: [n] N·m, of a finger
+    that holds no tension, whose loops carry any load.
     """
-    arms, own = moment_arms(data), pretension * pretension_vector(data)
-    if not own.any():
+    arms = moment_arms(data)
+    if not tension.any():
         return _LOOP_LOAD * torque
     pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
+    if not pulls.any():
+        return _LOOP_LOAD * torque
     each = np.abs(arms).max(axis=0)  # N·m per N of one tendon
     taken = np.abs(np.linalg.pinv(arms)).T @ each  # N, from each tendon, at most
-    room = float(np.min((1 - _TAUT) * own[pulls] / np.maximum(taken[pulls], 1e-12))) if pulls.any() else pretension
-    return np.asarray(room * each)
+    return np.asarray(np.min((1 - _TAUT) * tension[pulls] / np.maximum(taken[pulls], 1e-12)) * each)
 
 
 def _shortened(section: Section, count: int, **changes: Any) -> Section:
