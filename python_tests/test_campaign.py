@@ -12,8 +12,8 @@ import pytest
 from tendonfmu import campaign as campaigns
 from tendonfmu.campaign import collect, run_campaign, still_to_do
 from tendonfmu.campaign_cases import Case, Truth, made, read_cases
-from tendonfmu.campaign_judgement import judge
-from tendonfmu.campaign_rates import markdown, mean, rate, rates
+from tendonfmu.campaign_judgement import judge, judge_names
+from tendonfmu.campaign_rates import markdown, mean, rate, rates, rivals_of, seen_by
 from tendonfmu.diagnosis_result import (
     Cause,
     Diagnosis,
@@ -105,7 +105,7 @@ def test_a_maker_writes_the_files_of_its_case(tmp_path: Path) -> None:
 def test_a_campaign_is_resumed_and_survives_a_case_that_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ran: list[str] = []
 
-    def run(case: Case) -> dict[str, Any]:
+    def run(case: Case, beside: str | None) -> dict[str, Any]:
         ran.append(case.name)
         error = "ValueError: bad" if case.name == "b" else ""
         row = judge(case, diagnosis()) | {"name": case.name, "group": "null", "rig": "", "seed": 0, "error": error}
@@ -160,6 +160,22 @@ def test_one_effect_named_first_in_a_set_or_not_at_all() -> None:
     assert (row["detected"], row["in_set"], row["first"], row["place"]) == (True, False, False, None)
     row = judge(case("single", truth), diagnosis(verdict="unexplained"))
     assert (row["detected"], row["in_set"], row["unknown"]) == (True, False, True)
+
+
+def test_rivals_are_asked_the_same(tmp_path: Path) -> None:
+    names = [Where("gravity", 2), Where("inertia", 1)]
+    row = judge_names(case("single", Truth("inertia", 1)), names)
+    assert (row["in_set"], row["first"], row["place"], row["cause_count"]) == (True, False, True, 2)
+    assert judge_names(case("double", Truth("gravity", 1), Truth("inertia", 1)), names)["exactly"]
+    rows = [
+        judge(case("null"), diagnosis(verdict="adequate"))
+        | {"group": "null", "error": ""}
+        | {f"bic.{key}": value for key, value in judge_names(case("null"), names[:k]).items()}
+        for k in (0, 1)
+    ]
+    assert rivals_of(rows) == ["bic"]
+    assert [(rates(each)[0].hits, rates(each)[0].cases) for each in (rows, seen_by(rows, "bic"))] == [(0, 2), (1, 2)]
+    assert "The same by bic" in markdown(rows)
 
 
 def test_two_effects_found_and_nothing_else() -> None:

@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from tendonfmu.campaign_cases import Case, made, names_of
-from tendonfmu.campaign_judgement import judge
+from tendonfmu.campaign_cases import Case, made, names_of, python_function
+from tendonfmu.campaign_judgement import judge, judge_names
 from tendonfmu.errors import InputError
 from tendonfmu.whole_file import check_output_folder, whole_file
 
@@ -47,19 +47,22 @@ def _wanted(file: Path, failed_again: bool) -> bool:
 # --- one case, on a worker --------------------------------------------------------------------------------------------
 
 
-def run_case(case: Case) -> Row:
-    """Makes the recordings, diagnoses them untold, and judges the answer. What goes wrong becomes the row's `error`."""
+def run_case(case: Case, beside: str | None = None) -> Row:
+    """Makes the recordings, diagnoses them untold, and judges the answer. What goes wrong becomes the row's `error`.
+
+    beside: FILE.py:FUNCTION, called as FUNCTION(case, diagnosis) -> name of a rival -> the causes that it names.
+    """
     begin = time.perf_counter()
     row: Row = {"name": case.name, "group": case.group, "rig": case.rig, "seed": case.seed, "error": ""}
     try:
         with tempfile.TemporaryDirectory(prefix="tendonfmu-campaign-") as folder:
-            row |= _diagnosed(made(case, Path(folder)))
+            row |= _diagnosed(made(case, Path(folder)), beside)
     except Exception as failed:  # a campaign of days goes on: the row says what happened
         row["error"] = f"{type(failed).__name__}: {' '.join(str(failed).split())}"
     return row | {"seconds": time.perf_counter() - begin}
 
 
-def _diagnosed(case: Case) -> Row:
+def _diagnosed(case: Case, beside: str | None) -> Row:
     from tendonfmu.diagnosis import diagnose
 
     assert case.finger is not None
@@ -72,6 +75,9 @@ def _diagnosed(case: Case) -> Row:
     row |= dict(case.facts) | judge(case, found)
     if case.reference:
         row["true_gain"] = true_gain(found.nominal_data, found.extended_data, case)
+    if beside is not None:
+        for rival, names in python_function(beside, Path.cwd())(case, found).items():
+            row |= {f"{rival}.{key}": value for key, value in judge_names(case, names).items()}
     return row
 
 
@@ -117,7 +123,9 @@ def cluster(address: str | None, workers: int) -> Iterator[Any]:
     limits = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     with (
         dask.config.set({"distributed.nanny.pre-spawn-environ": limits}),
-        library.LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0") as here,
+        library.LocalCluster(
+            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0"
+        ) as here,
         library.Client(here) as client,
     ):
         yield client
@@ -128,13 +136,15 @@ def run_campaign(
     folder: Path,
     client: Any,
     *,
+    beside: str | None = None,
     stop_after: float = math.inf,
     failed_again: bool = False,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> int:
     """Runs what has no row yet, a row's file as each case ends. Returns how many ran.
 
-    client: of dask, or None: here, one after another. stop_after: s, after which no further case begins.
+    client: of dask, or None: here, one after another. beside: as for `run_case`, its file absolute. stop_after: s, after
+    which no further case begins.
     """
     check_output_folder(folder)
     (folder / ROWS).mkdir(parents=True, exist_ok=True)
@@ -142,14 +152,14 @@ def run_campaign(
     done = len(cases) - len(waiting)
     progress(done, len(cases))
     count = 0
-    for row in _rows(waiting, client, time.monotonic() + stop_after):
+    for row in _rows(waiting, client, beside, time.monotonic() + stop_after):
         write_row(folder, row)
         count += 1
         progress(done + count, len(cases))
     return count
 
 
-def _rows(cases: Sequence[Case], client: Any, deadline: float) -> Iterator[Row]:
+def _rows(cases: Sequence[Case], client: Any, beside: str | None, deadline: float) -> Iterator[Row]:
     """Each row as it ends. Only as many cases are under way as there are workers to take them at once, and one more."""
     waiting = iter(cases)
 
@@ -158,19 +168,19 @@ def _rows(cases: Sequence[Case], client: Any, deadline: float) -> Iterator[Row]:
 
     if client is None:
         while (case := next_case()) is not None:
-            yield run_case(case)
+            yield run_case(case, beside)
         return
     import distributed
 
     library: Any = distributed
     threads = max(1, sum(client.nthreads().values()))
     begun = [case for case in (next_case() for _ in range(threads + 1)) if case is not None]
-    pending = library.as_completed([client.submit(run_case, case, pure=False) for case in begun])
+    pending = library.as_completed([client.submit(run_case, case, beside, pure=False) for case in begun])
     for future in pending:
         yield future.result()
         case = next_case()
         if case is not None:
-            pending.add(client.submit(run_case, case, pure=False))
+            pending.add(client.submit(run_case, case, beside, pure=False))
 
 
 def write_row(folder: Path, row: Row) -> None:

@@ -184,7 +184,7 @@ def made(case: Case, folder: Path) -> Case:
     """The case with its files; those of a maker are written into the folder. Raises InputError."""
     if case.maker is None:
         return case
-    found = _function(case)(folder, **case.arguments)
+    found = python_function(case.maker, case.folder)(folder, **case.arguments)
     if not isinstance(found, Mapping):
         raise InputError(f"{case.maker}: returned {type(found).__name__}; expected the keys of a case with files")
     value = {"name": case.name, "group": case.group, "rig": case.rig or None, "seed": case.seed, **found}
@@ -194,13 +194,15 @@ def made(case: Case, folder: Path) -> Case:
         raise InputError(f"{case.maker}: {refused}") from None
 
 
-def _function(case: Case) -> Callable[..., Any]:
-    match = _MAKER.fullmatch(case.maker or "")
-    assert match is not None
-    module = _module((case.folder / match["file"]).resolve())
+def python_function(name: str, folder: Path) -> Callable[..., Any]:
+    """FILE.py:FUNCTION, the file relative to a folder. Raises InputError."""
+    match = _MAKER.fullmatch(name)
+    if match is None:
+        raise InputError(f"{name!r}: no function of a Python file; expected FILE.py:FUNCTION")
+    module = _module((folder / match["file"]).resolve())
     function = getattr(module, match["function"], None)
     if not callable(function):
-        raise InputError(f"{case.maker}: no function {match['function']}; expected one in {match['file']}")
+        raise InputError(f"{name}: no function {match['function']}; expected one in {match['file']}")
     return function  # type: ignore[no-any-return]
 
 

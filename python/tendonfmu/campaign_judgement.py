@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from tendonfmu.campaign_cases import Case, Truth
+from tendonfmu.campaign_cases import NOT_IN_MODEL, Case, Truth
 from tendonfmu.diagnosis_result import Cause, Diagnosis, Where
 
 ALARMS = ("unexplained", "partly explained")
@@ -22,7 +22,7 @@ def judge(case: Case, found: Diagnosis) -> dict[str, Any]:
     something unexplained, or the first cause's own set says unknown. wrong_name: an effect is named that is not
     there, and the verdict calls everything explained.
     """
-    causes = [cause for cause in found.causes if cause.where.effect not in ("contact", "unknown")]
+    causes = [cause for cause in found.causes if cause.where.effect not in NOT_IN_MODEL]
     row: dict[str, Any] = {
         "verdict": found.verdict,
         "causes": json.dumps([_listed(cause) for cause in found.causes]),
@@ -39,7 +39,7 @@ def judge(case: Case, found: Diagnosis) -> dict[str, Any]:
     }
     row |= dict.fromkeys(("in_set", "first", "set_size", "place", "both", "exactly", "not_visible", "experiment"))
     row |= {"unknown": _says_unknown(found), "wrong_name": bool(causes) and not _says_unknown(found)}
-    truths = [truth for truth in case.truth if truth.effect not in ("contact", "unknown")]
+    truths = [truth for truth in case.truth if truth.effect not in NOT_IN_MODEL]
     if case.group == "single":
         row |= _single(truths[0], causes)
     if case.group == "double":
@@ -47,6 +47,23 @@ def judge(case: Case, found: Diagnosis) -> dict[str, Any]:
         row |= {"both": all(hits), "exactly": all(hits) and len(causes) == len(truths)}
     if case.group in ("single", "absorbed"):
         row |= _invisible(truths[0], found, causes)
+    return row
+
+
+def judge_names(case: Case, names: Sequence[Where]) -> dict[str, Any]:
+    """The same questions for a rival that only names causes, the first one first."""
+    row: dict[str, Any] = {"cause_count": len(names), "detected": bool(names), "wrong_name": bool(names)}
+    row |= dict.fromkeys(("in_set", "first", "place", "both", "exactly"))
+    truths = [truth for truth in case.truth if truth.effect not in NOT_IN_MODEL]
+    effects = [where.effect for where in names]
+    if case.group == "single":
+        truth = truths[0]
+        row |= {"in_set": truth.effect in effects, "first": effects[:1] == [truth.effect]}
+        named = [where for where in names if where.effect == truth.effect][:1]
+        row |= {"place": (named[0].joint, named[0].tendon) == (truth.joint, truth.tendon)} if named else {}
+    if case.group == "double":
+        both = all(truth.effect in effects for truth in truths)
+        row |= {"both": both, "exactly": both and len(names) == len(truths)}
     return row
 
 

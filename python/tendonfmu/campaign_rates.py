@@ -97,6 +97,26 @@ def rates(rows: Sequence[Row]) -> list[Rate]:
     return found
 
 
+def rivals_of(rows: Sequence[Row]) -> list[str]:
+    """Rivals that ran beside, by the columns that they left."""
+    keys = dict.fromkeys(key for row in rows for key in row if key.endswith(".cause_count"))
+    return [key.rsplit(".", 1)[0] for key in keys]
+
+
+def seen_by(rows: Sequence[Row], rival: str) -> list[Row]:
+    """The rows with a rival's answers in place of the diagnosis's own; those without them are left out."""
+    silent = dict.fromkeys(("set_size", "not_visible", "experiment", "unknown", "true_gain"))
+    own = [
+        {key.removeprefix(f"{rival}."): value for key, value in row.items() if key.startswith(f"{rival}.")}
+        for row in rows
+    ]
+    return [
+        dict(row) | silent | answers
+        for row, answers in zip(rows, own, strict=True)
+        if answers.get("cause_count") is not None
+    ]
+
+
 def _one_effect(what: str, rows: Sequence[Row], goals: Sequence[str]) -> list[Rate]:
     return [
         rate(f"{what}: detected", goals[0], rows, lambda row: row["detected"]),
@@ -131,6 +151,9 @@ EFFECT_HEADINGS = ("hidden effect", "cases", "detected", "in the set", "first", 
 def markdown(rows: Sequence[Row]) -> str:
     """Both tables, for a page."""
     parts = [_table(HEADINGS, [each.cells() for each in rates(rows)])]
+    for rival in rivals_of(rows):
+        cells = [each.cells() for each in rates(seen_by(rows, rival)) if each.cases]
+        parts.append(f"The same by {rival}:\n\n" + _table(HEADINGS, cells))
     lines = by_effect(rows)
     if lines:
         parts.append(_table(EFFECT_HEADINGS, lines))

@@ -29,6 +29,9 @@ def campaign(
     stop_after: Annotated[
         float, typer.Option(min=0.0, metavar="SECONDS", help="begin no case after that time; go on another day")
     ] = math.inf,
+    beside: Annotated[
+        str | None, typer.Option(metavar="FILE.py:FUNCTION", help="rivals, asked to name a cause for each case, too")
+    ] = None,
     again: Annotated[bool, typer.Option("--again", help="run cases that ended in an error once more")] = False,
     report: Annotated[Path | None, typer.Option(metavar="R.md", help="the tables as Markdown")] = None,
     progress: Annotated[
@@ -41,7 +44,7 @@ def campaign(
     The rows together are DIR/campaign.parquet; every rate has its number of cases and its 95 % interval.
     """
     from tendonfmu.campaign import cluster, collect, run_campaign, still_to_do, worker_count
-    from tendonfmu.campaign_cases import read_cases
+    from tendonfmu.campaign_cases import python_function, read_cases
     from tendonfmu.campaign_rates import EFFECT_HEADINGS, HEADINGS, by_effect, markdown, rates
     from tendonfmu.fit_files import write_text
     from tendonfmu.whole_file import check_output, check_output_folder
@@ -50,6 +53,8 @@ def campaign(
     check_output_folder(output)
     if report is not None:
         check_output(report, cases)
+    if beside is not None:
+        python_function(beside, Path.cwd())
     waiting = len(still_to_do(listed, output, again))
     if waiting and stop_after > 0:
         with (
@@ -61,6 +66,7 @@ def campaign(
                 listed,
                 output,
                 client,
+                beside=None if beside is None else str(Path(beside).absolute()),
                 stop_after=stop_after,
                 failed_again=again,
                 progress=lambda done, total: bar.update(task, completed=done, total=total),
