@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-#include "directional_derivative.h"
+#include "extension_derivative.h"
 #include "extensions.h"
 #include "slot_view.h"
 
@@ -33,7 +33,7 @@ size_t parameter_derivative_size(const tendonfmu_finger* finger) {
   const size_t words = 2 * (s.records + s.rows + 2 * s.joints);
   return (words + 1) / 2 * 2 * sizeof(uint32_t) + (s.friction + s.bias) * sizeof(law_term) +
          s.plain * sizeof(plain_term) +
-         (3 * s.places * finger->joints + 4 * finger->joints + 2 * s.places) * sizeof(double);
+         (3 * s.places * finger->joints + 4 * finger->joints + 3 * s.places) * sizeof(double);
 }
 
 typedef struct law_search {
@@ -106,6 +106,7 @@ void parameter_derivative_place(const tendonfmu_finger* finger, void* memory, pa
   derivative->jumped = take(&from, 2 * n * sizeof(double));
   derivative->base = take(&from, s.places * sizeof(double));
   derivative->jump_base = take(&from, s.places * sizeof(double));
+  derivative->kept_entry = take(&from, s.places * sizeof(double));
   derivative->friction = take(&from, s.friction * sizeof(law_term));
   derivative->bias = take(&from, s.bias * sizeof(law_term));
   derivative->plain = take(&from, s.plain * sizeof(plain_term));
@@ -186,28 +187,31 @@ static double read_stop(const place_laws* p, double side, double grip, parameter
   return side * add_magnitude(p, side < 0.0, p->threshold, grip * side, d->bias, &d->bias_count);
 }
 
-/* With entry_load, −κ·e where it leaves rest: e was side·|F|·(what acted then), and depends on the law as F does. What
- * acted then is held fixed: differs from the rest of this file, which carries forces along. */
-static void read_kept_entry(const place_laws* p, double side, double kept, parameter_derivative* d) {
+/* With entry_load, −κ·e where it leaves rest: e was side·|F|·(what acted then). Its slopes are taken as if angle and
+ * the friction before it were those of now, in proportion: what they were is not remembered. Returns −κ·e over what
+ * acts now. */
+static double read_kept_entry(const place_laws* p, double side, double kept, parameter_derivative* d) {
   const size_t first = d->bias_count;
   const double held = side * add_magnitude(p, side < 0.0, p->threshold, side, d->bias, &d->bias_count);
   const double share = held * p->acting != 0.0 ? -kept * *p->entry / (held * p->acting) : 0.0;
+  d->kept_entry[p->place] = -kept * *p->entry;
   for (size_t k = first; k < d->bias_count; ++k) {
     for (int number = 0; number < LAW_SIDE_NUMBERS; ++number) {
       d->bias[k].slope[number] *= share;
     }
   }
+  return share * held;
 }
 
-/* b of fig. 5 where it leaves rest; what entry_load keeps apart is in the slopes alone, as it moves no force */
+/* b of fig. 5 where it leaves rest; kept_jump: what entry_load keeps apart of it, as a b */
 static double read_start(const tendonfmu_finger* f, const place_laws* p, double before, double now, double grip,
-                         parameter_derivative* d) {
+                         double* kept_jump, parameter_derivative* d) {
   const double kept = before == 0.0 ? 0.0 : law_exponential(rest_exponent(f, p->slot));
   const int keeps_entry = f->derived.settings.remembers_entry_load && before != 0.0;
   const double factor = -(1.0 - kept) * now;
   double jump = factor * add_magnitude(p, now < 0.0, p->threshold, grip * factor, d->bias, &d->bias_count);
   if (keeps_entry) {
-    read_kept_entry(p, before, kept, d);
+    *kept_jump = read_kept_entry(p, before, kept, d);
   } else if (kept != 0.0) {
     const double back = -kept * before;
     jump += back * add_magnitude(p, before < 0.0, p->threshold, grip * back, d->bias, &d->bias_count);
@@ -219,13 +223,14 @@ static double read_jump(const tendonfmu_finger* f, const place_laws* p, paramete
   const finger_state* s = &f->remembered;
   const double before = s->side_before[p->slot], now = s->side[p->slot], event = s->event[p->slot];
   const double grip = f->extensions.friction ? f->scratch.bias_grip[p->slot] : 1.0;
-  d->jump_base[p->place] = 0.0;
+  double kept_jump = 0.0;
+  d->jump_base[p->place] = d->kept_entry[p->place] = 0.0;
   if (event == 0.0 || grip == 0.0 || (event > 0.0 && before == 0.0)) {
     return 0.0;
   }
-  const double jump = event > 0.0 ? read_stop(p, before, grip, d) : read_start(f, p, before, now, grip, d);
+  const double jump = event > 0.0 ? read_stop(p, before, grip, d) : read_start(f, p, before, now, grip, &kept_jump, d);
   d->jump_base[p->place] = jump;
-  return grip * jump;
+  return grip * jump + kept_jump;
 }
 
 static place_laws edge_at(const tendonfmu_finger* f, const parameter_derivative* d, size_t i, size_t j) {
@@ -379,116 +384,6 @@ static void read_covers(const tendonfmu_finger* f, parameter_derivative* d) {
   }
 }
 
-/* --- extensions -----------------------------------------------------------------------------------------------------
- */
-
-static void add_plain(parameter_derivative* d, uint32_t parameter, const double* torque, const double* jump) {
-  for (size_t j = 0; j < d->joints; ++j) {
-    if (torque[j] != 0.0 || jump[j] != 0.0) {
-      d->plain[d->plain_count++] =
-          (plain_term){.parameter = parameter, .joint = (uint32_t)j, .slope = torque[j], .jump = jump[j]};
-    }
-  }
-}
-
-static void read_torque_row(const tendonfmu_finger* f, const extension_row* row, parameter_derivative* d) {
-  const effect_sample sample = remembered_sample(f);
-  for (uint32_t k = 0; k < row->effect->parameter_count; ++k) {
-    double unit[EFFECT_MAX_PARAMETERS] = {0.0}, torque[MODEL_MAX_JOINTS] = {0.0};
-    const double none[MODEL_MAX_JOINTS] = {0.0};
-    unit[k] = 1.0;
-    row->effect->torque(row->place, unit, &sample, row->memory, torque);
-    add_plain(d, row->first_parameter + k, torque, none);
-  }
-}
-
-static void read_signal_row(const tendonfmu_finger* f, size_t n, parameter_derivative* d) {
-  const extension_row* row = signal_row(f, n);
-  for (uint32_t k = 0; k < row->effect->parameter_count; ++k) {
-    double torque[MODEL_MAX_JOINTS], jump[MODEL_MAX_JOINTS];
-    const double* angle = signal_slopes(f, row, k);
-    signal_derivative signals;
-    derive_signals(f, n, k, 0, &signals);
-    const double* memory = angle + 2 * f->joints + f->tendons;
-    const state_direction direction = {angle, angle + f->joints, signals.force, memory};
-    torque_along(f, &direction, torque, jump);
-    add_plain(d, row->first_parameter + k, torque, jump);
-  }
-}
-
-/* what the other friction rows make of a slot */
-static double other_grips(const tendonfmu_finger* f, const extension_row* row, size_t slot, double own) {
-  if (own != 0.0) {
-    return f->scratch.grip[slot] / own;
-  }
-  double product = 1.0;
-  for (size_t r = 0; r < f->extensions.friction; ++r) {
-    const extension_row* other = friction_row(f, r);
-    const size_t members = other == row ? 0 : friction_members(f, other->place);
-    for (size_t k = 0; k < members; ++k) {
-      if (friction_slot(f, other->place, k) == slot) {
-        product *=
-            other->effect->grip(other->place, other->parameters, other->memory, friction_member(other->place, k)).value;
-      }
-    }
-  }
-  return product;
-}
-
-/* the two places whose friction slides with a slot; the second of a tendon is the pulley at the joint before */
-static void places_of_slot(const tendonfmu_finger* f, size_t slot, size_t place[2], size_t* count) {
-  const size_t n = f->joints, lanes = f->tendon_lanes;
-  if (slot >= n * lanes) {
-    place[0] = f->tendons * 2 * n + 2 * (slot - n * lanes);
-    place[1] = place[0] + 1;
-    *count = 2;
-  } else {
-    place[0] = 2 * (slot % lanes * n + slot / lanes);
-    place[1] = place[0] - 1;
-    *count = slot >= lanes ? 2 : 1;
-  }
-}
-
-static void read_friction_row(const tendonfmu_finger* f, const extension_row* row, parameter_derivative* d) {
-  double torque[EFFECT_MAX_PARAMETERS][MODEL_MAX_JOINTS] = {{0.0}};
-  double jump[EFFECT_MAX_PARAMETERS][MODEL_MAX_JOINTS] = {{0.0}};
-  const size_t members = friction_members(f, row->place);
-  for (size_t member = 0; member < members; ++member) {
-    const size_t slot = friction_slot(f, row->place, member);
-    const effect_grip grip =
-        row->effect->grip(row->place, row->parameters, row->memory, friction_member(row->place, member));
-    const double others = other_grips(f, row, slot, grip.value);
-    size_t place[2], count;
-    places_of_slot(f, slot, place, &count);
-    for (size_t p = 0; p < count; ++p) {
-      const double moved = others * d->base[place[p]], jumped = others * d->jump_base[place[p]];
-      for (size_t at = place[p] * d->joints, j = 0; j < d->joints && (moved != 0.0 || jumped != 0.0); ++at, ++j) {
-        for (uint32_t k = 0; k < row->effect->parameter_count; ++k) {
-          torque[k][j] += d->torque_factor[at] * moved * grip.by_parameter[k];
-          if (d->has_jump) {
-            jump[k][j] += (d->jump_factor[at] * moved + d->bias_factor[at] * jumped) * grip.by_parameter[k];
-          }
-        }
-      }
-    }
-  }
-  for (uint32_t k = 0; k < row->effect->parameter_count; ++k) {
-    add_plain(d, row->first_parameter + k, torque[k], jump[k]);
-  }
-}
-
-static void read_extensions(const tendonfmu_finger* f, parameter_derivative* d) {
-  for (size_t n = 0; n < f->extensions.signals; ++n) {
-    read_signal_row(f, n, d);
-  }
-  for (size_t n = 0; n < f->extensions.friction; ++n) {
-    read_friction_row(f, friction_row(f, n), d);
-  }
-  for (size_t n = 0; n < f->extensions.torques; ++n) {
-    read_torque_row(f, torque_row(f, n), d);
-  }
-}
-
 static int any_transition(const tendonfmu_finger* f) {
   double events = 0.0;
   for (size_t slot = 0; slot < f->slots; ++slot) {
@@ -508,5 +403,5 @@ void parameter_derivative_read(const tendonfmu_finger* finger, parameter_derivat
   }
   read_covers(finger, derivative);
   derivative->plain_count = derivative->covers;
-  read_extensions(finger, derivative);
+  extension_derivative_read(finger, derivative);
 }

@@ -47,6 +47,7 @@ typedef struct parameter_derivative {
   plain_term* plain;                                 /* of T alone */
   double *torque_factor, *jump_factor, *bias_factor; /* [places × n]; rows of places without a term mean nothing */
   double *moved, *jumped;                            /* [2n] F and b along the tendon being read */
+  double* kept_entry;                                /* [places] −κ·e of entry_load; 0 where nothing leaves rest */
   double *base, *jump_base;                          /* [places] F and b before extensions act on friction; |F| where
                                                         they make it slide at all times */
 } parameter_derivative;

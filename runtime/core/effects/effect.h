@@ -12,7 +12,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { EFFECT_MAX_PARAMETERS = 4, EFFECT_NOWHERE = 0xffffffffu, EFFECT_ALL_JOINTS = 16 };
+enum { EFFECT_MAX_PARAMETERS = 4, EFFECT_ALL_JOINTS = 16 };
+
+#define EFFECT_NOWHERE 0xffffffffu
 
 typedef enum place_need { PLACE_REFUSED, PLACE_OPTIONAL, PLACE_REQUIRED } place_need;
 
