@@ -19,6 +19,7 @@ from tendonfmu import native
 from tendonfmu.balance import moment_arms
 from tendonfmu.estimation import Estimator
 from tendonfmu.fit_recordings import FitRecording
+from tendonfmu.fit_residuals import delayed_torque
 from tendonfmu.friction_places import DEFAULT_THRESHOLD
 
 Numbers = NDArray[np.float64]
@@ -102,14 +103,14 @@ class Columns:
 class Trial:
     """A candidate at a place with one choice of its non-linear numbers: columns first .. first + count − 1 of a bank.
 
-    effect, joint, tendon: as in the report. sign: expected of the magnitudes, 0 either. shape: the choice. origin:
+    effect, joint, tendon: as in the report. signs: expected of each magnitude, 0 either. shape: the choice. origin:
     whatever made it (the candidate), for the caller.
     """
 
     effect: str
     joint: int | None
     tendon: int | None
-    sign: int
+    signs: tuple[int, ...]
     shape: Mapping[str, float]
     first: int
     count: int
@@ -212,16 +213,24 @@ def held_at_rest(values: Numbers, jumps: Numbers, held: Numbers) -> tuple[Number
     return found, after
 
 
-def exact_model(data: Mapping[str, Any], recording: FitRecording) -> Numbers:
-    """[N, n] N·m: G of a description by a run of the core, NaN outside the parts."""
-    kept = {key: value for key, value in (data.get("bias") or {}).items() if key in ("forget_rate", "entry_load")}
+def exact_model(data: Mapping[str, Any], recording: FitRecording, *, entry_load: bool | None = None) -> Numbers:
+    """[N, n] N·m: G of a description by a run of the core, NaN outside the parts.
+
+    entry_load: in place of what the description says. Less the delay of the measured torque, where the description
+    delays the forces: measured τ less this is what bias and noise are.
+    """
+    given = data.get("bias") or {}
     joints = len(data["joints"])
+    kept = {key: given[key] for key in ("forget_rate", "entry_load") if given.get(key) is not None}
     still = {**kept, "drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": [0.0] * joints}
+    if entry_load is not None:
+        still["entry_load"] = entry_load
     alone = {**data, "bias": still, "contact": {"threshold": [_NEVER] * joints}}
     image, found = native.image_from_json(json.dumps(alone)), np.full(recording.target.shape, np.nan)
     for part in recording.parts:
-        finger = native.Finger(image, kinematics_source=recording.kinematics)
-        found[part] = finger.run(recording.arrays(part))["friction_torque"]
+        arrays = recording.arrays(part)
+        outputs = native.Finger(image, kinematics_source=recording.kinematics).run(arrays)
+        found[part] = outputs["friction_torque"] - delayed_torque(data, arrays, outputs["joint_torque"])
     return found
 
 

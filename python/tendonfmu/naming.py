@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from tendonfmu.nuisance import basis
 from tendonfmu.significance import DRAWS, Prepared, Problem, Tested, prepare, tested_trials
 
 Numbers = NDArray[np.float64]
+Array = NDArray[Any]
 Place = tuple[str, int | None, int | None]
 
 SIGNIFICANCE = 0.01
@@ -53,15 +55,15 @@ class Judged:
     tested: Tested
 
 
-def held_out_gains(score: Numbers, gram: Numbers, sign: int) -> tuple[Numbers, Numbers]:
+def held_out_gains(score: Numbers, gram: Numbers, signs: Sequence[int]) -> tuple[Numbers, Numbers]:
     """Gain [K] on each block of estimates made without it, and what they gain where they are made [K].
 
-    score: [K, d], gram: [K, d, d].
+    score: [K, d], gram: [K, d, d]. signs: [d] expected, 0 either.
     """
     rest, energy = score.sum(axis=0) - score, gram.sum(axis=0) - gram
     estimate = _estimates(energy, rest)
-    if sign:
-        estimate = _one_sided(energy, rest, estimate, sign)
+    if any(signs):
+        estimate = _one_sided(energy, rest, estimate, np.array(signs))
     own = 2 * np.einsum("kd,kd->k", estimate, score) - np.einsum("kd,kde,ke->k", estimate, gram, estimate)
     trained = 2 * np.einsum("kd,kd->k", estimate, rest) - np.einsum("kd,kde,ke->k", estimate, energy, estimate)
     return own, trained
@@ -75,10 +77,10 @@ def _estimates(energy: Numbers, score: Numbers) -> Numbers:
     return np.asarray(np.einsum("kde,ke->kd", inverse, score / length) / length)
 
 
-def _one_sided(energy: Numbers, score: Numbers, estimate: Numbers, sign: int) -> Numbers:
+def _one_sided(energy: Numbers, score: Numbers, estimate: Numbers, signs: Array) -> Numbers:
     """Magnitudes of the wrong sign are taken out, one at a time, the worst first."""
     for _ in range(estimate.shape[1]):
-        reach = sign * estimate * np.sqrt(np.maximum(np.einsum("kdd->kd", energy), 0.0))
+        reach = signs * estimate * np.sqrt(np.maximum(np.einsum("kdd->kd", energy), 0.0))
         wrong = reach.min(axis=1) < 0
         if not wrong.any():
             break
@@ -101,7 +103,7 @@ def judge(prepared: Prepared, trials: Sequence[Trial], eligible: Sequence[bool],
             by_place.setdefault(trial.place, []).append(k)
     gains, best, p_values = {}, {}, {}
     for place, members in by_place.items():
-        pairs = [held_out_gains(prepared.score(trials[k]), prepared.gram(trials[k]), trials[k].sign) for k in members]
+        pairs = [held_out_gains(prepared.score(trials[k]), prepared.gram(trials[k]), trials[k].signs) for k in members]
         own, trained = (np.array([pair[which] for pair in pairs]) for which in (0, 1))
         gains[place] = own[trained.argmax(axis=0), np.arange(own.shape[1])]
         best[place] = members[int(np.argmax(trained.sum(axis=1)))]

@@ -37,6 +37,11 @@ def bias_splines(series: Series, knots: float = KNOTS) -> Numbers:
     return found
 
 
+def constant_bias(series: Series) -> Numbers:
+    """[B, s] a constant for every stretch without a gap."""
+    return np.asarray(series.segment[:, None] == np.unique(series.segment), dtype=np.float64)
+
+
 def basis(columns: Array) -> Numbers:
     """[R, r] orthonormal basis of the span of columns [R, c]; directions that rounding decides are left out."""
     values = np.asarray(columns, dtype=np.float64)

@@ -30,6 +30,7 @@ BLOCK = 1.5  # s, of the sign flips
 DRAWS = 2000
 VISITS = 8.0  # effective number of blocks in which a trial must show
 TAIL = 0.1  # share of the draws that the tail is taken from
+MOST_TAKEN = 1e-3  # share of a direction that the nuisance leaves, at least, for it to be given back
 _CHUNK = 64  # columns at a time
 
 
@@ -48,12 +49,14 @@ class Prepared:
     """Target and columns white and orthogonal to the nuisance, rows sorted by time.
 
     target: [V, n]; columns: [V, n, c]; starts: [K] first row of each block of time. whitener: of the residual.
+    unshrunk: [V, n] the target less what the nuisance has taken of each block's variance.
     """
 
     target: Numbers
     columns: Array
     starts: NDArray[np.int64]
     whitener: Whitener
+    unshrunk: Numbers
 
     @property
     def blocks(self) -> int:
@@ -62,12 +65,24 @@ class Prepared:
     @cached_property
     def scores(self) -> Numbers:
         """[K, c]"""
-        products = np.einsum("vnc,vn->vc", self.columns, self.target.astype(self.columns.dtype))
+        return self._scores(self.target)
+
+    @cached_property
+    def unshrunk_scores(self) -> Numbers:
+        """[K, c], whose outer products have the covariance of the sum of `scores` as their mean."""
+        return self._scores(self.unshrunk)
+
+    def _scores(self, target: Numbers) -> Numbers:
+        products = np.einsum("vnc,vn->vc", self.columns, target.astype(self.columns.dtype))
         return np.add.reduceat(products.astype(np.float64), self.starts, axis=0)
 
     def score(self, trial: Trial) -> Numbers:
         """[K, d]"""
         return self.scores[:, trial.first : trial.first + trial.count]
+
+    def unshrunk_score(self, trial: Trial) -> Numbers:
+        """[K, d]"""
+        return self.unshrunk_scores[:, trial.first : trial.first + trial.count]
 
     def gram(self, trial: Trial) -> Numbers:
         """[K, d, d]"""
@@ -88,51 +103,80 @@ def prepare(problem: Problem, accepted: Array | None = None) -> Prepared:
     for first in range(0, values.shape[2], _CHUNK):
         chunk = slice(first, first + _CHUNK)
         columns[:, :, chunk] = cleaner.clean(values[:, :, chunk])
-    return Prepared(cleaner.target, columns, block_starts(series, white), white)
+    starts = block_starts(series, white)
+    return Prepared(cleaner.target, columns, starts, white, unshrunk_target(cleaner.target, cleaner.span, starts))
 
 
-def residual_of(series: Series, splines: Numbers, nominal: Numbers) -> Numbers:
+class _Cleaner:
+    """Takes everything off columns that the nuisance explains: whitens, makes joints uncorrelated, and takes off what
+    the bias and the nominal model's numbers can do (generalised least squares)."""
+
+    def __init__(self, white: Whitener, splines: Numbers, target: Numbers, nominal: Numbers) -> None:
+        joints = target.shape[1]
+        self._white = white
+        self._mixing = np.eye(joints)
+        bias = self._mixed(splines_of_joints(splines, joints))
+        own = np.concatenate([bias, self._mixed(nominal)], axis=2)
+        left = self._mixed(target[:, :, None])
+        plain = without(left.reshape(-1), basis(own.reshape(-1, own.shape[2]))).reshape(len(left), joints)
+        self._mixing = common(plain, np.ones(len(plain), dtype=bool))
+        own = np.einsum("vnc,nm->vmc", own, self._mixing, optimize=True)
+        self.span = basis(own.reshape(-1, own.shape[2]))
+        mixed = (left[:, :, 0] @ self._mixing).reshape(-1)
+        self.target: Numbers = without(mixed, self.span).reshape(len(left), joints)
+
+    def _mixed(self, values: Array) -> Array:
+        whitened = self._white.apply(values)[self._white.valid]
+        return np.asarray(np.einsum("vnc,nm->vmc", whitened, self._mixing.astype(values.dtype), optimize=True))
+
+    def clean(self, values: Array) -> Array:
+        """[V, n, c] of columns [B, n, c]."""
+        mixed = self._mixed(values)
+        return without(mixed.reshape(-1, mixed.shape[2]), self.span).reshape(mixed.shape)
+
+
+def splines_of_joints(splines: Numbers, joints: int) -> Numbers:
+    """[B, n, n·s]: those of each joint are columns of their own."""
+    found = np.zeros((len(splines), joints, joints * splines.shape[1]))
+    for j in range(joints):
+        found[:, j, j * splines.shape[1] : (j + 1) * splines.shape[1]] = splines
+    return found
+
+
+def unshrunk_target(target: Numbers, span: Numbers, starts: NDArray[np.int64]) -> Numbers:
+    """[V, n] (I − H_bb)^(−½) of the residual in each block, H the projection on the nuisance's orthonormal span: what
+    the nuisance has taken of a block is given back in the mean (CR2: Bell and McCaffrey, 2002).
+    """
+    joints = target.shape[1]
+    flat, found = target.reshape(-1), target.reshape(-1).copy()
+    for begin, end in zip(starts, [*starts[1:], len(target)], strict=True):
+        rows = slice(int(begin) * joints, int(end) * joints)
+        own = span[rows]
+        if own.shape[0] < own.shape[1]:
+            taken, side = np.linalg.eigh(own @ own.T)
+        else:
+            taken, right = np.linalg.eigh(own.T @ own)
+            kept = taken > 1e-9
+            taken = taken[kept]
+            side = own @ (right[:, kept] / np.sqrt(taken))
+        factor = 1.0 / np.sqrt(np.maximum(1.0 - taken, MOST_TAKEN)) - 1.0
+        found[rows] += side @ (factor * (side.T @ flat[rows]))
+    return np.asarray(found.reshape(target.shape))
+
+
+def residual_of(series: Series, splines: Numbers, nominal: Array) -> Numbers:
     """[B, n] N·m: target less bias and all that `nominal` [B, n, u] explains by least squares; unused rows as found."""
     used = series.used
     span = basis(splines[used])
     target = without(series.target[used], span)
     if nominal.shape[2]:
-        own = np.stack([without(nominal[used, j], span) for j in range(nominal.shape[1])], axis=1)
+        wide = np.asarray(nominal[used], dtype=np.float64)
+        own = np.stack([without(wide[:, j], span) for j in range(wide.shape[1])], axis=1)
         flat = basis(own.reshape(-1, own.shape[2]))
         target = without(target.reshape(-1), flat).reshape(target.shape)
     found = series.target - np.mean(series.target[used], axis=0)
     found[used] = target
     return np.asarray(found)
-
-
-class _Cleaner:
-    """Takes everything off columns that the nuisance explains: whitens, takes the bias off joint by joint, makes joints
-    uncorrelated, takes off what the nominal model's numbers can do."""
-
-    def __init__(self, white: Whitener, splines: Numbers, target: Numbers, nominal: Numbers) -> None:
-        joints = target.shape[1]
-        self._white = white
-        whitened = white.apply(np.repeat(splines[:, None], joints, axis=1))[white.valid]
-        self._bias = [basis(whitened[:, j]) for j in range(joints)]
-        self._mixing = np.eye(joints)
-        self._span = np.zeros((0, 0))
-        own = self._without_bias(nominal)
-        left = self._without_bias(target[:, :, None])[:, :, 0]
-        flat = basis(own.reshape(-1, own.shape[2]))
-        plain = without(left.reshape(-1), flat).reshape(left.shape)
-        self._mixing = common(plain, np.ones(len(plain), dtype=bool))
-        self._span = basis(np.einsum("vnc,nm->vmc", own, self._mixing).reshape(-1, own.shape[2]))
-        self.target: Numbers = without((left @ self._mixing).reshape(-1), self._span).reshape(left.shape)
-
-    def _without_bias(self, values: Array) -> Array:
-        whitened = self._white.apply(values)[self._white.valid]
-        return np.stack([without(whitened[:, j], span) for j, span in enumerate(self._bias)], axis=1)
-
-    def clean(self, values: Array) -> Array:
-        """[V, n, c] of columns [B, n, c]."""
-        own = self._without_bias(values)
-        mixed = np.einsum("vnc,nm->vmc", own, self._mixing.astype(own.dtype), optimize=True)
-        return without(mixed.reshape(-1, own.shape[2]), self._span).reshape(own.shape)
 
 
 def block_starts(series: Series, white: Whitener, length: float = BLOCK) -> NDArray[np.int64]:
@@ -172,23 +216,20 @@ def tested_trials(
     p_values, statistic = np.ones(count), np.zeros(count)
     if not chosen or blocks < 3:
         return Tested(p_values, statistic, visits, draws)
-    scaled, sides, offsets = _scaled_scores(prepared, [trials[k] for k in chosen])
+    totals, scaled, sides, offsets = _scaled_scores(prepared, [trials[k] for k in chosen])
     degrees = np.diff([*offsets, scaled.shape[1]])
-    signed = np.array([trials[k].sign != 0 for k in chosen])
+    signed = np.array([all(trials[k].signs) for k in chosen])
 
-    def p_of(flips: Array) -> tuple[Numbers, Numbers]:
-        squares = np.add.reduceat((flips @ scaled) ** 2, offsets, axis=1)
-        right = ~signed | (flips @ sides > 0)
-        return _single_p(np.where(right, squares, 0.0), degrees, signed, blocks), squares
+    def p_of(scores: Numbers, side: Numbers) -> tuple[Numbers, Numbers]:
+        squares = np.add.reduceat(scores**2, offsets, axis=1)
+        return _single_p(np.where(~signed | (side > 0), squares, 0.0), degrees, signed, blocks), squares
 
-    own, squares = p_of(np.ones((1, blocks)))
+    own, squares = p_of(*totals)
     rng = np.random.default_rng([seed, 20])
-    least_p = np.concatenate(
-        [
-            p_of(rng.integers(0, 2, (min(500, draws - begin), blocks)) * 2.0 - 1.0)[0].min(axis=1)
-            for begin in range(0, draws, 500)
-        ]
-    )
+    least_p = np.zeros(0)
+    while len(least_p) < draws:
+        flips = rng.integers(0, 2, (min(500, draws - len(least_p)), blocks)) * 2.0 - 1.0
+        least_p = np.append(least_p, p_of(flips @ scaled, flips @ sides)[0].min(axis=1))
     p_values[chosen], statistic[chosen] = family_wise(own[0], least_p), squares[0]
     return Tested(p_values, statistic, visits, draws)
 
@@ -200,22 +241,30 @@ def effective_blocks(gram: Numbers) -> float:
     return float(energy.sum() ** 2 / power) if power > 0 else 0.0
 
 
-def _scaled_scores(prepared: Prepared, trials: Sequence[Trial]) -> tuple[Numbers, Numbers, list[int]]:
-    """Scores [K, C] of unit covariance within each trial, a score [K, T] whose sum has the sign of the estimates, and
-    where each trial begins among the C."""
-    scaled, sides, offsets, first = [], [], [], 0
+def _scaled_scores(
+    prepared: Prepared, trials: Sequence[Trial]
+) -> tuple[tuple[Numbers, Numbers], Numbers, Numbers, list[int]]:
+    """Of all trials, one after the other: scores [K, C] whose outer products add up to the identity within a trial, and
+    scores [K, T] whose sum has the sign of the estimates; before them the actual sums of both, [1, C] and [1, T], and
+    at last where each trial begins among the C."""
+    sums, scaled, side_sums, sides, offsets, first = [], [], [], [], [], 0
     for trial in trials:
-        score, total = prepared.score(trial), prepared.gram(trial).sum(axis=0)
+        total = prepared.gram(trial).sum(axis=0)
         length = np.sqrt(np.maximum(np.diag(total), 1e-300))
-        score, total = score / length, total / np.outer(length, length)
+        whole, score = prepared.score(trial).sum(axis=0) / length, prepared.unshrunk_score(trial) / length
         power, direction = np.linalg.eigh(score.T @ score)
         kept = power > 1e-9 * power[-1]
-        scaled.append(score @ (direction[:, kept] / np.sqrt(power[kept])) if power[-1] > 0 else score[:, :1] * 0.0)
-        estimate = np.linalg.lstsq(total, np.ones(len(total)), rcond=1e-9)[0]
-        sides.append((trial.sign or 1) * (score @ estimate))
+        turn = direction[:, kept] / np.sqrt(power[kept]) if power[-1] > 0 else np.zeros((len(length), 1))
+        # the sum of the estimates, each in its expected direction
+        estimate = np.linalg.lstsq(total / np.outer(length, length), np.array(trial.signs, dtype=float), rcond=1e-9)[0]
+        sums.append(whole @ turn)
+        scaled.append(score @ turn)
+        side_sums.append(whole @ estimate)
+        sides.append(score @ estimate)
         offsets.append(first)
-        first += scaled[-1].shape[1]
-    return np.concatenate(scaled, axis=1), np.column_stack(sides), offsets
+        first += turn.shape[1]
+    actual = np.concatenate(sums)[None], np.array(side_sums)[None]
+    return actual, np.concatenate(scaled, axis=1), np.column_stack(sides), offsets
 
 
 def _single_p(statistic: Numbers, degrees: Array, signed: Array, blocks: int) -> Numbers:
