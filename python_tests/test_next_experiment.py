@@ -11,12 +11,22 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tendonfmu.balance import moment_arms
+from tendonfmu.balance import moment_arms, pretension_vector
 from tendonfmu.discrimination import discriminating_motion
 from tendonfmu.effects import CANDIDATES, Place
 from tendonfmu.errors import InputError
 from tendonfmu.estimation import HAS_ESTIMATION
-from tendonfmu.experiment_menu import Entry, Recorded, Section, combined, entry_from_json, loads, motions, tensions
+from tendonfmu.experiment_menu import (
+    WIDER,
+    Entry,
+    Recorded,
+    Section,
+    combined,
+    entry_from_json,
+    loads,
+    motions,
+    tensions,
+)
 from tendonfmu.experiment_motion import expected_recording, perform
 from tendonfmu.extension_fit import Accepted, FitSettings, extended_description, fit_numbers
 from tendonfmu.fit_recordings import FitRecording
@@ -82,10 +92,10 @@ def test_load_and_plain_friction_are_told_by_the_pretension(planned: Experiments
     """At one pretension friction that grows with the load is constant, as plain friction is."""
     answer = planned.answers[0]
     assert answer.tells and answer.entry.tension != ""
-    assert len({section.pretension for section in answer.entry.sections}) > 1 or answer.entry.sections[0].lowest
+    assert len({section.pretension for section in answer.entry.sections}) > 1 or answer.entry.sections[0].swing
     assert answer.distance > 3 * answer.now and answer.distance > 0.33
     assert planned.best.separates and planned.best.separates[0][0].effect == "joint_friction"
-    assert "pretension" in planned.sentence(0) and "joint load friction" in planned.sentence(0)
+    assert "tension" in planned.sentence(0) and "joint load friction" in planned.sentence(0)
     gain = planned.answers[1]
     assert gain.tells and (gain.entry.tension or gain.entry.load) and gain.distance > 2 * gain.now
 
@@ -118,13 +128,19 @@ def all_entries() -> list[Entry]:
 
 @pytest.mark.parametrize("entry", all_entries(), ids=lambda entry: entry.words[:60])
 def test_a_motion_stays_where_it_was_recorded(entry: Entry) -> None:
-    """Within the ranges, taut, as fast as it says, at rest at both ends; the same after a report."""
+    """Within its ranges, taut, as fast as it says, at rest at both ends; the same after a report."""
     again = entry_from_json(json.loads(json.dumps(entry.as_json())), 2)
     assert again == entry
     rate = 50.0
     found = perform(FINGER, entry, rate)
-    for j, (low, high) in enumerate(RANGES):
+    for j in range(2):
+        ends = [section.ranges[j] for section in entry.sections]
+        low, high = min(low for low, _ in ends), max(high for _, high in ends)
         assert low - 1e-9 <= found.position[:, j].min() and found.position[:, j].max() <= high + 1e-9
+        wider = WIDER if "times the range" in entry.motion else 1.0
+        assert wider * RANGES[j][0] - 1e-9 <= low and high <= wider * RANGES[j][1] + 1e-9
+    lowest = min(section.pretension if section.swing is None else section.lowest for section in entry.sections)
+    assert found.tension.min() >= lowest * min(pretension_vector(FINGER)) * (1 - 1e-9)
     fastest = max(section.max_speed for section in entry.sections)
     assert np.abs(found.velocity).max() <= fastest * (1 + 1e-9)
     middle = (found.position[2:] - found.position[:-2]) * rate / 2
@@ -173,7 +189,7 @@ def test_the_motion_can_be_run(planned: Experiments, tmp_path: Path) -> None:
     )
     levels = np.array(motion.pretension["value"])
     for section in found.entry.sections:
-        assert section.lowest is not None or np.isclose(levels, section.pretension).any()
+        assert section.swing is not None or np.isclose(levels, section.pretension).any()
     assert found.sentence == planned.best.sentence
     assert any(found.entry.words in line for line in found.lines())
 

@@ -1,4 +1,4 @@
-"""What else could be recorded: a menu of motions, pretensions and known loads, within the range that was recorded.
+"""What else could be recorded: a menu of motions, pretensions and known loads, mostly in the range that was recorded.
 
 An entry is a list of sections, each a training motion of `excitation.py` with a pretension and a load of its own; it is
 plain JSON (`Menu`), so that a report can carry it and `tendonfmu excite --discriminate` can write it.
@@ -22,6 +22,8 @@ Data = Mapping[str, Any]
 
 LEVELS = (0.5, 1.0, 2.0, 4.0)  # of the pretension that was recorded
 SLOW, FAST = 0.2, 2.5  # of the speed that was recorded
+SWING = 0.7  # Hz, of tensions; splines of a slow bias follow up to a third of it
+WIDER = 1.6  # times the range that was recorded
 SECONDS = 40.0  # s, of an entry
 LONG = 600.0  # s
 _SMALL = 0.08  # of a joint's range: small strokes
@@ -34,17 +36,18 @@ _ALTERNATIONS = 2  # of a known load from one side to the other
 
 @dataclass(frozen=True)
 class Section:
-    """A stretch of motion. ranges: [n] of (low, high) rad. max_speed: rad/s. seconds. pretension: N, mean. lowest,
-    highest: N, of tensions that change from tendon to tendon, None: they stand at the pretension. load: [n] N·m, known,
-    at the joints. max_acceleration: rad/s².
+    """A stretch of motion. ranges: [n] of (low, high) rad. max_speed: rad/s. seconds. pretension: N, mean. swing: Hz,
+    at which the tensions swing between `lowest` and `highest` (N), from tendon to tendon; None: they stand. load: [n]
+    N·m, known, at the joints. max_acceleration: rad/s².
     """
 
     ranges: tuple[tuple[float, float], ...]
     max_speed: float
     seconds: float
     pretension: float
-    lowest: float | None = None
-    highest: float | None = None
+    swing: float | None = None
+    lowest: float = 0.0
+    highest: float = 0.0
     load: tuple[float, ...] = ()
     max_acceleration: float = 10.0
 
@@ -140,6 +143,11 @@ def motions(recorded: Recorded) -> Iterator[Entry]:
         f"fast strokes of up to {fast:.2g} rad/s",
         (replace(usual, max_speed=fast, max_acceleration=max(10.0, 10.0 * fast)),),
     )
+    middle, half = recorded.ranges.mean(axis=1), 0.5 * WIDER * np.ptp(recorded.ranges, axis=1)
+    wide = _as_ranges(np.column_stack([middle - half, middle + half]))
+    yield Entry(
+        f"the same kind of motion over {WIDER:g} times the range, if the joints can", (replace(usual, ranges=wide),)
+    )
     long = max(LONG, 2 * recorded.seconds)
     yield Entry(
         f"the same kind of motion for {long / 60:.0f} min without a pause, from cold", (replace(usual, seconds=long),)
@@ -184,7 +192,7 @@ def _small_strokes(recorded: Recorded, usual: Section) -> Entry:
 
 
 def tensions(data: Data, entry: Entry) -> Iterator[Entry]:
-    """The entry at several pretensions, and with tensions that change from tendon to tendon, where the finger can."""
+    """The entry at several pretensions, and with tensions that swing faster than a bias drifts, where it holds any."""
     base = entry.sections[0].pretension
     if not pretension_vector(data).any() or base <= 0:
         return
@@ -196,21 +204,19 @@ def tensions(data: Data, entry: Entry) -> Iterator[Entry]:
         ),
         tension="at pretensions of " + ", ".join(f"{level:.3g}" for level in levels[:-1]) + f" and {levels[-1]:.3g} N",
     )
-    arms = moment_arms(data)
-    if len(arms) > arms.shape[1] + 1:
-        low, high = levels[0], levels[-1]
-        yield replace(
-            entry,
-            sections=tuple(replace(section, lowest=low, highest=high) for section in entry.sections),
-            tension=f"each tendon tight and loose in turn, {low:.3g} to {high:.3g} N",
-        )
+    low, high = levels[0], levels[-2]
+    yield replace(
+        entry,
+        sections=tuple(replace(section, swing=SWING, lowest=low, highest=high) for section in entry.sections),
+        tension=f"the tensions swinging about every {1 / SWING:.2g} s between {low:.3g} and {high:.3g} N",
+    )
 
 
 def loads(data: Data, entry: Entry, recorded: Recorded) -> Iterator[Entry]:
     """The entry with a known load at the joints, on one side and on the other."""
     first = entry.sections[0]
     own = first.pretension * pretension_vector(data)
-    least = own if first.lowest is None else np.minimum(own, first.lowest)
+    least = own if first.swing is None else np.minimum(own, first.lowest)
     largest = known_load(data, least, recorded.torque)
     if not largest.any():
         return

@@ -19,12 +19,12 @@ from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.fit_residuals import model_alone
 from tendonfmu.quintic import evaluate
 from tendonfmu.recording import Recording
-from tendonfmu.tension_plan import Variation
 
 Numbers = NDArray[np.float64]
 Data = Mapping[str, Any]
 
-_VARY_EVERY = 6.0  # s
+_SPREAD = (0.75, 1.35)  # times the frequency of the swing, of the first and the last of the ways in which tensions can
+_CLOSE = 1e-9  # of the largest singular value: moment arms that are dependent
 _CHANGE = 2.0  # s, at least, from one section to the next
 _PEAK_OVER_MEAN = 1.875  # speed of a quintic stroke from rest to rest
 
@@ -108,9 +108,6 @@ def expected_recording(data: Data, performed: Performed, kinematics: int) -> Fit
 
 
 def _section(data: Data, section: Section, rate: float, seed: int) -> Performed:
-    vary = None
-    if section.lowest is not None and section.highest is not None:
-        vary = Variation(section.lowest, section.highest, min(_VARY_EVERY, section.seconds / 2))
     plan = Plan(
         ranges=np.array(section.ranges, dtype=float),
         max_speed=section.max_speed,
@@ -118,7 +115,6 @@ def _section(data: Data, section: Section, rate: float, seed: int) -> Performed:
         pretensions=(section.pretension if pretension_vector(data).any() else 0.0,),
         rate=rate,
         seed=seed,
-        vary=vary,
         max_acceleration=section.max_acceleration,
     )
     motion: Excitation = plan_excitation(data, plan)
@@ -128,10 +124,39 @@ def _section(data: Data, section: Section, rate: float, seed: int) -> Performed:
         position=motion.joint_position,
         velocity=motion.joint_velocity,
         acceleration=motion.joint_acceleration,
-        tension=motion.tension,
+        tension=_tension(data, section, motion),
         load=np.tile(load, (len(motion.time), 1)),
         tendon_position=motion.tendon_position,
     )
+
+
+def _tension(data: Data, section: Section, motion: Excitation) -> Numbers:
+    """[N, m] N that hold themselves. Where they swing, each way in which tensions can change without turning a joint
+    has a frequency of its own, so that no two tendons swing alike; together they stay within the limits.
+    """
+    if section.swing is None:
+        return motion.tension
+    arms, time = moment_arms(data), motion.time
+    left, sizes, _ = np.linalg.svd(arms)
+    ways = left[:, int(np.sum(sizes > _CLOSE * sizes[0])) :]
+    shares = pretension_vector(data)
+    pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
+    low, high = np.where(pulls, section.lowest, -section.highest), np.full(len(arms), section.highest)
+    even = shares * float(np.clip(section.pretension, _fit(low, shares, np.max), _fit(high, shares, np.min)))
+    reach = np.abs(ways).sum(axis=1)
+    room = np.minimum(np.maximum(even - low, 0.0), np.maximum(high - even, 0.0))
+    size = float(np.min(room[reach > _CLOSE] / reach[reach > _CLOSE]))
+    rates = section.swing * np.geomspace(*_SPREAD, ways.shape[1]) if ways.shape[1] > 1 else np.array([section.swing])
+    # at rest at both ends
+    grow, _, _ = evaluate(np.array([[0.0, 0, 0, 0], [_CHANGE, 1, 0, 0]]), np.minimum(time, time[-1] - time))
+    waves = np.sin(2 * np.pi * time[:, None] * rates + np.arange(len(rates)))
+    return even + size * (grow[:, None] * waves) @ ways.T
+
+
+def _fit(limit: Numbers, shares: Numbers, worst: Any) -> float:
+    """Pretension at which every tendon's share keeps its limit."""
+    used = shares > _CLOSE
+    return float(worst(limit[used] / shares[used]))
 
 
 def _passage(before: Performed, after: Performed, speed: float, rate: float) -> Performed:

@@ -367,14 +367,10 @@ def _sentence(told: Sequence[Answer]) -> str:
     first = told[0]
     cause, rival = _described(first.question.cause), first.question.rival
     if not first.tells:
-        what = (
-            f"{cause} apart from {_described(rival)}"
-            if rival is not None
-            else f"{cause} apart from the model's own numbers"
-        )
+        what = f"{cause} from {_described(rival)}" if rival is not None else f"{cause} from the model's own numbers"
         return (
             f"No motion, pretension or known load of the menu tells {what}: at best {_times(first.distance)} the noise "
-            f"would be left of it"
+            f"is left of it. {first.question.cause.candidate.explanation}"
         )
     what = f"{cause} from {_described(rival)}" if rival is not None else f"{cause} from the model's own numbers"
     apart = "the predictions differ by" if rival is not None else "what is left of an ordinary one is"
