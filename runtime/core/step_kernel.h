@@ -91,6 +91,9 @@ HOT_INLINE int all_finite(const tendonfmu_finger* f) {
     probe += 0.0 * (1e160 * sum); /* infinite above 1.8e148 */
     probe += 0.0 * s->angle[j] + 0.0 * joint_velocity[j];
   }
+  for (size_t k = 0; k < f->shape.extension_memory; ++k) {
+    probe += 0.0 * s->extension[k];
+  }
   return probe == 0.0;
 }
 

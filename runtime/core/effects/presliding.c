@@ -41,8 +41,10 @@ static void advance(effect_place place, const double* values, const effect_sampl
     const double travel = sample->first ? 0.0 : v * sample->step, side = travel < 0.0 ? -1.0 : 1.0;
     const double kept = law_exponential(fabs(travel) / values[0]), left = side - before[SHARE];
     after[SHARE] = travel == 0.0 ? before[SHARE] : side - left * kept;
-    after[BY_DISPLACEMENT] = kept * (before[BY_DISPLACEMENT] - left * fabs(travel) / values[0] / values[0]);
-    after[BY_VELOCITY] = sample->first ? 0.0 : left * kept * side * sample->step / values[0];
+    const int lasts = kept > 0.0; /* else its slopes are 0, however short the displacement */
+    after[BY_DISPLACEMENT] =
+        lasts ? kept * (before[BY_DISPLACEMENT] - left * fabs(travel) / values[0] / values[0]) : 0.0;
+    after[BY_VELOCITY] = lasts && !sample->first ? left * kept * side * sample->step / values[0] : 0.0;
   }
 }
 
