@@ -134,10 +134,10 @@ def by_sindy(data: Plain) -> list[Trial]:
     import pysindy
 
     power = np.einsum("rc,rc->c", data.columns, data.columns)
-    shown = [trial for trial in data.trials if _shows(trial, power)]
-    numbers = [trial.first + k for trial in shown for k in range(trial.count)]
-    owner = [trial for trial in shown for _ in range(trial.count)]
-    scaled = data.columns[:, numbers] / data.columns[:, numbers].std(axis=0)
+    every = [(trial.first + k, trial) for trial in data.trials for k in range(trial.count)]
+    numbers = [number for number, _ in every if power[number] > _least(power)]
+    owner = [trial for number, trial in every if power[number] > _least(power)]
+    scaled = data.columns[:, numbers] / np.sqrt(power[numbers] / len(data.target))
     model = pysindy.SINDy(
         optimizer=pysindy.STLSQ(threshold=THRESHOLD, alpha=0.05), feature_library=pysindy.IdentityLibrary()
     )

@@ -143,8 +143,8 @@ def run_campaign(
 ) -> int:
     """Runs what has no row yet, a row's file as each case ends. Returns how many ran.
 
-    client: of dask, or None: here, one after another. beside: as for `run_case`, its file absolute. stop_after: s, after
-    which no further case begins.
+    client: of dask, or None: here, one after another. beside: as for `run_case`, its file absolute. stop_after: s,
+    after which no further case begins.
     """
     check_output_folder(folder)
     (folder / ROWS).mkdir(parents=True, exist_ok=True)
