@@ -150,7 +150,7 @@ def _tension(data: Data, section: Section, motion: Excitation) -> Numbers:
     # at rest at both ends
     grow, _, _ = evaluate(np.array([[0.0, 0, 0, 0], [_CHANGE, 1, 0, 0]]), np.minimum(time, time[-1] - time))
     waves = np.sin(2 * np.pi * time[:, None] * rates + np.arange(len(rates)))
-    return even + size * (grow[:, None] * waves) @ ways.T
+    return np.asarray(even + size * (grow[:, None] * waves) @ ways.T)
 
 
 def _fit(limit: Numbers, shares: Numbers, worst: Any) -> float:
