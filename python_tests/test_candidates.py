@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from tendonfmu import native
 from tendonfmu.balance import balanced_forces, moment_arms
 from tendonfmu.block_averages import Blocks, BlockSums, regular_blocks
-from tendonfmu.candidate_columns import CandidateColumns, Proposal, Shape, block_prediction, candidate_columns
+from tendonfmu.block_runs import block_prediction
+from tendonfmu.candidate_columns import CandidateColumns, Proposal, Shape, candidate_columns
 from tendonfmu.derivative_passes import nominal_directions, plan_passes
 from tendonfmu.description import FingerDescription
 from tendonfmu.diagnosis_span import Span, span_of
@@ -106,8 +107,8 @@ def moved(data: Data, seconds: float, seed: int, gap: bool = False) -> Recording
 class Case:
     """Columns of two recordings, one with a gap, in blocks that leave some samples out."""
 
-    def __init__(self) -> None:
-        self.data = finger_data()
+    def __init__(self, bias: Mapping[str, Any] | None = None) -> None:
+        self.data = finger_data() | ({} if bias is None else {"bias": bias})
         finger = described(self.data)
         made = (moved(self.data, 6.0, 1, gap=True), moved(self.data, 5.0, 2))
         self.recordings: list[FitRecording] = [prepare(finger, each, 1, Held()) for each in made]
@@ -136,6 +137,11 @@ class Case:
 @pytest.fixture(scope="module")
 def case() -> Case:
     return Case()
+
+
+@pytest.fixture(scope="module")
+def remembering() -> Case:
+    return Case({"entry_load": True, "forget_rate": 0.0})
 
 
 def by_difference(case: Case, base: Data, numbers: Mapping[str, float], step: float, one_sided: bool) -> Numbers:
@@ -251,6 +257,17 @@ def test_prediction_is_what_a_run_says(case: Case) -> None:
 @pytest.mark.parametrize("name", CONTRACT)
 def test_columns_are_differences_of_the_core(case: Case, name: str) -> None:
     """Derivatives at a strength of zero by small steps, secants by the term at full strength."""
+    assert_all_columns(case, name)
+
+
+@pytest.mark.parametrize(
+    "name", ["viscous_friction", "asymmetric_friction", "edge_friction", "friction_drift", "gravity"]
+)
+def test_columns_where_stiction_remembers_its_load(remembering: Case, name: str) -> None:
+    assert_all_columns(remembering, name)
+
+
+def assert_all_columns(case: Case, name: str) -> None:
     shapes = case.shapes(name)
     assert shapes
     for _, shape, variant in shapes:
@@ -268,7 +285,9 @@ def test_columns_are_differences_of_the_core(case: Case, name: str) -> None:
             assert_column(values[:, :, k], expected, column.expected, f"{name} {shape.shape} {column.path}")
 
 
-def test_nominal_columns_are_differences_of_the_core(case: Case) -> None:
+@pytest.mark.parametrize("which", ["case", "remembering"])
+def test_nominal_columns_are_differences_of_the_core(request: pytest.FixtureRequest, which: str) -> None:
+    case = request.getfixturevalue(which)
     names, directions = nominal_directions(case.data)
     assert case.columns.nominal_names == names and len(names) == case.columns.nominal.shape[2]
     assert {"joints[1].friction.rate", "tendons[4].edge_friction[1].negative.coulomb", "extensions[1].sine"} <= set(
@@ -352,6 +371,20 @@ def test_a_fit_estimates_what_is_added(case: Case, name: str) -> None:
 def test_magnitudes_are_counted(case: Case) -> None:
     with pytest.raises(InputError, match="magnitudes: 1 numbers; expected 2, one per column"):
         by_name("gravity").extended(case.data, Place(2), {}, [1.0])
+
+
+def test_sizes_stay_within_what_a_description_takes(case: Case) -> None:
+    """A candidate's magnitude is an estimate, and may be anything."""
+    for name, place, shape, most in (
+        ("time_delay", Place(), {"delay": -0.03}, 50.0),
+        ("friction_drift", Place(), {"time_constant": 3.0}, -40.0),
+        ("force_gain", Place(tendon=1), {}, -3.0),
+        ("asymmetric_friction", Place(1, 3), {}, 9.0),
+        ("edge_friction", Place(1, 2), {}, -5.0),
+    ):
+        candidate = by_name(name)
+        sizes = [most] * candidate.variant(case.data, place, shape).count
+        native.image_from_json(json.dumps(candidate.extended(case.data, place, shape, sizes)))
 
 
 # --- averages ---------------------------------------------------------------------------------------------------------

@@ -7,28 +7,27 @@ the C core.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu import native
-from tendonfmu.balance import moment_arms
 from tendonfmu.block_averages import Blocks
-from tendonfmu.derivative_passes import nominal_directions, plan_passes, run_pass
+from tendonfmu.block_runs import block_prediction, block_slope, needs_differences, ordinary_size
+from tendonfmu.derivative_passes import Direction, nominal_directions, plan_passes, run_pass
 from tendonfmu.diagnosis_span import Span, span_of
 from tendonfmu.effects import CANDIDATES, Candidate, Place, Variant
+from tendonfmu.errors import InputError
 from tendonfmu.fit_recordings import FitRecording
 
 Numbers = NDArray[np.float64]
 Single = NDArray[np.float32]
 Progress = Callable[[int, int], None]
 
-_NEVER = 1e9  # N·m; no contact threshold is ever passed
-_STRETCH = 4000  # samples of a run at a time: what a run returns stays near the processor
+_MOST_MEMORY = 8.0  # GB, of all columns
 
 
 @dataclass(frozen=True)
@@ -91,79 +90,108 @@ def candidate_columns(
     """The columns of the description and of all candidates that it lacks.
 
     data: the fitted nominal description. recordings: made ready for it, all with the same kinematics source. span: of
-    the recordings, None: found here. progress: called with samples done and all samples, over all passes.
+    the recordings, None: found here. progress: called with samples done and all samples, over all passes. Raises
+    InputError where the columns would not fit in memory.
     """
     plain = without_uncertainty(data)
     found_span = span_of(plain, recordings) if span is None else span
     proposed = list(_proposed(plain, recordings[0].kinematics, found_span, candidates))
     names, nominal = nominal_directions(plain)
     variants = [variant for _, _, variants in proposed for variant in variants]
-    firsts = np.cumsum([0, *(variant.count for variant in variants)]).tolist()
-    joints, u, c = len(data["joints"]), len(names), firsts[-1]
-    passes = plan_passes(plain, [(v, u + at) for v, at in zip(variants, firsts, strict=False) if not v.secant_rows])
-    secants = [(v, u + at) for v, at in zip(variants, firsts, strict=False) if v.secant_rows]
-    sums = np.zeros((blocks.count, joints, u + c), dtype=np.float32)
-    watch = _watched(progress, recordings, len(passes) + len(_bundles(secants)) + 1)
-    passes[0].columns[:0] = enumerate(nominal)
-    for each in passes:
-        if each.columns:
-            run_pass(each.data(), each.columns, recordings, blocks, sums, watch)
-    sizes = np.maximum(blocks.sizes(), 1)
-    sums /= sizes[:, None, None].astype(np.float32)
-    prediction = block_prediction(plain, recordings, blocks)
-    watch(_samples(recordings))
-    for bundle in _bundles(secants):
-        together = bundle[0][0].with_secants([variant for variant, _ in bundle])
-        change = block_prediction(together, recordings, blocks) - prediction
-        for variant, at in bundle:
-            own = slice(None) if variant.only_joint is None else variant.only_joint - 1
-            sums[:, own, at] = change[:, own]
-        watch(_samples(recordings))
+    joints, u = len(data["joints"]), len(names)
+    firsts = np.cumsum([u, *(variant.count for variant in variants)]).tolist()
+    _refuse_too_many(blocks.count * joints * firsts[-1] * 4 / 1e9, firsts[-1])
+    work = _Work(plain, recordings, blocks, np.zeros((blocks.count, joints, firsts[-1]), dtype=np.float32), progress)
+    work.plan(nominal, list(zip(variants, firsts, strict=False)))
+    prediction = work.run()
     proposals, labels = _labelled(proposed)
-    return CandidateColumns(prediction, sums[:, :, :u], names, sums[:, :, u:], labels, proposals)
+    return CandidateColumns(prediction, work.values[:, :, :u], names, work.values[:, :, u:], labels, proposals)
+
+
+class _Work:
+    """All that has to be run: passes of derivatives, slopes by small steps, and terms at full strength.
+
+    values: [B, n, u + c], to be filled.
+    """
+
+    def __init__(
+        self,
+        data: Mapping[str, Any],
+        recordings: Sequence[FitRecording],
+        blocks: Blocks,
+        values: Single,
+        progress: Progress | None,
+    ) -> None:
+        self._data, self._recordings, self._blocks = data, recordings, blocks
+        self.values, self._progress = values, progress
+        self._slopes: list[tuple[int, Callable[[], Mapping[str, Any]], Direction, float]] = []
+        self._samples = sum(part.stop - part.start for each in recordings for part in each.parts)
+        self._done = 0
+
+    def plan(self, nominal: Sequence[Direction], variants: Sequence[tuple[Variant, int]]) -> None:
+        """nominal: directions of the first columns. variants: each with the place of its first column."""
+        exact = []
+        for variant, at in variants:
+            paths = [path for column in variant.columns for path in column.numbers]
+            if needs_differences(self._data, paths):
+                for k, column in enumerate(variant.columns):
+                    self._slopes.append((at + k, partial(_own_data, variant), column.numbers, column.expected))
+            elif not variant.secant_rows:
+                exact.append((variant, at))
+        self._passes = plan_passes(self._data, exact)
+        for at, direction in reversed(list(enumerate(nominal))):
+            if needs_differences(self._data, list(direction)):
+                self._slopes.append((at, lambda: self._data, direction, ordinary_size(self._data, direction)))
+            else:
+                self._passes[0].columns.insert(0, (at, direction))
+        self._passes = [each for each in self._passes if each.columns]
+        self._bundles = _bundles([(variant, at) for variant, at in variants if variant.secant_rows])
+        self._total = self._samples * (len(self._passes) + len(self._slopes) + len(self._bundles) + 1)
+
+    def run(self) -> Numbers:
+        """Fills the values; returns G of the description."""
+        for each in self._passes:
+            run_pass(each.data(), each.columns, self._recordings, self._blocks, self.values, self._watch)
+        self.values /= np.maximum(self._blocks.sizes(), 1)[:, None, None].astype(np.float32)
+        prediction = self._prediction(self._data)
+        for at, data, direction, size in self._slopes:
+            self.values[:, :, at] = block_slope(data(), direction, size, prediction, self._recordings, self._blocks)
+            self._watch(self._samples)
+        for bundle in self._bundles:
+            together = bundle[0][0].with_secants([variant for variant, _ in bundle])
+            change = self._prediction(together) - prediction
+            for variant, at in bundle:
+                own = slice(None) if variant.only_joint is None else variant.only_joint - 1
+                self.values[:, own, at] = change[:, own]
+        return prediction
+
+    def _prediction(self, data: Mapping[str, Any]) -> Numbers:
+        found = block_prediction(data, self._recordings, self._blocks)
+        self._watch(self._samples)
+        return found
+
+    def _watch(self, samples: int) -> None:
+        self._done += samples
+        if self._progress is not None:
+            self._progress(min(self._done, self._total), self._total)
+
+
+def _own_data(variant: Variant) -> Mapping[str, Any]:
+    return variant.data
+
+
+def _refuse_too_many(size: float, columns: int) -> None:
+    if size > _MOST_MEMORY:
+        raise InputError(
+            f"{columns} columns of what may be missing need {size:.0f} GB: expected at most {_MOST_MEMORY:g} GB: "
+            "a finger of fewer joints and tendons at a time, or shorter recordings"
+        )
 
 
 def without_uncertainty(data: Mapping[str, Any]) -> dict[str, Any]:
     """Without directions of uncertainty, which tell of the description's own numbers and grow with their count."""
     contact = {key: value for key, value in data["contact"].items() if not key.startswith("uncertainty")}
     return {**data, "contact": contact}
-
-
-def block_prediction(data: Mapping[str, Any], recordings: Sequence[FitRecording], blocks: Blocks) -> Numbers:
-    """[B, n] block means of G of a description, N·m, less the torque of the forces in use beyond the measured ones.
-
-    The latter is 0 but for forces that the description delays (`time_delay` below 0).
-    """
-    sums = np.zeros((blocks.count, len(data["joints"])))
-    finger, arms = native.Finger(native.image_from_json(json.dumps(_learning_nothing(data)))), moment_arms(data)
-    for recording, block in zip(recordings, blocks.of, strict=True):
-        for part in recording.parts:
-            finger.reset()
-            finger.set_kinematics_source(recording.kinematics)
-            for begin in range(part.start, part.stop, _STRETCH):
-                rows = slice(begin, min(begin + _STRETCH, part.stop))
-                arrays = recording.arrays(rows)
-                # τ − T_eff, and T_eff is T with all jumps so far where the bias learns nothing
-                whole = arrays["tendon_force"] @ arms - finger.run(arrays)["compensated_torque"]
-                _add_up(sums, block[rows], whole)
-    return np.asarray(sums / np.maximum(blocks.sizes(), 1)[:, None])
-
-
-def _add_up(sums: Numbers, block: NDArray[np.int64], values: Numbers) -> None:
-    inside = block >= 0
-    if inside.any():
-        first, own = int(block[inside][0]), block[inside]
-        for j in range(sums.shape[1]):
-            found = np.bincount(own - first, weights=values[inside, j])
-            sums[first : first + len(found), j] += found
-
-
-def _learning_nothing(data: Mapping[str, Any]) -> dict[str, Any]:
-    """The description whose bias moves by the jumps alone, and that never sees contact."""
-    kept = {key: value for key, value in (data.get("bias") or {}).items() if key in ("forget_rate", "entry_load")}
-    joints = len(data["joints"])
-    still = {**kept, "drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": [0.0] * joints}
-    return {**data, "bias": still, "contact": {"threshold": [_NEVER] * joints}}
 
 
 def _proposed(
@@ -212,19 +240,3 @@ def _label(candidate: Candidate, place: Place, variant: Variant, path: str) -> s
     where = [f"{word} {number}" for word, number in parts if number is not None]
     numbers = [f"{key} {value:.4g}" for key, value in variant.shape.items()]
     return ", ".join([candidate.name, *where, *numbers, *([path] if path else [])])
-
-
-def _samples(recordings: Sequence[FitRecording]) -> int:
-    return sum(part.stop - part.start for each in recordings for part in each.parts)
-
-
-def _watched(progress: Progress | None, recordings: Sequence[FitRecording], passes: int) -> Callable[[int], None]:
-    total, done = passes * _samples(recordings), 0
-
-    def watch(samples: int) -> None:
-        nonlocal done
-        done += samples
-        if progress is not None:
-            progress(min(done, total), total)
-
-    return watch

@@ -59,7 +59,8 @@ class Variant:
     rows of `extensions`. settings: numbers of laws that mean nothing at strength zero: path of the law -> Stribeck
     velocity. shape: the non-linear numbers here. columns: derivatives to take. secant_rows: where there is no
     derivative, the rows at full strength; the one column is then the difference that they make, magnitude 1.
-    scaled: keys of secant_rows that grow with the magnitude. only_joint: whose torque alone the rows change, from 1.
+    scaled: keys of secant_rows that grow with the magnitude, up to `most` at either sign. only_joint: whose torque
+    alone the rows change, from 1.
     """
 
     base: Data
@@ -70,6 +71,7 @@ class Variant:
     settings: Mapping[str, float] | None = None
     secant_rows: tuple[Mapping[str, Any], ...] = ()
     scaled: tuple[str, ...] = ()
+    most: float = math.inf
     only_joint: int | None = None
 
     @cached_property
@@ -111,7 +113,9 @@ class Variant:
             raise InputError(f"magnitudes: {len(magnitudes)} numbers; expected {self.count}, one per column")
         if self.secant_rows:
             factor = min(max(float(magnitudes[0]), 0.2), 5.0)
-            rows = [{k: v * factor if k in self.scaled else v for k, v in row.items()} for row in self.secant_rows]
+            rows = [dict(row) for row in self.secant_rows]
+            for row in rows:
+                row |= {key: min(max(row[key] * factor, -self.most), self.most) for key in self.scaled}
             return apply_edits(self.base, (), rows, {})
         result = apply_edits(self.base, self.edits, self.rows, self.settings or {})
         for column, magnitude in zip(self.columns, magnitudes, strict=True):

@@ -16,7 +16,7 @@ from tendonfmu.fit_structure import MAGNITUDES, get_number, own_copy, set_number
 Data = Mapping[str, Any]
 
 ABSENT, POINTS, SIDES, COVER = "absent", "points", "sides", "cover"  # kinds of edits, in the order of their making
-_NEXT_TO_NONE = 1e-12  # of the force, or N·m
+_NEXT_TO_NONE = 1e-15  # of the force, or N·m
 _ORDER = (ABSENT, POINTS, SIDES, COVER)
 _LAW = re.compile(
     r"(?P<law>joints\[\d+\]\.(?:load_)?friction|tendons\[\d+\]\.(?:edge|pulley)_friction\[\d+\])"

@@ -40,11 +40,13 @@ def secant_variant(
     *,
     scaled: bool,
     only_joint: int | None = None,
+    most: float = math.inf,
 ) -> Variant:
     """A term whose torque has no useful derivative at zero: its column is the difference at full strength.
 
     number: of the row, with the shape's value. scaled: whether twice the number makes about twice the difference.
-    only_joint: whose torque alone it changes.
+    only_joint: whose torque alone it changes. most: the largest size of the number that the description takes.
     """
     rows = (row(effect, place, **{number: float(shape[number])}),)
-    return Variant(data, shape, secant_rows=rows, scaled=(number,) if scaled else (), only_joint=only_joint)
+    keys = (number,) if scaled else ()
+    return Variant(data, shape, secant_rows=rows, scaled=keys, only_joint=only_joint, most=most)

@@ -9,6 +9,7 @@ from tendonfmu.effects.extension_row import row_variant
 from tendonfmu.effects.friction_law_places import all_tendons, without_rows
 
 NAME = "force_gain"
+_LEAST = -0.9  # of the gain; at −1 nothing is left of the force
 
 
 def _places(data: Data, kinematics: int) -> list[Place]:
@@ -16,7 +17,7 @@ def _places(data: Data, kinematics: int) -> list[Place]:
 
 
 def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
-    return row_variant(data, NAME, place, shape, {"correction": 0})
+    return row_variant(data, NAME, place, shape, {"correction": 0}, least=_LEAST)
 
 
 CANDIDATE = Candidate(

@@ -11,7 +11,7 @@ from tendonfmu.effects.friction_law_places import rubbing_joints, rubbing_tendon
 
 NAME = "friction_drift"
 _OF_DURATION = (0.1, 0.6)  # time constants
-_ORDINARY, _LEAST = 0.2, -0.85  # of the friction
+_LEAST = -0.85  # of the friction
 
 
 def _places(data: Data, kinematics: int) -> list[Place]:

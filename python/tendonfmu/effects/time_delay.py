@@ -11,6 +11,7 @@ from tendonfmu.effects.friction_law_places import without_rows
 
 NAME = "time_delay"
 _DELAYS = (0.001, 0.004, 0.015)  # s
+_LONGEST = 0.05  # s; docs/extensions.md
 _LEAST_STEPS, _MOST_STEPS = 0.5, 60.0  # samples: what can be told, and what the model remembers
 
 
@@ -19,13 +20,13 @@ def _places(data: Data, kinematics: int) -> list[Place]:
 
 
 def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
-    longest = min(0.05, _MOST_STEPS * span.step)
+    longest = min(_LONGEST, _MOST_STEPS * span.step)
     grid = sorted({min(max(delay, _LEAST_STEPS * span.step), longest) for delay in _DELAYS})
     return [{"delay": sign * delay} for delay in grid for sign in (1, -1)]
 
 
 def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
-    return secant_variant(data, NAME, place, shape, "delay", scaled=True)
+    return secant_variant(data, NAME, place, shape, "delay", scaled=True, most=_LONGEST)
 
 
 CANDIDATE = Candidate(

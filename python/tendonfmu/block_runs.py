@@ -1,0 +1,105 @@
+"""Block means of whole runs of the core: G of a description, and its slopes along directions of its numbers.
+
+Slopes by small steps serve where the estimator's derivatives are not exact: with `bias.entry_load` what an effect
+remembers from when it came to rest depends on the friction in front of it at that time.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu import native
+from tendonfmu.balance import moment_arms
+from tendonfmu.block_averages import Blocks
+from tendonfmu.effects.description_edit import add_to_number, data_number, is_law_number
+from tendonfmu.fit_recordings import FitRecording
+from tendonfmu.fit_structure import get_number, own_copy, set_number
+
+Numbers = NDArray[np.float64]
+
+STEP = 1e-4  # of a number's ordinary size: G is linear in most numbers, and nearly so in the others over this
+_NEVER = 1e9  # N·m; no contact threshold is ever passed
+_STRETCH = 4000  # samples of a run at a time: what a run returns stays near the processor
+
+
+def block_prediction(data: Mapping[str, Any], recordings: Sequence[FitRecording], blocks: Blocks) -> Numbers:
+    """[B, n] block means of G of a description, N·m, less the torque of the forces in use beyond the measured ones.
+
+    The latter is 0 but for forces that the description delays (`time_delay` below 0).
+    """
+    sums = np.zeros((blocks.count, len(data["joints"])))
+    finger, arms = native.Finger(native.image_from_json(json.dumps(_learning_nothing(data)))), moment_arms(data)
+    for recording, block in zip(recordings, blocks.of, strict=True):
+        for part in recording.parts:
+            finger.reset()
+            finger.set_kinematics_source(recording.kinematics)
+            for begin in range(part.start, part.stop, _STRETCH):
+                rows = slice(begin, min(begin + _STRETCH, part.stop))
+                arrays = recording.arrays(rows)
+                # τ − T_eff, and T_eff is T with all jumps so far where the bias learns nothing
+                whole = arrays["tendon_force"] @ arms - finger.run(arrays)["compensated_torque"]
+                _add_up(sums, block[rows], whole)
+    return np.asarray(sums / np.maximum(blocks.sizes(), 1)[:, None])
+
+
+def _add_up(sums: Numbers, block: NDArray[np.int64], values: Numbers) -> None:
+    inside = block >= 0
+    if inside.any():
+        first, own = int(block[inside][0]), block[inside]
+        for j in range(sums.shape[1]):
+            found = np.bincount(own - first, weights=values[inside, j])
+            sums[first : first + len(found), j] += found
+
+
+def _learning_nothing(data: Mapping[str, Any]) -> dict[str, Any]:
+    """The description whose bias moves by the jumps alone, and that never sees contact."""
+    kept = {key: value for key, value in (data.get("bias") or {}).items() if key in ("forget_rate", "entry_load")}
+    joints = len(data["joints"])
+    still = {**kept, "drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": [0.0] * joints}
+    return {**data, "bias": still, "contact": {"threshold": [_NEVER] * joints}}
+
+
+# --- slopes -----------------------------------------------------------------------------------------------------------
+
+
+def needs_differences(data: Mapping[str, Any], paths: Sequence[str]) -> bool:
+    """Whether the estimator's derivatives by these numbers leave out what `bias.entry_load` remembers."""
+    if not (data.get("bias") or {}).get("entry_load"):
+        return False
+    return any(is_law_number(path) or path.endswith((".amplitude", ".time_constant")) for path in paths)
+
+
+def block_slope(
+    data: Mapping[str, Any],
+    direction: Mapping[str, float],
+    size: float,
+    prediction: Numbers,
+    recordings: Sequence[FitRecording],
+    blocks: Blocks,
+) -> Numbers:
+    """[B, n] change of G per magnitude along a direction of numbers, as the estimator counts them: `static` is its
+    difference from `coulomb`, which takes it along, and a Stribeck velocity moves by its inverse.
+
+    size: an ordinary magnitude; the step is a small share of it, upwards. prediction: G at `data`.
+    """
+    changed, step = own_copy(data), STEP * size
+    for path, share in direction.items():
+        if is_law_number(path) and path.endswith(".stribeck_velocity"):
+            set_number(changed, path, 1.0 / (1.0 / float(get_number(changed, path)) + step * share))
+        else:
+            add_to_number(changed, path, step * share)
+    return np.asarray((block_prediction(changed, recordings, blocks) - prediction) / step)
+
+
+def ordinary_size(data: Mapping[str, Any], direction: Mapping[str, float]) -> float:
+    """Of a magnitude along a direction of a fit's numbers: the number itself, of a Stribeck velocity its inverse."""
+    path = next(iter(direction))
+    value = abs(data_number(data, path))
+    if is_law_number(path) and path.endswith(".static"):
+        value -= abs(data_number(data, f"{path.rsplit('.', 1)[0]}.coulomb"))
+    return 1.0 / value if path.endswith(".stribeck_velocity") else value or 1.0
