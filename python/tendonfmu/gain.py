@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,7 @@ from tendonfmu.errors import InputError
 from tendonfmu.fit_evaluation import residuals
 from tendonfmu.fit_files import description_text
 from tendonfmu.fit_recordings import FitRecording
-from tendonfmu.fit_residuals import Model, bias_settings, delayed_torque, rms
+from tendonfmu.fit_residuals import BiasSettings, Model, bias_settings, delayed_torque, rms
 from tendonfmu.fmu import run_fmu
 from tendonfmu.gain_interval import Blocks, blocks_of, gain_interval
 from tendonfmu.packaging import build_fmu
@@ -79,7 +79,7 @@ def measure_gain(
     there is nothing to test on, or the FMU does not agree with the core.
     """
     test = _Test.of(training, tests)
-    if bias_settings(nominal) != bias_settings(extended):
+    if _filter_of(nominal) != _filter_of(extended):
         raise InputError("bias: not the same in both descriptions; expected equal settings, or rms tells nothing")
     runs = {name: [run_both(data, each) for each in test.recordings] for name, data in _both(nominal, extended)}
     left = {name: [run.residual for run in found] for name, found in runs.items()}
@@ -95,6 +95,11 @@ def measure_gain(
         held_out=test.held_out,
         agreement=max(run.agreement for found in runs.values() for run in found),
     )
+
+
+def _filter_of(data: Data) -> BiasSettings:
+    """The bias filter's settings; where the bias begins is a number that is fitted, and may differ."""
+    return replace(bias_settings(data), initial_torque=None)
 
 
 def residual_of(data: Data, recording: FitRecording) -> Numbers:
