@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.remainder_features import run_starts
-from tendonfmu.remainder_learner import autoregression, layout, whitened
+from tendonfmu.whitening import whitener
 
 if TYPE_CHECKING:
     from tendonfmu.diagnosis_series import Series
@@ -51,15 +51,7 @@ def noise_floor(series: Series, residual: Numbers) -> NoiseFloor:
     seconds = count * series.step
     if seconds >= LEAST:
         return NoiseFloor(tuple(np.sqrt(square / count).tolist()), REPEATS, pairs, seconds)
-    return NoiseFloor(_white(series, residual), WHITE, 0, 0.0)
-
-
-def _white(series: Series, residual: Numbers) -> tuple[float, ...]:
-    """rms of the innovations of each joint's autoregressive model."""
-    plan = layout(series)
-    used = residual[plan.rows]
-    found = [whitened(used[:, j], autoregression(used[:, j], plan.run), plan.run) for j in range(used.shape[1])]
-    return tuple(float(np.sqrt(np.mean(each**2))) if len(each) else 0.0 for each in found)
+    return NoiseFloor(tuple(whitener(series, residual).scale.tolist()), WHITE, 0, 0.0)
 
 
 def _motion(series: Series) -> Numbers:

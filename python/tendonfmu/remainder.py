@@ -18,6 +18,7 @@ from tendonfmu import remainder_learner as learner
 from tendonfmu.remainder_features import Features, features
 from tendonfmu.remainder_text import described
 from tendonfmu.spectral_line import Line, find_lines
+from tendonfmu.whitening import whitener
 
 if TYPE_CHECKING:
     from tendonfmu.diagnosis_series import Series
@@ -67,21 +68,24 @@ def measure_remainder(
 ) -> Remainder:
     """residual: [B, n] N·m. nuisance: per joint, columns [B, p] whose span was taken from its residual (bias splines,
     derivatives of the nominal model); columns of the learner get the same. Blocks that are not used are left out."""
-    plan = learner.layout(series)
+    filters = whitener(series, residual)
+    plan = learner.layout(series, filters.valid)
     joints = residual.shape[1]
     if plan.blocks < learner.FEWEST_BLOCKS:
         nothing = ((0.0, 0.0),) * joints
         return Remainder((0.0,) * joints, nothing, 1.0, False, "", np.zeros_like(residual), ())
     with threadpool_limits(limits=1):
-        seen = _rows_of(features(series, seed=seed), plan)
-        learned = [_learned(residual[:, j], nuisance[j], seen, plan) for j in range(joints)]
-        null = learner.null_surprises([skill for each in learned for skill in each.skills], plan.blocks, seed)
+        seen = features(series, seed=seed)
+        ready = [learner.prepared(j, residual, nuisance[j], seen, filters, plan) for j in range(joints)]
+        learned = [_learned(each, seen, plan, np.random.default_rng((seed, j))) for j, each in enumerate(ready)]
+        null = np.max([each.null for each in learned], axis=0)
     prediction = np.zeros_like(residual)
     prediction[plan.rows] = np.stack([each.values for each in learned], axis=1)
     findings = [_finding(number + 1, each, null) for number, each in enumerate(learned)]
     lines, waves = [], np.zeros_like(residual)
     for joint in range(joints):
-        found, waves[:, joint] = find_lines(series, residual[:, joint] - prediction[:, joint], level=level / joints)
+        left = residual[:, joint] - prediction[:, joint]
+        found, waves[:, joint] = find_lines(series, left, learner.of_joint(filters, joint), level=level / joints)
         lines += [Finding(joint + 1, "line", "", min(1.0, joints * each.p_value), each) for each in found]
     p_value = min(each.p_value for each in [*findings, *lines])
     findings = sorted([each for each in [*findings, *lines] if each.p_value <= level], key=lambda each: each.p_value)
@@ -92,36 +96,31 @@ def measure_remainder(
     return Remainder(share, interval, p_value, bool(clear), text, prediction, tuple(findings))
 
 
-def _rows_of(all_rows: Features, plan: learner.Layout) -> Features:
-    return Features(all_rows.values[plan.rows], all_rows.group, all_rows.subject)
-
-
 @dataclass(frozen=True)
 class _Learned:
-    """Of one joint. values: [U] N·m, predicted. named: choice that predicts best of those that have a name."""
+    """Of one joint. surprise: the greatest. null: [DRAWS] of it. values: [U] N·m, predicted. named: choice that
+    predicts best of those that have a name."""
 
-    skills: list[learner.Skill]
+    surprise: float
+    null: Numbers
     values: Numbers
     named: learner.Choice
 
 
-def _learned(residual: Numbers, nuisance: Numbers, seen: Features, plan: learner.Layout) -> _Learned:
-    ready = learner.prepared(residual[plan.rows], nuisance[plan.rows], seen, plan)
-    order = learner.ranked(ready, seen)
+def _learned(ready: learner.Prepared, seen: Features, plan: learner.Layout, rng: np.random.Generator) -> _Learned:
+    skills, null = learner.skills(ready, seen, plan, rng)
+    order = list({id(skill.choice): skill.choice for skill in skills}.values())
     everything = next(choice for choice in order if not choice.group)
     single = [choice for choice in order if choice.group][:TRIED]
     best = learner.Choice("", "", np.unique(np.concatenate([choice.columns for choice in single[: TRIED // 2]])))
     guess = learner.predicted(ready, [*single, everything, best], seen, plan)
-    explained = guess.goal if max(guess.gains) > 0.0 else np.zeros_like(guess.goal)
-    gain = dict(zip(range(len(single)), guess.gains, strict=False))
-    plain = [number for number in gain if single[number].group != "interaction"] or list(gain)
-    named = single[max(plain, key=lambda number: gain[number])]
-    return _Learned(learner.skills(ready, order, explained, plan), guess.values, named)
+    plain = [k for k, choice in enumerate(single) if choice.group != "interaction"] or [0]
+    named = single[max(plain, key=lambda number: guess.gains[number])]
+    return _Learned(skills[0].surprise, null, guess.values, named)
 
 
 def _finding(joint: int, learned: _Learned, null: Numbers) -> Finding:
-    best = max((skill.surprise for skill in learned.skills), default=0.0)
-    p_value = float(1 + np.sum(null >= best)) / (1 + len(null))
+    p_value = float(1 + np.sum(null >= learned.surprise)) / (1 + len(null))
     return Finding(joint, learned.named.group, learned.named.subject, p_value)
 
 

@@ -1,12 +1,12 @@
-"""A flexible learner with a calibrated null: ridge regression on whitened columns, blocks of time as its samples.
+"""A flexible learner with a calibrated null: ridge regression on whitened columns.
 
-Residual and columns get the same treatment before anything is split: whitened by one autoregressive filter, projected
-off the nuisance columns. Whether there is anything to learn: S = z'W z with z = X'y and W = (X'X + λ)^-1 (a score test
-with a ridge prior). Had the noise of each block of a few seconds the other sign, z would be Σ s_b X_b'y_b: random signs
-s give the distribution of S whatever the colour of the noise (block wild bootstrap), and S is a quadratic form in s, so
-thousands of draws cost one small matrix. The projection takes more from the noise of some blocks than of others: each
-block is corrected for its leverage (Bell and McCaffrey 2002, CR2). How much can be learned: the same regression, on
-blocks it has not seen.
+Residual and columns get the same treatment before anything is split: whitened by one filter, projected off the
+nuisance columns. Whether there is anything to learn: S = z'W z with z = X'y, W = (X'X + λ)^-1, a score test with a
+ridge prior (le Cessie and van Houwelingen 1995). Its null follows from z ~ N(0, X'X) by simulation, for all sets of
+columns together. What the filter left of the noise's memory, or noise that comes in bursts, shows as blocks of a few
+seconds that vary more than white noise: S is divided by that ratio. The projection takes more from the noise of some
+blocks than of others; each is corrected for its leverage (Bell and McCaffrey 2002, CR2). How much can be learned: the
+same regression, on blocks it has not seen.
 """
 
 from __future__ import annotations
@@ -18,16 +18,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, eigh, qr, solve, solve_toeplitz, solve_triangular
+from scipy.linalg import cho_factor, eigh, eigvalsh, solve, solve_triangular
 from scipy.stats import gamma, norm
 
+from tendonfmu.nuisance import basis, without
 from tendonfmu.remainder_features import Features
+from tendonfmu.whitening import Whitener
 
 if TYPE_CHECKING:
     from tendonfmu.diagnosis_series import Series
 
 Numbers = NDArray[np.float64]
 Indices = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 BLOCK = 2.0  # s: longer than the noise remembers once the bias splines are out
 FOLD_BLOCKS = 3  # blocks side by side in a fold; one block on either side of them is learned from by nobody
@@ -36,8 +39,8 @@ FEWEST_BLOCKS = 8
 TEST_PENALTIES = (30.0, 300.0)  # noise variance over the variance that a group may explain
 PENALTIES = (3.0, 30.0, 300.0)
 FLATTEST = 0.95  # leverage that is corrected for, at most
-MOST_ORDER = 12
 DRAWS = 2000
+CHANCE = 1.3  # ratio of block variances that a small set may have by chance
 
 
 @dataclass(frozen=True)
@@ -55,66 +58,25 @@ class Layout:
     fold_of: Indices
 
 
-def layout(series: Series) -> Layout:
-    """Blocks of BLOCK seconds that no gap cuts, and folds of neighbouring blocks."""
-    rows = np.flatnonzero(series.used)
-    new = np.ones(len(rows), dtype=bool)
-    if len(rows):
-        new[1:] = (np.diff(rows) > 1) | (np.diff(series.segment[rows]) != 0)
-    run = np.cumsum(new) - 1
+def layout(series: Series, rows: Flags) -> Layout:
+    """rows: [B] that may be learned from. Blocks of BLOCK seconds that no gap cuts, folds of neighbouring blocks."""
+    chosen = np.flatnonzero(rows)
+    new = np.ones(len(chosen), dtype=bool)
+    new[1:] = (np.diff(chosen) > 1) | (np.diff(series.segment[chosen]) != 0)
     length = max(1, round(BLOCK / series.step))
-    block = np.empty(len(rows), dtype=np.int64)
+    block = np.empty(len(chosen), dtype=np.int64)
     count = 0
-    starts = np.concatenate([np.flatnonzero(new), [len(rows)]])
-    for first, end in pairwise(starts):
+    for first, end in pairwise([*np.flatnonzero(new).tolist(), len(chosen)]):
         pieces = max(1, round((end - first) / length))
         block[first:end] = count + np.arange(end - first) * pieces // (end - first)
         count += pieces
-    bundle = np.arange(count) // FOLD_BLOCKS
-    fold_of = bundle % max(1, min(FOLDS, int(bundle[-1]) + 1 if count else 1))
-    return Layout(rows, run, block, fold_of[block] if count else block, count, fold_of)
+    fold_of = np.arange(count) // FOLD_BLOCKS % max(1, min(FOLDS, -(-count // FOLD_BLOCKS)))
+    return Layout(chosen, np.cumsum(new) - 1, block, fold_of[block], count, fold_of)
 
 
-def autoregression(signal: Numbers, run: Indices) -> Numbers:
-    """Coefficients a_1.. of the whitening filter e_t = y_t + Σ a_l y_{t−l}, order by BIC (Yule-Walker)."""
-    count = len(signal)
-    covariance = np.array([_lagged(signal, run, lag) for lag in range(MOST_ORDER + 1)]) / max(count, 1)
-    if covariance[0] <= 0.0:
-        return np.empty(0)
-    best, chosen = np.log(covariance[0]) * count, np.empty(0)
-    for order in range(1, MOST_ORDER + 1):
-        found = -solve_toeplitz(covariance[:order], covariance[1 : order + 1])
-        variance = covariance[0] + found @ covariance[1 : order + 1]
-        score = np.log(max(variance, 1e-12 * covariance[0])) * count + order * np.log(count)
-        if score < best:
-            best, chosen = score, found
-    return np.asarray(chosen)
-
-
-def _lagged(signal: Numbers, run: Indices, lag: int) -> float:
-    if lag == 0:
-        return float(signal @ signal)
-    return float(np.sum((signal[lag:] * signal[:-lag])[run[lag:] == run[:-lag]]))
-
-
-def whitened(values: NDArray[Any], coefficients: Numbers, run: Indices) -> NDArray[Any]:
-    """values [U] or [U, k], filtered within each run; nothing is known before a run."""
-    result = values.copy()
-    for lag, coefficient in enumerate(coefficients, start=1):
-        same = (run[lag:] == run[:-lag]).astype(values.dtype) * values.dtype.type(coefficient)
-        result[lag:] += values[:-lag] * (same if values.ndim == 1 else same[:, None])
-    return np.asarray(result)
-
-
-def orthonormal(columns: Numbers) -> Numbers:
-    """Orthonormal basis [U, r] of the span of columns [U, p]."""
-    norms = np.linalg.norm(columns, axis=0)
-    kept = columns[:, norms > 0.0] / norms[norms > 0.0]
-    if not kept.shape[1]:
-        return np.empty((len(columns), 0))
-    basis, triangle, _ = qr(kept, mode="economic", pivoting=True)
-    diagonal = np.abs(np.diag(triangle))
-    return np.asarray(basis[:, : int(np.sum(diagonal > 1e-9 * diagonal[0]))])
+def of_joint(filters: Whitener, joint: int) -> Whitener:
+    """Of arrays [B, 1, ...] of this joint alone."""
+    return Whitener(filters.coefficients[:, joint : joint + 1], filters.scale[joint : joint + 1], filters.valid)
 
 
 @dataclass(frozen=True)
@@ -133,26 +95,29 @@ class Prepared:
     inner: Numbers
 
 
-def prepared(residual: Numbers, nuisance: Numbers, seen: Features, plan: Layout) -> Prepared:
-    """residual: [U] of the rows of the plan; nuisance: [U, p]; seen: columns of the same rows."""
-    basis = orthonormal(nuisance)
-    target = residual - basis @ (basis.T @ residual)
-    coefficients = autoregression(target, plan.run)
-    inner = orthonormal(whitened(nuisance, coefficients, plan.run))
-    table = np.asarray(whitened(seen.values.astype(np.float32), coefficients, plan.run), dtype=np.float32)
+def prepared(
+    joint: int, residual: Numbers, nuisance: Numbers, seen: Features, filters: Whitener, plan: Layout
+) -> Prepared:
+    """joint: from 0. residual: [B, n] N·m; nuisance: [B, p] of this joint; seen: [B, D]. plan: of the filters' valid
+    rows."""
+    own = of_joint(filters, joint)
+
+    def filtered(values: NDArray[Any]) -> NDArray[Any]:
+        return np.asarray(own.apply(values.reshape(len(values), 1, -1))[plan.rows, 0])
+
+    plain = basis(nuisance[plan.rows])
+    inner = basis(filtered(nuisance))
+    table = filtered(seen.values.astype(np.float32))
     before = np.mean(table**2, axis=0)
-    small = inner.astype(np.float32)
-    table -= small @ (small.T @ table)
+    table = without(table, inner)
     after = np.mean(table**2, axis=0)
     scale = np.where(after > 1e-4 * before, 1.0, 0.0)  # nothing is left of the others but rounding
     for name in dict.fromkeys(seen.group.tolist()):
         power = float(np.sum((after * scale)[seen.group == name]))
         scale[seen.group == name] *= 1.0 / np.sqrt(power) if power > 0.0 else 0.0
-    table *= scale.astype(np.float32)
-    goal = whitened(target, coefficients, plan.run)
-    goal -= inner @ (inner.T @ goal)
+    goal = without(filtered(residual[:, joint])[:, 0], inner)
     spread = max(float(goal.std()), 1e-300)
-    return Prepared(table, (goal / spread).astype(np.float32), scale * spread, basis, inner)
+    return Prepared(table * scale.astype(np.float32), (goal / spread).astype(np.float32), scale * spread, plain, inner)
 
 
 def _even_leverage(goal: Numbers, inner: Numbers, plan: Layout) -> Numbers:
@@ -184,23 +149,6 @@ class Choice:
     columns: Indices
 
 
-def ranked(ready: Prepared, seen: Features) -> list[Choice]:
-    """All groups, each of their subjects, all columns together: the most telling first, by theory for white noise."""
-    gram = (ready.table.T @ ready.table).astype(np.float64)
-    whole = (ready.table.T @ ready.goal).astype(np.float64)
-    scored = []
-    for choice in _choices(seen, ready.scale > 0.0):
-        inner, power = _inner(gram, choice, len(ready.goal))
-        value, vectors = eigh(inner, check_finite=False)
-        share = np.clip(value, 0.0, None) / (np.clip(value, 0.0, None) + TEST_PENALTIES[0])
-        turned = vectors.T @ (whole[choice.columns] / np.sqrt(power))
-        excess = float(np.sum(turned**2 / (value.clip(0.0) + TEST_PENALTIES[0])) - share.sum())
-        spread, third = float(np.sqrt(2.0 * np.sum(share**2))), 8.0 * float(np.sum(share**3))
-        skew = min(third / spread**3, 2.8) if spread > 0.0 else 0.0
-        scored.append((float(_surprise(np.array([excess / max(spread, 1e-12)]), skew)[0]), choice))
-    return [choice for _, choice in sorted(scored, key=lambda pair: -pair[0])]
-
-
 def _choices(seen: Features, alive: NDArray[np.bool_]) -> list[Choice]:
     pairs = list(dict.fromkeys(zip(seen.group.tolist(), seen.subject.tolist(), strict=True)))
     names = list(dict.fromkeys(group for group, _ in pairs))
@@ -222,72 +170,77 @@ def _inner(gram: Numbers, choice: Choice, rows: int) -> tuple[Numbers, float]:
 
 @dataclass(frozen=True)
 class Skill:
-    """What one choice of columns tells of a residual. kernel: [b, b] symmetric, without diagonal, unit null variance.
-
-    score: over the standard deviation under the null. skew: of the null.
-    """
+    """What one choice of columns tells of a residual. surprise: −log p of this choice alone. excess: ratio of the
+    variance of blocks to that of white noise, at least 1."""
 
     choice: Choice
-    kernel: NDArray[np.float32]
-    score: float
-    skew: float
-
-    @property
-    def surprise(self) -> float:
-        """−log p of this choice alone."""
-        return float(_surprise(np.array([self.score]), self.skew)[0])
+    surprise: float
+    excess: float
 
 
-def skills(ready: Prepared, choices: Sequence[Choice], explained: Numbers, plan: Layout) -> list[Skill]:
-    """explained: [U] what is predicted of the goal on unseen blocks, or 0: signs are drawn for what is left of it, else
-    a strong effect would pass for noise of its own strength."""
-    even = _even_leverage(ready.goal - explained, ready.inner, plan).astype(np.float32)
-    product = np.zeros((plan.blocks, ready.table.shape[1]), dtype=np.float32)
+def skills(ready: Prepared, seen: Features, plan: Layout, rng: np.random.Generator) -> tuple[list[Skill], Numbers]:
+    """Of all groups, of each of their subjects and of all columns together, the most telling first; and [DRAWS] the
+    greatest surprise among them where there is nothing but noise."""
+    even = _even_leverage(ready.goal.astype(np.float64), ready.inner, plan).astype(np.float32)
     starts = np.flatnonzero(np.diff(plan.block, prepend=-1))
-    np.add.reduceat(ready.table * even[:, None], starts, axis=0, out=product)
+    product = np.add.reduceat(ready.table * even[:, None], starts, axis=0)
     gram = (ready.table.T @ ready.table).astype(np.float64)
     whole = (ready.table.T @ ready.goal).astype(np.float64)
-    found = []
-    for choice in choices:
+    drawn = _drawn(gram, rng)
+    null = np.zeros(DRAWS)
+    raw: list[tuple[Choice, float, float, tuple[float, float, float]]] = []
+    for choice in _choices(seen, ready.scale > 0.0):
         inner, power = _inner(gram, choice, len(ready.goal))
-        right = np.column_stack([whole[choice.columns], product[:, choice.columns].T]) / np.sqrt(power)
+        columns = choice.columns
+        right = np.concatenate([whole[columns, None], product[:, columns].T, drawn[columns]], axis=1) / np.sqrt(power)
         for penalty in TEST_PENALTIES:
             factor = cho_factor(inner + penalty * np.eye(len(inner)), lower=True, check_finite=False)[0]
             turned = solve_triangular(factor, right, lower=True, check_finite=False)
-            kernel = turned[:, 1:].T @ turned[:, 1:]
-            excess = float(turned[:, 0] @ turned[:, 0] - np.trace(kernel))
-            np.fill_diagonal(kernel, 0.0)
-            spread, skew = _null_shape(kernel)
-            if spread > 0.0:
-                found.append(Skill(choice, (kernel / spread).astype(np.float32), excess / spread, skew))
-    return found
+            shape = _shape(inner, penalty)
+            if shape[1] <= 0.0:
+                continue
+            ratio = _block_power(turned[:, 1 : 1 + plan.blocks]) / shape[0]
+            raw.append((choice, float(np.sum(turned[:, 0] ** 2)), ratio, shape))
+            null = np.maximum(null, _surprises(np.sum(turned[:, 1 + plan.blocks :] ** 2, axis=0), *shape))
+    # the ratio of a small set is uncertain: its own counts only as far as it is beyond chance
+    usual = max(1.0, float(np.median([ratio for _, _, ratio, _ in raw])))
+    found = []
+    for choice, score, ratio, shape in raw:
+        excess = max(usual, ratio / CHANCE)
+        found.append(Skill(choice, float(_surprises(np.array([score / excess]), *shape)[0]), excess))
+    return sorted(found, key=lambda skill: -skill.surprise), null
 
 
-def _null_shape(kernel: Numbers) -> tuple[float, float]:
-    """Standard deviation and skewness of s'K s over random signs; exact where the diagonal of K is 0."""
-    variance = 2.0 * float(np.sum(kernel**2))
-    if variance <= 0.0:
-        return 0.0, 0.0
-    third = 8.0 * float(np.sum((kernel @ kernel) * kernel))
-    return float(np.sqrt(variance)), float(np.clip(third / variance**1.5, 0.0, 2.8))
+def _drawn(gram: Numbers, rng: np.random.Generator) -> Numbers:
+    """[D, DRAWS] X'y of white noise y."""
+    value, vectors = eigh(gram, check_finite=False)
+    return np.asarray((vectors * np.sqrt(value.clip(0.0))) @ rng.standard_normal((len(gram), DRAWS)))
 
 
-def _surprise(score: Numbers, skew: float) -> Numbers:
-    """−log of the upper tail of Pearson's third distribution with mean 0, variance 1."""
+def _shape(inner: Numbers, penalty: float) -> tuple[float, float, float]:
+    """Mean, standard deviation and skewness of S for white noise."""
+    value = eigvalsh(inner, check_finite=False).clip(0.0)
+    share = value / (value + penalty)
+    spread = float(np.sqrt(2.0 * np.sum(share**2)))
+    return float(share.sum()), spread, min(8.0 * float(np.sum(share**3)) / max(spread, 1e-300) ** 3, 2.83)
+
+
+def _block_power(blocks: Numbers) -> float:
+    """Σ |z_b|² of blocks [D, b], of single ones or of neighbours taken together, whichever is more."""
+    both = blocks[:, 1:] + blocks[:, :-1]
+    single = float(np.sum(blocks**2))
+    # every block but the two outer ones lies in two pairs
+    paired = 0.5 * (float(np.sum(both**2)) + float(np.sum(blocks[:, [0, -1]] ** 2)))
+    return max(single, paired)
+
+
+def _surprises(score: Numbers, mean: float, spread: float, skew: float) -> Numbers:
+    """−log of the upper tail of Pearson's third distribution with these moments."""
+    ratio = (score - mean) / spread
     if skew < 0.02:
-        return np.asarray(-norm.logsf(score))
+        return np.asarray(-norm.logsf(ratio))
     shape = 4.0 / skew**2
-    return np.asarray(-gamma.logsf(np.maximum(score * np.sqrt(shape) + shape, 1e-12), shape))
-
-
-def null_surprises(found: Sequence[Skill], blocks: int, seed: int) -> Numbers:
-    """[DRAWS] the greatest surprise of all sets of all joints over random signs of the blocks."""
-    signs = np.random.default_rng(seed).choice(np.array([-1.0, 1.0], dtype=np.float32), (DRAWS, blocks))
-    best = np.zeros(DRAWS)
-    for each in found:
-        score = np.einsum("ij,ij->i", signs @ each.kernel, signs)
-        best = np.maximum(best, _surprise(score.astype(np.float64), each.skew))
-    return best
+    return np.asarray(-gamma.logsf(np.maximum(ratio * np.sqrt(shape) + shape, 1e-12), shape))
 
 
 @dataclass(frozen=True)
@@ -320,7 +273,7 @@ def predicted(ready: Prepared, choices: Sequence[Choice], seen: Features, plan: 
     guesses = np.stack([_by_fold(ready.table, each, plan) for each in weights])
     gains = (2.0 * guesses @ ready.goal.astype(np.float64) - np.sum(guesses**2, axis=1)) / len(ready.goal)
     best = int(np.argmax(gains))
-    values = _by_fold(seen.values, weights[best] * ready.scale, plan)
+    values = _by_fold(seen.values[plan.rows], weights[best] * ready.scale, plan)
     values -= ready.basis @ (ready.basis.T @ values)
     return Prediction(guesses[best], values, tuple(gains.reshape(len(choices), -1).max(axis=1).tolist()))
 

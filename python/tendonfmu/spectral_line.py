@@ -15,13 +15,15 @@ from scipy.ndimage import median_filter
 from scipy.special import gammainccinv
 from scipy.stats import gamma
 
+from tendonfmu.whitening import Whitener
+
 if TYPE_CHECKING:
     from tendonfmu.diagnosis_series import Series
 
 Numbers = NDArray[np.float64]
 
-LOWEST = 0.4  # Hz: slower ones belong to the bias
-BACKGROUND = 41  # bins of the smooth spectrum on either side
+LOWEST = 0.5  # Hz: slower ones belong to the bias
+BACKGROUND = 121  # bins of the smooth spectrum on either side
 MOST_LINES = 5
 
 
@@ -35,14 +37,20 @@ class Line:
     share: float
 
 
-def find_lines(series: Series, residual: Numbers, *, level: float) -> tuple[tuple[Line, ...], Numbers]:
-    """Lines in the residual [B] of a joint with p-values up to the level, and their sum [B]; 0 in unused blocks."""
+def find_lines(
+    series: Series, residual: Numbers, filters: Whitener, *, level: float
+) -> tuple[tuple[Line, ...], Numbers]:
+    """Lines in the residual [B] of a joint with p-values up to the level, and their sum [B]; 0 in unused blocks.
+
+    filters: of this joint; lines are looked for in what it leaves, so that a steep spectrum does not spill over.
+    """
     used = series.used & np.isfinite(residual)
     left = np.where(used, residual, 0.0)
     total, lines = np.zeros(len(residual)), []
     variance = float(np.sum(left**2))
     for _ in range(MOST_LINES):
-        found = _strongest(series, left, used)
+        flat = np.where(filters.valid, filters.apply(left[:, None])[:, 0], 0.0)
+        found = _strongest(series, flat, filters.valid)
         if found is None or found[1] > level:
             break
         wave, amplitude = _fitted(series, left, used, found[0])
@@ -53,7 +61,7 @@ def find_lines(series: Series, residual: Numbers, *, level: float) -> tuple[tupl
     return tuple(lines), total
 
 
-def _strongest(series: Series, left: Numbers, used: NDArray[np.bool_]) -> tuple[float, float] | None:
+def _strongest(series: Series, flat: Numbers, used: NDArray[np.bool_]) -> tuple[float, float] | None:
     """Frequency, Hz, and family-wise p-value of the highest point of the periodogram over its background."""
     recordings = np.unique(series.recording)
     places = [np.flatnonzero(series.recording == each) for each in recordings]
@@ -65,8 +73,8 @@ def _strongest(series: Series, left: Numbers, used: NDArray[np.bool_]) -> tuple[
         if seen * series.step < 5.0 / LOWEST:
             continue
         signal = np.zeros(length)
-        signal[slot] = left[rows]
-        power += np.abs(np.fft.rfft(signal)) ** 2 / max(float(np.sum(left[rows] ** 2)), 1e-300)
+        signal[slot] = flat[rows]
+        power += np.abs(np.fft.rfft(signal)) ** 2 / max(float(np.sum(flat[rows] ** 2)), 1e-300)
         waves += 1
     frequency = np.fft.rfftfreq(length, series.step)
     allowed = (frequency >= LOWEST) & (frequency <= 0.45 / series.step)
