@@ -22,16 +22,16 @@ ScaledBox::ScaledBox(const Unknowns& unknowns) {
     start[k] = u.start / u.scale;
     lower[k] = u.lower / u.scale;
     upper[k] = u.upper / u.scale;
-    if (u.role == Role::rate) {
-      rates.push_back(k);
+    if (u.curved) {
+      curved.push_back(k);
     }
   }
 }
 
 ScaledBox ScaledBox::around(const VectorXd& x, double share) const {
   ScaledBox box = *this;
-  for (const Index k : rates) {
-    const double most = share * std::max(x[k], 0.5);
+  for (const Index k : curved) {
+    const double most = share * std::max(std::fabs(x[k]), 0.5);
     box.lower[k] = std::max(lower[k], x[k] - most);
     box.upper[k] = std::min(upper[k], x[k] + most);
   }

@@ -12,9 +12,9 @@ struct ScaledBox {
   explicit ScaledBox(const Unknowns& unknowns);
 
   Eigen::VectorXd scale, start, lower, upper; /* all but scale divided by it */
-  std::vector<Eigen::Index> rates;            /* 1/vs: the only unknowns in which the model is far from linear */
+  std::vector<Eigen::Index> curved;           /* those in which the model is far from linear, such as 1/vs */
 
-  /* the box around x in which a local model is trusted: rates change by a share of what they are */
+  /* the box around x in which a local model is trusted: these change by a share of what they are */
   ScaledBox around(const Eigen::VectorXd& x, double share) const;
   Eigen::VectorXd clip(const Eigen::VectorXd& x) const { return x.cwiseMax(lower).cwiseMin(upper); }
   std::vector<double> unknowns(const Eigen::VectorXd& x) const;

@@ -158,7 +158,7 @@ class Columns {
   void add(const Candidate& c) {
     const auto [place, is_new] = by_group_.try_emplace(group_[c.parameter], list.size());
     if (is_new) {
-      list.push_back({c.role, {}, 0.0, 0.0, 0.0, 0.0, c.joint, path_of(s_.finger, c.parameter)});
+      list.push_back({c.role, {}, 0.0, 0.0, 0.0, 0.0, c.joint, path_of(s_.finger, c.parameter), false});
       kinds_.push_back(c.kind);
     }
     Unknown& unknown = list[place->second];
@@ -179,6 +179,10 @@ class Columns {
     for (const std::uint32_t p : unknown->parameters) {
       unknown->start += value_of(unknown->role, p, start) / count;
       scale += expected(unknown->role, p) / count;
+      const model_item item = parameter_item(&s_.finger->shape, p);
+      /* torques are linear in their numbers; what turns friction or the signals is not */
+      unknown->curved = unknown->curved || unknown->role == Role::rate ||
+                        (item.kind == ITEM_EXTENSION && item.effect->kind != EFFECT_TORQUE);
     }
     unknown->scale = scale > 0.0 ? scale : neighbours_scale(column);
     bound(unknown);

@@ -27,9 +27,10 @@ struct Unknown {
   std::vector<std::uint32_t>
       parameters; /* that it moves: of a drop the statics; of a tied coulomb its static follows */
   double start, lower, upper;
-  double scale;      /* expected magnitude: of the prior, and what makes the columns comparable */
-  std::size_t joint; /* the first that it turns, 0-based: it turns none before */
-  std::string path;  /* of its first parameter */
+  double scale;        /* expected magnitude: of the prior, and what makes the columns comparable */
+  std::size_t joint;   /* the first that it turns, 0-based: it turns none before */
+  std::string path;    /* of its first parameter */
+  bool curved = false; /* the model is far from linear in it */
 };
 
 /* Columns of one side of a law: −1 where a number is fixed. */
