@@ -24,6 +24,7 @@ from real_browser import Elements, framed, measure, visit
 from tendonfmu.diagnosis_page import PAGE, diagnosis_page, write_diagnosis_page
 from tendonfmu.diagnosis_report import build_report, report_text
 from tendonfmu.diagnosis_result import Diagnosis, Interval, ModelErrors, Where
+from tendonfmu.diagnosis_size import size_of
 from tendonfmu.diagnosis_text import (
     headline,
     lines,
@@ -138,6 +139,33 @@ def test_every_verdict_reads_right(verdict: str, count: int) -> None:
     assert not re.search(r"\b(1 causes|0 causes|None|causes explains)\b", text)
 
 
+@pytest.mark.parametrize(
+    ("effect", "numbers", "words"),
+    [
+        ("load_friction", {"coulomb": (8.1e-5, "m")}, "81 µN·m of friction for each newton of tendon force"),
+        ("preload_friction", {"coulomb": (0.2, "N")}, "0.2 N of friction"),
+        ("gravity", {"sine": (0.03, "N.m"), "cosine": (-0.04, "N.m")}, "50 mN·m at most"),
+        ("presliding", {"displacement": (3.2e-4, "m")}, "friction builds up over 0.32 mm"),
+        ("time_delay", {"delay": (-8e-4, "s")}, "the forces come 0.8 ms earlier than the positions"),
+        ("force_gain", {"correction": (-0.021, "1")}, "the true force is 2.1 % smaller than measured"),
+        ("moment_arm", {"correction": (-2.5e-4, "m")}, "−0.25 mm on the described arm"),
+        ("inertia", {"inertia": (1.2e-5, "kg.m2")}, "1.2·10⁻⁵ kg·m²"),
+        ("edge_friction", {"a.coulomb": (0.021, "1"), "b.coulomb": (0.03, "1")}, "up to 3 % of the tendon force"),
+        (
+            "asymmetric_friction",
+            {"positive.coulomb": (0.02, "N.m"), "negative.coulomb": (0.03, "N.m")},
+            "20 mN·m in the positive direction, 30 mN·m in the negative one",
+        ),
+        ("asymmetric_friction", {"coulomb": (0.02, "N.m")}, "coulomb 20 mN·m"),
+        ("friction_drift", {"amplitude": (-0.18, "1")}, "amplitude −18 %"),
+        ("contact", {}, ""),
+    ],
+)
+def test_a_size_is_told_in_units_that_suit(effect: str, numbers: dict[str, tuple[float, str]], words: str) -> None:
+    found = size_of(effect, {f"extensions[1].{name}": number for name, number in numbers.items()})
+    assert found.replace("\u00a0", " ") == words
+
+
 def test_an_unknown_cause_is_no_named_one() -> None:
     full = examples.three_causes()
     found = replace(full, causes=(replace(full.causes[0], where=Where("unknown", joint=1)), full.causes[1]))
@@ -230,7 +258,7 @@ def test_the_first_screen_says_it_all(written: tuple[Diagnosis, dict[Path, str]]
             assert f"{title_of(other.effect)}, at {names.place(other)}" in first
     for each in found.invisible:
         assert each.title in first and each.experiment in first
-    assert found.unexplained.description in first and "22 % of the residual's variance" in first
+    assert found.unexplained.description[1:] in first and "22 % of the residual's variance" in first
     assert found.experiment.sentence in first and "--discriminate" in first
     assert all(warning in first for warning in found.warnings)
 
@@ -254,7 +282,10 @@ def test_many_effects_that_cannot_be_seen_are_counted() -> None:
     places = tuple(replace(one, where=Where("cover_hardening", joint=1 + k % 2)) for k in range(6))
     others = tuple(replace(one, where=Where(name), title=name) for name in "abcdefg")
     text = plain(diagnosis_page(replace(examples.adequate(), invisible=places + others), []))
-    assert ", at 6 places, such as joint 1 (mcp). Refitting absorbs it" in text and "2 more are not visible in these data: f; g" in text
+    assert (
+        ", at 6 places, such as joint 1 (mcp). Refitting absorbs it" in text
+        and "2 more are not visible in these data: f; g" in text
+    )
 
 
 def test_names_and_warnings_are_escaped() -> None:

@@ -40,7 +40,8 @@ class Names:
 
 def _numbered(kind: str, number: int, names: Sequence[str]) -> str:
     name = names[number - 1] if 0 < number <= len(names) else ""
-    return f"{kind} {number}" if name in ("", f"{kind} {number}", str(number)) else f"{kind} {number} ({name})"
+    plain = f"{kind} {number}"
+    return plain if name.replace("_", " ").lower() in ("", plain, str(number)) else f"{plain} ({name})"
 
 
 def names_of(found: Diagnosis) -> Names:
@@ -213,7 +214,8 @@ def unexplained_sentence(found: Diagnosis) -> str:
     if not math.isfinite(rest.share) or rest.share < 0.005:
         return ""
     text = f"{percent(rest.share)} of the residual's variance above the noise floor is explained by nothing"
-    return f"{text}: {rest.description.rstrip('.')}." if rest.description else f"{text}."
+    where = rest.description.rstrip(".")
+    return f"{text}. {where[0].upper()}{where[1:]}." if where else f"{text}."
 
 
 @dataclass(frozen=True)
@@ -247,7 +249,10 @@ def hidden_sentences(found: Diagnosis, names: Names, most: int = 6) -> Iterator[
     effects = hidden(found, names)
     for each in effects[:most]:
         place = f", at {each.places}" if each.places else ""
-        experiment = f" To see it: {each.experiment.rstrip('.')}." if each.experiment else ""
+        what, _, _ = each.experiment.partition(":")  # what to do; what it tells stands in the table of all
+        experiment = f" To see it: {what[0].lower()}{what[1:].rstrip('.')}." if what else ""
+        if what.startswith("No "):
+            experiment = f" {what.rstrip('.')}."
         yield (
             f"Not visible in these data: {each.title}{place}. Refitting absorbs it; {percent(each.share)} would be "
             f"left.{experiment}"
