@@ -168,6 +168,26 @@ def test_a_menu_has_what_a_finger_can_do() -> None:
     assert combined(loop, entry, recorded) == []
 
 
+def test_a_tendon_that_a_load_holds() -> None:
+    """One pulling tendon against a known load: no pretension, the load changes in size and keeps its side."""
+    jaw = {
+        "joints": [{"friction": LAW}],
+        "tendons": [{"stiffness": 1e5, "moment_arms": [0.005]}],
+        "bias": FINGER["bias"],
+        "contact": {"threshold": [1.0]},
+        "format": FINGER["format"],
+        "name": "jaw",
+    }
+    recorded = Recorded(np.array([[-1.0, 1.0]]), 2.0, 30.0, np.array([0.02]), 30.0, np.array([0.1]))
+    entry = next(motions(recorded))
+    assert list(tensions(jaw, entry)) == []
+    (loaded,) = loads(jaw, entry, recorded)
+    assert [section.load[0] for section in loaded.sections] == pytest.approx([0.05, 0.1, 0.2, 0.4])
+    for each in (entry, loaded):
+        found = expected_recording(jaw, perform(jaw, each, 50.0), 3)
+        assert found.recording.groups["tendon_force"].min() > 0
+
+
 # --- the motion for the robot -----------------------------------------------------------------------------------------
 
 

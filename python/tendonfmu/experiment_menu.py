@@ -31,6 +31,7 @@ _POSTURES = (0.2, 0.5, 0.8)  # of a joint's range: where small strokes are made
 _LEAST_RANGE, _LEAST_SPEED = 0.02, 0.05  # rad, rad/s
 _TAUT = 0.25  # of its pretension that every pulling tendon keeps under the known load
 _LOOP_LOAD = 3.0  # times the torque that was recorded: known load at a finger that holds no pretension
+_SHARES = (0.5, 1.0, 2.0, 4.0)  # of a known load that holds the tendons
 _ALTERNATIONS = 2  # of a known load from one side to the other
 
 
@@ -101,7 +102,7 @@ def entry_from_json(value: Mapping[str, Any], joints: int) -> Entry:
 @dataclass(frozen=True)
 class Recorded:
     """What was recorded. ranges: [n, 2] rad; speed: rad/s, fastest; pretension: N, mean tendon force; torque: [n] N·m,
-    spread of the joint torque; seconds: of the longest stretch.
+    spread of the joint torque; seconds: of the longest stretch. load: [n] N·m, mean of the known load.
     """
 
     ranges: Numbers
@@ -109,10 +110,11 @@ class Recorded:
     pretension: float
     torque: Numbers
     seconds: float
+    load: Numbers | None = None
 
 
-def recorded_of(span: Span) -> Recorded:
-    """Ranges of less than a little are widened: every joint has to move."""
+def recorded_of(span: Span, load: Numbers | None = None) -> Recorded:
+    """Ranges of less than a little are widened: every joint has to move. load: [n] N·m."""
     middle, half = span.angle.mean(axis=1), np.maximum(0.5 * np.ptp(span.angle, axis=1), 0.5 * _LEAST_RANGE)
     return Recorded(
         ranges=np.column_stack([middle - half, middle + half]),
@@ -120,7 +122,16 @@ def recorded_of(span: Span) -> Recorded:
         pretension=float(np.abs(span.force).mean()),
         torque=span.torque,
         seconds=span.duration,
+        load=load,
     )
+
+
+def own_tension(data: Data) -> Numbers:
+    """[m] tendon forces per newton of pretension; zeros where the finger holds none by itself."""
+    try:
+        return pretension_vector(data)
+    except InputError:
+        return np.zeros(len(data["tendons"]))
 
 
 # --- motions ----------------------------------------------------------------------------------------------------------
@@ -129,7 +140,8 @@ def recorded_of(span: Span) -> Recorded:
 def motions(recorded: Recorded) -> Iterator[Entry]:
     """At the tension that was recorded, the simplest first."""
     whole = _as_ranges(recorded.ranges)
-    usual = Section(whole, recorded.speed, SECONDS, recorded.pretension)
+    held = () if recorded.load is None else tuple(recorded.load.tolist())
+    usual = Section(whole, recorded.speed, SECONDS, recorded.pretension, load=held)
     yield Entry("the same kind of motion", (usual,))
     slow = SLOW * recorded.speed
     yield Entry(
@@ -194,7 +206,7 @@ def _small_strokes(recorded: Recorded, usual: Section) -> Entry:
 def tensions(data: Data, entry: Entry) -> Iterator[Entry]:
     """The entry at several pretensions, and with tensions that swing faster than a bias drifts, where it holds any."""
     base = entry.sections[0].pretension
-    if not pretension_vector(data).any() or base <= 0:
+    if not own_tension(data).any() or base <= 0:
         return
     levels = [level * base for level in LEVELS]
     yield replace(
@@ -215,12 +227,17 @@ def tensions(data: Data, entry: Entry) -> Iterator[Entry]:
 def loads(data: Data, entry: Entry, recorded: Recorded) -> Iterator[Entry]:
     """The entry with a known load at the joints, on one side and on the other."""
     first = entry.sections[0]
-    own = first.pretension * pretension_vector(data)
+    own = first.pretension * own_tension(data)
     least = own if first.swing is None else np.minimum(own, first.lowest)
-    largest = known_load(data, least, recorded.torque)
+    largest = known_load(data, least, recorded)
     if not largest.any():
         return
-    sides = [sign * largest for _ in range(_ALTERNATIONS) for sign in (1.0, -1.0)]
+    if _held_by_load(data, recorded):
+        sides = [share * largest for share in _SHARES]
+        how = f"of {', '.join(f'{share:g}' for share in _SHARES)} times as much"
+    else:
+        sides = [sign * largest for _ in range(_ALTERNATIONS) for sign in (1.0, -1.0)]
+        how = "on one side and on the other"
     sections = tuple(
         _shortened(section, len(sides), load=tuple(load.tolist())) for load in sides for section in entry.sections
     )
@@ -229,20 +246,26 @@ def loads(data: Data, entry: Entry, recorded: Recorded) -> Iterator[Entry]:
     yield replace(
         entry,
         sections=sections,
-        load=f"with a known load of {sizes} {where}, on one side and on the other (column external_torque)",
+        load=f"with a known load of {sizes} {where}, {how} (column external_torque)",
     )
 
 
-def known_load(data: Data, tension: Numbers, torque: Numbers) -> Numbers:
-    """[n] N·m that leaves every pulling tendon taut at tensions (N, [m]), on either side. torque: [n] N·m, of a finger
-    that holds no tension, whose loops carry any load.
+def _held_by_load(data: Data, recorded: Recorded) -> bool:
+    """Whether pulling tendons are held taut by a known load alone, which then has to stay on its side."""
+    pulls = any(not tendon.get("bidirectional") for tendon in data["tendons"])
+    return pulls and not own_tension(data).any() and recorded.load is not None and bool(recorded.load.any())
+
+
+def known_load(data: Data, tension: Numbers, recorded: Recorded) -> Numbers:
+    """[n] N·m that leaves every pulling tendon taut at tensions (N, [m]), on either side; that of the recordings where
+    it holds the tendons, and some times the joint torque where cable loops carry any load.
     """
+    if _held_by_load(data, recorded):
+        return np.asarray(recorded.load)
     arms = moment_arms(data)
-    if not tension.any():
-        return _LOOP_LOAD * torque
     pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
-    if not pulls.any():
-        return _LOOP_LOAD * torque
+    if not tension.any() or not pulls.any():
+        return _LOOP_LOAD * recorded.torque
     each = np.abs(arms).max(axis=0)  # N·m per N of one tendon
     taken = np.abs(np.linalg.pinv(arms)).T @ each  # N, from each tendon, at most
     return np.asarray(np.min((1 - _TAUT) * tension[pulls] / np.maximum(taken[pulls], 1e-12)) * each)

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.balance import balanced_forces, moment_arms, pretension_vector
+from tendonfmu.balance import balanced_forces, moment_arms
 from tendonfmu.excitation import Excitation, Plan, plan_excitation
-from tendonfmu.experiment_menu import Entry, Section
+from tendonfmu.experiment_menu import Entry, Section, own_tension
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.fit_residuals import model_alone
 from tendonfmu.quintic import evaluate
@@ -112,12 +112,12 @@ def _section(data: Data, section: Section, rate: float, seed: int) -> Performed:
         ranges=np.array(section.ranges, dtype=float),
         max_speed=section.max_speed,
         duration=section.seconds,
-        pretensions=(section.pretension if pretension_vector(data).any() else 0.0,),
+        pretensions=(section.pretension if own_tension(data).any() else 0.0,),
         rate=rate,
         seed=seed,
         max_acceleration=section.max_acceleration,
     )
-    motion: Excitation = plan_excitation(data, plan)
+    motion: Excitation = plan_excitation(_plannable(data), plan)
     load = np.array(section.load or [0.0] * len(section.ranges), dtype=float)
     return Performed(
         time=motion.time,
@@ -130,6 +130,13 @@ def _section(data: Data, section: Section, rate: float, seed: int) -> Performed:
     )
 
 
+def _plannable(data: Data) -> Data:
+    """The finger as a plan takes it: tendons that a known load alone holds count as loops, which need no pretension."""
+    if own_tension(data).any():
+        return data
+    return {**data, "tendons": [{**tendon, "bidirectional": True} for tendon in data["tendons"]]}
+
+
 def _tension(data: Data, section: Section, motion: Excitation) -> Numbers:
     """[N, m] N that hold themselves. Where they swing, each way in which tensions can change without turning a joint
     has a frequency of its own, so that no two tendons swing alike; together they stay within the limits.
@@ -139,7 +146,7 @@ def _tension(data: Data, section: Section, motion: Excitation) -> Numbers:
     arms, time = moment_arms(data), motion.time
     left, sizes, _ = np.linalg.svd(arms)
     ways = left[:, int(np.sum(sizes > _CLOSE * sizes[0])) :]
-    shares = pretension_vector(data)
+    shares = own_tension(data)
     pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
     low, high = np.where(pulls, section.lowest, -section.highest), np.full(len(arms), section.highest)
     even = shares * float(np.clip(section.pretension, _fit(low, shares, np.max), _fit(high, shares, np.min)))

@@ -9,7 +9,8 @@ of experiments for discriminating between two rival models", Biometrika 62 (1975
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,13 +20,14 @@ from scipy.interpolate import BSpline
 from scipy.sparse import identity
 from scipy.sparse.linalg import splu
 
+from tendonfmu.balance import moment_arms
 from tendonfmu.block_averages import regular_blocks
 from tendonfmu.candidate_columns import CandidateColumns, candidate_columns
 from tendonfmu.diagnosis_result import Experiment, Where
 from tendonfmu.diagnosis_span import Span, span_of
 from tendonfmu.effects.candidate import Candidate
 from tendonfmu.errors import InputError
-from tendonfmu.experiment_menu import Entry, combined, loads, motions, recorded_of, tensions
+from tendonfmu.experiment_menu import Entry, combined, loads, motions, own_tension, recorded_of, tensions
 from tendonfmu.experiment_motion import expected_recording, perform
 from tendonfmu.extension_fit import Accepted
 from tendonfmu.fit_recordings import FitRecording
@@ -94,7 +96,7 @@ class Experiments:
 
     def sentence(self, number: int) -> str:
         """For one question, in plain words."""
-        return _sentence([self.answers[number]])
+        return _sentence([self.answers[number]]) if self.answers else self.best.sentence
 
 
 def plan_experiments(
@@ -118,7 +120,7 @@ def plan_experiments(
         raise InputError("no recording; expected those of the diagnosis")
     found_span = span_of(data, recordings) if span is None else span
     lab = _Laboratory(data, recordings, questions, noise, found_span, seed)
-    recorded = recorded_of(found_span)
+    recorded = recorded_of(found_span, None if own_tension(data).any() else _mean_load(data, recordings))
     *plain, long = motions(recorded)
     varied = [*tensions(data, plain[0]), *loads(data, plain[0], recorded)]
     scores = []
@@ -127,14 +129,17 @@ def plan_experiments(
         each is not None and each.candidate.coordinate == "time" for q in questions for each in (q.cause, q.rival)
     )
     first = [*plain, *varied, *([long] if slow else [])]
-    for entry in first:
-        scores.append(lab.answers(entry))
+    for k, entry in enumerate(first):
+        scores += lab.answers_of([entry])
         if progress is not None:
-            progress(len(scores), len(first))
+            progress(k + 1, len(first))
+    if not scores:
+        return Experiments((), Experiment("The menu has no motion that this finger can make"))
     open_ = [q for q in range(len(questions)) if max(found[q].distance for found in scores) < VISIBLE]
     if open_:
-        motion = max(scores[: len(plain)], key=lambda found: sum(found[q].distance for q in open_))[0].entry
-        scores += [lab.answers(entry) for entry in combined(data, motion, recorded)]
+        simple = [found for found in scores if not (found[0].entry.tension or found[0].entry.load)]
+        motion = max(simple or scores, key=lambda found: sum(found[q].distance for q in open_))[0].entry
+        scores += lab.answers_of(combined(data, motion, recorded))
     answers = tuple(_best([found[q] for found in scores]) for q in range(len(questions)))
     return Experiments(answers, _first_of_all(answers, scores, seed))
 
@@ -183,8 +188,16 @@ class _Laboratory:
             (self._look(_shortened(each)) for each in recordings[1:3]), self._look(_shortened(recordings[0]))
         )
 
+    def answers_of(self, entries: Iterable[Entry]) -> list[list[Answer]]:
+        """For each entry that this finger can make, for each question."""
+        found = []
+        for entry in entries:
+            with suppress(InputError):  # too short a stroke, a tendon that nothing holds taut
+                found.append(self.answers(entry))
+        return found
+
     def answers(self, entry: Entry) -> list[Answer]:
-        """For each question."""
+        """For each question. Raises InputError where the motion cannot be."""
         seconds = sum(section.seconds for section in entry.sections)
         rate = min(_RATE, max(_LEAST_RATE, _MOST_SAMPLES / seconds))
         performed = perform(self.data, entry, rate, self.seed)
@@ -302,6 +315,17 @@ def _restricted(cause: Accepted, data: Data, span: Span) -> Candidate:
     shapes = [own, *(shape for shape in grid if dict(shape) != own)]
     return replace(
         cause.candidate, find_places=lambda *_: [cause.place], find_shapes=lambda *_: [dict(shape) for shape in shapes]
+    )
+
+
+def _mean_load(data: Data, recordings: Sequence[FitRecording]) -> Numbers:
+    """[n] N·m that was known to act on the joints, on average."""
+    arms = moment_arms(data)
+    loads = [(each.recording.groups["tendon_force"] @ arms - each.target).mean(axis=0) for each in recordings]
+    return (
+        np.asarray(np.mean(loads, axis=0))
+        if any(each.external is not None for each in recordings)
+        else np.zeros(arms.shape[1])
     )
 
 
