@@ -135,7 +135,7 @@ def test_workers_of_dask_write_the_rows(tmp_path: Path) -> None:
         assert run_campaign(cases, tmp_path / "out", client) == 2
     rows = collect(cases, tmp_path / "out")
     assert [row["name"] for row in rows] == ["a", "b"]
-    assert all("f.json" in row["error"] and row["seconds"] >= 0 for row in rows)
+    assert all("f.json" in row["error"] and row["run_seconds"] >= 0 for row in rows)
 
 
 # --- judging ----------------------------------------------------------------------------------------------------------

@@ -59,7 +59,7 @@ def run_case(case: Case, beside: str | None = None) -> Row:
             row |= _diagnosed(made(case, Path(folder)), beside)
     except Exception as failed:  # a campaign of days goes on: the row says what happened
         row["error"] = f"{type(failed).__name__}: {' '.join(str(failed).split())}"
-    return row | {"seconds": time.perf_counter() - begin}
+    return row | {"run_seconds": time.perf_counter() - begin}
 
 
 def _diagnosed(case: Case, beside: str | None) -> Row:

@@ -30,7 +30,8 @@ ABSORBED = 0.005  # and up to which it counts as absorbed
 ABSORBABLE = ("force_offset", "force_gain", "moment_arm", "asymmetric_friction", "gravity")
 SLOW_TENSION = 8.0  # s: hands whose pretension hardly changes hide what scales with it
 ATTEMPTS = 40  # fingers and places, of which the first suitable one is taken
-HELD_OUT = 1000  # added to the seed of the motion
+OTHER_MOTION = 1_000_000  # added to the seed of the motion
+MEASURED = {"test": 60.0, "reference": 240.0}  # s, of cases whose gain is measured: to measure it on, and the true one
 PUSH = (0.08, 0.2)  # N·m, unlabelled contacts
 PAIRS = (
     "load_friction",
@@ -67,7 +68,15 @@ def fitting_hand(effect: str, seed: int, attempt: int, options: dict[str, Any]) 
 
 def settings(options: dict[str, Any]) -> dict[str, Any]:
     """The options of every maker, with what is usual."""
-    usual = {"joints": 2, "seconds": 60.0, "rate": 500.0, "presliding": False, "wander": 1.0, "reference": 0.0}
+    usual = {
+        "joints": 2,
+        "seconds": 60.0,
+        "rate": 500.0,
+        "presliding": False,
+        "wander": 1.0,
+        "test": 0.0,
+        "reference": 0.0,
+    }
     unknown = set(options) - set(usual)
     if unknown:
         raise ValueError(f"arguments.{min(unknown)}: unknown; expected {', '.join(usual)}")
@@ -75,16 +84,17 @@ def settings(options: dict[str, Any]) -> dict[str, Any]:
 
 
 def files(folder: Path, hand: Hand, made: Made, seed: int, options: dict[str, Any], **keys: Any) -> dict[str, Any]:
-    """What the campaign wants of a maker: recording, nominal, and a long recording of other motion where asked for."""
+    """What the campaign wants of a maker: recording, nominal, and recordings of other motions where asked for."""
     recording, nominal = made.write(folder)
     found = {
         "finger": nominal.name, "recordings": [recording.name], "kinematics": hand.source,
         "rig": "matched, presliding" if options["presliding"] else "matched, static", **keys,
     }  # fmt: skip
-    if options["reference"] > 0:
-        other = record(hand, seed + HELD_OUT, options["reference"])
-        pq.write_table(pa.table(other.columns), folder / "reference.parquet")
-        found["reference"] = ["reference.parquet"]
+    for number, key in enumerate(("test", "reference"), start=1):
+        if options[key] > 0:
+            other = record(hand, seed + number * OTHER_MOTION, options[key])
+            pq.write_table(pa.table(other.columns), folder / f"{key}.parquet")
+            found[key] = [f"{key}.parquet"]
     facts = {name: options[name] for name in ("joints", "seconds", "rate", "wander")}
     found["facts"] = facts | {"presliding": float(options["presliding"])} | keys.get("facts", {})
     return found
@@ -226,7 +236,7 @@ def _singles(count: int, strengths: list[float], seed: int, options: dict[str, A
             for number, effect in enumerate(BUILDERS):
                 if effect != "force_offset":  # refitting always absorbs it
                     yield _case(
-                        f"{effect}_{strength:g}_{k}", "single", "single", options | {"reference": 240.0}, k + number,
+                        f"{effect}_{strength:g}_{k}", "single", "single", options | MEASURED, k + number,
                         effect=effect, strength=strength, seed=seed + 1000 + 100 * k + number,
                     )  # fmt: skip
 
@@ -237,7 +247,7 @@ def _doubles(count: int, seed: int, options: dict[str, Any]) -> Iterator[dict[st
         effects = [str(name) for name in rng.choice(PAIRS, 2, replace=False)]
         static = "presliding" in effects
         yield _case(
-            f"double_{k}", "double", "double", options | {"reference": 240.0}, 0 if static else k,
+            f"double_{k}", "double", "double", options | MEASURED, 0 if static else k,
             effects=effects, strength=0.3, seed=seed + 200_000 + k,
         )  # fmt: skip
 
