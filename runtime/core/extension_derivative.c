@@ -2,6 +2,8 @@
 
 #include "extension_derivative.h"
 
+#include <string.h>
+
 #include "directional_derivative.h"
 #include "extensions.h"
 
@@ -72,38 +74,47 @@ static void places_of_slot(const tendonfmu_finger* f, size_t slot, size_t place[
   }
 }
 
-/* −κ·e of a place at joint j of tendon or joint; entry_load */
-static double kept_torque(const tendonfmu_finger* f, const parameter_derivative* d, size_t place, size_t j) {
-  const size_t n = f->joints, i = place / (2 * n), own = place % (2 * n) / 2;
-  if (place >= 2 * n * f->tendons) {
-    return j == (place - 2 * n * f->tendons) / 2 ? d->kept_entry[place] : 0.0;
-  }
-  return j >= own ? f->derived.moment_arm[j * f->tendon_lanes + i] * d->kept_entry[place] : 0.0;
-}
-
 /* Slopes of T_j and Δb_j by every number of a row. */
 typedef struct row_slopes {
   double torque[EFFECT_MAX_PARAMETERS][MODEL_MAX_JOINTS], jump[EFFECT_MAX_PARAMETERS][MODEL_MAX_JOINTS];
 } row_slopes;
 
-/* what a row with this grip makes of one place; others: what the other rows make of it */
-static void add_place(const tendonfmu_finger* f, const parameter_derivative* d, const extension_row* row, size_t place,
-                      double others, const effect_grip* grip, row_slopes* sum) {
-  const double moved = others * d->base[place], jumped = grip->slides ? 0.0 : others * d->jump_base[place];
-  const double kept = d->kept_entry[place] != 0.0 && grip->value != 0.0 ? 1.0 / grip->value : 0.0;
-  if (moved == 0.0 && jumped == 0.0 && kept == 0.0) {
-    return;
-  }
+static void add_place(const parameter_derivative* d, const place_slopes* slopes, size_t place, uint32_t parameters,
+                      row_slopes* sum) {
   for (size_t at = place * d->joints, j = 0; j < d->joints; ++at, ++j) {
-    const double torque = moved != 0.0 || jumped != 0.0 ? d->torque_factor[at] * moved : 0.0;
-    double jump =
-        d->has_jump && (moved != 0.0 || jumped != 0.0) ? d->jump_factor[at] * moved + d->bias_factor[at] * jumped : 0.0;
-    if (kept != 0.0) {
-      jump += kept * kept_torque(f, d, place, j);
+    for (uint32_t k = 0; k < parameters; ++k) {
+      sum->torque[k][j] += d->torque_factor[at] * slopes->friction[k];
+      if (d->has_jump) {
+        sum->jump[k][j] += d->jump_factor[at] * slopes->friction[k] + d->bias_factor[at] * slopes->jump[k];
+      }
     }
-    for (uint32_t k = 0; k < row->effect->parameter_count; ++k) {
-      sum->torque[k][j] += torque * grip->by_parameter[k];
-      sum->jump[k][j] += jump * grip->by_parameter[k];
+  }
+}
+
+/* F and b of a place by the numbers of a row that acts on it with this grip; 0: neither depends on them */
+static int slopes_of_place(const parameter_derivative* d, size_t place, double others, const effect_grip* grip,
+                           place_slopes* slopes) {
+  const double moved = others * d->base[place], jumped = grip->slides ? 0.0 : others * d->jump_base[place];
+  for (int k = 0; k < EFFECT_MAX_PARAMETERS; ++k) {
+    slopes->friction[k] = moved * grip->by_parameter[k];
+    slopes->jump[k] = jumped * grip->by_parameter[k];
+  }
+  return moved != 0.0 || jumped != 0.0;
+}
+
+void extension_place_slopes(const tendonfmu_finger* f, const parameter_derivative* d, size_t row_number, size_t place,
+                            place_slopes* slopes) {
+  const extension_row* row = friction_row(f, row_number);
+  const size_t members = friction_members(f, row->place);
+  memset(slopes, 0, sizeof *slopes);
+  for (size_t member = 0; member < members; ++member) {
+    const size_t slot = friction_slot(f, row->place, member);
+    size_t places[2], count;
+    places_of_slot(f, slot, places, &count);
+    if (places[0] == place || (count == 2 && places[1] == place)) {
+      const effect_grip grip =
+          row->effect->grip(row->place, row->parameters, row->memory, friction_member(row->place, member));
+      slopes_of_place(d, place, other_grips(f, row, slot, grip.value), &grip, slopes);
     }
   }
 }
@@ -119,7 +130,10 @@ static void read_friction_row(const tendonfmu_finger* f, const extension_row* ro
     size_t place[2], count;
     places_of_slot(f, slot, place, &count);
     for (size_t p = 0; p < count; ++p) {
-      add_place(f, d, row, place[p], others, &grip, &sum);
+      place_slopes slopes;
+      if (slopes_of_place(d, place[p], others, &grip, &slopes)) {
+        add_place(d, &slopes, place[p], row->effect->parameter_count, &sum);
+      }
     }
   }
   for (uint32_t k = 0; k < row->effect->parameter_count; ++k) {

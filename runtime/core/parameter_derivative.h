@@ -47,8 +47,13 @@ typedef struct parameter_derivative {
   plain_term* plain;                                 /* of T alone */
   double *torque_factor, *jump_factor, *bias_factor; /* [places × n]; rows of places without a term mean nothing */
   double *moved, *jumped;                            /* [2n] F and b along the tendon being read */
-  double* kept_entry;                                /* [places] −κ·e of entry_load; 0 where nothing leaves rest */
-  double *base, *jump_base;                          /* [places] F and b before extensions act on friction; |F| where
+  /* with entry_load, of a sample with jumps; [places] */
+  double* stop_jump;        /* b of what comes to rest */
+  double* left_share;       /* κ of what leaves rest and had moved before: −κ·e is part of Δb */
+  double* acting;           /* what multiplies F and b */
+  double* acting_factor;    /* [places × 2n] its derivative by F of the places of the same tendon before it */
+  double* load_factor;      /* [places × n] ∂f_B at each joint by F of a place */
+  double *base, *jump_base; /* [places] F and b before extensions act on friction; |F| where
                                                         they make it slide at all times */
 } parameter_derivative;
 

@@ -51,7 +51,8 @@ class Worker {
     for (JointSum& joint : joints_) {
       joint.begin_segment();
     }
-    finger_.resume(states[segment], numbers_);
+    finger_.resume(states[segment].finger, numbers_);
+    rows_.resume(states[segment].entries);
     for (std::size_t k = first; k < last && !stopped; ++k) {
       finger_.step(k, recording.time(k), recording.inputs(k));
       take(recording, gains, k);
@@ -73,7 +74,7 @@ class Worker {
  private:
   void take(const Recording& recording, const BiasGains& gains, std::size_t k) {
     const bool looked_at = gains.gain[k] > 0.0 || gains.weight[k] > 0.0;
-    if (!looked_at && !jumps()) {
+    if (!looked_at && !rows_.sees_event()) {
       return;
     }
     rows_.read();
@@ -101,16 +102,6 @@ class Worker {
       joints_[j].rows.add(residual_column, torque - rows_.torque(j));
       joints_[j].filter(gains.gain[k], gains.weight[k]);
     }
-  }
-
-  bool jumps() const {
-    const tendonfmu_finger* f = finger_.get();
-    for (std::size_t slot = 0; slot < f->slots; ++slot) {
-      if (f->remembered.event[slot] != 0.0) {
-        return true;
-      }
-    }
-    return false;
   }
 
   void add_term(const Term& term, bool looked_at) {
@@ -223,8 +214,9 @@ class Pass {
     }
     if (remembers_numbers(problem.finger.get())) {
       FreeFinger finger(problem.image.data(), problem.image.size());
+      SampleRows rows(problem.unknowns, finger.get());
       for (const Recording& recording : problem.recordings) {
-        states_.push_back(recording.states_with(&finger, numbers_));
+        states_.push_back(states_with(recording, &finger, &rows, numbers_));
       }
     }
     waiting_.resize(tasks_.size());

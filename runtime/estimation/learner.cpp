@@ -128,6 +128,7 @@ void Learner::initialise(const LearnerSample& first, int kinematics_source) {
     throw refused(tendonfmu_last_error(finger_.get()));
   }
   initialised_ = written_ = true;
+  rows_.forget();
   bias_started_ = false;
   rows_.read();
   if (first.use || finger_.get()->derived.settings.has_initial_torque) {

@@ -126,7 +126,7 @@ Recording::Recording(FreeFinger* finger, const RecordingArrays& a)
   finger->begin(start, source_);
   for (std::size_t k = 0; k < a.samples; ++k) {
     if (k % segment_length_ == 0) {
-      states_.push_back(finger->save());
+      states_.push_back({finger->save(), {}});
     }
     finger->step(k, time_[k], inputs(k));
     if (k > 0 && time_[k] == time_[k - 1]) {
@@ -150,18 +150,6 @@ Recording::Recording(FreeFinger* finger, const RecordingArrays& a)
   if (used_count_ < 2) {
     throw refused(std::to_string(used_count_) + " samples to learn from: expected at least 2");
   }
-}
-
-SegmentStates Recording::states_with(FreeFinger* finger, const std::vector<double>& numbers) const {
-  SegmentStates states;
-  finger->begin(numbers, source_);
-  for (std::size_t k = 0; states.size() < segments(); ++k) {
-    if (k % segment_length_ == 0) {
-      states.push_back(finger->save());
-    }
-    finger->step(k, time_[k], inputs(k));
-  }
-  return states;
 }
 
 tendonfmu_inputs Recording::inputs(std::size_t row) const {

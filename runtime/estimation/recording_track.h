@@ -42,8 +42,12 @@ class FreeFinger {
  * found anew. */
 bool remembers_numbers(const tendonfmu_finger* finger);
 
-/* States at the beginnings of the segments of a recording. */
-using SegmentStates = std::vector<std::vector<unsigned char>>;
+/* The beginning of a segment of a recording: the finger's state, and the sample_rows.h entries. */
+struct SegmentState {
+  std::vector<unsigned char> finger;
+  std::vector<double> entries;
+};
+using SegmentStates = std::vector<SegmentState>;
 
 /* Arrays of the caller, row-major. */
 struct RecordingArrays {
@@ -79,8 +83,6 @@ class Recording {
   std::size_t segment_length() const { return segment_length_; }
   std::size_t segments() const { return states_.size(); }
   const SegmentStates& states() const { return states_; }
-  /* the same with other numbers of the description */
-  SegmentStates states_with(FreeFinger* finger, const std::vector<double>& numbers) const;
 
  private:
   std::vector<double> time_, force_, position_, angle_, velocity_, external_, noise_, noise_scale_;

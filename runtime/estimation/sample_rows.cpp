@@ -10,6 +10,14 @@ SampleRows::SampleRows(const Unknowns& unknowns, const tendonfmu_finger* finger)
       memory_((parameter_derivative_size(finger) + sizeof(double) - 1) / sizeof(double)) {
   parameter_derivative_place(finger, memory_.data(), &derivative_);
   terms_.reserve(6 * derivative_.places);
+  if (finger->derived.settings.remembers_entry_load) {
+    entries_.assign(derivative_.places * unknowns.count(), 0.0);
+  }
+}
+
+bool SampleRows::sees_event() const {
+  const double* event = finger_->remembered.event;
+  return std::any_of(event, event + finger_->slots, [](double each) { return each != 0.0; });
 }
 
 /* slopes by static, coulomb, 1/vs, viscous to those by coulomb, drop, 1/vs, viscous: static = coulomb + drop */
@@ -26,7 +34,8 @@ void SampleRows::add(const law_term& from, bool is_jump) {
             &side,
             from.speed,
             is_jump ? nullptr : derivative_.torque_factor + row,
-            derivative_.has_jump ? jump : nullptr};
+            derivative_.has_jump ? jump : nullptr,
+            from.place};
   if (side.run_length > 0) {
     term.run_first = side.run_first;
     term.run_length = side.run_length;
@@ -53,6 +62,80 @@ void SampleRows::read() {
     const plain_term& term = derivative_.plain[k];
     if (unknowns_.plain(term.parameter) >= 0) {
       plain_.push_back({unknowns_.plain(term.parameter), term.joint, term.slope, term.jump});
+    }
+  }
+  if (!entries_.empty() && derivative_.has_jump) {
+    leave_rest();
+    come_to_rest();
+  }
+}
+
+/* −κ·e of every place that leaves rest, at all joints that it turns */
+void SampleRows::leave_rest() {
+  const std::size_t n = joints(), ends = 2 * n * derivative_.tendons;
+  for (std::size_t place = 0; place < derivative_.places; ++place) {
+    const double kept = derivative_.left_share[place];
+    const double* slopes = entry(place);
+    for (std::size_t c = 0; kept != 0.0 && c < unknowns_.count(); ++c) {
+      for (std::size_t j = 0; slopes[c] != 0.0 && j < n; ++j) {
+        double arm = place >= ends && (place - ends) / 2 == j ? 1.0 : 0.0;
+        if (place < ends && j >= place % (2 * n) / 2) {
+          arm = finger_->derived.moment_arm[j * finger_->tendon_lanes + place / (2 * n)];
+        }
+        if (arm != 0.0) {
+          plain_.push_back({static_cast<std::int32_t>(c), j, 0.0, -kept * arm * slopes[c]});
+        }
+      }
+    }
+  }
+}
+
+/* ∂(acting·b) of every place that comes to rest: its own b, and what the friction before it makes of what acts */
+void SampleRows::come_to_rest() {
+  const std::size_t n = joints(), ends = 2 * n * derivative_.tendons;
+  for (std::size_t place = 0; place < derivative_.places; ++place) {
+    const double jump = derivative_.stop_jump[place];
+    if (jump == 0.0) {
+      continue;
+    }
+    double* slopes = entry(place);
+    std::fill_n(slopes, unknowns_.count(), 0.0);
+    add_slopes(place, true, derivative_.acting[place], slopes);
+    if (place < ends) {
+      for (std::size_t k = 0; k < place % (2 * n); ++k) {
+        add_slopes(place - place % (2 * n) + k, false, jump * derivative_.acting_factor[place * 2 * n + k], slopes);
+      }
+    } else if ((place - ends) % 2 == 1) { /* T_jvf·Σ f_B */
+      for (std::size_t other = 0; other < ends; ++other) {
+        add_slopes(other, false, jump * derivative_.load_factor[other * n + (place - ends) / 2], slopes);
+      }
+    }
+  }
+}
+
+/* factor·∂F, or ∂b, of a place */
+void SampleRows::add_slopes(std::size_t place, bool is_jump, double factor, double* entry) const {
+  if (factor == 0.0) {
+    return;
+  }
+  for (const Term& term : terms_) {
+    if (term.place == place && (term.torque == nullptr) == is_jump) {
+      for (std::size_t k = 0; k < 4; ++k) {
+        if (term.column[k] >= 0) {
+          entry[term.column[k]] += factor * term.slope[k];
+        }
+      }
+    }
+  }
+  for (std::size_t r = 0; r < finger_->extensions.friction; ++r) {
+    const extension_row* row = friction_row(finger_, r);
+    place_slopes slopes;
+    extension_place_slopes(finger_, &derivative_, r, place, &slopes);
+    for (std::uint32_t k = 0; k < row->effect->parameter_count; ++k) {
+      const std::int32_t column = unknowns_.plain(row->first_parameter + k);
+      if (column >= 0) {
+        entry[column] += factor * (is_jump ? slopes.jump[k] : slopes.friction[k]);
+      }
     }
   }
 }
@@ -86,6 +169,21 @@ void SampleRows::dense(double* torque_rows, double* jump_rows) const {
       jump_rows[at] += term.jump;
     }
   }
+}
+
+SegmentStates states_with(const Recording& recording, FreeFinger* finger, SampleRows* rows,
+                          const std::vector<double>& numbers) {
+  SegmentStates states;
+  finger->begin(numbers, recording.kinematics_source());
+  rows->forget();
+  for (std::size_t k = 0; states.size() < recording.segments(); ++k) {
+    if (k % recording.segment_length() == 0) {
+      states.push_back({finger->save(), rows->entries()});
+    }
+    finger->step(k, recording.time(k), recording.inputs(k));
+    rows->follow();
+  }
+  return states;
 }
 
 }  // namespace tendonfmu::estimation

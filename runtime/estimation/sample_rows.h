@@ -2,12 +2,15 @@
 #ifndef TENDONFMU_ESTIMATION_SAMPLE_ROWS_H
 #define TENDONFMU_ESTIMATION_SAMPLE_ROWS_H
 
+#include <algorithm>
 #include <vector>
 
+#include "recording_track.h"
 #include "unknowns.h"
 
 extern "C" {
-#include "parameter_derivative.h"
+#include "extension_derivative.h"
+#include "extensions.h"
 }
 
 namespace tendonfmu::estimation {
@@ -23,6 +26,7 @@ struct Term {
   double speed; /* m/s or rad/s: ∂²/∂rate² = −speed·slope by rate, ∂²/∂rate∂drop = −speed·slope by drop */
   const double* torque; /* [n] ∂T_j; nullptr: a jump's own */
   const double* jump;   /* [n] ∂Δb_j; nullptr: no jump at this sample */
+  std::size_t place;    /* parameter_derivative.h */
 };
 
 /* A number that enters a joint's torque as it is. */
@@ -37,8 +41,20 @@ class SampleRows {
   /* both must outlive the rows */
   SampleRows(const Unknowns& unknowns, const tendonfmu_finger* finger);
 
-  /* the sample that the finger last took, by a step */
+  /* the sample that the finger last took, by a step; with entry_load none that sees_event() may be left out */
   void read();
+  bool sees_event() const;
+
+  /* What entry_load's rests began with, by the unknowns; empty without it. */
+  const std::vector<double>& entries() const { return entries_; }
+  void resume(const std::vector<double>& entries) { entries_ = entries; }
+  void forget() { std::fill(entries_.begin(), entries_.end(), 0.0); }
+  /* a sample whose derivative nobody wants: read only where it is remembered */
+  void follow() {
+    if (!entries_.empty() && sees_event()) {
+      read();
+    }
+  }
 
   std::size_t joints() const { return derivative_.joints; }
   double torque(std::size_t joint) const { return finger_->scratch.friction[joint]; }    /* T_j of eq. (10), N·m */
@@ -53,6 +69,10 @@ class SampleRows {
 
  private:
   void add(const law_term& from, bool is_jump);
+  void leave_rest();
+  void come_to_rest();
+  void add_slopes(std::size_t place, bool is_jump, double factor, double* entry) const;
+  double* entry(std::size_t place) { return entries_.data() + place * unknowns_.count(); }
 
   const Unknowns& unknowns_;
   const tendonfmu_finger* finger_;
@@ -60,7 +80,13 @@ class SampleRows {
   parameter_derivative derivative_;
   std::vector<Term> terms_;
   std::vector<PlainTerm> plain_;
+  std::vector<double> entries_; /* [places × unknowns] of e of every place, as it came to rest */
 };
+
+/* The beginnings of a recording's segments with other numbers of the description than those it was added with; rows: of
+ * that finger. */
+SegmentStates states_with(const Recording& recording, FreeFinger* finger, SampleRows* rows,
+                          const std::vector<double>& numbers);
 
 }  // namespace tendonfmu::estimation
 

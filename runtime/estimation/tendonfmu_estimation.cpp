@@ -69,14 +69,14 @@ std::vector<double> checked(const Problem& problem, const double* z) {
 }
 
 const SegmentStates& states_at(tendonfmu_estimator* estimator, std::size_t recording, const std::vector<double>& z,
-                               const std::vector<double>& numbers, FreeFinger* finger) {
+                               const std::vector<double>& numbers, FreeFinger* finger, SampleRows* rows) {
   const Recording& r = estimator->problem.recordings[recording];
   if (!remembers_numbers(finger->get())) {
     return r.states();
   }
   auto& last = estimator->last;
   if (last.states.empty() || last.recording != recording || last.z != z) {
-    last.states = r.states_with(finger, numbers);
+    last.states = states_with(r, finger, rows, numbers);
     last.recording = recording;
     last.z = z;
   }
@@ -86,7 +86,7 @@ const SegmentStates& states_at(tendonfmu_estimator* estimator, std::size_t recor
 /* the finger over the samples of a recording from `first` on, with a call after each */
 template <typename Body>
 void replay(tendonfmu_estimator* estimator, std::size_t recording, const std::vector<double>& z, std::size_t first,
-            std::size_t count, FreeFinger* finger, const Body& body) {
+            std::size_t count, FreeFinger* finger, SampleRows* rows, const Body& body) {
   const Problem& problem = estimator->problem;
   if (recording >= problem.recordings.size()) {
     throw refused("recording " + std::to_string(recording) + ": expected below " +
@@ -102,11 +102,15 @@ void replay(tendonfmu_estimator* estimator, std::size_t recording, const std::ve
   }
   const std::size_t segment = first / r.segment_length();
   const std::vector<double> numbers = problem.unknowns.write(z.data());
-  finger->resume(states_at(estimator, recording, z, numbers, finger)[segment], numbers);
+  const SegmentState& state = states_at(estimator, recording, z, numbers, finger, rows)[segment];
+  finger->resume(state.finger, numbers);
+  rows->resume(state.entries);
   for (std::size_t k = segment * r.segment_length(); k < first + count; ++k) {
     finger->step(k, r.time(k), r.inputs(k));
     if (k >= first) {
       body(r, k);
+    } else {
+      rows->follow();
     }
   }
 }
@@ -273,20 +277,21 @@ tendonfmu_status tendonfmu_estimator_jacobian(tendonfmu_estimator* estimator, si
     FreeFinger finger(problem.image.data(), problem.image.size());
     SampleRows rows(problem.unknowns, finger.get());
     std::vector<double> by_torque(row), by_jump(row);
-    replay(estimator, recording, checked(problem, z), first, count, &finger, [&](const Recording&, std::size_t k) {
-      rows.read();
-      rows.dense(by_torque.data(), by_jump.data());
-      for (std::size_t j = 0; j < n; ++j) {
-        put(torque, (k - first) * n + j, rows.torque(j));
-        put(jump, (k - first) * n + j, rows.jump(j));
-      }
-      if (torque_derivative) {
-        std::copy(by_torque.begin(), by_torque.end(), torque_derivative + (k - first) * row);
-      }
-      if (jump_derivative) {
-        std::copy(by_jump.begin(), by_jump.end(), jump_derivative + (k - first) * row);
-      }
-    });
+    replay(estimator, recording, checked(problem, z), first, count, &finger, &rows,
+           [&](const Recording&, std::size_t k) {
+             rows.read();
+             rows.dense(by_torque.data(), by_jump.data());
+             for (std::size_t j = 0; j < n; ++j) {
+               put(torque, (k - first) * n + j, rows.torque(j));
+               put(jump, (k - first) * n + j, rows.jump(j));
+             }
+             if (torque_derivative) {
+               std::copy(by_torque.begin(), by_torque.end(), torque_derivative + (k - first) * row);
+             }
+             if (jump_derivative) {
+               std::copy(by_jump.begin(), by_jump.end(), jump_derivative + (k - first) * row);
+             }
+           });
   });
 }
 
@@ -302,6 +307,7 @@ tendonfmu_status tendonfmu_estimator_innovations(tendonfmu_estimator* estimator,
     const std::size_t n = problem.joints(),
                       samples = recording < problem.recordings.size() ? problem.recordings[recording].samples() : 0;
     FreeFinger finger(problem.image.data(), problem.image.size());
+    SampleRows rows(problem.unknowns, finger.get());
     std::vector<BiasFilter> filters(n);
     std::vector<double> gain, weight;
     if (samples > 0) {
@@ -314,7 +320,7 @@ tendonfmu_status tendonfmu_estimator_innovations(tendonfmu_estimator* estimator,
       filters[j] = {column < 0 ? derived.initial_torque[j] : unknowns[static_cast<std::size_t>(column)], true};
     }
     const double nan = std::numeric_limits<double>::quiet_NaN();
-    replay(estimator, recording, unknowns, 0, samples, &finger, [&](const Recording& r, std::size_t k) {
+    replay(estimator, recording, unknowns, 0, samples, &finger, &rows, [&](const Recording& r, std::size_t k) {
       const finger_scratch& s = finger.get()->scratch;
       const bool starts = gain[k] == 1.0 && weight[k] == 0.0;
       for (std::size_t j = 0; j < n; ++j) {
