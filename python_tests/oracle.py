@@ -1,8 +1,8 @@
 """Naive numpy implementation of the sample semantics (contract section 5), used by tests alone.
 
-Written from the texts (the contract, docs/contract-additions.md, the paper), sharing no code with the runtime.
-It favours reading over speed: one plain loop over samples, and one small object per friction effect. Indices in this
-file start at 0; joint 0 is the first joint, so the edge before joint 0 sees the angle q_0 = 0.
+Written from the texts (the contract, docs/contract-additions.md, docs/extensions.md, the paper), sharing no code with
+the runtime. It favours reading over speed: one plain loop over samples, and one small object per friction effect.
+Indices in this file start at 0; joint 0 is the first joint, so the edge before joint 0 sees the angle q_0 = 0.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from oracle_detection import NEAR, Bounds, Detector
+from oracle_detection import NEAR, Bounds, Detector, direction_above
+from oracle_extensions import Extensions
 from oracle_finger import Effect, Places, given, read_joints, read_tendons
 
 Array = NDArray[Any]
@@ -74,6 +75,8 @@ class FingerOracle:
         self._read_structure(description)
         self._read_settings(description)
         self.detector = Detector(description, self.n, self.m, self.branches)
+        self.extensions = Extensions(description, self.n, self.m, self.R, self.joints, kinematics_source, self.branches)
+        self.grips = [self.extensions.rows_at(kind, at) for kind, at, _ in self.places]
         # state
         self.samples = 0
         self.time = math.nan
@@ -85,7 +88,9 @@ class FingerOracle:
         self.last = Step()
 
     def _read_structure(self, description: Mapping[str, Any]) -> None:
-        self.hysteresis = float(given(given(description, "velocity_threshold", {}), "hysteresis", 0.0))
+        threshold = given(description, "velocity_threshold", {})
+        self.hysteresis = float(given(threshold, "hysteresis", 0.0))
+        self.thresholds = float(given(threshold, "tendon", 0.0005)), float(given(threshold, "joint", 0.01))
         self.n = len(description["joints"])
         self.m = len(description["tendons"])
         self.joints = read_joints(description)
@@ -128,6 +133,7 @@ class FingerOracle:
         first = self.samples == 0
         dt = 0.0 if first else time - self.time
         out = Step()
+        inputs = self.extensions.signals(time, inputs, first)
         f0 = np.asarray(inputs["tendon_force"], dtype=float)
 
         def decide(key: Key, value: Any, others: list[Any]) -> Any:
@@ -140,8 +146,9 @@ class FingerOracle:
         # 1. kinematics
         q, v = self._kinematics(inputs, f0, dt, first)
         x_dot = self._tendon_velocity(v)
+        self.extensions.advance(q, v, x_dot, f0, dt, first, self.thresholds, decide, out)
         # 2. each friction effect: F, the increment b, and what stiction may hide
-        F, b, hidden = self._effects(q, v, x_dot, time, first, decide, out)
+        F, b, hidden = self._effects(q, v, x_dot, time, dt, first, decide, out)
         # 3. forces at and between the joints, and with them what multiplies an F or a b
         f_between, f_before_edge, slack = self._propagate(f0, F.edge, F.pulley, decide, out)
         f = self._loads(f_before_edge, f_between)
@@ -199,9 +206,10 @@ class FingerOracle:
     def _kinematics(self, inputs: Mapping[str, Array], f0: Array, dt: float, first: bool) -> tuple[Array, Array]:
         if self.source == 1:
             k = np.array([tendon.stiffness for tendon in self.tendons])
-            q = self.R_plus @ (np.asarray(inputs["tendon_position"], dtype=float) - f0 / k)
+            q = self.R_plus @ (np.asarray(inputs["tendon_position"], dtype=float) - self.extensions.stretch(f0, k))
         else:
             q = np.array(inputs["joint_position"], dtype=float)
+        q = self.extensions.play(q, first)
         if self.source == 3:
             return q, np.array(inputs["joint_velocity"], dtype=float)
         if first:
@@ -220,17 +228,28 @@ class FingerOracle:
         return x_dot
 
     def _effects(
-        self, q: Array, v: Array, x_dot: Array, time: float, first: bool, decide: Callable[..., Any], out: Step
-    ) -> tuple[Places, Places, Places]:
+        self, q: Array, v: Array, x_dot: Array, time: float, dt: float, first: bool,
+        decide: Callable[..., Any], out: Step,
+    ) -> tuple[Places, Places, Places]:  # fmt: skip
         """Step 2: F, b and, of the stuck effects, |F| at the present |v| on the side of their last motion (for H)."""
         F, b, hidden = (Places.zeros(self.m, self.n) for _ in range(3))
-        for kind, at, effect in self.places:
+        for (kind, at, effect), rows in zip(self.places, self.grips, strict=True):
             velocity, angle, key = self._seen_by(kind, at, q, v, x_dot)
-            taken = self._take_effect(effect, velocity, angle, time, first, key, decide, out)
-            getattr(F, kind)[at], getattr(b, kind)[at] = taken
+            factor = self.extensions.factor(rows, abs(velocity), time)
+            displacement = self.extensions.slides(rows)
+            if displacement is not None:
+                taken = self._slide(effect, displacement, velocity, angle, dt, key), 0.0
+                direction = direction_above(velocity, effect.limit(self.hysteresis), key, decide, out)
+                effect.side, effect.rests = direction or effect.side, direction == 0
+            else:
+                taken = self._take_effect(effect, velocity, angle, time, first, key, decide, out)
+            getattr(F, kind)[at], getattr(b, kind)[at] = factor * taken[0], factor * taken[1]
             if effect.stuck and self.detector.friction_bound is not None:
-                getattr(hidden, kind)[at] = abs(effect.value(effect.side or 1, abs(velocity), angle))
+                getattr(hidden, kind)[at] = factor * abs(effect.value(effect.side or 1, abs(velocity), angle))
         return F, b, hidden
+
+    def _slide(self, effect: Effect, displacement: float, v: float, angle: float, dt: float, key: Key) -> float:
+        return self.extensions.sliding_friction(effect, displacement, key, v, angle, dt)
 
     def _seen_by(self, kind: str, at: tuple[int, ...], q: Array, v: Array, x_dot: Array) -> tuple[float, float, Key]:
         """Velocity and angle of one place, and the key of its decision: who sees the same velocity decides together."""
@@ -247,13 +266,7 @@ class FingerOracle:
         decide: Callable[..., Any], out: Step,
     ) -> tuple[float, float]:  # fmt: skip
         """Step 2 of section 5: (F, b) of one effect, and what it remembers."""
-        sign = int(np.sign(v))
-        limit = effect.limit(self.hysteresis)
-        margin = abs(abs(v) - limit)
-        out.velocity_margin = min(out.velocity_margin, margin)
-        direction = sign if abs(v) > limit else 0
-        others = [d for d in (-1, 0, 1) if d != direction] if abs(v) < NEAR else [0 if direction else sign]
-        direction = decide(key, direction, others if margin < NEAR else [])
+        direction = direction_above(v, effect.limit(self.hysteresis), key, decide, out)
         self._count_place(effect, direction, abs(v), angle)
 
         effect.taken_out, effect.enters = 0.0, False
@@ -342,13 +355,13 @@ class FingerOracle:
             negative = decide(("force", i, place, j), force < 0.0, [not force < 0.0] if near else [])
             if negative:
                 slack[i] = True
-                self.branches["slack_by_loss" if computed else "slack_at_spring"] += 1
+                self.branches["slack_at_spring" if place == "spring" else "slack_by_loss"] += 1
                 return 0.0
             return force
 
         for i in range(self.m):
-            # f0 is an input: every implementation compares the same number, so it is never "near"
-            f_A = checked(float(f0[i]), i, "spring", 0, computed=False)
+            # f0 is an input: every implementation compares the same number, so it is never "near" (but interpolated)
+            f_A = checked(float(f0[i]), i, "spring", 0, computed=self.extensions.forces_are_computed)
             for j in range(self.n):
                 f_before_edge[i, j] = f_A
                 # a force of 0 stays 0 whatever the friction: nothing is decided there by rounding
@@ -394,10 +407,8 @@ class FingerOracle:
         return np.array([joint.cover_stiffness * (q[j] - joint.rest_angle) for j, joint in enumerate(self.joints)])
 
     def _springs(self, q: Array) -> Array:
-        """T_jq and the cubic extension `cover_hardening`."""
-        return self._covers(q) + np.array(
-            [each.hardening * (q[j] - each.rest_angle) ** 3 for j, each in enumerate(self.joints)]
-        )
+        """T_jq and the torques of `extensions`."""
+        return self._covers(q) + self.extensions.torques()
 
     def _contact(
         self, r: Array, bounds: Bounds, mean_force: float, time: float, dt: float,
@@ -425,11 +436,8 @@ class FingerOracle:
 
     def _inhibit(self, time: float) -> None:
         """Contact: b_eff and P stay, the rest counts as begun now (fig. 5, t1 = t)."""
-        effects = [joint.friction for joint in self.joints] + [joint.load_friction for joint in self.joints]
-        for tendon in self.tendons:
-            effects += tendon.pulley + tendon.edge
-        for effect in effects:
-            if effect is not None and effect.stuck:
+        for _, _, effect in self.places:
+            if effect.stuck:
                 effect.stuck_since = time
                 self.branches["stuck_in_contact"] += 1
 

@@ -22,6 +22,16 @@ NEAR = 1e-9  # contract section 5: a decision closer than this to its threshold 
 FASTEST = 10.0  # the evidence of `cusum` grows at most this many seconds a second
 
 
+def direction_above(v: float, limit: float, key: tuple[Any, ...], decide: Callable[..., Any], out: Any) -> int:
+    """sgn(v) where |v| > limit, else 0."""
+    sign = int(np.sign(v))
+    margin = abs(abs(v) - limit)
+    out.velocity_margin = min(out.velocity_margin, margin)
+    direction = sign if abs(v) > limit else 0
+    others = [d for d in (-1, 0, 1) if d != direction] if abs(v) < NEAR else [0 if direction else sign]
+    return int(decide(key, direction, others if margin < NEAR else []))
+
+
 @dataclass
 class Bounds:
     """Step 4a at one sample, N·m: H, J, E and u [n]; parts [n, m + 3]."""

@@ -46,12 +46,15 @@ class Effect:
     entry_load: float = 0.0  # e: the product b·f that it added on coming to rest
     enters: bool = False  # of the present sample alone, like
     taken_out: float = 0.0  # κ·e
+    share: float = 0.0  # ζ of the extension `presliding`; with it an effect never sticks, though it
+    rests: bool | None = None  # may be slower than what counts as motion
 
     def limit(self, hysteresis: float) -> float:
         """The |v| above which the effect moves at this sample."""
-        if self.stuck is None:
+        rested = self.stuck if self.rests is None else self.rests
+        if rested is None:
             return self.threshold
-        return (1.0 + hysteresis if self.stuck else 1.0 - hysteresis) * self.threshold
+        return (1.0 + hysteresis if rested else 1.0 - hysteresis) * self.threshold
 
     def value(self, side: int, speed: float, angle: float) -> float:
         """F(side * speed); the laws' values are interpolated over the angle, constant outside."""
@@ -81,13 +84,12 @@ class Tendon:
 
 @dataclass
 class Joint:
-    """Constants of one joint: cover spring, T_jv0, T_jvf, and the cubic cover extension."""
+    """Constants of one joint: cover spring, T_jv0, T_jvf."""
 
     cover_stiffness: float
     rest_angle: float
     friction: Effect | None
     load_friction: Effect | None
-    hardening: float = 0.0
 
 
 @dataclass
@@ -160,10 +162,6 @@ def read_joints(description: Mapping[str, Any]) -> list[Joint]:
                 load_friction=read_effect(entry.get("load_friction"), threshold),
             )
         )
-    for extension in given(description, "extensions", []):
-        if extension["effect"] != "cover_hardening":
-            raise ValueError(f"extensions: effect {extension['effect']!r} is unknown to the oracle")
-        joints[extension["joint"] - 1].hardening += float(extension["stiffness"])
     return joints
 
 

@@ -4,6 +4,9 @@ Velocities, who moves, who sticks and when do not depend on θ. So the oracle ru
 reach, and what each friction effect did is written down (`Course`); after that T and Δb are formulas over all samples
 that take complex numbers too: the imaginary part of one evaluation at θ + i h is the exact derivative along h, without
 the cancellation of a difference. Tests hold the formulas and the derivatives against the oracle itself.
+
+Extensions of step 4 and of friction are part of the formulas; those that change the signals (`time_delay`, `backlash`,
+`tendon_nonlinearity`) move the kinematics, which stay those of the description.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import oracle
+from oracle_extensions import factor_of, next_share, torque_of
 from oracle_finger import Effect, given
 
 Array = NDArray[Any]
@@ -26,6 +30,7 @@ Values = Mapping[str, Any]  # path of a parameter -> its number, or [U, 1] numbe
 Place = tuple[Any, ...]
 
 NEVER = 1e9  # N·m, a contact threshold out of reach
+SPRINGS = ("cover_hardening", "joint_coupling")
 
 
 def without_contact(description: Mapping[str, Any]) -> dict[str, Any]:
@@ -52,7 +57,8 @@ class Course:
     """What one friction effect did over a recording, all [N].
 
     direction: 0 stuck, else sgn(v). speed: |v|. angle: that its working points see. at_plus, at_minus: b of the sample
-    is at_plus·F(+v_min) + at_minus·F(−v_min), F with its sign.
+    is at_plus·F(+v_min) + at_minus·F(−v_min), F with its sign. travel: with the extension `presliding` Δ, and the
+    direction is then the side of the law, also at rest.
     """
 
     direction: Array
@@ -60,6 +66,7 @@ class Course:
     angle: Array
     at_plus: Array
     at_minus: Array
+    travel: Array
 
 
 class Recorder(oracle.FingerOracle):
@@ -71,6 +78,7 @@ class Recorder(oracle.FingerOracle):
             raise ValueError("bias.entry_load: b then belongs to the loads of two samples, which no Course tells")
         self.rows: dict[int, list[tuple[float, ...]]] = {}
         self.totals: list[Array] = []
+        self.moments: list[Any] = []  # what torques of extensions see
         self.residuals: list[Array] = []  # r of step 5, from the second sample on
 
     def _contact(self, r: Array, *others: Any) -> Array:
@@ -99,8 +107,13 @@ class Recorder(oracle.FingerOracle):
         elif not first and direction == 0 and not stuck:
             assert side is not None
             of_side[side] += 1.0
-        self.rows.setdefault(id(effect), []).append((direction, abs(v), angle, of_side[1], of_side[-1]))
+        self.rows.setdefault(id(effect), []).append((direction, abs(v), angle, of_side[1], of_side[-1], 0.0))
         return F, b
+
+    def _slide(self, effect: Effect, displacement: float, v: float, angle: float, dt: float, key: Any) -> float:
+        side = self.extensions.side_of(effect, key)
+        self.rows.setdefault(id(effect), []).append((side, abs(v), angle, 0.0, 0.0, v * dt))
+        return super()._slide(effect, displacement, v, angle, dt, key)
 
     def course(self, effect: Effect) -> Course:
         return Course(*np.array(self.rows[id(effect)], dtype=float).T)
@@ -118,6 +131,7 @@ def run_recorder(
         steps.append(finger.step(float(time), {name: recording[name][k] for name in present}))
         friction, increments = finger.totals
         torque.append(friction + finger._springs(finger.q))
+        finger.moments.append(finger.extensions.moment)
         jump.append(increments)
     return finger, np.array(torque), np.array(jump), steps
 
@@ -137,7 +151,7 @@ class Trace:
         self.n, self.m, self.R = finger.n, finger.m, finger.R
         self.bidirectional = [tendon.bidirectional for tendon in finger.tendons]
         self.time = np.asarray(recording["time"], dtype=float)
-        self.force = np.asarray(recording["tendon_force"], dtype=float)
+        self.force = np.array([moment.f0 for moment in finger.moments])
         self.q = np.array([step.values["joint_angle"] for step in steps])
         self.tau = np.array([step.values["joint_torque"] for step in steps])
         # within 1e-9 of a threshold; exactly at it (at rest, v_min = 0) nothing is left to rounding
@@ -145,8 +159,13 @@ class Trace:
         self.near = ((margins > 0.0) & (margins < oracle.NEAR)).any(axis=1)
         self.residual = np.array([np.full(self.n, np.nan), *finger.residuals])
         self.branches = finger.branches
+        self.rows = finger.extensions.rows
+        self.units = self._unit_torques(finger)
         self.laws: dict[Place, tuple[Course, float, Array, list[tuple[str, str]]]] = {}
+        self.grips: dict[Place, list[int]] = {}  # rows of extensions that change the friction of a place
+        rows_of = {id(effect): rows for (_, _, effect), rows in zip(finger.places, finger.grips, strict=True)}
         for place, path, entry, effect in self._places(finger):
+            self.grips[place] = [k for k, row in enumerate(self.rows) if any(row is one for one in rows_of[id(effect)])]
             self.laws[place] = (finger.course(effect), effect.threshold, *self._points(effect, path, entry, finger))
 
     def _places(self, finger: Recorder) -> list[tuple[Place, str, Any, Effect]]:
@@ -177,6 +196,35 @@ class Trace:
             sides.append((f"{own}.positive", f"{own}.negative") if "positive" in law else (own, own))
         return weights, sides
 
+    def _unit_torques(self, finger: Recorder) -> dict[str, Array]:
+        """[N, n] torque of step 4 by each number of the extensions, but for springs (their rest angles may change)."""
+        found = {}
+        for k, row in enumerate(self.rows):
+            if row.effect not in SPRINGS:
+                for name in row.numbers:
+                    unit = dict.fromkeys(row.numbers, 0.0) | {name: 1.0}
+                    cosines = finger.extensions.cosines
+                    series = [torque_of(row, unit, moment, self.R, cosines) for moment in finger.moments]
+                    found[f"extensions[{k + 1}].{name}"] = np.array(series)
+        return found
+
+    def _numbers(self, k: int, theta: Values) -> dict[str, Any]:
+        return {name: theta[f"extensions[{k + 1}].{name}"] for name in self.rows[k].numbers}
+
+    def _grip(self, place: Place, theta: Values) -> tuple[Any, Any]:
+        """What multiplies F and b [U, N], and ζ [U, N] where the effect slides (else None)."""
+        factor, share = 1.0, None
+        course = self.laws[place][0]
+        for k in self.grips[place]:
+            numbers = self._numbers(k, theta)
+            factor = factor * factor_of(self.rows[k], numbers, course.speed, self.time - self.time[0])
+            if self.rows[k].effect == "presliding":
+                series = [0.0 * numbers["displacement"]]
+                for travel in course.travel[1:]:
+                    series.append(next_share(series[-1], travel, numbers["displacement"]))
+                share = np.concatenate([np.atleast_2d(each) for each in series], axis=-1)
+        return factor, share
+
     def _friction_and_jump(self, place: Place, theta: Values, samples: slice) -> tuple[Any, Any]:
         """F and b of one effect, [U, N]."""
         if place not in self.laws:
@@ -196,7 +244,12 @@ class Trace:
             forward, backward = magnitude(positive, speed), -magnitude(negative, speed)
             F = F + weight * np.where(direction > 0, forward, np.where(direction < 0, backward, 0.0))
             b = b + weight * (at_plus * magnitude(positive, threshold) - at_minus * magnitude(negative, threshold))
-        return F, b
+        if not self.grips[place]:
+            return F, b
+        factor, share = self._grip(place, theta)
+        if np.ndim(factor):
+            factor = factor[..., samples]
+        return factor * (F if share is None else share[..., samples] * np.where(direction > 0, F, -F)), factor * b
 
     def evaluate(
         self, theta: Values, samples: slice = slice(None), frozen: Values | None = None
@@ -255,15 +308,25 @@ class Trace:
         return np.where(force.real < 0.0, -force, force) if self.bidirectional[i] else force
 
     def _springs(self, theta: Values, samples: slice) -> Array:
-        """Covers and their hardening, complex [U, samples, n]."""
+        """Covers and torques of extensions, complex [U, samples, n]."""
         size = max((np.size(value) for value in theta.values()), default=1)
         q = self.q[samples]
         torque = np.zeros((size, *q.shape), dtype=complex)
+
+        def bend(j: int) -> Any:
+            return q[:, j] - theta.get(f"joints[{j + 1}].cover.rest_angle", 0.0)
+
         for j in range(self.n):
-            path = f"joints[{j + 1}].cover"
-            bend = q[:, j] - theta.get(f"{path}.rest_angle", 0.0)
-            torque[..., j] += theta.get(f"{path}.stiffness", 0.0) * bend
-            for k, extension in enumerate(given(self.description, "extensions", []), start=1):
-                if extension["joint"] == j + 1:
-                    torque[..., j] += theta[f"extensions[{k}].stiffness"] * bend**3
+            torque[..., j] += theta.get(f"joints[{j + 1}].cover.stiffness", 0.0) * bend(j)
+        for k, row in enumerate(self.rows):
+            if row.effect in SPRINGS:
+                assert row.joint is not None
+                stiffness = self._numbers(k, theta)["stiffness"]
+                if row.effect == "cover_hardening":
+                    torque[..., row.joint] += stiffness * bend(row.joint) ** 3
+                else:
+                    torque[..., row.joint] += stiffness * (bend(row.joint) - bend(row.joint + 1))
+                    torque[..., row.joint + 1] -= stiffness * (bend(row.joint) - bend(row.joint + 1))
+        for path, unit in self.units.items():
+            torque += np.asarray(theta[path])[..., None] * unit[samples]
         return torque

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from random_extensions import random_axes, random_extensions
+
 Array = NDArray[Any]
 Description = dict[str, Any]
 Recording = dict[str, Array]
@@ -347,15 +349,27 @@ def random_detection(seed: int, finger: Description) -> Description:
     return finger
 
 
-def random_case(seed: int, samples: int = SAMPLES, detection: bool = False) -> tuple[Description, Recording]:
+def random_extended(seed: int, finger: Description) -> Description:
+    """The finger with any of the extensions of docs/extensions.md, a few of them with axes of the joints."""
+    rng = np.random.default_rng([seed, 7])
+    joints, tendons = len(finger["joints"]), len(finger["tendons"])
+    finger = finger | {"extensions": random_extensions(rng, joints, tendons)}
+    return finger | (random_axes(rng, joints) if rng.random() < 0.3 else {})
+
+
+def random_case(
+    seed: int, samples: int = SAMPLES, detection: bool = False, extensions: bool = False
+) -> tuple[Description, Recording]:
     """A finger and its recording; about a third begin under load, with `bias.initial_torque` near it.
 
-    detection: with any subset of the keys of docs/contract-additions.md.
+    detection: with any subset of the keys of docs/contract-additions.md. extensions: with rows of docs/extensions.md.
     """
     rng = np.random.default_rng([seed, 3])
     description = random_finger(seed)
     if detection:
         description = random_detection(seed, description)
+    if extensions:
+        description = random_extended(seed, description)
     recording = random_recording(description, seed, samples)
     if rng.random() < 0.3:
         R = np.array([tendon["moment_arms"] for tendon in description["tendons"]])
