@@ -145,7 +145,7 @@ def test_every_verdict_reads_right(verdict: str, count: int) -> None:
         ("load_friction", {"coulomb": (8.1e-5, "m")}, "81 µN·m of friction for each newton of tendon force"),
         ("preload_friction", {"coulomb": (0.2, "N")}, "0.2 N of friction"),
         ("gravity", {"sine": (0.03, "N.m"), "cosine": (-0.04, "N.m")}, "50 mN·m at most"),
-        ("presliding", {"displacement": (3.2e-4, "m")}, "friction builds up over 0.32 mm"),
+        ("presliding", {"displacement": (3.2e-4, "m")}, "over 0.32 mm"),
         ("time_delay", {"delay": (-8e-4, "s")}, "the forces come 0.8 ms earlier than the positions"),
         ("force_gain", {"correction": (-0.021, "1")}, "the true force is 2.1 % smaller than measured"),
         ("moment_arm", {"correction": (-2.5e-4, "m")}, "−0.25 mm on the described arm"),

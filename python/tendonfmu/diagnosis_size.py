@@ -16,7 +16,7 @@ _STEPS = ((0.1, 1.0, ""), (1e-4, 1e3, "m"), (0.0, 1e6, "µ"))  # from that magni
 
 
 def size_of(effect: str, parameters: Parameters) -> str:
-    """Such as "friction builds up over 0.32 mm". parameters: of the cause in the extended description."""
+    """Such as "a play of 0.32 mm". parameters: of the cause in the extended description."""
     numbers: Numbers = {}
     for path, number in parameters.items():
         numbers.setdefault(path.rsplit(".", 1)[-1], []).append(number)
@@ -141,7 +141,7 @@ _WORDS: Mapping[str, Callable[[Numbers], str]] = {
     "cover_hardening": _of("a cubic spring of {}", "stiffness"),
     "gravity": _wave("{} at most"),
     "inertia": _of("{}", "inertia"),
-    "presliding": _of("friction builds up over {}", "displacement"),
+    "presliding": _of("over {}", "displacement"),
     "friction_drift": _drift,
     "force_gain": _correction("the true force is"),
     "force_offset": _correction("the true force is"),
