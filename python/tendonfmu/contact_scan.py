@@ -81,7 +81,8 @@ def _unexplained(
     plan = learner.layout(series, filters.valid)
     left = np.array(series.target)
     for joint in range(residual.shape[1]):
-        ready = learner.prepared(joint, residual, nuisance[joint], seen, filters, plan)
+        own = learner.of_joint(filters, joint)
+        ready = learner.prepared(residual[:, joint], nuisance[joint], seen, own, plan)
         everything = learner.Choice("", "", np.flatnonzero(ready.scale > 0.0))
         guess = learner.predicted(ready, [everything], seen, plan)
         if guess.gains[0] > 0.0:

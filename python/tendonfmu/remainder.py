@@ -18,7 +18,7 @@ from tendonfmu import remainder_learner as learner
 from tendonfmu.remainder_features import Features, features
 from tendonfmu.remainder_text import described
 from tendonfmu.spectral_line import Line, find_lines
-from tendonfmu.whitening import whitener
+from tendonfmu.whitening import Whitener, whitener
 
 if TYPE_CHECKING:
     from tendonfmu.diagnosis_series import Series
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 Numbers = NDArray[np.float64]
 
 LEVEL = 0.005  # of a wrong "unknown", family-wise
-TRIED = 8  # choices of columns whose prediction is tried
+TRIED = 6  # choices of columns whose prediction is tried
 LEAST_SHARE = 0.02  # of the residual's variance: what is less is not worth a word
 
 
@@ -48,7 +48,7 @@ class Finding:
 class Remainder:
     """What is explainable of a residual [B, n].
 
-    share: per joint, of its variance that is predicted on unseen blocks (below 0: worse than nothing). interval: 95 %
+    share: per joint, of its variance that is predicted on unseen blocks. interval: 95 %
     of it. p_value: of there being nothing, family-wise over joints, groups and frequencies. unknown: whether there is
     something for certain and worth a word. prediction: [B, n] N·m, 0 where not used. findings: significant ones, the
     best first.
@@ -68,20 +68,16 @@ def measure_remainder(
 ) -> Remainder:
     """residual: [B, n] N·m. nuisance: per joint, columns [B, p] whose span was taken from its residual (bias splines,
     derivatives of the nominal model); columns of the learner get the same. Blocks that are not used are left out."""
+    joints = residual.shape[1]
     filters = whitener(series, residual)
     plan = learner.layout(series, filters.valid)
-    joints = residual.shape[1]
     if plan.blocks < learner.FEWEST_BLOCKS:
         nothing = ((0.0, 0.0),) * joints
         return Remainder((0.0,) * joints, nothing, 1.0, False, "", np.zeros_like(residual), ())
     with threadpool_limits(limits=1):
         seen = features(series, seed=seed)
-        ready = [learner.prepared(j, residual, nuisance[j], seen, filters, plan) for j in range(joints)]
-        learned = [_learned(each, seen, plan, np.random.default_rng((seed, j))) for j, each in enumerate(ready)]
-        null = np.max([each.null for each in learned], axis=0)
-    prediction = np.zeros_like(residual)
-    prediction[plan.rows] = np.stack([each.values for each in learned], axis=1)
-    findings = [_finding(number + 1, each, null) for number, each in enumerate(learned)]
+        findings, prediction = _look(residual, nuisance, seen, filters, plan, seed)
+    filters = whitener(series, residual - prediction)
     lines, waves = [], np.zeros_like(residual)
     for joint in range(joints):
         left = residual[:, joint] - prediction[:, joint]
@@ -94,6 +90,26 @@ def measure_remainder(
     clear = [each for each in findings if interval[each.joint - 1][0] > 0.0 and share[each.joint - 1] >= LEAST_SHARE]
     text = described(series, residual, prediction, clear, share) if clear else ""
     return Remainder(share, interval, p_value, bool(clear), text, prediction, tuple(findings))
+
+
+def _look(
+    residual: Numbers,
+    nuisance: Sequence[Numbers],
+    seen: Features,
+    filters: Whitener,
+    plan: learner.Layout,
+    seed: int,
+) -> tuple[list[Finding], Numbers]:
+    """The best finding of each joint, and the prediction [B, n]."""
+    learned = []
+    for joint, columns in enumerate(nuisance):
+        own = learner.of_joint(filters, joint)
+        ready = learner.prepared(residual[:, joint], columns, seen, own, plan)
+        learned.append(_learned(ready, seen, plan, np.random.default_rng((seed, joint))))
+    null = np.max([each.null for each in learned], axis=0)
+    prediction = np.zeros_like(residual)
+    prediction[plan.rows] = np.stack([each.values for each in learned], axis=1)
+    return [_finding(joint + 1, each, null) for joint, each in enumerate(learned)], prediction
 
 
 @dataclass(frozen=True)
@@ -116,7 +132,8 @@ def _learned(ready: learner.Prepared, seen: Features, plan: learner.Layout, rng:
     guess = learner.predicted(ready, [*single, everything, best], seen, plan)
     plain = [k for k, choice in enumerate(single) if choice.group != "interaction"] or [0]
     named = single[max(plain, key=lambda number: guess.gains[number])]
-    return _Learned(skills[0].surprise, null, guess.values, named)
+    values = guess.values if max(guess.gains) > 0.0 else np.zeros_like(guess.values)
+    return _Learned(skills[0].surprise, null, values, named)
 
 
 def _finding(joint: int, learned: _Learned, null: Numbers) -> Finding:

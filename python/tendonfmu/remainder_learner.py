@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, eigh, eigvalsh, solve, solve_triangular
-from scipy.stats import gamma, norm
+from scipy.special import gammaincc, log_ndtr
 
 from tendonfmu.nuisance import basis, without
 from tendonfmu.remainder_features import Features
@@ -36,8 +36,9 @@ BLOCK = 2.0  # s: longer than the noise remembers once the bias splines are out
 FOLD_BLOCKS = 3  # blocks side by side in a fold; one block on either side of them is learned from by nobody
 FOLDS = 10
 FEWEST_BLOCKS = 8
-TEST_PENALTIES = (30.0, 300.0)  # noise variance over the variance that a group may explain
-PENALTIES = (3.0, 30.0, 300.0)
+PENALTY = 30.0  # noise variance over the variance that a group may explain
+PENALTIES = (3.0, 30.0, 300.0)  # of large sets, where it matters
+LARGE = 100  # columns
 FLATTEST = 0.95  # leverage that is corrected for, at most
 DRAWS = 2000
 CHANCE = 1.3  # ratio of block variances that a small set may have by chance
@@ -83,7 +84,7 @@ def of_joint(filters: Whitener, joint: int) -> Whitener:
 class Prepared:
     """One joint's residual and columns, whitened and projected; rows [U] of a layout.
 
-    table: [U, D] float32, groups of equal power. goal: [U] float32, standard deviation 1. scale: [D] of the raw
+    table: [U, D] float32, groups of equal power. goal: [U] float32, of standard deviation 1. scale: [D] of the raw
     columns, weights in N·m; 0 for those that the nuisance columns leave nothing of. basis, inner: [U, r] orthonormal,
     of the nuisance columns before and after whitening.
     """
@@ -95,12 +96,8 @@ class Prepared:
     inner: Numbers
 
 
-def prepared(
-    joint: int, residual: Numbers, nuisance: Numbers, seen: Features, filters: Whitener, plan: Layout
-) -> Prepared:
-    """joint: from 0. residual: [B, n] N·m; nuisance: [B, p] of this joint; seen: [B, D]. plan: of the filters' valid
-    rows."""
-    own = of_joint(filters, joint)
+def prepared(residual: Numbers, nuisance: Numbers, seen: Features, own: Whitener, plan: Layout) -> Prepared:
+    """Of one joint. residual: [B] N·m; nuisance: [B, p]; seen: [B, D]; own: its filter. plan: of its valid rows."""
 
     def filtered(values: NDArray[Any]) -> NDArray[Any]:
         return np.asarray(own.apply(values.reshape(len(values), 1, -1))[plan.rows, 0])
@@ -115,9 +112,10 @@ def prepared(
     for name in dict.fromkeys(seen.group.tolist()):
         power = float(np.sum((after * scale)[seen.group == name]))
         scale[seen.group == name] *= 1.0 / np.sqrt(power) if power > 0.0 else 0.0
-    goal = without(filtered(residual[:, joint])[:, 0], inner)
+    goal = without(filtered(residual)[:, 0], inner)
     spread = max(float(goal.std()), 1e-300)
-    return Prepared(table * scale.astype(np.float32), (goal / spread).astype(np.float32), scale * spread, plain, inner)
+    table *= scale.astype(np.float32)
+    return Prepared(table, (goal / spread).astype(np.float32), scale * spread, plain, inner)
 
 
 def _even_leverage(goal: Numbers, inner: Numbers, plan: Layout) -> Numbers:
@@ -188,25 +186,25 @@ def skills(ready: Prepared, seen: Features, plan: Layout, rng: np.random.Generat
     whole = (ready.table.T @ ready.goal).astype(np.float64)
     drawn = _drawn(gram, rng)
     null = np.zeros(DRAWS)
-    raw: list[tuple[Choice, float, float, tuple[float, float, float]]] = []
+    raw: list[tuple[Choice, float, tuple[float, float, float]]] = []
+    ratios = []
     for choice in _choices(seen, ready.scale > 0.0):
         inner, power = _inner(gram, choice, len(ready.goal))
         columns = choice.columns
         right = np.concatenate([whole[columns, None], product[:, columns].T, drawn[columns]], axis=1) / np.sqrt(power)
-        for penalty in TEST_PENALTIES:
-            factor = cho_factor(inner + penalty * np.eye(len(inner)), lower=True, check_finite=False)[0]
-            turned = solve_triangular(factor, right, lower=True, check_finite=False)
-            shape = _shape(inner, penalty)
-            if shape[1] <= 0.0:
-                continue
-            ratio = _block_power(turned[:, 1 : 1 + plan.blocks]) / shape[0]
-            raw.append((choice, float(np.sum(turned[:, 0] ** 2)), ratio, shape))
+        factor = cho_factor(inner + PENALTY * np.eye(len(inner)), lower=True, check_finite=False)[0]
+        turned = solve_triangular(factor, right, lower=True, check_finite=False)
+        shape = _shape(inner)
+        if shape[1] > 0.0:
+            single, paired = _block_power(turned[:, 1 : 1 + plan.blocks])
+            raw.append((choice, float(np.sum(turned[:, 0] ** 2)), shape))
+            ratios.append((single / shape[0], paired / shape[0]))
             null = np.maximum(null, _surprises(np.sum(turned[:, 1 + plan.blocks :] ** 2, axis=0), *shape))
     # the ratio of a small set is uncertain: its own counts only as far as it is beyond chance
-    usual = max(1.0, float(np.median([ratio for _, _, ratio, _ in raw])))
+    usual = max(1.0, *np.median(ratios, axis=0).tolist())
     found = []
-    for choice, score, ratio, shape in raw:
-        excess = max(usual, ratio / CHANCE)
+    for (choice, score, shape), (single, _) in zip(raw, ratios, strict=True):
+        excess = max(usual, single / CHANCE)
         found.append(Skill(choice, float(_surprises(np.array([score / excess]), *shape)[0]), excess))
     return sorted(found, key=lambda skill: -skill.surprise), null
 
@@ -217,47 +215,49 @@ def _drawn(gram: Numbers, rng: np.random.Generator) -> Numbers:
     return np.asarray((vectors * np.sqrt(value.clip(0.0))) @ rng.standard_normal((len(gram), DRAWS)))
 
 
-def _shape(inner: Numbers, penalty: float) -> tuple[float, float, float]:
+def _shape(inner: Numbers) -> tuple[float, float, float]:
     """Mean, standard deviation and skewness of S for white noise."""
     value = eigvalsh(inner, check_finite=False).clip(0.0)
-    share = value / (value + penalty)
+    share = value / (value + PENALTY)
     spread = float(np.sqrt(2.0 * np.sum(share**2)))
     return float(share.sum()), spread, min(8.0 * float(np.sum(share**3)) / max(spread, 1e-300) ** 3, 2.83)
 
 
-def _block_power(blocks: Numbers) -> float:
-    """Σ |z_b|² of blocks [D, b], of single ones or of neighbours taken together, whichever is more."""
+def _block_power(blocks: Numbers) -> tuple[float, float]:
+    """Σ |z_b|² of blocks [D, b], of single ones and of neighbours taken together."""
     both = blocks[:, 1:] + blocks[:, :-1]
-    single = float(np.sum(blocks**2))
     # every block but the two outer ones lies in two pairs
     paired = 0.5 * (float(np.sum(both**2)) + float(np.sum(blocks[:, [0, -1]] ** 2)))
-    return max(single, paired)
+    return float(np.sum(blocks**2)), paired
 
 
 def _surprises(score: Numbers, mean: float, spread: float, skew: float) -> Numbers:
     """−log of the upper tail of Pearson's third distribution with these moments."""
     ratio = (score - mean) / spread
     if skew < 0.02:
-        return np.asarray(-norm.logsf(ratio))
+        return np.asarray(-log_ndtr(-ratio))
     shape = 4.0 / skew**2
-    return np.asarray(-gamma.logsf(np.maximum(ratio * np.sqrt(shape) + shape, 1e-12), shape))
+    return np.asarray(-np.log(np.maximum(gammaincc(shape, np.maximum(ratio * np.sqrt(shape) + shape, 0.0)), 1e-300)))
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """Of one joint, on unseen blocks. goal: [U] of the whitened residual. values: [U] N·m, off the nuisance columns.
+    """Of one joint, on unseen blocks. values: [U] N·m, off the nuisance columns.
 
     gains: of each choice, share of the whitened residual's variance that it takes away at its best penalty.
     """
 
-    goal: Numbers
     values: Numbers
     gains: tuple[float, ...]
 
 
 def predicted(ready: Prepared, choices: Sequence[Choice], seen: Features, plan: Layout) -> Prediction:
     """By the best of these choices and PENALTIES, by the whitened gain on the unseen blocks."""
-    tries = [(choice.columns, penalty) for choice in choices for penalty in PENALTIES]
+    tries = [
+        (k, penalty)
+        for k, choice in enumerate(choices)
+        for penalty in (PENALTIES if len(choice.columns) > LARGE else (PENALTY,))
+    ]
     folds = int(plan.fold_of.max()) + 1
     weights = np.zeros((len(tries), folds, ready.table.shape[1]))
     gram = (ready.table.T @ ready.table).astype(np.float64)
@@ -267,7 +267,8 @@ def predicted(ready: Prepared, choices: Sequence[Choice], seen: Features, plan: 
         apart = ready.table[held]
         inner = gram - (apart.T @ apart).astype(np.float64)
         right = (ready.table[~held].T @ ready.goal[~held]).astype(np.float64)
-        for number, (columns, penalty) in enumerate(tries):
+        for number, (k, penalty) in enumerate(tries):
+            columns = choices[k].columns
             matrix = inner[np.ix_(columns, columns)] + penalty * np.eye(len(columns))
             weights[number, fold, columns] = solve(matrix, right[columns], assume_a="pos", check_finite=False)
     guesses = np.stack([_by_fold(ready.table, each, plan) for each in weights])
@@ -275,7 +276,11 @@ def predicted(ready: Prepared, choices: Sequence[Choice], seen: Features, plan: 
     best = int(np.argmax(gains))
     values = _by_fold(seen.values[plan.rows], weights[best] * ready.scale, plan)
     values -= ready.basis @ (ready.basis.T @ values)
-    return Prediction(guesses[best], values, tuple(gains.reshape(len(choices), -1).max(axis=1).tolist()))
+    own = [
+        max(gain for gain, (k, _) in zip(gains.tolist(), tries, strict=True) if k == each)
+        for each in range(len(choices))
+    ]
+    return Prediction(values, tuple(own))
 
 
 def _by_fold(table: NDArray[Any], weights: Numbers, plan: Layout) -> Numbers:
