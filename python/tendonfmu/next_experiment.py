@@ -362,16 +362,20 @@ def _best(answers: Sequence[Answer]) -> Answer:
 
 
 def _first_of_all(answers: Sequence[Answer], scores: Sequence[Sequence[Answer]], seed: int) -> Experiment:
-    """The simplest entry that tells as many pairs of causes as any, and nearly as many effects."""
+    """The entry that tells most pairs of causes, then most effects, and the simplest of these; one that changes tension
+    and load at once only where no other tells anything more that matters.
+    """
 
     def told_by(found: Sequence[Answer]) -> tuple[int, int]:
         told = [answer for answer in found if answer.tells]
         return sum(answer.question.rival is not None for answer in told), len(told)
 
-    most_pairs = max(told_by(found)[0] for found in scores)
-    able = [found for found in scores if told_by(found)[0] == most_pairs]
-    most = max(told_by(found)[1] for found in able)
-    chosen = next(found for found in able if told_by(found)[1] >= _SIMPLER * most)
+    simple = [found for found in scores if not (found[0].entry.tension and found[0].entry.load)]
+    chosen = max(simple or scores, key=told_by)
+    pairs, count = told_by(chosen)
+    for found in scores:
+        if told_by(found)[0] > pairs or (not count and told_by(found)[1]):
+            chosen, (pairs, count) = found, told_by(found)
     told = [answer for answer in chosen if answer.tells]
     if not told:
         return Experiment(_sentence([max(answers, key=lambda answer: answer.distance)]))
@@ -398,7 +402,8 @@ def _sentence(told: Sequence[Answer]) -> str:
         )
     what = f"{cause} from {_described(rival)}" if rival is not None else f"{cause} from the model's own numbers"
     apart = "the predictions differ by" if rival is not None else "what is left of an ordinary one is"
-    others = f". It also answers {len(told) - 1} more such questions" if len(told) > 1 else ""
+    more = len(told) - 1
+    others = f". It also answers {more} more such question{'s' * (more > 1)}" if more else ""
     return (
         f"Record {first.entry.words}: it tells {what}; there {apart} {_times(first.distance)} the noise, here "
         f"{_times(first.now)}{others}"
