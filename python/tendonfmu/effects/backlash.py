@@ -10,7 +10,7 @@ from tendonfmu.effects.extension_row import secant_variant
 from tendonfmu.effects.friction_law_places import all_joints, all_tendons, without_rows
 
 NAME = "backlash"
-_OF_RANGE = (0.006, 0.03)  # widths, of the range of the position
+_OF_RANGE = (0.0006, 0.005, 0.03)  # widths, of the range of the position; the least as good as a derivative
 
 
 def _places(data: Data, kinematics: int) -> list[Place]:

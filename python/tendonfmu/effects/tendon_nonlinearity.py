@@ -10,7 +10,7 @@ from tendonfmu.effects.extension_row import secant_variant
 from tendonfmu.effects.friction_law_places import all_tendons, without_rows
 
 NAME = "tendon_nonlinearity"
-_SHARES = (0.4,)  # hardening·e²/(k·e) at the largest force, e = f/k
+_SHARES = (0.01, 0.2)  # hardening·e²/(k·e) at the largest force, e = f/k
 
 
 def _places(data: Data, kinematics: int) -> list[Place]:
