@@ -267,12 +267,33 @@ def test_columns_where_stiction_remembers_its_load(remembering: Case, name: str)
     assert_all_columns(remembering, name)
 
 
+def late_forces(case: Case, delay: float) -> Numbers:
+    """τ − G with forces measured late, less τ − G as it is, by whole runs."""
+    still = {"drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": [0.0, 0.0]}
+    alone = {**case.data, "bias": still, "contact": {"threshold": [1e9, 1e9]}}
+    found = np.zeros_like(case.columns.prediction)
+    for recording, block in zip(case.recordings, case.blocks.of, strict=True):
+        whole = np.zeros((len(recording.time), 2))
+        for part in recording.parts:
+            arrays = recording.arrays(part)
+            force = [np.interp(arrays["time"] - delay, arrays["time"], one) for one in arrays["tendon_force"].T]
+            late = native.run_recording(alone, {**arrays, "tendon_force": np.stack(force, axis=1)})
+            now = native.run_recording(alone, arrays)
+            whole[part] = late["compensated_torque"] - now["compensated_torque"]
+        for number in np.unique(block[block >= 0]):
+            found[number] = whole[block == number].mean(axis=0)
+    return found
+
+
 def assert_all_columns(case: Case, name: str) -> None:
     shapes = case.shapes(name)
     assert shapes
     for _, shape, variant in shapes:
         values = case.columns.values[:, :, shape.columns]
         assert values.shape[2] == variant.count
+        if name == "time_delay":
+            assert_column(values[:, :, 0], late_forces(case, shape.shape["delay"]), 1.0, f"{name} {shape.shape}")
+            continue
         if shape.secant:
             expected = case.prediction(variant.secant or {}) - case.columns.prediction
             assert np.abs(expected).max() > 1e-5 or name == "presliding"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -62,6 +63,42 @@ def _learning_nothing(data: Mapping[str, Any]) -> dict[str, Any]:
     joints = len(data["joints"])
     still = {**kept, "drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": [0.0] * joints}
     return {**data, "bias": still, "contact": {"threshold": [_NEVER] * joints}}
+
+
+def block_late_forces(
+    data: Mapping[str, Any],
+    recordings: Sequence[FitRecording],
+    blocks: Blocks,
+    delay: float,
+    prediction: Numbers,
+) -> Numbers:
+    """[B, n] what y − G becomes, N·m, when the forces are measured `delay` s later than they are, or earlier below 0.
+
+    prediction: G of the description at the recordings, whose forces are those that it explains.
+    """
+    late = [_with_late_forces(recording, delay) for recording in recordings]
+    moved = _block_torque(data, late, blocks) - _block_torque(data, recordings, blocks)
+    return np.asarray(moved - (block_prediction(data, late, blocks) - prediction))
+
+
+def _with_late_forces(recording: FitRecording, delay: float) -> FitRecording:
+    groups = dict(recording.recording.groups)
+    force = groups["tendon_force"].copy()
+    for part in recording.parts:
+        time = recording.time[part]
+        for i in range(force.shape[1]):
+            force[part, i] = np.interp(time - delay, time, groups["tendon_force"][part, i])
+    groups["tendon_force"] = force
+    return replace(recording, recording=replace(recording.recording, groups=groups))
+
+
+def _block_torque(data: Mapping[str, Any], recordings: Sequence[FitRecording], blocks: Blocks) -> Numbers:
+    """[B, n] block means of τ = Rᵀ f."""
+    arms = moment_arms(data)
+    sums = np.zeros((blocks.count, arms.shape[1]))
+    for recording, block in zip(recordings, blocks.of, strict=True):
+        _add_up(sums, block, recording.recording.groups["tendon_force"] @ arms)
+    return np.asarray(sums / np.maximum(blocks.sizes(), 1)[:, None])
 
 
 # --- slopes -----------------------------------------------------------------------------------------------------------

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.block_averages import Blocks
-from tendonfmu.block_runs import block_prediction, block_slope, needs_differences, ordinary_size
+from tendonfmu.block_runs import block_late_forces, block_prediction, block_slope, needs_differences, ordinary_size
 from tendonfmu.derivative_passes import Direction, nominal_directions, plan_passes, run_pass
 from tendonfmu.diagnosis_span import Span, span_of
 from tendonfmu.effects import CANDIDATES, Candidate, Place, Variant
@@ -158,6 +158,13 @@ class _Work:
             self.values[:, :, at] = block_slope(data(), direction, size, prediction, self._recordings, self._blocks)
             self._watch(self._samples)
         for bundle in self._bundles:
+            if bundle[0][0].late:
+                variant, at = bundle[0]
+                self.values[:, :, at] = block_late_forces(
+                    self._data, self._recordings, self._blocks, variant.late, prediction
+                )
+                self._watch(self._samples)
+                continue
             together = bundle[0][0].with_secants([variant for variant, _ in bundle])
             change = self._prediction(together) - prediction
             for variant, at in bundle:

@@ -60,7 +60,8 @@ class Variant:
     velocity. shape: the non-linear numbers here. columns: derivatives to take. secant_rows: where there is no
     derivative, the rows at full strength; the one column is then the difference that they make, magnitude 1.
     scaled: keys of secant_rows that grow with the magnitude, up to `most` at either sign. only_joint: whose torque
-    alone the rows change, from 1.
+    alone the rows change, from 1. late: s by which forces come later than positions: the column is what that does to
+    measured forces, not what the row makes of them.
     """
 
     base: Data
@@ -73,6 +74,7 @@ class Variant:
     scaled: tuple[str, ...] = ()
     most: float = math.inf
     only_joint: int | None = None
+    late: float = 0.0
 
     @cached_property
     def data(self) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from tendonfmu.diagnosis_span import Span
 from tendonfmu.effects.candidate import Candidate, Data, Place, Variant
@@ -26,7 +27,12 @@ def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
 
 
 def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
-    return secant_variant(data, NAME, place, shape, "delay", scaled=True, most=_LONGEST)
+    """Its column is what a delay does to forces that the model explains: they run ahead of it, or behind it.
+
+    The row undoes that for measured forces; at a reversal the two differ in the sign of the time since.
+    """
+    variant = secant_variant(data, NAME, place, shape, "delay", scaled=True, most=_LONGEST)
+    return replace(variant, late=float(shape["delay"]))
 
 
 CANDIDATE = Candidate(
