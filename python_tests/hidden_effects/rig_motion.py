@@ -11,8 +11,9 @@ from scipy.optimize import linprog
 Array = NDArray[Any]
 
 REACH = 0.7  # rad, largest joint angle
-SPEEDS = (0.15, 3.0)  # rad/s, mean speed of a stroke, evenly in its logarithm
-STROKES = (0.08, 1.2)  # rad
+SPEEDS = (0.25, 2.0)  # rad/s, mean speed of a stroke, evenly in its logarithm
+STROKES = (0.1, 1.0)  # rad
+SHORTEST = 0.3  # s, of a stroke: else a few of them would have most of all acceleration
 REST = (0.05, 0.8)  # s, of every third stroke or so
 
 
@@ -25,7 +26,7 @@ def strokes(rng: np.random.Generator, time: Array, speed: float = 1.0) -> Array:
         direction = 1.0 if at < -REACH + length else -1.0 if at > REACH - length else rng.choice([-1.0, 1.0])
         target = float(np.clip(at + direction * length, -REACH, REACH))
         mean_speed = speed * np.exp(rng.uniform(*np.log(SPEEDS)))
-        duration = max(abs(target - at) / mean_speed, 0.12)
+        duration = max(abs(target - at) / mean_speed, SHORTEST)
         s = np.clip((time - now) / duration, 0.0, 1.0)
         angle = np.where(time >= now, at + (target - at) * s**3 * (10.0 - 15.0 * s + 6.0 * s**2), angle)
         now, at = now + duration, target
