@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 import analytic_cases
+import analytic_extension_cases
 import analytic_force_cases
 import oracle
 from analytic_cases import DRY, LAW, Case, finger, one_edge, recording
 from random_fingers import random_case, random_law, random_moment_arms
 from runners import RUNNERS, Runner
 
-CASES = analytic_cases.CASES + analytic_force_cases.CASES
+CASES = analytic_cases.CASES + analytic_force_cases.CASES + analytic_extension_cases.CASES
 
 
 @pytest.fixture(params=RUNNERS, ids=lambda runner: runner.name)
