@@ -2,10 +2,9 @@
 
 A trial's score is the sum over blocks of time of (its columns)ᵀ (residual), columns orthogonal to all nuisance. Under
 the null hypothesis the signs of the blocks' scores are exchangeable (wild bootstrap by blocks: Liu, 1988; Mammen,
-1993), whatever the noise's distribution and its dependence within a block. The statistic is Hotelling's T² of the
-blocks' scores about 0: its covariance, the sum of their outer products, does not change under sign flips. The
-smallest p-value over all trials is compared with its own distribution under joint flips (min-p: Westfall and Young,
-1993), so p is family-wise.
+1993), whatever the noise's distribution and its dependence within a block. The statistic is that of a cluster-robust
+Wald test, computed anew for every flip (null imposed: Cameron, Gelbach and Miller, 2008). The smallest p-value over all
+trials is compared with its own distribution under joint flips (min-p: Westfall and Young, 1993), so p is family-wise.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import beta
+from scipy.special import fdtrc
 
 from tendonfmu.diagnosis_series import Bank, Series, Trial
 from tendonfmu.nuisance import basis, without
@@ -31,6 +30,7 @@ DRAWS = 2000
 VISITS = 8.0  # effective number of blocks in which a trial must show
 TAIL = 0.1  # share of the draws that the tail is taken from
 MOST_TAKEN = 1e-3  # share of a direction that the nuisance leaves, at least, for it to be given back
+_DRAWS = 500  # at a time
 _CHUNK = 64  # columns at a time
 
 
@@ -212,25 +212,23 @@ def tested_trials(
     count, blocks = len(trials), prepared.blocks
     visits = np.array([effective_blocks(prepared.gram(trial)) for trial in trials])
     least = min(VISITS, blocks / 3)
-    chosen = [k for k in range(count) if eligible[k] and visits[k] >= least]
     p_values, statistic = np.ones(count), np.zeros(count)
-    if not chosen or blocks < 3:
+    groups = []
+    for size in sorted({trial.count for trial in trials}):
+        members = [k for k in range(count) if trials[k].count == size and eligible[k] and visits[k] >= least]
+        if members and blocks > size + 1:
+            groups.append(_Group(prepared, trials, members, visits[members]))
+    if not groups:
         return Tested(p_values, statistic, visits, draws)
-    totals, scaled, sides, offsets = _scaled_scores(prepared, [trials[k] for k in chosen])
-    degrees = np.diff([*offsets, scaled.shape[1]])
-    signed = np.array([all(trials[k].signs) for k in chosen])
-
-    def p_of(scores: Numbers, side: Numbers) -> tuple[Numbers, Numbers]:
-        squares = np.add.reduceat(scores**2, offsets, axis=1)
-        return _single_p(np.where(~signed | (side > 0), squares, 0.0), degrees, signed, blocks), squares
-
-    own, squares = p_of(*totals)
+    for group in groups:
+        p_values[group.members], statistic[group.members] = (found[0] for found in group.actual())
     rng = np.random.default_rng([seed, 20])
     least_p = np.zeros(0)
     while len(least_p) < draws:
-        flips = rng.integers(0, 2, (min(500, draws - len(least_p)), blocks)) * 2.0 - 1.0
-        least_p = np.append(least_p, p_of(flips @ scaled, flips @ sides)[0].min(axis=1))
-    p_values[chosen], statistic[chosen] = family_wise(own[0], least_p), squares[0]
+        flips = rng.integers(0, 2, (min(_DRAWS, draws - len(least_p)), blocks)) * 2.0 - 1.0
+        least_p = np.append(least_p, np.min([group.flipped(flips)[0].min(axis=1) for group in groups], axis=0))
+    chosen = np.concatenate([group.members for group in groups])
+    p_values[chosen] = family_wise(p_values[chosen], least_p)
     return Tested(p_values, statistic, visits, draws)
 
 
@@ -241,40 +239,61 @@ def effective_blocks(gram: Numbers) -> float:
     return float(energy.sum() ** 2 / power) if power > 0 else 0.0
 
 
-def _scaled_scores(
-    prepared: Prepared, trials: Sequence[Trial]
-) -> tuple[tuple[Numbers, Numbers], Numbers, Numbers, list[int]]:
-    """Of all trials, one after the other: scores [K, C] whose outer products add up to the identity within a trial, and
-    scores [K, T] whose sum has the sign of the estimates; before them the actual sums of both, [1, C] and [1, T], and
-    at last where each trial begins among the C."""
-    sums, scaled, side_sums, sides, offsets, first = [], [], [], [], [], 0
-    for trial in trials:
-        total = prepared.gram(trial).sum(axis=0)
-        length = np.sqrt(np.maximum(np.diag(total), 1e-300))
-        whole, score = prepared.score(trial).sum(axis=0) / length, prepared.unshrunk_score(trial) / length
-        power, direction = np.linalg.eigh(score.T @ score)
-        kept = power > 1e-9 * power[-1]
-        turn = direction[:, kept] / np.sqrt(power[kept]) if power[-1] > 0 else np.zeros((len(length), 1))
-        # the sum of the estimates, each in its expected direction
-        estimate = np.linalg.lstsq(total / np.outer(length, length), np.array(trial.signs, dtype=float), rcond=1e-9)[0]
-        sums.append(whole @ turn)
-        scaled.append(score @ turn)
-        side_sums.append(whole @ estimate)
-        sides.append(score @ estimate)
-        offsets.append(first)
-        first += turn.shape[1]
-    actual = np.concatenate(sums)[None], np.array(side_sums)[None]
-    return actual, np.concatenate(scaled, axis=1), np.column_stack(sides), offsets
+class _Group:
+    """Trials of d columns each, their columns turned so that the whole energy is the identity.
+
+    With scores S_b and energies E_b of the blocks the estimate is α = Σ S_b, and T² = αᵀ V⁻¹ α with V the sum of the
+    outer products of S_b − E_b α, so that the effect itself does not count as noise. V is put together of sums that
+    flip with the blocks.
+    """
+
+    def __init__(self, prepared: Prepared, trials: Sequence[Trial], members: list[int], visits: Numbers) -> None:
+        self.members, self._visits = np.array(members), visits
+        self._size = trials[members[0]].count
+        turned = [_turned(prepared, trials[k]) for k in members]
+        whole, scores, energy, sides = (np.stack([each[part] for each in turned], axis=-2) for part in range(4))
+        self._energy = energy.reshape(prepared.blocks, len(members), self._size, self._size)
+        self._scores, self._whole, self._sides = scores, whole, sides[0]
+        self._signed = np.array([all(trials[k].signs) for k in members])
+        self._square = np.einsum("kti,ktj->tij", scores, scores)
+        self._fourth = np.einsum("ktij,ktlm->tijlm", self._energy, self._energy)
+        self._third = np.einsum("kti,ktjl->ktijl", scores, self._energy).reshape(prepared.blocks, -1)
+
+    def actual(self) -> tuple[Numbers, Numbers]:
+        """p [1, T] of single tests, and T² [1, T]."""
+        return self._judged(self._whole, self._third.sum(axis=0)[None])
+
+    def flipped(self, flips: Array) -> tuple[Numbers, Numbers]:
+        """The same [D, T] for signs [D, K] of the blocks."""
+        estimate = np.einsum("dk,kti->dti", flips, self._scores, optimize=True)
+        return self._judged(estimate, flips @ self._third)
+
+    def _judged(self, estimate: Numbers, third: Numbers) -> tuple[Numbers, Numbers]:
+        size = self._size
+        cross = np.einsum("dtijl,dtl->dtij", third.reshape(*estimate.shape[:2], size, size, size), estimate)
+        own = np.einsum("tijlm,dtj,dtm->dtil", self._fourth, estimate, estimate, optimize=True)
+        spread = self._square - cross - np.swapaxes(cross, 2, 3) + own
+        tiny = 1e-9 * np.trace(self._square, axis1=1, axis2=2)
+        spread = spread + tiny[None, :, None, None] * np.eye(size)
+        statistic = np.einsum("dti,dti->dt", estimate, np.linalg.solve(spread, estimate[..., None])[..., 0])
+        p_values = fdtrc(size, np.maximum(self._visits - size, 1.0), np.maximum(statistic, 0.0) / size)
+        right = np.einsum("dti,ti->dt", estimate, self._sides) > 0
+        return np.where(self._signed, np.where(right, 0.5 * p_values, 1.0), p_values), statistic
 
 
-def _single_p(statistic: Numbers, degrees: Array, signed: Array, blocks: int) -> Numbers:
-    """Tail of T² for K independent normal scores: T²/K has a Beta(d/2, (K − d)/2) distribution; halved for one side."""
-    found = np.ones_like(statistic)
-    for count in np.unique(degrees):
-        own = degrees == count
-        share = np.clip(statistic[:, own] / blocks, 0.0, 1.0 - 1e-15)
-        found[:, own] = beta.sf(share, count / 2, max(blocks - count, 1) / 2)
-    return np.asarray(np.where(signed, 0.5 * found, found))
+def _turned(prepared: Prepared, trial: Trial) -> tuple[Numbers, Numbers, Numbers, Numbers]:
+    """Of a trial in directions of energy 1: score [1, d], scores by block [K, d], energies by block [K, d·d], and the
+    direction [1, d] along which the sum of the estimates, each with its expected sign, grows."""
+    gram = prepared.gram(trial)
+    total = gram.sum(axis=0)
+    length = np.sqrt(np.maximum(np.diag(total), 1e-300))
+    power, direction = np.linalg.eigh(total / np.outer(length, length))
+    kept = power > 1e-9 * power[-1]
+    turn = np.where(kept, direction / np.sqrt(np.where(kept, power, 1.0)), 0.0) / length[:, None]
+    energy = np.einsum("ij,kil,lm->kjm", turn, gram, turn, optimize=True)
+    side = turn.T @ (np.array(trial.signs, dtype=float) * length)
+    whole = prepared.score(trial).sum(axis=0) @ turn
+    return whole[None], prepared.unshrunk_score(trial) @ turn, energy.reshape(len(gram), -1), side[None]
 
 
 def family_wise(p_values: Numbers, least: Numbers) -> Numbers:
