@@ -130,19 +130,27 @@ def _cause_sheet(found: Diagnosis, names: Names, number: int, cause: Cause) -> S
 
 def _evidence_panel(found: Evidence, names: Names, factor: float, unit: str) -> Panel:
     shown = (("before", found.before, found.before_std), ("after", found.after, found.after_std))
+    x, x_unit = (factor * found.coordinate, unit) if found.unit == "N·m" else (found.coordinate, found.unit)
     return Panel(
         title=f"Residual at {names.joint(found.joint)}",
         alt=f"Mean residual at {names.joint(found.joint)} over {found.label}, without and with this cause in the model",
-        x_label=f"{found.label} ({found.unit})",
+        x_label=f"{found.label} ({x_unit})",
         y_label=f"residual ({unit})",
         size="medium",
-        curves=tuple(Curve(f"{style}_line", found.coordinate, factor * mean) for style, mean, _ in shown),
+        curves=tuple(Curve(f"{style}_line", x, factor * mean) for style, mean, _ in shown),
         bars=tuple(
-            Bars(style, found.coordinate, factor * (mean - TWO_SIDED * std), factor * (mean + TWO_SIDED * std))
+            Bars(style, x, factor * (mean - TWO_SIDED * std), factor * (mean + TWO_SIDED * std))
             for style, mean, std in shown
         ),
-        dots=tuple(Dots(f"{style}_dots", found.coordinate, factor * mean) for style, mean, _ in shown),
+        dots=tuple(Dots(f"{style}_dots", x, factor * mean) for style, mean, _ in shown),
+        near_x=_near(found.coordinate) if found.label.startswith("travel") else 0.0,
     )
+
+
+def _near(travel: Numbers) -> float:
+    """What happens after a reversal happens within a small part of the travel: there the axis is stretched."""
+    size = np.abs(travel[np.isfinite(travel)])
+    return float(np.quantile(size, 0.25)) if len(size) else 0.0
 
 
 def _same_scale(panels: Sequence[Panel]) -> tuple[Panel, ...]:
@@ -213,6 +221,9 @@ def _view_panel(
         x_label=f"{view.label} ({view.unit})" if view.unit not in ("", "1") else view.label,
         y_label=f"residual ({unit})",
     )
+    if view.unit == "N·m":  # all torques in one unit
+        view = replace(view, x=factor * view.x, unit=unit)
+        panel = replace(panel, x_label=f"{view.label} ({unit})")
     if view.kind == "spectrum":
         return _spectrum(panel, view, factor, unit)
     if view.kind == "autocorrelation":
@@ -224,7 +235,8 @@ def _view_panel(
     if view.before_std is not None:
         low, high = view.before - view.before_std, view.before + view.before_std
         bands = (Band("before_scatter", view.x, factor * low, factor * high),)
-    return replace(panel, bands=bands, curves=_curves(view, factor), y_limits=limits)
+    near = _near(view.x) if view.kind == "travel" else 0.0
+    return replace(panel, bands=bands, curves=_curves(view, factor), y_limits=limits, near_x=near)
 
 
 def _spectrum(panel: Panel, view: ResidualView, factor: float, unit: str) -> Panel:

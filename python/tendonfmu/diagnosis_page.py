@@ -149,7 +149,7 @@ def _experiment(found: Diagnosis, names: Names) -> Iterator[str]:
         titles = dict.fromkeys(title_of(where.effect) for where in plan.makes_visible)
         yield f"Makes visible: {'; '.join(titles)}."
     if plan.distance > 0:
-        yield f"What is to be told apart then differs by {plan.distance:.2g} times the noise or more."
+        yield f"Each of them then stands out by {plan.distance:.2g} times the noise or more."
 
 
 # --- tables -----------------------------------------------------------------------------------------------------------

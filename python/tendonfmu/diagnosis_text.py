@@ -18,6 +18,7 @@ _OUTSIDE = {  # that are found, but are no term of a model
 }
 
 _MOST_PLACES = 4  # that are listed
+_TOLD = 2  # effects that are told at length
 Row = tuple[str, ...]
 
 
@@ -244,10 +245,14 @@ def hidden(found: Diagnosis, names: Names) -> list[Hidden]:
     return effects
 
 
-def hidden_sentences(found: Diagnosis, names: Names, most: int = 6) -> Iterator[str]:
-    """What cannot be seen, and how it could; beyond so many the rest is counted."""
+def hidden_sentences(found: Diagnosis, names: Names) -> Iterator[str]:
+    """What cannot be seen: one or two effects with how they could be, more in one sentence."""
     effects = hidden(found, names)
-    for each in effects[:most]:
+    if len(effects) > _TOLD:
+        listed = "; ".join(f"{each.title} ({each.places})" if each.places else each.title for each in effects)
+        yield f"{len(effects)} effects are not visible in these data, since refitting absorbs them: {listed}."
+        return
+    for each in effects:
         place = f", at {each.places}" if each.places else ""
         what, _, _ = each.experiment.partition(":")  # what to do; what it tells stands in the table of all
         experiment = f" To see it: {what[0].lower()}{what[1:].rstrip('.')}." if what else ""
@@ -256,10 +261,6 @@ def hidden_sentences(found: Diagnosis, names: Names, most: int = 6) -> Iterator[
         yield (
             f"Not visible in these data: {each.title}{place}. Refitting absorbs it; {percent(each.share)} would be "
             f"left.{experiment}"
-        )
-    if len(effects) > most:
-        yield f"{len(effects) - most} more are not visible in these data: " + "; ".join(
-            each.title for each in effects[most:]
         )
 
 

@@ -221,6 +221,9 @@ def _draw_axes(axes: Axes, panel: Panel) -> None:
             # without mathematics, which is not parsed (names may hold a $)
             getattr(axes, f"{axis}axis").set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
             getattr(axes, f"{axis}axis").set_minor_formatter(NullFormatter())
+    if panel.near_x > 0:
+        axes.set_xscale("symlog", linthresh=panel.near_x, linscale=0.6)
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     if panel.line is not None:
         axes.axvline(panel.line, color=GREY, linewidth=1.0, linestyle="--")
     _scale(axes, panel)

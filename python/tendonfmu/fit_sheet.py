@@ -63,7 +63,8 @@ class Panel:
     alt: what it shows, in words, for those who do not see it. note: small, at the right end of the title's line.
     stripes: shaded along x, in `stripe_style`. ticks: places and names along x. data: where samples are, bin edges
     [k + 1] and heights [k] from 0 to 1, along the bottom. rows: names of y = 0, 1, ... from the top; none: y is a
-    number. line: a marked x. log_x, log_y: logarithmic. height: CSS pixels, 0: the size's.
+    number. line: a marked x. log_x, log_y: logarithmic. near_x: to either side of 0 up to here x is linear, beyond it
+    logarithmic; 0: linear. height: CSS pixels, 0: the size's.
     """
 
     title: str
@@ -84,6 +85,7 @@ class Panel:
     y_limits: Interval | None = None
     log_x: bool = False
     log_y: bool = False
+    near_x: float = 0.0
     rows: tuple[str, ...] = ()
     line: float | None = None
     height: int = 0
