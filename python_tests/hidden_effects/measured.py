@@ -1,7 +1,7 @@
 """Known effects hidden in measured recordings: EMPS and the da Vinci jaw.
 
-The starting point of each machine is its own diagnosed model (examples/*/..._extended.json): on the unaltered recording
-there is nothing left to name, that is the null. What is to be hidden is first taken off recording and model where they
+The starting point of each machine is its own diagnosed model (measured_*.json): on the unaltered recording there is
+nothing left to name, that is the null. What is to be hidden is first taken off recording and model where they
 have it already. All formulas are physics written here; nothing is taken from the candidates or the core's terms.
 
 Strength: variance of the torque that the effect adds and that refitting the model's own numbers cannot absorb, over
@@ -158,6 +158,7 @@ def free_of_friction(machine: Machine) -> Machine:
     law = machine.model["joints"][0]["friction"]
     near = rows_of(machine.model, "stribeck")
     sliding = rows_of(machine.model, "presliding")
+    constant = sum(row["coulomb"] for row in rows_of(machine.model, "preload_friction")) * machine.arm
 
     def taken(columns: Columns) -> Columns:
         speed = speed_of(machine, columns)
@@ -168,9 +169,9 @@ def free_of_friction(machine: Machine) -> Machine:
         for row in sliding:
             step = np.diff(angle_of(machine, columns), prepend=angle_of(machine, columns)[0])
             torque = np.abs(torque) * built_up(side, step, row["displacement"])
-        return add_torque(machine, columns, -torque)
+        return add_torque(machine, columns, -torque - constant * side)
 
-    model = without_rows(machine.model, "stribeck", "presliding")
+    model = without_rows(machine.model, "stribeck", "presliding", "preload_friction")
     model["joints"][0]["friction"] = None
     return replace(machine, model=model, recordings={k: taken(v) for k, v in machine.recordings.items()})
 

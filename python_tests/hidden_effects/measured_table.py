@@ -40,7 +40,7 @@ MACHINES = ("emps", "davinci")
 STRENGTHS = (0.03, 0.1, 0.3, 1.0)
 NOTHING = "nothing"  # the unaltered recording
 SECONDS = 16.5  # da Vinci: before run 07 jams
-RUNS, CHOSEN = tuple(f"0{k}" for k in range(10)), 5
+RUNS, CHOSEN = tuple(f"0{k}" for k in range(10)), 3
 WINDOWS = ((0.0, 24.9), (0.0, 18.7), (6.2, 24.9), (3.1, 21.8))  # s, EMPS: cycles of 6.24 s
 
 
@@ -80,13 +80,12 @@ def part_of(columns: Columns, begin: float, end: float) -> Columns:
 
 
 def machine_of(name: str, case: int) -> Machine:
-    """The case's part of the recordings: case 0 is what the model was diagnosed with."""
+    """The case's part of the recordings. The model is the diagnosed one, diagnosed again until nothing was found."""
+    model = json.loads((HERE / f"measured_{name}.json").read_text(encoding="utf-8"))
     if name == "emps":
-        model = json.loads((ROOT / "examples" / "emps" / "emps_extended.json").read_text(encoding="utf-8"))
         columns = convert_file("emps", DATA / "emps" / "DATA_EMPS.mat", {"decimation": 1})
         return Machine(name, model, {"emps": part_of(columns, *WINDOWS[case % len(WINDOWS)])}, 3)
-    model = json.loads((ROOT / "examples" / "davinci" / "jaw_extended.json").read_text(encoding="utf-8"))
-    drawn = np.random.default_rng([case, 26]).permutation(RUNS)[:CHOSEN] if case else RUNS[::2]
+    drawn = np.random.default_rng([case, 26]).permutation(RUNS)[:CHOSEN]
     folder = DATA / "davinci_tool" / "Tool_4_Maryland_L_4"
     options = {"pretension": 13.0}
     runs = {run: convert_file("davinci", folder / f"{run}.TXT", options) for run in sorted(map(str, drawn))}
