@@ -50,17 +50,21 @@ def scan_events(
 ) -> tuple[Event, ...]:
     """residual: [B, n] N·m of the nominal model. nuisance: per joint, columns [B, p] whose span was taken from it.
     recordings: names, by number. In order of recording and time."""
+    residual = np.where(series.used[:, None], residual, 0.0)
     filters = whitener(series, residual)
     plan = learner.layout(series, series.used)
     if learner.layout(series, filters.valid).blocks < learner.FEWEST_BLOCKS:
         return ()
     with threadpool_limits(limits=1):
         left = _unexplained(series, residual, nuisance, filters, seed)
-    inside = _outlying(series, left, plan)
+    inside = _outlying(series, left, plan, np.zeros(left.shape, dtype=bool))
+    if inside.any():
+        # again with a bias that what was found does not bend
+        inside = _outlying(series, left, plan, inside)
     if float(inside[plan.rows].any(axis=1).mean()) > MOST:
         return ()
     left = left.copy()
-    left[plan.rows] = _flat(left, plan, max(3, round(SLOW / series.step)))
+    left[plan.rows] = _flat(left, plan, inside, max(3, round(SLOW / series.step)))
     return tuple(_event(series, left, inside, rows, recordings) for rows in _stretches(series, inside))
 
 
@@ -90,10 +94,16 @@ def _unexplained(
     return np.asarray(left)
 
 
-def _flat(left: Numbers, plan: learner.Layout, length: int) -> Numbers:
-    """[U] of each joint [U, n] without its running median."""
-    slow = np.stack([_slow(left[plan.rows, joint], plan.run, length) for joint in range(left.shape[1])], axis=1)
-    return np.asarray(left[plan.rows] - slow)
+def _flat(left: Numbers, plan: learner.Layout, known: Flags, length: int) -> Numbers:
+    """[U, n] without its running median, to which known blocks count as lying between their neighbours."""
+    result = left[plan.rows]
+    for joint in range(left.shape[1]):
+        values, own = left[plan.rows, joint], known[plan.rows, joint]
+        if own.any() and not own.all():
+            calm = median_filter(values[~own], size=max(3, length // 4), mode="nearest")
+            values = np.where(own, np.interp(plan.rows, plan.rows[~own], calm), values)
+        result[:, joint] -= _slow(values, plan.run, length)
+    return np.asarray(result)
 
 
 def _slow(values: Numbers, run: NDArray[np.int64], length: int) -> Numbers:
@@ -109,11 +119,14 @@ def _ends(run: NDArray[np.int64]) -> list[int]:
     return [0, *(np.flatnonzero(np.diff(run)) + 1).tolist(), len(run)]
 
 
-def _outlying(series: Series, left: Numbers, plan: learner.Layout) -> Flags:
-    """[B, n] blocks of windows that are higher than chance reaches, as far as the shortest window still stands out."""
+def _outlying(series: Series, left: Numbers, plan: learner.Layout, known: Flags) -> Flags:
+    """[B, n] blocks of windows that are higher than chance reaches, as far as the shortest window still stands out.
+
+    known: [B, n] blocks that the bias does not follow.
+    """
     inside = np.zeros(left.shape, dtype=bool)
     tests = len(WIDTHS) * left.shape[1]
-    flat = {slow: _flat(left, plan, max(3, round(slow / series.step))) for slow in set(WIDTHS.values())}
+    flat = {slow: _flat(left, plan, known, max(3, round(slow / series.step))) for slow in set(WIDTHS.values())}
     for joint in range(left.shape[1]):
         core = np.zeros(len(plan.rows), dtype=bool)
         for width, slow in WIDTHS.items():

@@ -69,6 +69,7 @@ def measure_remainder(
     """residual: [B, n] N·m. nuisance: per joint, columns [B, p] whose span was taken from its residual (bias splines,
     derivatives of the nominal model); columns of the learner get the same. Blocks that are not used are left out."""
     joints = residual.shape[1]
+    residual = np.where(series.used[:, None], residual, 0.0)
     filters = whitener(series, residual)
     plan = learner.layout(series, filters.valid)
     if plan.blocks < learner.FEWEST_BLOCKS:
