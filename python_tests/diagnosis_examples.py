@@ -189,7 +189,11 @@ EXPERIMENT = Experiment(
     separates=((Where("gravity", joint=2), Where("moment_arm", joint=2, tendon=1)),),
     makes_visible=(Where("tendon_nonlinearity", tendon=3),),
     distance=6.4,
-    motion={"pretension": [25.0], "max_speed": 0.4, "duration": 60.0},
+    motion={
+        "motion": "slow strokes of joint 2",
+        "sections": [{"ranges": [[0.0, 0.0], [-0.4, 0.9]], "max_speed": 0.4, "seconds": 60.0, "pretension": 25.0}],
+        "seed": 0,
+    },
 )
 
 NO_EXPERIMENT = Experiment(sentence="")

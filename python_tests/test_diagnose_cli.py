@@ -6,11 +6,13 @@ import json
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from importlib import import_module
 from importlib.resources import files as files_of
 from pathlib import Path
 from typing import Any
 
 import jsonschema
+import numpy as np
 import pytest
 
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
@@ -23,6 +25,7 @@ from tendonfmu.diagnosis_files import write_diagnosis
 from tendonfmu.diagnosis_result import Diagnosis
 from tendonfmu.effects import CANDIDATES
 from tendonfmu.errors import InputError
+from tendonfmu.tables import read_table
 
 PAGE = (Path(__file__).resolve().parents[1] / "docs" / "diagnose.md").read_text(encoding="utf-8")
 NAMED = {"diagnosis.html", "diagnosis.json", "extended.json", "extended.fmu", "nominal.json"}
@@ -174,3 +177,44 @@ def test_a_motion_that_discriminates_takes_no_plan_of_its_own(call: Call, tmp_pa
     write_diagnosis(replace(brief(examples.adequate()), experiment=examples.NO_EXPERIMENT), tmp_path / "out")
     answer = call("excite", "finger.json", "--discriminate", "out", "-o", "m.csv")
     assert answer.status == 2 and "no further experiment" in answer.err and not Path("m.csv").exists()
+
+
+def test_the_next_experiment_is_written(call: Call, tmp_path: Path) -> None:
+    found = brief(examples.three_causes())
+    (tmp_path / "finger.json").write_text(json.dumps(found.nominal_data))
+    write_diagnosis(found, tmp_path / "out")
+    answer = call("excite", "finger.json", "--discriminate", "out", "-o", "m.csv", "--rate", "50")
+    assert answer.status == 0, answer.err
+    motion = read_table(tmp_path / "m.csv", lambda *_: None)
+    assert motion["time"][1] == 0.02 and motion["time"][-1] >= 59.9
+    assert motion["pretension"].max() == pytest.approx(25.0)
+    assert np.ptp(motion["joint_position[1]"]) < 1e-9 and np.ptp(motion["joint_position[2]"]) > 0.5
+    assert np.abs(motion["joint_velocity[2]"]).max() <= 0.4 * 1.001
+    assert found.experiment.sentence in answer.out and "m.csv: 3" in answer.err
+
+
+# --- for real ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_hidden_spring_is_found(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A spring hidden in recordings that code of its own has made: the command names it and writes a model with it."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parent / "hidden_effects"))
+    rig, hiding = import_module("matched_rig"), import_module("effects_hidden")
+    hand = rig.random_hand(21, joints=1, presliding=False, source=2, rate=250.0)
+    hand, label = hiding.hide(hand, "cover_stiffness", 0.5, seed=21, motion=3, seconds=40.0)
+    for name, seed in (("train", 3), ("test", 4)):
+        (tmp_path / name).mkdir()
+        rig.record(hand, seed=seed, seconds=40.0).write(tmp_path / name)
+    words = "diagnose train/nominal.json train/recording.parquet --test test/recording.parquet -o out --kinematics 2"
+    answer = call(*words.split())
+    assert answer.status == 0, answer.err
+    report = json.loads(Path("out/diagnosis.json").read_text(encoding="utf-8"))
+    jsonschema.validate(report, json.loads(files_of("tendonfmu").joinpath("schema/diagnosis.schema.json").read_text()))
+    first = report["causes"][0]
+    assert "cover_stiffness" in {first["effect"], *(other["effect"] for other in first["confusable_with"])}
+    assert first["joint"] == label["joint"] and report["gain"]["interval"][0] > 0
+    assert report["extended"]["test_rms"][0] < report["nominal"]["test_rms"][0] < report["nominal"]["bias_only_rms"][0]
+    page = Path("out/diagnosis.html").read_text(encoding="utf-8")
+    assert first["title"] in page and first["size"] in page
+    run = "run out/extended.fmu test/recording.parquet -o run.csv --kinematics 2"
+    assert call(*run.split()).status == 0
