@@ -28,13 +28,12 @@ from tendonfmu.diagnosis_search import (
     NamedCause,
     Search,
     candidate_of,
-    extended_fit,
     search,
 )
 from tendonfmu.diagnosis_series import Series, Trial, make_grid
 from tendonfmu.diagnosis_size import size_of
 from tendonfmu.errors import InputError
-from tendonfmu.extension_fit import Accepted, FitSettings
+from tendonfmu.extension_fit import Accepted, FitSettings, fit_extended
 from tendonfmu.fit_recordings import FitRecording, Held, prepare, require_noise
 from tendonfmu.gain import Gain, measure_gain
 from tendonfmu.next_experiment import Experiments, Question, plan_experiments
@@ -196,7 +195,7 @@ class _Result:
         if not found.causes:
             return measure_gain(nominal.data, nominal.data, training, case.tests, seed=self._seed), []
         accepted = [cause.accepted for cause in found.causes]
-        fit = extended_fit(nominal, accepted, fit_to, self._settings, compare=True)
+        fit = fit_extended(nominal, accepted, fit_to, self._settings, compare=True)
         gain = measure_gain(
             nominal.data,
             fit.model.data,

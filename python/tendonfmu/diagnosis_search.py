@@ -14,10 +14,10 @@ from tendonfmu.contact_scan import left_out, scan_events
 from tendonfmu.diagnosis_result import Event
 from tendonfmu.diagnosis_series import Grid, Series, Trial, make_grid
 from tendonfmu.effects import Candidate, Place
-from tendonfmu.extension_fit import Accepted, ExtensionFit, FitSettings, FittedModel, fit_extended
+from tendonfmu.extension_fit import Accepted, FitSettings, FittedModel, fit_extended
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.naming import Found, Selection
-from tendonfmu.nominal_fit import fitted, rest_corrected
+from tendonfmu.nominal_fit import fitted
 from tendonfmu.significance import residual_of
 
 Numbers = NDArray[np.float64]
@@ -161,7 +161,7 @@ class _Rounds:
             self._phase("fitting the extended model", len(causes), None)
             accepted = [cause.accepted for cause in causes]
             clean = predicted_of(self.view.data, self._recordings, self._grid, self.view.series)
-            found = extended_fit(self._nominal, accepted, clean, self._settings)
+            found = fit_extended(self._nominal, accepted, clean, self._settings, compare=False)
             gone = _gone(found.model, found.paths)
             causes = [cause for cause, lost in zip(causes, gone, strict=True) if not lost]
             if not any(gone):
@@ -169,19 +169,6 @@ class _Rounds:
                 self.view = look(found.model.data, self._recordings, self._grid, self._out)
                 break
         return causes
-
-
-def extended_fit(
-    nominal: FittedModel,
-    causes: Sequence[Accepted],
-    recordings: Sequence[FitRecording],
-    settings: FitSettings,
-    *,
-    compare: bool = False,
-) -> ExtensionFit:
-    """The nominal description with the causes' terms, all numbers fitted again; see `extension_fit.fit_extended`."""
-    corrected = rest_corrected(nominal.data, recordings)
-    return fit_extended(nominal, causes, corrected, settings, compare=compare)
 
 
 def _gone(model: FittedModel, paths: Sequence[Sequence[str]]) -> list[bool]:

@@ -8,7 +8,7 @@ numbers of the description are all that is looked at here.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from tendonfmu import native
 from tendonfmu.balance import moment_arms
-from tendonfmu.estimation import Estimator
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.fit_residuals import delayed_torque
 from tendonfmu.friction_places import DEFAULT_THRESHOLD
@@ -29,7 +28,6 @@ Array = NDArray[Any]
 SHORTEST_STEP = 0.01  # s, of a block
 MOST_BLOCKS = 20_000
 _NEVER = 1e9  # N·m; no contact threshold is ever passed
-_ELEMENTS = 2_000_000  # derivatives in memory at a time
 
 
 @dataclass(frozen=True)
@@ -144,75 +142,6 @@ def make_grid(recordings: Sequence[FitRecording]) -> Grid:
     return Grid(tuple(segments), step)
 
 
-def estimator_over(
-    image: bytes, group: Array | None, scale: Array | None, recordings: Sequence[FitRecording], grid: Grid
-) -> Estimator:
-    """With the grid's segments as its recordings."""
-    estimator = Estimator(image, group, scale)
-    for segment in grid.segments:
-        recording = recordings[segment.recording]
-        external = recording.external
-        estimator.add_recording(
-            recording.arrays(segment.part),
-            recording.kinematics,
-            None if external is None else np.ascontiguousarray(external[segment.part]),
-            np.ascontiguousarray(recording.train[segment.part]),
-        )
-    return estimator
-
-
-def block_model(
-    estimator: Estimator,
-    z: Numbers,
-    grid: Grid,
-    *,
-    entry_load: bool = False,
-    dtype: type[np.floating[Any]] = np.float64,
-) -> tuple[Numbers, Array]:
-    """G [B, n] and its derivatives [B, n, u] (of dtype) by the estimator's unknowns at z; both block means.
-
-    entry_load: of the description, see `held_at_rest`. The estimator does not know it: G is then without it, too.
-    """
-    joints, unknowns = estimator.joints, len(estimator.unknowns)
-    torque = np.empty((grid.blocks, joints))
-    derivatives = np.empty((grid.blocks, joints, unknowns), dtype=dtype)
-    for number, segment in enumerate(grid.segments):
-        carried, carried_derivative = np.zeros(joints), np.zeros((joints, unknowns))
-        held = np.zeros((joints, unknowns))
-        for blocks, samples in _chunks(segment, joints * max(unknowns, 1)):
-            found = list(estimator.jacobian(number, z, samples.start, samples.stop))
-            torque[blocks], carried = _averaged(found[0], found[1], segment.samples, carried)
-            if entry_load:
-                found[2], held = held_at_rest(found[2], found[3], held)
-                found[3] = np.zeros_like(found[3][:1])
-            derivatives[blocks], carried_derivative = _averaged(found[2], found[3], segment.samples, carried_derivative)
-    return torque, derivatives
-
-
-def held_at_rest(values: Numbers, jumps: Numbers, held: Numbers) -> tuple[Numbers, Numbers]:
-    """Derivatives of G where leaving rest takes out what entering it put in (`bias.entry_load`): no jump stays.
-
-    A law's derivative of T is 0 at rest, and that of the jump at the entry is what the effect holds until it leaves.
-    values, jumps: [K, n, u] derivatives of T and of Δb at samples that follow each other. held: [n, u] from before.
-    Returns the derivatives of G [K, n, u] and what is held at the end [n, u].
-    """
-    jumping = jumps.any(axis=(0, 1)) | held.any(axis=0)
-    columns = np.flatnonzero(jumping)
-    if not len(columns):
-        return values, held
-    moving = values[:, :, columns].any(axis=1)
-    entering = ~moving & jumps[:, :, columns].any(axis=1)
-    rows = np.arange(len(values))[:, None]
-    last = np.maximum.accumulate(np.where(moving | entering, rows, -1), axis=0)
-    own = np.take_along_axis(jumps[:, :, columns], np.maximum(last, 0)[:, None, :], axis=0)
-    entered = np.take_along_axis(entering, np.maximum(last, 0), axis=0)
-    kept = np.where((last < 0)[:, None], held[:, columns], np.where(entered[:, None], own, 0.0))
-    found, after = values.copy(), np.zeros_like(held)
-    found[:, :, columns] += kept
-    after[:, columns] = kept[-1]
-    return found, after
-
-
 def exact_model(data: Mapping[str, Any], recording: FitRecording, *, entry_load: bool | None = None) -> Numbers:
     """[N, n] N·m: G of a description by a run of the core, NaN outside the parts.
 
@@ -238,29 +167,6 @@ def block_prediction(data: Mapping[str, Any], recordings: Sequence[FitRecording]
     """[B, n] N·m: block means of `exact_model`."""
     whole = {segment.recording: exact_model(data, recordings[segment.recording]) for segment in grid.segments}
     return np.concatenate([segment.mean(whole[segment.recording][segment.part]) for segment in grid.segments])
-
-
-def _chunks(segment: Segment, width: int) -> Iterator[tuple[slice, slice]]:
-    """Blocks in the whole, and samples of the segment, of chunks of bounded size."""
-    blocks = max(1, _ELEMENTS // (width * segment.samples))
-    for begin in range(0, segment.count, blocks):
-        end = min(begin + blocks, segment.count)
-        yield slice(segment.first + begin, segment.first + end), slice(begin * segment.samples, end * segment.samples)
-
-
-def _averaged(torque: Array, jump: Array, samples: int, carried: Array) -> tuple[Array, Array]:
-    """Block means of torque + Σ jump [K, ...], and the sum of all jumps so far; arrays [K·samples, ...]."""
-    shape = (len(torque) // samples, samples, *torque.shape[1:])
-    mean = torque.reshape(shape).mean(axis=1)
-    if not jump.any():  # one row of zeros stands for none at all
-        return np.asarray(mean + carried), carried
-    jumps = jump.reshape(shape)
-    total = jumps.sum(axis=1)
-    # a jump at sample k of a block counts from there to its end
-    weight = (samples - np.arange(samples)) / samples
-    inside = np.tensordot(jumps, weight, axes=(1, 0))
-    summed = np.cumsum(total, axis=0)
-    return np.asarray(mean + inside + carried + summed - total), np.asarray(carried + summed[-1])
 
 
 # --- the series -------------------------------------------------------------------------------------------------------

@@ -25,7 +25,7 @@ from tendonfmu.whitening import Whitener, common, whitener
 Numbers = NDArray[np.float64]
 Array = NDArray[Any]
 
-BLOCK = 1.5  # s, of the sign flips
+BLOCK = 2.0  # s, of the sign flips: longer than what a bias that wanders remembers between the splines' knots
 DRAWS = 2000
 VISITS = 8.0  # effective number of blocks in which a trial must show
 TAIL = 0.1  # share of the draws that the tail is taken from
