@@ -201,9 +201,22 @@ def _parameters(model: FittedModel, paths: Sequence[str], units: Mapping[str, st
 # --- parts ------------------------------------------------------------------------------------------------------------
 
 
+def _possible(data: Mapping[str, Any], causes: Sequence[Accepted]) -> list[Accepted]:
+    """Without those that change a law which only a cause that is not among them brings."""
+    found = []
+    for cause in causes:
+        try:
+            data = cause.added_to(data)
+        except KeyError:
+            continue
+        found.append(cause)
+    return found
+
+
 def _fit_with(
     nominal: FittedModel, causes: Sequence[Accepted], recordings: Sequence[FitRecording], settings: FitSettings
 ) -> FittedModel:
+    causes = _possible(nominal.data, causes)
     if not causes:
         return nominal
     begin = extended_description(nominal.data, causes)
