@@ -189,9 +189,10 @@ class Session {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
   static const Bytes images[] = {test_finger::image(), test_finger::image(one_joint),
-                                 test_finger::image(test_finger::every_key())};
+                                 test_finger::image(test_finger::every_key()),
+                                 test_finger::image(test_finger::every_effect())};
   FuzzedDataProvider data(bytes, size);
-  Session session(data, data.PickValueInArray({&images[0], &images[1], &images[2]})[0]);
+  Session session(data, data.PickValueInArray({&images[0], &images[1], &images[2], &images[3]})[0]);
   while (data.remaining_bytes() > 0) session.call();
   return 0;
 }

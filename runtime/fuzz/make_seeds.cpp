@@ -38,6 +38,21 @@ std::string placed_finger() {
   return finger.dump();
 }
 
+// a seed for each effect alone, which is mutated more deeply, one with all of them, and one with forces taken late
+std::vector<std::string> extended_fingers() {
+  const nlohmann::json every = nlohmann::json::parse(test_finger::every_effect());
+  nlohmann::json late = every;
+  std::vector<std::string> fingers = {every.dump()};
+  for (nlohmann::json& row : late.at("extensions")) {
+    nlohmann::json alone = nlohmann::json::parse(test_finger::json);
+    alone["extensions"] = {row};
+    fingers.push_back(alone.dump());
+    if (row.contains("delay")) row["delay"] = -0.004;
+  }
+  fingers.push_back(late.dump());
+  return fingers;
+}
+
 // all keys and texts of a description
 void collect(const nlohmann::json& value, std::set<std::string>& words) {
   if (value.is_string()) {
@@ -88,6 +103,7 @@ int main(int count, char** arguments) {
     return 2;
   }
   std::vector<std::string> fingers = {test_finger::json, least_finger, placed_finger(), test_finger::every_key()};
+  for (const std::string& finger : extended_fingers()) fingers.push_back(finger);
   for (int i = 2; i < count; ++i) {
     std::ifstream file(arguments[i], std::ios::binary);
     fingers.emplace_back(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());

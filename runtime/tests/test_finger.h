@@ -55,6 +55,33 @@ inline std::string every_key() {
   return text;
 }
 
+// And with every effect of docs/extensions.md, at every kind of place.
+inline std::string every_effect() {
+  std::string text = every_key();
+  const std::string list = "\"extensions\": [";
+  text.insert(text.find(list) + list.size(), R"({"effect": "gravity", "joint": 2, "sine": 0.02, "cosine": -0.03},
+    {"effect": "inertia", "joint": 1, "inertia": 1e-4}, {"effect": "joint_coupling", "joint": 1, "stiffness": 0.05},
+    {"effect": "preload_friction", "tendon": 1, "coulomb": 0.4},
+    {"effect": "preload_friction", "joint": 2, "tendon": 2, "coulomb": 0.4},
+    {"effect": "load_friction", "joint": 2, "tendon": 1, "coulomb": 2e-4},
+    {"effect": "force_gain", "tendon": 2, "correction": 0.07},
+    {"effect": "force_offset", "tendon": 1, "correction": -0.5},
+    {"effect": "moment_arm", "joint": 1, "tendon": 3, "correction": 6e-4},
+    {"effect": "moment_arm_variation", "joint": 2, "tendon": 2, "slope": -4e-4},
+    {"effect": "pulley_eccentricity", "joint": 1, "tendon": 1, "sine": 5e-4, "cosine": 3e-4},
+    {"effect": "presliding", "joint": 1, "displacement": 0.02},
+    {"effect": "presliding", "tendon": 3, "displacement": 2e-4},
+    {"effect": "friction_drift", "amplitude": 0.3, "time_constant": 0.5},
+    {"effect": "friction_drift", "joint": 2, "amplitude": -0.2, "time_constant": 5},
+    {"effect": "friction_drift", "tendon": 2, "amplitude": 0.2, "time_constant": 5},
+    {"effect": "stribeck", "joint": 1, "amplitude": -0.4, "stribeck_velocity": 0.3},
+    {"effect": "stribeck", "tendon": 1, "amplitude": 0.4, "stribeck_velocity": 0.004},
+    {"effect": "tendon_nonlinearity", "tendon": 2, "hardening": 1e5},
+    {"effect": "backlash", "joint": 2, "width": 0.02}, {"effect": "backlash", "tendon": 1, "width": 2e-4},
+    {"effect": "time_delay", "delay": 0.0033}, )");
+  return text;
+}
+
 constexpr std::size_t joints = 2, tendons = 3;
 
 inline std::vector<unsigned char> image(const std::string& text = json) {
