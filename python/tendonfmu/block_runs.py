@@ -1,8 +1,4 @@
-"""Block means of whole runs of the core: G of a description, and its slopes along directions of its numbers.
-
-Slopes by small steps serve where the estimator's derivatives are not exact: with `bias.entry_load` what an effect
-remembers from when it came to rest depends on the friction in front of it at that time.
-"""
+"""Block means of whole runs of the core: G of a description."""
 
 from __future__ import annotations
 
@@ -17,13 +13,10 @@ from numpy.typing import NDArray
 from tendonfmu import native
 from tendonfmu.balance import moment_arms
 from tendonfmu.block_averages import Blocks
-from tendonfmu.effects.description_edit import add_to_number, data_number, is_law_number
 from tendonfmu.fit_recordings import FitRecording
-from tendonfmu.fit_structure import get_number, own_copy, set_number
 
 Numbers = NDArray[np.float64]
 
-STEP = 1e-4  # of a number's ordinary size: G is linear in most numbers, and nearly so in the others over this
 _NEVER = 1e9  # N·m; no contact threshold is ever passed
 _STRETCH = 4000  # samples of a run at a time: what a run returns stays near the processor
 
@@ -99,44 +92,3 @@ def _block_torque(data: Mapping[str, Any], recordings: Sequence[FitRecording], b
     for recording, block in zip(recordings, blocks.of, strict=True):
         _add_up(sums, block, recording.recording.groups["tendon_force"] @ arms)
     return np.asarray(sums / np.maximum(blocks.sizes(), 1)[:, None])
-
-
-# --- slopes -----------------------------------------------------------------------------------------------------------
-
-
-def needs_differences(data: Mapping[str, Any], paths: Sequence[str]) -> bool:
-    """Whether the estimator's derivatives by these numbers leave out what `bias.entry_load` remembers."""
-    if not (data.get("bias") or {}).get("entry_load"):
-        return False
-    return any(is_law_number(path) or path.endswith((".amplitude", ".time_constant")) for path in paths)
-
-
-def block_slope(
-    data: Mapping[str, Any],
-    direction: Mapping[str, float],
-    size: float,
-    prediction: Numbers,
-    recordings: Sequence[FitRecording],
-    blocks: Blocks,
-) -> Numbers:
-    """[B, n] change of G per magnitude along a direction of numbers, as the estimator counts them: `static` is its
-    difference from `coulomb`, which takes it along, and a Stribeck velocity moves by its inverse.
-
-    size: an ordinary magnitude; the step is a small share of it, upwards. prediction: G at `data`.
-    """
-    changed, step = own_copy(data), STEP * size
-    for path, share in direction.items():
-        if is_law_number(path) and path.endswith(".stribeck_velocity"):
-            set_number(changed, path, 1.0 / (1.0 / float(get_number(changed, path)) + step * share))
-        else:
-            add_to_number(changed, path, step * share)
-    return np.asarray((block_prediction(changed, recordings, blocks) - prediction) / step)
-
-
-def ordinary_size(data: Mapping[str, Any], direction: Mapping[str, float]) -> float:
-    """Of a magnitude along a direction of a fit's numbers: the number itself, of a Stribeck velocity its inverse."""
-    path = next(iter(direction))
-    value = abs(data_number(data, path))
-    if is_law_number(path) and path.endswith(".static"):
-        value -= abs(data_number(data, f"{path.rsplit('.', 1)[0]}.coulomb"))
-    return 1.0 / value if path.endswith(".stribeck_velocity") else value or 1.0

@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.block_averages import Blocks
-from tendonfmu.block_runs import block_late_forces, block_prediction, block_slope, needs_differences, ordinary_size
+from tendonfmu.block_runs import block_late_forces, block_prediction
 from tendonfmu.derivative_passes import Direction, nominal_directions, plan_passes, run_pass
 from tendonfmu.diagnosis_span import Span, span_of
 from tendonfmu.effects import CANDIDATES, Candidate, Place, Variant
@@ -109,7 +108,7 @@ def candidate_columns(
 
 
 class _Work:
-    """All that has to be run: passes of derivatives, slopes by small steps, and terms at full strength.
+    """All that has to be run: passes of derivatives, and terms at full strength.
 
     values: [B, n, u + c], to be filled.
     """
@@ -124,7 +123,6 @@ class _Work:
     ) -> None:
         self._data, self._recordings, self._blocks = data, recordings, blocks
         self.values, self._progress = values, progress
-        self._slopes: list[tuple[int, Callable[[], Mapping[str, Any]], Direction, float]] = []
         self._samples = sum(part.stop - part.start for each in recordings for part in each.parts)
         self._done = 0
 
@@ -132,21 +130,14 @@ class _Work:
         """nominal: directions of the first columns. variants: each with the place of its first column."""
         exact = []
         for variant, at in variants:
-            paths = [path for column in variant.columns for path in column.numbers]
-            if needs_differences(self._data, paths):
-                for k, column in enumerate(variant.columns):
-                    self._slopes.append((at + k, partial(_own_data, variant), column.numbers, column.expected))
-            elif not variant.secant_rows:
+            if not variant.secant_rows:
                 exact.append((variant, at))
         self._passes = plan_passes(self._data, exact)
         for at, direction in reversed(list(enumerate(nominal))):
-            if needs_differences(self._data, list(direction)):
-                self._slopes.append((at, lambda: self._data, direction, ordinary_size(self._data, direction)))
-            else:
-                self._passes[0].columns.insert(0, (at, direction))
+            self._passes[0].columns.insert(0, (at, direction))
         self._passes = [each for each in self._passes if each.columns]
         self._bundles = _bundles([(variant, at) for variant, at in variants if variant.secant_rows])
-        self._total = self._samples * (len(self._passes) + len(self._slopes) + len(self._bundles) + 1)
+        self._total = self._samples * (len(self._passes) + len(self._bundles) + 1)
 
     def run(self) -> Numbers:
         """Fills the values; returns G of the description."""
@@ -154,9 +145,6 @@ class _Work:
             run_pass(each.data(), each.columns, self._recordings, self._blocks, self.values, self._watch)
         self.values /= np.maximum(self._blocks.sizes(), 1)[:, None, None].astype(np.float32)
         prediction = self._prediction(self._data)
-        for at, data, direction, size in self._slopes:
-            self.values[:, :, at] = block_slope(data(), direction, size, prediction, self._recordings, self._blocks)
-            self._watch(self._samples)
         for bundle in self._bundles:
             if bundle[0][0].late:
                 variant, at = bundle[0]
@@ -181,10 +169,6 @@ class _Work:
         self._done += samples
         if self._progress is not None:
             self._progress(min(self._done, self._total), self._total)
-
-
-def _own_data(variant: Variant) -> Mapping[str, Any]:
-    return variant.data
 
 
 def _refuse_too_many(size: float, columns: int) -> None:

@@ -4,7 +4,6 @@
 
 #include <string.h>
 
-#include "extension_derivative.h"
 #include "extensions.h"
 #include "slot_view.h"
 
@@ -406,5 +405,4 @@ void parameter_derivative_read(const tendonfmu_finger* finger, parameter_derivat
   }
   read_covers(finger, derivative);
   derivative->plain_count = derivative->covers;
-  extension_derivative_read(finger, derivative);
 }

@@ -63,7 +63,8 @@ size_t parameter_derivative_size(const tendonfmu_finger* finger);
 /* Lays it into memory [parameter_derivative_size], aligned for doubles. */
 void parameter_derivative_place(const tendonfmu_finger* finger, void* memory, parameter_derivative* derivative);
 
-/* Fills it for the sample that the finger last took, by a step: a restored state has no scratch. */
+/* Fills it, but for the extensions (extension_derivative.h), for the sample that the finger last took, by a step: a
+ * restored state has no scratch. */
 void parameter_derivative_read(const tendonfmu_finger* finger, parameter_derivative* derivative);
 
 #endif

@@ -50,6 +50,7 @@ void SampleRows::add(const law_term& from, bool is_jump) {
 
 void SampleRows::read() {
   parameter_derivative_read(finger_, &derivative_);
+  extension_derivative_read(finger_, &derivative_);
   terms_.clear();
   plain_.clear();
   for (std::size_t k = 0; k < derivative_.friction_count; ++k) {

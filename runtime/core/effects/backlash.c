@@ -57,9 +57,8 @@ static void signal_slope(effect_place place, const double* values, uint32_t k, c
 
 /* inside the play it stays what it was */
 static void signal_pass(effect_place place, const double* values, const double* memory, effect_signals* direction) {
-  (void)values;
   double* position = position_of(place, direction);
-  if (position && memory[FOLLOWS] == 0.0) {
+  if (position && memory[FOLLOWS] == 0.0 && values[0] > 0.0) {
     const int at_joint = place.joint != EFFECT_NOWHERE;
     const double* before = at_joint ? direction->angle_before : direction->position_before;
     *position = before ? before[at_joint ? place.joint : place.tendon] : 0.0;
