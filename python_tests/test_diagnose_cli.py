@@ -70,7 +70,7 @@ def test_it_writes_everything(call: Call, answering: Callable[[Diagnosis], Calle
     assert (finger, recordings, tests) == ("f.json", ["a.csv", "b.csv"], ["c.csv", "d.csv"])
     assert (options["seed"], options["kinematics"], options["jobs"]) == (3, 3, 2)
     report = json.loads(Path("new/out/diagnosis.json").read_text(encoding="utf-8"))
-    jsonschema.validate(report, json.loads(files_of("tendonfmu").joinpath("schema/diagnosis.schema.json").read_text()))
+    jsonschema.validate(report, json.loads((files_of("tendonfmu") / "schema" / "diagnosis.schema.json").read_text()))
     assert set(report["files"]) == files_in(Path("new/out")) >= NAMED
     assert files_in(Path("new")) == {"out"}  # nothing is left beside it
     assert [line for line in answer.err.splitlines() if line.startswith("tendonfmu: warning: ")] == [
@@ -209,7 +209,7 @@ def test_a_hidden_spring_is_found(call: Call, tmp_path: Path, monkeypatch: pytes
     answer = call(*words.split())
     assert answer.status == 0, answer.err
     report = json.loads(Path("out/diagnosis.json").read_text(encoding="utf-8"))
-    jsonschema.validate(report, json.loads(files_of("tendonfmu").joinpath("schema/diagnosis.schema.json").read_text()))
+    jsonschema.validate(report, json.loads((files_of("tendonfmu") / "schema" / "diagnosis.schema.json").read_text()))
     first = report["causes"][0]
     assert "cover_stiffness" in {first["effect"], *(other["effect"] for other in first["confusable_with"])}
     assert first["joint"] == label["joint"] and report["gain"]["interval"][0] > 0

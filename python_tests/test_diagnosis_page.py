@@ -39,7 +39,7 @@ from tendonfmu.diagnosis_text import (
 
 LARGEST = 5_000_000  # bytes
 HOSTILE = "<script>alert('x')</script>&\"$\\frac{"
-SCHEMA = json.loads(files_of("tendonfmu").joinpath("schema", "diagnosis.schema.json").read_text("utf-8"))
+SCHEMA = json.loads((files_of("tendonfmu") / "schema" / "diagnosis.schema.json").read_text("utf-8"))
 
 
 @pytest.fixture(scope="module")
