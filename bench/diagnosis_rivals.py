@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from tendonfmu.campaign_cases import Case
-from tendonfmu.diagnosis_result import Diagnosis, Where
+from tendonfmu.diagnosis_result import Where
 from tendonfmu.diagnosis_series import Trial
 from tendonfmu.nuisance import basis, without
 from tendonfmu.significance import Problem, residual_of
@@ -171,8 +171,8 @@ def answers(problem: Problem) -> dict[str, list[Where]]:
     return {name: [Where(*trial.place) for trial in trials] for name, trials in found.items()}
 
 
-def beside(case: Case, found: Diagnosis) -> Mapping[str, list[Where]]:
-    """For `tendonfmu campaign --beside`: the rivals on the case that was just diagnosed."""
+def beside(case: Case) -> Mapping[str, list[Where]]:
+    """For `tendonfmu campaign --beside`: the rivals on a case."""
     from tendonfmu.diagnosis import problem_of
 
     assert case.finger is not None

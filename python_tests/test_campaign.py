@@ -105,7 +105,7 @@ def test_a_maker_writes_the_files_of_its_case(tmp_path: Path) -> None:
 def test_a_campaign_is_resumed_and_survives_a_case_that_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ran: list[str] = []
 
-    def run(case: Case, beside: str | None) -> dict[str, Any]:
+    def run(case: Case, how: campaigns.How) -> dict[str, Any]:
         ran.append(case.name)
         error = "ValueError: bad" if case.name == "b" else ""
         row = judge(case, diagnosis()) | {"name": case.name, "group": "null", "rig": "", "seed": 0, "error": error}

@@ -13,13 +13,14 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tendonfmu.campaign_cases import Case, made, names_of, python_function
-from tendonfmu.campaign_judgement import judge, judge_names
+from tendonfmu.campaign_judgement import judge, judge_causes, judge_names
 from tendonfmu.errors import InputError
 from tendonfmu.whole_file import check_output_folder, whole_file
 
@@ -47,37 +48,59 @@ def _wanted(file: Path, failed_again: bool) -> bool:
 # --- one case, on a worker --------------------------------------------------------------------------------------------
 
 
-def run_case(case: Case, beside: str | None = None) -> Row:
-    """Makes the recordings, diagnoses them untold, and judges the answer. What goes wrong becomes the row's `error`.
+@dataclass(frozen=True)
+class How:
+    """beside: FILE.py:FUNCTION, its file absolute, called as FUNCTION(case) -> name of a rival -> the causes that it
+    names. names_only: the search for causes alone, without gain, remainder and experiments; what these would answer
+    stays open."""
 
-    beside: FILE.py:FUNCTION, called as FUNCTION(case, diagnosis) -> name of a rival -> the causes that it names.
-    """
+    beside: str | None = None
+    names_only: bool = False
+
+
+ALL_OF_IT = How()
+
+
+def run_case(case: Case, how: How = ALL_OF_IT) -> Row:
+    """Makes the recordings, diagnoses them untold, and judges the answer. What goes wrong becomes the row's `error`."""
     begin = time.perf_counter()
     row: Row = {"name": case.name, "group": case.group, "rig": case.rig, "seed": case.seed, "error": ""}
     try:
         with tempfile.TemporaryDirectory(prefix="tendonfmu-campaign-") as folder:
-            row |= _diagnosed(made(case, Path(folder)), beside)
+            row |= _answered(made(case, Path(folder)), how)
     except Exception as failed:  # a campaign of days goes on: the row says what happened
         row["error"] = f"{type(failed).__name__}: {' '.join(str(failed).split())}"
     return row | {"run_seconds": time.perf_counter() - begin}
 
 
-def _diagnosed(case: Case, beside: str | None) -> Row:
+def _answered(case: Case, how: How) -> Row:
+    row: Row = {"rig": case.rig, "truth": json.dumps([vars(truth) for truth in case.truth])}
+    if case.truth:
+        row |= {f"true_{key}": value for key, value in vars(case.truth[0]).items()}
+    row |= dict(case.facts) | (_named(case) if how.names_only else _diagnosed(case))
+    if how.beside is not None:
+        for rival, names in python_function(how.beside, Path.cwd())(case).items():
+            row |= {f"{rival}.{key}": value for key, value in judge_names(case, names).items()}
+    return row
+
+
+def _named(case: Case) -> Row:
+    from tendonfmu.campaign_search import find_names
+
+    causes, events = find_names(case)
+    return judge_causes(case, causes) | {"events": len(events)}
+
+
+def _diagnosed(case: Case) -> Row:
     from tendonfmu.diagnosis import diagnose
 
     assert case.finger is not None
     found = diagnose(
         case.finger, list(case.recordings), tests=list(case.test), kinematics=case.kinematics, seed=case.seed
     )
-    row: Row = {"rig": case.rig, "truth": json.dumps([vars(truth) for truth in case.truth])}
-    if case.truth:
-        row |= {f"true_{key}": value for key, value in vars(case.truth[0]).items()}
-    row |= dict(case.facts) | judge(case, found)
+    row = judge(case, found)
     if case.reference:
         row["true_gain"] = true_gain(found.nominal_data, found.extended_data, case)
-    if beside is not None:
-        for rival, names in python_function(beside, Path.cwd())(case, found).items():
-            row |= {f"{rival}.{key}": value for key, value in judge_names(case, names).items()}
     return row
 
 
@@ -136,15 +159,14 @@ def run_campaign(
     folder: Path,
     client: Any,
     *,
-    beside: str | None = None,
+    how: How = ALL_OF_IT,
     stop_after: float = math.inf,
     failed_again: bool = False,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> int:
     """Runs what has no row yet, a row's file as each case ends. Returns how many ran.
 
-    client: of dask, or None: here, one after another. beside: as for `run_case`, its file absolute. stop_after: s,
-    after which no further case begins.
+    client: of dask, or None: here, one after another. stop_after: s, after which no further case begins.
     """
     check_output_folder(folder)
     (folder / ROWS).mkdir(parents=True, exist_ok=True)
@@ -152,14 +174,14 @@ def run_campaign(
     done = len(cases) - len(waiting)
     progress(done, len(cases))
     count = 0
-    for row in _rows(waiting, client, beside, time.monotonic() + stop_after):
+    for row in _rows(waiting, client, how, time.monotonic() + stop_after):
         write_row(folder, row)
         count += 1
         progress(done + count, len(cases))
     return count
 
 
-def _rows(cases: Sequence[Case], client: Any, beside: str | None, deadline: float) -> Iterator[Row]:
+def _rows(cases: Sequence[Case], client: Any, how: How, deadline: float) -> Iterator[Row]:
     """Each row as it ends. Only as many cases are under way as there are workers to take them at once, and one more."""
     waiting = iter(cases)
 
@@ -168,19 +190,19 @@ def _rows(cases: Sequence[Case], client: Any, beside: str | None, deadline: floa
 
     if client is None:
         while (case := next_case()) is not None:
-            yield run_case(case, beside)
+            yield run_case(case, how)
         return
     import distributed
 
     library: Any = distributed
     threads = max(1, sum(client.nthreads().values()))
     begun = [case for case in (next_case() for _ in range(threads + 1)) if case is not None]
-    pending = library.as_completed([client.submit(run_case, case, beside, pure=False) for case in begun])
+    pending = library.as_completed([client.submit(run_case, case, how, pure=False) for case in begun])
     for future in pending:
         yield future.result()
         case = next_case()
         if case is not None:
-            pending.add(client.submit(run_case, case, beside, pure=False))
+            pending.add(client.submit(run_case, case, how, pure=False))
 
 
 def write_row(folder: Path, row: Row) -> None:

@@ -86,7 +86,7 @@ def rates(rows: Sequence[Row]) -> list[Rate]:
             "absorbed by refitting: “not visible”, with an experiment",
             "≥ 95 %",
             absorbed,
-            lambda row: bool(row["not_visible"] and row["experiment"]),
+            lambda row: None if row["not_visible"] is None else row["not_visible"] and row["experiment"],
         ),
         rate("the same, named after the experiment", "≥ 90 %", absorbed, lambda row: row.get("named_after_experiment")),
         rate("not in the list: unknown", "≥ 95 %", unknown, lambda row: row["unknown"]),

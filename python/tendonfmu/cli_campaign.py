@@ -32,6 +32,9 @@ def campaign(
     beside: Annotated[
         str | None, typer.Option(metavar="FILE.py:FUNCTION", help="rivals, asked to name a cause for each case, too")
     ] = None,
+    names_only: Annotated[
+        bool, typer.Option("--names-only", help="the search for causes alone: ten times as fast, no gain, no verdict")
+    ] = False,
     again: Annotated[bool, typer.Option("--again", help="run cases that ended in an error once more")] = False,
     report: Annotated[Path | None, typer.Option(metavar="R.md", help="the tables as Markdown")] = None,
     progress: Annotated[
@@ -43,7 +46,7 @@ def campaign(
     Each case writes its row as it ends; interrupted, the same command goes on where it was.
     The rows together are DIR/campaign.parquet; every rate has its number of cases and its 95 % interval.
     """
-    from tendonfmu.campaign import cluster, collect, run_campaign, still_to_do, worker_count
+    from tendonfmu.campaign import How, cluster, collect, run_campaign, still_to_do, worker_count
     from tendonfmu.campaign_cases import python_function, read_cases
     from tendonfmu.campaign_rates import EFFECT_HEADINGS, HEADINGS, by_effect, markdown, rates
     from tendonfmu.fit_files import write_text
@@ -66,7 +69,7 @@ def campaign(
                 listed,
                 output,
                 client,
-                beside=None if beside is None else str(Path(beside).absolute()),
+                how=How(None if beside is None else str(Path(beside).absolute()), names_only),
                 stop_after=stop_after,
                 failed_again=again,
                 progress=lambda done, total: bar.update(task, completed=done, total=total),

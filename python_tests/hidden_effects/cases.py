@@ -282,6 +282,7 @@ def main() -> None:
     parser.add_argument("--per-effect", type=int, default=10, help="cases of each effect and strength")
     parser.add_argument("--strengths", type=float, nargs="+", default=[0.03, 0.1])
     parser.add_argument("--double", type=int, default=100)
+    parser.add_argument("--groups", nargs="+", help="of these groups only: null single double absorbed unknown contact")
     parser.add_argument("--joints", type=int, default=2)
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--rate", type=float, default=500.0)
@@ -293,6 +294,7 @@ def main() -> None:
             joints=given.joints, seconds=given.seconds, rate=given.rate,
         )
     )  # fmt: skip
+    cases = [case for case in cases if not given.groups or case["group"] in given.groups]
     here = Path(__file__).resolve().parent
     for case in cases:
         case["maker"] = str(here / case["maker"])
