@@ -75,3 +75,19 @@ def test_says_what_is_seen_meanwhile() -> None:
     assert event.joints == (2,)
     assert "joint 2 stands still" in event.description
     assert "tendon 3 nearly slack" in event.description
+
+
+def test_a_joint_that_comes_loose_needs_less_of_a_residual() -> None:
+    """Reversals as rough as the stall hide it from the block maxima; its motion is like no other."""
+    series = make_series(27)
+    target, velocity = series.target.copy(), series.velocity.copy()
+    for turn in range(4, 60, 5):
+        target[turn * 100 : turn * 100 + 25, 0] += 0.05
+    loose = (series.time > 41.0) & (series.time < 41.3)
+    target[loose, 0] += 0.05
+    assert events_of(replace(series, target=target)) == ()
+    velocity[np.flatnonzero(loose)[:8], 0] = 60.0
+    (event,) = events_of(replace(series, target=target, velocity=velocity))
+    assert event.start == pytest.approx(41.0, abs=0.3)
+    assert event.end == pytest.approx(41.3, abs=0.3)
+    assert "joint 1 jumps" in event.description

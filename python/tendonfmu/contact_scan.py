@@ -39,6 +39,7 @@ WIDTHS = {
     0.8: SLOW,
     1.6: SLOW,
 }  # s of a window → s of the running median it is held against
+JUMP = 8.0  # times the usual speed: a residual of LEAST is then enough, that rare a motion is in no learner's reach
 MERGED = 0.3  # s between parts of one event
 PAD = 0.1  # s on either side
 MOST = 0.25  # of the time: what is there more often is no event
@@ -129,6 +130,7 @@ def _outlying(series: Series, left: Numbers, plan: learner.Layout, known: Flags)
     flat = {slow: _flat(left, plan, known, max(3, round(slow / series.step))) for slow in set(WIDTHS.values())}
     for joint in range(left.shape[1]):
         core = np.zeros(len(plan.rows), dtype=bool)
+        jump = _jumps(series.velocity[plan.rows, joint])
         for width, slow in WIDTHS.items():
             length = max(1, round(width / series.step))
             mean = _sliding(flat[slow][:, joint], plan.run, length)
@@ -136,10 +138,18 @@ def _outlying(series: Series, left: Numbers, plan: learner.Layout, known: Flags)
             if scale > 0.0:
                 score = np.abs(mean) / scale
                 core |= _widened(score > _reach(score, plan, tests), plan.run, length)
+                core |= _widened(jump, plan.run, length) & _widened(score > LEAST, plan.run, length)
         mean = np.abs(_sliding(flat[SLOW][:, joint], plan.run, max(1, round(min(WIDTHS) / series.step))))
         raised = mean > EDGE * MAD * float(np.median(mean))
         inside[plan.rows, joint] = _reached(core, raised, plan.run)
     return inside
+
+
+def _jumps(velocity: Numbers) -> Flags:
+    """[U] blocks of a velocity that the joint has at no other time: it came loose, or was thrown."""
+    speed = np.abs(velocity)
+    moving = speed[speed > np.median(speed)]
+    return np.asarray(speed > JUMP * np.quantile(moving, 0.9)) if len(moving) else np.zeros(len(speed), dtype=bool)
 
 
 def _reached(core: Flags, raised: Flags, run: NDArray[np.int64]) -> Flags:
@@ -223,6 +233,8 @@ def _circumstances(series: Series, rows: NDArray[np.int64], joint: int) -> str:
     if len(slack):
         notes.append(f"tendon {' and '.join(str(tendon + 1) for tendon in slack)} nearly slack")
     speed = np.abs(series.velocity[:, joint])
-    if np.median(speed[rows]) < 0.03 * np.quantile(speed, 0.95):
+    if _jumps(speed)[rows].any():
+        notes.append(f"joint {joint + 1} jumps")
+    elif np.median(speed[rows]) < 0.03 * np.quantile(speed, 0.95):
         notes.append(f"joint {joint + 1} stands still")
     return f" ({', '.join(notes)})" if notes else ""
