@@ -185,7 +185,7 @@ def _errors(found: Diagnosis, names: Names, factor: float) -> list[dict[str, Any
     rows = []
     for j, row in enumerate(error_rows(found, names, factor)):
         total = j == len(found.nominal.train_rms)
-        ceiling = percent(found.ceiling[j]) if j < len(found.ceiling) and not total else ""
+        ceiling = percent(max(found.ceiling[j], 0.0)) if j < len(found.ceiling) and not total else ""
         white = (
             [rounded(value, 2) for value in found.whiteness[j]] if j < len(found.whiteness) and not total else ["", ""]
         )
