@@ -84,10 +84,38 @@ std::string detection_keys(int joints, int tendons, bool by_cusum) {
          R"(, "deviation": )" + per_joint("0.002") + R"(, "release_ratio": 0.7, "hold_time": 0.05, "release_time": 2)";
 }
 
+std::string row(const char* effect, const char* key, int place, const char* numbers) {
+  return std::string(R"({"effect": ")") + effect + "\", \"" + key + "\": " + std::to_string(place + 1) + ", " +
+         numbers + "}";
+}
+
+std::string extension_rows(int joints, int tendons, Keys keys) {
+  std::vector<std::string> rows;
+  for (int j = 0; j < joints && keys == Keys::torques; ++j) {
+    rows.push_back(row("gravity", "joint", j, R"("sine": 0.01, "cosine": 0.01)"));
+    rows.push_back(row("inertia", "joint", j, R"("inertia": 1e-5)"));
+    rows.push_back(row("cover_hardening", "joint", j, R"("stiffness": 0.01)"));
+  }
+  for (int j = 0; j < joints && keys == Keys::presliding; ++j) {
+    rows.push_back(row("presliding", "joint", j, R"("displacement": 0.004)"));
+  }
+  for (int i = 0; i < tendons; ++i) {
+    if (keys == Keys::presliding) {
+      rows.push_back(row("presliding", "tendon", i, R"("displacement": 4e-5)"));
+    } else if (keys == Keys::torques) {
+      rows.push_back(row("force_gain", "tendon", i, R"("correction": 0.02)"));
+    }
+  }
+  if (keys == Keys::delay) {
+    rows.push_back(R"({"effect": "time_delay", "delay": 0.002})");
+  }
+  return list(static_cast<int>(rows.size()), [&](int k) { return rows[static_cast<std::size_t>(k)]; });
+}
+
 }  // namespace
 
-std::string description(int joints, int tendons, int points, Detection detection) {
-  const bool everything = detection == Detection::everything;
+std::string description(int joints, int tendons, int points, Keys keys) {
+  const bool everything = keys == Keys::everything, detects = everything || keys == Keys::innovation;
   return R"({"format": "tendonfmu-finger-1", "name": "bench", "joints": )" +
          list(joints,
               [&](int j) {
@@ -96,7 +124,8 @@ std::string description(int joints, int tendons, int points, Detection detection
               }) +
          R"(, "tendons": )" + list(tendons, [&](int i) { return tendon(i, joints, points); }) +
          R"(, "contact": {"threshold": )" + list(joints, [](int) { return std::string("5"); }) +
-         (detection == Detection::paper ? "" : detection_keys(joints, tendons, everything)) + "}" +
+         (detects ? detection_keys(joints, tendons, everything) : "") + R"(}, "extensions": )" +
+         extension_rows(joints, tendons, keys) +
          (everything ? R"(, "velocity_threshold": {"hysteresis": 0.3}, "bias": {"forgetting": "absorption", )"
                        R"("entry_load": true})"
                      : "") +

@@ -8,11 +8,12 @@
 
 namespace bench_finger {
 
-// Which keys of docs/contract-additions.md a description has.
-enum class Detection { paper, innovation, everything };
+// Which keys of docs/contract-additions.md, or rows of docs/extensions.md, a description has: torques: three a joint
+// and one a tendon; presliding: everywhere.
+enum class Keys { paper, innovation, everything, torques, presliding, delay };
 
 // A description with n joints, m tendons and `points` working points at every edge, all laws different.
-std::string description(int joints, int tendons, int points, Detection detection = Detection::paper);
+std::string description(int joints, int tendons, int points, Keys keys = Keys::paper);
 
 std::vector<unsigned char> image(const std::string& json);
 

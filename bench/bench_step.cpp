@@ -7,15 +7,15 @@
 
 namespace {
 
-using bench_finger::Detection;
+using bench_finger::Keys;
 
 constexpr std::size_t samples = 20000;
 
 // A finger with room for its outputs that runs over a recording again and again.
 class Runner {
  public:
-  Runner(int joints, int tendons, int points, const char* kernel, Detection detection = Detection::paper)
-      : image_(bench_finger::image(bench_finger::description(joints, tendons, points, detection))) {
+  Runner(int joints, int tendons, int points, const char* kernel, Keys keys = Keys::paper)
+      : image_(bench_finger::image(bench_finger::description(joints, tendons, points, keys))) {
     char message[400];
     finger_ = tendonfmu_create(image_.data(), image_.size(), message, sizeof message);
     usable_ = tendonfmu_set_kernel(finger_, kernel) == TENDONFMU_OK;
@@ -53,9 +53,8 @@ class Runner {
   std::vector<double> torque_;
 };
 
-void steps(benchmark::State& state, const char* kernel, int joints, int tendons, int points, bool shaking,
-           Detection detection) {
-  Runner runner(joints, tendons, points, kernel, detection);
+void steps(benchmark::State& state, const char* kernel, int joints, int tendons, int points, bool shaking, Keys keys) {
+  Runner runner(joints, tendons, points, kernel, keys);
   if (!runner.usable()) {
     state.SkipWithError("this kernel cannot run here");
     return;
@@ -69,20 +68,22 @@ void steps(benchmark::State& state, const char* kernel, int joints, int tendons,
                                                   benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 
-// name, kernel, joints, tendons, points, shaking, detection
+// name, kernel, joints, tendons, points, shaking, keys
 const auto* const registered = [] {
   const auto add = [](const char* name, const char* kernel, int joints, int tendons, int points, bool shaking,
-                      Detection detection = Detection::paper) {
+                      Keys keys = Keys::paper) {
     return benchmark::RegisterBenchmark(
-               name,
-               [=](benchmark::State& state) { steps(state, kernel, joints, tendons, points, shaking, detection); })
+               name, [=](benchmark::State& state) { steps(state, kernel, joints, tendons, points, shaking, keys); })
         ->Unit(benchmark::kMillisecond);
   };
   add("step/avx2/4x8x5", "avx2", 4, 8, 5, false);
-  add("step/avx2/4x8x5/innovation", "avx2", 4, 8, 5, false, Detection::innovation);
-  add("step/avx2/4x8x5/everything", "avx2", 4, 8, 5, false, Detection::everything);
-  add("step/plain/4x8x5/innovation", "plain", 4, 8, 5, false, Detection::innovation);
-  add("step/avx2/4x8x5/shaking/everything", "avx2", 4, 8, 5, true, Detection::everything);
+  add("step/avx2/4x8x5/innovation", "avx2", 4, 8, 5, false, Keys::innovation);
+  add("step/avx2/4x8x5/everything", "avx2", 4, 8, 5, false, Keys::everything);
+  add("step/plain/4x8x5/innovation", "plain", 4, 8, 5, false, Keys::innovation);
+  add("step/avx2/4x8x5/shaking/everything", "avx2", 4, 8, 5, true, Keys::everything);
+  add("step/avx2/4x8x5/torques", "avx2", 4, 8, 5, false, Keys::torques);
+  add("step/avx2/4x8x5/presliding", "avx2", 4, 8, 5, false, Keys::presliding);
+  add("step/avx2/4x8x5/delay", "avx2", 4, 8, 5, false, Keys::delay);
   add("step/sse2/4x8x5", "sse2", 4, 8, 5, false);
   add("step/plain/4x8x5", "plain", 4, 8, 5, false);
   add("step/avx2/4x8x5/shaking", "avx2", 4, 8, 5, true);
