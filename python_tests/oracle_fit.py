@@ -31,9 +31,9 @@ class Number:
 
 
 def family(path: str) -> tuple[str, str]:
-    """The side of a law (or the table) that a parameter belongs to, and its own name."""
+    """The side of a law (or the table) that a parameter belongs to, and its own name ("number" of an extension's)."""
     before, _, name = path.rpartition(".")
-    return before, name
+    return before, "number" if before.startswith("extensions[") else name
 
 
 class Unknowns:
@@ -253,6 +253,7 @@ def free_groups(paths: Sequence[str], values: Array) -> list[int]:
             "stribeck_velocity": drop > 0.0,
             "viscous": number[path] > 0.0,
             "stiffness": not before.startswith("tendons") and number[path] != 0.0,
+            "number": True,
         }.get(name, path.startswith("bias.initial_torque"))
         group.append(used if present else -1)
         used += present

@@ -74,8 +74,6 @@ class Recorder(oracle.FingerOracle):
 
     def __init__(self, description: Mapping[str, Any], kinematics_source: int) -> None:
         super().__init__(without_contact(description), kinematics_source)
-        if self.has_entry_load:
-            raise ValueError("bias.entry_load: b then belongs to the loads of two samples, which no Course tells")
         self.rows: dict[int, list[tuple[float, ...]]] = {}
         self.totals: list[Array] = []
         self.moments: list[Any] = []  # what torques of extensions see
@@ -147,6 +145,8 @@ class Trace:
         self, description: Mapping[str, Any], recording: Mapping[str, Array], kinematics_source: int = 1
     ) -> None:
         finger, self.torque, self.jump, steps = run_recorder(description, recording, kinematics_source)
+        if finger.has_entry_load:
+            raise ValueError("bias.entry_load: b then belongs to the loads of two samples, which no Course tells")
         self.description = description
         self.n, self.m, self.R = finger.n, finger.m, finger.R
         self.bidirectional = [tendon.bidirectional for tendon in finger.tendons]

@@ -18,7 +18,7 @@ from random_fingers import Description, Recording, random_case
 from runners import ORACLE, RUNNERS, Runner, product
 
 FINGERS = range(600, 640)
-SAMPLES = 180
+SAMPLES = 130
 FMU_STRIDE = 4  # packing takes its time
 CLOSED = ("presliding", "friction_drift", "stribeck", "backlash")  # at a joint or at a tendon
 
@@ -172,7 +172,7 @@ def test_derivatives_are_those_of_the_oracle() -> None:
         seed += seed // 4 % 4
         description, inputs = case(seed)
         source = source_of(seed)
-        k = 20 + seed % 60
+        k = 20 + seed % 7 * 10
         recording = {name: series[: k + 1] for name, series in inputs.items()}
         found, errors = oracle_derivatives.derivatives(description, recording, source, k)
         finger = product("native").Finger.from_description(description, source)
@@ -190,7 +190,7 @@ def test_derivatives_are_those_of_the_oracle() -> None:
                     compared["all"] += known.size
                     compared["not 0"] += int((slopes[output] != 0.0).sum())
     assert compared["known"] > 0.95 * compared["all"], compared
-    assert compared["not 0"] > 1000, compared
+    assert compared["not 0"] > 0.3 * compared["all"], compared
 
 
 def test_a_run_of_the_oracle_is_the_same_sample_by_sample() -> None:

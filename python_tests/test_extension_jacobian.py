@@ -1,0 +1,129 @@
+"""∂T/∂z and ∂Δb/∂z of the estimation by the numbers of `extensions`, all effects together in random fingers: against
+formulas in complex numbers (exact) where the kinematics stay, and against central differences of the oracle."""
+
+from __future__ import annotations
+
+import functools
+from collections import Counter
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import oracle_fit
+from fit_cases import groups, image_of, twin_of
+from oracle_extensions import read_rows
+from oracle_trace import Trace, run_recorder, with_values
+from random_extensions import MAGNITUDES, MAKE
+from random_fingers import Description, random_case
+from tendonfmu import estimation
+
+if not estimation.HAS_ESTIMATION:
+    pytest.skip(f"SKIPPED: {estimation.ESTIMATION_MISSING}", allow_module_level=True)
+
+Array = NDArray[Any]
+
+FINGERS = range(700, 712)
+SAMPLES = 50
+SIGNALS = ("time_delay", "backlash", "tendon_nonlinearity")
+ROUNDING = 1e-9  # of the column's largest
+BY_DIFFERENCES = 3e-5  # of the column's largest
+
+
+class Case:
+    """A random finger with extensions and the estimator's rows at its own numbers.
+
+    Every third one has `entry_load`; every fourth one all magnitudes at 0, where `diagnose` takes its candidates.
+    """
+
+    def __init__(self, seed: int) -> None:
+        description, self.recording = random_case(seed, SAMPLES, extensions=True)
+        self.source = (1, 1, 2, 3)[seed % 4]
+        noise = {"drift_variance": 1e-4, "noise_std": 0.01, "entry_load": seed % 3 == 0}
+        self.description: Description = description | {"bias": dict(description.get("bias") or {}) | noise}
+        self.at_zero = seed % 4 == 1
+        if self.at_zero:
+            rows = description["extensions"]
+            self.description["extensions"] = [row | {k: 0.0 for k in MAGNITUDES if k in row} for row in rows]
+        self.group = groups(self.description)
+        self.estimator = estimation.Estimator(image_of(self.description), self.group)
+        self.estimator.add_recording(self.recording, self.source)
+        self.twin = twin_of(self.description, self.group, self.estimator.unknowns)
+        self.z = self.estimator.start
+        self.rows = self.estimator.jacobian(0, self.z, 0, SAMPLES)
+
+    def oracle_rows(self, values: dict[str, float], less_tau: bool = False) -> Array:
+        """[2, N, n]: T (or T − τ) and Δb of the oracle."""
+        changed = with_values(self.description, values)
+        finger, torque, jump, _ = run_recorder(changed, self.recording, self.source)
+        tau = np.array([moment.f0 for moment in finger.moments]) @ finger.R
+        return np.stack([torque - tau if less_tau else torque, jump])
+
+
+@functools.cache
+def case(seed: int) -> Case:
+    return Case(seed)
+
+
+def largest(values: Array) -> Array:
+    """Of each column (last axis), 1 where it is 0."""
+    found = np.abs(values).reshape(-1, values.shape[-1]).max(axis=0)
+    return np.asarray(np.where(found > 0.0, found, 1.0))
+
+
+@pytest.mark.parametrize("seed", [seed for seed in FINGERS if seed % 3])
+def test_torques_and_friction_by_formula(seed: int) -> None:
+    """Every number but those of the signals: laws, arms, factors, presliding, what multiplies what."""
+    each = case(seed)
+    trace = Trace(each.description, each.recording, each.source)
+    kept = ~trace.near
+    expected = oracle_fit.derivatives(trace, each.twin, each.z)
+    signals = {f"extensions[{k + 1}]" for k, row in enumerate(read_rows(each.description)) if row.effect in SIGNALS}
+    columns = [c for c, one in enumerate(each.estimator.unknowns) if one.path.rpartition(".")[0] not in signals]
+    for found, wanted in zip(each.rows[2:], expected, strict=True):
+        scale = largest(np.concatenate([wanted, each.rows[2]]))
+        assert (np.abs(found - wanted) / scale)[kept][..., columns].max() < ROUNDING
+
+
+@pytest.mark.parametrize("seed", FINGERS)
+def test_all_numbers_by_differences(seed: int) -> None:
+    """But for samples at which the step turns a decision (a threshold, a play, a neighbour in time)."""
+    each = case(seed)
+    at = each.oracle_rows({})
+    np.testing.assert_allclose(np.stack(each.rows[:2]), at, rtol=0.0, atol=1e-9 * np.abs(at).max() + 1e-12)
+    derivative = np.stack(each.rows[2:])
+    for column, unknown in enumerate(each.estimator.unknowns):
+        if not unknown.path.startswith("extensions["):
+            continue
+        step = 1e-4 * (abs(unknown.start) or unknown.scale)
+        one_sided = unknown.start - step < unknown.lower or unknown.path.endswith((".width", ".delay"))
+
+        # later forces change τ too, which the estimation counts with the model
+        less_tau = unknown.path.endswith(".delay") and unknown.start < 0.0
+
+        def moved(by: float, path: str = unknown.path, start: float = unknown.start, less: bool = less_tau) -> Array:
+            return each.oracle_rows({path: start + by}, less)
+
+        if one_sided and each.at_zero:  # the direction that exists: kinks at 0
+            fine, wide = (moved(h) - at for h in (step / 2.0, step))
+            expected, error = (4.0 * fine - wide) / step, np.abs(2.0 * fine - wide) / step
+        else:
+            fine, wide = (moved(h) - moved(-h) for h in (step / 2.0, step))
+            expected, error = (4.0 * fine - wide / 2.0) / (3.0 * step), np.abs(fine - wide / 2.0) / step
+        scale = max(np.abs(derivative[..., column]).max(), np.abs(at).max() * 1e-9 / step)
+        known = error < 1e-3 * scale
+        wrong = np.abs(derivative[..., column] - expected) > BY_DIFFERENCES * scale + error
+        assert known.mean() > 0.9, (unknown.path, known.mean())
+        assert (wrong & known).mean() == 0.0, (unknown.path, each.description["extensions"])
+
+
+def test_the_fingers_have_every_effect() -> None:
+    seen: Counter[str] = Counter()
+    for seed in FINGERS:
+        seen.update(row.effect for row in read_rows(case(seed).description))
+        rows = case(seed).description["extensions"]
+        seen["forces late"] += any(row.get("delay", 0.0) < 0.0 for row in rows)
+        seen["positions late"] += any(row.get("delay", 0.0) > 0.0 for row in rows)
+    assert {effect for effect in MAKE if seen[effect] < 2} == set(), seen
+    assert seen["forces late"] and seen["positions late"]
