@@ -227,7 +227,8 @@ def _case(name: str, group: str, function: str, options: dict[str, Any], k: int,
 def _nulls(count: int, seed: int, options: dict[str, Any]) -> Iterator[dict[str, Any]]:
     for k in range(count):
         wander = 3.0 if k % 4 >= 2 else 1.0
-        yield _case(f"null_{k}", "null", "null", options, k, seed=seed + k, wander=wander)
+        joints = options["joints"] if k % 3 == 0 else 1
+        yield _case(f"null_{k}", "null", "null", options, k, seed=seed + k, wander=wander, joints=joints)
 
 
 def _singles(count: int, strengths: list[float], seed: int, options: dict[str, Any]) -> Iterator[dict[str, Any]]:
@@ -236,7 +237,7 @@ def _singles(count: int, strengths: list[float], seed: int, options: dict[str, A
             for number, effect in enumerate(BUILDERS):
                 if effect != "force_offset":  # refitting always absorbs it
                     yield _case(
-                        f"{effect}_{strength:g}_{k}", "single", "single", options | MEASURED, k + number,
+                        f"{effect}_{strength:g}_{k}", "single", "single", options, k + number,
                         effect=effect, strength=strength, seed=seed + 1000 + 100 * k + number,
                     )  # fmt: skip
 
@@ -247,7 +248,7 @@ def _doubles(count: int, seed: int, options: dict[str, Any]) -> Iterator[dict[st
         effects = [str(name) for name in rng.choice(PAIRS, 2, replace=False)]
         static = "presliding" in effects
         yield _case(
-            f"double_{k}", "double", "double", options | MEASURED, 0 if static else k,
+            f"double_{k}", "double", "double", options, 0 if static else k,
             effects=effects, strength=0.3, seed=seed + 200_000 + k,
         )  # fmt: skip
 
@@ -283,6 +284,9 @@ def main() -> None:
     parser.add_argument("--strengths", type=float, nargs="+", default=[0.03, 0.1])
     parser.add_argument("--double", type=int, default=100)
     parser.add_argument("--groups", nargs="+", help="of these groups only: null single double absorbed unknown contact")
+    parser.add_argument(
+        "--measured", action="store_true", help="with recordings to measure the gain on, and the true one"
+    )
     parser.add_argument("--joints", type=int, default=2)
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--rate", type=float, default=500.0)
@@ -291,7 +295,7 @@ def main() -> None:
     cases = list(
         planned(
             given.null, given.per_effect, given.strengths, given.double, given.seed,
-            joints=given.joints, seconds=given.seconds, rate=given.rate,
+            **(MEASURED if given.measured else {}), joints=given.joints, seconds=given.seconds, rate=given.rate,
         )
     )  # fmt: skip
     cases = [case for case in cases if not given.groups or case["group"] in given.groups]
