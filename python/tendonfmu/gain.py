@@ -151,7 +151,7 @@ def _fmu_outputs(data: Data, recording: FitRecording) -> dict[str, Numbers]:
     with tempfile.TemporaryDirectory(prefix="tendonfmu-") as folder:
         file = Path(folder) / "finger.json"
         file.write_text(description_text(data), encoding="utf-8")
-        fmu = build_fmu(file, file.with_suffix(".fmu"))
+        fmu = build_fmu(file, file.with_suffix(".fmu"), illustrated=False)
         columns = run_fmu(fmu, recording.recording, kinematics_source=recording.kinematics, parameters=out_of_reach)
     return {
         name: np.column_stack([columns[f"{name}[{j}]"] for j in range(1, len(data["joints"]) + 1)]) for name in NUMBERS

@@ -73,14 +73,17 @@ RESERVED = frozenset(
 )
 
 
-def build_fmu(description_path: Path, output_path: Path, *, binaries: Path | None = None) -> Path:
+def build_fmu(
+    description_path: Path, output_path: Path, *, binaries: Path | None = None, illustrated: bool = True
+) -> Path:
     """Packs the FMU of a finger description and returns its path.
 
-    binaries: a folder of <FMI platform>/tendonfmu.<so, dll or dylib> in place of the installed ones.
+    binaries: a folder of <FMI platform>/tendonfmu.<so, dll or dylib> in place of the installed ones. illustrated: with
+    pictures and a page for readers; without, it is packed sooner.
     Raises InputError. output_path appears whole or not at all.
     """
     description = read_finger(description_path)
-    archive = pack(members(description, binaries=binaries))
+    archive = pack(members(description, binaries=binaries, illustrated=illustrated))
     with whole_file(output_path) as file:
         file.write_bytes(archive)
     return output_path
@@ -102,12 +105,10 @@ def guid(resource: bytes, table: VariableTable) -> str:
     return native.image_guid(resource, variable_generator().salt(table.data))
 
 
-def members(description: FingerDescription, *, binaries: Path | None = None) -> dict[str, bytes]:
-    """Path in the archive to content, for all files of the FMU."""
-    from tendonfmu.documentation import documentation_page
-    from tendonfmu.drawing import finger_drawing
-    from tendonfmu.plots import draw_finger
-
+def members(
+    description: FingerDescription, *, binaries: Path | None = None, illustrated: bool = True
+) -> dict[str, bytes]:
+    """Path in the archive to content, for all files of the FMU. illustrated: see `build_fmu`."""
     table = read_table(package_file("model_description/variables.json").read_text(encoding="utf-8"))
     identifier = model_identifier(description.name)
     sources = _sources()
@@ -119,20 +120,31 @@ def members(description: FingerDescription, *, binaries: Path | None = None) -> 
         "version": native.version(),
         "source_files": sources.pop("sources.txt").decode("ascii").split(),
     }
-    picture = io.BytesIO()
-    draw_finger(finger_drawing(description), picture)
     content = {
         "modelDescription.xml": model_description(context),
-        "model.png": picture.getvalue(),
-        "documentation/finger.png": picture.getvalue(),
-        "documentation/index.html": documentation_page(description, context).encode(),
         "resources/model.image": description.image,
         "resources/finger.json": description.text,
     }
+    if illustrated:
+        content |= _for_readers(description, context)
     content |= {f"sources/{name}": data for name, data in sources.items()}
     libraries = find_binaries(binaries, BINARIES, BINARY_STEM, identifier)
     content |= {f"binaries/{path}": data for path, data in libraries.items()}
     return content
+
+
+def _for_readers(description: FingerDescription, context: Mapping[str, Any]) -> dict[str, bytes]:
+    from tendonfmu.documentation import documentation_page
+    from tendonfmu.drawing import finger_drawing
+    from tendonfmu.plots import draw_finger
+
+    picture = io.BytesIO()
+    draw_finger(finger_drawing(description), picture)
+    return {
+        "model.png": picture.getvalue(),
+        "documentation/finger.png": picture.getvalue(),
+        "documentation/index.html": documentation_page(description, context).encode(),
+    }
 
 
 # --- parts -----------------------------------------------------------------------------------------------------------
