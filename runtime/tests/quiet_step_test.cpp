@@ -69,11 +69,14 @@ void free(void* block) {
 
 namespace {
 
-/* every call with the paper's finger, and with every key beyond it */
-const std::vector<unsigned char>& image_of(bool every_key) {
-  static const std::vector<unsigned char> images[] = {test_finger::image(),
-                                                      test_finger::image(test_finger::every_key())};
-  return images[every_key];
+/* every call with the paper's finger, with every key beyond it, and with every extension too */
+enum { FINGERS = 3 };
+
+const std::vector<unsigned char>& image_of(int which) {
+  static const std::vector<unsigned char> images[FINGERS] = {test_finger::image(),
+                                                             test_finger::image(test_finger::every_key()),
+                                                             test_finger::image(test_finger::every_effect())};
+  return images[which];
 }
 
 /* everything that the header promises to be fit for real time; returns how many calls did not answer as they should */
@@ -107,9 +110,9 @@ TEST(QuietStep, AllocatesNothing) {
 #else
   const Motion motion(20000);
   const char* const kernels[] = {"plain", "sse2", "avx2"};
-  for (int k = 0; k < 6; ++k) {
-    const char* const kernel = kernels[k / 2];
-    Finger finger(image_of(k % 2));
+  for (int k = 0; k < 3 * FINGERS; ++k) {
+    const char* const kernel = kernels[k / FINGERS];
+    Finger finger(image_of(k % FINGERS));
     if (tendonfmu_set_kernel(finger, kernel) != TENDONFMU_OK) continue;
     Outputs outputs(motion.time.size());
     std::vector<unsigned char> state(tendonfmu_state_size(finger));
@@ -147,8 +150,8 @@ TEST(QuietStep, MakesNoSystemCall) {
   const int caught = exit_status_without_system_calls([] { return getppid() > 0 ? 0 : 1; });
   if (caught == 77) GTEST_SKIP() << "SKIPPED: this kernel has no seccomp";
   ASSERT_EQ(caught, -SIGKILL) << "a system call went unnoticed";
-  for (const bool every_key : {false, true}) {
-    Finger finger(image_of(every_key));
+  for (int which = 0; which < FINGERS; ++which) {
+    Finger finger(image_of(which));
     Outputs outputs(motion.time.size());
     std::vector<unsigned char> state(tendonfmu_state_size(finger));
     EXPECT_EQ(exit_status_without_system_calls([&] { return exercise(finger, motion, outputs, state); }), 0);
@@ -159,7 +162,7 @@ TEST(QuietStep, MakesNoSystemCall) {
 
 TEST(QuietStep, LeavesTheHostAsItWas) {
   const Motion motion(2000);
-  Finger finger(image_of(true));
+  Finger finger(image_of(FINGERS - 1));
   Outputs outputs(motion.time.size());
   std::vector<unsigned char> state(tendonfmu_state_size(finger));
   fenv_t before, after;
