@@ -13,7 +13,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ import numpy as np
 
 from tendonfmu.campaign_cases import Case, made, names_of, python_function
 from tendonfmu.campaign_judgement import judge, judge_causes, judge_names
+from tendonfmu.diagnosis_result import Diagnosis
 from tendonfmu.errors import InputError
 from tendonfmu.whole_file import check_output_folder, whole_file
 
@@ -101,7 +102,25 @@ def _diagnosed(case: Case) -> Row:
     row = judge(case, found)
     if case.reference:
         row["true_gain"] = true_gain(found.nominal_data, found.extended_data, case)
+    if case.experiment is not None:
+        row["named_after_experiment"] = named_after_experiment(case, found)
     return row
+
+
+def named_after_experiment(case: Case, found: Diagnosis) -> bool:
+    """Whether the hidden effect is named once what the diagnosis asks for, for its sake, has been recorded as well."""
+    from tendonfmu.campaign_search import find_names
+
+    assert case.experiment is not None
+    truth = case.truth[0]
+    own = [each.motion for each in found.invisible if each.where.effect == truth.effect and each.motion]
+    motion = own[0] if own else found.experiment.motion
+    if not motion:
+        return False
+    folder = case.recordings[0].parent
+    recording = folder / python_function(case.experiment, folder)(folder, motion, **case.arguments)
+    causes, _ = find_names(replace(case, recordings=(*case.recordings, recording)))
+    return any(truth.effect in (w.effect for w in (each.where, *each.confusable_with)) for each in causes)
 
 
 def true_gain(nominal: Mapping[str, Any], extended: Mapping[str, Any], case: Case) -> float:

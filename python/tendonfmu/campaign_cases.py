@@ -19,7 +19,7 @@ import importlib.util
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -45,6 +45,7 @@ _KEYS = (
     "facts",
     "maker",
     "arguments",
+    "experiment",
 )
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.\-]{0,119}")
 _MAKER = re.compile(r"(?P<file>.+\.py):(?P<function>[A-Za-z_]\w*)")
@@ -66,6 +67,8 @@ class Case:
     name: of its row's file. group: of `GROUPS`. rig: what made it, for the table. finger, recordings, test: as for
     `tendonfmu diagnose`. reference: long recordings of the same finger, for the true gain of the extended model.
     truth: empty for null. facts: numbers and words that go into the row. maker, arguments: instead of files.
+    experiment: FILE.py:FUNCTION that carries out what a diagnosis asks for, FUNCTION(folder, motion, **arguments) ->
+    name of the recording; motion: as in `diagnosis.json`.
     """
 
     name: str
@@ -82,6 +85,7 @@ class Case:
     facts: Mapping[str, float | str] = field(default_factory=dict)
     maker: str | None = None
     arguments: Mapping[str, Any] = field(default_factory=dict)
+    experiment: str | None = None
 
 
 def read_cases(path: Path) -> list[Case]:
@@ -120,9 +124,10 @@ def case_of(node: Node, folder: Path) -> Case:
         "seed": node.member("seed").integer(0, 2**53, default=0),
     }
     arguments = node.member("arguments")
+    for each in (maker, node.member("experiment")):
+        if not each.absent and not _MAKER.fullmatch(each.text("FILE.py:FUNCTION")):
+            each.refuse("FILE.py:FUNCTION")
     if not maker.absent:
-        if not _MAKER.fullmatch(maker.text("FILE.py:FUNCTION")):
-            maker.refuse("FILE.py:FUNCTION")
         if not isinstance(arguments.value or {}, dict):
             arguments.refuse("an object")
         return Case(**common, maker=maker.value, arguments=arguments.value or {})
@@ -145,6 +150,7 @@ def _files(node: Node, folder: Path) -> dict[str, Any]:
         "finger": folder / node.member("finger").text("the name of a finger description, or a maker"),
         "recordings": recordings,
         "test": several("test"),
+        "experiment": node.member("experiment").value,
         "reference": several("reference"),
         "kinematics": node.member("kinematics").integer(1, 3, default=1),
     }
@@ -189,7 +195,7 @@ def made(case: Case, folder: Path) -> Case:
         raise InputError(f"{case.maker}: returned {type(found).__name__}; expected the keys of a case with files")
     value = {"name": case.name, "group": case.group, "rig": case.rig or None, "seed": case.seed, **found}
     try:
-        return case_of(Node(value, case.name), folder)
+        return replace(case_of(Node(value, case.name), folder), arguments=case.arguments)
     except Refusal as refused:
         raise InputError(f"{case.maker}: {refused}") from None
 

@@ -73,12 +73,16 @@ class Cause:
 
 @dataclass(frozen=True)
 class Invisible:
-    """An effect that these data cannot show: share of its variance that survives the refit of the nominal model."""
+    """An effect that these data cannot show: share of its variance that survives the refit of the nominal model.
+
+    experiment: what would show it, in a sentence; motion: the same as `Experiment.motion` has it, empty if none would.
+    """
 
     where: Where
     title: str
     surviving_share: float
     experiment: str
+    motion: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

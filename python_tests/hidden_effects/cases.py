@@ -19,6 +19,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 from effects_hidden import BUILDERS, placed, scaled
+from experiments import perform_experiment
 from hidden_unknown import UNKNOWN
 from matched_rig import Hand, Made, Unreachable, random_hand, record
 from numpy.typing import NDArray
@@ -151,7 +152,16 @@ def absorbed(folder: Path, effect: str, seed: int, **given: Any) -> dict[str, An
     options = settings(given)
     hand, label = suitable(effect, None, seed, options, absorbed=True)
     made = record(hand, seed, options["seconds"])
-    return files(folder, hand, made, seed, options, truth=[truth_of(label)], facts=facts_of(label))
+    found = files(folder, hand, made, seed, options, truth=[truth_of(label)], facts=facts_of(label))
+    return found | {"experiment": f"{Path(__file__).resolve()}:perform"}
+
+
+def perform(folder: Path, motion: dict[str, Any], effect: str, seed: int, **given: Any) -> str:
+    """The experiment that a diagnosis of `absorbed` asks for, on the same hand."""
+    hand, _ = suitable(effect, None, seed, settings(given), absorbed=True)
+    made = perform_experiment(hand, motion, seed)
+    pq.write_table(pa.table(made.columns), folder / "experiment.parquet")
+    return "experiment.parquet"
 
 
 def double(folder: Path, effects: list[str], strength: float, seed: int, **given: Any) -> dict[str, Any]:
