@@ -15,7 +15,7 @@ from typing import Annotated
 import typer
 
 from tendonfmu import cli_campaign, cli_detect, cli_diagnose
-from tendonfmu.console import fit_bar, print_tables, progress_bar, say
+from tendonfmu.console import fit_bar, phase_bar, print_tables, progress_bar, say
 from tendonfmu.errors import InputError
 
 app = typer.Typer(
@@ -439,18 +439,21 @@ def demo(
         "tendonfmu-demo"
     ),
 ) -> None:
-    """The whole story on built-in data: build an FMU, run it over three recordings, show what it feels."""
-    from tendonfmu.demo import run_demo
-    from tendonfmu.demo_text import demo_lines, demo_tables
+    """The whole story on built-in data, in two minutes: run, fit, detect, and diagnose an effect hidden in the data.
 
-    with progress_bar() as bar:
-        task = bar.add_task("samples", total=None)
+    DIR gets story.html, which tells all of it, and all that it is made from.
+    """
+    from tendonfmu.demo import Story
+    from tendonfmu.demo_text import chapter_lines, chapter_tables, file_lines
 
-        def show(done: int, total: int) -> None:
-            bar.update(task, completed=done, total=total)
-
-        result = run_demo(output, progress=show)
-    print_tables(demo_tables(result), demo_lines(result), left="")
+    story = Story(output)
+    for number, chapter in enumerate(story.chapters, start=1):
+        say(f"{number} {chapter.name}: {chapter.title.lower()}")
+        with progress_bar() as bar:
+            chapter.run(phase_bar(bar))
+        print_tables(chapter_tables(story, chapter.name), chapter_lines(story, chapter.name), left="")
+    story.write()
+    print_tables((), file_lines(story), left="")
 
 
 if __name__ == "__main__":

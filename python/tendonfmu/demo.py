@@ -1,170 +1,115 @@
-"""The demo: the built-in finger and its built-in recordings, through the FMU to a table and a figure. Computes, prints
-nothing.
+"""The demo: the whole story on built-in data, from tendon forces to a named cause. Computes, prints nothing.
 
-The paper's story on a simulated finger whose truth is known: free motion at a low pretension, the same motion at four
-times the pretension, and pushes on the fingertip. The description holds the simulated finger's own static friction;
-nothing is fitted to these recordings.
+Four chapters, in this order: an FMU run over recordings of the index finger; the numbers of a two-joint finger fitted;
+pushes on the index finger detected; and what the two-joint finger's model lacks, which the demo is not told, found,
+named, built into the model and measured on a recording that nobody has seen. One page tells all of it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from importlib.resources import as_file, files
+from importlib.resources import as_file
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
-from tendonfmu.description import FingerDescription, read_finger
-from tendonfmu.detection_score import DetectionScore, score_detection
+from tendonfmu.demo_run import DATA, IndexFinger
 from tendonfmu.errors import InputError
-from tendonfmu.figure_data import CompensationFigure, StoryFigure, compensation_figure
-from tendonfmu.fmu import run_fmu
-from tendonfmu.packaging import build_fmu
-from tendonfmu.recording import Recording, read_recording
-from tendonfmu.signals import NUMBERS
-from tendonfmu.tables import write_table
 
-FINGER = "index_finger.json"
-FREE, FREE_X4, PUSHES = "index_finger_free", "index_finger_free_x4", "index_finger_pushes"
-ABDUCTION, FLEXION = "mcp_abduction", "mcp_flexion"  # the joints that are drawn
-FMU, FIGURE = "index_finger.fmu", "compensated.png"
+if TYPE_CHECKING:
+    from tendonfmu.diagnosis_result import Diagnosis
+    from tendonfmu.fit_methods import Progress
+    from tendonfmu.fitting import FrictionFit
 
-Outputs = Mapping[str, NDArray[Any]]
+TWO_JOINTS, TRAINING, UNSEEN = "two_joints.json", "two_joints_training.parquet", "two_joints_unseen.parquet"
+FIT, DIAGNOSIS = "fit", "diagnosis"  # folders of the full pages
+FITTED = "fitted.json"
+
+Phase = Callable[[str, int, int | None], None]
 
 
 @dataclass(frozen=True)
-class JointResult:
-    """rms in N·m. measured, left: joint torque and what compensation leaves of it, while nobody pushes.
-
-    load, error: external torque, and compensated minus external, while somebody pushes; nan if nobody ever does.
+class Chapter:
+    """name: a word. title: what it is about. run: tells it; called with a function that
+    gets what is being done, how much of it is done, and of how much (None: unknown).
     """
 
     name: str
-    measured: float
-    left: float
-    load: float
-    error: float
+    title: str
+    run: Callable[[Phase], None]
 
 
-@dataclass(frozen=True)
-class RecordingResult:
-    """mean_force: N, of all tendons over all samples. score: against the labels; without them all alarms are wrong."""
+class Story:
+    """The demo in a folder: the chapters are run one by one, in order; `write` then makes the page of all of them.
 
-    name: str
-    seconds: float
-    mean_force: float
-    joints: list[JointResult]
-    score: DetectionScore
+    finger: chapters 1 and 3. fit: chapter 2. diagnosis: chapter 4. files: path -> what is in it.
+    """
 
+    fit: FrictionFit
+    diagnosis: Diagnosis
 
-@dataclass(frozen=True)
-class DemoResult:
-    """free, free_x4, pushed: the recordings in the order of the story. files: path -> what is in it."""
-
-    finger: str
-    free: RecordingResult
-    free_x4: RecordingResult
-    pushed: RecordingResult
-    files: dict[Path, str]
+    def __init__(self, folder: Path) -> None:
+        """Raises InputError where the folder cannot be made."""
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"{folder}: cannot be made ({error.strerror})") from None
+        self.folder = folder
+        self.finger = IndexFinger(folder)
+        self._files: dict[Path, str] = {}
+        self.chapters = (
+            Chapter("run", "What the joints feel, friction subtracted", self._run),
+            Chapter("fit", "Friction learned from motion", self._fit),
+            Chapter("detect", "Contact without a touch sensor", self._detect),
+            Chapter("diagnose", "What the model gets wrong, and why", self._diagnose),
+        )
 
     @property
-    def recordings(self) -> tuple[RecordingResult, RecordingResult, RecordingResult]:
-        return self.free, self.free_x4, self.pushed
+    def files(self) -> dict[Path, str]:
+        """In the order of the story, the page first."""
+        return {**self._files, **self.finger.files}
 
+    def write(self) -> Path:
+        """The page of the whole story."""
+        from tendonfmu.demo_page import PAGE, write_story
 
-def run_demo(folder: Path, *, progress: Callable[[int, int], None]) -> DemoResult:
-    """Builds the FMU, runs it over the recordings, writes FMU, outputs and figure into `folder` (made if missing)."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be made ({error.strerror})") from None
-    data = files("tendonfmu") / "data"
-    fmu, figure = folder / FMU, folder / FIGURE
-    with as_file(data / FINGER) as finger:
-        description = read_finger(finger)
-        build_fmu(finger, fmu)
-    recordings = {}
-    for name in (FREE, FREE_X4, PUSHES):
-        with as_file(data / f"{name}.parquet") as path:
-            recordings[name] = read_recording(path)
+        page = self.folder / PAGE
+        write_story(self, page)
+        self._files = {page: "the whole story, to be read in a browser", **self._files}
+        return page
 
-    total = sum(map(len, recordings.values()))
-    outputs: dict[str, Outputs] = {}
-    written = {fmu: "the FMU"}
-    for name, recording in recordings.items():
-        before = sum(len(done["time"]) for done in outputs.values())
-        outputs[name] = run_fmu(fmu, recording, progress=partial(_advance, progress, before, total))
-        table = folder / f"{name}.csv"
-        write_table(table, outputs[name])
-        written[table] = f"its outputs over {name}.parquet"
+    def _run(self, phase: Phase) -> None:
+        self.finger.free_motion(lambda done, total: phase("running the FMU", done, total))
 
-    results = {name: _result(description, name, recordings[name], outputs[name]) for name in recordings}
-    _draw(description, results, recordings, outputs, figure)
-    written[figure] = "torques, what is left of them, contacts"
-    return DemoResult(description.name, results[FREE], results[FREE_X4], results[PUSHES], written)
+    def _fit(self, phase: Phase) -> None:
+        from tendonfmu.fit_files import write_text
+        from tendonfmu.fit_page import write_fit_page
+        from tendonfmu.fitting import FitWarning, FrictionFit
 
+        def show(now: Progress) -> None:
+            phase(f"fitting: {now.phase}", now.done, now.total)
 
-def _advance(progress: Callable[[int, int], None], before: int, total: int, done: int) -> None:
-    progress(before + done, total)
+        with as_file(DATA) as data, warnings.catch_warnings():
+            warnings.simplefilter("ignore", FitWarning)  # they are on the fit's page
+            self.fit = FrictionFit(data / TWO_JOINTS, progress=show).fit(data / TRAINING, compare=data / UNSEEN)
+        phase("drawing the fit", 0, None)
+        folder = self.folder / FIT
+        page, *_ = write_fit_page(self.fit.picture(), folder)
+        write_text(folder / FITTED, self.fit.description_text())
+        self._files |= {page: "all of the fit", folder / FITTED: "the fitted description"}
 
+    def _detect(self, phase: Phase) -> None:
+        self.finger.pushes(lambda done, total: phase("running the FMU", done, total))
 
-def _draw(
-    description: FingerDescription,
-    results: Mapping[str, RecordingResult],
-    recordings: Mapping[str, Recording],
-    outputs: Mapping[str, Outputs],
-    figure: Path,
-) -> None:
-    from tendonfmu.plots import draw_story
+    def _diagnose(self, phase: Phase) -> None:
+        from tendonfmu.diagnosis import diagnose
+        from tendonfmu.diagnosis_files import write_diagnosis
 
-    def panel(name: str, title: str, joints: Sequence[int]) -> CompensationFigure:
-        recording = recordings[name]
-        measured: dict[str, NDArray[Any]] = recording.arrays()
-        if recording.contact is not None:
-            measured["contact"] = recording.contact
-        series = {each: _rows(outputs[name], each) for each in NUMBERS} | {"contact": outputs[name]["contact"]}
-        title = f"{title}, {results[name].mean_force:.0f} N"
-        return compensation_figure(description, measured, series, title=title, joints=joints)
-
-    flexion = description.joint_names.index(FLEXION)
-    free = [panel(FREE, "(a) free motion", [flexion]), panel(FREE_X4, "(b) the same motion", [flexion])]
-    pushed = panel(PUSHES, "(c) with pushes", [description.joint_names.index(ABDUCTION), flexion])
-    story = StoryFigure(f"{description.name}: friction compensation", free, pushed)
-    draw_story(story, figure)
-
-
-def _rows(outputs: Outputs, name: str) -> NDArray[Any]:
-    """[N, n] the columns name[1], name[2], ..."""
-    count = sum(column.startswith(f"{name}[") for column in outputs)
-    return np.column_stack([outputs[f"{name}[{i}]"] for i in range(1, count + 1)])
-
-
-def _rms(values: NDArray[np.float64]) -> float:
-    return float(np.sqrt(np.mean(np.square(values)))) if values.size else float("nan")
-
-
-def _result(description: FingerDescription, name: str, recording: Recording, outputs: Outputs) -> RecordingResult:
-    torque, left = _rows(outputs, "joint_torque"), _rows(outputs, "compensated_torque")
-    label = np.zeros(len(recording), bool) if recording.contact is None else recording.contact
-    external = recording.groups.get("external_torque", np.zeros_like(torque))
-    joints = [
-        JointResult(
-            name=joint,
-            measured=_rms(torque[~label, j]),
-            left=_rms(left[~label, j]),
-            load=_rms(external[label, j]),
-            error=_rms(left[label, j] - external[label, j]),
-        )
-        for j, joint in enumerate(description.joint_names)
-    ]
-    return RecordingResult(
-        name=name,
-        seconds=float(recording.time[-1] - recording.time[0]),
-        mean_force=float(recording.groups["tendon_force"].mean()),
-        joints=joints,
-        score=score_detection(recording.time, label, outputs["contact"]),
-    )
+        with as_file(DATA) as data:
+            self.diagnosis = diagnose(data / TWO_JOINTS, [data / TRAINING], [data / UNSEEN], progress=phase)
+        phase("writing", 0, None)
+        written = write_diagnosis(self.diagnosis, self.folder / DIAGNOSIS)
+        named = ("diagnosis.html", "diagnosis.json", "extended.json", "extended.fmu")
+        self._files |= {file: what for file, what in written.items() if file.name in named}
+        self._files[self.folder / DIAGNOSIS / "diagnosis.html"] = "all of the diagnosis"

@@ -82,7 +82,7 @@ def diagnosis_page(found: Diagnosis, figures: Sequence[PageFigure]) -> str:
         found=found,
         unit=unit,
         first=_first_screen(found, names),
-        cards=[_card(cause, names) for cause in found.causes],
+        cards=cards_of(found, names),
         errors=_errors(found, names, factor),
         events=_events(found, names, factor),
         detection=None if found.detection is None else _detection(found.detection, factor, unit),
@@ -153,6 +153,11 @@ def _experiment(found: Diagnosis, names: Names) -> Iterator[str]:
 
 
 # --- tables -----------------------------------------------------------------------------------------------------------
+
+
+def cards_of(found: Diagnosis, names: Names) -> list[dict[str, Any]]:
+    """What a page tells of each cause."""
+    return [_card(cause, names) for cause in found.causes]
 
 
 def _card(cause: Cause, names: Names) -> dict[str, Any]:

@@ -64,12 +64,13 @@ def write_fit_page(picture: FitPicture, folder: Path) -> dict[Path, str]:
     return {page: "all of it, to be read in a browser"} | written
 
 
-def draw_sheet(sheet: Sheet, file: Path) -> PageFigure:
-    """Writes the sheet as PNG, and gives its panels as the page shows them."""
+def draw_sheet(sheet: Sheet, file: Path | None = None) -> PageFigure:
+    """Its panels as the page shows them; with a file, the sheet is written there as PNG too."""
     from tendonfmu.fit_plots import STYLES, draw_panel, png, size_of, write_sheet
 
     pixels = [draw_panel(panel) for panel in sheet.panels]
-    write_sheet(sheet, pixels, file)
+    if file is not None:
+        write_sheet(sheet, pixels, file)
     images = []
     for panel, drawn in zip(sheet.panels, pixels, strict=True):
         data = base64.b64encode(png(drawn, exact=isinstance(panel, MatrixPanel))).decode("ascii")

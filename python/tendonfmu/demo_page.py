@@ -1,0 +1,92 @@
+"""The page of the demo: its four chapters with their figures in one HTML file that needs nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from tendonfmu.demo import DIAGNOSIS, FIT, Story
+from tendonfmu.demo_figures import story_sheets
+from tendonfmu.demo_run import FLEXION, FREE, FREE_X4, PUSHES
+from tendonfmu.demo_text import alarms, chapter_tables, fit_sentence, push_sentence
+from tendonfmu.diagnosis_page import PAGE as DIAGNOSIS_PAGE
+from tendonfmu.diagnosis_page import Tile, cards_of
+from tendonfmu.diagnosis_text import error_sentence, headline, names_of, percent, together, unit_of
+from tendonfmu.fit_page import PAGE as FIT_PAGE
+from tendonfmu.fit_page import PageFigure, draw_sheet, render
+from tendonfmu.fit_summary import residual_tables, rounded
+from tendonfmu.whole_file import whole_file
+
+PAGE = "story.html"
+
+
+def write_story(story: Story, file: Path) -> None:
+    """All chapters of a story that was told to its end. The file appears whole or not at all."""
+    text = story_page(story, [draw_sheet(sheet) for sheet in story_sheets(story)])
+    with whole_file(file) as partial:
+        partial.write_text(text, encoding="utf-8")
+
+
+def story_page(story: Story, figures: list[PageFigure]) -> str:
+    """HTML text of the page."""
+    by_section: dict[str, list[PageFigure]] = {}
+    for figure in figures:
+        by_section.setdefault(figure.sheet.section, []).append(figure)
+    return render(
+        "story.html.jinja",
+        chapters=story.chapters,
+        tiles=list(_tiles(story)),
+        tables={each.name: list(chapter_tables(story, each.name)) for each in story.chapters},
+        figures=by_section,
+        run=_run(story),
+        fit={"sentence": fit_sentence(story), "page": f"{FIT}/{FIT_PAGE}"},
+        detect=_detect(story),
+        diagnosis=_diagnosis(story),
+        files=[(path.relative_to(story.folder).as_posix(), what) for path, what in story.files.items()],
+    )
+
+
+def _tiles(story: Story) -> Iterator[tuple[str, Tile]]:
+    """(chapter, figure that matters), one for each."""
+    results, found = story.finger.results, story.diagnosis
+    joint = next(each for each in results[FREE].joints if each.name == FLEXION)
+    left = f"{1e3 * joint.measured:.0f} → {1e3 * joint.left:.1f}"
+    yield "run", Tile(left, "mN·m", "torque at the base of the finger, before and after its friction is subtracted")
+    unseen = list(residual_tables(story.fit.picture()))[-1]
+    fitted = f"{rounded(unseen.all.start)} → {rounded(unseen.all.fitted)}"
+    yield "fit", Tile(fitted, unseen.unit, "error on an unseen recording, before and after friction is learned")
+    score = results[PUSHES].score
+    yield "detect", Tile(f"{score.found} of {len(score.events)}", "", "pushes found, without a touch sensor")
+    factor, unit = unit_of(found)
+    before, after = (rounded(factor * together(each.test_rms)) for each in (found.nominal, found.extended))
+    meaning = f"error on the unseen recording, {percent(found.gain.value)} less once the cause is in the model"
+    yield "diagnose", Tile(f"{before} → {after}", unit, meaning if found.causes else "no cause was found")
+
+
+def _run(story: Story) -> dict[str, Any]:
+    results = story.finger.results
+    return {
+        "finger": story.finger.description.name.replace("_", " "),
+        "joint": FLEXION.replace("_", " "),
+        "force": f"{results[FREE].mean_force:.0f}",
+        "more": f"{results[FREE_X4].mean_force:.0f}",
+        "alarms": alarms(results[FREE].score),
+    }
+
+
+def _detect(story: Story) -> dict[str, Any]:
+    result = story.finger.results[PUSHES]
+    return {"sentence": push_sentence(result.score), "alarms": alarms(result.score), "seconds": f"{result.seconds:.0f}"}
+
+
+def _diagnosis(story: Story) -> dict[str, Any]:
+    found = story.diagnosis
+    return {
+        "headline": headline(found),
+        "error": error_sentence(found),
+        "cards": cards_of(found, names_of(found)),
+        "tested": found.tested,
+        "page": f"{DIAGNOSIS}/{DIAGNOSIS_PAGE}",
+        "seconds": f"{found.seconds:.0f}",
+    }
