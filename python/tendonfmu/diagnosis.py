@@ -29,6 +29,7 @@ from tendonfmu.diagnosis_search import (
     Search,
     candidate_of,
     search,
+    without_events,
 )
 from tendonfmu.diagnosis_series import Series, Trial, make_grid
 from tendonfmu.diagnosis_size import size_of
@@ -76,7 +77,9 @@ def diagnose(
     with threadpool_limits(limits=max(jobs, 1)):
         case = _case(finger, recordings, tests, kinematics)
         found = search(case.finger.data, case.whole, seed, phase, jobs)
-        result = _Result(case, found, seed, jobs, phase)
+        unseen, events = without_events(found.extended.data, case.tests, seed)
+        found = replace(found, events=(*found.events, *events))
+        result = _Result(replace(case, tests=unseen), found, seed, jobs, phase)
         return replace(result.diagnosis(), seconds=perf_counter() - begun)
 
 

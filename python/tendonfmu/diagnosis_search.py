@@ -95,6 +95,21 @@ def search(
     return Search(nominal, rounds.model, first, rounds.view, clean, tuple(causes), rounds.parameters, events)
 
 
+def without_events(
+    data: Mapping[str, Any], recordings: Sequence[FitRecording], seed: int
+) -> tuple[list[FitRecording], tuple[Event, ...]]:
+    """Recordings that are only judged on, less what no friction explains, and what that is. data: the model with its
+    causes, since what it lacks would hide a short event."""
+    if not recordings:
+        return [], ()
+    grid = make_grid(recordings)
+    series = series_of(data, recordings, grid)
+    names = [str(recording.path) for recording in recordings]
+    events = _events(data, series, names, seed)
+    out = left_out(series, events, names)
+    return [_without(recording, k, grid, out) for k, recording in enumerate(recordings)], events
+
+
 def _events(data: Mapping[str, Any], series: Series, names: Sequence[str], seed: int) -> tuple[Event, ...]:
     splines = bias_of(data, series)
     residual = residual_of(series, splines, np.zeros((*series.target.shape, 0)))
