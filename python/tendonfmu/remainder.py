@@ -64,10 +64,18 @@ class Remainder:
 
 
 def measure_remainder(
-    series: Series, residual: Numbers, nuisance: Sequence[Numbers], *, seed: int = 0, level: float = LEVEL
+    series: Series,
+    residual: Numbers,
+    nuisance: Sequence[Numbers],
+    *,
+    force: Numbers | None = None,
+    seed: int = 0,
+    level: float = LEVEL,
 ) -> Remainder:
     """residual: [B, n] N·m. nuisance: per joint, columns [B, p] whose span was taken from its residual (bias splines,
-    derivatives of the nominal model); columns of the learner get the same. Blocks that are not used are left out."""
+    derivatives of the nominal model); columns of the learner get the same. force: [B, m] N predicted by the model, for
+    the learner; without it only what makes no torque of the measured one. Blocks that are not used are left out.
+    """
     joints = residual.shape[1]
     residual = np.where(series.used[:, None], residual, 0.0)
     filters = whitener(series, residual)
@@ -76,8 +84,8 @@ def measure_remainder(
         nothing = ((0.0, 0.0),) * joints
         return Remainder((0.0,) * joints, nothing, 1.0, False, "", np.zeros_like(residual), ())
     with threadpool_limits(limits=1):
-        seen = features(series, seed=seed)
-        findings, prediction = _look(residual, nuisance, seen, filters, plan, seed)
+        seen = features(series, force=force, seed=seed)
+        findings, gains, prediction = _look(residual, nuisance, seen, filters, plan, seed)
     filters = whitener(series, residual - prediction)
     lines, waves = [], np.zeros_like(residual)
     for joint in range(joints):
@@ -88,7 +96,8 @@ def measure_remainder(
     findings = sorted([each for each in [*findings, *lines] if each.p_value <= level], key=lambda each: each.p_value)
     prediction += waves
     share, interval = _shares(residual, prediction, plan)
-    clear = [each for each in findings if interval[each.joint - 1][0] > 0.0 and share[each.joint - 1] >= LEAST_SHARE]
+    large = [max(gains[j], share[j] if interval[j][0] > 0.0 else 0.0) >= LEAST_SHARE for j in range(joints)]
+    clear = [each for each in findings if large[each.joint - 1]]
     text = described(series, residual, prediction, clear, share) if clear else ""
     return Remainder(share, interval, p_value, bool(clear), text, prediction, tuple(findings))
 
@@ -100,41 +109,48 @@ def _look(
     filters: Whitener,
     plan: learner.Layout,
     seed: int,
-) -> tuple[list[Finding], Numbers]:
-    """The best finding of each joint, and the prediction [B, n]."""
+) -> tuple[list[Finding], list[float], Numbers]:
+    """Of each joint the best finding and the share of the whitened residual predicted; and the prediction [B, n]."""
     learned = []
     for joint, columns in enumerate(nuisance):
-        own = learner.of_joint(filters, joint)
-        ready = learner.prepared(residual[:, joint], columns, seen, own, plan)
-        learned.append(_learned(ready, seen, plan, np.random.default_rng((seed, joint))))
+        own, plain = learner.of_joint(filters, joint), Whitener(np.zeros((0, 1)), np.ones(1), filters.valid)
+        both = [learner.prepared(residual[:, joint], columns, seen, each, plan) for each in (own, plain)]
+        learned.append(_learned(both[0], both[1], seen, plan, np.random.default_rng((seed, joint))))
     null = np.max([each.null for each in learned], axis=0)
     prediction = np.zeros_like(residual)
     prediction[plan.rows] = np.stack([each.values for each in learned], axis=1)
-    return [_finding(joint + 1, each, null) for joint, each in enumerate(learned)], prediction
+    findings = [_finding(joint + 1, each, null) for joint, each in enumerate(learned)]
+    return findings, [each.gain for each in learned], prediction
 
 
 @dataclass(frozen=True)
 class _Learned:
-    """Of one joint. surprise: the greatest. null: [DRAWS] of it. values: [U] N·m, predicted. named: choice that
-    predicts best of those that have a name."""
+    """Of one joint. surprise: the greatest. null: [DRAWS] of it. gain: share of the whitened residual it predicts.
+    values: [U] N·m, predicted. named: choice that predicts best of those that have a name."""
 
     surprise: float
     null: Numbers
+    gain: float
     values: Numbers
     named: learner.Choice
 
 
-def _learned(ready: learner.Prepared, seen: Features, plan: learner.Layout, rng: np.random.Generator) -> _Learned:
+def _learned(
+    ready: learner.Prepared, plain: learner.Prepared, seen: Features, plan: learner.Layout, rng: np.random.Generator
+) -> _Learned:
+    """ready: whitened; plain: the same without. What is quick shows in the former only, its size in the latter."""
     skills, null = learner.skills(ready, seen, plan, rng)
-    order = list({id(skill.choice): skill.choice for skill in skills}.values())
+    order = [skill.choice for skill in skills]
     everything = next(choice for choice in order if not choice.group)
     single = [choice for choice in order if choice.group][:TRIED]
     best = learner.Choice("", "", np.unique(np.concatenate([choice.columns for choice in single[: TRIED // 2]])))
-    guess = learner.predicted(ready, [*single, everything, best], seen, plan)
-    plain = [k for k, choice in enumerate(single) if choice.group != "interaction"] or [0]
-    named = single[max(plain, key=lambda number: guess.gains[number])]
-    values = guess.values if max(guess.gains) > 0.0 else np.zeros_like(guess.values)
-    return _Learned(skills[0].surprise, null, values, named)
+    sharp = learner.predicted(ready, [*single, everything, best], seen, plan)
+    named_ones = [k for k, choice in enumerate(single) if choice.group != "interaction"] or [0]
+    named = single[max(named_ones, key=lambda number: sharp.gains[number])]
+    smooth = learner.predicted(plain, [named, everything, best], seen, plan)
+    tries = [np.zeros(len(plan.rows)), sharp.values, smooth.values]
+    left = [float(np.sum((plain.target - values) ** 2)) for values in tries]
+    return _Learned(skills[0].surprise, null, max(sharp.gains), tries[int(np.argmin(left))], named)
 
 
 def _finding(joint: int, learned: _Learned, null: Numbers) -> Finding:

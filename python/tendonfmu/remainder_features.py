@@ -7,7 +7,7 @@ to every column alike, and the null distribution of the learner's skill costs on
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, pairwise, permutations
 from typing import TYPE_CHECKING
 
@@ -56,8 +56,14 @@ GROUPS = {
 }
 
 
-def features(series: Series, *, seed: int = 0) -> Features:
-    """All columns for the blocks of a series, standardised; constant ones are left out."""
+def features(series: Series, *, force: Numbers | None = None, seed: int = 0) -> Features:
+    """All columns for the blocks of a series, standardised; constant ones are left out.
+
+    force: [B, m] N that knows nothing of the residual, predicted by the model. The measured one does: its torque
+    is what the residual is taken from, noise and all, and would explain it. Without a prediction only that part of the
+    measured force is used that makes no torque.
+    """
+    series = replace(series, force=_without_torque(series) if force is None else force)
     columns: list[Numbers] = []
     group: list[str] = []
     subject: list[str] = []
@@ -76,6 +82,15 @@ def features(series: Series, *, seed: int = 0) -> Features:
     spread = table.std(axis=0)
     kept = spread > 1e-9 * max(1.0, float(spread.max(initial=0.0)))
     return Features(table[:, kept] / spread[kept], np.array(group)[kept], np.array(subject)[kept])
+
+
+def _without_torque(series: Series) -> Numbers:
+    """[B, m] the part of the forces that pulls against itself, N: off the moment arms that the motion shows."""
+    arms = np.linalg.lstsq(series.velocity, series.tendon_velocity[:, :, 0], rcond=1e-9)[0].T
+    pulling = arms @ np.linalg.pinv(arms, rcond=1e-9)
+    inner = series.force - series.force @ pulling
+    tiny = 1e-9 * max(float(np.abs(series.force).max(initial=0.0)), 1e-300)
+    return np.asarray(inner * (np.abs(inner).max(axis=0) > tiny))
 
 
 @dataclass(frozen=True)

@@ -86,7 +86,7 @@ class Prepared:
 
     table: [U, D] float32, groups of equal power. goal: [U] float32, of standard deviation 1. scale: [D] of the raw
     columns, weights in N·m; 0 for those that the nuisance columns leave nothing of. basis, inner: [U, r] orthonormal,
-    of the nuisance columns before and after whitening.
+    of the nuisance columns before and after whitening. target: [U] N·m, off the former.
     """
 
     table: NDArray[np.float32]
@@ -94,6 +94,7 @@ class Prepared:
     scale: Numbers
     basis: Numbers
     inner: Numbers
+    target: Numbers
 
 
 def prepared(residual: Numbers, nuisance: Numbers, seen: Features, own: Whitener, plan: Layout) -> Prepared:
@@ -112,10 +113,11 @@ def prepared(residual: Numbers, nuisance: Numbers, seen: Features, own: Whitener
     for name in dict.fromkeys(seen.group.tolist()):
         power = float(np.sum((after * scale)[seen.group == name]))
         scale[seen.group == name] *= 1.0 / np.sqrt(power) if power > 0.0 else 0.0
+    target = without(residual[plan.rows], plain)
     goal = without(filtered(residual)[:, 0], inner)
     spread = max(float(goal.std()), 1e-300)
     table *= scale.astype(np.float32)
-    return Prepared(table, (goal / spread).astype(np.float32), scale * spread, plain, inner)
+    return Prepared(table, (goal / spread).astype(np.float32), scale * spread, plain, inner, target)
 
 
 def _even_leverage(goal: Numbers, inner: Numbers, plan: Layout) -> Numbers:

@@ -31,11 +31,14 @@ def described(
         what = " and ".join(dict.fromkeys(_what(finding) for finding in own[:3]))
         rms = float(np.sqrt(np.mean(prediction[series.used, joint - 1] ** 2)))
         where = _where(series, prediction[:, joint - 1], joint, own)
-        sentences.append(
-            f"Joint {joint}: {100.0 * share[joint - 1]:.0f} % of what is left ({1000.0 * rms:.2g} mN·m rms) follows "
-            f"{what}{where}."
-        )
+        sentences.append(f"Joint {joint}: {_part(share[joint - 1], rms)} follows {what}{where}.")
     return " ".join(sentences)
+
+
+def _part(share: float, rms: float) -> str:
+    if share < 0.01:
+        return "a small but certain part of what is left, in its quick changes,"
+    return f"{100.0 * share:.0f} % of what is left ({1000.0 * rms:.2g} mN·m rms)"
 
 
 def _what(finding: Finding) -> str:
