@@ -269,16 +269,19 @@ class _Result:
         questions = [*rivals, *(Question(_ordinary(trial)) for trial in nearest.values())]
         self._phase("choosing the next experiment", 0, None)
         planned = plan_experiments(
-            self._found.extended.data,
+            self._found.nominal.data,  # that has no cause that is in question
             self._found.fitted_to,
             questions,
             noise=[float(value) for value in self._found.last.residual[self._series.used].std(axis=0)],
             seed=self._seed,
             progress=lambda done, total: self._phase("choosing the next experiment", done, total),
         )
-        said = {effect: planned.sentence(len(rivals) + k) for k, effect in enumerate(nearest)}
+        said = {
+            effect: (planned.sentence(len(rivals) + k), planned.motion(len(rivals) + k))
+            for k, effect in enumerate(nearest)
+        }
         return planned, tuple(
-            Invisible(where_of(trial), candidate_of(trial)[0].title, share, said[trial.effect])
+            Invisible(where_of(trial), candidate_of(trial)[0].title, share, *said[trial.effect])
             for trial, share in unseen
         )
 

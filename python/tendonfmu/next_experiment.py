@@ -93,6 +93,12 @@ class Experiments:
 
     answers: tuple[Answer, ...]
     best: Experiment
+    seed: int = 0
+
+    def motion(self, number: int) -> dict[str, Any]:
+        """What answers one question, as `Experiment.motion`; empty where nothing of the menu does."""
+        told = bool(self.answers) and self.answers[number].tells
+        return {**self.answers[number].entry.as_json(), "seed": self.seed} if told else {}
 
     def sentence(self, number: int) -> str:
         """For one question, in plain words."""
@@ -141,7 +147,7 @@ def plan_experiments(
         motion = max(simple or scores, key=lambda found: sum(found[q].distance for q in open_))[0].entry
         scores += lab.answers_of(combined(data, motion, recorded))
     answers = tuple(_best([found[q] for found in scores]) for q in range(len(questions)))
-    return Experiments(answers, _first_of_all(answers, scores, seed))
+    return Experiments(answers, _first_of_all(answers, scores, seed), seed)
 
 
 # --- what a recording would show --------------------------------------------------------------------------------------
