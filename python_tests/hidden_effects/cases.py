@@ -28,7 +28,7 @@ Array = NDArray[Any]
 
 VISIBLE = 0.02  # share that survives refitting, from which an effect counts as one that can be seen
 ABSORBED = 0.005  # and up to which it counts as absorbed
-ABSORBABLE = ("force_offset", "force_gain", "moment_arm", "asymmetric_friction", "gravity")
+ABSORBABLE = ("force_offset", "force_gain", "moment_arm", "gravity")
 SLOW_TENSION = 8.0  # s: hands whose pretension hardly changes hide what scales with it
 ATTEMPTS = 40  # fingers and places, of which the first suitable one is taken
 OTHER_MOTION = 1_000_000  # added to the seed of the motion
