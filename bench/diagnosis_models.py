@@ -3,8 +3,8 @@
     python bench/diagnosis_models.py --cases 3
 
 Each case is a finger of the matched rig (python_tests/hidden_effects) with one hidden effect at strength 1: 60 s to
-learn from, 60 s of another motion to be judged on. All models predict the torque of every sample; r of contract section 5,
-step 5, is then what the same bias filter leaves (rms over all joints, mN·m).
+learn from, 60 s of another motion to be judged on. All models predict the torque of every sample; r of contract
+section 5, step 5, is then what the same bias filter leaves (rms over all joints, mN·m).
 
 - nominal, extended: the description as refitted, and as `diagnose` extends it;
 - learner: gradient-boosted trees from angles, velocities, tendon forces, travel since the reversal and the side of the
