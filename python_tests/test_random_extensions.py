@@ -145,6 +145,25 @@ def test_a_restored_state_gives_the_same_bits() -> None:
                 np.testing.assert_array_equal(rest[name], series[at:], err_msg=f"finger {seed}, {name}")
 
 
+def test_kernels_give_the_same_bits() -> None:
+    native = product("native")
+    for seed in FINGERS[::2]:
+        description, recording = case(seed)
+        found = []
+        for kernel in ("plain", "sse2", "avx2"):
+            finger = native.Finger.from_description(description, source_of(seed))
+            try:
+                finger.kernel = kernel
+            except product("errors").InputError:  # not on this machine
+                continue
+            found.append((finger.run(recording, parts=True), finger.save_state()))
+        assert found
+        for outputs, state in found[1:]:
+            assert state == found[0][1], seed
+            for name, series in outputs.items():
+                np.testing.assert_array_equal(series, found[0][0][name], err_msg=f"finger {seed}, {name}")
+
+
 def test_a_refused_sample_changes_nothing_that_effects_remember() -> None:
     native = product("native")
     for seed in FINGERS:
