@@ -14,7 +14,7 @@ from tendonfmu.candidate_columns import CandidateColumns, candidate_columns
 from tendonfmu.diagnosis_series import Bank, Columns, Grid, Series, Trial, block_prediction, make_series
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.fit_residuals import bias_settings
-from tendonfmu.nuisance import basis, bias_splines, constant_bias, without
+from tendonfmu.nuisance import KNOTS, TRENDS, basis, bias_splines, constant_bias, without
 from tendonfmu.regressors import predicted_forces
 from tendonfmu.significance import Problem, residual_of
 
@@ -29,8 +29,9 @@ LEAST_SHARE = 0.01  # of a candidate's variance that has to survive the refit fo
 class View:
     """A description and what it may lack, on all recordings.
 
-    predicted: the recordings with the forces that the model predicts. residual: [B, n] N·m, bias and all that refitting
-    can mend taken off. shares: [T] of each trial's variance that survives. eligible: [T] whether it is visible.
+    predicted: the recordings with the forces that the model predicts. bias: [B, s] splines. residual: [B, n] N·m, bias
+    and all that refitting can mend taken off. shares: [T] of each trial's variance that survives. eligible: [T] whether
+    it is visible.
     """
 
     data: Mapping[str, Any]
@@ -38,6 +39,7 @@ class View:
     predicted: Sequence[FitRecording]
     problem: Problem
     columns: CandidateColumns
+    bias: Numbers
     residual: Numbers
     shares: Numbers
 
@@ -62,9 +64,11 @@ def look(
     splines = bias_of(data, series)
     predicted = predicted_of(data, recordings, grid, series)
     columns = candidate_columns(data, predicted, blocks_of(grid, recordings), progress=progress)
-    problem = Problem(series, bank_of(columns), splines, columns.nominal)
+    trends = bias_of(data, series, TRENDS)
+    problem = Problem(series, bank_of(columns), trends, columns.nominal)
     residual = residual_of(series, splines, columns.nominal)
-    return View(data, recordings, predicted, problem, columns, residual, surviving_shares(problem))
+    shares = surviving_shares(replace(problem, splines=splines))
+    return View(data, recordings, predicted, problem, columns, splines, residual, shares)
 
 
 def series_of(
@@ -83,9 +87,9 @@ def predicted_of(
     return predicted_forces(data, recordings, grid, series, residual_of(series, bias_of(data, series), nothing))
 
 
-def bias_of(data: Mapping[str, Any], series: Series) -> Numbers:
-    """[B, s]: splines, or constants where the description says that the bias does not wander."""
-    return bias_splines(series) if bias_settings(data).drift > 0 else constant_bias(series)
+def bias_of(data: Mapping[str, Any], series: Series, knots: float = KNOTS) -> Numbers:
+    """[B, s]: splines, or constants where the description says that the bias does not wander. knots: s apart."""
+    return bias_splines(series, knots) if bias_settings(data).drift > 0 else constant_bias(series)
 
 
 def blocks_of(grid: Grid, recordings: Sequence[FitRecording]) -> Blocks:

@@ -244,7 +244,7 @@ class _Result:
 
     def _remainder(self, residual: Numbers, view: View) -> Remainder:
         nominal = np.asarray(view.problem.nominal, dtype=np.float64)
-        nuisance = [np.hstack([view.problem.splines, nominal[:, j]]) for j in range(nominal.shape[1])]
+        nuisance = [np.hstack([view.bias, nominal[:, j]]) for j in range(nominal.shape[1])]
         return measure_remainder(view.series, residual, nuisance, seed=self._seed)
 
     def _torque(self) -> Numbers:

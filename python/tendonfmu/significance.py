@@ -36,7 +36,9 @@ _CHUNK = 64  # columns at a time
 
 @dataclass(frozen=True)
 class Problem:
-    """What is to be explained. splines: [B, s] of the bias; nominal: [B, n, u] derivatives by all that is fitted."""
+    """What is to be explained. splines: [B, s] of the bias's trend. nominal: [B, n, u] derivatives by all that is
+    fitted.
+    """
 
     series: Series
     bank: Bank
@@ -49,14 +51,14 @@ class Prepared:
     """Target and columns white and orthogonal to the nuisance, rows sorted by time.
 
     target: [V, n]; columns: [V, n, c]; starts: [K] first row of each block of time. whitener: of the residual.
-    unshrunk: [V, n] the target less what the nuisance has taken of each block's variance.
+    unshrunk: [V, n, c] the columns, what the nuisance has taken of each block given back.
     """
 
     target: Numbers
     columns: Array
     starts: NDArray[np.int64]
     whitener: Whitener
-    unshrunk: Numbers
+    unshrunk: Array
 
     @property
     def blocks(self) -> int:
@@ -65,15 +67,15 @@ class Prepared:
     @cached_property
     def scores(self) -> Numbers:
         """[K, c]"""
-        return self._scores(self.target)
+        return self._scores(self.columns)
 
     @cached_property
     def unshrunk_scores(self) -> Numbers:
         """[K, c], whose outer products have the covariance of the sum of `scores` as their mean."""
         return self._scores(self.unshrunk)
 
-    def _scores(self, target: Numbers) -> Numbers:
-        products = np.einsum("vnc,vn->vc", self.columns, target.astype(self.columns.dtype))
+    def _scores(self, columns: Array) -> Numbers:
+        products = np.einsum("vnc,vn->vc", columns, self.target.astype(columns.dtype))
         return np.add.reduceat(products.astype(np.float64), self.starts, axis=0)
 
     def score(self, trial: Trial) -> Numbers:
@@ -86,8 +88,16 @@ class Prepared:
 
     def gram(self, trial: Trial) -> Numbers:
         """[K, d, d]"""
-        own = self.columns[:, :, trial.first : trial.first + trial.count].astype(np.float64)
-        return np.asarray(np.add.reduceat(np.einsum("vni,vnj->vij", own, own), self.starts, axis=0))
+        return self._gram(self.columns, trial)
+
+    def unshrunk_gram(self, trial: Trial) -> Numbers:
+        """[K, d, d]: what the effect itself makes of `unshrunk_score`, per magnitude."""
+        return self._gram(self.unshrunk, trial)
+
+    def _gram(self, columns: Array, trial: Trial) -> Numbers:
+        chosen = slice(trial.first, trial.first + trial.count)
+        left, right = (values[:, :, chosen].astype(np.float64) for values in (columns, self.columns))
+        return np.asarray(np.add.reduceat(np.einsum("vni,vnj->vij", left, right), self.starts, axis=0))
 
 
 def prepare(problem: Problem, accepted: Array | None = None) -> Prepared:
@@ -104,7 +114,7 @@ def prepare(problem: Problem, accepted: Array | None = None) -> Prepared:
         chunk = slice(first, first + _CHUNK)
         columns[:, :, chunk] = cleaner.clean(values[:, :, chunk])
     starts = block_starts(series, white)
-    return Prepared(cleaner.target, columns, starts, white, unshrunk_target(cleaner.target, cleaner.span, starts))
+    return Prepared(cleaner.target, columns, starts, white, unshrunk_columns(columns, cleaner.span, starts))
 
 
 class _Cleaner:
@@ -143,13 +153,14 @@ def splines_of_joints(splines: Numbers, joints: int) -> Numbers:
     return found
 
 
-def unshrunk_target(target: Numbers, span: Numbers, starts: NDArray[np.int64]) -> Numbers:
-    """[V, n] (I − H_bb)^(−½) of the residual in each block, H the projection on the nuisance's orthonormal span: what
-    the nuisance has taken of a block is given back in the mean (CR2: Bell and McCaffrey, 2002).
+def unshrunk_columns(columns: Array, span: Numbers, starts: NDArray[np.int64]) -> Array:
+    """[V, n, c] (I − H_bb)^(−½) of the columns in each block, H the projection on the nuisance's orthonormal span. With
+    them a block's score has the variance that the nuisance has taken of the residual there (CR2: Bell and McCaffrey,
+    2002).
     """
-    joints = target.shape[1]
-    flat, found = target.reshape(-1), target.reshape(-1).copy()
-    for begin, end in zip(starts, [*starts[1:], len(target)], strict=True):
+    joints = columns.shape[1]
+    found = columns.reshape(-1, columns.shape[2]).copy()
+    for begin, end in zip(starts, [*starts[1:], len(columns)], strict=True):
         rows = slice(int(begin) * joints, int(end) * joints)
         own = span[rows]
         if own.shape[0] < own.shape[1]:
@@ -160,8 +171,9 @@ def unshrunk_target(target: Numbers, span: Numbers, starts: NDArray[np.int64]) -
             taken = taken[kept]
             side = own @ (right[:, kept] / np.sqrt(taken))
         factor = 1.0 / np.sqrt(np.maximum(1.0 - taken, MOST_TAKEN)) - 1.0
-        found[rows] += side @ (factor * (side.T @ flat[rows]))
-    return np.asarray(found.reshape(target.shape))
+        side = side.astype(columns.dtype)
+        found[rows] += (side * factor.astype(columns.dtype)) @ (side.T @ found[rows])
+    return np.asarray(found.reshape(columns.shape))
 
 
 def residual_of(series: Series, splines: Numbers, nominal: Array) -> Numbers:
@@ -290,7 +302,7 @@ def _turned(prepared: Prepared, trial: Trial) -> tuple[Numbers, Numbers, Numbers
     power, direction = np.linalg.eigh(total / np.outer(length, length))
     kept = power > 1e-9 * power[-1]
     turn = np.where(kept, direction / np.sqrt(np.where(kept, power, 1.0)), 0.0) / length[:, None]
-    energy = np.einsum("ij,kil,lm->kjm", turn, gram, turn, optimize=True)
+    energy = np.einsum("ij,kil,lm->kjm", turn, prepared.unshrunk_gram(trial), turn, optimize=True)
     side = turn.T @ (np.array(trial.signs, dtype=float) * length)
     whole = prepared.score(trial).sum(axis=0) @ turn
     return whole[None], prepared.unshrunk_score(trial) @ turn, energy.reshape(len(gram), -1), side[None]
