@@ -37,6 +37,7 @@ typedef struct linearisation {
   double mean_force, mean_force_slope;
   int gripped;                /* extensions act on friction */
   const double* memory_slope; /* of what the extensions remember; NULL: held fixed */
+  double* entry;              /* [places] ∂(b·what acts); NULL: not wanted */
 } linearisation;
 
 static double seed(const double* direction, size_t i) {
@@ -116,7 +117,7 @@ static dual friction_at(const linearisation* l, const effect_laws* laws, size_t 
   }
   if (grip.slides) {
     const double sign = velocity.value < 0.0 ? -1.0 : 1.0;
-    const int negative = sliding_side(velocity.value, threshold, s->side[slot]);
+    const int negative = sliding_side(velocity.value, threshold, s->side_before[slot]);
     return product((dual){grip.value, slope}, magnitude_at(laws, negative, scaled(sign, velocity)));
   }
   if (s->moving[slot] == 0.0) {
@@ -170,6 +171,15 @@ static dual acting(const tendonfmu_finger* f, size_t i, dual* force) {
   return *force;
 }
 
+/* b of a place times what acts there */
+static dual jump_at(linearisation* l, size_t place, dual acts, dual bias) {
+  const dual jump = product(acts, bias);
+  if (l->entry) {
+    l->entry[place] = jump.slope;
+  }
+  return jump;
+}
+
 static void linearise_tendon(linearisation* l, size_t i, double force_slope) {
   const tendonfmu_finger* f = l->finger;
   const size_t lanes = f->tendon_lanes;
@@ -185,7 +195,8 @@ static void linearise_tendon(linearisation* l, size_t i, double force_slope) {
     const size_t slot = j * lanes + i;
     const effect_laws edge = edge_laws(l, j, i);
     const dual edge_loss = product(acts, friction_at(l, &edge, slot, threshold, velocity[j]));
-    jumped = sum(jumped, product(acts, bias_at(l, &edge, slot, threshold, velocity[j])));
+    const size_t place = 2 * (i * f->joints + j);
+    jumped = sum(jumped, jump_at(l, place, acts, bias_at(l, &edge, slot, threshold, velocity[j])));
     lost = sum(lost, edge_loss);
     force = difference(force, edge_loss);
     acts = acting(f, i, &force);
@@ -193,7 +204,8 @@ static void linearise_tendon(linearisation* l, size_t i, double force_slope) {
     if (j + 1 < f->joints) {
       const effect_laws pulley = {.below = f->derived.pulley_law + (slot + lanes) * LAW_NUMBERS};
       const dual pulley_loss = product(acts, friction_at(l, &pulley, slot + lanes, threshold, velocity[j + 1]));
-      jumped = sum(jumped, product(acts, bias_at(l, &pulley, slot + lanes, threshold, velocity[j + 1])));
+      const dual bias = bias_at(l, &pulley, slot + lanes, threshold, velocity[j + 1]);
+      jumped = sum(jumped, jump_at(l, place + 1, acts, bias));
       lost = sum(lost, pulley_loss);
       force = difference(force, pulley_loss);
       acts = acting(f, i, &force);
@@ -220,7 +232,9 @@ static void linearise_joints(linearisation* l) {
     const dual load_bias = bias_at(l, &loaded, joint_row + j, threshold, l->speed[j]);
     const dual cover = scaled(f->derived.cover_stiffness[j], l->angle[j]);
     l->friction[j] = sum(l->friction[j], sum(own_friction, sum(product(load_friction, l->load[j]), cover)));
-    l->bias_step[j] = sum(l->bias_step[j], sum(own_bias, product(load_bias, l->load[j])));
+    const size_t place = 2 * f->joints * f->tendons + 2 * j;
+    const dual own_jump = jump_at(l, place, (dual){1.0, 0.0}, own_bias);
+    l->bias_step[j] = sum(l->bias_step[j], sum(own_jump, jump_at(l, place + 1, l->load[j], load_bias)));
   }
 }
 
@@ -318,8 +332,10 @@ void directional_derivative(const tendonfmu_finger* finger, const tendonfmu_inpu
   }
 }
 
-void torque_along(const tendonfmu_finger* finger, const state_direction* direction, double* torque, double* jump) {
-  linearisation l = {.finger = finger, .gripped = finger->extensions.friction > 0, .memory_slope = direction->memory};
+void torque_along(const tendonfmu_finger* finger, const state_direction* direction, double* torque, double* jump,
+                  double* entry) {
+  linearisation l = {
+      .finger = finger, .gripped = finger->extensions.friction > 0, .memory_slope = direction->memory, .entry = entry};
   for (size_t j = 0; j < finger->joints; ++j) {
     l.angle[j] = (dual){finger->remembered.angle[j], direction->angle[j]};
     l.speed[j] = (dual){finger->remembered.speed[j], direction->speed[j]};

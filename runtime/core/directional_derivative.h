@@ -14,6 +14,8 @@ void directional_derivative(const tendonfmu_finger* finger, const tendonfmu_inpu
 typedef struct state_direction {
   const double *angle, *speed, *force, *memory;
 } state_direction;
-void torque_along(const tendonfmu_finger* finger, const state_direction* direction, double* torque, double* jump);
+/* entry [2·n·m + 2·n] ∂(b·what acts) of every place (parameter_derivative.h); NULL: not wanted. */
+void torque_along(const tendonfmu_finger* finger, const state_direction* direction, double* torque, double* jump,
+                  double* entry);
 
 #endif

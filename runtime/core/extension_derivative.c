@@ -27,18 +27,27 @@ static void read_torque_row(const tendonfmu_finger* f, const extension_row* row,
   }
 }
 
+static void along_signal(const tendonfmu_finger* f, size_t n, uint32_t k, double* torque, double* jump, double* entry) {
+  const double* angle = signal_slopes(f, signal_row(f, n), k);
+  const double* memory = angle + 2 * f->joints + f->tendons;
+  signal_derivative signals;
+  derive_signals(f, n, k, 0, &signals);
+  const state_direction direction = {angle, angle + f->joints, signals.force, memory};
+  torque_along(f, &direction, torque, jump, entry);
+}
+
 static void read_signal_row(const tendonfmu_finger* f, size_t n, parameter_derivative* d) {
   const extension_row* row = signal_row(f, n);
   for (uint32_t k = 0; k < row->effect->parameter_count; ++k) {
     double torque[MODEL_MAX_JOINTS], jump[MODEL_MAX_JOINTS];
-    const double* angle = signal_slopes(f, row, k);
-    signal_derivative signals;
-    derive_signals(f, n, k, 0, &signals);
-    const double* memory = angle + 2 * f->joints + f->tendons;
-    const state_direction direction = {angle, angle + f->joints, signals.force, memory};
-    torque_along(f, &direction, torque, jump);
+    along_signal(f, n, k, torque, jump, NULL);
     add_plain(d, row->first_parameter + k, torque, jump);
   }
+}
+
+void extension_entry_slopes(const tendonfmu_finger* f, size_t row_number, uint32_t k, double* entry) {
+  double torque[MODEL_MAX_JOINTS], jump[MODEL_MAX_JOINTS];
+  along_signal(f, row_number, k, torque, jump, entry);
 }
 
 /* what the other friction rows make of a slot */

@@ -17,4 +17,7 @@ typedef struct place_slopes {
 void extension_place_slopes(const tendonfmu_finger* finger, const parameter_derivative* derivative, size_t row_number,
                             size_t place, place_slopes* slopes);
 
+/* ∂(b·what acts) of every place [places] by number k of the row_number-th signal row. */
+void extension_entry_slopes(const tendonfmu_finger* finger, size_t row_number, uint32_t k, double* entry);
+
 #endif

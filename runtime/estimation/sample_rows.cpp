@@ -12,6 +12,7 @@ SampleRows::SampleRows(const Unknowns& unknowns, const tendonfmu_finger* finger)
   terms_.reserve(6 * derivative_.places);
   if (finger->derived.settings.remembers_entry_load) {
     entries_.assign(derivative_.places * unknowns.count(), 0.0);
+    by_signal_.assign(derivative_.places, 0.0);
   }
 }
 
@@ -109,6 +110,25 @@ void SampleRows::come_to_rest() {
     } else if ((place - ends) % 2 == 1) { /* T_jvf·Σ f_B */
       for (std::size_t other = 0; other < ends; ++other) {
         add_slopes(other, false, jump * derivative_.load_factor[other * n + (place - ends) / 2], slopes);
+      }
+    }
+  }
+  come_to_rest_by_signals();
+}
+
+void SampleRows::come_to_rest_by_signals() {
+  for (std::size_t r = 0; r < finger_->extensions.signals; ++r) {
+    const extension_row* row = signal_row(finger_, r);
+    for (std::uint32_t k = 0; k < row->effect->parameter_count; ++k) {
+      const std::int32_t column = unknowns_.plain(row->first_parameter + k);
+      if (column < 0) {
+        continue;
+      }
+      extension_entry_slopes(finger_, r, k, by_signal_.data());
+      for (std::size_t place = 0; place < derivative_.places; ++place) {
+        if (derivative_.stop_jump[place] != 0.0) {
+          entry(place)[column] += by_signal_[place];
+        }
       }
     }
   }

@@ -71,6 +71,7 @@ class SampleRows {
   void add(const law_term& from, bool is_jump);
   void leave_rest();
   void come_to_rest();
+  void come_to_rest_by_signals();
   void add_slopes(std::size_t place, bool is_jump, double factor, double* entry) const;
   double* entry(std::size_t place) { return entries_.data() + place * unknowns_.count(); }
 
@@ -80,7 +81,8 @@ class SampleRows {
   parameter_derivative derivative_;
   std::vector<Term> terms_;
   std::vector<PlainTerm> plain_;
-  std::vector<double> entries_; /* [places × unknowns] of e of every place, as it came to rest */
+  std::vector<double> entries_;   /* [places × unknowns] of e of every place, as it came to rest */
+  std::vector<double> by_signal_; /* [places] room */
 };
 
 /* The beginnings of a recording's segments with other numbers of the description than those it was added with; rows: of
