@@ -39,7 +39,7 @@ def test_noise_is_not_unknown(seed: int) -> None:
     found = measure_remainder(series, residual_of(series, nuisance), nuisance)
     assert not found.unknown
     assert found.description == ""
-    assert found.p_value > 0.005
+    assert found.p_value > 0.01
     assert max(found.share) < 0.1
 
 
@@ -55,9 +55,9 @@ def test_finds_what_no_candidate_is(signal: object, groups: set[str] | None) -> 
     assert found.findings[0].joint == 2
     assert "Joint 2" in found.description
     assert groups is None or found.findings[0].group in groups
-    # all of it is 0.3 / 1.3 of the variance
-    assert 0.08 < found.share[1] < 0.30
-    assert found.interval[1][0] < 0.3 / 1.3 < found.interval[1][1] + 0.15
+    # all of it is 0.3 / 1.3 of the variance; of a shape that must be learned from 60 s a fifth at least
+    assert 0.3 / 1.3 / 5.0 < found.share[1] < 0.3 / 1.3 + 0.07
+    assert 0.0 < found.interval[1][0] < 0.3 / 1.3
     if signal is oscillation:
         line = found.findings[0].line
         assert line is not None

@@ -6,8 +6,9 @@ oscillations in time (spectral_line.py). Both have a calibrated null, family-wis
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 Numbers = NDArray[np.float64]
 
-LEVEL = 0.005  # of a wrong "unknown", family-wise
+LEVEL = 0.01  # of a wrong "unknown", family-wise
 TRIED = 6  # choices of columns whose prediction is tried
 LEAST_SHARE = 0.02  # of the residual's variance: what is less is not worth a word
 
@@ -113,9 +114,10 @@ def _look(
     """Of each joint the best finding and the share of the whitened residual predicted; and the prediction [B, n]."""
     learned = []
     for joint, columns in enumerate(nuisance):
-        own, plain = learner.of_joint(filters, joint), Whitener(np.zeros((0, 1)), np.ones(1), filters.valid)
-        both = [learner.prepared(residual[:, joint], columns, seen, each, plan) for each in (own, plain)]
-        learned.append(_learned(both[0], both[1], seen, plan, np.random.default_rng((seed, joint))))
+        prepared = partial(learner.prepared, residual[:, joint], columns, seen, plan=plan)
+        ready = prepared(own=learner.of_joint(filters, joint))
+        plain = partial(prepared, own=Whitener(np.zeros((0, 1)), np.ones(1), filters.valid))
+        learned.append(_learned(ready, plain, seen, plan, np.random.default_rng((seed, joint))))
     null = np.max([each.null for each in learned], axis=0)
     prediction = np.zeros_like(residual)
     prediction[plan.rows] = np.stack([each.values for each in learned], axis=1)
@@ -136,7 +138,11 @@ class _Learned:
 
 
 def _learned(
-    ready: learner.Prepared, plain: learner.Prepared, seen: Features, plan: learner.Layout, rng: np.random.Generator
+    ready: learner.Prepared,
+    plain: Callable[[], learner.Prepared],
+    seen: Features,
+    plan: learner.Layout,
+    rng: np.random.Generator,
 ) -> _Learned:
     """ready: whitened; plain: the same without. What is quick shows in the former only, its size in the latter."""
     skills, null = learner.skills(ready, seen, plan, rng)
@@ -147,9 +153,10 @@ def _learned(
     sharp = learner.predicted(ready, [*single, everything, best], seen, plan)
     named_ones = [k for k, choice in enumerate(single) if choice.group != "interaction"] or [0]
     named = single[max(named_ones, key=lambda number: sharp.gains[number])]
-    smooth = learner.predicted(plain, [named, everything, best], seen, plan)
-    tries = [np.zeros(len(plan.rows)), sharp.values, smooth.values]
-    left = [float(np.sum((plain.target - values) ** 2)) for values in tries]
+    tries = [np.zeros(len(plan.rows)), sharp.values]
+    if max(sharp.gains) > LEAST_SHARE / 2.0:
+        tries.append(learner.predicted(plain(), [named, everything, best], seen, plan).values)
+    left = [float(np.sum((ready.target - values) ** 2)) for values in tries]
     return _Learned(skills[0].surprise, null, max(sharp.gains), tries[int(np.argmin(left))], named)
 
 

@@ -68,7 +68,16 @@ def features(series: Series, *, force: Numbers | None = None, seed: int = 0) -> 
     group: list[str] = []
     subject: list[str] = []
     states = _states(series)
-    for maker in (_of_angles, _of_velocities, _of_forces, _of_accelerations, _of_memory, _of_time, _of_tendons):
+    for maker in (
+        _of_angles,
+        _of_velocities,
+        _of_forces,
+        _of_accelerations,
+        _of_memory,
+        _of_slides,
+        _of_time,
+        _of_tendons,
+    ):
         for name, who, values in maker(series, states):
             columns.append(values)
             group += [name] * values.shape[1]
@@ -250,6 +259,22 @@ def _of_memory(series: Series, states: _States) -> _Made:
         fresh = np.exp(-travel / (0.3 * stroke))
         columns = [rested, rested * side, rested * moving, rested * side * fresh]
         yield "rest", _joint(joint), np.stack(columns, axis=1)
+
+
+def _of_slides(series: Series, states: _States) -> _Made:
+    """Friction of a tendon that remembers how much and how fast it slid lately."""
+    starts = run_starts(series.segment)
+    level = np.abs(series.force).mean(axis=0)
+    for tendon in range(series.force.shape[1]):
+        load = np.abs(series.force[:, tendon]) / level[tendon] if level[tendon] > 0.0 else np.ones(len(series.time))
+        slip = series.tendon_velocity[:, tendon]
+        ratio = np.abs(slip[:, 0]) / states.tendon_speed[tendon]
+        signals = np.stack([np.minimum(ratio / 0.2, 1.0), ratio], axis=1)
+        past = np.concatenate([_filtered(signals, each, series.step, starts) for each in MEMORY[2:5]], axis=1)
+        past -= past.mean(axis=0)
+        side = _last_side(slip, np.full(slip.shape[1], MOVING * states.tendon_speed[tendon]), starts)
+        columns = [past * (load * side[:, joint])[:, None] for joint in range(slip.shape[1])]
+        yield "memory of speed", f"tendon {tendon + 1}", np.concatenate(columns, axis=1)
 
 
 def _of_time(series: Series, states: _States) -> _Made:
