@@ -25,6 +25,7 @@ Flags = NDArray[np.bool_]
 Phase = Callable[[str, int, int | None], None]
 
 ROUNDS = 6  # of selection and fit
+PAYS = 0.003  # least share of the residual's variance that a cause takes away, refitted with and without it
 STRONG = 0.3  # share of the whitened residual's variance above which causes are taken one at a time, each fitted first
 
 
@@ -147,7 +148,7 @@ class _Rounds:
         seed: int,
         phase: Phase,
     ) -> None:
-        self.model, self.view = nominal, first
+        self.model, self.view, self._first = nominal, first, first
         self.parameters: tuple[Mapping[str, tuple[float, str]], ...] = ()
         self._nominal, self._recordings, self._grid, self._out = nominal, recordings, grid, out
         self._settings, self._seed, self._phase = settings, seed, phase
@@ -166,9 +167,35 @@ class _Rounds:
             if len(taken) <= len(causes):
                 break
             causes = taken
+        causes = self._paying(causes)
         order = sorted(range(len(causes)), key=lambda k: -causes[k].found.gain)
         self.parameters = tuple(self.parameters[k] for k in order)
         return [causes[k] for k in order]
+
+    def _paying(self, causes: list[NamedCause]) -> list[NamedCause]:
+        """Without causes that nothing is lost with, the least worth first, all fitted again after each.
+
+        In long recordings everything is significant; and what was selected first may be another's by the end.
+        """
+        while causes:
+            accepted = [cause.accepted for cause in causes]
+            clean = predicted_of(self.view.data, self._recordings, self._grid, self.view.series)
+            without = fit_extended(self._nominal, accepted, clean, self._settings, compare=True).without
+            left = self._variance(self.model.data)
+            worth = [1.0 - left / max(self._variance(model.data), 1e-300) for model in without]
+            least = int(np.argmin(worth))
+            if worth[least] >= PAYS:
+                break
+            causes = self._fitted([*causes[:least], *causes[least + 1 :]])
+        if not causes:
+            self.model, self.view, self.parameters = self._nominal, self._first, ()
+        return causes
+
+    def _variance(self, data: Mapping[str, Any]) -> float:
+        """Of the residual of a model over the recordings as they were measured, bias taken off, N²m²."""
+        series = series_of(data, self._recordings, self._grid, self._out)
+        left = residual_of(series, bias_of(data, series), np.zeros((*series.target.shape, 0)))
+        return float(np.mean(left[series.used] ** 2))
 
     def _fitted(self, causes: list[NamedCause]) -> list[NamedCause]:
         """Fits the description with these causes; those that the fit drives to nothing are dropped."""
