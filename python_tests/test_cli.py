@@ -338,22 +338,6 @@ def test_a_negative_time_and_a_late_start(
 # --- demo -------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
-def test_demo_tells_the_story_and_leaves_an_fmu_tables_and_a_figure(call: Call, tmp_path: Path) -> None:
-    answer = call("demo")
-    assert answer.status == 0, answer
-    for words in ("mcp_abduction", "8 of 11 pushes found", "(a) alarms without a push: none", "bias is frozen"):
-        assert words in answer.out, answer.out
-    folder = tmp_path / "tendonfmu-demo"
-    recordings = {f"index_finger_{name}.csv" for name in ("free", "free_x4", "pushes")}
-    assert {file.name for file in folder.iterdir()} == {"index_finger.fmu", "compensated.png", *recordings}
-    assert (folder / "compensated.png").read_bytes().startswith(b"\x89PNG")
-    found = {name: outputs_of(folder / name) for name in recordings}
-    assert {len(outputs["time"]) for outputs in found.values()} == {30000}
-    assert not found["index_finger_free.csv"]["contact"].any()
-    assert 0.05 < found["index_finger_pushes.csv"]["contact"].mean() < 0.3
-
-
 def test_demo_into_a_place_that_cannot_be(call: Call, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("x")
     assert "file" in refused(call("demo", "-o", "file"))

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import copy
+import importlib.util
 import json
 import re
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +24,7 @@ from tendonfmu.native import Finger
 from tendonfmu.recording import Recording, read_recording
 from tendonfmu.rig import read_rig
 from tendonfmu.simulation import Table, simulate
+from tendonfmu.tables import read_table
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 FOLDER = EXAMPLES / "demo_recording"
@@ -29,6 +34,7 @@ RIGS = {
     "index_finger_free_x4": "index_finger_x4.json",
     "index_finger_pushes": "index_finger_pushes.json",
 }
+TWO_JOINTS = ("two_joints_training", "two_joints_unseen")  # made by make_hidden.py
 SIZES = {"tendon_force": 8, "tendon_position": 8, "joint_position": 4, "external_torque": 4}
 STEPS = {"tendon_force": 0.002, "tendon_position": 2e-6, "joint_position": 2e-4, "external_torque": 2e-4}
 JOINTS = ("mcp_abduction", "mcp_flexion", "pip_flexion", "dip_flexion")
@@ -64,7 +70,7 @@ def rms(values: Array) -> Array:
 
 
 def test_nothing_else_is_there_and_together_they_are_small() -> None:
-    assert {file.name for file in FOLDER.glob("*.parquet")} == {f"{name}.parquet" for name in RIGS}
+    assert {file.stem for file in FOLDER.glob("*.parquet")} == {*RIGS, *TWO_JOINTS}
     assert sum(file.stat().st_size for file in FOLDER.iterdir()) < 10e6
 
 
@@ -191,6 +197,55 @@ def test_one_percent_of_other_friction_at_the_joints_shows(
 def columns_of(recording: Recording) -> list[str]:
     names = ["time"] + [f"{group}[{k + 1}]" for group, array in recording.groups.items() for k in range(array.shape[1])]
     return names if recording.contact is None else [*names, "contact"]
+
+
+# --- the finger that lacks something ----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def hidden_rig() -> Iterator[Any]:
+    """The script that made its recordings."""
+    path = list(sys.path)
+    spec = importlib.util.spec_from_file_location("make_hidden", FOLDER / "make_hidden.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    yield module
+    sys.path[:] = path
+
+
+def test_the_two_joint_finger_is_what_its_rig_gives(hidden_rig: Any) -> None:
+    """Description, label and both recordings; one percent less of what is hidden shows in these."""
+    hand, label = hidden_rig.true_hand()
+    kept = {
+        name: json.loads((FOLDER / f"{name}.json").read_text("utf-8")) for name in ("two_joints", "two_joints_hidden")
+    }
+    assert is_alike(kept["two_joints"], hidden_rig.description(hand), 1e-9)
+    assert is_alike(kept["two_joints_hidden"], label, 1e-6)
+    assert not [row for row in kept["two_joints"]["extensions"] if row["effect"] == label["effect"]]
+    weaker = replace(hand, hidden=tuple(replace(each, magnitude=0.99 * each.magnitude) for each in hand.hidden))
+    for name in TWO_JOINTS:
+        file = read_table(FOLDER / f"{name}.parquet", lambda *_: None)
+        assert apart(file, hidden_rig.recorded(hand, name)) < 0.001
+        assert apart(file, hidden_rig.recorded(weaker, name)) > 0.05
+    assert sum((FOLDER / f"{name}.parquet").stat().st_size for name in TWO_JOINTS) < 2.5e6
+
+
+def apart(one: Table, other: dict[str, Array]) -> float:
+    """Share of the samples that differ by more than a step of their sensor, and a bit."""
+    assert list(one) == list(other)
+    steps = {"tendon_force": 1.2e-4, "tendon_position": 1.2e-7, "time": 1e-12}
+    far = [np.abs(one[name] - other[name]) > steps[name.partition("[")[0]] for name in one]
+    return float(np.mean(far))
+
+
+def is_alike(one: Any, other: Any, share: float) -> bool:
+    """The same keys and words, numbers equal up to a share of them."""
+    if isinstance(one, dict):
+        return one.keys() == other.keys() and all(is_alike(one[key], other[key], share) for key in one)
+    if isinstance(one, list):
+        return len(one) == len(other) and all(is_alike(*pair, share) for pair in zip(one, other, strict=True))
+    return bool(one == other or (isinstance(one, float) and abs(one - other) <= share * abs(one)))
 
 
 # --- the story --------------------------------------------------------------------------------------------------------

@@ -28,20 +28,30 @@ RATE = 500.0  # Hz
 FORCE_STEP, POSITION_STEP = 1e-4, 1e-7  # N, m; of the sensors
 
 
-def made() -> tuple[dict[str, Any], dict[str, dict[str, NDArray[Any]]], dict[str, Any]]:
-    """The nominal description, the columns of each recording, and what is hidden in them."""
+def true_hand() -> tuple[Any, dict[str, Any]]:
+    """The finger (`matched_rig.Hand`) with the effect in it, and what is hidden."""
     from effects_hidden import hide
-    from matched_rig import random_hand, record
+    from matched_rig import random_hand
 
     hand = random_hand(SEED, joints=2, presliding=True, source=1, rate=RATE)
     hand = replace(hand, noise=replace(hand.noise, tendon_step=POSITION_STEP))
     seed, seconds = RECORDINGS[f"{NAME}_training"]
-    hand, label = hide(hand, EFFECT, STRENGTH, seed=SEED, motion=seed, seconds=seconds)
-    recordings = {}
-    for name, (seed, seconds) in RECORDINGS.items():
-        columns = record(hand, seed=seed, seconds=seconds).columns
-        recordings[name] = {key: as_sensed(key, values) for key, values in columns.items()}
-    return {**hand.nominal, "name": NAME}, recordings, label
+    found: tuple[Any, dict[str, Any]] = hide(hand, EFFECT, STRENGTH, seed=SEED, motion=seed, seconds=seconds)
+    return found
+
+
+def recorded(hand: Any, name: str) -> dict[str, NDArray[Any]]:
+    """The columns of one of `RECORDINGS`."""
+    from matched_rig import record
+
+    seed, seconds = RECORDINGS[name]
+    columns = record(hand, seed=seed, seconds=seconds).columns
+    return {key: as_sensed(key, values) for key, values in columns.items()}
+
+
+def description(hand: Any) -> dict[str, Any]:
+    """What the tool is given: without the effect, its numbers off by up to half."""
+    return {**hand.nominal, "name": NAME}
 
 
 def as_sensed(name: str, values: NDArray[Any]) -> NDArray[Any]:
@@ -59,10 +69,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-o", "--output", type=Path, default=HERE, help="folder")
     folder = parser.parse_args().output
-    nominal, recordings, label = made()
-    for name, content in ((NAME, nominal), (f"{NAME}_hidden", label)):
+    hand, label = true_hand()
+    for name, content in ((NAME, description(hand)), (f"{NAME}_hidden", label)):
         (folder / f"{name}.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    for name, columns in recordings.items():
+    for name in RECORDINGS:
+        columns = recorded(hand, name)
         pq.write_table(
             pa.table(columns), folder / f"{name}.parquet", compression="zstd", compression_level=19,
             use_dictionary=False, column_encoding=dict.fromkeys(columns, "BYTE_STREAM_SPLIT"),

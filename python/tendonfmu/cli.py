@@ -447,6 +447,8 @@ def demo(
     from tendonfmu.demo_text import chapter_lines, chapter_tables, file_lines
 
     story = Story(output)
+    if story.missing:
+        say(f"tendonfmu: warning: {story.missing}")
     for number, chapter in enumerate(story.chapters, start=1):
         say(f"{number} {chapter.name}: {chapter.title.lower()}")
         with progress_bar() as bar:

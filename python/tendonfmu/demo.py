@@ -2,7 +2,8 @@
 
 Four chapters, in this order: an FMU run over recordings of the index finger; the numbers of a two-joint finger fitted;
 pushes on the index finger detected; and what the two-joint finger's model lacks, which the demo is not told, found,
-named, built into the model and measured on a recording that nobody has seen. One page tells all of it.
+named, built into the model and measured on a recording that nobody has seen. One page tells all of it. Where the
+installation cannot estimate, the second and the last chapter are left out.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from tendonfmu.demo_run import DATA, IndexFinger
 from tendonfmu.errors import InputError
+from tendonfmu.estimation import ESTIMATION_MISSING, HAS_ESTIMATION
 
 if TYPE_CHECKING:
     from tendonfmu.diagnosis_result import Diagnosis
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
 TWO_JOINTS, TRAINING, UNSEEN = "two_joints.json", "two_joints_training.parquet", "two_joints_unseen.parquet"
 FIT, DIAGNOSIS = "fit", "diagnosis"  # folders of the full pages
 FITTED = "fitted.json"
+ESTIMATING = ("fit", "diagnose")  # chapters that need what not every installation has
 
 Phase = Callable[[str, int, int | None], None]
 
@@ -43,7 +46,8 @@ class Chapter:
 class Story:
     """The demo in a folder: the chapters are run one by one, in order; `write` then makes the page of all of them.
 
-    finger: chapters 1 and 3. fit: chapter 2. diagnosis: chapter 4. files: path -> what is in it.
+    finger: of run and detect. fit, diagnosis: of theirs. files: path -> what is in it. missing: why chapters are left
+    out, empty if none is.
     """
 
     fit: FrictionFit
@@ -58,12 +62,14 @@ class Story:
         self.folder = folder
         self.finger = IndexFinger(folder)
         self._files: dict[Path, str] = {}
-        self.chapters = (
+        told = (
             Chapter("run", "What the joints feel, friction subtracted", self._run),
             Chapter("fit", "Friction learned from motion", self._fit),
             Chapter("detect", "Contact without a touch sensor", self._detect),
             Chapter("diagnose", "What the model gets wrong, and why", self._diagnose),
         )
+        self.chapters = [each for each in told if HAS_ESTIMATION or each.name not in ESTIMATING]
+        self.missing = "" if HAS_ESTIMATION else f"{' and '.join(ESTIMATING)} are left out: {ESTIMATION_MISSING}"
 
     @property
     def files(self) -> dict[Path, str]:

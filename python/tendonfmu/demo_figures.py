@@ -25,9 +25,11 @@ _HEIGHT = 270  # CSS pixels
 def story_sheets(story: Story) -> Iterator[Sheet]:
     """All figures of the page, each in the section of its chapter."""
     yield _free_sheet(story)
+    yield _push_sheet(story)
+    if story.missing:
+        return
     yield _error_sheet(story)
     yield from _fit_sheets(story)
-    yield _push_sheet(story)
     yield from (sheet for sheet in diagnosis_sheets(story.diagnosis) if sheet.section != "views")
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,8 @@ from tendonfmu.demo_run import FLEXION, FREE, FREE_X4, PUSHES
 from tendonfmu.demo_text import alarms, chapter_tables, fit_sentence, push_sentence
 from tendonfmu.diagnosis_page import PAGE as DIAGNOSIS_PAGE
 from tendonfmu.diagnosis_page import Tile, cards_of
-from tendonfmu.diagnosis_text import error_sentence, headline, names_of, percent, together, unit_of
+from tendonfmu.diagnosis_result import Diagnosis
+from tendonfmu.diagnosis_text import at_place, error_sentence, headline, names_of, percent, together, unit_of
 from tendonfmu.fit_page import PAGE as FIT_PAGE
 from tendonfmu.fit_page import PageFigure, draw_sheet, render
 from tendonfmu.fit_summary import residual_tables, rounded
@@ -36,32 +36,44 @@ def story_page(story: Story, figures: list[PageFigure]) -> str:
     return render(
         "story.html.jinja",
         chapters=story.chapters,
-        tiles=list(_tiles(story)),
+        tiles=[(each.name, _tile(story, each.name)) for each in story.chapters],
         tables={each.name: list(chapter_tables(story, each.name)) for each in story.chapters},
         figures=by_section,
         run=_run(story),
-        fit={"sentence": fit_sentence(story), "page": f"{FIT}/{FIT_PAGE}"},
+        fit=None if story.missing else {"sentence": fit_sentence(story), "page": f"{FIT}/{FIT_PAGE}"},
         detect=_detect(story),
-        diagnosis=_diagnosis(story),
+        diagnosis=None if story.missing else _diagnosis(story),
+        missing=story.missing,
         files=[(path.relative_to(story.folder).as_posix(), what) for path, what in story.files.items()],
     )
 
 
-def _tiles(story: Story) -> Iterator[tuple[str, Tile]]:
-    """(chapter, figure that matters), one for each."""
-    results, found = story.finger.results, story.diagnosis
-    joint = next(each for each in results[FREE].joints if each.name == FLEXION)
-    left = f"{1e3 * joint.measured:.0f} → {1e3 * joint.left:.1f}"
-    yield "run", Tile(left, "mN·m", "torque at the base of the finger, before and after its friction is subtracted")
-    unseen = list(residual_tables(story.fit.picture()))[-1]
-    fitted = f"{rounded(unseen.all.start)} → {rounded(unseen.all.fitted)}"
-    yield "fit", Tile(fitted, unseen.unit, "error on an unseen recording, before and after friction is learned")
-    score = results[PUSHES].score
-    yield "detect", Tile(f"{score.found} of {len(score.events)}", "", "pushes found, without a touch sensor")
+def _tile(story: Story, chapter: str) -> Tile:
+    """The figure that matters in a chapter."""
+    results = story.finger.results
+    if chapter == "run":
+        joint = next(each for each in results[FREE].joints if each.name == FLEXION)
+        left = f"{1e3 * joint.measured:.0f} → {1e3 * joint.left:.1f}"
+        return Tile(left, "mN·m", "torque at the base of the finger, before and after its friction is subtracted")
+    if chapter == "fit":
+        unseen = list(residual_tables(story.fit.picture()))[-1]
+        fitted = f"{rounded(unseen.all.start)} → {rounded(unseen.all.fitted)}"
+        return Tile(fitted, unseen.unit, "error on an unseen recording, before and after friction is learned")
+    if chapter == "detect":
+        score = results[PUSHES].score
+        return Tile(f"{score.found} of {len(score.events)}", "", "pushes found, without a touch sensor")
+    return _tile_of_cause(story.diagnosis)
+
+
+def _tile_of_cause(found: Diagnosis) -> Tile:
     factor, unit = unit_of(found)
     before, after = (rounded(factor * together(each.test_rms)) for each in (found.nominal, found.extended))
-    meaning = f"error on the unseen recording, {percent(found.gain.value)} less once the cause is in the model"
-    yield "diagnose", Tile(f"{before} → {after}", unit, meaning if found.causes else "no cause was found")
+    if not found.causes:
+        return Tile(before, unit, "error on an unseen recording; no cause was found")
+    first = found.causes[0]
+    cause = f"{at_place(first.title, first.where, names_of(found))}, found and built in"
+    meaning = f"error on an unseen recording: {percent(found.gain.value)} less with {cause}"
+    return Tile(f"{before} → {after}", unit, meaning)
 
 
 def _run(story: Story) -> dict[str, Any]:
@@ -72,6 +84,7 @@ def _run(story: Story) -> dict[str, Any]:
         "force": f"{results[FREE].mean_force:.0f}",
         "more": f"{results[FREE_X4].mean_force:.0f}",
         "alarms": alarms(results[FREE].score),
+        "more_alarms": alarms(results[FREE_X4].score),
     }
 
 
