@@ -203,7 +203,7 @@ def test_two_causes_are_found_where_one_hides_the_other(columns: tuple[Array, Ar
     values = np.concatenate([values[:, :, :8], both[:, :, None]], axis=2)
     target = coloured(np.random.default_rng(9)) + 0.3 * values[:, :, 1] + 0.7 * values[:, :, 2]
     selection = Selection(made_problem(target, values, [1] * 9, nominal), [True] * 9)
-    _, first = selection.given([])
+    first = selection.given([])
     assert max(first.gains, key=lambda place: first.gains[place].sum())[0] == "effect_8"
     found = {each.trial.effect for each in selection.run()}
     assert len(found) == 2
@@ -253,7 +253,7 @@ def test_equal_gains_are_alike_and_clear_ones_are_not() -> None:
     places = [("a", 1, None), ("b", 1, None), ("c", 1, None)]
     gains = {places[0]: gain, places[1]: gain + 0.3 * rng.standard_normal(40) - 0.02, places[2]: gain - 1.0}
     nothing = significance.Tested(np.zeros(0), np.zeros(0), np.zeros(0), 0)
-    judged = Judged(gains, dict.fromkeys(places, 0), dict.fromkeys(places, 1e-6), nothing)
+    judged = Judged(gains, dict.fromkeys(places, 0), dict.fromkeys(places, 1e-6), nothing, {})
     assert alike(judged, places[0]) == [places[1]]
 
 

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.diagnosis_series import Trial
-from tendonfmu.nuisance import basis
 from tendonfmu.significance import DRAWS, Prepared, Problem, Tested, prepare, tested_trials
 
 Numbers = NDArray[np.float64]
@@ -47,12 +46,13 @@ class Found:
 @dataclass(frozen=True)
 class Judged:
     """All places with the causes `kept` in the nuisance. gains: place → [K] on held-out blocks. best: place → its trial
-    (number). p_values: place → family-wise p."""
+    (number). p_values: place → family-wise p. magnitudes: place → estimates of its trial's, from all blocks."""
 
     gains: dict[Place, Numbers]
     best: dict[Place, int]
     p_values: dict[Place, float]
     tested: Tested
+    magnitudes: dict[Place, Numbers]
 
 
 def held_out_gains(score: Numbers, gram: Numbers, signs: Sequence[int]) -> tuple[Numbers, Numbers]:
@@ -101,14 +101,17 @@ def judge(prepared: Prepared, trials: Sequence[Trial], eligible: Sequence[bool],
     for k, trial in enumerate(trials):
         if eligible[k] and tested.p_values[k] < 1.0:
             by_place.setdefault(trial.place, []).append(k)
-    gains, best, p_values = {}, {}, {}
+    gains, best, p_values, magnitudes = {}, {}, {}, {}
     for place, members in by_place.items():
         pairs = [held_out_gains(prepared.score(trials[k]), prepared.gram(trials[k]), trials[k].signs) for k in members]
         own, trained = (np.array([pair[which] for pair in pairs]) for which in (0, 1))
         gains[place] = own[trained.argmax(axis=0), np.arange(own.shape[1])]
         best[place] = members[int(np.argmax(trained.sum(axis=1)))]
         p_values[place] = float(min(tested.p_values[k] for k in members))
-    return Judged(gains, best, p_values, tested)
+        chosen = trials[best[place]]
+        energy, score = (values.sum(axis=0)[None] for values in (prepared.gram(chosen), prepared.score(chosen)))
+        magnitudes[place] = _estimates(energy, score)[0]
+    return Judged(gains, best, p_values, tested, magnitudes)
 
 
 def spread(gains: Numbers) -> float:
@@ -148,16 +151,16 @@ class Selection:
     def __init__(self, problem: Problem, eligible: Sequence[bool], seed: int = 0) -> None:
         self.problem, self.eligible, self.seed = problem, list(eligible), seed
         self.trials = problem.bank.trials
-        self._known: dict[frozenset[Place], tuple[Prepared, Judged]] = {}
+        self._known: dict[frozenset[Place], Judged] = {}
 
-    def given(self, kept: Sequence[Place]) -> tuple[Prepared, Judged]:
+    def given(self, kept: Sequence[Place]) -> Judged:
         """Everything judged with the causes `kept` in the nuisance."""
         key = frozenset(kept)
         if key not in self._known:
             columns = [self._shapes(place) for place in sorted(key, key=str)]
             prepared = prepare(self.problem, np.concatenate(columns, axis=2) if columns else None)
             open_ = [ok and trial.place not in key for ok, trial in zip(self.eligible, self.trials, strict=True)]
-            self._known[key] = prepared, judge(prepared, self.trials, open_, self.seed)
+            self._known[key] = judge(prepared, self.trials, open_, self.seed)
         return self._known[key]
 
     def _shapes(self, place: Place) -> Numbers:
@@ -177,7 +180,7 @@ class Selection:
         kept: list[Place] = []
         seen: set[frozenset[Place]] = set()
         while len(kept) < MOST_CAUSES:
-            more = leading(self.given(kept)[1])
+            more = leading(self.given(kept))
             if more is None:
                 break
             kept = self._revised([*kept, more])
@@ -195,7 +198,7 @@ class Selection:
             changed = False
             for place in list(kept):
                 others = [other for other in kept if other != place]
-                better = leading(self.given(others)[1])
+                better = leading(self.given(others))
                 if better == place:
                     continue
                 kept = others if better is None else [*others, better]
@@ -206,7 +209,7 @@ class Selection:
         return kept
 
     def found(self, place: Place, others: Sequence[Place]) -> Found:
-        prepared, judged = self.given(others)
+        judged = self.given(others)
         gains = judged.gains[place]
         trial = self.trials[judged.best[place]]
         return Found(
@@ -215,15 +218,10 @@ class Selection:
             gain=float(gains.sum()),
             error=spread(gains),
             alike=tuple(self.trials[judged.best[other]] for other in alike(judged, place)),
-            magnitudes=_estimates(prepared.gram(trial).sum(axis=0)[None], prepared.score(trial).sum(axis=0)[None])[0],
+            magnitudes=judged.magnitudes[place],
         )
 
 
 def null_p_value(judged: Judged) -> float:
     """Least family-wise p of all places."""
     return min(judged.p_values.values(), default=1.0)
-
-
-def span_of(columns: Numbers) -> Numbers:
-    """[R, r] orthonormal basis of [B, n, a] flattened over joints."""
-    return basis(columns.reshape(-1, columns.shape[2]))
