@@ -180,7 +180,7 @@ static double read_friction(const tendonfmu_finger* f, const place_laws* p, para
   const int gripped = f->extensions.friction > 0;
   const double grip = gripped ? f->scratch.grip[p->slot] : 1.0;
   if (gripped && f->scratch.slides[p->slot] != 0.0) {
-    const int negative = sliding_side(v, p->threshold, f->remembered.side[p->slot]);
+    const int negative = sliding_side(v, p->threshold, f->remembered.side_before[p->slot]);
     d->base[p->place] = add_magnitude(p, negative, speed, grip, d->friction, &d->friction_count);
   } else if (f->remembered.moving[p->slot] == 0.0) {
     d->base[p->place] = 0.0;
