@@ -104,6 +104,7 @@ static effect_signals signal_direction(const tendonfmu_finger* f, signal_derivat
                           .position = d->position,
                           .angle = d->angle,
                           .velocity = d->velocity,
+                          .position_behind = d->position_behind,
                           .inverse_stiffness = f->derived.inverse_stiffness};
 }
 
@@ -199,7 +200,7 @@ void follow_signals(tendonfmu_finger* f, double step, double velocity_gain) {
         next[j] = d.angle[j];
         next[n + j] = given ? d.velocity[j] : first ? 0.0 : filtered;
       }
-      memcpy(next + 2 * n, d.position, f->tendons * sizeof(double));
+      memcpy(next + 2 * n, d.position_behind, f->tendons * sizeof(double));
     }
   }
 }

@@ -74,6 +74,7 @@ void remember_extensions(tendonfmu_finger* finger);
 /* A direction in the space of the signals, or what the effects make of one. */
 typedef struct signal_derivative {
   double force[MODEL_MAX_TENDONS], position[MODEL_MAX_TENDONS], angle[MODEL_MAX_JOINTS], velocity[MODEL_MAX_JOINTS];
+  double position_behind[MODEL_MAX_TENDONS]; /* behind the play of a tendon */
 } signal_derivative;
 
 /* Adds what position and force make of the joint angles, where these come from them. */
@@ -83,7 +84,8 @@ void angles_along(const tendonfmu_finger* finger, signal_derivative* derivative)
  * last remembered. */
 void derive_signals(const tendonfmu_finger* finger, size_t n, uint32_t k, int in_step, signal_derivative* derivative);
 
-/* By number k of a signal row, at the sample last remembered: [n] ∂q, [n] ∂q̇, [m] ∂x0, [effect_memory]. */
+/* By number k of a signal row, at the sample last remembered: [n] ∂q, [n] ∂q̇, [m] ∂z behind the play of
+ * a tendon, [effect_memory]. */
 const double* signal_slopes(const tendonfmu_finger* finger, const extension_row* row, uint32_t k);
 
 /* Turns a direction of the inputs into that of what the signal rows made of them, at the sample last remembered; before

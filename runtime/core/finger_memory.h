@@ -49,7 +49,7 @@ typedef struct extension_row {
   double *memory, *next; /* as the last sample left it; as the present one will */
   size_t memory_count;   /* of the effect itself */
   size_t offset;         /* of its memory among the effect_memory; not of signals */
-  double* slopes; /* of signals, in memory, by each number: [n] ∂q, [n] ∂q̇, [m] ∂x0, [effect_memory]; next too */
+  double* slopes; /* of signals, in memory, by each number: [n] ∂q, [n] ∂q̇, [m] ∂z, [effect_memory]; next too */
   double* next_slopes;
 } extension_row;
 

@@ -137,7 +137,7 @@ typedef struct model_item {
 int model_visit(const model_shape* shape, int (*visit)(void* context, const model_item* item), void* context);
 
 /* Where row `index` of the extensions acts, and how many numbers it remembers: its own, and, where it changes signals,
- * by each of its numbers ∂q and ∂q̇ of every joint, ∂x0 of every tendon and the derivative of all effect_memory. */
+ * by each of its numbers ∂q and ∂q̇ of every joint, ∂z of every tendon and the derivative of all effect_memory. */
 effect_place model_extension_place(const model_shape* shape, uint32_t index);
 size_t model_extension_memory(const effect_type* effect, const model_shape* shape, effect_place place);
 

@@ -72,7 +72,8 @@ typedef struct effect_signals {
   double *force, *position;                     /* [m] f0, x0 */
   double *angle, *velocity;                     /* [n]; velocity with source 3 only */
   const double* inverse_stiffness;              /* [m] 1/k, m/N */
-  const double *position_before, *angle_before; /* of directions: what they were at the sample before; NULL: 0 */
+  const double *position_before, *angle_before; /* of directions: behind a play at the sample before; NULL: 0 */
+  double* position_behind;                      /* [m] of directions: receives the same of this sample; NULL: not */
 } effect_signals;
 
 /* What an effect makes of the friction at one place: F = share·|F(v)| where it slides at all times, else factor times

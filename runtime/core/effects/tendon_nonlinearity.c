@@ -22,6 +22,9 @@ static size_t state_count(size_t joints, size_t tendons, effect_place place) {
 static void signal(effect_place place, const double* values, effect_signals* signals, const double* before,
                    double* after) {
   (void)before;
+  if (signals->source != 1) {
+    after[BY_HARDENING] = after[BY_FORCE] = 0.0; /* not what another source left there */
+  }
   if (signals->late || signals->source != 1) {
     return;
   }
@@ -39,12 +42,16 @@ static void signal_slope(effect_place place, const double* values, uint32_t k, c
                          effect_signals* derivative) {
   (void)values;
   (void)k;
-  derivative->position[place.tendon] += memory[BY_HARDENING];
+  if (!derivative->late) {
+    derivative->position[place.tendon] += memory[BY_HARDENING];
+  }
 }
 
 static void signal_pass(effect_place place, const double* values, const double* memory, effect_signals* direction) {
   (void)values;
-  direction->position[place.tendon] += memory[BY_FORCE] * direction->force[place.tendon];
+  if (!direction->late) {
+    direction->position[place.tendon] += memory[BY_FORCE] * direction->force[place.tendon];
+  }
 }
 
 const effect_type effect_tendon_nonlinearity = {

@@ -33,8 +33,8 @@ typedef struct late_rows {
   size_t count[2];
 } late_rows;
 
-static late_rows rows_of(const double* values, const effect_signals* s) {
-  if (values[0] < 0.0) {
+static late_rows rows_of(int forces, const effect_signals* s) {
+  if (forces) {
     return (late_rows){{s->force, NULL}, {s->tendons, 0}};
   }
   if (s->source == 1) {
@@ -77,16 +77,16 @@ static void signal(effect_place place, const double* values, effect_signals* sig
   }
   const size_t width = width_of(signals->joints, signals->tendons);
   memcpy(after, before, state_count(signals->joints, signals->tendons, place) * sizeof(double));
-  const double forces = values[0] < 0.0 ? 1.0 : 0.0;
-  const int begins = signals->first || before[FORCES] != forces; /* or the parameter has changed its sign */
+  const int forces = values[0] < 0.0;
+  const int begins = signals->first || (before[FORCES] != 0.0) != forces; /* or the parameter has changed its sign */
   const size_t count_before = begins ? 0 : whole_number(before[COUNT], KEPT);
   const size_t newest = count_before ? (whole_number(before[NEWEST], KEPT - 1) + 1) % KEPT : 0;
   const size_t count = count_before < KEPT ? count_before + 1 : KEPT;
   double *slopes = after + TIMES + KEPT, *kept = slopes + width, *now = kept + newest * width;
-  const late_rows rows = rows_of(values, signals);
+  const late_rows rows = rows_of(forces, signals);
   after[NEWEST] = (double)newest;
   after[COUNT] = (double)count;
-  after[FORCES] = forces;
+  after[FORCES] = forces ? 1.0 : 0.0;
   after[TIMES + newest] = signals->time;
   for (size_t r = 0, at = 0; r < 2; at += rows.count[r++]) {
     for (size_t i = 0; i < rows.count[r]; ++i) {
@@ -99,7 +99,7 @@ static void signal(effect_place place, const double* values, effect_signals* sig
     for (size_t i = 0; i < rows.count[r]; ++i) {
       const double older = kept[b.older * width + at + i], newer = kept[b.newer * width + at + i];
       rows.row[r][i] = newer + (1.0 - b.weight) * (older - newer);
-      slopes[at + i] = (values[0] < 0.0 ? 1.0 : -1.0) * (newer - older) * b.inverse_length;
+      slopes[at + i] = (forces ? 1.0 : -1.0) * (newer - older) * b.inverse_length;
     }
   }
 }
@@ -107,12 +107,13 @@ static void signal(effect_place place, const double* values, effect_signals* sig
 static void signal_slope(effect_place place, const double* values, uint32_t k, const double* memory,
                          effect_signals* derivative) {
   (void)place;
+  (void)values; /* they may have changed since the sample */
   (void)k;
   if (derivative->late) {
     return;
   }
   const double* slopes = memory + TIMES + KEPT;
-  const late_rows rows = rows_of(values, derivative);
+  const late_rows rows = rows_of(memory[FORCES] != 0.0, derivative);
   for (size_t r = 0, at = 0; r < 2; at += rows.count[r++]) {
     for (size_t i = 0; i < rows.count[r]; ++i) {
       rows.row[r][i] += slopes[at + i];
@@ -122,10 +123,11 @@ static void signal_slope(effect_place place, const double* values, uint32_t k, c
 
 static void signal_pass(effect_place place, const double* values, const double* memory, effect_signals* direction) {
   (void)place;
+  (void)values;
   if (direction->late) {
     return;
   }
-  const late_rows rows = rows_of(values, direction);
+  const late_rows rows = rows_of(memory[FORCES] != 0.0, direction);
   for (size_t r = 0; r < 2; ++r) {
     for (size_t i = 0; i < rows.count[r]; ++i) {
       rows.row[r][i] *= memory[SHARE];
