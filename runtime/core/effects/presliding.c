@@ -32,6 +32,11 @@ static size_t state_count(size_t joints, size_t tendons, effect_place place) {
   return MEMORY_ROWS * member_count(place, joints);
 }
 
+/* finite: no slope may be a reason to refuse a sample */
+static double bounded(double slope) {
+  return slope > 1e290 ? 1e290 : slope < -1e290 ? -1e290 : slope;
+}
+
 static void advance(effect_place place, const double* values, const effect_sample* sample, const double* before,
                     double* after) {
   const size_t count = member_count(place, sample->joints);
@@ -39,12 +44,13 @@ static void advance(effect_place place, const double* values, const effect_sampl
     const double v = place.joint != EFFECT_NOWHERE ? sample->velocity[place.joint]
                                                    : sample->tendon_velocity[k * sample->lanes + place.tendon];
     const double travel = sample->first ? 0.0 : v * sample->step, side = travel < 0.0 ? -1.0 : 1.0;
-    const double kept = law_exponential(fabs(travel) / values[0]), left = side - before[SHARE];
+    const double ratio = fabs(travel) / values[0], kept = law_exponential(ratio), left = side - before[SHARE];
     after[SHARE] = travel == 0.0 ? before[SHARE] : side - left * kept;
-    const int lasts = kept > 0.0; /* else its slopes are 0, however short the displacement */
+    /* nothing is left of where it was: slopes of 0, however short the displacement */
+    const int lasts = ratio < 700.0;
     after[BY_DISPLACEMENT] =
-        lasts ? kept * (before[BY_DISPLACEMENT] - left * fabs(travel) / values[0] / values[0]) : 0.0;
-    after[BY_VELOCITY] = lasts && !sample->first ? left * kept * side * sample->step / values[0] : 0.0;
+        lasts ? bounded(kept * (before[BY_DISPLACEMENT] - bounded(left * ratio / values[0]))) : 0.0;
+    after[BY_VELOCITY] = lasts && !sample->first ? bounded(left * kept * side * sample->step / values[0]) : 0.0;
   }
 }
 

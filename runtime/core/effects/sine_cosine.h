@@ -10,7 +10,7 @@ typedef struct sine_cosine {
 } sine_cosine;
 
 static inline sine_cosine sine_cosine_of(double angle) {
-  const double limit = 1e5, x = angle < -limit ? -limit : angle > limit ? limit : angle;
+  const double limit = 1e5, x = angle > -limit ? (angle < limit ? angle : limit) : -limit; /* NaN: −1e5 too */
 
   /* x = k·π/2 + r with |r| <= π/4; adding 1.5·2^52 rounds to the integer k. π/2 in three parts, of which the products
    * with k are exact */
