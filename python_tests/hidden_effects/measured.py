@@ -191,21 +191,28 @@ def free_of_delay(machine: Machine) -> Machine:
 
 
 def free_of_spring(machine: Machine) -> Machine:
-    cover = machine.model["joints"][0].get("cover")
-    if not cover:
-        return machine
+    """Recordings less all torques that follow the angle alone, as the model has them: cover and weight."""
+    cover = machine.model["joints"][0].get("cover") or {"stiffness": 0.0, "rest_angle": 0.0}
+    weights, cubes = rows_of(machine.model, "gravity"), rows_of(machine.model, "cover_hardening")
 
     def taken(columns: Columns) -> Columns:
-        bent = angle_of(machine, columns) - cover.get("rest_angle", 0.0)
-        return add_torque(machine, columns, -cover["stiffness"] * bent)
+        angle = angle_of(machine, columns)
+        bent = angle - cover.get("rest_angle", 0.0)
+        torque = cover["stiffness"] * bent
+        for row in weights:
+            torque = torque + row.get("sine", 0.0) * np.sin(angle) + row.get("cosine", 0.0) * np.cos(angle)
+        for row in cubes:
+            torque = torque + row["stiffness"] * bent**3
+        return add_torque(machine, columns, -torque)
 
-    model = copy.deepcopy(machine.model)
-    model["joints"][0].pop("cover")
+    model = without_rows(machine.model, "gravity", "cover_hardening")
+    model["joints"][0].pop("cover", None)
     return replace(machine, model=model, recordings={k: taken(v) for k, v in machine.recordings.items()})
 
 
 def free_of_growth(machine: Machine) -> Machine:
-    """Recordings less the friction that grows with the force, as the model has it."""
+    """Recordings less the friction that grows with the force, as the model's rows have it; a law of the joint that does
+    so stays, and takes its share of what is hidden."""
     rows = rows_of(machine.model, "load_friction")
     if not rows:
         return machine
