@@ -15,6 +15,7 @@ pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not i
 
 from command import Call
 from real_browser import Elements, find_browser, measure
+from tendonfmu import demo
 from tendonfmu.tables import read_table
 
 HIDDEN = Path(__file__).resolve().parents[1] / "examples" / "demo_recording" / "two_joints_hidden.json"
@@ -34,6 +35,13 @@ def test_the_demo_tells_the_whole_story(call: Call, tmp_path: Path) -> None:
     is_self_contained(folder, page)
     tells_the_same(page, answer.out)
     fits_screens(tmp_path, page)
+
+
+def test_chapters_that_cannot_be_are_left_out_loudly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(demo, "HAS_ESTIMATION", False)
+    story = demo.Story(tmp_path / "out")
+    assert [each.name for each in story.chapters] == ["run", "detect"]
+    assert "fit and diagnose are left out: " in story.missing and "Eigen" in story.missing
 
 
 def says_every_chapter(out: str, err: str) -> None:

@@ -63,7 +63,7 @@ def _left(finger: str, results: Sequence[RecordingResult]) -> Table:
 
 
 def _pushed(result: RecordingResult) -> Table:
-    rows = [
+    rows: list[Row] = [
         (
             joint.name,
             f"{1e3 * joint.measured:.1f} → {1e3 * joint.left:.1f}",
