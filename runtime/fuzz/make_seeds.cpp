@@ -45,7 +45,7 @@ std::vector<std::string> extended_fingers() {
   std::vector<std::string> fingers = {every.dump()};
   for (nlohmann::json& row : late.at("extensions")) {
     nlohmann::json alone = nlohmann::json::parse(test_finger::json);
-    alone["extensions"] = {row};
+    alone["extensions"] = nlohmann::json::array({row});
     fingers.push_back(alone.dump());
     if (row.contains("delay")) row["delay"] = -0.004;
   }

@@ -208,7 +208,7 @@ Parabola random_parabola(Index p, std::mt19937_64* random) {
   Parabola q{MatrixXd::NullaryExpr(p, p, [&] { return normal(*random); }), some(2.0), some(1.0), empty_box()};
   q.h = (q.h * q.h.transpose()).eval();
   q.h.diagonal().array() += 0.01;
-  q.box.rates.clear();
+  q.box.curved.clear();
   q.box.lower = q.box.upper = q.x;
   for (Index k = 0; k < p; ++k) { /* at a side, at both, inside, or unbounded */
     const double kind = uniform(*random);
@@ -274,7 +274,7 @@ TEST(BoxedStep, MovesNothingWhereEverythingIsHeld) {
 /* an unknown that nothing depends on, and two that only their sum shows: without a prior h is singular */
 TEST(BoxedStep, IsFiniteWhereTheMatrixIsSingular) {
   Parabola q{MatrixXd::Zero(4, 4), VectorXd::Zero(4), VectorXd::Constant(4, 0.5), empty_box()};
-  q.box.rates.clear();
+  q.box.curved.clear();
   q.box.lower = VectorXd::Zero(4);
   q.box.upper = VectorXd::Constant(4, 3.0);
   q.h(1, 1) = q.h(1, 2) = q.h(2, 1) = q.h(2, 2) = 4e6;
