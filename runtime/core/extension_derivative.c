@@ -58,12 +58,9 @@ static double other_grips(const tendonfmu_finger* f, const extension_row* row, s
   double product = 1.0;
   for (size_t r = 0; r < f->extensions.friction; ++r) {
     const extension_row* other = friction_row(f, r);
-    const size_t members = other == row ? 0 : friction_members(f, other->place);
-    for (size_t k = 0; k < members; ++k) {
-      if (friction_slot(f, other->place, k) == slot) {
-        product *=
-            other->effect->grip(other->place, other->parameters, other->memory, friction_member(other->place, k)).value;
-      }
+    size_t member;
+    if (other != row && friction_acts_on(f, other->place, slot, &member)) {
+      product *= other->effect->grip(other->place, other->parameters, other->memory, member).value;
     }
   }
   return product;

@@ -311,6 +311,19 @@ size_t friction_member(effect_place place, size_t k) {
   return place.tendon != EFFECT_NOWHERE ? k : 0;
 }
 
+int friction_acts_on(const tendonfmu_finger* f, effect_place place, size_t slot, size_t* member) {
+  const size_t lanes = f->tendon_lanes, joint_row = f->joints * lanes;
+  *member = 0;
+  if (place.joint != EFFECT_NOWHERE) {
+    return slot == joint_row + place.joint;
+  }
+  if (place.tendon != EFFECT_NOWHERE) {
+    *member = slot / lanes;
+    return slot < joint_row && slot % lanes == place.tendon;
+  }
+  return slot < joint_row ? slot % lanes < f->tendons : slot - joint_row < f->joints;
+}
+
 static void add_grip(slot_grip* to, const effect_grip* grip) {
   to->value *= grip->value;
   to->slides |= grip->slides;
@@ -321,13 +334,10 @@ slot_grip slot_grip_of(const tendonfmu_finger* f, size_t slot) {
   slot_grip found = {.value = 1.0, .bias = 1.0};
   for (size_t r = 0; r < f->extensions.friction; ++r) {
     const extension_row* row = friction_row(f, r);
-    const size_t members = friction_members(f, row->place);
-    for (size_t k = 0; k < members; ++k) {
-      if (friction_slot(f, row->place, k) == slot) {
-        const effect_grip grip =
-            row->effect->grip(row->place, row->parameters, row->memory, friction_member(row->place, k));
-        add_grip(&found, &grip);
-      }
+    size_t member;
+    if (friction_acts_on(f, row->place, slot, &member)) {
+      const effect_grip grip = row->effect->grip(row->place, row->parameters, row->memory, member);
+      add_grip(&found, &grip);
     }
   }
   return found;
@@ -337,20 +347,17 @@ double slot_grip_slope(const tendonfmu_finger* f, size_t slot, double velocity_s
   double value = 1.0, slope = 0.0;
   for (size_t r = 0; r < f->extensions.friction; ++r) {
     const extension_row* row = friction_row(f, r);
-    const size_t members = friction_members(f, row->place);
-    for (size_t k = 0; k < members; ++k) {
-      if (friction_slot(f, row->place, k) != slot) {
-        continue;
-      }
-      const size_t member = friction_member(row->place, k);
-      const effect_grip own = row->effect->grip(row->place, row->parameters, row->memory, member);
-      double own_slope = own.by_velocity * velocity_slope;
-      if (memory_slope && row->effect->advance_slope) {
-        own_slope = row->effect->grip(row->place, row->parameters, memory_slope + row->offset, member).value;
-      }
-      slope = slope * own.value + value * own_slope;
-      value *= own.value;
+    size_t member;
+    if (!friction_acts_on(f, row->place, slot, &member)) {
+      continue;
     }
+    const effect_grip own = row->effect->grip(row->place, row->parameters, row->memory, member);
+    double own_slope = own.by_velocity * velocity_slope;
+    if (memory_slope && row->effect->advance_slope) {
+      own_slope = row->effect->grip(row->place, row->parameters, memory_slope + row->offset, member).value;
+    }
+    slope = slope * own.value + value * own_slope;
+    value *= own.value;
   }
   return slope;
 }

@@ -29,6 +29,9 @@ size_t friction_slot(const tendonfmu_finger* finger, effect_place place, size_t 
 /* The member as effect_type.grip() counts it. */
 size_t friction_member(effect_place place, size_t k);
 
+/* Whether such a row acts on a slot, and which member it is there, as effect_type.grip() counts it. */
+int friction_acts_on(const tendonfmu_finger* finger, effect_place place, size_t slot, size_t* member);
+
 /* What all friction rows together make of a slot, from the memory: F = value·|F(v)| where it slides, else value·F; b is
  * multiplied by bias. */
 typedef struct slot_grip {

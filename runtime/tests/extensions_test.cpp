@@ -217,6 +217,29 @@ TEST(Presliding, OfTheShortestDisplacementsTakesEverySample) {
   }
 }
 
+// --- places ----------------------------------------------------------------------------------------------------------
+
+TEST(Places, OfARowAreTheSlotsThatItActsOn) {
+  Finger finger(test_finger::image());
+  const effect_place places[] = {{0, EFFECT_NOWHERE},
+                                 {1, EFFECT_NOWHERE},
+                                 {EFFECT_NOWHERE, 0},
+                                 {EFFECT_NOWHERE, 2},
+                                 {EFFECT_NOWHERE, EFFECT_NOWHERE}};
+  for (const effect_place& place : places) {
+    std::vector<std::size_t> member(finger.handle->slots, 99);
+    for (std::size_t k = 0; k < friction_members(finger, place); ++k) {
+      member[friction_slot(finger, place, k)] = friction_member(place, k);
+    }
+    for (std::size_t slot = 0; slot < finger.handle->slots; ++slot) {
+      std::size_t found = 0;
+      const bool acts = friction_acts_on(finger, place, slot, &found) != 0;
+      EXPECT_EQ(acts, member[slot] != 99) << "slot " << slot;
+      EXPECT_TRUE(!acts || found == member[slot]) << "slot " << slot;
+    }
+  }
+}
+
 // --- derivatives -----------------------------------------------------------------------------------------------------
 
 // numbers that change afterwards do not change what the sample was
