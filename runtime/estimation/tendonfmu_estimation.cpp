@@ -76,9 +76,10 @@ const SegmentStates& states_at(tendonfmu_estimator* estimator, std::size_t recor
   }
   auto& last = estimator->last;
   if (last.states.empty() || last.recording != recording || last.z != z) {
-    last.states = states_with(r, finger, rows, numbers);
-    last.recording = recording;
+    last.states.clear(); /* nothing, should anything fail from here on */
     last.z = z;
+    last.recording = recording;
+    last.states = states_with(r, finger, rows, numbers);
   }
   return last.states;
 }
