@@ -57,11 +57,12 @@ def phase_bar(bar: Progress) -> Callable[[str, int, int | None], None]:
     now = ""
 
     def show(phase: str, done: int, total: int | None) -> None:
-        nonlocal now
-        if phase != now:
-            bar.reset(task, total=total)
+        nonlocal now, task
+        if phase != now:  # another task: a total, once given, cannot be taken back
+            bar.remove_task(task)
+            task = bar.add_task(phase, total=total)
             now = phase
-        bar.update(task, completed=done, total=total, description=phase)
+        bar.update(task, completed=done, total=total)
 
     return show
 
