@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -51,16 +51,16 @@ PAIRS = (
 )
 
 
-def fitting_hand(effect: str, seed: int, attempt: int, options: dict[str, Any]) -> Hand:
-    """A finger on which the effect is possible, with the sensors that show it."""
+def fitting_hand(effects: Collection[str], seed: int, attempt: int, options: dict[str, Any]) -> Hand:
+    """A finger on which the effects are possible, with the sensors that show them."""
     joints = options["joints"]
-    source = 1 if effect == "tendon_nonlinearity" else 2
-    if effect in ("pulley_friction", "joint_coupling"):
+    source = 1 if "tendon_nonlinearity" in effects else 2
+    if {"pulley_friction", "joint_coupling"} & set(effects):
         joints = max(joints, 2)
     return random_hand(
         seed * 1000 + attempt,
         joints,
-        presliding=options["presliding"] and effect != "stribeck",
+        presliding=options["presliding"],
         source=source,
         rate=options["rate"],
         wander=options["wander"],
@@ -112,14 +112,14 @@ def facts_of(label: dict[str, Any]) -> dict[str, Any]:
 def null(folder: Path, seed: int, **given: Any) -> dict[str, Any]:
     """Nothing hidden."""
     options = settings(given)
-    hand = fitting_hand("", seed, 0, options)
+    hand = fitting_hand((), seed, 0, options)
     return files(folder, hand, record(hand, seed, options["seconds"]), seed, options)
 
 
 def suitable(effect: str, strength: float | None, seed: int, options: dict[str, Any], absorbed: bool) -> Any:
     """The first finger and place at which the effect survives refitting, or is absorbed by it, as wanted."""
     for attempt in range(ATTEMPTS):
-        hand = fitting_hand(effect, seed, attempt, options)
+        hand = fitting_hand((effect,), seed, attempt, options)
         if absorbed:
             hand = replace(hand, tension_time=SLOW_TENSION)
         try:
@@ -168,7 +168,7 @@ def double(folder: Path, effects: list[str], strength: float, seed: int, **given
     """Two effects, each of the strength by itself."""
     options = settings(given)
     for attempt in range(ATTEMPTS):
-        hand = fitting_hand(effects[0], seed, attempt, options)
+        hand = fitting_hand(effects, seed, attempt, options)
         try:
             hidden = []
             for k, effect in enumerate(effects):  # both are taken out of the descriptions before either is scaled
@@ -195,7 +195,7 @@ def double(folder: Path, effects: list[str], strength: float, seed: int, **given
 def contact(folder: Path, seed: int, **given: Any) -> dict[str, Any]:
     """Nothing hidden, but somebody touches the finger a few times and no label says so."""
     options = settings(given)
-    hand = fitting_hand("", seed, 0, options)
+    hand = fitting_hand((), seed, 0, options)
     rng = np.random.default_rng([seed, 64])
     time = np.arange(round(options["seconds"] * hand.rate)) / hand.rate
     load = np.zeros((len(time), options["joints"]))

@@ -113,6 +113,8 @@ def missing_law(name: str, kind: str, size: float, speed: float) -> Builder:
 
     def build(hand: Hand, rng: Random) -> tuple[Hand, Hidden]:
         m, n = len(hand.truth["tendons"]), len(hand.truth["joints"])
+        if kind == "pulley" and n < 2:
+            raise Unreachable("pulley_friction: one joint alone has no pulley that a tendon runs over")
         at = (int(rng.integers(m)), int(rng.integers(n - (kind == "pulley")))) if kind in ("edge", "pulley") else (
             int(rng.integers(n)),)  # fmt: skip
         shape = np.array([1.0, 0.4 * (rng.random() < 0.5), speed, 0.0])
