@@ -209,7 +209,7 @@ def _possible(data: Mapping[str, Any], causes: Sequence[Accepted]) -> list[Accep
     for cause in causes:
         try:
             data = cause.added_to(data)
-        except KeyError:
+        except (KeyError, StopIteration):  # no such law
             continue
         found.append(cause)
     return found
