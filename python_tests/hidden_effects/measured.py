@@ -82,8 +82,12 @@ def add_torque(machine: Machine, columns: Columns, torque: Array) -> Columns:
 
 
 def coulomb(machine: Machine, columns: Columns, magnitude: float) -> Columns:
-    """Coulomb friction in the joint, N·m."""
-    return add_torque(machine, columns, magnitude * side_of(machine, columns))
+    """Coulomb friction in the joint, N·m; where the model's joint has presliding, it turns round over that distance."""
+    side = side_of(machine, columns)
+    for row in rows_of(machine.model, "presliding"):
+        angle = angle_of(machine, columns)
+        side = built_up(side, np.diff(angle, prepend=angle[0]), row["displacement"])
+    return add_torque(machine, columns, magnitude * side)
 
 
 def gain(machine: Machine, columns: Columns, magnitude: float) -> Columns:
@@ -171,7 +175,9 @@ def free_of_friction(machine: Machine) -> Machine:
             torque = np.abs(torque) * built_up(side, step, row["displacement"])
         return add_torque(machine, columns, -torque - constant * side)
 
-    model = without_rows(machine.model, "stribeck", "presliding", "preload_friction")
+    # presliding stays where the joint has friction that grows with the load, which it acts on too
+    kept = machine.model["joints"][0].get("load_friction") is not None
+    model = without_rows(machine.model, "stribeck", "preload_friction", *([] if kept else ["presliding"]))
     model["joints"][0]["friction"] = None
     return replace(machine, model=model, recordings={k: taken(v) for k, v in machine.recordings.items()})
 
