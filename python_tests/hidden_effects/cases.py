@@ -55,8 +55,8 @@ def fitting_hand(effects: Collection[str], seed: int, attempt: int, options: dic
     """A finger on which the effects are possible, with the sensors that show them."""
     joints = options["joints"]
     source = 1 if "tendon_nonlinearity" in effects else 2
-    if {"pulley_friction", "joint_coupling"} & set(effects):
-        joints = max(joints, 2)
+    if {"pulley_friction", "joint_coupling", "rubbing"} & set(effects):
+        joints = max(joints, 2)  # tendons of one joint rub by its velocity: that is friction that grows with the load
     return random_hand(
         seed * 1000 + attempt,
         joints,

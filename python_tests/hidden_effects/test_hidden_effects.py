@@ -36,39 +36,41 @@ def sets_of(found: Search) -> list[set[str]]:
     return [{cause.found.trial.effect, *(trial.effect for trial in cause.found.alike)} for cause in found.causes]
 
 
-# effect: strength, seed, on the presliding rig. The seed is the first one whose finger has a place where the effect
-# survives refitting; strengths are those at which a recording of 40 s is long enough.
+# effect: on the presliding rig, s of the recording. What shows little in each stroke wants more of them: with 40 s the
+# family-wise test over all effects and places does not see it.
 SINGLES = {
-    "viscous_friction": (0.3, 1, False),
-    "stribeck": (0.3, 1, False),
-    "asymmetric_friction": (0.3, 1, True),
-    "edge_friction": (0.3, 1, False),
-    "pulley_friction": (0.3, 1, True),
-    "joint_friction": (0.3, 1, False),
-    "joint_load_friction": (0.3, 1, True),
-    "preload_friction": (0.3, 1, False),
-    "load_friction": (0.3, 1, True),
-    "cover_stiffness": (0.3, 1, False),
-    "cover_hardening": (0.3, 1, True),
-    "gravity": (0.3, 1, False),
-    "inertia": (0.3, 1, True),
-    "presliding": (0.3, 1, False),
-    "friction_drift": (0.3, 1, True),
-    "joint_coupling": (0.3, 1, False),
-    "force_gain": (0.3, 1, True),
-    "time_delay": (0.3, 1, True),
-    "moment_arm": (0.3, 1, False),
-    "moment_arm_variation": (0.3, 1, True),
-    "pulley_eccentricity": (0.3, 1, False),
-    "tendon_nonlinearity": (0.3, 1, True),
-    "backlash": (0.3, 1, True),
+    "viscous_friction": (False, 40.0),
+    "stribeck": (False, 40.0),
+    "asymmetric_friction": (True, 40.0),
+    "edge_friction": (False, 40.0),
+    "pulley_friction": (True, 40.0),
+    "joint_friction": (False, 40.0),
+    "joint_load_friction": (True, 60.0),
+    "preload_friction": (False, 40.0),
+    "load_friction": (True, 40.0),
+    "cover_stiffness": (False, 40.0),
+    "cover_hardening": (True, 40.0),
+    "gravity": (False, 40.0),
+    "inertia": (True, 40.0),
+    "presliding": (False, 40.0),
+    "friction_drift": (True, 40.0),
+    "joint_coupling": (False, 40.0),
+    "force_gain": (True, 40.0),
+    "time_delay": (False, 40.0),
+    "moment_arm": (False, 40.0),
+    "moment_arm_variation": (True, 40.0),
+    "pulley_eccentricity": (False, 40.0),
+    "tendon_nonlinearity": (True, 60.0),
+    "backlash": (True, 40.0),
 }
+STRENGTH = 0.3
 
 
 @pytest.mark.parametrize("effect", SINGLES)
 def test_one_hidden_effect_is_in_the_reported_set(effect: str, tmp_path: Path) -> None:
-    strength, seed, presliding = SINGLES[effect]
-    made = cases.single(tmp_path, effect, strength, seed, presliding=presliding, **SHORT)
+    presliding, seconds = SINGLES[effect]
+    options: dict[str, Any] = SHORT | {"seconds": seconds}
+    made = cases.single(tmp_path, effect, STRENGTH, 1, presliding=presliding, **options)
     assert made["facts"]["surviving_share"] >= cases.VISIBLE
     assert any(effect in names for names in sets_of(searched(tmp_path, made)))
 
