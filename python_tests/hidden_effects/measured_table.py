@@ -211,6 +211,20 @@ def table(rows: list[dict[str, Any]]) -> Iterator[str]:
                 yield f"| {machine} | {effect} | {strength} | {share} | {rates} | {size} | {rate(of, 'invisible')} |"
 
 
+def pooled(rows: list[dict[str, Any]]) -> Iterator[str]:
+    """All effects of a machine and strength together."""
+    yield "| machine | strength | cases | detected | in the set | first |"
+    yield "| --- | ---: | ---: | ---: | ---: | ---: |"
+    for machine in MACHINES:
+        for strength in (0.0, *STRENGTHS):
+            of = [row for row in rows if row["machine"] == machine and float(row["strength"]) == strength]
+            if of:
+                rates = [
+                    rate(of, name) if strength or name == "detected" else "" for name in ("detected", "named", "first")
+                ]
+                yield f"| {machine} | {strength or 'nothing hidden'} | {len(of)} | {' | '.join(rates)} |"
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("-o", "--output", type=Path, required=True, help="rows, .csv; goes on where it ended")
@@ -219,7 +233,8 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=1e6, help="begin no case after these")
     options = parser.parse_args()
     run_all(cases_of(options.cases), options.output, options.jobs, options.minutes)
-    for line in table(read_rows(options.output)):
+    rows = read_rows(options.output)
+    for line in [*pooled(rows), "", *table(rows)]:
         print(line)
 
 
