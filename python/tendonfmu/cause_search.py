@@ -128,7 +128,7 @@ def surviving_shares(problem: Problem) -> Numbers:
     joints = values.shape[1]
     nominal = np.asarray(problem.nominal[used], dtype=np.float64)
     own = np.stack([without(nominal[:, j], span) for j in range(joints)], axis=1)
-    refit = basis(own.reshape(-1, own.shape[2]))
+    refit = basis(own.reshape(own.shape[0] * joints, own.shape[2]))
     found = np.zeros(len(problem.bank.trials))
     for k, trial in enumerate(problem.bank.trials):
         columns = np.asarray(values[used, :, trial.first : trial.first + trial.count], dtype=np.float64)

@@ -245,7 +245,11 @@ class _Result:
     def _remainder(self, residual: Numbers, view: View) -> Remainder:
         nominal = np.asarray(view.problem.nominal, dtype=np.float64)
         nuisance = [np.hstack([view.bias, nominal[:, j]]) for j in range(nominal.shape[1])]
-        return measure_remainder(view.series, residual, nuisance, seed=self._seed)
+        force = [
+            segment.mean(view.predicted[segment.recording].recording.groups["tendon_force"][segment.part])
+            for segment in make_grid(view.recordings).segments
+        ]
+        return measure_remainder(view.series, residual, nuisance, force=np.concatenate(force), seed=self._seed)
 
     def _torque(self) -> Numbers:
         """[B, n] N·m: what is to be explained."""
@@ -318,4 +322,4 @@ def _unexplained(left: Remainder, residual: Numbers, series: Series) -> Unexplai
     shares = np.maximum(np.array(left.share), 0.0)
     whole = float(variance.sum())
     share = float(shares @ variance) / whole if whole > 0 and left.unknown else 0.0
-    return Unexplained(share, left.description, tuple(float(value) for value in shares))
+    return Unexplained(share, left.description, tuple(float(value) for value in shares), left.p_value, left.unknown)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.contact_scan import LEVEL as SCAN_LEVEL
 from tendonfmu.diagnosis_result import (
     Cause,
     DetectionGain,
@@ -26,6 +27,11 @@ from tendonfmu.finite_numbers import finite
 FORMAT = "tendonfmu-diagnosis-1"
 REPORT, NOMINAL, EXTENDED, EXTENDED_FMU = "diagnosis.json", "nominal.json", "extended.json", "extended.fmu"
 DIGITS = 6  # of what is drawn
+UNMENDED = {
+    "contact": "the recording is not free of contact",
+    "unknown": "something that no effect of the list explains",
+}
+CONTACT = 6.0  # nominal residuals rms that an event's peak is, at least, to be called contact among the causes
 
 
 def build_report(found: Diagnosis, files: Sequence[str] = ()) -> dict[str, Any]:
@@ -47,7 +53,7 @@ def build_report(found: Diagnosis, files: Sequence[str] = ()) -> dict[str, Any]:
         },
         "noise_floor": found.noise_floor,
         "gain": _gain(found.gain),
-        "causes": [_cause(cause) for cause in found.causes],
+        "causes": [*(_cause(cause) for cause in found.causes), *_without_a_term(found)],
         "unexplained": {
             "share": found.unexplained.share,
             "description": found.unexplained.description,
@@ -122,6 +128,38 @@ def _cause(cause: Cause) -> dict[str, Any]:
         "share": cause.share,
         "first_gain": None if cause.first_gain is None else _gain(cause.first_gain),
         "evidence": [_evidence(each) for each in cause.evidence],
+    }
+
+
+def _without_a_term(found: Diagnosis) -> list[dict[str, Any]]:
+    """`contact` and `unknown`, which no term of the model mends: they gain nothing."""
+    causes = []
+    events = [event for event in found.events if event.peak >= CONTACT * max(found.nominal.train_rms)]
+    if events:
+        joints = {joint for event in events for joint in event.joints}
+        joint = joints.pop() if len(joints) == 1 else None
+        causes.append(_unmended("contact", joint, SCAN_LEVEL, events[0].description))
+    if found.unexplained.unknown:
+        shares = found.unexplained.by_joint
+        largest = int(np.argmax(shares)) + 1 if any(shares) else None
+        causes.append(_unmended("unknown", largest, found.unexplained.p_value, found.unexplained.description))
+    return causes
+
+
+def _unmended(effect: str, joint: int | None, p_value: float, size: str) -> dict[str, Any]:
+    return {
+        **_where(Where(effect, joint)),
+        "p_value": p_value,
+        "gain": _gain(Interval(0.0, 0.0, 0.0)),
+        "confusable_with": [],
+        "parameters": {},
+        "units": {},
+        "size": size,
+        "title": UNMENDED[effect],
+        "explanation": "",
+        "share": 0.0,
+        "first_gain": None,
+        "evidence": [],
     }
 
 

@@ -101,12 +101,15 @@ class Event:
 class Unexplained:
     """What no effect explains.
 
-    share: of the residual variance above the noise floor. interval: of it. where: joint → share.
+    share: of the residual variance above the noise floor; by_joint: of each. p_value: of there being nothing,
+    family-wise. unknown: whether there is something.
     """
 
     share: float
     description: str
     by_joint: tuple[float, ...] = ()
+    p_value: float = 1.0
+    unknown: bool = False
 
 
 @dataclass(frozen=True)

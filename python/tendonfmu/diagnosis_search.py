@@ -163,6 +163,7 @@ class _Rounds:
                 break
             if len(found) > 1 and _explained(found, self.view) > STRONG:
                 found = [selection.found(found[0].trial.place, [])]
+            found = _apart(found)
             taken = self._fitted([*causes, *(NamedCause(each, accepted_of(each)) for each in found)])
             if len(taken) <= len(causes):
                 break
@@ -211,6 +212,17 @@ class _Rounds:
                 self.view = look(found.model.data, self._recordings, self._grid, self._out)
                 break
         return causes
+
+
+def _apart(found: Sequence[Found]) -> list[Found]:
+    """Without what another cause brings: an effect everywhere, and the same at single places; the larger gain stays."""
+    kept: list[Found] = []
+    for each in found:
+        own = [other.trial for other in kept if other.trial.effect == each.trial.effect]
+        everywhere = [trial.joint is None and trial.tendon is None for trial in [each.trial, *own]]
+        if not own or not any(everywhere):
+            kept.append(each)
+    return kept
 
 
 def _gone(model: FittedModel, paths: Sequence[Sequence[str]]) -> list[bool]:

@@ -48,7 +48,7 @@ def model_alone(
 ) -> Model:
     """arrays: of `native.Finger.run`, one for each part; each begins anew. source: kinematics, 1 to 3."""
     joints, tendons = len(data["joints"]), len(data["tendons"])
-    probe = native.Finger(native.image_from_json(json.dumps(without_filter(data))), kinematics_source=source)
+    probe = native.Finger(native.image_from_json(json.dumps(_without_filter(data))), kinematics_source=source)
     start = probe.save_state()
     torque, jump, angle, speed = (np.full((samples, joints), np.nan) for _ in range(4))
     slack = np.zeros((samples, tendons), dtype=bool)
@@ -75,9 +75,9 @@ def delayed_torque(data: Mapping[str, Any], arrays: Mapping[str, Numbers], torqu
     return np.asarray(torque - arrays["tendon_force"] @ arms)
 
 
-def without_filter(data: Mapping[str, Any]) -> dict[str, Any]:
+def _without_filter(data: Mapping[str, Any]) -> dict[str, Any]:
     """The description whose bias moves by the jumps alone, and that never sees contact."""
-    bias = {key: value for key, value in (data.get("bias") or {}).items() if key == "forget_rate"}
+    bias = {key: value for key, value in (data.get("bias") or {}).items() if key in ("forget_rate", "entry_load")}
     still = {**bias, "drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": [0.0] * len(data["joints"])}
     return {**data, "bias": still, "contact": {"threshold": [_NEVER] * len(data["joints"])}}
 
