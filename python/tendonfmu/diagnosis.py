@@ -34,7 +34,7 @@ from tendonfmu.diagnosis_search import (
 from tendonfmu.diagnosis_series import Series, Trial, make_grid
 from tendonfmu.diagnosis_size import size_of
 from tendonfmu.errors import InputError
-from tendonfmu.extension_fit import Accepted, FitSettings, fit_extended
+from tendonfmu.extension_fit import Accepted, FitSettings, fit_extended, possible
 from tendonfmu.fit_recordings import FitRecording, Held, prepare, require_noise
 from tendonfmu.gain import Gain, measure_gain
 from tendonfmu.next_experiment import Experiments, Question, plan_experiments
@@ -261,10 +261,12 @@ class _Result:
     def _experiments(self) -> tuple[Experiments, tuple[Invisible, ...]]:
         """For confusion sets, and for what is not visible: one question for each effect, at the place that comes
         nearest to being visible."""
+        nominal = self._found.nominal.data
         rivals = [
-            Question(cause.accepted, _ordinary(trial))
+            Question(cause.accepted, rival)
             for cause in self._found.causes
-            for trial in cause.found.alike[:MOST_RIVALS]
+            for rival in map(_ordinary, cause.found.alike[:MOST_RIVALS])
+            if possible(nominal, [cause.accepted]) and possible(nominal, [rival])  # not on a law that another brought
         ]
         unseen = self._unseen()
         nearest: dict[str, Trial] = {}
@@ -273,7 +275,7 @@ class _Result:
         questions = [*rivals, *(Question(_ordinary(trial)) for trial in nearest.values())]
         self._phase("choosing the next experiment", 0, None)
         planned = plan_experiments(
-            self._found.nominal.data,  # that has no cause that is in question
+            nominal,  # that has no cause that is in question
             self._found.fitted_to,
             questions,
             noise=[float(value) for value in self._found.last.residual[self._series.used].std(axis=0)],
