@@ -34,7 +34,7 @@ from tendonfmu.diagnosis_search import (
 from tendonfmu.diagnosis_series import Series, Trial, make_grid
 from tendonfmu.diagnosis_size import size_of
 from tendonfmu.errors import InputError
-from tendonfmu.extension_fit import Accepted, FitSettings, fit_extended, possible
+from tendonfmu.extension_fit import Accepted, FitSettings, fit_extended
 from tendonfmu.fit_recordings import FitRecording, Held, prepare, require_noise
 from tendonfmu.gain import Gain, measure_gain
 from tendonfmu.next_experiment import Experiments, Question, plan_experiments
@@ -261,13 +261,13 @@ class _Result:
     def _experiments(self) -> tuple[Experiments, tuple[Invisible, ...]]:
         """For confusion sets, and for what is not visible: one question for each effect, at the place that comes
         nearest to being visible."""
-        nominal = self._found.nominal.data
+        nominal, source = self._found.nominal.data, self._found.fitted_to[0].kinematics
         rivals = [
             Question(cause.accepted, rival)
             for cause in self._found.causes
             for rival in map(_ordinary, cause.found.alike[:MOST_RIVALS])
-            if possible(nominal, [cause.accepted]) and possible(nominal, [rival])  # not on a law that another brought
-        ]
+            if all(each.place in each.candidate.places(nominal, source) for each in (cause.accepted, rival))
+        ]  # not about a law that another cause has brought
         unseen = self._unseen()
         nearest: dict[str, Trial] = {}
         for trial, _ in unseen:

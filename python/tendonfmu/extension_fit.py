@@ -203,7 +203,7 @@ def _parameters(model: FittedModel, paths: Sequence[str], units: Mapping[str, st
 # --- parts ------------------------------------------------------------------------------------------------------------
 
 
-def possible(data: Mapping[str, Any], causes: Sequence[Accepted]) -> list[Accepted]:
+def _possible(data: Mapping[str, Any], causes: Sequence[Accepted]) -> list[Accepted]:
     """Without those that change a law which only a cause that is not among them brings."""
     found = []
     for cause in causes:
@@ -218,7 +218,7 @@ def possible(data: Mapping[str, Any], causes: Sequence[Accepted]) -> list[Accept
 def _fit_with(
     nominal: FittedModel, causes: Sequence[Accepted], recordings: Sequence[FitRecording], settings: FitSettings
 ) -> FittedModel:
-    causes = possible(nominal.data, causes)
+    causes = _possible(nominal.data, causes)
     if not causes:
         return nominal
     begin = extended_description(nominal.data, causes)
