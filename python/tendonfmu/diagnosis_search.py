@@ -14,7 +14,7 @@ from tendonfmu.contact_scan import left_out, scan_events
 from tendonfmu.diagnosis_result import Event
 from tendonfmu.diagnosis_series import Grid, Series, Trial, make_grid
 from tendonfmu.effects import Candidate, Place
-from tendonfmu.extension_fit import Accepted, FitSettings, FittedModel, fit_extended
+from tendonfmu.extension_fit import Accepted, FitSettings, FittedModel, fit_extended, possible
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.naming import Found, Selection
 from tendonfmu.nominal_fit import fitted
@@ -202,7 +202,10 @@ class _Rounds:
         """Fits the description with these causes; those that the fit drives to nothing are dropped."""
         while causes:
             self._phase("fitting the extended model", len(causes), None)
-            accepted = [cause.accepted for cause in causes]
+            accepted = possible(self._nominal.data, [cause.accepted for cause in causes])
+            causes = [cause for cause in causes if any(cause.accepted is each for each in accepted)]
+            if not causes:
+                break
             clean = predicted_of(self.view.data, self._recordings, self._grid, self.view.series)
             found = fit_extended(self._nominal, accepted, clean, self._settings, compare=False)
             gone = _gone(found.model, found.paths)

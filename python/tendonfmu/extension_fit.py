@@ -203,13 +203,13 @@ def _parameters(model: FittedModel, paths: Sequence[str], units: Mapping[str, st
 # --- parts ------------------------------------------------------------------------------------------------------------
 
 
-def _possible(data: Mapping[str, Any], causes: Sequence[Accepted]) -> list[Accepted]:
+def possible(data: Mapping[str, Any], causes: Sequence[Accepted]) -> list[Accepted]:
     """Without those that change a law which only a cause that is not among them brings."""
     found = []
     for cause in causes:
         try:
             data = cause.added_to(data)
-        except (KeyError, StopIteration):  # no such law
+        except (KeyError, StopIteration, AttributeError):  # no such law: nothing to change where it should be
             continue
         found.append(cause)
     return found
@@ -218,7 +218,7 @@ def _possible(data: Mapping[str, Any], causes: Sequence[Accepted]) -> list[Accep
 def _fit_with(
     nominal: FittedModel, causes: Sequence[Accepted], recordings: Sequence[FitRecording], settings: FitSettings
 ) -> FittedModel:
-    causes = _possible(nominal.data, causes)
+    causes = possible(nominal.data, causes)
     if not causes:
         return nominal
     begin = extended_description(nominal.data, causes)

@@ -187,7 +187,7 @@ class Selection:
             if frozenset(kept) in seen:
                 break
             seen.add(frozenset(kept))
-        found = [self.found(place, [other for other in kept if other != place]) for place in kept]
+        found = [self.found(place, others) for place, others in _each(kept) if place in self.given(others).gains]
         return sorted(found, key=lambda each: -each.gain)
 
     def _revised(self, kept: list[Place]) -> list[Place]:
@@ -220,6 +220,11 @@ class Selection:
             alike=tuple(self.trials[judged.best[other]] for other in alike(judged, place)),
             magnitudes=judged.magnitudes[place],
         )
+
+
+def _each(kept: Sequence[Place]) -> list[tuple[Place, list[Place]]]:
+    """Each place with the others."""
+    return [(place, [other for other in kept if other != place]) for place in kept]
 
 
 def null_p_value(judged: Judged) -> float:
