@@ -31,6 +31,7 @@ ROWS: list[dict[str, Any]] = [
     {"effect": "time_delay", "delay": 0.0013},
     {"effect": "stribeck", "joint": 1, "amplitude": -0.4, "stribeck_velocity": 0.3},
     {"effect": "stribeck", "tendon": 2, "amplitude": 0.4, "stribeck_velocity": 0.004},
+    {"effect": "presliding", "displacement": 0.3},
 ]
 
 

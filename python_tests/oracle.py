@@ -236,7 +236,7 @@ class FingerOracle:
         for (kind, at, effect), rows in zip(self.places, self.grips, strict=True):
             velocity, angle, key = self._seen_by(kind, at, q, v, x_dot)
             factor = self.extensions.factor(rows, abs(velocity), time)
-            displacement = self.extensions.slides(rows)
+            displacement = self.extensions.slides(rows, effect.threshold)
             if displacement is not None:
                 taken = self._slide(effect, displacement, velocity, angle, dt, key), 0.0
                 direction = direction_above(velocity, effect.limit(self.hysteresis), key, decide, out)

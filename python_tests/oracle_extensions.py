@@ -139,6 +139,15 @@ def factor_of(row: Row, numbers: Mapping[str, Any], speed: Any, since_start: Any
     return 1.0
 
 
+def everywhere(row: Row) -> bool:
+    return row.joint is None and row.tendon is None
+
+
+def distance_of(row: Row, displacement: Any, threshold: float) -> Any:
+    """D of `presliding` at an effect with this v_min, m or rad."""
+    return displacement * threshold if everywhere(row) else displacement
+
+
 def next_share(share: Any, travel: float, displacement: Any) -> Any:
     """ζ_k of `presliding` from ζ_{k−1}."""
     if travel == 0.0:
@@ -173,8 +182,10 @@ class Extensions:
         for row in self.rows:
             if row.effect == "preload_friction":
                 found += [("tendon", row.tendon, j) for j in (range(self.n) if row.joint is None else [row.joint])]
-            elif row.effect == "presliding" and row.tendon is not None:
-                found += [("tendon", row.tendon, j) for j in range(self.n + 1)]
+            elif row.effect == "presliding" and row.joint is None:
+                tendons = range(m) if row.tendon is None else [row.tendon]
+                found += [("tendon", i, j) for i in tendons for j in range(self.n + 1)]
+                found += [("joint", j) for j in range(self.n) if row.tendon is None]
             elif row.effect in ("presliding", "load_friction"):
                 found.append(("joint", row.joint))
         return found
@@ -262,8 +273,10 @@ class Extensions:
         """The rows that change the friction of one place."""
         joint, tendon = (at[0], None) if kind in ("joint", "load") else (None, at[0])
         rows = [row for row in self.rows if row.effect in ("presliding", "friction_drift", "stribeck")]
-        return [row for row in rows if (row.joint is None or row.joint == joint)
+        rows = [row for row in rows if (row.joint is None or row.joint == joint)
                 and (row.tendon is None or row.tendon == tendon)]  # fmt: skip
+        named = any(row.effect == "presliding" and not everywhere(row) for row in rows)
+        return [row for row in rows if not (named and row.effect == "presliding" and everywhere(row))]
 
     def factor(self, rows: list[Row], speed: float, time: float) -> float:
         found = 1.0
@@ -273,9 +286,10 @@ class Extensions:
                 self.branches[row.effect] += 1
         return found
 
-    def slides(self, rows: list[Row]) -> float | None:
-        """The displacement of `presliding` at a place, m or rad."""
-        return next((row.numbers["displacement"] for row in rows if row.effect == "presliding"), None)
+    def slides(self, rows: list[Row], threshold: float) -> float | None:
+        """D of `presliding` at a place, m or rad; threshold: v_min there."""
+        row = next((row for row in rows if row.effect == "presliding"), None)
+        return None if row is None else float(distance_of(row, row.numbers["displacement"], threshold))
 
     def side_of(self, effect: Effect, key: tuple[Any, ...]) -> int:
         """On which side an effect with `presliding` is; effect.side is still that of the samples before this one."""

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import oracle
-from oracle_extensions import factor_of, next_share, torque_of
+from oracle_extensions import distance_of, factor_of, next_share, torque_of
 from oracle_finger import Effect, given
 
 Array = NDArray[Any]
@@ -214,14 +214,15 @@ class Trace:
     def _grip(self, place: Place, theta: Values) -> tuple[Any, Any]:
         """What multiplies F and b [U, N], and ζ [U, N] where the effect slides (else None)."""
         factor, share = 1.0, None
-        course = self.laws[place][0]
+        course, threshold = self.laws[place][:2]
         for k in self.grips[place]:
             numbers = self._numbers(k, theta)
             factor = factor * factor_of(self.rows[k], numbers, course.speed, self.time - self.time[0])
             if self.rows[k].effect == "presliding":
-                series = [0.0 * numbers["displacement"]]
+                distance = distance_of(self.rows[k], numbers["displacement"], threshold)
+                series = [0.0 * distance]
                 for travel in course.travel[1:]:
-                    series.append(next_share(series[-1], travel, numbers["displacement"]))
+                    series.append(next_share(series[-1], travel, distance))
                 share = np.concatenate([np.atleast_2d(each) for each in series], axis=-1)
         return factor, share
 

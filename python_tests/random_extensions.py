@@ -50,7 +50,10 @@ def distance(rng: np.random.Generator, rad: float, m: float) -> tuple[float, flo
 
 def presliding(rng: np.random.Generator, n: int, m: int, j: int, i: int) -> Row:
     rad, metres = distance(rng, 0.01, 1e-4)
-    return somewhere(rng, j, i, {"displacement": rad}, {"displacement": metres})
+    draw = rng.random()
+    if draw < 0.25:
+        return {"displacement": 40.0 * rad}  # s, of both velocity thresholds
+    return {"joint": j, "displacement": rad} if draw < 0.6 else {"tendon": i, "displacement": metres}
 
 
 def stribeck(rng: np.random.Generator, n: int, m: int, j: int, i: int) -> Row:
@@ -94,8 +97,13 @@ ONCE = ("time_delay", "backlash", "tendon_nonlinearity", "presliding")  # at a p
 OPTIONAL = ("presliding", "friction_drift", "stribeck", "backlash")  # of joint and tendon
 
 
-def random_extensions(rng: np.random.Generator, joints: int, tendons: int, source: int = 1) -> list[Row]:
-    """Two to fourteen rows in any order; what a kinematics source does not see is there too, but rarely."""
+def random_extensions(
+    rng: np.random.Generator, joints: int, tendons: int, source: int = 1, thresholds: bool = True
+) -> list[Row]:
+    """Two to fourteen rows in any order; what a kinematics source does not see is there too, but rarely.
+
+    thresholds: the velocity thresholds are above 0, so that presliding may be everywhere.
+    """
     names = list(MAKE)
     likely = np.ones(len(names))
     if source != 1:
@@ -105,6 +113,8 @@ def random_extensions(rng: np.random.Generator, joints: int, tendons: int, sourc
     for name in rng.choice(names, int(rng.integers(2, 15)), p=likely / likely.sum()):
         made = MAKE[name](rng, joints, tendons, int(rng.integers(1, joints + 1)), int(rng.integers(1, tendons + 1)))
         row = {"effect": str(name)} | made
+        if name == "presliding" and row.keys().isdisjoint(("joint", "tendon")) and not thresholds:
+            row["joint"] = joints
         place = [row.get(key) for key in ("effect", "joint", "tendon")]
         if name in ONCE and place in [[other.get(key) for key in ("effect", "joint", "tendon")] for other in rows]:
             continue

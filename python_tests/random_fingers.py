@@ -353,7 +353,8 @@ def random_extended(seed: int, finger: Description) -> Description:
     """The finger with any of the extensions of docs/extensions.md, a few of them with axes of the joints."""
     rng = np.random.default_rng([seed, 7])
     joints, tendons = len(finger["joints"]), len(finger["tendons"])
-    finger = finger | {"extensions": random_extensions(rng, joints, tendons)}
+    thresholds = all(finger.get("velocity_threshold", {}).get(key) != 0.0 for key in ("tendon", "joint"))
+    finger = finger | {"extensions": random_extensions(rng, joints, tendons, thresholds=thresholds)}
     return finger | (random_axes(rng, joints) if rng.random() < 0.3 else {})
 
 

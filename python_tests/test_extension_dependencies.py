@@ -57,7 +57,8 @@ def bare(row: dict[str, Any]) -> dict[str, Any]:
         for key in ("cover", "friction", "load_friction", "pulley_friction", "edge_friction"):
             if not friction:
                 part.pop(key, None)
-    return finger | {"extensions": [row], "velocity_threshold": {"tendon": 0.0, "joint": 0.0}}
+    least = 1e-9 if name_of(row) == "presliding" else 0.0  # it multiplies them
+    return finger | {"extensions": [row], "velocity_threshold": {"tendon": least, "joint": least}}
 
 
 @pytest.mark.parametrize("row", ROWS, ids=name_of)
@@ -135,11 +136,11 @@ def test_a_delay_leaves_no_fixed_factor(tmp_path: Path) -> None:
 def test_numbers_say_of_which_effect_they_are(tmp_path: Path) -> None:
     found = {variable["name"]: variable for variable in described(ROWS, tmp_path)["variables"]}
     numbers = {name: found[name] for name in found if name.startswith("extensions[")}
-    assert len(numbers) == 32
+    assert len(numbers) == 33
     assert (
         numbers["extensions[8].coulomb"]["description"] == "Extension 8: coulomb, of load_friction at joint 2, tendon 1"
     )
     assert numbers["extensions[22].delay"]["description"] == "Extension 22: delay, of time_delay"
     for number in numbers.values():
         assert number["variability"] == "tunable" and number["causality"] == "parameter"
-    assert {numbers[f"extensions[{k}].displacement"]["unit"] for k in (14, 15)} == {"rad", "m"}
+    assert {numbers[f"extensions[{k}].displacement"]["unit"] for k in (14, 15, 25)} == {"rad", "m", "s"}

@@ -89,7 +89,7 @@ def test_fingers_have_every_effect_at_every_place_and_take_every_branch() -> Non
         seen["initial_torque"] += "initial_torque" in description.get("bias", {})
     assert not {name for name in BRANCHES if branches[name] < 10}
     wanted = {f"{effect}-{place}" for effect in CLOSED for place in ("joint", "tendon")}
-    wanted |= {"preload_friction-tendon", "preload_friction-joint-tendon", "friction_drift", "time_delay"}
+    wanted |= {"preload_friction-tendon", "preload_friction-joint-tendon", "friction_drift", "time_delay", "presliding"}
     assert not {name for name in wanted if not seen[name]}
     assert not {effect for effect in MAKE if not any(name.split("-")[0] == effect for name in seen)}
     assert not {name for name, count in seen.items() if not count}

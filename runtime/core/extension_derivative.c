@@ -59,7 +59,7 @@ static double other_grips(const tendonfmu_finger* f, const extension_row* row, s
   for (size_t r = 0; r < f->extensions.friction; ++r) {
     const extension_row* other = friction_row(f, r);
     size_t member;
-    if (other != row && friction_acts_on(f, other->place, slot, &member)) {
+    if (other != row && friction_acts_on(f, other, slot, &member)) {
       product *= other->effect->grip(other->place, other->parameters, other->memory, member).value;
     }
   }
@@ -117,9 +117,8 @@ void extension_place_slopes(const tendonfmu_finger* f, const parameter_derivativ
     const size_t slot = friction_slot(f, row->place, member);
     size_t places[2], count;
     places_of_slot(f, slot, places, &count);
-    if (places[0] == place || (count == 2 && places[1] == place)) {
-      const effect_grip grip =
-          row->effect->grip(row->place, row->parameters, row->memory, friction_member(row->place, member));
+    if (!row_yields(f, row, slot) && (places[0] == place || (count == 2 && places[1] == place))) {
+      const effect_grip grip = row->effect->grip(row->place, row->parameters, row->memory, member);
       slopes_of_place(d, place, other_grips(f, row, slot, grip.value), &grip, slopes);
     }
   }
@@ -130,8 +129,10 @@ static void read_friction_row(const tendonfmu_finger* f, const extension_row* ro
   const size_t members = friction_members(f, row->place);
   for (size_t member = 0; member < members; ++member) {
     const size_t slot = friction_slot(f, row->place, member);
-    const effect_grip grip =
-        row->effect->grip(row->place, row->parameters, row->memory, friction_member(row->place, member));
+    if (row_yields(f, row, slot)) {
+      continue;
+    }
+    const effect_grip grip = row->effect->grip(row->place, row->parameters, row->memory, member);
     const double others = other_grips(f, row, slot, grip.value);
     size_t place[2], count;
     places_of_slot(f, slot, place, &count);

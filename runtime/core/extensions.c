@@ -71,6 +71,19 @@ static void find_axis_cosines(tendonfmu_finger* f) {
   }
 }
 
+/* the slots whose place a row names, of the effects that leave it to such a row */
+static void find_named_slots(tendonfmu_finger* f) {
+  memset(f->extensions.is_named, 0, f->slots);
+  for (size_t r = 0; r < f->extensions.friction; ++r) {
+    const extension_row* row = friction_row(f, r);
+    if (row->effect->yields && !is_everywhere(row->place)) {
+      for (size_t k = 0; k < friction_members(f, row->place); ++k) {
+        f->extensions.is_named[friction_slot(f, row->place, k)] = 1;
+      }
+    }
+  }
+}
+
 void find_extensions(tendonfmu_finger* f) {
   if (!f->shape.extension_count) {
     return;
@@ -83,6 +96,7 @@ void find_extensions(tendonfmu_finger* f) {
   f->extensions.friction = note_kind(f, EFFECT_FRICTION, 0, signals, &offset);
   f->extensions.torques = note_kind(f, EFFECT_TORQUE, 0, signals + f->extensions.friction, &offset);
   find_axis_cosines(f);
+  find_named_slots(f);
 }
 
 const extension_row* extension_of(const tendonfmu_finger* f, uint32_t index) {
@@ -307,12 +321,9 @@ size_t friction_slot(const tendonfmu_finger* f, effect_place place, size_t k) {
   return k < f->joints * f->tendons ? k / f->tendons * lanes + k % f->tendons : f->joints * (lanes - f->tendons) + k;
 }
 
-size_t friction_member(effect_place place, size_t k) {
-  return place.tendon != EFFECT_NOWHERE ? k : 0;
-}
-
-int friction_acts_on(const tendonfmu_finger* f, effect_place place, size_t slot, size_t* member) {
+int friction_acts_on(const tendonfmu_finger* f, const extension_row* row, size_t slot, size_t* member) {
   const size_t lanes = f->tendon_lanes, joint_row = f->joints * lanes;
+  const effect_place place = row->place;
   *member = 0;
   if (place.joint != EFFECT_NOWHERE) {
     return slot == joint_row + place.joint;
@@ -321,7 +332,9 @@ int friction_acts_on(const tendonfmu_finger* f, effect_place place, size_t slot,
     *member = slot / lanes;
     return slot < joint_row && slot % lanes == place.tendon;
   }
-  return slot < joint_row ? slot % lanes < f->tendons : slot - joint_row < f->joints;
+  const int at_tendon = slot < joint_row, used = at_tendon ? slot % lanes < f->tendons : slot - joint_row < f->joints;
+  *member = at_tendon ? slot / lanes * f->tendons + slot % lanes : f->joints * f->tendons + slot - joint_row;
+  return used && !row_yields(f, row, slot);
 }
 
 static void add_grip(slot_grip* to, const effect_grip* grip) {
@@ -335,7 +348,7 @@ slot_grip slot_grip_of(const tendonfmu_finger* f, size_t slot) {
   for (size_t r = 0; r < f->extensions.friction; ++r) {
     const extension_row* row = friction_row(f, r);
     size_t member;
-    if (friction_acts_on(f, row->place, slot, &member)) {
+    if (friction_acts_on(f, row, slot, &member)) {
       const effect_grip grip = row->effect->grip(row->place, row->parameters, row->memory, member);
       add_grip(&found, &grip);
     }
@@ -348,7 +361,7 @@ double slot_grip_slope(const tendonfmu_finger* f, size_t slot, double velocity_s
   for (size_t r = 0; r < f->extensions.friction; ++r) {
     const extension_row* row = friction_row(f, r);
     size_t member;
-    if (!friction_acts_on(f, row->place, slot, &member)) {
+    if (!friction_acts_on(f, row, slot, &member)) {
       continue;
     }
     const effect_grip own = row->effect->grip(row->place, row->parameters, row->memory, member);
@@ -374,8 +387,10 @@ static void find_grips(tendonfmu_finger* f) {
     const size_t members = friction_members(f, row->place);
     for (size_t k = 0; k < members; ++k) {
       const size_t slot = friction_slot(f, row->place, k);
-      const effect_grip grip =
-          row->effect->grip(row->place, row->parameters, row->next, friction_member(row->place, k));
+      if (row_yields(f, row, slot)) {
+        continue;
+      }
+      const effect_grip grip = row->effect->grip(row->place, row->parameters, row->next, k);
       s->grip[slot] *= grip.value;
       s->bias_grip[slot] *= grip.slides ? 0.0 : grip.value;
       s->slides[slot] = grip.slides ? 1.0 : s->slides[slot];

@@ -22,15 +22,19 @@ static inline const extension_row* torque_row(const tendonfmu_finger* finger, si
 /* Row of the extension `index` of the description. */
 const extension_row* extension_of(const tendonfmu_finger* finger, uint32_t index);
 
-/* Slots of a friction row: its member k slides with slot friction_slot(k), k < friction_members(). A row everywhere has
- * the slots of all tendons, then those of all joints. */
+/* Slots of a friction row: its member k, as effect_type.grip() counts it, slides with slot friction_slot(k),
+ * k < friction_members(). A row everywhere has the slots of all tendons, then those of all joints, but for those that
+ * it yields. */
 size_t friction_members(const tendonfmu_finger* finger, effect_place place);
 size_t friction_slot(const tendonfmu_finger* finger, effect_place place, size_t k);
-/* The member as effect_type.grip() counts it. */
-size_t friction_member(effect_place place, size_t k);
 
-/* Whether such a row acts on a slot, and which member it is there, as effect_type.grip() counts it. */
-int friction_acts_on(const tendonfmu_finger* finger, effect_place place, size_t slot, size_t* member);
+/* Whether a row leaves one of its slots to another row of the same effect, which names the place. */
+static inline int row_yields(const tendonfmu_finger* finger, const extension_row* row, size_t slot) {
+  return row->effect->yields && is_everywhere(row->place) && finger->extensions.is_named[slot];
+}
+
+/* Whether such a row acts on a slot, and which member it is there. */
+int friction_acts_on(const tendonfmu_finger* finger, const extension_row* row, size_t slot, size_t* member);
 
 /* What all friction rows together make of a slot, from the memory: F = value·|F(v)| where it slides, else value·F; b is
  * multiplied by bias. */

@@ -82,6 +82,7 @@ static void lay_out_extensions(tendonfmu_finger* f, cursor* c) {
   f->scratch.grip = take_numbers(c, slots);
   f->scratch.bias_grip = take_numbers(c, slots);
   f->scratch.slides = take_numbers(c, slots);
+  f->extensions.is_named = take(c, slots);
 }
 
 static void lay_out_state(tendonfmu_finger* f, cursor* c) {

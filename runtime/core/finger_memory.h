@@ -57,6 +57,7 @@ typedef struct extension_row {
 typedef struct extension_rows {
   extension_row* row;
   size_t signals, friction, torques; /* how many of each */
+  unsigned char* is_named;           /* [n × M + N] 1: a row of an effect that yields names the place */
 } extension_rows;
 
 /* All that follows from the parameters; filled in one place, derived_numbers.c. Arrays of [n × M] have a row a joint.

@@ -368,8 +368,19 @@ static int place_is_sound(const effect_type* effect, const model_shape* shape, u
   }
 }
 
+/* whether such a row, of an effect that yields, stands without a place as one before it does */
+static int is_everywhere_twice(const effect_type* effect, const unsigned char* row, uint32_t* everywhere) {
+  if (!effect->yields || load_u32(row + 4) || load_u32(row + 8)) {
+    return 0;
+  }
+  const int again = *everywhere == effect->id;
+  *everywhere = effect->id;
+  return again;
+}
+
 static int check_extensions(const unsigned char* image, model_shape* shape, message_line message) {
   const unsigned char* row = image + MODEL_HEADER_BYTES + 4u * (size_t)shape->word_count;
+  uint32_t everywhere = 0;
   for (uint32_t i = 0; i < shape->extension_count; ++i, row += 4 * MODEL_EXTENSION_WORDS) {
     const effect_type* effect = effect_by_id(load_u32(row));
     if (!effect) {
@@ -378,6 +389,9 @@ static int check_extensions(const unsigned char* image, model_shape* shape, mess
     const uint32_t joint = load_u32(row + 4), tendon = load_u32(row + 8);
     if (!place_is_sound(effect, shape, joint, tendon) || load_u32(row + 12)) {
       return refuse_value(message, "model image: joint of an extension", joint, "a place where such an effect can be");
+    }
+    if (is_everywhere_twice(effect, row, &everywhere)) {
+      return refuse(message, "model image with two extensions of one effect everywhere, expected one");
     }
     shape->effect_memory += effect->kind == EFFECT_SIGNAL ? 0 : own_memory(effect, shape, place_of(joint, tendon));
   }

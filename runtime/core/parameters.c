@@ -192,8 +192,9 @@ static parameter_range range_of_law(const model_item* item, uint32_t offset) {
 
 static parameter_range range_of_effect(const model_item* item, uint32_t offset) {
   const effect_parameter* p = &item->effect->parameters[offset];
-  const int at_joint = item->place.joint != EFFECT_NOWHERE && p->unit_at_joint;
-  return (parameter_range){at_joint ? p->unit_at_joint : p->unit, p->minimum, p->maximum, p->above_minimum, 1};
+  const int at_joint = item->place.joint != EFFECT_NOWHERE;
+  const char* elsewhere = at_joint ? p->unit_at_joint : is_everywhere(item->place) ? p->unit_everywhere : NULL;
+  return (parameter_range){elsewhere ? elsewhere : p->unit, p->minimum, p->maximum, p->above_minimum, 1};
 }
 
 parameter_range parameter_range_of(const model_item* item, uint32_t index) {
@@ -282,6 +283,7 @@ typedef struct check {
   const double* values;
   message_line message;
   const model_shape* shape;
+  model_item threshold; /* of the two velocity thresholds one that is 0; count 0: none */
 } check;
 
 static int check_range(void* context, const model_item* item) {
@@ -329,14 +331,40 @@ static int check_axis(const check* c, const model_item* item) {
   return -1;
 }
 
+/* the thresholds come before the extensions */
+static void note_threshold(check* c, const model_item* item) {
+  if (c->values[item->first] == 0.0 && !c->threshold.count) {
+    c->threshold = *item;
+  }
+}
+
+/* a row without a place that counts distances by thresholds */
+static int check_extension(const check* c, const model_item* item) {
+  if (!item->effect->yields || !is_everywhere(item->place) || !c->threshold.count) {
+    return 0;
+  }
+  say_value(c->message, &c->threshold, c->threshold.first, 0.0);
+  message_text(c->message, ": expected above 0 ");
+  message_text(c->message, parameter_range_of(&c->threshold, c->threshold.first).unit);
+  message_text(c->message, ", since extensions[");
+  message_count(c->message, item->extension + 1);
+  message_text(c->message, "], ");
+  message_text(c->message, item->effect->name);
+  message_text(c->message, " without joint or tendon, multiplies it");
+  return -1;
+}
+
 static int check_relation(void* context, const model_item* item) {
-  const check* c = context;
+  check* c = context;
   if (item->law != LAW_ABSENT) {
     return check_law(c, item);
   }
   switch (item->kind) {
     case ITEM_EDGE_ANGLES: return check_angles(c, item);
     case ITEM_LINK_AXIS: return check_axis(c, item);
+    case ITEM_TENDON_THRESHOLD:
+    case ITEM_JOINT_THRESHOLD: note_threshold(c, item); return 0;
+    case ITEM_EXTENSION: return check_extension(c, item);
     default: return 0;
   }
 }
@@ -355,7 +383,7 @@ static int collect_arms(void* context, const model_item* item) {
 }
 
 int parameter_check_relations(const model_shape* shape, const double* values, message_line message) {
-  check c = {values, message, shape};
+  check c = {.values = values, .message = message, .shape = shape};
   return model_visit(shape, check_relation, &c);
 }
 
@@ -375,7 +403,7 @@ int parameter_check_routing(const model_shape* shape, const double* values, mess
 }
 
 int parameter_check_all(const model_shape* shape, const double* values, message_line message) {
-  check c = {values, message, shape};
+  check c = {.values = values, .message = message, .shape = shape};
   if (model_visit(shape, check_range, &c)) {
     return -1;
   }

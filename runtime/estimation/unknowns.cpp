@@ -78,6 +78,12 @@ std::string path_of(const tendonfmu_finger* finger, std::uint32_t parameter) {
   return path;
 }
 
+/* expected of a number of an extension where nothing else says it */
+double scale_of(const model_item& item, std::uint32_t parameter) {
+  const effect_parameter& number = item.effect->parameters[parameter - item.first];
+  return is_everywhere(item.place) && number.scale_everywhere > 0.0 ? number.scale_everywhere : number.scale;
+}
+
 /* what is present is estimated, what is absent stays absent (contract section 7) */
 std::vector<std::int32_t> present_groups(const Structure& s) {
   const double* value = s.finger->start;
@@ -200,7 +206,7 @@ class Columns {
     }
     const double value = std::fabs(value_of(role, p, s_.finger->start));
     const model_item item = parameter_item(&s_.finger->shape, p);
-    return item.kind == ITEM_EXTENSION ? std::max(value, item.effect->parameters[p - item.first].scale) : value;
+    return item.kind == ITEM_EXTENSION ? std::max(value, scale_of(item, p)) : value;
   }
 
   /* an unknown that starts at 0: as large as the largest of its kind */

@@ -60,6 +60,7 @@ TEST(Described, EachEffectIsARowOfTheImage) {
     {"effect": "pulley_eccentricity", "joint": 2, "tendon": 1},
     {"effect": "presliding", "joint": 1, "displacement": 0.01},
     {"effect": "presliding", "joint": null, "tendon": 1, "displacement": 1e-4},
+    {"effect": "presliding", "displacement": 0.02},
     {"effect": "friction_drift", "amplitude": 0.2, "time_constant": 60},
     {"effect": "friction_drift", "tendon": 2, "amplitude": 0.2, "time_constant": 60},
     {"effect": "friction_drift", "tendon": 2, "amplitude": 0.2, "time_constant": 60},
@@ -74,8 +75,8 @@ TEST(Described, EachEffectIsARowOfTheImage) {
   ASSERT_TRUE(model.accepted) << model.message;
   const std::vector<std::array<std::uint32_t, 3>> expected = {
       {1, 2, 0},  {2, 2, 0},  {3, 1, 0},  {4, 1, 0},  {5, 0, 2},  {5, 2, 1},  {6, 2, 1},  {7, 0, 2},
-      {8, 0, 1},  {9, 1, 2},  {10, 2, 2}, {11, 2, 1}, {20, 1, 0}, {20, 0, 1}, {21, 0, 0}, {21, 0, 2},
-      {21, 0, 2}, {22, 0, 2}, {23, 0, 2}, {23, 2, 0}, {25, 0, 2}, {24, 0, 0}};
+      {8, 0, 1},  {9, 1, 2},  {10, 2, 2}, {11, 2, 1}, {20, 1, 0}, {20, 0, 1}, {20, 0, 0}, {21, 0, 0},
+      {21, 0, 2}, {21, 0, 2}, {22, 0, 2}, {23, 0, 2}, {23, 2, 0}, {25, 0, 2}, {24, 0, 0}};
   ASSERT_EQ(model.shape.extension_count, expected.size());
   for (std::size_t k = 0; k < expected.size(); ++k) {
     const std::uint32_t* row = model.shape.extensions + k * MODEL_EXTENSION_WORDS;
@@ -84,11 +85,24 @@ TEST(Described, EachEffectIsARowOfTheImage) {
   }
   // what is left out
   const std::size_t last = model.values.size();
-  const std::vector<double> numbers(model.values.end() - 28, model.values.end());
+  const std::vector<double> numbers(model.values.end() - 29, model.values.end());
   EXPECT_EQ(numbers.front(), 0.3);
   EXPECT_EQ(numbers[1], 0.0);   // gravity's sine
   EXPECT_EQ(numbers[2], 0.01);  // its cosine
   EXPECT_EQ(model.values[last - 1], -0.001);
+}
+
+TEST(Described, PreslidingEverywhereMultipliesThresholds) {
+  for (const char* key : {"tendon", "joint"}) {
+    nlohmann::json finger = small_finger();
+    finger["extensions"] = nlohmann::json::parse(R"([{"effect": "presliding", "joint": 1, "displacement": 0.01}])");
+    finger["velocity_threshold"][key] = 0;
+    EXPECT_EQ(read(finger).message, "");
+    finger["extensions"].push_back({{"effect", "presliding"}, {"displacement", 0.02}});
+    const std::string unit = std::string(key) == "tendon" ? "m/s" : "rad/s";
+    EXPECT_EQ(read(finger).message, std::string("velocity_threshold.") + key + " = 0: expected above 0 " + unit +
+                                        ", since extensions[2], presliding without joint or tendon, multiplies it");
+  }
 }
 
 TEST(Described, HasRoomForAThousandExtensions) {

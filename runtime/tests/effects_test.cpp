@@ -411,6 +411,27 @@ TEST(Friction, BuildsUpOverADistance) {
   EXPECT_NEAR(grip_of(presliding).value, -1.0 + (1.0 + before) * std::exp(-1.0), 1e-15);
 }
 
+TEST(Friction, BuildsUpEverywhereByThresholds) {
+  Effect presliding("presliding", 0, 0, {0.1});
+  ASSERT_EQ(presliding.memory.size(), 3 * joints * (tendons + 1));
+  Sample sample;
+  presliding.memory = presliding.advanced(sample);
+  const auto grip_at = [&](std::size_t member) {
+    return presliding.type->grip(presliding.place, presliding.numbers.data(), presliding.memory.data(), member);
+  };
+  const auto tendon_velocity = sample.tendon_velocity();
+  for (std::size_t j = 0; j < joints; ++j) {
+    for (std::size_t i = 0; i < tendons; ++i) {
+      const double ratio = tendon_velocity[j * lanes + i] * 0.01 / (0.1 * 0.0005), left = std::exp(-std::fabs(ratio));
+      EXPECT_NEAR(grip_at(j * tendons + i).value, std::copysign(ratio == 0.0 ? 0.0 : 1.0 - left, ratio), 1e-15);
+    }
+    const double ratio = sample.velocity[j] * 0.01 / (0.1 * 0.01), left = std::exp(-std::fabs(ratio));
+    EXPECT_NEAR(grip_at(joints * tendons + j).value, std::copysign(1.0 - left, ratio), 1e-15);
+    EXPECT_NEAR(grip_at(joints * tendons + j).by_parameter[0], -left * ratio / 0.1, 1e-13);
+    EXPECT_NEAR(grip_at(joints * tendons + j).by_velocity, left * 0.01 / (0.1 * 0.01), 1e-12);
+  }
+}
+
 // --- the table -------------------------------------------------------------------------------------------------------
 
 TEST(Table, HasDifferentNamesAndNumbers) {

@@ -217,6 +217,62 @@ TEST(Presliding, OfTheShortestDisplacementsTakesEverySample) {
   }
 }
 
+// T without a place is the distance T·v_min at each place; a row that names the place is there instead
+TEST(Presliding, EverywhereIsThatOfEveryPlaceByItsThreshold) {
+  const Motion motion(1300);
+  const auto outputs_of = [&motion](const std::string& rows) {
+    Finger finger(test_finger::image(with_extensions(rows)));
+    test_finger::Outputs found(1300);
+    const tendonfmu_inputs inputs = motion.all();
+    const tendonfmu_outputs view = found.view();
+    EXPECT_EQ(tendonfmu_run(finger, 1300, motion.time.data(), &inputs, &view, nullptr), TENDONFMU_OK);
+    return found;
+  };
+  const auto row = [](const char* place, const char* displacement) {
+    return std::string(R"({"effect": "presliding", )") + place + R"("displacement": )" + displacement + "}";
+  };
+  // powers of 2, so that T·v_min has no rounding: 0.25·0.0005 m, 0.25·0.02 rad
+  const std::string joint1 = row(R"("joint": 1, )", "0.005"), joint2 = row(R"("joint": 2, )", "0.005");
+  const std::string tendons = row(R"("tendon": 1, )", "0.000125") + ", " + row(R"("tendon": 2, )", "0.000125");
+  const std::string tendon3 = row(R"("tendon": 3, )", "0.000125"), other = row(R"("tendon": 3, )", "0.002");
+  const std::string other_joint = row(R"("joint": 2, )", "0.3"), everywhere = row("", "0.25");
+  const auto all = outputs_of(joint1 + ", " + joint2 + ", " + tendons + ", " + tendon3);
+  EXPECT_TRUE(outputs_of(everywhere) == all);
+  EXPECT_FALSE(outputs_of(tendons + ", " + tendon3) == all);
+  const auto finer = outputs_of(other + ", " + joint1 + ", " + tendons + ", " + other_joint);
+  EXPECT_TRUE(outputs_of(other + ", " + everywhere + ", " + other_joint) == finer);
+  EXPECT_TRUE(outputs_of(everywhere + ", " + other_joint + ", " + other) == finer);
+  EXPECT_FALSE(finer == all);
+}
+
+TEST(Presliding, EverywhereOfTheShortestTimeTakesEverySample) {
+  const Motion motion(300);
+  for (const char* displacement : {"1e-160", "5e-324"}) {
+    SCOPED_TRACE(displacement);
+    Finger finger(
+        test_finger::image(with_extensions(std::string(R"({"effect": "presliding", "displacement": )") + displacement +
+                                           R"(}, {"effect": "time_delay", "delay": 0.0033})")));
+    run(finger, motion, 0, 300);
+  }
+}
+
+TEST(Presliding, EverywhereNeedsThresholds) {
+  Finger finger(test_finger::image(with_extensions(R"({"effect": "presliding", "displacement": 0.1})")));
+  for (const char* path : {"velocity_threshold.tendon", "velocity_threshold.joint"}) {
+    EXPECT_EQ(tendonfmu_set_parameter(finger, path, 0.0), TENDONFMU_BAD_PARAMETER);
+    EXPECT_EQ(std::string(tendonfmu_last_error(finger)).find(path), 0u) << tendonfmu_last_error(finger);
+    EXPECT_EQ(tendonfmu_set_parameter(finger, path, 0.003), TENDONFMU_OK);
+  }
+  const tendonfmu_parameter_info info = [&finger] {
+    tendonfmu_parameter_info found{};
+    tendonfmu_get_parameter_info(finger, tendonfmu_find_parameter(finger, "extensions[1].displacement"), &found);
+    return found;
+  }();
+  EXPECT_STREQ(info.unit, "s");
+  Finger free(test_finger::image(with_extensions(R"({"effect": "presliding", "joint": 1, "displacement": 0.1})")));
+  EXPECT_EQ(tendonfmu_set_parameter(free, "velocity_threshold.joint", 0.0), TENDONFMU_OK);
+}
+
 // --- places ----------------------------------------------------------------------------------------------------------
 
 TEST(Places, OfARowAreTheSlotsThatItActsOn) {
@@ -227,13 +283,16 @@ TEST(Places, OfARowAreTheSlotsThatItActsOn) {
                                  {EFFECT_NOWHERE, 2},
                                  {EFFECT_NOWHERE, EFFECT_NOWHERE}};
   for (const effect_place& place : places) {
+    extension_row row{};
+    row.effect = effect_by_name("friction_drift");
+    row.place = place;
     std::vector<std::size_t> member(finger.handle->slots, 99);
     for (std::size_t k = 0; k < friction_members(finger, place); ++k) {
-      member[friction_slot(finger, place, k)] = friction_member(place, k);
+      member[friction_slot(finger, place, k)] = k;
     }
     for (std::size_t slot = 0; slot < finger.handle->slots; ++slot) {
       std::size_t found = 0;
-      const bool acts = friction_acts_on(finger, place, slot, &found) != 0;
+      const bool acts = friction_acts_on(finger, &row, slot, &found) != 0;
       EXPECT_EQ(acts, member[slot] != 99) << "slot " << slot;
       EXPECT_TRUE(!acts || found == member[slot]) << "slot " << slot;
     }

@@ -28,18 +28,24 @@ typedef enum place_rule {
 typedef struct effect_parameter {
   const char* name;
   const char* unit;
-  const char* unit_at_joint; /* where it differs there; NULL: the same */
+  const char* unit_at_joint;   /* where it differs there; NULL: the same */
+  const char* unit_everywhere; /* of a row without a place, where it differs there; NULL: the same */
   double minimum, maximum;
   int above_minimum;
-  double missing_value; /* taken where the description leaves the key out */
-  int required;         /* 1: it must not be left out */
-  double scale;         /* expected magnitude where nothing is known, for the estimation */
+  double missing_value;    /* taken where the description leaves the key out */
+  int required;            /* 1: it must not be left out */
+  double scale;            /* expected magnitude where nothing is known, for the estimation */
+  double scale_everywhere; /* of a row without a place; 0: the same */
 } effect_parameter;
 
 /* Where a row of the description's extensions acts; 0-based, EFFECT_NOWHERE where the key is absent. */
 typedef struct effect_place {
   uint32_t joint, tendon;
 } effect_place;
+
+static inline int is_everywhere(effect_place place) {
+  return place.joint == EFFECT_NOWHERE && place.tendon == EFFECT_NOWHERE;
+}
 
 /* What an effect sees of a finger and one sample. Rows of [n × lanes] have a row a joint. */
 typedef struct effect_sample {
@@ -94,7 +100,8 @@ typedef struct effect_type {
   int order; /* of signals: rows act in the order of these, whatever theirs */
   place_need joint, tendon;
   place_rule rule;
-  int once; /* 1: at most once a place */
+  int once;   /* 1: at most once a place */
+  int yields; /* 1: a row without a place leaves a place to the row that names it, and needs both thresholds above 0 */
   uint32_t parameter_count;
   const effect_parameter* parameters;
 
@@ -119,7 +126,8 @@ typedef struct effect_type {
                 const effect_direction* direction, double* slope);
 
   /* --- EFFECT_FRICTION ----------------------------------------------------------------------------------------------
-   * member: which of the velocities of its place: 0 of a joint, the joint (0-based) of a tendon's or a finger's */
+   * member: which of the velocities of its place: 0 of a joint, the joint (0-based) of a tendon's; of a finger's
+   * joint·m + tendon, and after all of these n·m + joint for the joints' own */
   effect_grip (*grip)(effect_place place, const double* parameters, const double* memory, size_t member);
 
   /* --- EFFECT_SIGNAL ------------------------------------------------------------------------------------------------

@@ -2,12 +2,13 @@
 
 #include "presliding.h"
 
+#include <float.h>
 #include <math.h>
 
 #include "friction_law.h"
 
-/* F = ζ·|F(v)|, dζ = (s − ζ)·|dx|/displacement with s = sgn(dx), integrated exactly over each sample (Dahl 1968 with
- * exponent 1). */
+/* F = ζ·|F(v)|, dζ = (s − ζ)·|dx|/D with s = sgn(dx), integrated exactly over each sample (Dahl 1968 with exponent 1).
+ * D is the displacement at a place; of a row without one displacement·v_min, v_min being the effect's threshold. */
 
 /* per velocity of the place */
 enum { SHARE, BY_DISPLACEMENT, BY_VELOCITY, MEMORY_ROWS };
@@ -16,20 +17,57 @@ static const effect_parameter parameters[] = {
     {.name = "displacement",
      .unit = "m",
      .unit_at_joint = "rad",
+     .unit_everywhere = "s",
      .minimum = 0.0,
      .maximum = 1e9,
      .above_minimum = 1,
      .required = 1,
-     .scale = 1e-4},
+     .scale = 1e-4,
+     .scale_everywhere = 0.05},
 };
 
-static size_t member_count(effect_place place, size_t joints) {
-  return place.joint != EFFECT_NOWHERE ? 1 : joints;
+static size_t member_count(effect_place place, size_t joints, size_t tendons) {
+  return place.joint != EFFECT_NOWHERE ? 1 : is_everywhere(place) ? joints * (tendons + 1) : joints;
 }
 
 static size_t state_count(size_t joints, size_t tendons, effect_place place) {
-  (void)tendons;
-  return MEMORY_ROWS * member_count(place, joints);
+  return MEMORY_ROWS * member_count(place, joints, tendons);
+}
+
+/* A velocity of the place. */
+typedef struct member_of_place {
+  int at_joint;
+  size_t at; /* of a joint: which one; of a tendon: where it stands among the tendon velocities */
+} member_of_place;
+
+static member_of_place find_member(effect_place place, const effect_sample* sample, size_t k) {
+  const size_t along_tendons = sample->joints * sample->tendons;
+  if (place.joint != EFFECT_NOWHERE) {
+    return (member_of_place){1, place.joint};
+  }
+  if (place.tendon != EFFECT_NOWHERE) {
+    return (member_of_place){0, k * sample->lanes + place.tendon};
+  }
+  if (k < along_tendons) {
+    return (member_of_place){0, k / sample->tendons * sample->lanes + k % sample->tendons};
+  }
+  return (member_of_place){1, k - along_tendons};
+}
+
+/* its travel within the sample */
+static double travel_of(member_of_place member, const effect_sample* sample) {
+  const double v = member.at_joint ? sample->velocity[member.at] : sample->tendon_velocity[member.at];
+  return sample->first ? 0.0 : v * sample->step;
+}
+
+/* D */
+static double distance_of(effect_place place, member_of_place member, double displacement,
+                          const effect_sample* sample) {
+  if (!is_everywhere(place)) {
+    return displacement;
+  }
+  const double distance = displacement * (member.at_joint ? sample->joint_threshold : sample->tendon_threshold);
+  return distance > DBL_MIN ? distance : DBL_MIN;
 }
 
 /* finite: no slope may be a reason to refuse a sample */
@@ -37,35 +75,40 @@ static double bounded(double slope) {
   return slope > 1e290 ? 1e290 : slope < -1e290 ? -1e290 : slope;
 }
 
+static void advance_member(double displacement, double distance, double travel, const effect_sample* sample,
+                           const double* before, double* after) {
+  const double side = travel < 0.0 ? -1.0 : 1.0;
+  const double ratio = fabs(travel) / distance, kept = law_exponential(ratio), left = side - before[SHARE];
+  after[SHARE] = travel == 0.0 ? before[SHARE] : side - left * kept;
+  /* nothing is left of where it was: slopes of 0, however short the displacement */
+  const int lasts = ratio < 700.0;
+  after[BY_DISPLACEMENT] =
+      lasts ? bounded(kept * (before[BY_DISPLACEMENT] - bounded(left * ratio / displacement))) : 0.0;
+  after[BY_VELOCITY] = lasts && !sample->first ? bounded(left * kept * side * sample->step / distance) : 0.0;
+}
+
 static void advance(effect_place place, const double* values, const effect_sample* sample, const double* before,
                     double* after) {
-  const size_t count = member_count(place, sample->joints);
+  const size_t count = member_count(place, sample->joints, sample->tendons);
   for (size_t k = 0; k < count; ++k, before += MEMORY_ROWS, after += MEMORY_ROWS) {
-    const double v = place.joint != EFFECT_NOWHERE ? sample->velocity[place.joint]
-                                                   : sample->tendon_velocity[k * sample->lanes + place.tendon];
-    const double travel = sample->first ? 0.0 : v * sample->step, side = travel < 0.0 ? -1.0 : 1.0;
-    const double ratio = fabs(travel) / values[0], kept = law_exponential(ratio), left = side - before[SHARE];
-    after[SHARE] = travel == 0.0 ? before[SHARE] : side - left * kept;
-    /* nothing is left of where it was: slopes of 0, however short the displacement */
-    const int lasts = ratio < 700.0;
-    after[BY_DISPLACEMENT] =
-        lasts ? bounded(kept * (before[BY_DISPLACEMENT] - bounded(left * ratio / values[0]))) : 0.0;
-    after[BY_VELOCITY] = lasts && !sample->first ? bounded(left * kept * side * sample->step / values[0]) : 0.0;
+    const member_of_place member = find_member(place, sample, k);
+    advance_member(values[0], distance_of(place, member, values[0], sample), travel_of(member, sample), sample, before,
+                   after);
   }
 }
 
 static void advance_slope(effect_place place, const double* values, const effect_sample* sample, const double* before,
                           const effect_direction* direction, const double* slope_before, double* slope_after) {
-  const size_t count = member_count(place, sample->joints);
-  double after[MEMORY_ROWS * EFFECT_ALL_JOINTS];
-  advance(place, values, sample, before, after);
+  const size_t count = member_count(place, sample->joints, sample->tendons);
   for (size_t k = 0; k < count; ++k) {
-    const size_t row = MEMORY_ROWS * k, at = k * sample->lanes + place.tendon;
-    const int at_joint = place.joint != EFFECT_NOWHERE;
-    const double v = at_joint ? sample->velocity[place.joint] : sample->tendon_velocity[at];
-    const double slope = at_joint ? direction->velocity[place.joint] : direction->tendon_velocity[at];
-    const double kept = sample->first ? 1.0 : law_exponential(fabs(v * sample->step) / values[0]);
-    slope_after[row + SHARE] = kept * slope_before[row + SHARE] + after[row + BY_VELOCITY] * slope;
+    const size_t row = MEMORY_ROWS * k;
+    const member_of_place member = find_member(place, sample, k);
+    const double distance = distance_of(place, member, values[0], sample), travel = travel_of(member, sample);
+    const double slope = member.at_joint ? direction->velocity[member.at] : direction->tendon_velocity[member.at];
+    double after[MEMORY_ROWS];
+    advance_member(values[0], distance, travel, sample, before + row, after);
+    slope_after[row + SHARE] =
+        law_exponential(fabs(travel) / distance) * slope_before[row + SHARE] + after[BY_VELOCITY] * slope;
     slope_after[row + BY_DISPLACEMENT] = slope_after[row + BY_VELOCITY] = 0.0; /* only the share is read */
   }
 }
@@ -86,8 +129,9 @@ const effect_type effect_presliding = {
     .kind = EFFECT_FRICTION,
     .joint = PLACE_OPTIONAL,
     .tendon = PLACE_OPTIONAL,
-    .rule = PLACES_EXACTLY_ONE,
+    .rule = PLACES_AT_MOST_ONE,
     .once = 1,
+    .yields = 1,
     .parameter_count = 1,
     .parameters = parameters,
     .state_count = state_count,
