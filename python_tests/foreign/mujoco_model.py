@@ -1,4 +1,4 @@
-"""A tendon-driven finger as an MJCF text: motors on slides, springy tendons, hinges, friction by MuJoCo's `frictionloss`.
+"""A tendon-driven finger as an MJCF text: motors on slides, springy tendons, hinges, friction by `frictionloss`.
 
 The finger lies in the x-z plane; every hinge turns about −y, so that a positive angle lifts the link. A tendon with a
 positive arm runs above the hinge. Tendons are fixed ones (constant arms by construction) or spatial ones that wrap
@@ -13,7 +13,6 @@ import dataclasses
 
 import mujoco
 import numpy as np
-
 from foreign_case import Array
 
 LINK = 0.04  # m, length of a link
@@ -213,7 +212,8 @@ def probe(physics: Physics) -> str:
     if not physics.pushes:
         return ""
     return (
-        '<body pos="0.05 0 0.14" gravcomp="1"><joint name="probe" type="slide" axis="0 0 -1" range="0 0.28" damping="1"/>'
+        '<body pos="0.05 0 0.14" gravcomp="1">'
+        '<joint name="probe" type="slide" axis="0 0 -1" range="0 0.28" damping="1"/>'
         '<inertial pos="0 0 0" mass="0.03" diaginertia="1e-4 1e-4 1e-4"/>'
         '<geom type="box" size="0.15 0.02 0.005" contype="1" conaffinity="1"/></body>'
     )

@@ -6,7 +6,6 @@ import dataclasses
 
 import mujoco
 import numpy as np
-
 from foreign_case import Array, Truth
 from mujoco_model import Physics, compiled
 
