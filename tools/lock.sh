@@ -16,4 +16,5 @@ compile requirements-portable.lock --group portable --constraints requirements.l
 compile requirements-peers.lock --group peers --constraints requirements.lock
 compile requirements-fit-peers.lock --group fit-peers --constraints requirements.lock
 compile requirements-coupling.lock --group coupling --constraints requirements.lock
+compile requirements-foreign.lock --group foreign --constraints requirements.lock
 compile requirements-diagnosis-peers.lock --group diagnosis-peers --constraints requirements.lock

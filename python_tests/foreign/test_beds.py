@@ -1,0 +1,217 @@
+"""The foreign test beds themselves: same seed same bits, sound mechanics, hidden effects of the stated size."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import functools
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+
+import fingers_in_numpy
+import numpy as np
+import pandas as pd
+import pytest
+import recorded
+from foreign_case import Array, Case, Truth
+
+try:
+    import fingers_in_mujoco
+    import mujoco_run
+
+    HAS_MUJOCO = True
+except ModuleNotFoundError as missing:
+    if missing.name != "mujoco":
+        raise
+    HAS_MUJOCO = False
+
+FOLDER = Path(__file__).resolve().parent
+SECONDS = 6.0  # of the training recordings that are made here
+NEEDS_MUJOCO = pytest.mark.skipif(not HAS_MUJOCO, reason="SKIPPED: mujoco is not installed (requirements-foreign.lock)")
+# every numpy case, and the MuJoCo cases that use different parts of its model
+MUJOCO_NUMBERS = (3, 11, 14)
+BEDS = [pytest.param("fingers_in_numpy", number, id=f"numpy_{number:02d}") for number in fingers_in_numpy.NUMBERS]
+BEDS += [
+    pytest.param("fingers_in_mujoco", number, id=f"mujoco_{number:02d}", marks=NEEDS_MUJOCO)
+    for number in MUJOCO_NUMBERS
+]
+# Effects that alter what the sensors say of a position, so that R⁺ x1 is not the joint angle.
+BENT = {"time_delay", "pulley_eccentricity", "moment_arm_variation", "force_gain", "force_offset"}
+# Effects whose hidden torque is not what makes them visible: a delay turns friction around too late, a constant offset
+# and a gain go into the bias and the laws.
+UNSIZED = {"none", "time_delay", "force_gain", "force_offset"}
+
+
+def bed(module: str) -> ModuleType:
+    return sys.modules[module]
+
+
+@functools.cache
+def made(module: str, number: int) -> Case:
+    return bed(module).make(number, SECONDS, 1.0)
+
+
+def columns(data: pd.DataFrame, name: str) -> Array:
+    return data[[column for column in data if column.startswith(name)]].to_numpy()
+
+
+def arms(case: Case) -> Array:
+    return np.array([tendon["moment_arms"] for tendon in case.nominal["tendons"]])
+
+
+def spring(case: Case) -> Array:
+    return np.array([tendon["stiffness"] for tendon in case.nominal["tendons"]])
+
+
+@pytest.mark.parametrize(
+    ("module", "number"),
+    [
+        ("fingers_in_numpy", 1),
+        ("fingers_in_numpy", 2),
+        pytest.param("fingers_in_mujoco", 1, marks=NEEDS_MUJOCO),
+    ],
+)
+def test_the_same_seed_gives_the_same_case(module: str, number: int) -> None:
+    first, second = (bed(module).make(number, 1.0, 0.5) for _ in range(2))
+    pd.testing.assert_frame_equal(first.train, second.train, check_exact=True)
+    pd.testing.assert_frame_equal(first.test, second.test, check_exact=True)
+    assert first.nominal == second.nominal
+    assert not np.array_equal(
+        columns(first.train, "tendon_position")[:100], columns(first.test, "tendon_position")[:100]
+    )
+
+
+@pytest.mark.parametrize(("module", "number"), BEDS)
+def test_columns_are_those_of_the_contract(module: str, number: int) -> None:
+    case = made(module, number)
+    m, n = arms(case).shape
+    expected = ["time", *(f"tendon_force[{i}]" for i in range(1, m + 1))]
+    expected += [f"tendon_position[{i}]" for i in range(1, m + 1)]
+    if "joint_position[1]" in case.train:
+        expected += [f"joint_position[{j}]" for j in range(1, n + 1)]
+    for data in (case.train, case.test):
+        assert list(data) == expected
+        assert np.isfinite(data.to_numpy()).all() and data["time"].iloc[0] == 0.0
+        rate = 1 / np.diff(data["time"])
+        assert rate.min() > 249.0 and rate.max() < 1001.0
+    assert case.train["time"].iloc[-1] == pytest.approx(SECONDS, abs=0.03)
+
+
+@pytest.mark.parametrize(("module", "number"), BEDS)
+def test_descriptions_have_the_right_form(module: str, number: int) -> None:
+    case = made(module, number)
+    assert case.nominal["format"] == "tendonfmu-finger-1"
+    assert case.truth.joints == len(case.nominal["joints"]) == arms(case).shape[1]
+    assert np.linalg.matrix_rank(arms(case)) == case.truth.joints
+    for tendon in case.nominal["tendons"]:
+        assert len(tendon.get("edge_friction", [None])) <= case.truth.joints
+        assert tendon.get("pulley_friction", [None])[-1] is None
+    assert case.truth.joint is None or 1 <= case.truth.joint <= case.truth.joints
+    assert case.truth.tendon is None or 1 <= case.truth.tendon <= len(case.nominal["tendons"])
+
+
+@pytest.mark.parametrize(("module", "number"), BEDS)
+def test_positions_and_forces_give_the_true_angle(module: str, number: int) -> None:
+    case = made(module, number)
+    assert case.inside is not None
+    x1 = columns(case.train, "tendon_position") - columns(case.train, "tendon_force") / spring(case)
+    error = x1 @ np.linalg.pinv(arms(case)).T - case.inside.angle
+    # 50 mN through 3000 N/m on an arm of 7 mm are 2.4 mrad of one tendon
+    assert (error.std(axis=0).max() < 0.003) or case.truth.hidden in BENT
+    if "joint_position[1]" in case.train:
+        assert np.abs(columns(case.train, "joint_position") - case.inside.angle).max() < 2e-4
+
+
+@pytest.mark.parametrize(("module", "number"), BEDS)
+def test_torques_balance(module: str, number: int) -> None:
+    case = made(module, number)
+    inside = case.inside
+    assert inside is not None
+    # MuJoCo solves for its constraints' forces to a tolerance
+    assert np.abs(inside.measured - inside.described - inside.hidden).max() < 1e-5
+    noise = columns(case.train, "tendon_force") @ arms(case) - inside.measured
+    assert noise.std(axis=0).max() < 0.05 * 0.01 * 6**0.5
+
+
+@pytest.mark.parametrize(("module", "number"), BEDS)
+def test_no_tendon_is_slack(module: str, number: int) -> None:
+    case = made(module, number)
+    assert min(columns(data, "tendon_force").min() for data in (case.train, case.test)) > 2.0
+
+
+@pytest.mark.parametrize(("module", "number"), BEDS)
+def test_hidden_torques_have_their_size(module: str, number: int) -> None:
+    truth = made(module, number).truth
+    assert truth.rms is not None
+    if truth.hidden == "none":
+        assert truth.rms < 1e-9
+    elif truth.hidden not in UNSIZED:
+        assert 0.004 < truth.rms < 0.05  # of the first seconds; the whole recordings have 8 to 30 mN·m
+
+
+@NEEDS_MUJOCO
+def test_spatial_and_fixed_tendons_make_the_same_finger() -> None:
+    """Wrapped around cylinders on the joints' axes, tendons have constant arms: the two routings must agree."""
+    plan = fingers_in_mujoco.Plan("none", 3)
+    physics = fingers_in_mujoco.finger(plan, np.random.default_rng(1))
+    motion = mujoco_run.random_motion(3, np.random.default_rng(2))
+    fixed, spatial = (
+        mujoco_run.run(dataclasses.replace(physics, spatial=each), Truth("none", 3), motion, 0.5, 250.0)
+        for each in (False, True)
+    )
+    assert np.abs(fixed.angle - spatial.angle).max() < 1e-9
+    assert np.abs(fixed.force - spatial.force).max() < 1e-6
+
+
+@NEEDS_MUJOCO
+def test_the_probe_touches_while_it_pushes() -> None:
+    number = next(k for k in fingers_in_mujoco.NUMBERS if fingers_in_mujoco.PLANS[k - 1].hidden == "contact")
+    plan = fingers_in_mujoco.PLANS[number - 1]
+    rng = np.random.default_rng(3)
+    physics = fingers_in_mujoco.finger(plan, rng)
+    physics = dataclasses.replace(physics, pushes=((1.0, 2.0, 0.8),))
+    motion = mujoco_run.random_motion(plan.joints, rng)
+    trace = mujoco_run.run(physics, Truth("contact", plan.joints), motion, 2.5, 250.0)
+    touched = np.abs(trace.hidden).max(axis=1)
+    assert touched[trace.time < 1.0].max() < 1e-9
+    assert touched[(trace.time > 1.5) & (trace.time < 2.0)].min() > 0.01
+
+
+def test_numbers_of_the_families() -> None:
+    hidden = [plan.hidden for plan in fingers_in_numpy.PLANS]
+    assert len(hidden) >= 14 and hidden.count("none") >= 4
+    assert {fingers_in_numpy.PLANS[k].simulator for k in range(0, len(hidden), 2)} == {
+        plan.simulator for plan in fingers_in_numpy.PLANS
+    }
+    if HAS_MUJOCO:
+        assert len(fingers_in_mujoco.PLANS) >= 12
+        assert {plan.joints for plan in fingers_in_mujoco.PLANS if plan.hidden == "none"} == {2, 3, 4}
+
+
+@pytest.mark.skipif(recorded.folder() is None, reason="SKIPPED: no folder shared/foreign beside the repository")
+def test_recorded_cases_are_read() -> None:
+    numbers = recorded.numbers()
+    assert len(numbers) == 26
+    case = recorded.make(numbers[-1])
+    assert case.name == "recorded_26" and case.truth.hidden == "force_gain"
+    assert case.train["time"].iloc[-1] > 59.0 and case.test["time"].iloc[-1] > 29.0
+
+
+def imports(path: Path) -> Iterator[str]:
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name.partition(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield (node.module or "").partition(".")[0]
+
+
+def test_beds_share_nothing_with_the_product() -> None:
+    own = {path.stem for path in FOLDER.glob("*.py")}
+    allowed = own | set(sys.stdlib_module_names) | {"numpy", "scipy", "pandas", "mujoco", "pytest"}
+    foreign = {path.name: set(imports(path)) - allowed for path in FOLDER.glob("*.py")}
+    assert {name: found for name, found in foreign.items() if found} == {}
+    simulators = {path: set(imports(path)) & own for path in FOLDER.glob("numpy_*.py")}
+    assert len(simulators) >= 4
+    assert all(found == {"foreign_case"} for found in simulators.values())
