@@ -24,7 +24,7 @@ from tendonfmu.cli_diagnose import several_tests
 from tendonfmu.diagnosis_files import write_diagnosis
 from tendonfmu.diagnosis_result import Diagnosis
 from tendonfmu.effects import CANDIDATES
-from tendonfmu.errors import InputError
+from tendonfmu.errors import InternalError
 from tendonfmu.tables import read_table
 
 PAGE = (Path(__file__).resolve().parents[1] / "docs" / "diagnose.md").read_text(encoding="utf-8")
@@ -108,7 +108,7 @@ def test_what_fails_leaves_the_folder_as_it_was(tmp_path: Path) -> None:
     write_diagnosis(brief(examples.adequate()), tmp_path / "out")
     before = {file.name: file.read_bytes() for file in (tmp_path / "out").iterdir()}
     broken = replace(brief(examples.three_causes()), extended_data={"format": "tendonfmu-finger-1", "name": "broken"})
-    with pytest.raises(InputError, match="joints"):
+    with pytest.raises(InternalError, match="joints"):
         write_diagnosis(broken, tmp_path / "out")
     assert {file.name: file.read_bytes() for file in (tmp_path / "out").iterdir()} == before
     assert files_in(tmp_path) == {"out"}
