@@ -87,6 +87,8 @@ def diagnose(
     from tendonfmu.diagnosis_text import lines, tables
     from tendonfmu.fit_files import check_given_once
 
+    if not 0.0 <= least_gain <= 0.5:  # NaN passes the range
+        raise InputError(f"--least-gain {least_gain:g}: expected 0 to 0.5")
     tests = test or []
     check_folder(output, [finger, *recordings, *tests])
     check_given_once(recordings, tests, "a test")

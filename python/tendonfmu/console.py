@@ -137,6 +137,10 @@ class PhaseDisplay:
         elif self._shown:
             say(words)
 
+    def refresh(self) -> None:
+        """Draws the bar now, not at its next moment."""
+        self._bar.refresh()
+
     def _show(self, head: str, state: PhaseState, is_new: bool) -> None:
         left = time_left(state.left_s)
         if is_new:
