@@ -129,7 +129,7 @@ def test_what_fails_leaves_the_folder_as_it_was(tmp_path: Path) -> None:
         (("f.json", "a.csv", "copy.csv", "-o", "new"), "copy.csv: given twice, as a.csv"),
         (("f.json", "a.csv", "-o", "new", "--least-gain", "0.6"), "--least-gain"),
         (("f.json", "a.csv", "-o", "new", "--least-gain", "-0.01"), "--least-gain"),
-        (("f.json", "a.csv", "-o", "new", "--least-gain", "nan"), "--least-gain nan: expected 0 to 0.5"),
+        (("f.json", "a.csv", "-o", "new", "--least-gain", "nan"), "--least-gain"),
         (("f.json", "a.csv", "-o", "new", "--least-gain", "3%"), "--least-gain"),
         (("f.json", "-o", "new"), "RECORDING"),
         (("f.json", "a.csv"), "-o"),
