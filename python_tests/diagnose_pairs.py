@@ -58,7 +58,7 @@ def routing(rng: np.random.Generator, joints: int, tendons: int) -> Array:
     """[m, n] m: pairs of tendons that pull either way; those that go further pass the joints before."""
     arms = np.zeros((tendons, joints))
     for i in range(tendons):
-        last = min(i // 2, joints - 1) if tendons > joints else i
+        last = i * joints // tendons
         arms[i, last] = (1.0 if i % 2 == 0 else -1.0) * rng.uniform(0.006, 0.012)
         arms[i, :last] = rng.choice([-1.0, 1.0]) * rng.uniform(0.003, 0.008, last)
     return arms
@@ -525,7 +525,7 @@ def stuck_sensor(rng: np.random.Generator, pair: Pair) -> None:
 def a_joint_that_rests(rng: np.random.Generator, pair: Pair) -> None:
     pair.kinematics = 3
     for columns in pair.all:
-        columns["joint_position"][:, -1] = 0.1
+        columns["joint_position"][:, -1] = 0.1 + 1e-6 * rng.normal(size=len(columns["time"]))
         columns["joint_velocity"][:, -1] = 0.0
 
 

@@ -52,6 +52,8 @@ USUAL = [
 _CODE = re.compile(
     r"\b\w+(Error|Exception|Warning)\b|Traceback|internal|object at 0x|numpy|\bNone\b|<class|\bNoneType\b"
 )
+_OPTION = re.compile(r"--[a-z][a-z-]+")
+OPTIONS = ("--test", "--kinematics", "--least-gain", "--seed", "--jobs")
 
 
 def written(folder: Path, pair: Pair) -> tuple[Path, list[Path], list[Path]]:
@@ -109,6 +111,8 @@ def faults_of_report(folder: Path) -> Iterator[str]:
         yield "files: not those in the folder"
     for name in ("nominal.json", "extended.json"):
         read_finger(folder / name)
+    for text in report["warnings"]:
+        yield from (f"no option of diagnose: {text}" for option in _OPTION.findall(text) if option not in OPTIONS)
     sentences = [*report["warnings"], report["next_experiment"], report["unexplained"]["description"]]
     yield from (f"not in plain words: {text}" for text in sentences if _CODE.search(text) or "nan" in text.split())
 
