@@ -21,7 +21,9 @@ pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eige
 
 import diagnosis_examples as examples
 from command import Call
-from diagnose_pairs import COUNT, QUIRKS, Columns, Pair, make_pair
+from diagnose_pairs import COUNT, make_pair
+from diagnose_quirks import QUIRKS
+from odd_finger import Columns, Pair
 from tendonfmu import diagnosis
 from tendonfmu.description import read_finger
 from tendonfmu.diagnosis import diagnose

@@ -77,6 +77,8 @@ def whole_file(file: Path) -> Iterator[Path]:
 
 def is_about(error: OSError, folder: Path) -> bool:
     """Whether an error in writing concerns a folder: it names no file, such as that of a full disk, or one in there."""
+    if error.errno is None:  # not of the operating system
+        return False
     if not isinstance(error.filename, str | bytes):
         return True
     return folder.absolute() in Path(os.fsdecode(error.filename)).absolute().parents
