@@ -24,7 +24,10 @@ from tendonfmu.cli_diagnose import several_tests
 from tendonfmu.diagnosis_files import write_diagnosis
 from tendonfmu.diagnosis_result import Diagnosis
 from tendonfmu.effects import CANDIDATES
-from tendonfmu.errors import InputError
+from tendonfmu.errors import InputError, InternalError
+from tendonfmu.fit_files import check_unseen
+from tendonfmu.phases import PhaseState
+from tendonfmu.recording import Recording
 from tendonfmu.tables import read_table
 
 PAGE = (Path(__file__).resolve().parents[1] / "docs" / "diagnose.md").read_text(encoding="utf-8")
@@ -41,7 +44,7 @@ def answering(monkeypatch: pytest.MonkeyPatch) -> Callable[[Diagnosis], Called]:
         asked: Called = []
 
         def answer(finger: Path, recordings: Sequence[Path], tests: Sequence[Path], **options: Any) -> Diagnosis:
-            options["progress"]("fitting", 1, 2)
+            options["progress"](PhaseState(1, 2, "fitting", 1, 2, 0.0, None))
             asked.append((finger.name, [each.name for each in recordings], [each.name for each in tests], options))
             return found
 
@@ -64,11 +67,11 @@ def test_it_writes_everything(call: Call, answering: Callable[[Diagnosis], Calle
     found = examples.three_causes()
     asked = answering(found)
     words = "diagnose f.json a.csv b.csv --test c.csv d.csv -o new/out --seed 3 --kinematics 3 --jobs 2"
-    answer = call(*words.split())
+    answer = call(*words.split(), "--least-gain", "0.1")
     assert answer.status == 0
     finger, recordings, tests, options = asked[0]
     assert (finger, recordings, tests) == ("f.json", ["a.csv", "b.csv"], ["c.csv", "d.csv"])
-    assert (options["seed"], options["kinematics"], options["jobs"]) == (3, 3, 2)
+    assert (options["seed"], options["kinematics"], options["jobs"], options["least_gain"]) == (3, 3, 2, 0.1)
     report = json.loads(Path("new/out/diagnosis.json").read_text(encoding="utf-8"))
     jsonschema.validate(report, json.loads((files_of("tendonfmu") / "schema" / "diagnosis.schema.json").read_text()))
     assert set(report["files"]) == files_in(Path("new/out")) >= NAMED
@@ -108,7 +111,7 @@ def test_what_fails_leaves_the_folder_as_it_was(tmp_path: Path) -> None:
     write_diagnosis(brief(examples.adequate()), tmp_path / "out")
     before = {file.name: file.read_bytes() for file in (tmp_path / "out").iterdir()}
     broken = replace(brief(examples.three_causes()), extended_data={"format": "tendonfmu-finger-1", "name": "broken"})
-    with pytest.raises(InputError, match="joints"):
+    with pytest.raises(InternalError, match="joints"):
         write_diagnosis(broken, tmp_path / "out")
     assert {file.name: file.read_bytes() for file in (tmp_path / "out").iterdir()} == before
     assert files_in(tmp_path) == {"out"}
@@ -120,7 +123,14 @@ def test_what_fails_leaves_the_folder_as_it_was(tmp_path: Path) -> None:
         (("f.json", "a.csv", "-o", "f.json"), "f.json: a file; expected a folder"),
         (("out/extended.json", "a.csv", "-o", "out"), "out/extended.json: the same file as the input"),
         (("f.json", "a.csv", "./a.csv", "-o", "new"), "a.csv: given twice; expected each recording once"),
-        (("f.json", "a.csv", "--test", "a.csv", "-o", "new"), "a.csv: compared with, but trained on as well"),
+        (("f.json", "a.csv", "--test", "a.csv", "-o", "new"), "a.csv: a test, but trained on as well; expected"),
+        (("f.json", "a.csv", "--test", "link.csv", "-o", "new"), "link.csv: a test, but trained on as well"),
+        (("f.json", "a.csv", "--test", "copy.csv", "-o", "new"), "copy.csv: a test, but trained on as well, as a.csv"),
+        (("f.json", "a.csv", "copy.csv", "-o", "new"), "copy.csv: given twice, as a.csv"),
+        (("f.json", "a.csv", "-o", "new", "--least-gain", "0.6"), "--least-gain"),
+        (("f.json", "a.csv", "-o", "new", "--least-gain", "-0.01"), "--least-gain"),
+        (("f.json", "a.csv", "-o", "new", "--least-gain", "nan"), "--least-gain"),
+        (("f.json", "a.csv", "-o", "new", "--least-gain", "3%"), "--least-gain"),
         (("f.json", "-o", "new"), "RECORDING"),
         (("f.json", "a.csv"), "-o"),
         (("f.json", "a.csv", "-o", "new", "--kinematics", "4"), "--kinematics"),
@@ -133,6 +143,9 @@ def test_bad_usage_is_one_line(call: Call, tmp_path: Path, arguments: tuple[str,
     (tmp_path / "out").mkdir()
     for name in ("f.json", "a.csv", "out/extended.json"):
         (tmp_path / name).write_text("{}")
+    (tmp_path / "a.csv").write_text("time,tendon_force[1]\n")
+    (tmp_path / "copy.csv").write_text("time,tendon_force[1]\n")
+    (tmp_path / "link.csv").symlink_to(tmp_path / "a.csv")
     (tmp_path / "finger.json").write_text(json.dumps(examples.adequate().nominal_data))
     answer = call("diagnose", *arguments)
     assert answer.status == 2 and words in answer.err and answer.err.count("\n") == 1 and answer.out == ""
@@ -153,6 +166,24 @@ def test_bad_usage_is_one_line(call: Call, tmp_path: Path, arguments: tuple[str,
 )
 def test_several_tests_after_the_recordings(given: str, read: str) -> None:
     assert several_tests(given.split(), {"--test", "-o", "--seed"}) == read.split()
+
+
+def test_least_gain_is_three_percent(call: Call, answering: Callable[[Diagnosis], Called]) -> None:
+    asked = answering(brief(examples.adequate()))
+    assert call("diagnose", "f.json", "a.csv", "-o", "out").status == 0
+    assert asked[0][3]["least_gain"] == 0.03
+
+
+def test_a_test_that_holds_what_is_trained_on_is_refused() -> None:
+    """Whatever its file's name and format, and when it begins."""
+    motion = np.random.default_rng(1).normal(size=(50, 2))
+    groups = {"tendon_force": motion, "tendon_position": motion[:, ::-1]}
+    monday = Recording(Path("monday.csv"), np.arange(50) / 100, groups)
+    copy = Recording(Path("copy.parquet"), 7.0 + np.arange(50) / 100, {k: v.copy() for k, v in groups.items()})
+    other = Recording(Path("other.csv"), monday.time, {**groups, "tendon_force": motion + 1e-3})
+    check_unseen([monday], [other])
+    with pytest.raises(InputError, match=r"copy\.parquet: a test, but trained on as well: the same samples as monday"):
+        check_unseen([monday], [other, copy])
 
 
 def test_options_and_effects_are_on_the_page(call: Call) -> None:

@@ -208,9 +208,9 @@ def test_initial_torque_is_an_unknown_of_any_sign() -> None:
     ids=["stiffness", "noise", "threshold", "angle", "two kinds in one group"],
 )
 def test_what_cannot_be_estimated_is_refused(chosen: dict[str, int], named: str) -> None:
-    from tendonfmu.errors import InputError
+    from tendonfmu.estimation import EstimationError
 
-    with pytest.raises(InputError) as refused:
+    with pytest.raises(EstimationError) as refused:
         estimator_of(SMALL, chosen)
     assert named in str(refused.value)
     assert "expected" in str(refused.value) and "\n" not in str(refused.value)
@@ -225,9 +225,9 @@ def test_what_cannot_be_estimated_is_refused(chosen: dict[str, int], named: str)
     ids=["group too short", "scale too long"],
 )
 def test_wrong_lengths_are_refused(group: Any, scale: Any) -> None:
-    from tendonfmu.errors import InputError
+    from tendonfmu.estimation import EstimationError
 
-    with pytest.raises(InputError) as refused:
+    with pytest.raises(EstimationError) as refused:
         estimation.Estimator(image_of(SMALL), group, scale)
     assert str(len(PATHS)) in str(refused.value)
     assert "\n" not in str(refused.value)

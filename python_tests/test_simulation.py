@@ -20,7 +20,6 @@ from plant_rigs import needs_plant
 from random_rigs import random_rig
 from rig_cases import RIGS, changed, index_rig, with_everything, written
 from tendonfmu import plant as binding
-from tendonfmu.errors import InputError
 from tendonfmu.plant import Plant, PlantError, SolverError
 from tendonfmu.recording import read_recording
 from tendonfmu.rig import read_rig
@@ -397,7 +396,7 @@ def test_other_threads_run_while_the_plant_does(plant: Plant) -> None:
 
 
 def test_a_bad_rig_text_is_refused() -> None:
-    with pytest.raises(InputError):
+    with pytest.raises(PlantError):
         Plant("{}")
-    with pytest.raises(InputError):
+    with pytest.raises(PlantError):
         Plant(json.dumps({"format": "tendonfmu-rig-1"}).encode())

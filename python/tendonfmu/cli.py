@@ -1,6 +1,6 @@
 """The command `tendonfmu`: parses, calls, prints.
 
-Exit status: 0 done, 1 the answer is no, 2 bad usage or input.
+Exit status: 0 done, 1 the answer is no, 2 bad usage or input, 3 a fault of tendonfmu itself, 130 and 143 interrupted.
 
 Results go to files or standard output, messages to standard error.
 """
@@ -10,13 +10,15 @@ from __future__ import annotations
 import sys
 import warnings
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 import typer
 
 from tendonfmu import cli_campaign, cli_detect, cli_diagnose
-from tendonfmu.console import fit_bar, phase_bar, print_tables, progress_bar, say
-from tendonfmu.errors import InputError
+from tendonfmu.console import fit_bar, leave, phase_bar, print_tables, progress_bar, say
+from tendonfmu.errors import InputError, line_of
+from tendonfmu.fault_report import is_own_file, write_fault_report
+from tendonfmu.interruption import ended_by_signals
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -25,40 +27,60 @@ app = typer.Typer(
     help="Friction of tendon-driven robot fingers: what the finger feels, without a tactile sensor.",
 )
 
+FAULT = 3
 INTERRUPTED = 130
 
 FingerFile = Annotated[Path, typer.Argument(metavar="FINGER.json", help="finger description")]
 
 
 def main() -> None:
-    """Entry point: every refusal is one line on standard error and exit status 2."""
-    try:
-        status = app(standalone_mode=False)
-    except (InputError, OSError) as refused:
-        if isinstance(refused, BrokenPipeError):  # the reader of standard output has seen enough
-            sys.stderr.close()
-            sys.exit(0)
-        _refuse(str(refused))
-    except (KeyboardInterrupt, typer.Abort):
-        say("tendonfmu: interrupted; no file was left half written")
-        sys.exit(INTERRUPTED)
-    except Exception as refused:  # bad usage; the class has moved between versions of typer
-        if not hasattr(refused, "format_message"):
+    """Entry point: every refusal is one line on standard error and exit status 2, every fault of its own one and 3."""
+    with ended_by_signals() as ending:
+        try:
+            status = app(standalone_mode=False)
+        except (InputError, OSError) as refused:
+            if isinstance(refused, BrokenPipeError):  # the reader of standard output has seen enough
+                sys.stderr.close()
+                sys.exit(0)
+            if isinstance(refused, OSError) and (refused.errno is None or is_own_file(refused.filename)):
+                _fault(refused)
+            _refuse(line_of(refused))
+        except (KeyboardInterrupt, typer.Abort):
+            _interrupted(ending.status)
+        except SystemExit as ended:
+            if ended.code == INTERRUPTED:  # the command has said what it leaves
+                leave(ending.status)
             raise
-        if type(refused).__name__ == "NoArgsIsHelpError":
-            say(refused.format_message())
-            sys.exit(2)
-        page = getattr(getattr(refused, "ctx", None), "command_path", "tendonfmu")
-        _refuse(f"{refused.format_message().rstrip('.')}; see {page} --help")
-    else:
-        if status == INTERRUPTED:  # newer versions of typer turn Ctrl-C into a status
-            say("tendonfmu: interrupted; no file was left half written")
-        sys.exit(status if isinstance(status, int) else 0)
+        except Exception as refused:
+            if not hasattr(refused, "format_message"):  # of bad usage; its class has moved between versions of typer
+                _fault(refused)
+            elif type(refused).__name__ == "NoArgsIsHelpError":
+                say(refused.format_message())
+                sys.exit(2)
+            else:
+                page = getattr(getattr(refused, "ctx", None), "command_path", "tendonfmu")
+                _refuse(f"{refused.format_message().rstrip('.')}; see {page} --help")
+        else:
+            if status == INTERRUPTED:  # newer versions of typer turn Ctrl-C into a status
+                _interrupted(ending.status)
+            sys.exit(status if isinstance(status, int) else 0)
 
 
-def _refuse(reason: str) -> None:
+def _refuse(reason: str) -> NoReturn:
     say(f"tendonfmu: {' '.join(reason.split())}")
     sys.exit(2)
+
+
+def _fault(error: BaseException) -> NoReturn:
+    report = write_fault_report(error, sys.argv[1:])
+    where = "no report could be written" if report is None else f"please send the report {report}"
+    say(f"tendonfmu: a fault of tendonfmu, not of its input ({type(error).__name__}); {where}")
+    leave(FAULT)
+
+
+def _interrupted(status: int) -> NoReturn:
+    say("tendonfmu: interrupted; no file was left half written")
+    leave(status)
 
 
 def _show_version(wanted: bool) -> None:

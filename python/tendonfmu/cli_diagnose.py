@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from tendonfmu.console import phase_bar, print_tables, progress_bar, say
+from tendonfmu.console import PhaseDisplay, print_tables, say
 from tendonfmu.errors import InputError
 
 
@@ -67,6 +67,10 @@ def diagnose(
             min=1, max=3, help="1: tendon positions, 2: measured joint positions, 3: joint positions and velocities"
         ),
     ] = 1,
+    least_gain: Annotated[
+        float,
+        typer.Option(min=0.0, max=0.5, metavar="SHARE", help="by which a cause has to lower the rms on unseen data"),
+    ] = 0.03,
     seed: Annotated[int, typer.Option(min=0, max=2**53, help="of all that is drawn at random")] = 0,
     jobs: Annotated[int, typer.Option(min=1, max=64, help="processor cores to use; the result is the same")] = 1,
     progress: Annotated[
@@ -83,13 +87,23 @@ def diagnose(
     from tendonfmu.diagnosis_text import lines, tables
     from tendonfmu.fit_files import check_given_once
 
+    if not 0.0 <= least_gain <= 0.5:  # NaN passes the range
+        raise InputError(f"--least-gain {least_gain:g}: expected 0 to 0.5")
     tests = test or []
     check_folder(output, [finger, *recordings, *tests])
-    check_given_once(recordings, tests)
-    with progress_bar(progress) as bar:
-        show = phase_bar(bar)
-        found = find(finger, recordings, tests, kinematics=kinematics, seed=seed, jobs=jobs, progress=show)
-        show("writing", 0, None)
+    check_given_once(recordings, tests, "a test")
+    with PhaseDisplay(progress) as display:
+        found = find(
+            finger,
+            recordings,
+            tests,
+            kinematics=kinematics,
+            least_gain=least_gain,
+            seed=seed,
+            jobs=jobs,
+            progress=display,
+        )
+        display.note("writing the files")
         written = write_diagnosis(found, output)
     for sentence in found.warnings:
         say(f"tendonfmu: warning: {sentence}")

@@ -40,7 +40,7 @@ _SPARE = 1.3  # times the least time that supports a rate: recordings are cut in
 
 
 def detection_gain(nominal: Data, extended: Data, recordings: Sequence[FitRecording]) -> DetectionGain | None:
-    """None without labelled contact, or without free motion to tune on.
+    """None without labelled contact, or where nothing can be tuned: no free motion, or a bias that does not drift.
 
     nominal, extended: fitted descriptions. recordings: all of the diagnosis, for training and tests; those without any
     contact are free motion, and where there are none, the stretches without contact of the others.
@@ -57,7 +57,10 @@ def detection_gain(nominal: Data, extended: Data, recordings: Sequence[FitRecord
     rate = max(RATE, _SPARE * least_hours(1.0, CONFIDENCE) / hours)
     if rate > 3600:
         return None
-    tuned = [_tuned(data, free, kinematics, rate) for data in (nominal, extended)]
+    try:
+        tuned = [_tuned(data, free, kinematics, rate) for data in (nominal, extended)]
+    except InputError:  # no thresholds can be tuned, such as of a bias without drift
+        return None
     before, after = (_score(data, labelled, kinematics) for data in tuned)
     return DetectionGain(
         events=len(before.events),

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 from tendonfmu.demo_run import DATA, IndexFinger
 from tendonfmu.errors import InputError
 from tendonfmu.estimation import ESTIMATION_MISSING, HAS_ESTIMATION
+from tendonfmu.phases import PhaseState
 
 if TYPE_CHECKING:
     from tendonfmu.diagnosis_result import Diagnosis
@@ -112,8 +113,11 @@ class Story:
         from tendonfmu.diagnosis import diagnose
         from tendonfmu.diagnosis_files import write_diagnosis
 
+        def show(state: PhaseState) -> None:
+            phase(state.words, state.done, state.total)
+
         with as_file(DATA) as data:
-            self.diagnosis = diagnose(data / TWO_JOINTS, [data / TRAINING], [data / UNSEEN], progress=phase)
+            self.diagnosis = diagnose(data / TWO_JOINTS, [data / TRAINING], [data / UNSEEN], progress=show)
         phase("writing", 0, None)
         written = write_diagnosis(self.diagnosis, self.folder / DIAGNOSIS)
         named = ("diagnosis.html", "diagnosis.json", "extended.json", "extended.fmu")

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from tendonfmu.diagnosis_page import PAGE, write_diagnosis_page
 from tendonfmu.diagnosis_report import EXTENDED, EXTENDED_FMU, NOMINAL, REPORT, build_report, report_text
 from tendonfmu.diagnosis_result import Diagnosis
-from tendonfmu.errors import InputError
+from tendonfmu.errors import InputError, own_fault
 from tendonfmu.fit_files import description_text, write_text
+from tendonfmu.interruption import uninterrupted
 from tendonfmu.packaging import build_fmu
-from tendonfmu.whole_file import check_output, check_output_folder
+from tendonfmu.whole_file import check_output, check_output_folder, is_about
 
+_SUFFIXES = (".html", ".png", ".json", ".fmu")
 _NAMED = (REPORT, EXTENDED, EXTENDED_FMU, PAGE, NOMINAL)
 
 
@@ -30,21 +34,58 @@ def check_folder(folder: Path, inputs: Sequence[Path]) -> None:
 def write_diagnosis(found: Diagnosis, folder: Path) -> dict[Path, str]:
     """Writes report, both descriptions, the FMU, page and figures. Returns file -> what is in it, in order of use.
 
-    Everything is made beside the folder and then moved into it, the report last; files that an earlier diagnosis left
-    there are removed. Raises InputError where nothing can be written: the folder is then as before.
+    Everything is made beside the folder and then moved into it, at once also for Ctrl-C; files that an earlier
+    diagnosis left there are removed. Raises InputError where nothing can be written: the folder is then as before.
     """
     beside = folder.absolute().parent
     try:
         beside.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=beside, prefix=f".{folder.absolute().name}-") as name:
-            made = _make(found, Path(name))
-            folder.mkdir(exist_ok=True)
-            _remove_earlier(folder)
-            for file in sorted(made, key=lambda file: file.name == REPORT):
-                os.replace(file, folder / file.name)
+        with _folder_beside(folder) as made_in:
+            (made_in / "new").mkdir()
+            with own_fault("the files of the diagnosis"):
+                made = _make(found, made_in / "new")
+            with uninterrupted():
+                _move(made, folder, made_in / "old")
     except OSError as error:
+        if not is_about(error, beside):
+            raise
         raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from None
     return {folder / file.name: what for file, what in made.items()}
+
+
+@contextmanager
+def _folder_beside(folder: Path) -> Iterator[Path]:
+    """A temporary folder on the same disk, whose removal is not interrupted."""
+    name = tempfile.mkdtemp(dir=folder.absolute().parent, prefix=f".{folder.absolute().name}-")
+    try:
+        yield Path(name)
+    finally:
+        with uninterrupted():
+            shutil.rmtree(name, ignore_errors=True)
+
+
+def _move(files: Iterable[Path], folder: Path, old: Path) -> None:
+    """Moves files into a folder, the report last, and takes those of an earlier diagnosis out; on an error, back.
+
+    old: folder to be made for what was there before.
+    """
+    is_new = not folder.exists()
+    folder.mkdir(exist_ok=True)
+    old.mkdir()
+    moved: list[tuple[Path, Path]] = []
+    ordered = sorted(files, key=lambda file: file.name == REPORT)
+    names = {*_earlier(folder), *(file.name for file in ordered)}
+    leaving = [(folder / name, old / name) for name in sorted(names) if (folder / name).is_file()]
+    try:
+        for source, target in (*leaving, *((file, folder / file.name) for file in ordered)):
+            os.replace(source, target)
+            moved.append((source, target))
+    except BaseException:
+        for source, target in reversed(moved):
+            os.replace(target, source)
+        if is_new:
+            folder.rmdir()
+        raise
 
 
 def _make(found: Diagnosis, folder: Path) -> dict[Path, str]:
@@ -67,16 +108,12 @@ def _make(found: Diagnosis, folder: Path) -> dict[Path, str]:
     return files
 
 
-def _remove_earlier(folder: Path) -> None:
-    """What the report of an earlier diagnosis lists, and nothing else: figures of causes that are no more."""
+def _earlier(folder: Path) -> list[str]:
+    """Names of what the report of an earlier diagnosis lists, and nothing else: also figures of causes that are no
+    more."""
     try:
         listed = json.loads((folder / REPORT).read_bytes())["files"]
     except (OSError, ValueError, KeyError, TypeError):
-        return
-    for name in listed if isinstance(listed, list) else ():
-        if (
-            isinstance(name, str)
-            and Path(name).name == name
-            and Path(name).suffix in (".html", ".png", ".json", ".fmu")
-        ):
-            (folder / name).unlink(missing_ok=True)
+        return []
+    texts = [name for name in listed if isinstance(name, str)] if isinstance(listed, list) else []
+    return [name for name in texts if Path(name).name == name and Path(name).suffix in _SUFFIXES]

@@ -35,8 +35,8 @@ LearnerWatch = Callable[[int, int], bool | None]
 BatchWatch = Callable[[int, int, int, int, float, Numbers], bool | None]
 
 
-class EstimationError(InputError):
-    """Refused by the estimation: a structure, a recording, unknowns."""
+class EstimationError(ValueError):
+    """Refused by the estimation: a structure, a recording, unknowns. Who knows the file makes it an InputError."""
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import filecmp
 import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
@@ -14,9 +15,10 @@ from numpy.typing import NDArray
 
 from tendonfmu import native
 from tendonfmu.description import FingerDescription
-from tendonfmu.errors import InputError
+from tendonfmu.errors import InputError, InternalError
 from tendonfmu.fit_structure import Structure, own_copy, set_number
 from tendonfmu.json_node import read_json
+from tendonfmu.recording import Recording
 from tendonfmu.whole_file import check_output, check_output_folder, whole_file
 
 Numbers = NDArray[np.float64]
@@ -38,10 +40,11 @@ def check_outputs(output: Path, report: Path | None, figures: Path | None, input
         check_output_folder(figures)
 
 
-def check_given_once(training: Iterable[object], compared: Iterable[object]) -> None:
+def check_given_once(training: Iterable[object], compared: Iterable[object], role: str = "compared with") -> None:
     """Raises InputError where a file is trained on twice, as if it were two measurements, or compared as if new.
 
-    Only files are told apart; recordings in memory may be pieces of one file.
+    Files are the same when one name leads to the other, or when they hold the same bytes; `check_unseen` compares what
+    is measured. Recordings in memory may be pieces of one file. role: of those compared, in words.
     """
     seen: dict[Path, bool] = {}
     for sources, trained in ((training, True), (compared, False)):
@@ -49,11 +52,42 @@ def check_given_once(training: Iterable[object], compared: Iterable[object]) -> 
             if not isinstance(source, str | os.PathLike):
                 continue
             file = Path(source).resolve()
-            if seen.get(file) and not trained:
-                raise InputError(f"{source}: compared with, but trained on as well; expected another recording")
-            if file in seen:
-                raise InputError(f"{source}: given twice; expected each recording once")
+            same = next((each for each in seen if each == file or _same_bytes(each, file)), None)
+            if same is not None:
+                what = "" if same == file else f", as {same.name}"
+                if seen[same] and not trained:
+                    raise InputError(f"{source}: {role}, but trained on as well{what}; expected another recording")
+                raise InputError(f"{source}: given twice{what}; expected each recording once")
             seen[file] = trained
+
+
+def _same_bytes(one: Path, other: Path) -> bool:
+    """Whether two files hold the same; False where one is empty or cannot be read, which is said later."""
+    try:
+        return one.stat().st_size == other.stat().st_size > 0 and filecmp.cmp(one, other, shallow=False)
+    except OSError:
+        return False
+
+
+def check_unseen(training: Iterable[Recording], tests: Iterable[Recording], role: str = "a test") -> None:
+    """Raises InputError where a recording that is to be unseen holds the samples of one that is trained on.
+
+    Also when they begin at another time, or are in another format or order of columns.
+    """
+    known = [(each, _measured(each)) for each in training]
+    for test in tests:
+        own = _measured(test)
+        for other, measured in known:
+            if own.shape == measured.shape and np.array_equal(own, measured):
+                raise InputError(
+                    f"{test.path}: {role}, but trained on as well: the same samples as {other.path}; expected another "
+                    "recording"
+                )
+
+
+def _measured(recording: Recording) -> Numbers:
+    """[N, 2m] forces and positions."""
+    return np.hstack([recording.groups["tendon_force"], recording.groups["tendon_position"]])
 
 
 # --- descriptions -----------------------------------------------------------------------------------------------------
@@ -72,8 +106,8 @@ def with_values(structure: Structure, values: Numbers) -> FingerDescription:
     text = description_text(data).encode()
     try:
         return FingerDescription(structure.start.path, text, data, native.image_from_json(text))
-    except native.NativeError as refused:  # a fit keeps every bound, so this is no fault of the user's
-        raise InputError(f"{structure.start.path}: the fitted description is refused: {refused}") from None
+    except native.NativeError as refused:  # a fit keeps every bound
+        raise InternalError(f"{structure.start.path}: the fitted description is refused: {refused}") from refused
 
 
 def with_uncertainty(

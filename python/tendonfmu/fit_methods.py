@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.estimation import Estimator, Learner
+from tendonfmu.errors import InputError
+from tendonfmu.estimation import EstimationError, Estimator, Learner
 from tendonfmu.fit_files import with_values
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.fit_structure import Structure
@@ -82,7 +83,11 @@ def unknown_names(estimator: Estimator) -> list[str]:
 
 
 def _estimator(structure: Structure) -> Estimator:
-    return Estimator(structure.start.image, structure.group, structure.scale)
+    """Raises InputError: a number whose size nothing tells."""
+    try:
+        return Estimator(structure.start.image, structure.group, structure.scale)
+    except EstimationError as refused:
+        raise InputError(f"{structure.start.path}: {refused}") from None
 
 
 def _starting_point(estimator: Estimator, start: Start | None) -> Numbers:
@@ -113,10 +118,13 @@ def learn_batch(
     """Maximum likelihood. Raises Interrupted."""
     estimator = _estimator(structure)
     begin = _starting_point(estimator, start)
-    for recording in recordings:
-        for part in recording.parts:
-            if recording.train[part].any():
-                estimator.add_recording(**_rows(recording, part))
+    parts = [(recording, part) for recording in recordings for part in recording.parts]
+    learned = [(recording, part) for recording, part in parts if np.count_nonzero(recording.train[part]) > 1]
+    if not learned:
+        paths = ", ".join(str(recording.path) for recording in recordings)
+        raise InputError(f"{paths}: no two samples to learn from between two gaps; expected motion without contact")
+    for recording, part in learned:
+        estimator.add_recording(**_rows(recording, part))
     best, best_cost = begin, float("nan")
 
     def show(number: int, stride: int, done: int, total: int, cost: float, z: Numbers) -> bool:
@@ -148,14 +156,7 @@ def learn_batch(
         passes=found.passes,
         converged=found.converged,
         innovations=[],
-        warnings=[] if found.converged else [_not_converged(found.passes)],
-    )
-
-
-def _not_converged(passes: int) -> str:
-    return (
-        f"not converged after {passes} passes over the data: allow more (--passes), or estimate fewer numbers "
-        "(--only, --fix, --share)"
+        warnings=[] if found.converged else [f"not converged after {found.passes} passes over the data"],
     )
 
 
@@ -212,6 +213,8 @@ def _filter_once(
         for part in recording.parts:
             try:
                 outputs = learner.run(**_rows(recording, part), progress=show)
+            except EstimationError as refused:  # the filter diverges: a unit is wrong, or a scale
+                raise InputError(f"{recording.path}: {refused}") from None
             except KeyboardInterrupt:
                 raise Interrupted(estimator, learner.z, float("nan"), by_user=True) from None
             if watch.stopped:
@@ -229,6 +232,9 @@ def _learner(structure: Structure, estimator: Estimator, options: Mapping[str, A
         own = np.abs(estimator.values(estimator.start))
         scale = np.where(np.isnan(scale), own, scale)
         image = with_values(structure, estimator.values(_starting_point(estimator, start))).image
-    return Learner(
-        image, structure.group, scale, prior_std=options["prior"], parameter_drift=options["parameter_drift"]
-    )
+    try:
+        return Learner(
+            image, structure.group, scale, prior_std=options["prior"], parameter_drift=options["parameter_drift"]
+        )
+    except EstimationError as refused:
+        raise InputError(f"{structure.start.path}: {refused}") from None

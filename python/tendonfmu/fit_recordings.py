@@ -35,14 +35,19 @@ Flags = NDArray[np.bool_]
 FEWEST = 20  # samples of a part; fewer say nothing of a bias, let alone of friction
 _LOOKED_AT = 50_000  # samples, about, of which is said where the motion has been
 SHORTEST_BLOCK = 1.0  # s; of a held-out block
+LARGEST, LATEST = 1e12, 1e15  # of a signal in its unit, and s: what the model takes
 
 
 @dataclass(frozen=True)
 class Held:
-    """Which share of time is held out (0 to below 1), in blocks of how many seconds at most."""
+    """Which share of time is held out (0 to below 1), in blocks of how many seconds at most.
+
+    strict: refuse a recording that is too short for blocks of `SHORTEST_BLOCK`; otherwise its blocks are shorter.
+    """
 
     share: float = 0.0
     block: float = 10.0
+    strict: bool = False
 
 
 @dataclass(frozen=True)
@@ -160,13 +165,16 @@ def _check_numbers(recording: Recording) -> None:
     """What the reader of files has seen to, for a recording that was made in memory."""
     check_times(recording.path, recording.time)
     for name, values in recording.groups.items():
-        wrong = np.argwhere(~np.isfinite(values))
+        wrong = np.argwhere(~(np.abs(values) <= LARGEST))
         if len(wrong):
             row, column = wrong[0]
+            what = f"at most {LARGEST:g}" if np.isfinite(values[row, column]) else "a finite number"
             raise InputError(
                 f"{recording.path}: column {name}[{column + 1}], row {row + 1}: {values[row, column]:g}; "
-                "expected a finite number"
+                f"expected {what}"
             )
+    if np.abs(recording.time).max(initial=0.0) > LATEST:
+        raise InputError(f"{recording.path}: column time: {recording.time[-1]:g} s; expected at most {LATEST:g} s")
 
 
 def _arrays(recording: Recording, part: slice) -> dict[str, Numbers]:
@@ -266,7 +274,7 @@ def _held_out(recording: Recording, parts: list[slice], held: Held) -> Flags:
     for part in parts:
         time = recording.time[part] - recording.time[part.start]
         length = min(held.block, float(time[-1]) * held.share / 2)
-        if length < SHORTEST_BLOCK:
+        if held.strict and length < SHORTEST_BLOCK:
             continue
         block = np.floor(time / length)
         # the share's multiples that a block passes: 0.2 takes blocks 4, 9, 14, ...

@@ -60,6 +60,7 @@ Source = Recording | str | os.PathLike[str]
 
 METHODS = {"batch": (learn_batch, 60), "ekf": (learn_ekf, 2)}  # with the passes over the data, at most
 LEAST_NIS, MOST_NIS, MOST_LAG_ONE = 0.5, 2.0, 0.3  # beyond, a warning
+_MORE_PASSES = ": allow more (--passes), or estimate fewer numbers (--only, --fix, --share)"
 SIDES = ("given", "symmetric", "asymmetric")
 
 
@@ -150,7 +151,7 @@ class FrictionFit(ConstructorArguments):
         chosen = (self.only, self.fix, self.share, self.scale)
         structure = build_structure(finger, Choice(self.sides, *map(_listed_text, chosen)))
         self.structure_, self.start_ = structure, structure.start
-        held = Held(self.holdout, self.holdout_block)
+        held = Held(self.holdout, self.holdout_block, strict=True)
         training, others = _listed(recordings), _listed(compare)
         check_given_once(training, others)
         self.recordings_ = [self._prepared(each, held) for each in training]
@@ -389,7 +390,8 @@ def _trained(found: Evaluation) -> Numbers:
 
 
 def _fit_sentences(learned: Learned, numbers: Sequence[Fitted]) -> list[str]:
-    found = list(learned.warnings)
+    more = "" if learned.converged else _MORE_PASSES
+    found = [f"{sentence}{more}" for sentence in learned.warnings]
     at_bound = [number for number in numbers if number.at_bound]
     if at_bound:
         some = ", ".join(number.number.path for number in at_bound[:3])

@@ -143,7 +143,7 @@ class _Run:
         """Turns fmpy's exceptions into one line with the FMU's own words."""
         try:
             yield
-        except InputError:
+        except (InputError, TypeError, AttributeError, NameError, AssertionError, ArithmeticError, MemoryError):
             raise
         except Exception as error:  # fmpy raises bare exceptions
             reason = self._messages[-1] if self._messages else str(error)
@@ -170,6 +170,10 @@ class _Run:
 
     def _initialise(self, start: float, source: int) -> None:
         self._slave.setupExperiment(startTime=start)
+        if "kinematics_source" not in self._all:
+            raise InputError(
+                f"{self.path}: no parameter kinematics_source; expected a friction FMU of `tendonfmu build`"
+            )
         self._slave.setInteger([self._all["kinematics_source"].valueReference], [source])
         for path, value in self._parameters.items():
             if path not in self._all:

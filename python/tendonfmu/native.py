@@ -1,6 +1,7 @@
 """The binding of the C runtime, and only it: every call of the model from Python goes through here.
 
-Errors come as `NativeError` with the runtime's own line: what, where, what was expected.
+Errors come as `NativeError` with the runtime's own line: what, where, what was expected. It is no `InputError`: who
+gives the runtime something of the user's names its file.
 """
 
 from __future__ import annotations
@@ -15,13 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu import _native
-from tendonfmu.errors import InputError
 from tendonfmu.signals import DETECTION, FLAGS, INPUTS, NUMBERS, PLACE
 
 Array = NDArray[Any]
 
 
-class NativeError(InputError):
+class NativeError(ValueError):
     """Refused by the runtime: a description, an image, a parameter, a sample or a state."""
 
 

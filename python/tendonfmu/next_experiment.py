@@ -26,12 +26,14 @@ from tendonfmu.candidate_columns import CandidateColumns, candidate_columns
 from tendonfmu.diagnosis_result import Experiment, Where
 from tendonfmu.diagnosis_span import Span, span_of
 from tendonfmu.effects.candidate import Candidate
-from tendonfmu.errors import InputError
+from tendonfmu.errors import InputError, InternalError
+from tendonfmu.estimation import EstimationError
 from tendonfmu.experiment_menu import Entry, combined, loads, motions, own_tension, recorded_of, tensions
 from tendonfmu.experiment_motion import expected_recording, perform
 from tendonfmu.extension_fit import Accepted
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.fit_residuals import Model, bias_settings
+from tendonfmu.native import NativeError
 from tendonfmu.nuisance import KNOTS
 from tendonfmu.recording import Recording
 
@@ -123,7 +125,7 @@ def plan_experiments(
     if not questions:
         return Experiments((), Experiment(""))
     if not recordings:
-        raise InputError("no recording; expected those of the diagnosis")
+        raise InternalError("next experiment: no recording; expected those of the diagnosis")
     found_span = span_of(data, recordings) if span is None else span
     lab = _Laboratory(data, recordings, questions, noise, found_span, seed)
     recorded = recorded_of(found_span, None if own_tension(data).any() else _mean_load(data, recordings))
@@ -198,7 +200,8 @@ class _Laboratory:
         """For each entry that this finger can make, for each question."""
         found = []
         for entry in entries:
-            with suppress(InputError):  # too short a stroke, a tendon that nothing holds taut
+            # too short a stroke, a tendon that nothing holds taut, forces that no input can be
+            with suppress(InputError, EstimationError, NativeError):
                 found.append(self.answers(entry))
         return found
 
@@ -251,7 +254,7 @@ class _Laboratory:
         for k, proposal in enumerate(self.columns.proposals):
             if proposal.candidate.name == cause.candidate.name and proposal.place == cause.place:
                 return k
-        raise InputError(f"{_described(cause)}: cannot sit there in this finger; expected a place of the candidate")
+        raise InternalError(f"{_described(cause)}: cannot sit there in this finger; expected a place of the candidate")
 
     def _direction(self, cause: Accepted) -> Numbers:
         """[c] magnitudes of the cause, in all columns."""

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from tendonfmu import native
 from tendonfmu.description import FingerDescription, read_finger
-from tendonfmu.errors import InputError
+from tendonfmu.errors import InputError, InternalError
 from tendonfmu.model_variables import VariableTable, describe_model, read_table
 from tendonfmu.whole_file import whole_file
 
@@ -159,7 +159,7 @@ def variable_generator() -> ModuleType:
     path = Path(str(package_file("model_description/generate_variables.py")))
     spec = importlib.util.spec_from_file_location("tendonfmu_generate_variables", path)
     if spec is None or spec.loader is None:
-        raise InputError(f"{path}: not found; expected in the installed package")
+        raise InternalError(f"{path}: not found; expected in the installed package")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -205,12 +205,12 @@ def _checked(xml: bytes) -> bytes:
 
     spec = importlib.util.find_spec("fmpy")
     if spec is None or not spec.submodule_search_locations:
-        raise InputError("modelDescription.xml: FMI's schema not found; expected the Python package fmpy")
+        raise InternalError("modelDescription.xml: FMI's schema not found; expected the Python package fmpy")
     schema_path = Path(spec.submodule_search_locations[0]) / "schema" / "fmi2" / "fmi2ModelDescription.xsd"
     schema = etree.XMLSchema(etree.parse(str(schema_path)))
     if not schema.validate(etree.fromstring(xml)):
         error = schema.error_log[0]
-        raise InputError(f"modelDescription.xml, line {error.line}: {error.message}")
+        raise InternalError(f"modelDescription.xml, line {error.line}: {error.message}")
     return xml
 
 

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -52,8 +53,8 @@ FLAGS = ("contact", "slack")
 SCALARS = ("contact", "friction_level")
 
 
-class PlantError(InputError):
-    """Refused by the plant: a rig, a setting, an input, a time or a state."""
+class PlantError(ValueError):
+    """Refused by the plant: a rig, a setting, an input, a time or a state. `refused_by` makes it an InputError."""
 
 
 class SolverError(PlantError):
@@ -98,6 +99,15 @@ def _refusals() -> Iterator[None]:
         raise PlantError(str(refused)) from None
     except RuntimeError as failed:
         raise SolverError(str(failed)) from None
+
+
+@contextmanager
+def refused_by(rig: Path) -> Iterator[None]:
+    """Within, what the plant refuses is the fault of a rig's file: an InputError that begins with it."""
+    try:
+        yield
+    except PlantError as refused:
+        raise InputError(f"{rig}: {refused}") from None
 
 
 def require_plant() -> None:

@@ -13,7 +13,7 @@ from tendonfmu import native
 from tendonfmu.errors import InputError
 from tendonfmu.model_variables import read_table
 from tendonfmu.packaging import find_binaries, guid, model_description, model_identifier, pack, package_file
-from tendonfmu.plant import Plant, PlantError, Settings
+from tendonfmu.plant import Plant, Settings, refused_by
 from tendonfmu.plant_variables import describe_plant
 from tendonfmu.rig import Rig, read_rig
 from tendonfmu.whole_file import whole_file
@@ -66,10 +66,8 @@ def plant_members(rig: Rig, *, binaries: Path | None = None) -> dict[str, bytes]
 
 def _settings(rig: Rig, text: bytes) -> Settings:
     """The rig's own settings, from a plant that has accepted it."""
-    try:
+    with refused_by(rig.path):
         settings = Plant(text).settings
-    except PlantError as refused:
-        raise InputError(f"{rig.path}: {refused}") from None
     if settings.seed > LARGEST_SEED:
         raise InputError(
             f"{rig.path}: seed = {settings.seed}: expected at most {LARGEST_SEED} in an FMU, whose Integer has 32 bits"

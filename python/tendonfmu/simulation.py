@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.errors import InputError
-from tendonfmu.plant import MEASURED, TRUE, Array, Plant, PlantError, Statistics, require_plant
+from tendonfmu.plant import MEASURED, TRUE, Array, Plant, Statistics, refused_by, require_plant
 from tendonfmu.rig import Rig
 
 Table = dict[str, NDArray[np.float64]]
@@ -46,10 +45,8 @@ class Simulation:
 
 def plant_of(rig: Rig) -> Plant:
     """The plant of a rig. Raises InputError with the rig's file and the key path."""
-    try:
+    with refused_by(rig.path):
         return Plant(rig.json())
-    except PlantError as refused:
-        raise InputError(f"{rig.path}: {refused}") from None
 
 
 def simulate(
@@ -67,7 +64,7 @@ def simulate(
     require_plant()
     time = rig.times()
     plant = plant_of(rig)
-    try:
+    with refused_by(rig.path):
         if integrator is not None:
             plant.configure(integrator=integrator)
         plant.initialise()
@@ -79,8 +76,6 @@ def simulate(
         progress(len(time), len(time))
         work = plant.statistics
         used = plant.settings.integrator
-    except PlantError as failed:
-        raise InputError(f"{rig.path}: {failed}") from None
     signals = {name: np.concatenate([part[name] for part in parts]) for name in names}
     return Simulation(
         recording=_recording(rig, time, signals),

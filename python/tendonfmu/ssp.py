@@ -14,10 +14,11 @@ import numpy as np
 
 from tendonfmu.model_variables import NOT_IN_XML
 from tendonfmu.packaging import members, pack
-from tendonfmu.plant import Plant
+from tendonfmu.plant import refused_by
 from tendonfmu.plant_packaging import plant_members
 from tendonfmu.rig import Rig, read_rig
 from tendonfmu.signals import INPUTS
+from tendonfmu.simulation import plant_of
 from tendonfmu.whole_file import check_output, whole_file
 
 PLANT, FRICTION = "plant", "friction"
@@ -90,9 +91,10 @@ def system_structure(rig: Rig) -> str:
 
 def start_values(rig: Rig) -> str:
     """An SSV parameter set: the friction FMU's inputs at time 0, as the settled finger's sensors give them."""
-    plant = Plant(rig.json())
-    plant.initialise()
-    signals = plant.run(np.zeros(1), [f"measured_{group}" for group in INPUTS])
+    plant = plant_of(rig)
+    with refused_by(rig.path):
+        plant.initialise()
+        signals = plant.run(np.zeros(1), [f"measured_{group}" for group in INPUTS])
     values = {
         f"{FRICTION}.{group}[{i}]": float(value)
         for group in INPUTS

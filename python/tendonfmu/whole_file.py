@@ -68,6 +68,17 @@ def whole_file(file: Path) -> Iterator[Path]:
         temporary.chmod(0o666 & ~mask)
         os.replace(temporary, file)
     except OSError as error:
+        if not is_about(error, file.parent):
+            raise
         raise InputError(f"{file}: cannot be written ({error.strerror or error})") from None
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def is_about(error: OSError, folder: Path) -> bool:
+    """Whether an error in writing concerns a folder: it names no file, such as that of a full disk, or one in there."""
+    if error.errno is None:  # not of the operating system
+        return False
+    if not isinstance(error.filename, str | bytes):
+        return True
+    return folder.absolute() in Path(os.fsdecode(error.filename)).absolute().parents
