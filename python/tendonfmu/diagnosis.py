@@ -9,49 +9,51 @@ found.verdict, [cause.where for cause in found.causes], found.gain
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from tendonfmu.cause_search import LEAST_SHARE, View, bias_of, series_of
+from tendonfmu.cause_gains import Verified, verify
+from tendonfmu.cause_search import residual_alone, series_of
+from tendonfmu.cause_selection import LEAST_SHARE
 from tendonfmu.contact_gain import detection_gain
 from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.diagnosis_evidence import evidence
-from tendonfmu.diagnosis_result import Cause, Diagnosis, Invisible, Unexplained, Where
-from tendonfmu.diagnosis_search import (
-    NamedCause,
-    Search,
-    candidate_of,
-    search,
-    without_events,
-)
-from tendonfmu.diagnosis_series import Series, Trial, make_grid
+from tendonfmu.diagnosis_result import Cause, Diagnosis, FoundPlace, Invisible, Unexplained, Where
+from tendonfmu.diagnosis_search import NamedCause, Search, events_of, search, without_events
+from tendonfmu.diagnosis_series import make_grid
 from tendonfmu.diagnosis_size import size_of
-from tendonfmu.errors import InputError
-from tendonfmu.extension_fit import Accepted, FitSettings, fit_extended
+from tendonfmu.errors import InputError, own_fault
+from tendonfmu.extension_fit import Accepted, FitSettings
 from tendonfmu.fit_recordings import FitRecording, Held, prepare, require_noise
-from tendonfmu.gain import Gain, measure_gain
+from tendonfmu.hypotheses import HERE, Hypothesis
 from tendonfmu.next_experiment import Experiments, Question, plan_experiments
-from tendonfmu.noise_floor import noise_floor
-from tendonfmu.nominal_fit import fitted
+from tendonfmu.phases import Phases, PhaseState
 from tendonfmu.recording import Recording, read_recording
 from tendonfmu.remainder import Remainder, measure_remainder
 from tendonfmu.residual_views import residual_views, whiteness
-from tendonfmu.significance import Problem, residual_of
 
 Numbers = NDArray[np.float64]
 Finger = FingerDescription | str | os.PathLike[str]
 Source = Recording | str | os.PathLike[str]
-Phase = Callable[[str, int, int | None], None]
 
 HELD = Held(0.2, 10.0)  # of the recordings, for the gain, where no others are given
+LEAST_GAIN = 0.03
 MOST_RIVALS = 3  # of a cause, that an experiment is looked for
+MOST_UNSEEN = 6  # effects that are not visible, that an experiment is looked for
+PHASES = {
+    "signals, delay and presliding": 20.0,
+    "contact": 8.0,
+    "causes": 30.0,
+    "gain on unseen data": 20.0,
+    "what is left": 10.0,
+    "next experiment": 12.0,
+}
 
 
 def diagnose(
@@ -60,33 +62,27 @@ def diagnose(
     tests: Sequence[Source] = (),
     *,
     kinematics: int = 1,
+    least_gain: float = LEAST_GAIN,
     seed: int = 0,
     jobs: int = 1,
-    progress: Phase | None = None,
+    progress: Callable[[PhaseState], None] | None = None,
 ) -> Diagnosis:
-    """Finds what a description lacks (contract section 7).
+    """Finds what a description lacks.
 
     finger: description, or its file. recordings: of contact-free motion; samples labelled contact are left out. tests:
     recordings that the gain is measured on; without them every fifth stretch of 10 s of `recordings`, that the numbers
-    are then not fitted to, though the choice of causes has seen it. kinematics: source, 1 to 3. jobs: threads of the
-    fits. progress: called with what is being done, how much of it is done, and of how much (None: unknown).
-    Raises InputError.
+    are then not fitted to, though the choice of causes has seen it. kinematics: source, 1 to 3. least_gain: share of
+    what is left of the rms that a cause has to take away, 0 to 0.5. jobs: threads of the fits. progress: called with
+    what is being done. Raises InputError where a file or an option is at fault.
     """
     begun = perf_counter()
-    phase = progress or (lambda what, done, total: None)
+    phases = Phases(PHASES, progress or (lambda state: None))
     with threadpool_limits(limits=max(jobs, 1)):
-        case = _case(finger, recordings, tests, kinematics)
-        found = search(case.finger.data, case.whole, seed, phase, jobs)
-        unseen, events = without_events(found.extended.data, case.tests, seed)
-        found = replace(found, events=(*found.events, *events))
-        result = _Result(replace(case, tests=unseen), found, seed, jobs, phase)
-        return replace(result.diagnosis(), seconds=perf_counter() - begun)
-
-
-def problem_of(finger: Finger, recordings: Sequence[Source], *, kinematics: int = 1, seed: int = 0) -> Problem:
-    """What `naming.Selection` is given first: the residual of the nominal fit and the columns of all candidates."""
-    case = _case(finger, recordings, (), kinematics)
-    return search(case.finger.data, case.whole, seed, lambda what, done, total: None, 1, most_rounds=0).first.problem
+        case = _case(finger, recordings, tests, kinematics, least_gain)
+        with own_fault("diagnosis"):
+            found = search(case.finger, case.whole, least_gain=least_gain, seed=seed, threads=jobs, phases=phases)
+            result = _Result(case, found, least_gain, seed, jobs, phases)
+            return replace(result.diagnosis(), seconds=perf_counter() - begun)
 
 
 # --- what is given ----------------------------------------------------------------------------------------------------
@@ -94,7 +90,7 @@ def problem_of(finger: Finger, recordings: Sequence[Source], *, kinematics: int 
 
 @dataclass(frozen=True)
 class _Case:
-    """training: with held-out stretches where there are no tests. whole: with none. tests: recordings to judge on."""
+    """training: with held-out stretches where there are no tests. tests: recordings to judge on."""
 
     finger: FingerDescription
     training: list[FitRecording]
@@ -102,6 +98,7 @@ class _Case:
 
     @property
     def whole(self) -> list[FitRecording]:
+        """The training recordings without held-out stretches."""
         nothing = [np.zeros_like(each.held_out) for each in self.training]
         return [
             replace(each, train=each.train | each.held_out, held_out=none)
@@ -113,11 +110,15 @@ class _Case:
         return tuple(f"{each.path.name}: {text}" for each in [*self.training, *self.tests] for text in each.warnings)
 
 
-def _case(finger: Finger, recordings: Sequence[Source], tests: Sequence[Source], kinematics: int) -> _Case:
+def _case(
+    finger: Finger, recordings: Sequence[Source], tests: Sequence[Source], kinematics: int, least_gain: float
+) -> _Case:
     if not recordings:
         raise InputError("no recording; expected at least one")
     if kinematics not in (1, 2, 3):
         raise InputError(f"kinematics = {kinematics!r}: expected 1, 2 or 3")
+    if not 0.0 <= least_gain <= 0.5:
+        raise InputError(f"least_gain = {least_gain!r}: expected 0 to 0.5")
     given = finger if isinstance(finger, FingerDescription) else read_finger(Path(finger))
     held = Held() if tests else HELD
     training = [prepare(given, _read(each), kinematics, held) for each in recordings]
@@ -130,198 +131,236 @@ def _read(source: Source) -> Recording:
     return source if isinstance(source, Recording) else read_recording(source)
 
 
-# --- what is told -----------------------------------------------------------------------------------------------------
+# --- what is reported -------------------------------------------------------------------------------------------------
 
 
 class _Result:
     """Everything that is reported of a search."""
 
-    def __init__(self, case: _Case, found: Search, seed: int, jobs: int, phase: Phase) -> None:
-        self._case, self._found, self._seed, self._phase = case, found, seed, phase
-        self._settings = FitSettings(threads=jobs)
-        self._series: Series = found.last.series
+    def __init__(self, case: _Case, found: Search, least_gain: float, seed: int, jobs: int, phases: Phases) -> None:
+        self._case, self._found, self._seed, self._phases = case, found, seed, phases
+        self._least_gain, self._settings = least_gain, FitSettings(threads=jobs)
+        self._series = found.last.series
 
     def diagnosis(self) -> Diagnosis:
         """Without the time it took."""
         found, case = self._found, self._case
-        self._phase("measuring the gain", 0, None)
-        gain, left = self._gain()
-        self._phase("looking for what is left", 0, None)
-        before = self._remainder(found.first.residual, found.first)
-        after = before if not found.causes else self._remainder(found.last.residual, found.last)
-        floor = noise_floor(found.last.series, found.last.residual)
-        experiments, invisible = self._experiments()
-        torque = self._torque()
+        with self._phases.start("gain on unseen data"):
+            verified = self._verified()
+        with self._phases.start("what is left"):
+            left = self._left(verified.extended)
+            before = found.first.residual
+            remainder = self._remainder(left)
+            unexplained = self._unexplained(remainder, left)
+        experiments, invisible = self._experiments(verified)
+        gain = verified.gain
+        share = np.array(unexplained.by_joint)
         everything = [*case.training, *case.tests]
+        floor = np.array(gain.extended.test_rms) * np.sqrt(np.clip(1.0 - share, 0.0, 1.0))
         return Diagnosis(
             finger=case.finger.name,
-            verdict=_verdict(bool(found.causes), after.unknown),
+            verdict=_verdict(bool(verified.causes), unexplained.unknown),
             recordings=tuple(str(each.path) for each in case.training),
             tests=tuple(str(each.path) for each in case.tests),
             held_out=gain.held_out,
             seconds=0.0,
             seed=self._seed,
+            signals=found.estimation.signals.words,
+            least_gain=self._least_gain,
             nominal=gain.nominal,
             extended=gain.extended,
             bias_only_rms=gain.bias_only_rms,
-            noise_floor=tuple(floor.rms),
-            floor_source=floor.source,
-            ceiling=tuple(before.share),
+            noise_floor=tuple(float(value) for value in floor),
+            floor_source="what nothing recorded predicts on unseen stretches",
             gain=gain.value,
-            causes=tuple(sorted(self._causes(gain, left), key=lambda cause: -cause.gain.value)),
+            steps=gain.steps,
+            causes=tuple(self._cause(k, verified, left) for k in range(len(verified.causes))),
+            too_small=tuple(_too_small(each) for each in [*verified.dropped, *found.small]),
             invisible=invisible,
             events=found.events,
-            unexplained=_unexplained(after, found.last.residual, found.last.series),
+            unexplained=unexplained,
             experiment=experiments.best,
-            views=residual_views(self._series, found.first.residual, found.last.residual, load=torque),
-            whiteness=whiteness(self._series, found.first.residual, found.last.residual),
-            detection=detection_gain(found.nominal.data, found.extended.data, everything) if found.causes else None,
-            nominal_data=found.nominal.data,
-            extended_data=found.extended.data,
-            warnings=(*case.warnings, *found.extended.warnings),
-            tested=len({trial.place for trial in found.first.problem.bank.trials}),
+            views=residual_views(self._series, before, left, load=self._torque()),
+            whiteness=whiteness(self._series, before, left),
+            detection=detection_gain(verified.nominal_data, verified.extended_data, everything)
+            if verified.causes
+            else None,
+            nominal_data=verified.nominal_data,
+            extended_data=verified.extended_data,
+            warnings=(*case.warnings, *self._warnings()),
+            tested=len({each.key for each in found.first.selection.hypotheses}),
         )
+
+    def _warnings(self) -> list[str]:
+        folds = self._found.first.folds
+        found = list(self._found.extended.warnings)
+        if not folds.enough:
+            found.append("less than 8 s of motion: nothing can be held out, so no cause is named; record a minute")
+        elif folds.folds < 8:
+            found.append(
+                f"only {folds.stretches} stretches of 2 s: {folds.folds} parts are held out in place of 8, so a cause "
+                "has to be larger to be certain; record a minute"
+            )
+        return found
 
     # --- gain ---
 
-    def _gain(self) -> tuple[Gain, list[Numbers]]:
-        """The gain, and for each cause the residual [B, n] of the model that lacks it alone."""
-        case, found = self._case, self._found
-        training = [
-            replace(each, train=each.train & own.train, held_out=each.held_out & own.train)
-            for each, own in zip(case.training, found.fitted_to, strict=True)
-        ]
-        fit_to = [replace(own, train=each.train) for own, each in zip(found.fitted_to, training, strict=True)]
-        nominal, data = found.nominal, case.finger.data
-        if not case.tests:
-            nominal = fitted(nominal.data, fit_to, self._settings, given=data)
-        if not found.causes:
-            return measure_gain(nominal.data, nominal.data, training, case.tests, seed=self._seed), []
-        accepted = [cause.accepted for cause in found.causes]
-        fit = fit_extended(nominal, accepted, fit_to, self._settings, compare=True)
-        gain = measure_gain(
-            nominal.data,
-            fit.model.data,
-            training,
-            case.tests,
-            without=[model.data for model in fit.without],
-            alone=[model.data for model in fit.alone],
-            seed=self._seed,
-        )
-        return gain, self._left_without([model.data for model in fit.without])
+    def _verified(self) -> Verified:
+        found, case = self._found, self._case
+        tests = case.tests
+        if tests and found.events:
+            # only where the training recordings had some: what disturbed one recording may disturb the next
+            tests = [without_events(each, self._events_in(each)) for each in tests]
+        training = [without_events(each, found.events) for each in case.training]
+        return verify(case.finger, found, training, tests, self._least_gain, self._settings, self._seed)
 
-    def _left_without(self, models: Sequence[Mapping[str, Any]]) -> list[Numbers]:
-        """[B, n] each: residual of models over all recordings, bias taken off."""
-        grid, found = make_grid(self._case.whole), []
-        for data in models:
-            series = replace(series_of(data, self._case.whole, grid), used=self._series.used)
-            found.append(residual_of(series, bias_of(data, series), np.zeros((*series.target.shape, 0))))
-        return found
+    def _events_in(self, recording: FitRecording) -> Sequence[object]:
+        estimation = self._found.estimation
+        data = estimation.signals.restored(self._found.extended.data, self._case.finger.data)
+        return events_of(data, [recording], make_grid([recording]), self._seed)[0]
 
-    def _causes(self, gain: Gain, left: Sequence[Numbers]) -> list[Cause]:
-        after = self._left_without([self._found.extended.data])[0] if left else np.zeros(0)
-        return [self._cause(cause, k, gain, left[k], after) for k, cause in enumerate(self._found.causes)]
+    # --- causes ---
 
-    def _cause(self, cause: NamedCause, k: int, gain: Gain, before: Numbers, after: Numbers) -> Cause:
-        candidate, found = cause.accepted.candidate, cause.found
-        used, parameters = self._series.used, self._found.parameters[k]
-        lost, kept = (float(np.sum(values[used] ** 2)) for values in (before, after))
+    def _left(self, data: object) -> Numbers:
+        """[B, n] N·m: residual of a model over all recordings that were estimated from, bias taken off."""
+        estimation = self._found.estimation
+        series = series_of(data, estimation.recordings, estimation.grid)
+        return residual_alone(data, replace(series, used=self._series.used))
+
+    def _cause(self, k: int, verified: Verified, after: Numbers) -> Cause:
+        named, parameters = verified.causes[k], verified.parameters[k]
+        everything = {path: value for own in parameters for path, value in own.items()}
+        before = self._left(verified.without[k].data)
+        candidate = named.accepted[0].candidate
         return Cause(
-            where=where_of(found.trial),
+            where=Where(named.effect, named.joint, named.tendon),
             title=candidate.title,
             explanation=candidate.explanation,
-            p_value=found.p_value,
-            gain=gain.causes[k],
-            share=max(0.0, 1.0 - kept / lost) if lost > 0 else 0.0,
-            confusable_with=tuple(where_of(trial) for trial in found.alike),
-            parameters=parameters,
-            size=size_of(candidate.name, parameters),
-            evidence=evidence(cause.accepted, self._series, before, after),
-            first_gain=gain.alone[k],
+            p_value=named.p_value,
+            gain=verified.gains[k],
+            confusable_with=_wheres(named.alike),
+            parameters=everything,
+            size=size_of(candidate.name, parameters[0] if len(parameters) == 1 else everything),
+            places=tuple(
+                FoundPlace(each.place.joint, each.place.tendon, own)
+                for each, own in zip(named.accepted, parameters, strict=True)
+            ),
+            evidence=evidence(named.accepted[0], self._series, before, after),
         )
 
     # --- what is left, and what to do next ---
 
-    def _remainder(self, residual: Numbers, view: View) -> Remainder:
-        nominal = np.asarray(view.problem.nominal, dtype=np.float64)
-        nuisance = [np.hstack([view.bias, nominal[:, j]]) for j in range(nominal.shape[1])]
+    def _remainder(self, residual: Numbers) -> Remainder:
+        view = self._found.last
+        nominal = np.asarray(view.columns.nominal, dtype=np.float64)
+        nuisance = [np.hstack([view.splines, nominal[:, j]]) for j in range(nominal.shape[1])]
         force = [
             segment.mean(view.predicted[segment.recording].recording.groups["tendon_force"][segment.part])
-            for segment in make_grid(view.recordings).segments
+            for segment in self._found.estimation.grid.segments
         ]
         return measure_remainder(view.series, residual, nuisance, force=np.concatenate(force), seed=self._seed)
 
+    def _unexplained(self, left: Remainder, residual: Numbers) -> Unexplained:
+        """Of the variance that is left: what unseen stretches of it show to be no noise; unknown where mending it would
+        be material."""
+        variance = np.mean(residual[self._series.used] ** 2, axis=0)
+        shares = np.clip(np.array(left.share), 0.0, 1.0)
+        whole = float(variance.sum())
+        share = float(shares @ variance) / whole if whole > 0 else 0.0
+        unknown = left.unknown and 1.0 - np.sqrt(1.0 - share) >= self._least_gain
+        description = left.description if unknown else ""
+        return Unexplained(share, description, tuple(shares.tolist()), left.p_value, bool(unknown))
+
     def _torque(self) -> Numbers:
         """[B, n] N·m: what is to be explained."""
-        grid = make_grid(self._case.whole)
+        estimation = self._found.estimation
         return np.concatenate(
-            [segment.mean(self._case.whole[segment.recording].target[segment.part]) for segment in grid.segments]
+            [
+                segment.mean(estimation.recordings[segment.recording].target[segment.part])
+                for segment in estimation.grid.segments
+            ]
         )
 
-    def _experiments(self) -> tuple[Experiments, tuple[Invisible, ...]]:
+    def _experiments(self, verified: Verified) -> tuple[Experiments, tuple[Invisible, ...]]:
         """For confusion sets, and for what is not visible: one question for each effect, at the place that comes
         nearest to being visible."""
         nominal, source = self._found.nominal.data, self._found.fitted_to[0].kinematics
         rivals = [
-            Question(cause.accepted, rival)
-            for cause in self._found.causes
-            for rival in map(_ordinary, cause.found.alike[:MOST_RIVALS])
-            if all(each.place in each.candidate.places(nominal, source) for each in (cause.accepted, rival))
+            Question(cause.accepted[0], rival)
+            for cause in verified.causes
+            for rival in [_ordinary(each) for each in cause.alike[:MOST_RIVALS]]
+            if all(each.place in each.candidate.places(nominal, source) for each in (cause.accepted[0], rival))
         ]  # not about a law that another cause has brought
         unseen = self._unseen()
-        nearest: dict[str, Trial] = {}
-        for trial, _ in unseen:
-            nearest.setdefault(trial.effect, trial)
-        questions = [*rivals, *(Question(_ordinary(trial)) for trial in nearest.values())]
-        self._phase("choosing the next experiment", 0, None)
-        planned = plan_experiments(
-            nominal,  # that has no cause that is in question
-            self._found.fitted_to,
-            questions,
-            noise=[float(value) for value in self._found.last.residual[self._series.used].std(axis=0)],
-            seed=self._seed,
-            progress=lambda done, total: self._phase("choosing the next experiment", done, total),
-        )
+        nearest: dict[str, Hypothesis] = {}
+        for hypothesis, _ in unseen:
+            nearest.setdefault(hypothesis.effect, hypothesis)
+        asked = list(nearest)[:MOST_UNSEEN]
+        questions = [*rivals, *(Question(_ordinary(nearest[effect])) for effect in asked)]
+        noise = self._left(self._found.extended.data)[self._series.used].std(axis=0)
+        with self._phases.start("next experiment", len(questions) or None) as step:
+            planned = plan_experiments(
+                nominal,  # that has no cause that is in question
+                self._found.fitted_to,
+                questions,
+                noise=[float(value) for value in noise],
+                seed=self._seed,
+                progress=lambda done, total: step(done),
+            )
         said = {
             effect: (planned.sentence(len(rivals) + k), planned.motion(len(rivals) + k))
-            for k, effect in enumerate(nearest)
+            for k, effect in enumerate(asked)
         }
         return planned, tuple(
-            Invisible(where_of(trial), candidate_of(trial)[0].title, share, *said[trial.effect])
-            for trial, share in unseen
+            Invisible(where_of(each), _candidate(each).title, share, *said.get(each.effect, ("", {})))
+            for each, share in unseen
         )
 
-    def _unseen(self) -> list[tuple[Trial, float]]:
+    def _unseen(self) -> list[tuple[Hypothesis, float]]:
         """Of each place that is not visible the shape that comes nearest, with its share; the nearest places first."""
-        view = self._found.first
-        best: dict[tuple[str, int | None, int | None], tuple[Trial, float]] = {}
-        for trial, share in zip(view.problem.bank.trials, view.shares, strict=True):
-            if trial.place not in best or share > best[trial.place][1]:
-                best[trial.place] = (trial, float(share))
-        hidden = [pair for pair in best.values() if pair[1] < LEAST_SHARE]
-        return sorted(hidden, key=lambda pair: -pair[1])
+        selection = self._found.first.selection
+        best: dict[tuple[str, int | None, int | None], tuple[Hypothesis, float]] = {}
+        for each, share in zip(selection.hypotheses, selection.shares, strict=True):
+            if each.level == HERE and (each.key not in best or share > best[each.key][1]):
+                best[each.key] = (each, share)
+        return sorted((pair for pair in best.values() if pair[1] < LEAST_SHARE), key=lambda pair: -pair[1])
 
 
-def where_of(trial: Trial) -> Where:
-    return Where(trial.effect, trial.joint, trial.tendon)
+def where_of(hypothesis: Hypothesis) -> Where:
+    return Where(hypothesis.effect, hypothesis.joint, hypothesis.tendon)
 
 
-def _ordinary(trial: Trial) -> Accepted:
-    """An effect of ordinary size."""
-    candidate, place = candidate_of(trial)
-    return Accepted(candidate, place, dict(trial.shape))
+def _wheres(hypotheses: Sequence[Hypothesis]) -> tuple[Where, ...]:
+    return tuple(where_of(each) for each in hypotheses)
+
+
+def _candidate(hypothesis: Hypothesis) -> object:
+    return hypothesis.members[0].proposal.candidate
+
+
+def _ordinary(hypothesis: Hypothesis) -> Accepted:
+    """An effect of ordinary size, at its first place."""
+    member = hypothesis.members[0]
+    return Accepted(member.proposal.candidate, member.proposal.place, dict(member.shape.shape))
+
+
+def _too_small(named: NamedCause) -> Cause:
+    """What was certain and is not material, or not on unseen data; it is in no description, so it has no numbers."""
+    candidate = named.accepted[0].candidate
+    return Cause(
+        where=Where(named.effect, named.joint, named.tendon),
+        title=candidate.title,
+        explanation=candidate.explanation,
+        p_value=named.p_value,
+        gain=named.interval,
+        confusable_with=_wheres(named.alike),
+        parameters={},
+        size="",
+        places=tuple(FoundPlace(each.place.joint, each.place.tendon, {}) for each in named.accepted),
+    )
 
 
 def _verdict(causes: bool, unknown: bool) -> str:
     if causes:
         return "partly explained" if unknown else "explained"
     return "unexplained" if unknown else "adequate"
-
-
-def _unexplained(left: Remainder, residual: Numbers, series: Series) -> Unexplained:
-    """Of the variance that is left: what unseen blocks of it show to be no noise."""
-    variance = np.mean(residual[series.used] ** 2, axis=0)
-    shares = np.maximum(np.array(left.share), 0.0)
-    whole = float(variance.sum())
-    share = float(shares @ variance) / whole if whole > 0 and left.unknown else 0.0
-    return Unexplained(share, left.description, tuple(float(value) for value in shares), left.p_value, left.unknown)

@@ -49,13 +49,22 @@ class Evidence:
 
 
 @dataclass(frozen=True)
-class Cause:
-    """A cause that was found.
+class FoundPlace:
+    """One place of a cause. joint, tendon: from 1, None where it has none. parameters: path -> (value, unit)."""
 
-    p_value: family-wise, over all effects and places that were tested. gain: of this cause alone on held-out data,
-    1 − rms with / rms without, the other causes kept. share: of the residual's variance that it explains.
-    parameters: its numbers in the extended description by path, with units as (value, unit).
-    size: in plain words with physical units. shape: non-linear numbers that were chosen.
+    joint: int | None
+    tendon: int | None
+    parameters: Mapping[str, tuple[float, str]]
+
+
+@dataclass(frozen=True)
+class Cause:
+    """An effect that was found, at one place or several.
+
+    p_value: family-wise, over all effects and places that were tested. gain: of this cause alone on unseen data,
+    1 − rms with / rms without, the other causes kept. confusable_with: what the data cannot tell from it.
+    parameters: its numbers in the extended description by path, with units as (value, unit); of all places.
+    size: in plain words with physical units.
     """
 
     where: Where
@@ -63,12 +72,11 @@ class Cause:
     explanation: str
     p_value: float
     gain: Interval
-    share: float
     confusable_with: tuple[Where, ...]
     parameters: Mapping[str, tuple[float, str]]
     size: str
+    places: tuple[FoundPlace, ...] = ()
     evidence: tuple[Evidence, ...] = ()
-    first_gain: Interval | None = None  # alone, against the nominal model
 
 
 @dataclass(frozen=True)
@@ -102,7 +110,7 @@ class Unexplained:
     """What no effect explains.
 
     share: of the residual variance above the noise floor; by_joint: of each. p_value: of there being nothing,
-    family-wise. unknown: whether there is something.
+    family-wise. unknown: whether there is something material.
     """
 
     share: float
@@ -174,9 +182,11 @@ class Diagnosis:
     """The result of `diagnosis.diagnose`.
 
     verdict: "adequate", "explained", "partly explained" or "unexplained". recordings, tests: names of the files.
-    nominal_data, extended_data: the fitted descriptions. noise_floor: N·m per joint, None where there is no repeat to
-    take it from. ceiling: per joint, share of the residual variance that a flexible learner predicts on unseen blocks.
-    gain: over all joints on the test data; held_out: whether those are blocks of the training recordings.
+    signals: what was estimated from, in words. least_gain: of a cause. nominal_data, extended_data: the fitted
+    descriptions. noise_floor: N·m per joint, what of the extended model's test_rms nothing predicts; floor_source: how
+    that is known. steps: rms over all joints on unseen data, N·m, of the nominal model and after each cause in the order
+    of `causes`. gain: over all joints on the test data; held_out: whether those are parts of the training recordings.
+    too_small: seen for certain, but not material, or not on unseen data.
     """
 
     finger: str
@@ -186,14 +196,17 @@ class Diagnosis:
     held_out: bool
     seconds: float
     seed: int
+    signals: str
+    least_gain: float
     nominal: ModelErrors
     extended: ModelErrors
     bias_only_rms: tuple[float, ...]
     noise_floor: tuple[float, ...]
-    floor_source: str  # "repeats of the motion", "white part of the residual"
-    ceiling: tuple[float, ...]
+    floor_source: str
     gain: Interval
+    steps: tuple[float, ...]
     causes: tuple[Cause, ...]
+    too_small: tuple[Cause, ...]
     invisible: tuple[Invisible, ...]
     events: tuple[Event, ...]
     unexplained: Unexplained

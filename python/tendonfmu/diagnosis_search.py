@@ -1,126 +1,171 @@
-"""From recordings to the causes that a description lacks: fits, selections, and fits of the extended description."""
+"""From recordings to the causes that a description lacks: signals, starting point, and one cause after the other.
+
+After each cause the extended description is fitted again with all its numbers, and everything is looked at anew around
+it: derivatives of a wrong model would ask for small pieces that mend the linearisation. The search ends at the first
+candidate that is not material and certain.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.cause_search import View, bias_of, look, predicted_of, series_of
+from tendonfmu.cause_search import View, bias_of, look, predicted_of, residual_alone, series_of
+from tendonfmu.cause_selection import CERTAIN, Judged, Pick, rms_gain
 from tendonfmu.contact_scan import left_out, scan_events
-from tendonfmu.diagnosis_result import Event
-from tendonfmu.diagnosis_series import Grid, Series, Trial, make_grid
-from tendonfmu.effects import Candidate, Place
+from tendonfmu.description import FingerDescription
+from tendonfmu.diagnosis_result import Event, Interval
+from tendonfmu.diagnosis_series import Grid
 from tendonfmu.extension_fit import Accepted, FitSettings, FittedModel, fit_extended, possible
 from tendonfmu.fit_recordings import FitRecording
-from tendonfmu.naming import Found, Selection
+from tendonfmu.hypotheses import Hypothesis, Key
 from tendonfmu.nominal_fit import fitted
-from tendonfmu.significance import residual_of
+from tendonfmu.online_error import OnlineError
+from tendonfmu.phases import Phases, Step
+from tendonfmu.signal_choice import Estimation, choose
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-Phase = Callable[[str, int, int | None], None]
 
-ROUNDS = 6  # of selection and fit
-PAYS = 0.003  # least share of the residual's variance that a cause takes away, refitted with and without it
-STRONG = 0.3  # share of the whitened residual's variance above which causes are taken one at a time, each fitted first
+MOST_CAUSES = 8
+SIGNIFICANCE = 0.01  # family-wise
+MOST_REFUSED = 3  # effects that selection named and the fit, or the test, did not bear out
 
 
 @dataclass(frozen=True)
 class NamedCause:
-    """A cause as it was found, and as the description takes it."""
+    """A cause as it was found. effect, joint, tendon: where, None for everywhere. accepted: its places, as a
+    description takes them. gain, error: 1 − rms with / rms without on held-out folds, and its standard error. alike:
+    what the data cannot tell from it.
+    """
 
-    found: Found
-    accepted: Accepted
+    effect: str
+    joint: int | None
+    tendon: int | None
+    accepted: tuple[Accepted, ...]
+    gain: float
+    error: float
+    p_value: float
+    alike: tuple[Hypothesis, ...]
+    measured: Interval | None = None  # on unseen data, as it runs online
+
+    @property
+    def key(self) -> Key:
+        return self.effect, self.joint, self.tendon
+
+    @property
+    def interval(self) -> Interval:
+        """The measured gain, else that of the held-out folds, with 95 %."""
+        return self.measured or Interval(self.gain, self.gain - 1.96 * self.error, self.gain + 1.96 * self.error)
 
 
 @dataclass(frozen=True)
 class Search:
-    """nominal, extended: fitted descriptions. first, last: what each lacks and leaves. fitted_to: recordings with
-    forces that the model predicts, contact left out. causes: the largest gain first. parameters: of each cause, path ->
-    (value, unit). events: contact and stalls."""
+    """estimation: signals and recordings. nominal, extended: fitted descriptions, with the settings for estimating.
+    first, last: what each lacks and leaves. causes: in the order in which they were found; models: [causes + 1] after each, the nominal one first. small: certain
+    but not material. events: contact and stalls. out: [B] blocks in them. fitted_to: recordings with forces that the
+    model predicts, events left out.
+    """
 
+    estimation: Estimation
     nominal: FittedModel
     extended: FittedModel
     first: View
     last: View
-    fitted_to: Sequence[FitRecording]
     causes: tuple[NamedCause, ...]
-    parameters: tuple[Mapping[str, tuple[float, str]], ...]
+    models: tuple[FittedModel, ...]
+    small: tuple[NamedCause, ...]
     events: tuple[Event, ...]
+    out: Flags
+    fitted_to: Sequence[FitRecording]
 
 
-def candidate_of(trial: Trial) -> tuple[Candidate, Place]:
-    """The candidate and place that a trial was made of."""
-    proposal = trial.origin[0]
-    return proposal.candidate, proposal.place
-
-
-def accepted_of(found: Found) -> Accepted:
-    """A cause as `extension_fit` takes it."""
-    candidate, place = candidate_of(found.trial)
-    return Accepted(candidate, place, dict(found.trial.shape), tuple(float(value) for value in found.magnitudes))
+def accepted_of(hypothesis: Hypothesis, magnitudes: Numbers) -> tuple[Accepted, ...]:
+    """The places of a hypothesis with its common magnitudes [d], as `extension_fit` takes them."""
+    return tuple(
+        Accepted(
+            member.proposal.candidate,
+            member.proposal.place,
+            dict(member.shape.shape),
+            tuple(float(weight * value) for weight, value in zip(member.weights, magnitudes, strict=True)),
+        )
+        for member in hypothesis.members
+    )
 
 
 def search(
-    data: Mapping[str, Any],
+    given: FingerDescription,
     recordings: Sequence[FitRecording],
+    *,
+    least_gain: float,
     seed: int,
-    phase: Phase,
     threads: int,
-    most_rounds: int = ROUNDS,
+    phases: Phases,
 ) -> Search:
-    """data: the nominal description. recordings: `train` says where to look. most_rounds: of selection; 0: none.
+    """given: the nominal description. recordings: as they were measured; `train` says where to look. Raises InputError."""
+    settings = FitSettings(threads=threads)
+    with phases.start("signals, delay and presliding"):
+        chosen = choose(given, recordings, settings)
+    with phases.start("contact"):
+        events, out = events_of(chosen.model.data, chosen.recordings, chosen.grid, seed)
+    nominal = chosen.nominal
+    own = [without_blocks(each, k, chosen.grid, out) for k, each in enumerate(chosen.recordings)]
+    clean = predicted_of(nominal.data, own, chosen.grid, series_of(nominal.data, own, chosen.grid, out))
+    nominal = fitted(nominal.data, clean, settings, given=nominal.given)
+    chosen = replace(chosen, nominal=nominal, recordings=own)
+    online = OnlineError([without_events(each, events) for each in recordings])
+    with phases.start("causes", MOST_CAUSES) as step:
+        rounds = _Rounds(given.data, chosen, out, online, least_gain, settings)
+        rounds.run(step)
+    if events:
+        # what the causes explain was no event
+        left, _ = events_of(rounds.models[-1].data, chosen.recordings, chosen.grid, seed)
+        events = tuple(event for event in events if any(_overlap(event, other) for other in left))
+    return Search(
+        estimation=chosen,
+        nominal=nominal,
+        extended=rounds.models[-1],
+        first=rounds.first,
+        last=rounds.view,
+        causes=tuple(rounds.causes),
+        models=tuple(rounds.models),
+        small=tuple([*rounds.refused, *rounds.small()]),
+        events=events,
+        out=out,
+        fitted_to=clean,
+    )
 
-    Raises InputError.
-    """
-    settings, grid = FitSettings(threads=threads), make_grid(recordings)
-    phase("fitting the nominal model", 0, None)
-    model = fitted(data, recordings, settings)
-    phase("looking for contact", 0, None)
-    names = [str(recording.path) for recording in recordings]
-    series = series_of(model.data, recordings, grid)
-    events = _events(model.data, series, names, seed)
-    out = left_out(series, events, names)
-    recordings = [_without(recording, k, grid, out) for k, recording in enumerate(recordings)]
-    series = replace(series, used=series.used & ~out)
-    clean = predicted_of(model.data, recordings, grid, series)
-    phase("fitting the nominal model", 0, None)
-    nominal = fitted(model.data, clean, settings, given=data)
-    first = look(nominal.data, recordings, grid, out, lambda done, total: phase("columns of all effects", done, total))
-    rounds = _Rounds(nominal, first, recordings, grid, out, settings, seed, phase)
-    causes = rounds.run(most_rounds)
-    return Search(nominal, rounds.model, first, rounds.view, clean, tuple(causes), rounds.parameters, events)
+
+def _overlap(one: Event, other: Event) -> bool:
+    return one.recording == other.recording and one.start < other.end and other.start < one.end
 
 
-def without_events(
-    data: Mapping[str, Any], recordings: Sequence[FitRecording], seed: int
-) -> tuple[list[FitRecording], tuple[Event, ...]]:
-    """Recordings that are only judged on, less what no friction explains, and what that is. data: the model with its
-    causes, since what it lacks would hide a short event."""
-    if not recordings:
-        return [], ()
-    grid = make_grid(recordings)
+def events_of(
+    data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, seed: int
+) -> tuple[tuple[Event, ...], Flags]:
+    """What no friction explains in the residual of a model, and the blocks [B] that lie in it."""
     series = series_of(data, recordings, grid)
     names = [str(recording.path) for recording in recordings]
-    events = _events(data, series, names, seed)
-    out = left_out(series, events, names)
-    return [_without(recording, k, grid, out) for k, recording in enumerate(recordings)], events
+    nuisance = [bias_of(data, series)] * series.target.shape[1]
+    events = scan_events(series, residual_alone(data, series), nuisance, names, seed=seed)
+    return events, left_out(series, events, names)
 
 
-def _events(data: Mapping[str, Any], series: Series, names: Sequence[str], seed: int) -> tuple[Event, ...]:
-    splines = bias_of(data, series)
-    residual = residual_of(series, splines, np.zeros((*series.target.shape, 0)))
-    return scan_events(series, residual, [splines] * residual.shape[1], names, seed=seed)
+def without_events(recording: FitRecording, events: Sequence[Event]) -> FitRecording:
+    """The recording without the samples of events in it."""
+    inside = np.zeros(len(recording.time), dtype=bool)
+    for event in events:
+        if event.recording == str(recording.path):
+            inside |= (recording.time >= event.start) & (recording.time <= event.end)
+    return replace(recording, train=recording.train & ~inside, held_out=recording.held_out & ~inside)
 
 
-def _without(recording: FitRecording, number: int, grid: Grid, out: Flags) -> FitRecording:
+def without_blocks(recording: FitRecording, number: int, grid: Grid, out: Flags) -> FitRecording:
     """The recording without the samples of the blocks [B] that are out."""
-    if not out.any():
-        return recording
     train = recording.train.copy()
     for segment in grid.segments:
         if segment.recording == number:
@@ -131,114 +176,103 @@ def _without(recording: FitRecording, number: int, grid: Grid, out: Flags) -> Fi
 
 
 class _Rounds:
-    """Selection on the columns of the present description, fit of the extended one, and again, until nothing is found.
-
-    Where much is missing the columns of the nominal description are far from those of the true one: then the best
-    cause alone is fitted before the others are looked at.
-    """
+    """Cause after cause; models and views after each."""
 
     def __init__(
         self,
-        nominal: FittedModel,
-        first: View,
-        recordings: Sequence[FitRecording],
-        grid: Grid,
+        given: Mapping[str, Any],
+        chosen: Estimation,
         out: Flags,
+        online: OnlineError,
+        least_gain: float,
         settings: FitSettings,
-        seed: int,
-        phase: Phase,
     ) -> None:
-        self.model, self.view, self._first = nominal, first, first
-        self.parameters: tuple[Mapping[str, tuple[float, str]], ...] = ()
-        self._nominal, self._recordings, self._grid, self._out = nominal, recordings, grid, out
-        self._settings, self._seed, self._phase = settings, seed, phase
+        self.causes: list[NamedCause] = []
+        self.refused: list[NamedCause] = []
+        self.models = [chosen.nominal]
+        self._given, self._chosen, self._out, self._online = given, chosen, out, online
+        self._least_gain, self._settings = least_gain, settings
+        self.view = self.first = self._look(chosen.nominal)
+        self._left = self._online_error(chosen.nominal)
 
-    def run(self, most: int) -> list[NamedCause]:
-        causes: list[NamedCause] = []
-        for number in range(most):
-            self._phase("telling causes apart", number, None)
-            selection = Selection(self.view.problem, self.view.eligible, self._seed)
-            found = selection.run()
-            if not found:
+    def run(self, step: Step) -> None:
+        for accepted in self._chosen.start.causes:
+            effect = accepted.candidate.name
+            self._take(NamedCause(effect, None, None, (accepted,), 0.0, 0.0, 1.0, ()))
+        while len(self.causes) < MOST_CAUSES and len(self.refused) < MOST_REFUSED:
+            step(len(self.causes))
+            # what was refused explains something: no other effect is credited with that
+            picked = self.view.beside({each.key for each in self.refused}).best(self._least_gain)
+            if picked is None:
                 break
-            if len(found) > 1 and _explained(found, self.view) > STRONG:
-                found = [selection.found(found[0].trial.place, [])]
-            found = _apart(found)
-            taken = self._fitted([*causes, *(NamedCause(each, accepted_of(each)) for each in found)])
-            if len(taken) <= len(causes):
-                break
-            causes = taken
-        causes = self._paying(causes)
-        order = sorted(range(len(causes)), key=lambda k: -causes[k].found.gain)
-        self.parameters = tuple(self.parameters[k] for k in order)
-        return [causes[k] for k in order]
+            cause = self._named(picked)
+            if cause.p_value >= SIGNIFICANCE or not self._take(cause):
+                self.refused.append(cause)
 
-    def _paying(self, causes: list[NamedCause]) -> list[NamedCause]:
-        """Without causes that nothing is lost with, the least worth first, all fitted again after each.
+    def _named(self, picked: Pick) -> NamedCause:
+        own = picked.hypothesis
+        accepted = accepted_of(own, picked.judged.magnitudes)
+        p_value = self.view.p_value(own)
+        return NamedCause(own.effect, own.joint, own.tendon, accepted, picked.gain, picked.error, p_value, picked.alike)
 
-        In long recordings everything is significant; and what was selected first may be another's by the end.
-        """
-        while causes:
-            accepted = [cause.accepted for cause in causes]
-            clean = predicted_of(self.view.data, self._recordings, self._grid, self.view.series)
-            without = fit_extended(self._nominal, accepted, clean, self._settings, compare=True).without
-            left = self._variance(self.model.data)
-            worth = [1.0 - left / max(self._variance(model.data), 1e-300) for model in without]
-            least = int(np.argmin(worth))
-            if worth[least] >= PAYS:
-                break
-            causes = self._fitted([*causes[:least], *causes[least + 1 :]])
-        if not causes:
-            self.model, self.view, self.parameters = self._nominal, self._first, ()
-        return causes
+    def _take(self, cause: NamedCause) -> bool:
+        """Fits the description with a further cause; keeps it where it lowers the error on unseen stretches, and that of
+        the model as it runs online, materially and certainly."""
+        everything = [each for known in [*self.causes, cause] for each in known.accepted]
+        accepted = possible(self.models[0].data, everything)
+        if len(accepted) < len(everything):
+            return False
+        own = self._chosen.recordings
+        clean = predicted_of(self.view.data, own, self._chosen.grid, self.view.series)
+        model = fit_extended(self.models[0], accepted, clean, self._settings, compare=False).model
+        left = self._online_error(model)
+        if not self._pays(self._left, left):
+            return False
+        view = self._look(model)
+        before, after = self.view.selection.base, view.selection.base
+        if not self._pays(before, after):
+            return False
+        if cause.p_value >= SIGNIFICANCE:  # of the start: a step that has no column in the view before
+            cause = replace(cause, p_value=_step_p_value(before, after))
+        gain, error = rms_gain(before, after)
+        self.causes.append(replace(cause, gain=gain, error=error))
+        self.models.append(model)
+        self.view, self._left = view, left
+        return True
 
-    def _variance(self, data: Mapping[str, Any]) -> float:
-        """Of the residual of a model over the recordings as they were measured, bias taken off, N²m²."""
-        series = series_of(data, self._recordings, self._grid, self._out)
-        left = residual_of(series, bias_of(data, series), np.zeros((*series.target.shape, 0)))
-        return float(np.mean(left[series.used] ** 2))
+    def _pays(self, before: Numbers, after: Numbers) -> bool:
+        """Σ e² by stretch."""
+        gain, error = rms_gain(before, after)
+        return gain >= self._least_gain and gain > CERTAIN * error
 
-    def _fitted(self, causes: list[NamedCause]) -> list[NamedCause]:
-        """Fits the description with these causes; those that the fit drives to nothing are dropped."""
-        while causes:
-            self._phase("fitting the extended model", len(causes), None)
-            accepted = possible(self._nominal.data, [cause.accepted for cause in causes])
-            causes = [cause for cause in causes if any(cause.accepted is each for each in accepted)]
-            if not causes:
-                break
-            clean = predicted_of(self.view.data, self._recordings, self._grid, self.view.series)
-            found = fit_extended(self._nominal, accepted, clean, self._settings, compare=False)
-            gone = _gone(found.model, found.paths)
-            causes = [cause for cause, lost in zip(causes, gone, strict=True) if not lost]
-            if not any(gone):
-                self.model, self.parameters = found.model, found.parameters
-                self.view = look(found.model.data, self._recordings, self._grid, self._out)
-                break
-        return causes
+    def _online_error(self, model: FittedModel) -> Numbers:
+        return self._online.by_stretch(self._chosen.signals.restored(model.data, self._given))
 
+    def _look(self, model: FittedModel) -> View:
+        return look(model.data, self._chosen.recordings, self._chosen.grid, self._chosen.least, self._out)
 
-def _apart(found: Sequence[Found]) -> list[Found]:
-    """Without what another cause brings: an effect everywhere, and the same at single places; the larger gain stays."""
-    kept: list[Found] = []
-    for each in found:
-        own = [other.trial for other in kept if other.trial.effect == each.trial.effect]
-        everywhere = [trial.joint is None and trial.tendon is None for trial in [each.trial, *own]]
-        if not own or not any(everywhere):
-            kept.append(each)
-    return kept
+    def small(self) -> list[NamedCause]:
+        """Of every effect that is certain but not material the best place."""
+        found = []
+        known = {each.effect for each in self.refused}
+        for judged in self.view.selection.ranked():
+            gain, error = self.view.selection.gain(judged)
+            if (
+                judged.hypothesis.effect not in known
+                and gain > CERTAIN * error
+                and (p_value := self.view.p_value(judged.hypothesis)) < SIGNIFICANCE
+            ):
+                found.append(_small(judged, gain, error, p_value))
+        return found
 
 
-def _gone(model: FittedModel, paths: Sequence[Sequence[str]]) -> list[bool]:
-    """By cause: whether the fit left nothing of its numbers."""
-    found = []
-    for given in paths:
-        own = [path for path in given if path in model.values]
-        found.append(bool(own) and all(model.values[path] == 0.0 for path in own))
-    return found
+def _small(judged: Judged, gain: float, error: float, p_value: float) -> NamedCause:
+    own = judged.hypothesis
+    return NamedCause(own.effect, own.joint, own.tendon, accepted_of(own, judged.magnitudes), gain, error, p_value, ())
 
 
-def _explained(found: Sequence[Found], view: View) -> float:
-    """Share of the whitened residual's variance that the causes explain on held-out blocks, about."""
-    rows = int(view.series.used.sum()) * view.series.target.shape[1]
-    gain = sum(each.gain for each in found)
-    return float(gain / (rows + gain))
+def _step_p_value(before: Numbers, after: Numbers) -> float:
+    """Of a gain by stretch [K] being chance: a one-sided t test."""
+    from scipy.stats import ttest_1samp
+
+    return float(ttest_1samp(before - after, 0.0, alternative="greater").pvalue) if len(before) > 1 else 1.0

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from tendonfmu import native
 from tendonfmu.diagnosis_result import Interval, ModelErrors
-from tendonfmu.errors import InputError
+from tendonfmu.errors import InputError, InternalError
 from tendonfmu.fit_evaluation import residuals
 from tendonfmu.fit_files import description_text
 from tendonfmu.fit_recordings import FitRecording
@@ -45,8 +45,8 @@ _TINY = 1e-12  # N·m, as in contract section 5
 class Gain:
     """nominal, extended: rms per joint on the samples trained on, and on those of the test.
 
-    value: 1 − rms_extended/rms_nominal over all joints on the test. causes: of each cause alone, the others kept, [k].
-    alone: of each cause alone against the nominal model, [k]. blocks: of how many seconds-long blocks of the test the
+    value: 1 − rms_extended/rms_nominal over all joints on the test. steps: rms over all joints on the test, N·m, of each
+    model of a sequence. blocks: of how many seconds-long blocks of the test the
     intervals are. held_out: the test is held-out blocks of the training recordings. agreement: largest difference
     between an FMU's outputs and the core's, in units of the output's largest value.
     """
@@ -55,8 +55,7 @@ class Gain:
     extended: ModelErrors
     bias_only_rms: tuple[float, ...]
     value: Interval
-    causes: tuple[Interval, ...]
-    alone: tuple[Interval, ...]
+    steps: tuple[float, ...]
     blocks: int
     held_out: bool
     agreement: float
@@ -68,33 +67,50 @@ def measure_gain(
     training: Sequence[FitRecording],
     tests: Sequence[FitRecording] = (),
     *,
-    without: Sequence[Data] = (),
-    alone: Sequence[Data] = (),
+    between: Sequence[Data] = (),
     seed: int = 0,
 ) -> Gain:
     """nominal, extended: fitted descriptions with the same `bias`. tests: recordings that nothing was fitted to; where
-    there are none, the samples `held_out` of the training recordings. without, alone: of `extension_fit.ExtensionFit`.
+    there are none, the samples `held_out` of the training recordings. between: models with some of the causes.
 
-    The FMUs of nominal and extended are run; the models of single causes by the core alone. Raises InputError where
-    there is nothing to test on, or the FMU does not agree with the core.
+    The FMUs of nominal and extended are run; the models between them by the core alone. Raises InputError where
+    there is nothing to test on, InternalError where the FMU does not agree with the core.
     """
     test = _Test.of(training, tests)
-    if _filter_of(nominal) != _filter_of(extended):
-        raise InputError("bias: not the same in both descriptions; expected equal settings, or rms tells nothing")
+    _check_settings(nominal, extended)
     runs = {name: [run_both(data, each) for each in test.recordings] for name, data in _both(nominal, extended)}
     left = {name: [run.residual for run in found] for name, found in runs.items()}
     before, after = test.squares(left["nominal"]), test.squares(left["extended"])
+    sequence = [before, *(test.squares_of(data) for data in between), *([after] if extended is not nominal else [])]
     return Gain(
         nominal=ModelErrors(test.trained(nominal, left["nominal"]), test.tested(left["nominal"])),
         extended=ModelErrors(test.trained(extended, left["extended"]), test.tested(left["extended"])),
         bias_only_rms=test.tested([residuals(extended, each, None).residual for each in test.recordings]),
         value=gain_interval(before, after, seed),
-        causes=tuple(gain_interval(test.squares_of(data, before, nominal), after, seed) for data in without),
-        alone=tuple(gain_interval(before, test.squares_of(data, after, extended), seed) for data in alone),
+        steps=tuple(float(np.sqrt(squares.sum() / max(test.count, 1))) for squares in sequence),
         blocks=len(before),
         held_out=test.held_out,
         agreement=max(run.agreement for found in runs.values() for run in found),
     )
+
+
+def own_gains(
+    extended: Data,
+    without: Sequence[Data],
+    training: Sequence[FitRecording],
+    tests: Sequence[FitRecording] = (),
+    *,
+    seed: int = 0,
+) -> list[Interval]:
+    """Of each cause on unseen data, the others kept. without: models that lack one each, fitted. By the core alone."""
+    test = _Test.of(training, tests)
+    after = test.squares_of(extended)
+    return [gain_interval(test.squares_of(data), after, seed) for data in without]
+
+
+def _check_settings(nominal: Data, extended: Data) -> None:
+    if _filter_of(nominal) != _filter_of(extended):
+        raise InternalError("bias: not the same in both descriptions; rms would tell nothing")
 
 
 def _filter_of(data: Data) -> BiasSettings:
@@ -134,7 +150,7 @@ def run_both(data: Data, recording: FitRecording) -> BothRun:
         size = max(float(np.abs(beside["friction_torque"]).max()), float(np.abs(beside["joint_torque"]).max()))
         agreement = max(agreement, float(np.abs(left[1:] - beside["residual"][1:]).max()) / max(size, _TINY))
     if not agreement <= AGREEMENT:
-        raise InputError(
+        raise InternalError(
             f"{recording.path}: the FMU's outputs and the core's differ by {agreement:.3g} of their largest value; "
             f"expected at most {AGREEMENT:g}"
         )
@@ -227,9 +243,14 @@ class _Test:
             [block.sums(np.sum(each**2, axis=1)) for block, each in zip(self.blocks, left, strict=True)]
         )
 
-    def squares_of(self, data: Data, known: Numbers, of: Data) -> Numbers:
-        """The same of a description, by the core; `known` where it is the one that they are known of."""
-        return known if data is of else self.squares([residual_of(data, each) for each in self.recordings])
+    def squares_of(self, data: Data) -> Numbers:
+        """The same of a description, by the core."""
+        return self.squares([residual_of(data, each) for each in self.recordings])
+
+    @property
+    def count(self) -> int:
+        """Samples that are judged, times joints."""
+        return sum(int(mask.sum()) for mask in self.masks) * self.recordings[0].target.shape[1]
 
     def tested(self, left: Sequence[Numbers]) -> tuple[float, ...]:
         return _pooled(left, self.masks)

@@ -63,3 +63,18 @@ def without(columns: Array, span: Numbers) -> Array:
     """Columns [R, ...] less what lies in an orthonormal span [R, r]; keeps the type of number."""
     own = span.astype(columns.dtype, copy=False)
     return np.asarray(columns - own @ (own.T @ columns))
+
+
+def residual_of(series: Series, splines: Numbers, nominal: Array) -> Numbers:
+    """[B, n] N·m: target less bias and all that `nominal` [B, n, u] explains by least squares; unused rows as found."""
+    used = series.used
+    span = basis(splines[used])
+    target = without(series.target[used], span)
+    if nominal.shape[2]:
+        wide = np.asarray(nominal[used], dtype=np.float64)
+        own = np.stack([without(wide[:, j], span) for j in range(wide.shape[1])], axis=1)
+        flat = basis(own.reshape(-1, own.shape[2]))
+        target = without(target.reshape(-1), flat).reshape(target.shape)
+    found = series.target - np.mean(series.target[used], axis=0)
+    found[used] = target
+    return np.asarray(found)

@@ -41,8 +41,28 @@ def predicted_forces(
         predicted = np.where(pulls & (force > 0), np.maximum(force - shift, 0.0), force - shift)
         groups["tendon_force"] = predicted
         if "tendon_position" in groups:
-            groups["tendon_position"] = groups["tendon_position"] + (predicted - force) / stiffness
+            # a description with a delay pairs the position of now with the force of `delay` s later
+            change = _shifted(recording, (predicted - force) / stiffness, _delay(data))
+            groups["tendon_position"] = groups["tendon_position"] + change
         found.append(replace(recording, recording=replace(recording.recording, groups=groups)))
+    return found
+
+
+def _delay(data: Mapping[str, Any]) -> float:
+    """s by which the description says that forces come later than positions."""
+    rows = data.get("extensions") or []
+    return float(sum(row["delay"] for row in rows if row["effect"] == "time_delay"))
+
+
+def _shifted(recording: FitRecording, values: Numbers, delay: float) -> Numbers:
+    """[N, m] values of `delay` s later, within each part."""
+    if not delay:
+        return values
+    found = values.copy()
+    for part in recording.parts:
+        time = recording.time[part]
+        for i in range(values.shape[1]):
+            found[part, i] = np.interp(time + delay, time, values[part, i])
     return found
 
 

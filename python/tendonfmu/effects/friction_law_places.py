@@ -10,7 +10,7 @@ import numpy as np
 from tendonfmu.balance import moment_arms
 from tendonfmu.effects.candidate import Place
 from tendonfmu.effects.description_edit import magnitudes_of, sides_at
-from tendonfmu.friction_places import Effect, effects
+from tendonfmu.friction_places import DEFAULT_THRESHOLD, Effect, effects
 
 Data = Mapping[str, Any]
 KINDS = ("friction", "load_friction", "edge_friction", "pulley_friction")
@@ -81,6 +81,14 @@ def rubbing_joints(data: Data) -> list[Place]:
 def rubbing_tendons(data: Data) -> list[Place]:
     """Tendons with friction along them."""
     return [Place(tendon=i) for i in sorted({each.tendon for each in effects(data) if each.tendon})]
+
+
+def thresholds(data: Data) -> tuple[float, float]:
+    """Velocity thresholds of motion of tendons, m/s, and of joints, rad/s."""
+    given = data.get("velocity_threshold") or {}
+    found = (DEFAULT_THRESHOLD[kind] if given.get(kind) is None else given[kind] for kind in ("tendon", "joint"))
+    tendon, joint = (float(value) for value in found)
+    return tendon, joint
 
 
 # --- extensions -------------------------------------------------------------------------------------------------------

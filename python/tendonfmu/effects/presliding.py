@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from tendonfmu.diagnosis_span import Span
 from tendonfmu.effects.candidate import Candidate, Data, Place, Variant
 from tendonfmu.effects.extension_row import secant_variant
-from tendonfmu.effects.friction_law_places import row_places, rubbing_joints, rubbing_tendons
+from tendonfmu.effects.friction_law_places import row_places, rubbing_joints, rubbing_tendons, thresholds
 
 NAME = "presliding"
 EVERYWHERE = Place()
-_OF_TRAVEL = (0.006, 0.03, 0.12)  # displacements, of the median distance between reversals
+OF_TRAVEL = (0.002, 0.008, 0.03, 0.12)  # distances that are tried, of the median travel between reversals
+_TIMES = (0.3, 3.0)  # distances at one place, times that of everywhere
+_SLOWEST = 1e-9  # m/s or rad/s: a threshold of 0 has no scale
 
 
 def _single_places(data: Data) -> list[Place]:
@@ -19,11 +23,11 @@ def _single_places(data: Data) -> list[Place]:
 
 
 def _places(data: Data, kinematics: int) -> list[Place]:
-    """Each joint and tendon with friction; and all of them at once, where there are several and none has it."""
+    """All at once where none has it, else single ones: a place's own row takes precedence there."""
     taken = row_places(data, NAME)
-    places = _single_places(data)
-    everywhere = [EVERYWHERE] if len(places) > 1 and not taken else []
-    return everywhere + [place for place in places if place not in taken]
+    if not taken:
+        return [EVERYWHERE] if _single_places(data) and min(thresholds(data)) > _SLOWEST else _single_places(data)
+    return [place for place in _single_places(data) if place not in taken]
 
 
 def _travel(place: Place, span: Span) -> float:
@@ -32,28 +36,37 @@ def _travel(place: Place, span: Span) -> float:
     return float(span.tendon_travel[(place.tendon or 1) - 1])
 
 
+def _threshold(data: Data, place: Place) -> float:
+    tendon, joint = thresholds(data)
+    return joint if place.joint is not None else tendon
+
+
+def usual_time(data: Data, span: Span) -> float:
+    """s: travel from reversal to reversal over the threshold of motion, median over the places with friction."""
+    times = [_travel(place, span) / max(_threshold(data, place), _SLOWEST) for place in _single_places(data)]
+    return float(np.median([each for each in times if each > 0] or [0.0]))
+
+
 def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
-    """Everywhere: the same share of the travel of each joint and tendon."""
+    """Everywhere in s, times the threshold of motion; at a place in m or rad."""
     if place == EVERYWHERE:
-        travels = {_key(each): _travel(each, span) for each in _single_places(data)}
-        return [{key: share * travel for key, travel in travels.items() if travel > 0} for share in _OF_TRAVEL]
+        usual = usual_time(data, span)
+        return [{"displacement": share * usual} for share in OF_TRAVEL] if usual > 0 else []
+    everywhere = next((row for row in data.get("extensions") or [] if is_everywhere(row)), None)
+    if everywhere is not None:
+        present = float(everywhere["displacement"]) * _threshold(data, place)
+        return [{"displacement": factor * present} for factor in _TIMES]
     travel = _travel(place, span)
-    return [{"displacement": share * travel} for share in _OF_TRAVEL] if travel > 0 else []
+    return [{"displacement": share * travel} for share in OF_TRAVEL[1:]] if travel > 0 else []
 
 
-def _key(place: Place) -> str:
-    return f"joints[{place.joint}]" if place.joint is not None else f"tendons[{place.tendon}]"
+def is_everywhere(row: Mapping[str, object]) -> bool:
+    """Whether a row of `extensions` is presliding at all places."""
+    return row["effect"] == NAME and row.get("joint") is None and row.get("tendon") is None
 
 
 def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
-    if place != EVERYWHERE:
-        return secant_variant(data, NAME, place, shape, "displacement", scaled=False, only_joint=place.joint)
-    singles = [(each, shape[_key(each)]) for each in _single_places(data) if _key(each) in shape]
-    rows = [
-        secant_variant(data, NAME, each, {"displacement": value}, "displacement", scaled=False).secant_rows[0]
-        for each, value in singles
-    ]
-    return Variant(data, shape, secant_rows=tuple(rows))
+    return secant_variant(data, NAME, place, shape, "displacement", scaled=False, only_joint=place.joint)
 
 
 CANDIDATE = Candidate(

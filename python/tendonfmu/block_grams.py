@@ -1,0 +1,248 @@
+"""Held-out errors of any subset of columns from Gram matrices: after they are made, no sample is touched.
+
+Target and columns are block means with the slow bias projected out of both. Of each fold the products of all columns
+are kept; leaving a fold out is a subtraction. What the nominal model's own numbers can mend is refitted without the fold
+each time (Frisch and Waugh, 1933): candidates and target are replaced by what that refit leaves of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.linalg import cho_factor, cho_solve
+
+from tendonfmu.held_out_folds import Folds
+
+Numbers = NDArray[np.float64]
+Array = NDArray[Any]
+
+MEMORY = 20.0  # blocks that noise remembers, about: so many rows count as one against what is known beforehand
+_PIECE = 4096  # rows at a time
+_LOST = 1e-9  # of a column's square, below which the projection left rounding only
+
+
+@dataclass(frozen=True)
+class _Fold:
+    """One fold left out.
+
+    refit: [u, c + 1] numbers of the nominal model per candidate, and of the target. energy [c, c], score [c]: what is
+    learned from, nominal numbers refitted. own_energy [c, c], own_score [c], own_square: the same on the fold itself.
+    """
+
+    refit: Numbers
+    energy: Numbers
+    score: Numbers
+    own_energy: Numbers
+    own_score: Numbers
+    own_square: float
+
+
+class Grams:
+    """Products of a target, of the nominal model's columns and of candidates', by fold."""
+
+    def __init__(
+        self, folds: Folds, target: Numbers, nominal: Array, values: Array, splines: Numbers, scale: Numbers
+    ) -> None:
+        """target: [B, n] N·m. nominal: [B, n, u], values: [B, n, c]: derivatives. splines: [B, s] of the slow bias.
+        scale: [u] how far each nominal number may be expected to move: a ridge that decides where the data do not.
+        """
+        self.folds, self.nominal_count, self.count = folds, nominal.shape[2], values.shape[2]
+        rows, joints = folds.rows, target.shape[1]
+        span = self._span = _Span(splines[rows])
+        columns = self.nominal_count + self.count
+        self._table = np.empty((len(rows), joints, columns), dtype=np.float32)
+        for j in range(joints):
+            self._table[:, j, : self.nominal_count] = span.without(nominal[rows, j])
+            self._table[:, j, self.nominal_count :] = span.without(values[rows, j])
+        self._target = np.stack([span.without(target[rows, j][:, None])[:, 0] for j in range(joints)], axis=1)
+        self.square = float(np.sum(self._target**2))
+        whole, by_fold = self._products()
+        spread = self.square / max(self._target.size, 1) * MEMORY
+        ridge = np.zeros(self.nominal_count)
+        known = np.isfinite(scale) & (scale > 0)
+        ridge[known] = spread / scale[known] ** 2
+        diagonal = np.diagonal(whole)[: self.nominal_count]
+        self._ridge = np.maximum(ridge, 1e-9 * diagonal) + 1e-300
+        self._by_fold = [self._left_out(whole - own, own) for own in by_fold]
+        self._whole = self._left_out(whole, whole)
+
+    # --- making -------------------------------------------------------------------------------------------------------
+
+    def _products(self) -> tuple[Numbers, list[Numbers]]:
+        """[u + c + 1]² of all columns and the target, of everything and of each fold."""
+        size = self._table.shape[2] + 1
+        found = [np.zeros((size, size)) for _ in range(self.folds.folds)]
+        for number, total in enumerate(found):
+            rows = np.flatnonzero(self.folds.fold == number)
+            for begin in range(0, len(rows), _PIECE):
+                part = rows[begin : begin + _PIECE]
+                columns = self._table[part].reshape(-1, size - 1).astype(np.float64)
+                both = np.concatenate([columns, self._target[part].reshape(-1, 1)], axis=1)
+                total += both.T @ both
+        return np.sum(found, axis=0), found
+
+    def _left_out(self, learned: Numbers, own: Numbers) -> _Fold:
+        u = self.nominal_count
+        inner = learned[:u, :u] + np.diag(self._ridge)
+        refit = _solved(inner, learned[:u, u:])
+        after = learned[u:, u:] - learned[u:, :u] @ refit
+        mixed = own[u:, :u] @ refit
+        there = own[u:, u:] - mixed - mixed.T + refit.T @ own[:u, :u] @ refit
+        return _Fold(
+            refit=refit,
+            energy=after[:-1, :-1],
+            score=after[:-1, -1],
+            own_energy=there[:-1, :-1],
+            own_score=there[:-1, -1],
+            own_square=float(there[-1, -1]),
+        )
+
+    # --- errors -------------------------------------------------------------------------------------------------------
+
+    @property
+    def without(self) -> float:
+        """Σ e² on held-out folds, (N·m)², of the nominal model refitted, without any candidate."""
+        return float(sum(each.own_square for each in self._by_fold))
+
+    def surviving(self, mix: Numbers) -> float:
+        """Share of the variance of a combination of candidates [c, d] that the refit leaves, of its strongest direction."""
+        used = np.flatnonzero(mix.any(axis=1))
+        part, inner = mix[used], np.ix_(used, used)
+        before = part.T @ self._raw_energy()[inner] @ part
+        after = part.T @ self._whole.energy[inner] @ part
+        length = np.sqrt(np.diagonal(before))
+        if not (length > 0.0).all():
+            return 0.0
+        power, turned = np.linalg.eigh(before / (length[:, None] * length))
+        kept = power > 1e-6 * power[-1]
+        root = turned[:, kept] / np.sqrt(power[kept])
+        left = root.T @ (after / (length[:, None] * length)) @ root
+        return float(np.clip(np.linalg.eigvalsh(left)[-1], 0.0, 1.0))
+
+    def _raw_energy(self) -> Numbers:
+        if not hasattr(self, "_raw"):
+            values = self._table[:, :, self.nominal_count :].reshape(-1, self.count)
+            self._raw = np.zeros((self.count, self.count))
+            for begin in range(0, len(values), _PIECE):
+                part = values[begin : begin + _PIECE].astype(np.float64)
+                self._raw += part.T @ part
+        return self._raw
+
+    def magnitudes(self, mix: Numbers, low: Numbers, high: Numbers) -> Numbers:
+        """[d] learned from everything, between bounds [d]."""
+        return bounded(mix.T @ self._whole.energy @ mix, mix.T @ self._whole.score, low, high)
+
+    def error(self, mix: Numbers, low: Numbers, high: Numbers) -> tuple[float, Numbers]:
+        """Σ e² on held-out folds, (N·m)², with a combination of candidates [c, d]; magnitudes without each fold [f, d]."""
+        left, found = 0.0, []
+        used = np.flatnonzero(mix.any(axis=1))
+        part = mix[used]
+        for each in self._by_fold:
+            energy, own = (part.T @ matrix[np.ix_(used, used)] @ part for matrix in (each.energy, each.own_energy))
+            theta = bounded(energy, part.T @ each.score[used], low, high)
+            left += each.own_square - 2.0 * float(theta @ (part.T @ each.own_score[used])) + float(theta @ own @ theta)
+            found.append(theta)
+        return left, np.array(found)
+
+    def by_stretch(self, mix: Numbers | None, magnitudes: Numbers | None) -> Numbers:
+        """[stretches] Σ e² on unseen samples. mix: [c, d], magnitudes: [f, d], as `error` gives them; None: without."""
+        u = self.nominal_count
+        found = np.zeros(self.folds.stretches)
+        for number, each in enumerate(self._by_fold):
+            rows = self.folds.fold == number
+            change = np.zeros(u + self.count)
+            change[:u] = each.refit[:, -1]
+            if mix is not None and magnitudes is not None:
+                added = mix @ magnitudes[number]
+                change[u:] = added
+                change[:u] -= each.refit[:, :-1] @ added
+            used = np.flatnonzero(change)
+            left = self._target[rows] - self._table[rows][:, :, used] @ change[used]
+            found += np.bincount(self.folds.stretch[rows], np.sum(left**2, axis=1), minlength=self.folds.stretches)
+        return found
+
+    def errors_of(self, targets: Numbers) -> Numbers:
+        """[K] Σ e² on held-out folds, (N·m)², of other targets [B, n, K], the nominal numbers refitted to each."""
+        u, rows = self.nominal_count, self.folds.rows
+        flat = self._table[:, :, :u].astype(np.float64)
+        left = np.stack([self._span.without(targets[rows, j]) for j in range(targets.shape[1])], axis=1)
+        score = [np.einsum("rnu,rnk->uk", flat[own], left[own]) for own in self._rows_of_folds()]
+        energy = [np.einsum("rnu,rnv->uv", flat[own], flat[own], optimize=True) for own in self._rows_of_folds()]
+        found = np.zeros(targets.shape[2])
+        for k, own in enumerate(self._rows_of_folds()):
+            inner = np.sum(energy, axis=0) - energy[k] + np.diag(self._ridge)
+            refit = _solved(inner, np.sum(score, axis=0) - score[k])
+            found += np.einsum("rnk,rnk->k", left[own], left[own])
+            found += np.einsum("uk,uk->k", refit, energy[k] @ refit - 2.0 * score[k])
+        return found
+
+    def _rows_of_folds(self) -> list[NDArray[np.bool_]]:
+        return [self.folds.fold == number for number in range(self.folds.folds)]
+
+    def residual(self) -> Numbers:
+        """[R, n] N·m left of the target by the nominal model refitted on everything."""
+        change = self._whole.refit[:, -1]
+        return np.asarray(self._target - self._table[:, :, : self.nominal_count] @ change)
+
+
+def bounded(energy: Numbers, score: Numbers, low: Numbers, high: Numbers) -> Numbers:
+    """[d] least squares between bounds: what lies beyond one is put there, the worst first, the rest solved again."""
+    count = len(score)
+    length = np.sqrt(np.maximum(np.diagonal(energy), 1e-300))
+    scaled = energy / (length[:, None] * length)
+    right, low, high = score / length, low * length, high * length
+    fixed = np.full(count, np.nan)
+    for _ in range(count + 1):
+        free = np.isnan(fixed)
+        found = np.where(free, 0.0, fixed)
+        if free.any():
+            inner = scaled[np.ix_(free, free)] + 1e-9 * np.eye(int(free.sum()))
+            found[free] = np.linalg.solve(inner, right[free] - scaled[np.ix_(free, ~free)] @ found[~free])
+        beyond = np.where(free, np.maximum(low - found, found - high), -np.inf)
+        worst = int(np.argmax(beyond)) if count else 0
+        if not count or beyond[worst] <= 0.0:
+            break
+        fixed[worst] = low[worst] if found[worst] < low[worst] else high[worst]
+    return np.asarray(found / length) if count else np.zeros(0)
+
+
+def _solved(matrix: Numbers, right: Numbers) -> Numbers:
+    """[u, k] of a symmetric matrix above 0, its columns brought to one length first."""
+    length = np.sqrt(np.diagonal(matrix))
+    if not len(length):
+        return np.zeros((0, right.shape[1]))
+    scaled = matrix / (length[:, None] * length) + 1e-12 * np.eye(len(length))
+    factor = cho_factor(scaled, lower=True, check_finite=False)
+    return np.asarray(cho_solve(factor, right / length[:, None], check_finite=False) / length[:, None])
+
+
+class _Span:
+    """Takes what lies in the span of sparse columns off others."""
+
+    def __init__(self, splines: Numbers) -> None:
+        matrix = sparse.csr_array(splines)
+        alive = np.flatnonzero(np.asarray(abs(matrix).sum(axis=0)).ravel() > 0)
+        self._matrix = sparse.csr_array(matrix[:, alive])
+        gram = np.asarray((self._matrix.T @ self._matrix).todense())
+        self._inverse = np.linalg.pinv(gram, rcond=1e-10, hermitian=True) if gram.size else gram
+
+    def without(self, columns: Array) -> Array:
+        """[R, d] less their part in the span; a column of which nothing but rounding is left becomes 0."""
+        values = np.asarray(columns, dtype=np.float64)
+        if not self._matrix.shape[1]:
+            return values
+        left = values - self._matrix @ (self._inverse @ (self._matrix.T @ values))
+        gone = np.einsum("rc,rc->c", left, left) <= _LOST * np.einsum("rc,rc->c", values, values)
+        left[:, gone] = 0.0
+        return np.asarray(left)
+
+
+def standard_error(gains: Sequence[float] | Numbers) -> float:
+    """Of the sum of gains by stretch [K]; infinite for a single one."""
+    values = np.asarray(gains)
+    return float(np.sqrt(len(values)) * np.std(values, ddof=1)) if len(values) > 1 else np.inf

@@ -1,0 +1,167 @@
+"""What causes are worth on unseen data; those that are worth nothing there are taken out again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+from tendonfmu.cause_search import predicted_of, series_of
+from tendonfmu.description import FingerDescription
+from tendonfmu.diagnosis_result import Interval
+from tendonfmu.diagnosis_search import NamedCause, Search
+from tendonfmu.extension_fit import Accepted, ExtensionFit, FitSettings, FittedModel, fit_extended
+from tendonfmu.fit_recordings import FitRecording
+from tendonfmu.gain import Gain, measure_gain, own_gains
+from tendonfmu.nominal_fit import fitted
+from tendonfmu.signal_choice import estimation_recordings
+
+Data = Mapping[str, Any]
+Parameters = Mapping[str, tuple[float, str]]
+
+
+@dataclass(frozen=True)
+class Verified:
+    """causes: the largest gain first, places of one effect together; gains, parameters (of each place), without (the
+    fit that lacks it): of each. dropped: what unseen data do not bear out. nominal_data, extended_data: descriptions as
+    they run online. extended: with the settings for estimating.
+    """
+
+    causes: tuple[NamedCause, ...]
+    gains: tuple[Interval, ...]
+    parameters: tuple[tuple[Parameters, ...], ...]
+    without: tuple[FittedModel, ...]
+    dropped: tuple[NamedCause, ...]
+    gain: Gain
+    nominal_data: Data
+    extended_data: Data
+    extended: Data
+
+
+def verify(
+    given: FingerDescription,
+    found: Search,
+    training: Sequence[FitRecording],
+    tests: Sequence[FitRecording],
+    least_gain: float,
+    settings: FitSettings,
+    seed: int,
+) -> Verified:
+    """training, tests: as they were measured; where there are no tests, what is held out of training is judged on."""
+    bench = _Bench(given, found, training, tests, settings, seed)
+    causes, dropped = merged(found.causes), []
+    while True:
+        fit = bench.fit(causes)
+        without = [bench.fit([*causes[:k], *causes[k + 1 :]]).model for k in range(len(causes))]
+        gains = bench.gains(fit.model, without)
+        weak = [k for k, gain in enumerate(gains) if not (gain.low > 0.0 and gain.value >= least_gain)]
+        if not weak:
+            break
+        worst = min(weak, key=lambda k: gains[k].value)
+        dropped.append(replace(causes[worst], measured=gains[worst]))
+        causes = [*causes[:worst], *causes[worst + 1 :]]
+    order = sorted(range(len(causes)), key=lambda k: -gains[k].value)
+    ranked = [causes[k] for k in order]
+    between = [bench.online(bench.fit(ranked[: k + 1]).model) for k in range(len(ranked) - 1)]
+    nominal = bench.online(bench.nominal)
+    extended = bench.online(fit.model) if causes else nominal
+    return Verified(
+        causes=tuple(ranked),
+        gains=tuple(gains[k] for k in order),
+        parameters=tuple(_parameters(fit, causes, k) for k in order),
+        without=tuple(without[k] for k in order),
+        dropped=tuple(dropped),
+        gain=measure_gain(nominal, extended, training, tests, between=between, seed=seed),
+        nominal_data=nominal,
+        extended_data=extended,
+        extended=fit.model.data,
+    )
+
+
+def merged(causes: Sequence[NamedCause]) -> list[NamedCause]:
+    """Places of one effect as one cause: a place of its own beside others is part of the table of places."""
+    by_effect: dict[str, NamedCause] = {}
+    for cause in causes:
+        known = by_effect.get(cause.effect)
+        if known is None:
+            by_effect[cause.effect] = cause
+            continue
+        by_effect[cause.effect] = replace(
+            known,
+            joint=known.joint if known.joint == cause.joint else None,
+            tendon=known.tendon if known.tendon == cause.tendon else None,
+            accepted=(*known.accepted, *cause.accepted),
+            p_value=min(known.p_value, cause.p_value),
+            alike=tuple(each for each in known.alike if each.effect in {other.effect for other in cause.alike}),
+        )
+    return list(by_effect.values())
+
+
+def _parameters(fit: ExtensionFit, causes: Sequence[NamedCause], number: int) -> tuple[Parameters, ...]:
+    first = sum(len(cause.accepted) for cause in causes[:number])
+    return fit.parameters[first : first + len(causes[number].accepted)]
+
+
+class _Bench:
+    """Fits of any set of causes, and their residuals on unseen data."""
+
+    def __init__(
+        self,
+        given: FingerDescription,
+        found: Search,
+        training: Sequence[FitRecording],
+        tests: Sequence[FitRecording],
+        settings: FitSettings,
+        seed: int,
+    ) -> None:
+        self._given, self._found, self._settings, self._seed = given, found, settings, seed
+        self._training, self._tests = training, tests
+        self._fits: dict[tuple[int, ...], ExtensionFit] = {}
+        self._signals = found.estimation.signals
+        self.nominal, self._fit_to = found.nominal, list(found.fitted_to)
+        if not tests:
+            self._hold_out()
+
+    def _hold_out(self) -> None:
+        """Fits leave out what is judged on."""
+        finger = replace(self._given, data=self._signals.description(self._given.data))
+        own = estimation_recordings(finger, self._training, self._signals)
+        self._fit_to = [
+            replace(clean, train=clean.train & each.train) for clean, each in zip(self._fit_to, own, strict=True)
+        ]
+        self.nominal = fitted(self.nominal.data, self._fit_to, self._settings, given=self.nominal.given)
+
+    def fit(self, causes: Sequence[NamedCause]) -> ExtensionFit:
+        accepted = [each for cause in causes for each in cause.accepted]
+        key = tuple(id(each) for each in accepted)
+        if key not in self._fits:
+            self._fits[key] = self._fitted(accepted)
+        return self._fits[key]
+
+    def _fitted(self, accepted: Sequence[Accepted]) -> ExtensionFit:
+        if not accepted:
+            return ExtensionFit(self.nominal, (), (), ())
+        return fit_extended(self.nominal, accepted, self._predicted, self._settings, compare=False)
+
+    @cached_property
+    def _predicted(self) -> list[FitRecording]:
+        """The recordings with the forces that the model of all causes predicts."""
+        extended, estimation = self._found.extended.data, self._found.estimation
+        series = series_of(extended, estimation.recordings, estimation.grid, self._found.out)
+        predicted = predicted_of(extended, estimation.recordings, estimation.grid, series)
+        return [replace(clean, train=each.train) for clean, each in zip(predicted, self._fit_to, strict=True)]
+
+    def gains(self, model: FittedModel, without: Sequence[FittedModel]) -> list[Interval]:
+        if not without:
+            return []
+        return own_gains(
+            self.online(model),
+            [self.online(each) for each in without],
+            self._training,
+            self._tests,
+            seed=self._seed,
+        )
+
+    def online(self, model: FittedModel) -> dict[str, Any]:
+        return self._signals.restored(model.data, self._given.data)

@@ -1,0 +1,79 @@
+"""Whether what was selected could be chance: a cluster-robust test, on the residual as it is and made white.
+
+Scores of stretches of 2 s are independent, whatever the noise does within one (Liang and Zeger, 1986). Made white, the
+residual's slow colour does not hide a small effect; as it is, what a model of a real machine always leaves at high
+frequencies does not. Either may confirm; the p-value counts both, and everything that was tried (Bonferroni).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import fdtrc
+
+from tendonfmu.diagnosis_series import Series
+from tendonfmu.held_out_folds import Folds
+from tendonfmu.nuisance import basis, residual_of, without
+from tendonfmu.whitening import Whitener, whitener
+
+Numbers = NDArray[np.float64]
+Columns = NDArray[np.float32] | Numbers
+
+
+class Confirmation:
+    """The residual of a description, and what refitting it can mend."""
+
+    def __init__(self, series: Series, folds: Folds, splines: Numbers, trends: Numbers, nominal: Columns) -> None:
+        """splines: [B, s] of the slow bias; trends: [B, t] slower ones, for the white residual, whose filter sees what
+        the bias does faster. nominal: [B, n, u] derivatives by the description's own numbers."""
+        joints = series.target.shape[1]
+        white = whitener(series, residual_of(series, trends, nominal))
+        plain = Whitener(np.zeros((0, joints)), np.ones(joints), series.used)
+        self._tests = [
+            _ClusterTest(series, folds, splines, nominal, plain),
+            _ClusterTest(series, folds, trends, nominal, white),
+        ]
+
+    def p_value(self, columns: Columns, tried: int) -> float:
+        """Of columns [B, n, d] together; tried: how many like them."""
+        return min(1.0, len(self._tests) * tried * min(test.p_value(columns) for test in self._tests))
+
+
+class _ClusterTest:
+    """Wald's test of a regression with a covariance that stretches of time give."""
+
+    def __init__(self, series: Series, folds: Folds, splines: Numbers, nominal: Columns, filters: Whitener) -> None:
+        joints = series.target.shape[1]
+        self._filters, self._rows = filters, np.flatnonzero(filters.valid)
+        stretch = np.full(len(series.time), -1, dtype=np.int64)
+        stretch[folds.rows] = folds.stretch
+        self._stretch = np.unique(np.repeat(stretch[self._rows], joints), return_inverse=True)[1]
+        bias = np.zeros((len(splines), joints, joints * splines.shape[1]), dtype=np.float32)
+        for j in range(joints):
+            bias[:, j, j * splines.shape[1] : (j + 1) * splines.shape[1]] = splines
+        self._span = basis(self._flat(np.concatenate([bias, nominal], axis=2)))
+        self._target = without(self._flat(series.target[:, :, None]), self._span)[:, 0]
+
+    def _flat(self, values: Columns) -> Numbers:
+        found = self._filters.apply(values)[self._rows]
+        return np.asarray(found.reshape(-1, values.shape[2]), dtype=np.float64)
+
+    def p_value(self, columns: Columns) -> float:
+        values = without(self._flat(columns), self._span)
+        length = np.sqrt(np.einsum("rd,rd->d", values, values))
+        values = values[:, length > 0] / length[length > 0]
+        power, turned = np.linalg.eigh(values.T @ values) if values.shape[1] else (np.zeros(0), np.zeros((0, 0)))
+        kept = power > 1e-9 * power.max(initial=0.0)
+        if not kept.any():
+            return 1.0
+        values = values @ (turned[:, kept] / np.sqrt(power[kept]))
+        estimate = values.T @ self._target
+        products = values * (self._target - values @ estimate)[:, None]
+        scores = np.stack([np.bincount(self._stretch, products[:, k]) for k in range(values.shape[1])], axis=1)
+        count, size = scores.shape
+        if count - size < 2:
+            return 1.0
+        spread = scores.T @ scores * count / (count - 1)
+        spread += 1e-9 * np.trace(spread) * np.eye(size)
+        statistic = float(estimate @ np.linalg.solve(spread, estimate))
+        return float(fdtrc(size, count - size, statistic * (count - size) / (size * (count - 1))))

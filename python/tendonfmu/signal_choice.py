@@ -1,0 +1,141 @@
+"""Which signals to estimate from: smoothed ones or raw ones, by the error that is left on unseen stretches.
+
+Both are compared where both can see: the residual of raw signals is smoothed like the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.balance import moment_arms
+from tendonfmu.block_grams import Grams
+from tendonfmu.candidate_columns import candidate_columns, without_uncertainty
+from tendonfmu.cause_search import bias_of, blocks_of, nominal_scale, series_of
+from tendonfmu.description import FingerDescription
+from tendonfmu.diagnosis_series import Grid, make_grid
+from tendonfmu.estimation_signals import Signals, smoothing_of, zero_phase
+from tendonfmu.extension_fit import FitSettings, FittedModel, fit_extended
+from tendonfmu.fit_recordings import FitRecording, Held, prepare
+from tendonfmu.held_out_folds import make_folds
+from tendonfmu.least_sizes import LeastSizes, noise_of
+from tendonfmu.nominal_fit import fitted
+from tendonfmu.starting_point import Start, scan
+
+Numbers = NDArray[np.float64]
+
+NOISE_CUTOFF = 15.0  # Hz: what positions of a hand do faster is noise
+BETTER = 0.7  # of the error of smoothed signals, that raw ones have to be below: with them comes the lag of the filter
+
+
+@dataclass(frozen=True)
+class Estimation:
+    """What is estimated from. recordings: `train` says where. least: sizes that the sensors can show. nominal: the given
+    structure fitted; start: delay and presliding that it begins with, model: fitted with them. error: rms, N·m, on
+    unseen stretches.
+    """
+
+    signals: Signals
+    recordings: list[FitRecording]
+    grid: Grid
+    least: LeastSizes
+    nominal: FittedModel
+    start: Start
+    model: FittedModel
+    error: float
+
+
+def choose(given: FingerDescription, recordings: Sequence[FitRecording], settings: FitSettings) -> Estimation:
+    """recordings: as they were measured. Raises InputError."""
+    smoothing = smoothing_of([each.recording for each in recordings], given.data)
+    raw = Signals()
+    if smoothing is None:
+        return _estimated(given, recordings, raw, settings, None)
+    smooth = _estimated(given, recordings, smoothing, settings, None)
+    rough = _estimated(given, recordings, raw, settings, smooth)
+    return rough if rough.error < BETTER * smooth.error else smooth
+
+
+def _estimated(
+    given: FingerDescription,
+    recordings: Sequence[FitRecording],
+    signals: Signals,
+    settings: FitSettings,
+    known: Estimation | None,
+) -> Estimation:
+    """known: with other signals, whose starting point is taken over."""
+    finger = replace(given, data=signals.description(given.data))
+    own = estimation_recordings(finger, recordings, signals)
+    grid = make_grid(own)
+    nominal = fitted(finger.data, own, settings)
+    least = least_sizes(given.data, recordings, float(np.median(np.diff(own[0].time))))
+    if known is None:
+        starts = scan(nominal.data, own, grid, least.least("time_delay", None, None))
+        # of a known delay the two best distances: the derivative of one need not lead to the better
+        tried = [starts[0], *[each for each in starts[1:] if each.presliding is not starts[0].presliding][:1]]
+    else:
+        tried = [known.start]
+    cutoff = signals.cutoff or (known.signals.cutoff if known else None)
+    found = []
+    for start in tried:
+        model = nominal
+        if start.causes:
+            model = fit_extended(nominal, start.causes, own, settings, compare=False).model
+        found.append(
+            Estimation(signals, own, grid, least, nominal, start, model, _error(model.data, own, grid, cutoff))
+        )
+    return min(found, key=lambda each: each.error)
+
+
+def estimation_recordings(
+    finger: FingerDescription, recordings: Sequence[FitRecording], signals: Signals
+) -> list[FitRecording]:
+    """The recordings with these signals; what is not trained on or judged in the measured ones is not in these."""
+    if signals.cutoff is None:
+        return list(recordings)
+    found = []
+    for each in recordings:
+        own = prepare(finger, signals.recording(each.recording), each.kinematics, Held())
+        at = np.minimum(np.searchsorted(each.time, own.time), len(each.time) - 1)
+        found.append(replace(own, train=own.train & each.train[at], held_out=each.held_out[at]))
+    return found
+
+
+def least_sizes(data: Mapping[str, Any], recordings: Sequence[FitRecording], step: float) -> LeastSizes:
+    """From measured recordings; step: s between the samples that are estimated from."""
+    joints, tendons = [], []
+    stiffness = np.array([tendon["stiffness"] for tendon in data["tendons"]])
+    for recording in recordings:
+        groups = recording.recording.groups
+        angle, force = recording.model.joint_angle, groups["tendon_force"]
+        reached = (
+            groups["tendon_position"] - force / stiffness
+            if "tendon_position" in groups
+            else angle @ moment_arms(data).T
+        )
+        for part in recording.parts:
+            rate = 1.0 / float(np.median(np.diff(recording.time[part])))
+            for values, noise in ((angle[part], joints), (reached[part], tendons)):
+                noise.append(noise_of(values, zero_phase(values, NOISE_CUTOFF, rate)))
+    return LeastSizes(np.max(joints, axis=0), np.max(tendons, axis=0), step, 0.0)
+
+
+def _error(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, cutoff: float | None) -> float:
+    """rms, N·m, on held-out folds with the description's numbers refitted, both smoothed at a cutoff, Hz."""
+    plain = without_uncertainty(data)
+    series = series_of(plain, recordings, grid)
+    columns = candidate_columns(plain, recordings, blocks_of(grid, recordings), candidates=())
+    target, nominal = series.target.copy(), np.asarray(columns.nominal, dtype=np.float64)
+    if cutoff is not None and cutoff < 0.4 / grid.step:
+        for segment in grid.segments:
+            if segment.count > 10:
+                rows = segment.blocks
+                target[rows] = zero_phase(target[rows], cutoff, 1.0 / grid.step)
+                nominal[rows] = zero_phase(nominal[rows], cutoff, 1.0 / grid.step)
+    folds = make_folds(series)
+    grams = Grams(folds, target, nominal, columns.values, bias_of(plain, series), nominal_scale(plain))
+    return float(np.sqrt(grams.without / max(len(folds.rows) * target.shape[1], 1)))
