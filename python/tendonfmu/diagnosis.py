@@ -9,10 +9,11 @@ found.verdict, [cause.where for cause in found.causes], found.gain
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,10 +25,11 @@ from tendonfmu.cause_selection import LEAST_SHARE
 from tendonfmu.contact_gain import detection_gain
 from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.diagnosis_evidence import evidence
-from tendonfmu.diagnosis_result import Cause, Diagnosis, FoundPlace, Invisible, Unexplained, Where
+from tendonfmu.diagnosis_result import Cause, Diagnosis, Event, FoundPlace, Invisible, Unexplained, Where
 from tendonfmu.diagnosis_search import NamedCause, Search, events_of, search, without_events
 from tendonfmu.diagnosis_series import make_grid
 from tendonfmu.diagnosis_size import size_of
+from tendonfmu.effects import Candidate
 from tendonfmu.errors import InputError, own_fault
 from tendonfmu.extension_fit import Accepted, FitSettings
 from tendonfmu.fit_recordings import FitRecording, Held, prepare, require_noise
@@ -175,7 +177,11 @@ class _Result:
             gain=gain.value,
             steps=gain.steps,
             causes=tuple(self._cause(k, verified, left) for k in range(len(verified.causes))),
-            too_small=tuple(_too_small(each) for each in [*verified.dropped, *found.small]),
+            too_small=tuple(
+                _too_small(each)
+                for each in [*verified.dropped, *found.small]
+                if each.effect not in {cause.effect for cause in verified.causes}
+            ),
             invisible=invisible,
             events=found.events,
             unexplained=unexplained,
@@ -188,7 +194,7 @@ class _Result:
             nominal_data=verified.nominal_data,
             extended_data=verified.extended_data,
             warnings=(*case.warnings, *self._warnings()),
-            tested=len({each.key for each in found.first.selection.hypotheses}),
+            tested=len({each.key for each in found.last.selection.hypotheses}),
         )
 
     def _warnings(self) -> list[str]:
@@ -214,14 +220,14 @@ class _Result:
         training = [without_events(each, found.events) for each in case.training]
         return verify(case.finger, found, training, tests, self._least_gain, self._settings, self._seed)
 
-    def _events_in(self, recording: FitRecording) -> Sequence[object]:
+    def _events_in(self, recording: FitRecording) -> Sequence[Event]:
         estimation = self._found.estimation
         data = estimation.signals.restored(self._found.extended.data, self._case.finger.data)
         return events_of(data, [recording], make_grid([recording]), self._seed)[0]
 
     # --- causes ---
 
-    def _left(self, data: object) -> Numbers:
+    def _left(self, data: Mapping[str, Any]) -> Numbers:
         """[B, n] N·m: residual of a model over all recordings that were estimated from, bias taken off."""
         estimation = self._found.estimation
         series = series_of(data, estimation.recordings, estimation.grid)
@@ -252,13 +258,11 @@ class _Result:
 
     def _remainder(self, residual: Numbers) -> Remainder:
         view = self._found.last
-        nominal = np.asarray(view.columns.nominal, dtype=np.float64)
-        nuisance = [np.hstack([view.splines, nominal[:, j]]) for j in range(nominal.shape[1])]
         force = [
             segment.mean(view.predicted[segment.recording].recording.groups["tendon_force"][segment.part])
             for segment in self._found.estimation.grid.segments
         ]
-        return measure_remainder(view.series, residual, nuisance, force=np.concatenate(force), seed=self._seed)
+        return measure_remainder(view.series, residual, view.splines, force=np.concatenate(force), seed=self._seed)
 
     def _unexplained(self, left: Remainder, residual: Numbers) -> Unexplained:
         """Of the variance that is left: what unseen stretches of it show to be no noise; unknown where mending it would
@@ -318,7 +322,7 @@ class _Result:
 
     def _unseen(self) -> list[tuple[Hypothesis, float]]:
         """Of each place that is not visible the shape that comes nearest, with its share; the nearest places first."""
-        selection = self._found.first.selection
+        selection = self._found.last.selection
         best: dict[tuple[str, int | None, int | None], tuple[Hypothesis, float]] = {}
         for each, share in zip(selection.hypotheses, selection.shares, strict=True):
             if each.level == HERE and (each.key not in best or share > best[each.key][1]):
@@ -334,7 +338,7 @@ def _wheres(hypotheses: Sequence[Hypothesis]) -> tuple[Where, ...]:
     return tuple(where_of(each) for each in hypotheses)
 
 
-def _candidate(hypothesis: Hypothesis) -> object:
+def _candidate(hypothesis: Hypothesis) -> Candidate:
     return hypothesis.members[0].proposal.candidate
 
 

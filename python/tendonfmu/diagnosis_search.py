@@ -20,6 +20,7 @@ from tendonfmu.contact_scan import left_out, scan_events
 from tendonfmu.description import FingerDescription
 from tendonfmu.diagnosis_result import Event, Interval
 from tendonfmu.diagnosis_series import Grid
+from tendonfmu.effects import CANDIDATES, Candidate
 from tendonfmu.extension_fit import Accepted, FitSettings, FittedModel, fit_extended, possible
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.hypotheses import Hypothesis, Key
@@ -66,9 +67,9 @@ class NamedCause:
 @dataclass(frozen=True)
 class Search:
     """estimation: signals and recordings. nominal, extended: fitted descriptions, with the settings for estimating.
-    first, last: what each lacks and leaves. causes: in the order in which they were found; models: [causes + 1] after each, the nominal one first. small: certain
-    but not material. events: contact and stalls. out: [B] blocks in them. fitted_to: recordings with forces that the
-    model predicts, events left out.
+    first, last: what each lacks and leaves. causes: in the order in which they were found; models: [causes + 1] after
+    each, the nominal one first. small: certain but not material. events: contact and stalls. out: [B] blocks in them.
+    fitted_to: recordings with forces that the model predicts, events left out.
     """
 
     estimation: Estimation
@@ -106,7 +107,7 @@ def search(
     threads: int,
     phases: Phases,
 ) -> Search:
-    """given: the nominal description. recordings: as they were measured; `train` says where to look. Raises InputError."""
+    """given: the nominal description. recordings: as they were measured; `train` says where to look."""
     settings = FitSettings(threads=threads)
     with phases.start("signals, delay and presliding"):
         chosen = choose(given, recordings, settings)
@@ -133,7 +134,7 @@ def search(
         last=rounds.view,
         causes=tuple(rounds.causes),
         models=tuple(rounds.models),
-        small=tuple([*rounds.refused, *rounds.small()]),
+        small=(*rounds.refused, *rounds.small()),
         events=events,
         out=out,
         fitted_to=clean,
@@ -150,8 +151,7 @@ def events_of(
     """What no friction explains in the residual of a model, and the blocks [B] that lie in it."""
     series = series_of(data, recordings, grid)
     names = [str(recording.path) for recording in recordings]
-    nuisance = [bias_of(data, series)] * series.target.shape[1]
-    events = scan_events(series, residual_alone(data, series), nuisance, names, seed=seed)
+    events = scan_events(series, residual_alone(data, series), bias_of(data, series), names, seed=seed)
     return events, left_out(series, events, names)
 
 
@@ -192,13 +192,16 @@ class _Rounds:
         self.models = [chosen.nominal]
         self._given, self._chosen, self._out, self._online = given, chosen, out, online
         self._least_gain, self._settings = least_gain, settings
-        self.view = self.first = self._look(chosen.nominal)
+        # the start is fitted before anything is chosen: until then only what the nominal model leaves is asked for
+        self.view = self.first = self._look(chosen.nominal, () if chosen.start.causes else CANDIDATES)
         self._left = self._online_error(chosen.nominal)
 
     def run(self, step: Step) -> None:
         for accepted in self._chosen.start.causes:
             effect = accepted.candidate.name
             self._take(NamedCause(effect, None, None, (accepted,), 0.0, 0.0, 1.0, ()))
+        if self.view is self.first and not self.view.columns.proposals:
+            self.view = self._look(self.models[0])
         while len(self.causes) < MOST_CAUSES and len(self.refused) < MOST_REFUSED:
             step(len(self.causes))
             # what was refused explains something: no other effect is credited with that
@@ -216,15 +219,15 @@ class _Rounds:
         return NamedCause(own.effect, own.joint, own.tendon, accepted, picked.gain, picked.error, p_value, picked.alike)
 
     def _take(self, cause: NamedCause) -> bool:
-        """Fits the description with a further cause; keeps it where it lowers the error on unseen stretches, and that of
-        the model as it runs online, materially and certainly."""
+        """Fits the description with a further cause; keeps it where it lowers the error on unseen stretches, and that
+        of the model as it runs online, materially and certainly."""
         everything = [each for known in [*self.causes, cause] for each in known.accepted]
         accepted = possible(self.models[0].data, everything)
         if len(accepted) < len(everything):
             return False
         own = self._chosen.recordings
         clean = predicted_of(self.view.data, own, self._chosen.grid, self.view.series)
-        model = fit_extended(self.models[0], accepted, clean, self._settings, compare=False).model
+        model = fit_extended(self.models[0], accepted, clean, self._settings)
         left = self._online_error(model)
         if not self._pays(self._left, left):
             return False
@@ -248,8 +251,9 @@ class _Rounds:
     def _online_error(self, model: FittedModel) -> Numbers:
         return self._online.by_stretch(self._chosen.signals.restored(model.data, self._given))
 
-    def _look(self, model: FittedModel) -> View:
-        return look(model.data, self._chosen.recordings, self._chosen.grid, self._chosen.least, self._out)
+    def _look(self, model: FittedModel, candidates: Sequence[Candidate] = CANDIDATES) -> View:
+        chosen = self._chosen
+        return look(model.data, chosen.recordings, chosen.grid, chosen.least, self._out, candidates=candidates)
 
     def small(self) -> list[NamedCause]:
         """Of every effect that is certain but not material the best place."""

@@ -1,8 +1,8 @@
 """The signals that friction is estimated from: zero-phase smoothed, so that what is estimated is not the filter.
 
-Noise of the measured forces is noise of the joint angles, often as large as the distance over which friction builds up;
-a filter that runs online lags. Filtered forwards and backwards (Gustafsson, 1996, for the ends) both go away. The models
-that come of it run on raw samples, with the velocity filter that their description asks for.
+Noise of the measured forces is noise of the joint angles, often as large as the distance over which friction builds
+up; a filter that runs online lags. Filtered forwards and backwards (Gustafsson, 1996) both go away. The models that
+come of it run on raw samples, with the velocity filter that their description asks for.
 """
 
 from __future__ import annotations

@@ -45,8 +45,8 @@ _TINY = 1e-12  # N·m, as in contract section 5
 class Gain:
     """nominal, extended: rms per joint on the samples trained on, and on those of the test.
 
-    value: 1 − rms_extended/rms_nominal over all joints on the test. steps: rms over all joints on the test, N·m, of each
-    model of a sequence. blocks: of how many seconds-long blocks of the test the
+    value: 1 − rms_extended/rms_nominal over all joints on the test. steps: rms over all joints on the test, N·m, of
+    each model of a sequence. blocks: of how many seconds-long blocks of the test the
     intervals are. held_out: the test is held-out blocks of the training recordings. agreement: largest difference
     between an FMU's outputs and the core's, in units of the output's largest value.
     """
@@ -250,7 +250,7 @@ class _Test:
     @property
     def count(self) -> int:
         """Samples that are judged, times joints."""
-        return sum(int(mask.sum()) for mask in self.masks) * self.recordings[0].target.shape[1]
+        return sum(int(mask.sum()) for mask in self.masks) * int(self.recordings[0].target.shape[1])
 
     def tested(self, left: Sequence[Numbers]) -> tuple[float, ...]:
         return _pooled(left, self.masks)

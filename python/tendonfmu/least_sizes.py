@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.hypotheses import Hypothesis
+from tendonfmu.effects import Candidate, Place
+from tendonfmu.hypotheses import LARGEST_SECANT, Hypothesis
 
 Numbers = NDArray[np.float64]
 
@@ -39,6 +40,11 @@ class LeastSizes:
             if tendon is not None:
                 return OF_NOISE * float(self.tendon_noise[tendon - 1])
         return 0.0
+
+    def worth(self, candidate: Candidate, place: Place, shape: Mapping[str, float]) -> bool:
+        """Whether a step of this size can lead to a resolved one: a column is good for LARGEST_SECANT times it."""
+        least = self.least(candidate.name, place.joint, place.tendon)
+        return least == 0.0 or LARGEST_SECANT * abs(float(next(iter(shape.values())))) >= least
 
     def resolved(self, hypothesis: Hypothesis, magnitudes: Sequence[float] | Numbers) -> bool:
         """Whether a hypothesis with these magnitudes [d] is large enough."""

@@ -58,7 +58,7 @@ def _shifted(recording: FitRecording, values: Numbers, delay: float) -> Numbers:
     """[N, m] values of `delay` s later, within each part."""
     if not delay:
         return values
-    found = values.copy()
+    found: Numbers = values.copy()
     for part in recording.parts:
         time = recording.time[part]
         for i in range(values.shape[1]):

@@ -34,9 +34,9 @@ BETTER = 0.7  # of the error of smoothed signals, that raw ones have to be below
 
 @dataclass(frozen=True)
 class Estimation:
-    """What is estimated from. recordings: `train` says where. least: sizes that the sensors can show. nominal: the given
-    structure fitted; start: delay and presliding that it begins with, model: fitted with them. error: rms, N·m, on
-    unseen stretches.
+    """What is estimated from. recordings: `train` says where. least: sizes that the sensors can show. nominal: the
+    given structure fitted; start: delay and presliding that it begins with, model: fitted with them. error: rms, N·m,
+    on unseen stretches.
     """
 
     signals: Signals
@@ -84,7 +84,7 @@ def _estimated(
     for start in tried:
         model = nominal
         if start.causes:
-            model = fit_extended(nominal, start.causes, own, settings, compare=False).model
+            model = fit_extended(nominal, start.causes, own, settings)
         found.append(
             Estimation(signals, own, grid, least, nominal, start, model, _error(model.data, own, grid, cutoff))
         )
@@ -107,7 +107,8 @@ def estimation_recordings(
 
 def least_sizes(data: Mapping[str, Any], recordings: Sequence[FitRecording], step: float) -> LeastSizes:
     """From measured recordings; step: s between the samples that are estimated from."""
-    joints, tendons = [], []
+    joints: list[Numbers] = []
+    tendons: list[Numbers] = []
     stiffness = np.array([tendon["stiffness"] for tendon in data["tendons"]])
     for recording in recordings:
         groups = recording.recording.groups

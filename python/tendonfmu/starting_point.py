@@ -122,7 +122,7 @@ def _errors(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: G
 
 def _torque(recordings: Sequence[FitRecording], grid: Grid, delay: float) -> Numbers:
     """[B, n] block means of the target, N·m, taken `delay` s later."""
-    whole = {}
+    whole: dict[int, Numbers] = {}
     for segment in grid.segments:
         recording = recordings[segment.recording]
         shifted = whole.setdefault(segment.recording, recording.target.copy())
