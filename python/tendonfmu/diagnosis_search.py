@@ -22,12 +22,13 @@ from tendonfmu.diagnosis_result import Event, Interval
 from tendonfmu.diagnosis_series import Grid
 from tendonfmu.effects import CANDIDATES, Candidate
 from tendonfmu.extension_fit import Accepted, FitSettings, FittedModel, fit_extended, possible
+from tendonfmu.extensions import extended_row
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.hypotheses import Hypothesis, Key
 from tendonfmu.nominal_fit import fitted
 from tendonfmu.online_error import OnlineError
 from tendonfmu.phases import Phases, Step
-from tendonfmu.signal_choice import Estimation, choose
+from tendonfmu.signal_choice import Estimation
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -101,16 +102,15 @@ def accepted_of(hypothesis: Hypothesis, magnitudes: Numbers) -> tuple[Accepted, 
 def search(
     given: FingerDescription,
     recordings: Sequence[FitRecording],
+    chosen: Estimation,
     *,
     least_gain: float,
     seed: int,
-    threads: int,
     phases: Phases,
 ) -> Search:
-    """given: the nominal description. recordings: as they were measured; `train` says where to look."""
-    settings = FitSettings(threads=threads)
-    with phases.start("signals, delay and presliding"):
-        chosen = choose(given, recordings, settings)
+    """given: the nominal description. recordings: as they were measured; chosen: what is
+    estimated from; `train` says where to look."""
+    settings = chosen.settings
     with phases.start("contact"):
         events, out = events_of(chosen.model.data, chosen.recordings, chosen.grid, seed)
     nominal = chosen.nominal
@@ -228,6 +228,8 @@ class _Rounds:
         own = self._chosen.recordings
         clean = predicted_of(self.view.data, own, self._chosen.grid, self.view.series)
         model = fit_extended(self.models[0], accepted, clean, self._settings)
+        if not self._resolved(cause, model):
+            return False
         left = self._online_error(model)
         if not self._pays(self._left, left):
             return False
@@ -242,6 +244,12 @@ class _Rounds:
         self.models.append(model)
         self.view, self._left = view, left
         return True
+
+    def _resolved(self, cause: NamedCause, model: FittedModel) -> bool:
+        """Whether the sensors can show a fitted play or delay of this size."""
+        own = [extended_row(model.data, cause.effect, each.place) for each in cause.accepted]
+        least = self._chosen.least
+        return all(least.shows(cause.effect, each.place, row) for each, row in zip(cause.accepted, own, strict=True))
 
     def _pays(self, before: Numbers, after: Numbers) -> bool:
         """Σ e² by stretch."""

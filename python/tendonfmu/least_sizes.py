@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +46,11 @@ class LeastSizes:
         """Whether a step of this size can lead to a resolved one: a column is good for LARGEST_SECANT times it."""
         least = self.least(candidate.name, place.joint, place.tendon)
         return least == 0.0 or LARGEST_SECANT * abs(float(next(iter(shape.values())))) >= least
+
+    def shows(self, effect: str, place: Place, row: Mapping[str, Any] | None) -> bool:
+        """Whether a fitted play or delay, a row of `extensions`, is large enough."""
+        number = {"backlash": "width", "time_delay": "delay"}.get(effect)
+        return row is None or number is None or abs(row[number]) >= self.least(effect, place.joint, place.tendon)
 
     def resolved(self, hypothesis: Hypothesis, magnitudes: Sequence[float] | Numbers) -> bool:
         """Whether a hypothesis with these magnitudes [d] is large enough."""

@@ -35,7 +35,7 @@ BETTER = 0.7  # of the error of smoothed signals, that raw ones have to be below
 @dataclass(frozen=True)
 class Estimation:
     """What is estimated from. recordings: `train` says where. least: sizes that the sensors can show. nominal: the
-    given structure fitted; start: delay and presliding that it begins with, model: fitted with them. error: rms, N·m,
+    given structure fitted, with these settings; start: delay and presliding that it begins with, model: fitted with them. error: rms, N·m,
     on unseen stretches.
     """
 
@@ -47,6 +47,7 @@ class Estimation:
     start: Start
     model: FittedModel
     error: float
+    settings: FitSettings
 
 
 def choose(given: FingerDescription, recordings: Sequence[FitRecording], settings: FitSettings) -> Estimation:
@@ -86,7 +87,9 @@ def _estimated(
         if start.causes:
             model = fit_extended(nominal, start.causes, own, settings)
         found.append(
-            Estimation(signals, own, grid, least, nominal, start, model, _error(model.data, own, grid, cutoff))
+            Estimation(
+                signals, own, grid, least, nominal, start, model, _error(model.data, own, grid, cutoff), settings
+            )
         )
     return min(found, key=lambda each: each.error)
 
