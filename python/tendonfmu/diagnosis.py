@@ -191,7 +191,7 @@ class _Result:
                 if each.effect not in {cause.effect for cause in verified.causes}
             ),
             invisible=invisible,
-            events=found.events,
+            events=self._events,
             unexplained=unexplained,
             experiment=experiments.best,
             views=residual_views(self._series, before, left, load=self._torque()),
@@ -222,9 +222,9 @@ class _Result:
     def _verified(self) -> Verified:
         found, case = self._found, self._case
         tests = case.tests
-        if tests and found.events:
-            # only where the training recordings had some: what disturbed one recording may disturb the next
-            tests = [without_events(each, self._events_in(each)) for each in tests]
+        unseen = [self._events_in(each) for each in tests]
+        tests = [without_events(each, events) for each, events in zip(tests, unseen, strict=True)]
+        self._events = (*found.events, *(event for events in unseen for event in events))
         training = [without_events(each, found.events) for each in case.training]
         return verify(case.finger, found, training, tests, self._least_gain, self._settings, self._seed)
 

@@ -20,6 +20,7 @@ Numbers = NDArray[np.float64]
 
 OF_NOISE = 4.0  # standard deviations of the position's noise
 OF_SAMPLE = 0.75  # sample: velocities are late by half of one
+BEFORE_FIT = 0.5  # of the least size: how large an effect is only the fit tells
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ class LeastSizes:
         if hypothesis.effect == "presliding":  # its size is the distance that was tried, not the magnitude
             return True
         least = self.least(hypothesis.effect, hypothesis.joint, hypothesis.tendon)
-        return least == 0.0 or _size(hypothesis, magnitudes) >= least
+        return least == 0.0 or _size(hypothesis, magnitudes) >= BEFORE_FIT * least
 
 
 def _size(hypothesis: Hypothesis, magnitudes: Sequence[float] | Numbers) -> float:

@@ -77,7 +77,7 @@ def _estimated(
     if known is None:
         starts = scan(nominal.data, own, grid, least.least("time_delay", None, None))
         # of a known delay the two best distances: the derivative of one need not lead to the better
-        tried = [starts[0], *[each for each in starts[1:] if each.presliding is not starts[0].presliding][:1]]
+        tried = [starts[0], *[each for each in starts[1:] if each.presliding != starts[0].presliding][:1]]
     else:
         tried = [known.start]
     cutoff = signals.cutoff or (known.signals.cutoff if known else None)
@@ -85,7 +85,7 @@ def _estimated(
     for start in tried:
         model = nominal
         if start.causes:
-            model = fit_extended(nominal, start.causes, own, settings)
+            model = fit_extended(nominal, start.accepted, own, settings)
         found.append(
             Estimation(
                 signals, own, grid, least, nominal, start, model, _error(model.data, own, grid, cutoff), settings
