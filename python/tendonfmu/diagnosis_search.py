@@ -194,7 +194,6 @@ class _Rounds:
         self.models = [chosen.nominal]
         self._given, self._chosen, self._out, self._online = given, chosen, out, online
         self._least_gain, self._settings = least_gain, settings
-        self._has_tried_presliding = bool(chosen.start.presliding)
         # the start is fitted before anything is chosen: until then only what the nominal model leaves is asked for
         self.view = self.first = self._look(chosen.nominal, () if chosen.start.causes else CANDIDATES)
         self._left = self._online_error(chosen.nominal)
@@ -204,25 +203,26 @@ class _Rounds:
             self._take(_together(accepted))
         if self.view is self.first and not self.view.columns.proposals:
             self.view = self._look(self.models[0])
+        self._search(step)
+        if self._tries_presliding():
+            self._search(step)
+
+    def _search(self, step: Step) -> None:
         while len(self.causes) < MOST_CAUSES and len(self.refused) < MOST_REFUSED:
             step(len(self.causes))
             # what was refused explains something: no other effect is credited with that
             picked = self.view.beside({each.key for each in self.refused}).best(self._least_gain)
             if picked is None:
-                if self._tries_presliding():
-                    continue
                 break
             cause = self._named(picked)
             if cause.p_value >= SIGNIFICANCE or not self._take(cause):
                 self.refused.append(cause)
 
     def _tries_presliding(self) -> bool:
-        """Once, at the end, where the start has none: its distance may be far below what the scan tries. True if it was
-        taken."""
-        if self._has_tried_presliding or any(each.effect == "presliding" for each in [*self.causes, *self.refused]):
-            return False
-        self._has_tried_presliding = True
+        """Where none was taken: its distance may be far below what the scan tries. True if it was taken."""
         chosen = self._chosen
+        if any(each.effect == "presliding" for each in [*self.causes, *self.refused]):
+            return False
         span = span_of(self.models[-1].data, chosen.recordings)
         tried = presliding_everywhere(self.models[-1].data, chosen.recordings[0].kinematics, span)
         return bool(tried) and self._take(_together(tried[0]))

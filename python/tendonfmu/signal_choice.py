@@ -29,7 +29,7 @@ from tendonfmu.starting_point import Start, scan
 Numbers = NDArray[np.float64]
 
 NOISE_CUTOFF = 15.0  # Hz: what positions of a hand do faster is noise
-BETTER = 0.7  # of the error of smoothed signals, that raw ones have to be below: with them comes the lag of the filter
+BETTER = 0.7  # of the error of smoothed signals, that raw ones have to be below: with them comes a filter's lag
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,8 @@ def choose(given: FingerDescription, recordings: Sequence[FitRecording], setting
         return _estimated(given, recordings, raw, settings, None)
     smooth = _estimated(given, recordings, smoothing, settings, None)
     rough = _estimated(given, recordings, raw, settings, smooth)
-    return rough if rough.error < BETTER * smooth.error else smooth
+    lags = any(each.kinematics != 3 for each in recordings)
+    return rough if rough.error < (BETTER if lags else 1.0) * smooth.error else smooth
 
 
 def _estimated(
