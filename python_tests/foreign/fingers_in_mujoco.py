@@ -87,7 +87,7 @@ PLANS = (
     Plan("unknown_creep", 3, joint=2, spatial=True, add=lambda p: {"creep": (2, 0.06, 2.0)}),
     Plan("none", 3, spatial=True, rate=1000.0),
     Plan("none", 4, loaded=True),
-    Plan("stribeck", 2, add=lambda p: {"stribeck": (1.0, 0.004)}),
+    Plan("stribeck", 2, add=lambda p: {"stribeck": (1.6, 0.008)}),
     Plan("unknown_catch", 2, joint=1, add=lambda p: {"catch": (1, 0.06, 0.1)}),
     Plan("gravity", 4, rate=250.0, add=lambda p: {"heavy": (1, 2, 3, 4), "load": 0.03}),
     Plan("preload_friction", 2, tendon=3, add=lambda p: {"preload": (3, 2.0)}),
@@ -102,7 +102,7 @@ def make(number: int, train_seconds: float = TRAIN_SECONDS, test_seconds: float 
     plain = finger(plan, rng)
     physics = dataclasses.replace(plain, **plan.add(plain))
     truth = Truth(plan.hidden, plan.joints, plan.joint, plan.tendon, also=ALSO)
-    nominal = describe(plain if plan.hidden != "moment_arm_variation" else physics, plan, rng)
+    nominal = describe(plain, plan, rng)
     motions = [random_motion(plan.joints, rng, plan.speed) for _ in range(2)]
     still = dataclasses.replace(physics, pushes=())  # nobody pushes in the test recording
     train = run(physics, truth, motions[0], train_seconds + DELAY, plan.rate)
