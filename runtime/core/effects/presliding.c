@@ -11,7 +11,7 @@
  * D is the displacement at a place; of a row without one displacement·v_min, v_min being the effect's threshold. */
 
 /* per velocity of the place */
-enum { SHARE, BY_DISPLACEMENT, BY_VELOCITY, MEMORY_ROWS };
+enum { SHARE, BY_DISPLACEMENT, BY_MOTION, MEMORY_ROWS }; /* motion: velocity, or travel by a position filter */
 
 static const effect_parameter parameters[] = {
     {.name = "displacement",
@@ -56,8 +56,13 @@ static member_of_place find_member(effect_place place, const effect_sample* samp
 
 /* its travel within the sample */
 static double travel_of(member_of_place member, const effect_sample* sample) {
-  const double v = member.at_joint ? sample->velocity[member.at] : sample->tendon_velocity[member.at];
-  return sample->first ? 0.0 : v * sample->step;
+  if (sample->first) {
+    return 0.0;
+  }
+  if (sample->travel) {
+    return member.at_joint ? sample->travel[member.at] : sample->tendon_travel[member.at];
+  }
+  return (member.at_joint ? sample->velocity[member.at] : sample->tendon_velocity[member.at]) * sample->step;
 }
 
 /* D */
@@ -84,7 +89,8 @@ static void advance_member(double displacement, double distance, double travel, 
   const int lasts = ratio < 700.0;
   after[BY_DISPLACEMENT] =
       lasts ? bounded(kept * (before[BY_DISPLACEMENT] - bounded(left * ratio / displacement))) : 0.0;
-  after[BY_VELOCITY] = lasts && !sample->first ? bounded(left * kept * side * sample->step / distance) : 0.0;
+  const double by_travel = left * kept * side, by_motion = sample->travel ? by_travel : by_travel * sample->step;
+  after[BY_MOTION] = lasts && !sample->first ? bounded(by_motion / distance) : 0.0;
 }
 
 static void advance(effect_place place, const double* values, const effect_sample* sample, const double* before,
@@ -104,12 +110,12 @@ static void advance_slope(effect_place place, const double* values, const effect
     const size_t row = MEMORY_ROWS * k;
     const member_of_place member = find_member(place, sample, k);
     const double distance = distance_of(place, member, values[0], sample), travel = travel_of(member, sample);
-    const double slope = member.at_joint ? direction->velocity[member.at] : direction->tendon_velocity[member.at];
+    const double slope = member.at_joint ? direction->motion[member.at] : direction->tendon_motion[member.at];
     double after[MEMORY_ROWS];
     advance_member(values[0], distance, travel, sample, before + row, after);
     slope_after[row + SHARE] =
-        law_exponential(fabs(travel) / distance) * slope_before[row + SHARE] + after[BY_VELOCITY] * slope;
-    slope_after[row + BY_DISPLACEMENT] = slope_after[row + BY_VELOCITY] = 0.0; /* only the share is read */
+        law_exponential(fabs(travel) / distance) * slope_before[row + SHARE] + after[BY_MOTION] * slope;
+    slope_after[row + BY_DISPLACEMENT] = slope_after[row + BY_MOTION] = 0.0; /* only the share is read */
   }
 }
 
@@ -117,10 +123,8 @@ static effect_grip grip(effect_place place, const double* values, const double* 
   (void)place;
   (void)values;
   memory += MEMORY_ROWS * member;
-  return (effect_grip){.slides = 1,
-                       .value = memory[SHARE],
-                       .by_velocity = memory[BY_VELOCITY],
-                       .by_parameter = {memory[BY_DISPLACEMENT]}};
+  return (effect_grip){
+      .slides = 1, .value = memory[SHARE], .by_motion = memory[BY_MOTION], .by_parameter = {memory[BY_DISPLACEMENT]}};
 }
 
 const effect_type effect_presliding = {
