@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from oracle_detection import NEAR, Bounds, Detector, direction_above
 from oracle_extensions import Extensions
-from oracle_finger import Effect, Places, given, read_joints, read_tendons
+from oracle_finger import Effect, Places, given, read_joints, read_tendons, tendon_velocity
 from oracle_position_filter import read_position_filter
 
 Array = NDArray[Any]
@@ -148,9 +148,9 @@ class FingerOracle:
 
         # 1. kinematics
         q, v = self._kinematics(inputs, f0, dt, first, decide, out)
-        x_dot = self._tendon_velocity(v)
+        x_dot = tendon_velocity(self.R, v)
         travel = v * dt if self.travel is None else self.travel
-        self.travelled = travel, self._tendon_velocity(travel)
+        self.travelled = travel, tendon_velocity(self.R, travel)
         self.extensions.advance(q, v, x_dot, f0, dt, first, self.thresholds, decide, out)
         # 2. each friction effect: F, the increment b, and what stiction may hide
         F, b, hidden = self._effects(q, v, x_dot, time, dt, first, decide, out)
@@ -229,14 +229,6 @@ class FingerOracle:
             return q, raw
         return q, self.v + (1.0 - math.exp(-2.0 * math.pi * self.cutoff * dt)) * (raw - self.v)
 
-    def _tendon_velocity(self, v: Array) -> Array:
-        """eq. (5), [m, n + 1]; the last column is the velocity after the last joint, 0."""
-        x_dot = np.zeros((self.m, self.n + 1))
-        for i in range(self.m):
-            for j in range(self.n):
-                x_dot[i, j] = sum(self.R[i, after] * v[after] for after in range(j, self.n))
-        return x_dot
-
     def _effects(
         self, q: Array, v: Array, x_dot: Array, time: float, dt: float, first: bool,
         decide: Callable[..., Any], out: Step,
@@ -248,7 +240,8 @@ class FingerOracle:
             factor = self.extensions.factor(rows, abs(velocity), time)
             displacement = self.extensions.slides(rows, effect.threshold)
             if displacement is not None:
-                taken = self._slide(effect, displacement, velocity, angle, self._travel_of(kind, at), key), 0.0
+                travel = self._seen_by(kind, at, q, *self.travelled)[0]
+                taken = self._slide(effect, displacement, velocity, angle, travel, key), 0.0
                 direction = direction_above(velocity, effect.limit(self.hysteresis), key, decide, out)
                 effect.side, effect.rests = direction or effect.side, direction == 0
             else:
@@ -260,14 +253,6 @@ class FingerOracle:
 
     def _slide(self, effect: Effect, displacement: float, v: float, angle: float, travel: float, key: Key) -> float:
         return self.extensions.sliding_friction(effect, displacement, key, v, angle, travel)
-
-    def _travel_of(self, kind: str, at: tuple[int, ...]) -> float:
-        """Δ of one place."""
-        joint, tendon = self.travelled
-        if kind in ("joint", "load"):
-            return float(joint[at])
-        i, j = at
-        return float(tendon[i, j if kind == "edge" else j + 1])
 
     def _seen_by(self, kind: str, at: tuple[int, ...], q: Array, v: Array, x_dot: Array) -> tuple[float, float, Key]:
         """Velocity and angle of one place, and the key of its decision: who sees the same velocity decides together."""

@@ -27,6 +27,7 @@ NEIGHBOURS = (-2, -1, 1, 2)  # samples of the cubic
 BLOCK = 40  # samples
 FEWEST = 60  # samples: less says nothing
 GAP = 3.0  # times the median step: no cubic across a longer one
+LEAST = 1e-6  # rad, the least that the description takes
 GRID = 1e-3  # of a step: how well differences must fit to be multiples of it
 MOST_LEVELS = 0.5  # of the samples may differ where values come in steps
 
@@ -49,7 +50,8 @@ def joint_position_noise(data: Mapping[str, Any], recording: Recording | FitReco
     InputError: the recording has no such columns, or fewer than 60 samples without a gap.
     """
     if isinstance(recording, FitRecording):
-        recording, kinematics = recording.recording, recording.kinematics
+        kinematics = recording.kinematics
+        recording = recording.recording
     joints, tendons = len(data["joints"]), len(data["tendons"])
     if kinematics != 1:
         recording.require(joints, tendons, ("joint_position",))
@@ -62,7 +64,7 @@ def joint_position_noise(data: Mapping[str, Any], recording: Recording | FitReco
         routing = np.linalg.pinv(moment_arms(data))  # R⁺, [n, m]
         angles = (position - force * compliance) @ routing.T
         floor = np.sqrt(routing**2 @ (_rounding(position) ** 2 + (_rounding(force) * compliance) ** 2))
-    return np.maximum(np.maximum(white_noise(recording.time, angles), floor), 1e-6)
+    return np.asarray(np.maximum(np.maximum(white_noise(recording.time, angles), floor), LEAST))
 
 
 def joint_torque_noise(data: Mapping[str, Any], recording: Recording | FitRecording) -> Numbers:
@@ -86,7 +88,7 @@ def joint_torque_noise(data: Mapping[str, Any], recording: Recording | FitRecord
     recording.require(len(data["joints"]), len(data["tendons"]), ("tendon_force",))
     arms, force = moment_arms(data), recording.groups["tendon_force"]
     floor = np.sqrt((arms**2).T @ _rounding(force) ** 2)
-    return np.maximum(white_noise(recording.time, force @ arms), floor)
+    return np.asarray(np.maximum(white_noise(recording.time, force @ arms), floor))
 
 
 def white_noise(time: Numbers, values: Numbers) -> Numbers:
@@ -142,7 +144,7 @@ def _of_blocks(variance: Numbers) -> float:
 
 def _rounding(values: Numbers) -> Numbers:
     """[c] standard deviation of the rounding of columns whose values come in equal steps; else 0."""
-    return np.array([_step(column) for column in values.T]) / np.sqrt(12.0)
+    return np.asarray(np.array([_step(column) for column in values.T]) / np.sqrt(12.0))
 
 
 def _step(column: Numbers) -> float:

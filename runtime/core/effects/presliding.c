@@ -55,23 +55,19 @@ static member_of_place find_member(effect_place place, const effect_sample* samp
 }
 
 /* its travel within the sample */
-static double travel_of(member_of_place member, const effect_sample* sample) {
-  if (sample->first) {
-    return 0.0;
-  }
+static double travel_of(const effect_sample* sample, int at_joint, size_t at) {
   if (sample->travel) {
-    return member.at_joint ? sample->travel[member.at] : sample->tendon_travel[member.at];
+    return at_joint ? sample->travel[at] : sample->tendon_travel[at];
   }
-  return (member.at_joint ? sample->velocity[member.at] : sample->tendon_velocity[member.at]) * sample->step;
+  return (at_joint ? sample->velocity[at] : sample->tendon_velocity[at]) * sample->step;
 }
 
-/* D */
-static double distance_of(effect_place place, member_of_place member, double displacement,
-                          const effect_sample* sample) {
+/* D of a velocity of a tendon (0) or joint (1) */
+static double distance_of(effect_place place, double displacement, const effect_sample* sample, int at_joint) {
   if (!is_everywhere(place)) {
     return displacement;
   }
-  const double distance = displacement * (member.at_joint ? sample->joint_threshold : sample->tendon_threshold);
+  const double distance = displacement * (at_joint ? sample->joint_threshold : sample->tendon_threshold);
   return distance > DBL_MIN ? distance : DBL_MIN;
 }
 
@@ -96,10 +92,11 @@ static void advance_member(double displacement, double distance, double travel, 
 static void advance(effect_place place, const double* values, const effect_sample* sample, const double* before,
                     double* after) {
   const size_t count = member_count(place, sample->joints, sample->tendons);
+  const double distance[2] = {distance_of(place, values[0], sample, 0), distance_of(place, values[0], sample, 1)};
   for (size_t k = 0; k < count; ++k, before += MEMORY_ROWS, after += MEMORY_ROWS) {
     const member_of_place member = find_member(place, sample, k);
-    advance_member(values[0], distance_of(place, member, values[0], sample), travel_of(member, sample), sample, before,
-                   after);
+    const double travel = sample->first ? 0.0 : travel_of(sample, member.at_joint, member.at);
+    advance_member(values[0], distance[member.at_joint], travel, sample, before, after);
   }
 }
 
@@ -109,7 +106,8 @@ static void advance_slope(effect_place place, const double* values, const effect
   for (size_t k = 0; k < count; ++k) {
     const size_t row = MEMORY_ROWS * k;
     const member_of_place member = find_member(place, sample, k);
-    const double distance = distance_of(place, member, values[0], sample), travel = travel_of(member, sample);
+    const double distance = distance_of(place, values[0], sample, member.at_joint);
+    const double travel = sample->first ? 0.0 : travel_of(sample, member.at_joint, member.at);
     const double slope = member.at_joint ? direction->motion[member.at] : direction->tendon_motion[member.at];
     double after[MEMORY_ROWS];
     advance_member(values[0], distance, travel, sample, before + row, after);
