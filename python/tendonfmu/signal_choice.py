@@ -32,6 +32,7 @@ from tendonfmu.starting_point import Start, scan
 
 Numbers = NDArray[np.float64]
 
+NOISIEST = 1000.0  # rad, that `position_filter` takes
 NOISE_CUTOFF = 15.0  # Hz: what positions of a hand do faster is noise
 ENOUGH = 90.0  # s of motion, to choose signals and a start by
 BETTER = 0.7  # of the error of smoothed signals, that raw ones have to be below: with them comes a filter's lag
@@ -120,6 +121,8 @@ def _with_filter(chosen: Estimation, recordings: Sequence[FitRecording]) -> Esti
     if any(each.kinematics == 3 for each in recordings):
         return chosen
     noise = np.max([joint_position_noise(chosen.given, each) for each in recordings], axis=0)
+    if noise.max() > NOISIEST:
+        return chosen
     filtered = replace(chosen, given={**chosen.given, "position_filter": {"noise": [float(value) for value in noise]}})
     error = OnlineError(recordings)
     before, after = (error.by_stretch(each.online(each.model.data)) for each in (chosen, filtered))

@@ -15,7 +15,6 @@ NAME = "presliding"
 EVERYWHERE = Place()
 OF_TRAVEL = (0.002, 0.008, 0.03, 0.12)  # distances that are tried, of the median travel between reversals
 _TIMES = (0.3, 3.0)  # distances at one place, times that of everywhere
-_LONGEST = 1e6  # s, m or rad; no finger travels as far
 _SLOWEST = 1e-9  # m/s or rad/s: a threshold of 0 has no scale
 
 
@@ -52,13 +51,13 @@ def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
     """Everywhere in s, times the threshold of motion; at a place in m or rad."""
     if place == EVERYWHERE:
         usual = usual_time(data, span)
-        return [{"displacement": share * usual} for share in OF_TRAVEL] if 0 < usual <= _LONGEST else []
+        return [{"displacement": share * usual} for share in OF_TRAVEL] if usual > 0 else []
     everywhere = next((row for row in data.get("extensions") or [] if is_everywhere(row)), None)
     if everywhere is not None:
         present = float(everywhere["displacement"]) * _threshold(data, place)
         return [{"displacement": factor * present} for factor in _TIMES]
     travel = _travel(place, span)
-    return [{"displacement": share * travel} for share in OF_TRAVEL[1:]] if 0 < travel <= _LONGEST else []
+    return [{"displacement": share * travel} for share in OF_TRAVEL[1:]] if travel > 0 else []
 
 
 def is_everywhere(row: Mapping[str, object]) -> bool:
