@@ -44,7 +44,7 @@ def waterfall_of(found: Diagnosis, names: Names) -> Waterfall:
     steps = [factor * each for each in found.steps]
     left = left_of(found)
     widest = max([each for each in steps if math.isfinite(each)], default=0.0) or 1.0
-    floor = None if left is None else 100.0 * left.noise / widest
+    floor = None if left is None else min(100.0 * left.noise / widest, 100.0)
     return Waterfall(unit, tuple(_rows(found, names, steps, widest)), floor)
 
 
@@ -53,7 +53,7 @@ def _rows(found: Diagnosis, names: Names, steps: list[float], widest: float) -> 
     shown = [round(each, digits) for each in steps]
 
     def part(tone: str, begin: float, end: float) -> Part:
-        low, high = sorted((100.0 * begin / widest, 100.0 * end / widest))
+        low, high = sorted(min(100.0 * each / widest, 100.0) for each in (begin, end))
         return Part(tone, round(low, 2), round(high - low, 2))
 
     if found.causes:
