@@ -1,8 +1,8 @@
 """Held-out errors of any subset of columns from Gram matrices: after they are made, no sample is touched.
 
 Target and columns are block means with the slow bias projected out of both. Of each fold the products of all columns
-are kept; leaving a fold out is a subtraction. What the nominal model's own numbers can mend is refitted without the fold
-each time (Frisch and Waugh, 1933): candidates and target are replaced by what that refit leaves of them.
+are kept; leaving a fold out is a subtraction. What the nominal model's own numbers can mend is refitted without the
+fold each time (Frisch and Waugh, 1933): candidates and target are replaced by what that refit leaves of them.
 """
 
 from __future__ import annotations
@@ -75,13 +75,13 @@ class Grams:
 
     def _products(self) -> tuple[Numbers, list[Numbers]]:
         """[u + c + 1]² of all columns and the target, of everything and of each fold."""
-        size = self._table.shape[2] + 1
+        size, joints = self._table.shape[2] + 1, self._table.shape[1]
         found = [np.zeros((size, size)) for _ in range(self.folds.folds)]
         for number, total in enumerate(found):
             rows = np.flatnonzero(self.folds.fold == number)
             for begin in range(0, len(rows), _PIECE):
                 part = rows[begin : begin + _PIECE]
-                columns = self._table[part].reshape(-1, size - 1).astype(np.float64)
+                columns = self._table[part].reshape(len(part) * joints, size - 1).astype(np.float64)
                 both = np.concatenate([columns, self._target[part].reshape(-1, 1)], axis=1)
                 total += both.T @ both
         return np.sum(found, axis=0), found
@@ -110,7 +110,7 @@ class Grams:
         return float(sum(each.own_square for each in self._by_fold))
 
     def surviving(self, mix: Numbers) -> float:
-        """Share of the variance of a combination of candidates [c, d] that the refit leaves, of its strongest direction."""
+        """Share of the variance of a combination of candidates [c, d] that the refit leaves: of its best direction."""
         used = np.flatnonzero(mix.any(axis=1))
         part, inner = mix[used], np.ix_(used, used)
         before = part.T @ self._raw_energy()[inner] @ part
@@ -126,7 +126,7 @@ class Grams:
 
     def _raw_energy(self) -> Numbers:
         if not hasattr(self, "_raw"):
-            values = self._table[:, :, self.nominal_count :].reshape(-1, self.count)
+            values = self._table[:, :, self.nominal_count :].reshape(self._target.size, self.count)
             self._raw = np.zeros((self.count, self.count))
             for begin in range(0, len(values), _PIECE):
                 part = values[begin : begin + _PIECE].astype(np.float64)
@@ -138,7 +138,7 @@ class Grams:
         return bounded(mix.T @ self._whole.energy @ mix, mix.T @ self._whole.score, low, high)
 
     def error(self, mix: Numbers, low: Numbers, high: Numbers) -> tuple[float, Numbers]:
-        """Σ e² on held-out folds, (N·m)², with a combination of candidates [c, d]; magnitudes without each fold [f, d]."""
+        """Σ e² on held-out folds, (N·m)², with a combination of candidates [c, d]; magnitudes without each [f, d]."""
         left, found = 0.0, []
         used = np.flatnonzero(mix.any(axis=1))
         part = mix[used]

@@ -25,6 +25,7 @@ from tendonfmu.fit_recordings import FitRecording
 Numbers = NDArray[np.float64]
 Single = NDArray[np.float32]
 Progress = Callable[[int, int], None]
+Worth = Callable[[Candidate, Place, Mapping[str, float]], bool]
 
 _MOST_MEMORY = 8.0  # GB, of all columns
 
@@ -84,17 +85,19 @@ def candidate_columns(
     *,
     candidates: Sequence[Candidate] = CANDIDATES,
     span: Span | None = None,
+    worth: Worth | None = None,
     progress: Progress | None = None,
 ) -> CandidateColumns:
     """The columns of the description and of all candidates that it lacks.
 
     data: the fitted nominal description. recordings: made ready for it, all with the same kinematics source. span: of
-    the recordings, None: found here. progress: called with samples done and all samples, over all passes. Raises
+    the recordings, None: found here. worth: says which shapes of a candidate at a place are looked at. progress: called
+    with samples done and all samples, over all passes. Raises
     InputError where the columns would not fit in memory.
     """
     plain = without_uncertainty(data)
     found_span = span_of(plain, recordings) if span is None else span
-    proposed = list(_proposed(plain, recordings[0].kinematics, found_span, candidates))
+    proposed = list(_proposed(plain, recordings[0].kinematics, found_span, candidates, worth))
     names, nominal = nominal_directions(plain)
     variants = [variant for _, _, variants in proposed for variant in variants]
     joints, u = len(data["joints"]), len(names)
@@ -186,11 +189,13 @@ def without_uncertainty(data: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _proposed(
-    data: Mapping[str, Any], kinematics: int, span: Span, candidates: Sequence[Candidate]
+    data: Mapping[str, Any], kinematics: int, span: Span, candidates: Sequence[Candidate], worth: Worth | None
 ) -> Iterator[tuple[Candidate, Place, list[Variant]]]:
     for candidate in candidates:
         for place in candidate.places(data, kinematics):
             variants = candidate.variants(data, place, span)
+            if worth is not None:
+                variants = [each for each in variants if worth(candidate, place, each.shape)]
             if variants:
                 yield candidate, place, variants
 

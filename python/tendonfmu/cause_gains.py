@@ -11,7 +11,7 @@ from tendonfmu.cause_search import predicted_of, series_of
 from tendonfmu.description import FingerDescription
 from tendonfmu.diagnosis_result import Interval
 from tendonfmu.diagnosis_search import NamedCause, Search
-from tendonfmu.extension_fit import Accepted, ExtensionFit, FitSettings, FittedModel, fit_extended
+from tendonfmu.extension_fit import FitSettings, FittedModel, cause_parameters, fit_extended
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.gain import Gain, measure_gain, own_gains
 from tendonfmu.nominal_fit import fitted
@@ -53,9 +53,11 @@ def verify(
     causes, dropped = merged(found.causes), []
     while True:
         fit = bench.fit(causes)
-        without = [bench.fit([*causes[:k], *causes[k + 1 :]]).model for k in range(len(causes))]
-        gains = bench.gains(fit.model, without)
+        without = [bench.fit([*causes[:k], *causes[k + 1 :]]) for k in range(len(causes))]
+        gains = bench.gains(fit, without)
         weak = [k for k, gain in enumerate(gains) if not (gain.low > 0.0 and gain.value >= least_gain)]
+        if not weak and causes and bench.gains(fit, [bench.nominal])[0].value < 0.0:
+            weak = list(range(len(causes)))  # each mends what another one spoils
         if not weak:
             break
         worst = min(weak, key=lambda k: gains[k].value)
@@ -63,19 +65,19 @@ def verify(
         causes = [*causes[:worst], *causes[worst + 1 :]]
     order = sorted(range(len(causes)), key=lambda k: -gains[k].value)
     ranked = [causes[k] for k in order]
-    between = [bench.online(bench.fit(ranked[: k + 1]).model) for k in range(len(ranked) - 1)]
+    between = [bench.online(bench.fit(ranked[: k + 1])) for k in range(len(ranked) - 1)]
     nominal = bench.online(bench.nominal)
-    extended = bench.online(fit.model) if causes else nominal
+    extended = bench.online(fit) if causes else nominal
     return Verified(
         causes=tuple(ranked),
         gains=tuple(gains[k] for k in order),
-        parameters=tuple(_parameters(fit, causes, k) for k in order),
+        parameters=_parameters(bench.nominal, fit, causes, order),
         without=tuple(without[k] for k in order),
         dropped=tuple(dropped),
         gain=measure_gain(nominal, extended, training, tests, between=between, seed=seed),
         nominal_data=nominal,
         extended_data=extended,
-        extended=fit.model.data,
+        extended=fit.data,
     )
 
 
@@ -98,9 +100,13 @@ def merged(causes: Sequence[NamedCause]) -> list[NamedCause]:
     return list(by_effect.values())
 
 
-def _parameters(fit: ExtensionFit, causes: Sequence[NamedCause], number: int) -> tuple[Parameters, ...]:
-    first = sum(len(cause.accepted) for cause in causes[:number])
-    return fit.parameters[first : first + len(causes[number].accepted)]
+def _parameters(
+    nominal: FittedModel, model: FittedModel, causes: Sequence[NamedCause], order: Sequence[int]
+) -> tuple[tuple[Parameters, ...], ...]:
+    """Of each cause, in this order, of each of its places."""
+    found = iter(cause_parameters(nominal.data, [each for cause in causes for each in cause.accepted], model))
+    by_cause = [tuple(next(found) for _ in cause.accepted) for cause in causes]
+    return tuple(by_cause[k] for k in order)
 
 
 class _Bench:
@@ -117,10 +123,14 @@ class _Bench:
     ) -> None:
         self._given, self._found, self._settings, self._seed = given, found, settings, seed
         self._training, self._tests = training, tests
-        self._fits: dict[tuple[int, ...], ExtensionFit] = {}
+        self._fits: dict[frozenset[int], FittedModel] = {}
         self._signals = found.estimation.signals
         self.nominal, self._fit_to = found.nominal, list(found.fitted_to)
-        if not tests:
+        if tests:  # the search has fitted to the same samples
+            for count, model in enumerate(found.models):
+                known = [each for cause in found.causes[:count] for each in cause.accepted]
+                self._fits[frozenset(map(id, known))] = model
+        else:
             self._hold_out()
 
     def _hold_out(self) -> None:
@@ -132,17 +142,14 @@ class _Bench:
         ]
         self.nominal = fitted(self.nominal.data, self._fit_to, self._settings, given=self.nominal.given)
 
-    def fit(self, causes: Sequence[NamedCause]) -> ExtensionFit:
+    def fit(self, causes: Sequence[NamedCause]) -> FittedModel:
         accepted = [each for cause in causes for each in cause.accepted]
-        key = tuple(id(each) for each in accepted)
+        key = frozenset(map(id, accepted))
         if key not in self._fits:
-            self._fits[key] = self._fitted(accepted)
+            known = self._found.causes
+            fit_to = self._predicted if accepted and known else self._fit_to
+            self._fits[key] = fit_extended(self.nominal, accepted, fit_to, self._settings)
         return self._fits[key]
-
-    def _fitted(self, accepted: Sequence[Accepted]) -> ExtensionFit:
-        if not accepted:
-            return ExtensionFit(self.nominal, (), (), ())
-        return fit_extended(self.nominal, accepted, self._predicted, self._settings, compare=False)
 
     @cached_property
     def _predicted(self) -> list[FitRecording]:
@@ -164,4 +171,4 @@ class _Bench:
         )
 
     def online(self, model: FittedModel) -> dict[str, Any]:
-        return self._signals.restored(model.data, self._given.data)
+        return self._found.estimation.online(model.data)

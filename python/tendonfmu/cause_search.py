@@ -89,7 +89,14 @@ def look(
     series = series_of(data, recordings, grid, left_out)
     splines = bias_of(data, series)
     predicted = predicted_of(data, recordings, grid, series)
-    columns = candidate_columns(data, predicted, blocks_of(grid, recordings), candidates=candidates, progress=progress)
+    columns = candidate_columns(
+        data,
+        predicted,
+        blocks_of(grid, recordings),
+        candidates=candidates,
+        worth=least.worth,
+        progress=progress,
+    )
     folds = make_folds(series)
     grams = Grams(folds, series.target, columns.nominal, columns.values, splines, nominal_scale(data))
     return View(data, recordings, predicted, series, splines, columns, folds, grams, least)

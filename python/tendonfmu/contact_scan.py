@@ -15,12 +15,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter, uniform_filter1d
-from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from tendonfmu import remainder_learner as learner
 from tendonfmu.diagnosis_result import Event
+from tendonfmu.held_out_folds import Folds, make_folds
 from tendonfmu.remainder_features import features
-from tendonfmu.whitening import Whitener, whitener
+from tendonfmu.remainder_learner import Learner
 
 if TYPE_CHECKING:
     from tendonfmu.diagnosis_series import Series
@@ -38,33 +37,37 @@ WIDTHS = {
     0.4: 1.5,
     0.8: SLOW,
     1.6: SLOW,
+    3.2: 2 * SLOW,
 }  # s of a window → s of the running median it is held against
 JUMP = 8.0  # times the usual speed: a residual of LEAST is then enough, that rare a motion is in no learner's reach
 MERGED = 0.3  # s between parts of one event
+EXPLAINED = 0.5  # of the residual's variance, from which on what a flexible learner predicts of it is taken off
 PAD = 0.1  # s on either side
 MOST = 0.25  # of the time: what is there more often is no event
 MAD = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
 
 
 def scan_events(
-    series: Series, residual: Numbers, nuisance: Sequence[Numbers], recordings: Sequence[str], *, seed: int = 0
+    series: Series, residual: Numbers, splines: Numbers, recordings: Sequence[str], *, seed: int = 0
 ) -> tuple[Event, ...]:
-    """residual: [B, n] N·m of the nominal model. nuisance: per joint, columns [B, p] whose span was taken from it.
+    """residual: [B, n] N·m of the nominal model. splines: [B, s] of the bias, whose span was taken from it.
     recordings: names, by number. In order of recording and time."""
     residual = np.where(series.used[:, None], residual, 0.0)
-    filters = whitener(series, residual)
-    plan = learner.layout(series, series.used)
-    if learner.layout(series, filters.valid).blocks < learner.FEWEST_BLOCKS:
+    plan = make_folds(series)
+    if not plan.enough:
         return ()
-    with threadpool_limits(limits=1):
-        left = _unexplained(series, residual, nuisance, filters, seed)
+    learner = Learner(features(series, seed=seed), residual, splines, plan)
+    left = np.array(series.target)
+    guess = learner.predicted(learner.columns)
+    # what explains most is an effect; less may be the push itself, learned from its neighbours
+    helps = learner.gains(guess).sum(axis=0) > EXPLAINED * np.sum(learner.target**2, axis=0)
+    left[plan.rows] -= np.where(helps, guess, 0.0)
     inside = _outlying(series, left, plan, np.zeros(left.shape, dtype=bool))
     if inside.any():
         # again with a bias that what was found does not bend
         inside = _outlying(series, left, plan, inside)
     if float(inside[plan.rows].any(axis=1).mean()) > MOST:
         return ()
-    left = left.copy()
     left[plan.rows] = _flat(left, plan, inside, max(3, round(SLOW / series.step)))
     return tuple(_event(series, left, inside, rows, recordings) for rows in _stretches(series, inside))
 
@@ -78,24 +81,7 @@ def left_out(series: Series, events: Sequence[Event], recordings: Sequence[str])
     return inside
 
 
-def _unexplained(
-    series: Series, residual: Numbers, nuisance: Sequence[Numbers], filters: Whitener, seed: int
-) -> Numbers:
-    """[B, n] target less what all columns together predict of the residual on unseen blocks."""
-    seen = features(series, seed=seed)
-    plan = learner.layout(series, filters.valid)
-    left = np.array(series.target)
-    for joint in range(residual.shape[1]):
-        own = learner.of_joint(filters, joint)
-        ready = learner.prepared(residual[:, joint], nuisance[joint], seen, own, plan)
-        everything = learner.Choice("", "", np.flatnonzero(ready.scale > 0.0))
-        guess = learner.predicted(ready, [everything], seen, plan)
-        if guess.gains[0] > 0.0:
-            left[plan.rows, joint] -= guess.values
-    return np.asarray(left)
-
-
-def _flat(left: Numbers, plan: learner.Layout, known: Flags, length: int) -> Numbers:
+def _flat(left: Numbers, plan: Folds, known: Flags, length: int) -> Numbers:
     """[U, n] without its running median, to which known blocks count as lying between their neighbours."""
     result = left[plan.rows]
     for joint in range(left.shape[1]):
@@ -120,7 +106,7 @@ def _ends(run: NDArray[np.int64]) -> list[int]:
     return [0, *(np.flatnonzero(np.diff(run)) + 1).tolist(), len(run)]
 
 
-def _outlying(series: Series, left: Numbers, plan: learner.Layout, known: Flags) -> Flags:
+def _outlying(series: Series, left: Numbers, plan: Folds, known: Flags) -> Flags:
     """[B, n] blocks of windows that are higher than chance reaches, as far as the shortest window still stands out.
 
     known: [B, n] blocks that the bias does not follow.
@@ -173,14 +159,14 @@ def _sliding(values: Numbers, run: NDArray[np.int64], length: int) -> Numbers:
     return result
 
 
-def _reach(score: Numbers, plan: learner.Layout, tests: int) -> float:
+def _reach(score: Numbers, plan: Folds, tests: int) -> float:
     """How high chance reaches: Gumbel's distribution through the quartiles of the maxima of blocks."""
-    highest = np.zeros(plan.blocks)
-    np.maximum.at(highest, plan.block, score)
+    highest = np.zeros(plan.stretches)
+    np.maximum.at(highest, plan.stretch, score)
     low, middle, high = np.quantile(highest, (0.25, 0.5, 0.75))
     spread = (high - low) / (np.log(np.log(4.0)) - np.log(np.log(4.0 / 3.0)))
     centre = middle + spread * np.log(np.log(2.0))
-    return max(LEAST, float(centre + spread * np.log(plan.blocks * tests / LEVEL)))
+    return max(LEAST, float(centre + spread * np.log(plan.stretches * tests / LEVEL)))
 
 
 def _widened(high: Flags, run: NDArray[np.int64], length: int) -> Flags:

@@ -9,10 +9,11 @@ found.verdict, [cause.where for cause in found.causes], found.gain
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,21 +25,34 @@ from tendonfmu.cause_selection import LEAST_SHARE
 from tendonfmu.contact_gain import detection_gain
 from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.diagnosis_evidence import evidence
-from tendonfmu.diagnosis_result import Cause, Diagnosis, FoundPlace, Interval, Invisible, Unexplained, Where
+from tendonfmu.diagnosis_result import (
+    Cause,
+    Diagnosis,
+    Event,
+    FoundPlace,
+    Interval,
+    Invisible,
+    Unexplained,
+    Where,
+)
 from tendonfmu.diagnosis_search import NamedCause, Search, events_of, search, without_events
 from tendonfmu.diagnosis_series import make_grid
 from tendonfmu.diagnosis_size import size_of
+from tendonfmu.effects import Candidate
 from tendonfmu.effects.friction_law_places import thresholds
 from tendonfmu.errors import InputError, own_fault
 from tendonfmu.event_gain import event_gain
 from tendonfmu.extension_fit import Accepted, FitSettings
+from tendonfmu.fit_files import check_unseen
 from tendonfmu.fit_recordings import FitRecording, Held, prepare, require_noise
+from tendonfmu.gain import require_unseen
 from tendonfmu.hypotheses import HERE, Hypothesis
 from tendonfmu.next_experiment import Experiments, Question, plan_experiments
 from tendonfmu.phases import Phases, PhaseState
 from tendonfmu.recording import Recording, read_recording
 from tendonfmu.remainder import Remainder, measure_remainder
 from tendonfmu.residual_views import residual_views, whiteness
+from tendonfmu.signal_choice import choose
 
 Numbers = NDArray[np.float64]
 Finger = FingerDescription | str | os.PathLike[str]
@@ -48,8 +62,9 @@ HELD = Held(0.2, 10.0)  # of the recordings, for the gain, where no others are g
 LEAST_GAIN = 0.03
 MOST_RIVALS = 3  # of a cause, that an experiment is looked for
 MOST_UNSEEN = 6  # effects that are not visible, that an experiment is looked for
+SIGNALS = "signals, delay and presliding"
 PHASES = {
-    "signals, delay and presliding": 20.0,
+    SIGNALS: 20.0,
     "contact": 8.0,
     "causes": 30.0,
     "gain on unseen data": 20.0,
@@ -81,8 +96,10 @@ def diagnose(
     phases = Phases(PHASES, progress or (lambda state: None))
     with threadpool_limits(limits=max(jobs, 1)):
         case = _case(finger, recordings, tests, kinematics, least_gain)
-        with own_fault("diagnosis"):
-            found = search(case.finger, case.whole, least_gain=least_gain, seed=seed, threads=jobs, phases=phases)
+        with phases.start(SIGNALS):
+            chosen = choose(case.finger, case.whole, FitSettings(threads=jobs, path=case.finger.path))
+        with own_fault("diagnosis"):  # all that was given has been checked and fitted once
+            found = search(case.whole, chosen, least_gain=least_gain, seed=seed, phases=phases)
             result = _Result(case, found, least_gain, seed, jobs, phases)
             return replace(result.diagnosis(), seconds=perf_counter() - begun)
 
@@ -126,6 +143,8 @@ def _case(
     training = [prepare(given, _read(each), kinematics, held) for each in recordings]
     unseen = [prepare(given, _read(each), kinematics, Held()) for each in tests]
     require_noise(given, training)
+    require_unseen(training, unseen)
+    check_unseen([each.recording for each in training], [each.recording for each in unseen])
     return _Case(given, training, unseen)
 
 
@@ -141,7 +160,7 @@ class _Result:
 
     def __init__(self, case: _Case, found: Search, least_gain: float, seed: int, jobs: int, phases: Phases) -> None:
         self._case, self._found, self._seed, self._phases = case, found, seed, phases
-        self._least_gain, self._settings = least_gain, FitSettings(threads=jobs)
+        self._least_gain, self._settings = least_gain, FitSettings(threads=jobs, path=case.finger.path)
         self._series = found.last.series
 
     def diagnosis(self) -> Diagnosis:
@@ -167,7 +186,7 @@ class _Result:
             held_out=gain.held_out,
             seconds=0.0,
             seed=self._seed,
-            signals=found.estimation.signals.words,
+            signals=found.estimation.words,
             least_gain=self._least_gain,
             nominal=gain.nominal,
             extended=gain.extended,
@@ -177,9 +196,13 @@ class _Result:
             gain=gain.value,
             steps=gain.steps,
             causes=tuple(self._cause(k, verified, left) for k in range(len(verified.causes))),
-            too_small=tuple(_too_small(each) for each in [*verified.dropped, *found.small]),
+            too_small=tuple(
+                _too_small(each)
+                for each in [*verified.dropped, *found.small]
+                if each.effect not in {cause.effect for cause in verified.causes}
+            ),
             invisible=invisible,
-            events=found.events,
+            events=self._events,
             unexplained=unexplained,
             experiment=experiments.best,
             views=residual_views(self._series, before, left, load=self._torque()),
@@ -190,7 +213,7 @@ class _Result:
             nominal_data=verified.nominal_data,
             extended_data=verified.extended_data,
             warnings=(*case.warnings, *self._warnings()),
-            tested=len({each.key for each in found.first.selection.hypotheses}),
+            tested=len({each.key for each in found.last.selection.hypotheses}),
             event_gain=event_gain(verified.extended_data, case.whole, found.events, self._seed),
         )
 
@@ -211,20 +234,19 @@ class _Result:
     def _verified(self) -> Verified:
         found, case = self._found, self._case
         tests = case.tests
-        if tests and found.events:
-            # only where the training recordings had some: what disturbed one recording may disturb the next
-            tests = [without_events(each, self._events_in(each)) for each in tests]
+        unseen = [self._events_in(each) for each in tests]
+        tests = [without_events(each, events) for each, events in zip(tests, unseen, strict=True)]
+        self._events = (*found.events, *(event for events in unseen for event in events))
         training = [without_events(each, found.events) for each in case.training]
         return verify(case.finger, found, training, tests, self._least_gain, self._settings, self._seed)
 
-    def _events_in(self, recording: FitRecording) -> Sequence[object]:
-        estimation = self._found.estimation
-        data = estimation.signals.restored(self._found.extended.data, self._case.finger.data)
+    def _events_in(self, recording: FitRecording) -> Sequence[Event]:
+        data = self._found.estimation.online(self._found.extended.data)
         return events_of(data, [recording], make_grid([recording]), self._seed)[0]
 
     # --- causes ---
 
-    def _left(self, data: object) -> Numbers:
+    def _left(self, data: Mapping[str, Any]) -> Numbers:
         """[B, n] N·m: residual of a model over all recordings that were estimated from, bias taken off."""
         estimation = self._found.estimation
         series = series_of(data, estimation.recordings, estimation.grid)
@@ -256,13 +278,11 @@ class _Result:
 
     def _remainder(self, residual: Numbers) -> Remainder:
         view = self._found.last
-        nominal = np.asarray(view.columns.nominal, dtype=np.float64)
-        nuisance = [np.hstack([view.splines, nominal[:, j]]) for j in range(nominal.shape[1])]
         force = [
             segment.mean(view.predicted[segment.recording].recording.groups["tendon_force"][segment.part])
             for segment in self._found.estimation.grid.segments
         ]
-        return measure_remainder(view.series, residual, nuisance, force=np.concatenate(force), seed=self._seed)
+        return measure_remainder(view.series, residual, view.splines, force=np.concatenate(force), seed=self._seed)
 
     def _unexplained(self, left: Remainder, residual: Numbers) -> Unexplained:
         """Of the variance that is left: what unseen stretches of it show to be no noise; unknown where mending it would
@@ -326,7 +346,7 @@ class _Result:
 
     def _unseen(self) -> list[tuple[Hypothesis, float]]:
         """Of each place that is not visible the shape that comes nearest, with its share; the nearest places first."""
-        selection = self._found.first.selection
+        selection = self._found.last.selection
         best: dict[tuple[str, int | None, int | None], tuple[Hypothesis, float]] = {}
         for each, share in zip(selection.hypotheses, selection.shares, strict=True):
             if each.level == HERE and (each.key not in best or share > best[each.key][1]):
@@ -342,7 +362,7 @@ def _wheres(hypotheses: Sequence[Hypothesis]) -> tuple[Where, ...]:
     return tuple(where_of(each) for each in hypotheses)
 
 
-def _candidate(hypothesis: Hypothesis) -> object:
+def _candidate(hypothesis: Hypothesis) -> Candidate:
     return hypothesis.members[0].proposal.candidate
 
 

@@ -17,16 +17,19 @@ from numpy.typing import NDArray
 from tendonfmu.cause_search import View, bias_of, look, predicted_of, residual_alone, series_of
 from tendonfmu.cause_selection import CERTAIN, Judged, Pick, rms_gain
 from tendonfmu.contact_scan import left_out, scan_events
-from tendonfmu.description import FingerDescription
 from tendonfmu.diagnosis_result import Event, Interval
 from tendonfmu.diagnosis_series import Grid
+from tendonfmu.diagnosis_span import span_of
+from tendonfmu.effects import CANDIDATES, Candidate, Place
 from tendonfmu.extension_fit import Accepted, FitSettings, FittedModel, fit_extended, possible
+from tendonfmu.extensions import extended_row
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.hypotheses import Hypothesis, Key
 from tendonfmu.nominal_fit import fitted
 from tendonfmu.online_error import OnlineError
 from tendonfmu.phases import Phases, Step
-from tendonfmu.signal_choice import Estimation, choose
+from tendonfmu.signal_choice import Estimation
+from tendonfmu.starting_point import presliding_everywhere
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -66,9 +69,9 @@ class NamedCause:
 @dataclass(frozen=True)
 class Search:
     """estimation: signals and recordings. nominal, extended: fitted descriptions, with the settings for estimating.
-    first, last: what each lacks and leaves. causes: in the order in which they were found; models: [causes + 1] after each, the nominal one first. small: certain
-    but not material. events: contact and stalls. out: [B] blocks in them. fitted_to: recordings with forces that the
-    model predicts, events left out.
+    first, last: what each lacks and leaves. causes: in the order in which they were found; models: [causes + 1] after
+    each, the nominal one first. small: certain but not material. events: contact and stalls. out: [B] blocks in them.
+    fitted_to: recordings with forces that the model predicts, events left out.
     """
 
     estimation: Estimation
@@ -98,32 +101,31 @@ def accepted_of(hypothesis: Hypothesis, magnitudes: Numbers) -> tuple[Accepted, 
 
 
 def search(
-    given: FingerDescription,
     recordings: Sequence[FitRecording],
+    chosen: Estimation,
     *,
     least_gain: float,
     seed: int,
-    threads: int,
     phases: Phases,
 ) -> Search:
-    """given: the nominal description. recordings: as they were measured; `train` says where to look. Raises InputError."""
-    settings = FitSettings(threads=threads)
-    with phases.start("signals, delay and presliding"):
-        chosen = choose(given, recordings, settings)
+    """recordings: as they were measured; chosen: what is
+    estimated from; `train` says where to look."""
+    settings = chosen.settings
     with phases.start("contact"):
         events, out = events_of(chosen.model.data, chosen.recordings, chosen.grid, seed)
     nominal = chosen.nominal
     own = [without_blocks(each, k, chosen.grid, out) for k, each in enumerate(chosen.recordings)]
     clean = predicted_of(nominal.data, own, chosen.grid, series_of(nominal.data, own, chosen.grid, out))
     nominal = fitted(nominal.data, clean, settings, given=nominal.given)
+    touched = chosen.recordings  # with the events in them
     chosen = replace(chosen, nominal=nominal, recordings=own)
     online = OnlineError([without_events(each, events) for each in recordings])
     with phases.start("causes", MOST_CAUSES) as step:
-        rounds = _Rounds(given.data, chosen, out, online, least_gain, settings)
+        rounds = _Rounds(chosen, out, online, least_gain, settings)
         rounds.run(step)
     if events:
         # what the causes explain was no event
-        left, _ = events_of(rounds.models[-1].data, chosen.recordings, chosen.grid, seed)
+        left, _ = events_of(rounds.models[-1].data, touched, chosen.grid, seed)
         events = tuple(event for event in events if any(_overlap(event, other) for other in left))
     return Search(
         estimation=chosen,
@@ -133,7 +135,7 @@ def search(
         last=rounds.view,
         causes=tuple(rounds.causes),
         models=tuple(rounds.models),
-        small=tuple([*rounds.refused, *rounds.small()]),
+        small=(*rounds.refused, *rounds.small()),
         events=events,
         out=out,
         fitted_to=clean,
@@ -150,8 +152,7 @@ def events_of(
     """What no friction explains in the residual of a model, and the blocks [B] that lie in it."""
     series = series_of(data, recordings, grid)
     names = [str(recording.path) for recording in recordings]
-    nuisance = [bias_of(data, series)] * series.target.shape[1]
-    events = scan_events(series, residual_alone(data, series), nuisance, names, seed=seed)
+    events = scan_events(series, residual_alone(data, series), bias_of(data, series), names, seed=seed)
     return events, left_out(series, events, names)
 
 
@@ -180,7 +181,6 @@ class _Rounds:
 
     def __init__(
         self,
-        given: Mapping[str, Any],
         chosen: Estimation,
         out: Flags,
         online: OnlineError,
@@ -190,15 +190,22 @@ class _Rounds:
         self.causes: list[NamedCause] = []
         self.refused: list[NamedCause] = []
         self.models = [chosen.nominal]
-        self._given, self._chosen, self._out, self._online = given, chosen, out, online
+        self._chosen, self._out, self._online = chosen, out, online
         self._least_gain, self._settings = least_gain, settings
-        self.view = self.first = self._look(chosen.nominal)
+        # the start is fitted before anything is chosen: until then only what the nominal model leaves is asked for
+        self.view = self.first = self._look(chosen.nominal, () if chosen.start.causes else CANDIDATES)
         self._left = self._online_error(chosen.nominal)
 
     def run(self, step: Step) -> None:
         for accepted in self._chosen.start.causes:
-            effect = accepted.candidate.name
-            self._take(NamedCause(effect, None, None, (accepted,), 0.0, 0.0, 1.0, ()))
+            self._take(_together(accepted))
+        if self.view is self.first and not self.view.columns.proposals:
+            self.view = self._look(self.models[0])
+        self._search(step)
+        if self._tries_presliding():
+            self._search(step)
+
+    def _search(self, step: Step) -> None:
         while len(self.causes) < MOST_CAUSES and len(self.refused) < MOST_REFUSED:
             step(len(self.causes))
             # what was refused explains something: no other effect is credited with that
@@ -209,6 +216,15 @@ class _Rounds:
             if cause.p_value >= SIGNIFICANCE or not self._take(cause):
                 self.refused.append(cause)
 
+    def _tries_presliding(self) -> bool:
+        """Where none was taken: its distance may be far below what the scan tries. True if it was taken."""
+        chosen = self._chosen
+        if any(each.effect == "presliding" for each in [*self.causes, *self.refused]):
+            return False
+        span = span_of(self.models[-1].data, chosen.recordings)
+        tried = presliding_everywhere(self.models[-1].data, chosen.recordings[0].kinematics, span)
+        return bool(tried) and self._take(_together(tried[0]))
+
     def _named(self, picked: Pick) -> NamedCause:
         own = picked.hypothesis
         accepted = accepted_of(own, picked.judged.magnitudes)
@@ -216,15 +232,22 @@ class _Rounds:
         return NamedCause(own.effect, own.joint, own.tendon, accepted, picked.gain, picked.error, p_value, picked.alike)
 
     def _take(self, cause: NamedCause) -> bool:
-        """Fits the description with a further cause; keeps it where it lowers the error on unseen stretches, and that of
-        the model as it runs online, materially and certainly."""
+        """Fits the description with a further cause; keeps it where it lowers the error on unseen stretches, and that
+        of the model as it runs online, materially and certainly."""
         everything = [each for known in [*self.causes, cause] for each in known.accepted]
         accepted = possible(self.models[0].data, everything)
         if len(accepted) < len(everything):
             return False
         own = self._chosen.recordings
         clean = predicted_of(self.view.data, own, self._chosen.grid, self.view.series)
-        model = fit_extended(self.models[0], accepted, clean, self._settings, compare=False).model
+        model = fit_extended(self.models[0], accepted, clean, self._settings)
+        # again with the forces that the model with the cause predicts: those of the one before know nothing of it
+        clean = predicted_of(
+            model.data, own, self._chosen.grid, series_of(model.data, own, self._chosen.grid, self._out)
+        )
+        model = fitted(model.data, clean, self._settings, given=self.models[0].given)
+        if not self._resolved(cause, model):
+            return False
         left = self._online_error(model)
         if not self._pays(self._left, left):
             return False
@@ -240,16 +263,23 @@ class _Rounds:
         self.view, self._left = view, left
         return True
 
+    def _resolved(self, cause: NamedCause, model: FittedModel) -> bool:
+        """Whether the sensors can show a fitted play or delay of this size."""
+        own = [extended_row(model.data, cause.effect, each.place) for each in cause.accepted]
+        least = self._chosen.least
+        return all(least.shows(cause.effect, each.place, row) for each, row in zip(cause.accepted, own, strict=True))
+
     def _pays(self, before: Numbers, after: Numbers) -> bool:
         """Σ e² by stretch."""
         gain, error = rms_gain(before, after)
         return gain >= self._least_gain and gain > CERTAIN * error
 
     def _online_error(self, model: FittedModel) -> Numbers:
-        return self._online.by_stretch(self._chosen.signals.restored(model.data, self._given))
+        return self._online.by_stretch(self._chosen.online(model.data))
 
-    def _look(self, model: FittedModel) -> View:
-        return look(model.data, self._chosen.recordings, self._chosen.grid, self._chosen.least, self._out)
+    def _look(self, model: FittedModel, candidates: Sequence[Candidate] = CANDIDATES) -> View:
+        chosen = self._chosen
+        return look(model.data, chosen.recordings, chosen.grid, chosen.least, self._out, candidates=candidates)
 
     def small(self) -> list[NamedCause]:
         """Of every effect that is certain but not material the best place."""
@@ -264,6 +294,12 @@ class _Rounds:
             ):
                 found.append(_small(judged, gain, error, p_value))
         return found
+
+
+def _together(places: tuple[Accepted, ...]) -> NamedCause:
+    """A cause of the start, at one place or at all."""
+    place = places[0].place if len(places) == 1 else Place()
+    return NamedCause(places[0].candidate.name, place.joint, place.tendon, places, 0.0, 0.0, 1.0, ())
 
 
 def _small(judged: Judged, gain: float, error: float, p_value: float) -> NamedCause:

@@ -1,8 +1,8 @@
 """The signals that friction is estimated from: zero-phase smoothed, so that what is estimated is not the filter.
 
-Noise of the measured forces is noise of the joint angles, often as large as the distance over which friction builds up;
-a filter that runs online lags. Filtered forwards and backwards (Gustafsson, 1996, for the ends) both go away. The models
-that come of it run on raw samples, with the velocity filter that their description asks for.
+Noise of the measured forces is noise of the joint angles, often as large as the distance over which friction builds
+up; a filter that runs online lags. Filtered forwards and backwards (Gustafsson, 1996) both go away. The models that
+come of it run on raw samples, with the velocity filter that their description asks for.
 """
 
 from __future__ import annotations
@@ -76,12 +76,13 @@ class Signals:
             for key, default in (("noise_std", 0.01), ("noise_std_per_force", 0.0)):
                 value = default if bias.get(key) is None else float(bias[key])
                 bias[key] = value / np.sqrt(self.every)
-        return {**data, "velocity_filter_cutoff": 0.0, "bias": bias}
+        kept = {key: value for key, value in data.items() if key != "position_filter"}
+        return {**kept, "velocity_filter_cutoff": 0.0, "bias": bias}
 
     def restored(self, data: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
         """An estimated description with the settings of the given one, as it runs online."""
         found = dict(data)
-        for key in ("velocity_filter_cutoff", "bias"):
+        for key in ("velocity_filter_cutoff", "position_filter", "bias"):
             found.pop(key, None)
             if key in given:
                 found[key] = given[key]

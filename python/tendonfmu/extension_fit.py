@@ -54,13 +54,14 @@ class Accepted:
 
 @dataclass(frozen=True)
 class FitSettings:
-    """Options of `FrictionFit`, method batch. threads 0: all cores."""
+    """Options of `FrictionFit`, method batch. threads 0: all cores. path: of the description, for messages."""
 
     choice: Choice = field(default_factory=Choice)
     prior: float = 1.0
     max_passes: int = 60
     tolerance: float = 0.3
     threads: int = 0
+    path: Path = Path("finger")
 
 
 @dataclass(frozen=True)
@@ -85,23 +86,6 @@ class FittedModel:
         return description_text(self.data)
 
 
-@dataclass(frozen=True)
-class ExtensionFit:
-    """The nominal model with causes. By cause, in the order given:
-
-    paths: of the numbers that its term has beyond the model before it. parameters: path -> (value, unit).
-    vanished: the fit drove its term to nothing, or did no better with it. without: the fit that lacks this cause alone;
-    alone: the nominal model with this cause alone. Both are empty where `compare` was False.
-    """
-
-    model: FittedModel
-    paths: tuple[tuple[str, ...], ...]
-    parameters: tuple[Mapping[str, tuple[float, str]], ...]
-    vanished: tuple[bool, ...]
-    without: tuple[FittedModel, ...] = ()
-    alone: tuple[FittedModel, ...] = ()
-
-
 def fit_numbers(
     data: Mapping[str, Any],
     recordings: Sequence[FitRecording],
@@ -119,7 +103,7 @@ def fit_numbers(
     origin = data if given is None else given
     every = -(-sum(int(recording.train.sum()) for recording in recordings) // MOST_SAMPLES)
     recordings = [_thinned(_with_own_target(data, recording), max(every, 1)) for recording in recordings]
-    structure = _with_scale(build_structure(_described(data), settings.choice), origin)
+    structure = _with_scale(build_structure(_described(data, settings.path), settings.choice), origin)
     options = {
         "prior": settings.prior,
         "max_passes": settings.max_passes,
@@ -147,32 +131,30 @@ def fit_extended(
     causes: Sequence[Accepted],
     recordings: Sequence[FitRecording],
     settings: FitSettings = FitSettings(),
-    *,
-    compare: bool = True,
-) -> ExtensionFit:
+) -> FittedModel:
     """The nominal model with the causes' terms, all numbers fitted again, beginning at the nominal fit.
 
-    recordings: those of the nominal fit, with the same masks. compare: also fit what lacks one cause, and each cause
-    alone, for the gain by cause. Raises InputError.
+    recordings: those of the nominal fit, with the same masks. Raises InputError.
     """
-    model = _fit_with(nominal, causes, recordings, settings)
-    without: list[FittedModel] = []
-    alone: list[FittedModel] = []
-    if compare:
-        for k, cause in enumerate(causes):
-            others = [*causes[:k], *causes[k + 1 :]]
-            without.append(_fit_with(nominal, others, recordings, settings) if others else nominal)
-            alone.append(_fit_with(nominal, [cause], recordings, settings) if others else model)
-    paths = added_paths(nominal.data, causes)
+    causes = possible(nominal.data, causes)
+    if not causes:
+        return nominal
+    begin = extended_description(nominal.data, causes)
+    choice = settings.choice
+    if choice.only:
+        new = {path for own in added_paths(nominal.data, causes) for path in own}
+        structure = build_structure(_described(begin, settings.path), Choice(choice.sides))
+        known = {number.path for number in structure.numbers}
+        choice = replace(choice, only=(*choice.only, *sorted(new & known)))
+    return fit_numbers(begin, recordings, replace(settings, choice=choice), given=nominal.given)
+
+
+def cause_parameters(
+    nominal: Mapping[str, Any], causes: Sequence[Accepted], model: FittedModel
+) -> tuple[Mapping[str, tuple[float, str]], ...]:
+    """By cause its numbers in a model that was fitted with all of them: path -> (value, unit)."""
     units = {parameter.path: parameter.unit for parameter in native.Finger.from_description(model.data).parameters()}
-    return ExtensionFit(
-        model=model,
-        paths=paths,
-        parameters=tuple(_parameters(model, own, units) for own in paths),
-        vanished=tuple(_vanished(model, own, without[k] if compare else None) for k, own in enumerate(paths)),
-        without=tuple(without),
-        alone=tuple(alone),
-    )
+    return tuple(_parameters(model, own, units) for own in added_paths(nominal, causes))
 
 
 def extended_description(data: Mapping[str, Any], causes: Sequence[Accepted]) -> Mapping[str, Any]:
@@ -215,23 +197,6 @@ def possible(data: Mapping[str, Any], causes: Sequence[Accepted]) -> list[Accept
     return found
 
 
-def _fit_with(
-    nominal: FittedModel, causes: Sequence[Accepted], recordings: Sequence[FitRecording], settings: FitSettings
-) -> FittedModel:
-    causes = possible(nominal.data, causes)
-    if not causes:
-        return nominal
-    begin = extended_description(nominal.data, causes)
-    choice = settings.choice
-    if choice.only:
-        new = {path for own in added_paths(nominal.data, causes) for path in own}
-        structure = build_structure(_described(begin), Choice(choice.sides))
-        known = {number.path for number in structure.numbers}
-        choice = replace(choice, only=(*choice.only, *sorted(new & known)))
-    fitted = fit_numbers(begin, recordings, replace(settings, choice=choice), given=nominal.given)
-    return fitted
-
-
 def _with_own_target(data: Mapping[str, Any], recording: FitRecording) -> FitRecording:
     """The recording with the external torque that makes its own target of its forces."""
     groups = recording.recording.groups
@@ -249,12 +214,12 @@ def _thinned(recording: FitRecording, every: int) -> FitRecording:
     return replace(recording, train=recording.train & (np.arange(len(recording.train)) % every == 0))
 
 
-def _described(data: Mapping[str, Any]) -> FingerDescription:
+def _described(data: Mapping[str, Any], path: Path) -> FingerDescription:
     text = json.dumps(data).encode()
     try:
-        return FingerDescription(Path("finger"), text, data, native.image_from_json(text))
+        return FingerDescription(path, text, data, native.image_from_json(text))
     except native.NativeError as refused:
-        raise InputError(f"finger: {refused}") from None
+        raise InputError(f"{path}: {refused}") from None
 
 
 def _with_scale(structure: Structure, given: Mapping[str, Any]) -> Structure:
@@ -314,16 +279,3 @@ def _standard_errors(structure: Structure, learned: Learned) -> dict[str, float]
     return {
         number.path: float(np.sqrt(max(part, 0.0))) for number, part in zip(structure.numbers, variance, strict=True)
     }
-
-
-def _vanished(model: FittedModel, paths: Sequence[str], without: FittedModel | None) -> bool:
-    """Whether a cause's term is gone: nothing of it is left, or each of its numbers buys less than its own noise would.
-
-    With p numbers that mean nothing 2·(cost without − cost with) is χ² with p degrees of freedom, p on average.
-    """
-    own = [path for path in paths if path in model.values]
-    gone = all(abs(model.values[path]) <= BOUND * max(model.errors.get(path, 0.0), 1e-300) for path in own)
-    if without is None:
-        return bool(own) and gone
-    more = max(len(model.values) - len(without.values), 1)
-    return (bool(own) and gone) or 2 * (without.cost - model.cost) <= more

@@ -45,8 +45,8 @@ _TINY = 1e-12  # N·m, as in contract section 5
 class Gain:
     """nominal, extended: rms per joint on the samples trained on, and on those of the test.
 
-    value: 1 − rms_extended/rms_nominal over all joints on the test. steps: rms over all joints on the test, N·m, of each
-    model of a sequence. blocks: of how many seconds-long blocks of the test the
+    value: 1 − rms_extended/rms_nominal over all joints on the test. steps: rms over all joints on the test, N·m, of
+    each model of a sequence. blocks: of how many seconds-long blocks of the test the
     intervals are. held_out: the test is held-out blocks of the training recordings. agreement: largest difference
     between an FMU's outputs and the core's, in units of the output's largest value.
     """
@@ -106,6 +106,11 @@ def own_gains(
     test = _Test.of(training, tests)
     after = test.squares_of(extended)
     return [gain_interval(test.squares_of(data), after, seed) for data in without]
+
+
+def require_unseen(training: Sequence[FitRecording], tests: Sequence[FitRecording]) -> None:
+    """Raises InputError where there is nothing to measure a gain on."""
+    _Test.of(training, tests)
 
 
 def _check_settings(nominal: Data, extended: Data) -> None:
@@ -232,7 +237,7 @@ class _Test:
         masks = [_judged(each, each.held_out if held_out else each.tracked) for each in recordings]
         if not any(mask.any() for mask in masks):
             raise InputError(
-                "no data to measure the gain on: expected test recordings, or a held-out part of the others"
+                f"{recordings[0].path}: no sample to measure the gain on; expected free motion of some seconds"
             )
         blocks = [blocks_of(each.time, mask) for each, mask in zip(recordings, masks, strict=True)]
         return cls(training, recordings, masks, blocks, held_out)
@@ -250,7 +255,7 @@ class _Test:
     @property
     def count(self) -> int:
         """Samples that are judged, times joints."""
-        return sum(int(mask.sum()) for mask in self.masks) * self.recordings[0].target.shape[1]
+        return sum(int(mask.sum()) for mask in self.masks) * int(self.recordings[0].target.shape[1])
 
     def tested(self, left: Sequence[Numbers]) -> tuple[float, ...]:
         return _pooled(left, self.masks)

@@ -1,4 +1,4 @@
-"""What may be missing, from coarse to fine: an effect at every place at once, at all places of a joint or tendon, at one.
+"""What may be missing, from coarse to fine: an effect everywhere, at all places of a joint or tendon, at one place.
 
 A hypothesis is a combination of columns of single places with one set of magnitudes. One effect at many places is one
 hypothesis; a finer one is only taken where it tells materially more.

@@ -49,7 +49,7 @@ _BLOCK = 0.02  # s
 _OLD_SECONDS = 60.0  # of each recording that is looked at again
 CLEAR = 1.0  # rms of what is left over that of the noise, beyond which no more is tried
 _BETTER = 1.5  # times what there is now
-_ROUNDING = 1e-6  # of the noise: less is no effect but the rounding of a computation
+_FAINTEST = 0.01  # times the noise: what is left of less is rounding
 _SIMPLER = 0.7  # of the largest distance is enough for a simpler entry
 _RANK = 1e-9  # of the largest direction of a Gram matrix of columns of length 1: what float32 columns can tell
 
@@ -82,7 +82,7 @@ class Answer:
         """Whether it is worth recording. How large an effect is that was never seen nobody knows: that a refit leaves
         it, and more of it than before, is enough.
         """
-        better = self.distance >= max(_BETTER * self.now, _ROUNDING)
+        better = self.distance >= max(_BETTER * self.now, _FAINTEST)
         return self.share >= SHARE and (self.distance >= VISIBLE or (self.question.rival is None and better))
 
     @property

@@ -1,4 +1,4 @@
-"""What a description leaves of raw samples as it runs online: velocity filter, bias filter, one sample after the other."""
+"""What a description leaves of raw samples as it runs online, velocity filter and bias filter included."""
 
 from __future__ import annotations
 

@@ -1,22 +1,23 @@
 """How much of a residual could be explained at all, and where that part lives.
 
 Two looks: a flexible learner on everything that is known of the motion and its past (remainder_learner.py), and steady
-oscillations in time (spectral_line.py). Both have a calibrated null, family-wise over all joints.
+oscillations in time (spectral_line.py).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+from scipy.stats import ttest_1samp
 
-from tendonfmu import remainder_learner as learner
-from tendonfmu.remainder_features import Features, features
+from tendonfmu.block_grams import standard_error
+from tendonfmu.held_out_folds import make_folds
+from tendonfmu.remainder_features import features
+from tendonfmu.remainder_learner import Choice, Learner, choices
 from tendonfmu.remainder_text import described
 from tendonfmu.spectral_line import Line, find_lines
 from tendonfmu.whitening import Whitener, whitener
@@ -27,8 +28,8 @@ if TYPE_CHECKING:
 Numbers = NDArray[np.float64]
 
 LEVEL = 0.01  # of a wrong "unknown", family-wise
-TRIED = 6  # choices of columns whose prediction is tried
-LEAST_SHARE = 0.02  # of the residual's variance: what is less is not worth a word
+LEAST_SHARE = 0.02  # of the residual's variance: smaller parts are not reported
+CERTAIN = 2.0  # standard errors over the stretches
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,6 @@ class Finding:
     joint: int
     group: str
     subject: str
-    p_value: float
     line: Line | None = None
 
 
@@ -49,14 +49,14 @@ class Finding:
 class Remainder:
     """What is explainable of a residual [B, n].
 
-    share: per joint, of its variance that is predicted on unseen blocks. interval: 95 %
-    of it. p_value: of there being nothing, family-wise over joints, groups and frequencies. unknown: whether there is
-    something for certain and worth a word. prediction: [B, n] N·m, 0 where not used. findings: significant ones, the
-    best first.
+    share: per joint, of its variance that is predicted on unseen stretches. gain: [stretches, n] the same by stretch,
+    (N·m)². square: [n] of the residual, (N·m)². p_value: of there being nothing, over all joints. unknown: whether
+    there is something for certain. prediction: [B, n] N·m, 0 where not used. findings: what is certain.
     """
 
     share: tuple[float, ...]
-    interval: tuple[tuple[float, float], ...]
+    gain: Numbers
+    square: Numbers
     p_value: float
     unknown: bool
     description: str
@@ -65,117 +65,67 @@ class Remainder:
 
 
 def measure_remainder(
-    series: Series,
-    residual: Numbers,
-    nuisance: Sequence[Numbers],
-    *,
-    force: Numbers | None = None,
-    seed: int = 0,
-    level: float = LEVEL,
+    series: Series, residual: Numbers, splines: Numbers, *, force: Numbers | None = None, seed: int = 0
 ) -> Remainder:
-    """residual: [B, n] N·m. nuisance: per joint, columns [B, p] whose span was taken from its residual (bias splines,
-    derivatives of the nominal model); columns of the learner get the same. force: [B, m] N predicted by the model, for
-    the learner; without it only what makes no torque of the measured one. Blocks that are not used are left out.
+    """residual: [B, n] N·m. splines: [B, s] of the bias, whose span was taken from it. force: [B, m] N predicted by the
+    model, for the learner; without it only what makes no torque of the measured one.
     """
-    joints = residual.shape[1]
+    joints, folds = residual.shape[1], make_folds(series)
     residual = np.where(series.used[:, None], residual, 0.0)
-    filters = whitener(series, residual)
-    plan = learner.layout(series, filters.valid)
-    if plan.blocks < learner.FEWEST_BLOCKS:
-        nothing = ((0.0, 0.0),) * joints
-        return Remainder((0.0,) * joints, nothing, 1.0, False, "", np.zeros_like(residual), ())
-    with threadpool_limits(limits=1):
-        seen = features(series, force=force, seed=seed)
-        findings, gains, prediction = _look(residual, nuisance, seen, filters, plan, seed)
-    filters = whitener(series, residual - prediction)
-    lines, waves = [], np.zeros_like(residual)
+    if not folds.enough:
+        nothing = np.zeros((folds.stretches, joints))
+        return Remainder((0.0,) * joints, nothing, np.zeros(joints), 1.0, False, "", np.zeros_like(residual), ())
+    seen = features(series, force=force, seed=seed)
+    learner = Learner(seen, residual, splines, folds)
+    tried = choices(seen)
+    everything = learner.predicted(tried[0].columns)
+    prediction, findings, p_values = np.zeros_like(residual), [], []
     for joint in range(joints):
-        left = residual[:, joint] - prediction[:, joint]
-        found, waves[:, joint] = find_lines(series, left, learner.of_joint(filters, joint), level=level / joints)
-        lines += [Finding(joint + 1, "line", "", min(1.0, joints * each.p_value), each) for each in found]
-    p_value = min(each.p_value for each in [*findings, *lines])
-    findings = sorted([each for each in [*findings, *lines] if each.p_value <= level], key=lambda each: each.p_value)
-    prediction += waves
-    share, interval = _shares(residual, prediction, plan)
-    large = [max(gains[j], share[j] if interval[j][0] > 0.0 else 0.0) >= LEAST_SHARE for j in range(joints)]
-    clear = [each for each in findings if large[each.joint - 1]]
-    text = described(series, residual, prediction, clear, share) if clear else ""
-    return Remainder(share, interval, p_value, bool(clear), text, prediction, tuple(findings))
+        gain = learner.gains(everything)[:, joint]
+        p_values.append(_p_value(gain))
+        if gain.sum() > CERTAIN * standard_error(gain):
+            prediction[folds.rows, joint] = everything[:, joint]
+    large = [_share(learner.target[:, j], prediction[folds.rows, j]) >= LEAST_SHARE for j in range(joints)]
+    if any(large):
+        named = _named(learner, tried[1:])
+        findings += [Finding(j + 1, named[j].group, named[j].subject) for j in range(joints) if large[j]]
+    lines = _lines(series, residual, prediction, findings)
+    p_value = min([1.0, *(joints * each for each in p_values), *lines])
+    gain = learner.gains(prediction[folds.rows])
+    share = tuple(_share(learner.target[:, j], prediction[folds.rows, j]) for j in range(joints))
+    certain = [each for each in findings if share[each.joint - 1] >= LEAST_SHARE]
+    text = described(series, residual, prediction, certain, share) if certain else ""
+    square = np.sum(learner.target**2, axis=0)
+    return Remainder(share, gain, square, p_value, bool(certain), text, prediction, tuple(certain))
 
 
-def _look(
-    residual: Numbers,
-    nuisance: Sequence[Numbers],
-    seen: Features,
-    filters: Whitener,
-    plan: learner.Layout,
-    seed: int,
-) -> tuple[list[Finding], list[float], Numbers]:
-    """Of each joint the best finding and the share of the whitened residual predicted; and the prediction [B, n]."""
-    learned = []
-    for joint, columns in enumerate(nuisance):
-        prepared = partial(learner.prepared, residual[:, joint], columns, seen, plan=plan)
-        ready = prepared(own=learner.of_joint(filters, joint))
-        plain = partial(prepared, own=Whitener(np.zeros((0, 1)), np.ones(1), filters.valid))
-        learned.append(_learned(ready, plain, seen, plan, np.random.default_rng((seed, joint))))
-    null = np.max([each.null for each in learned], axis=0)
-    prediction = np.zeros_like(residual)
-    prediction[plan.rows] = np.stack([each.values for each in learned], axis=1)
-    findings = [_finding(joint + 1, each, null) for joint, each in enumerate(learned)]
-    return findings, [each.gain for each in learned], prediction
+def _share(target: Numbers, prediction: Numbers) -> float:
+    whole = float(np.sum(target**2))
+    return max(0.0, 1.0 - float(np.sum((target - prediction) ** 2)) / whole) if whole > 0.0 else 0.0
 
 
-@dataclass(frozen=True)
-class _Learned:
-    """Of one joint. surprise: the greatest. null: [DRAWS] of it. gain: share of the whitened residual it predicts.
-    values: [U] N·m, predicted. named: choice that predicts best of those that have a name."""
-
-    surprise: float
-    null: Numbers
-    gain: float
-    values: Numbers
-    named: learner.Choice
+def _p_value(gain: Numbers) -> float:
+    """Of gains by stretch [K] being chance: a one-sided t test."""
+    if not np.any(gain):
+        return 1.0
+    return float(ttest_1samp(gain, 0.0, alternative="greater").pvalue)
 
 
-def _learned(
-    ready: learner.Prepared,
-    plain: Callable[[], learner.Prepared],
-    seen: Features,
-    plan: learner.Layout,
-    rng: np.random.Generator,
-) -> _Learned:
-    """ready: whitened; plain: the same without. What is quick shows in the former only, its size in the latter."""
-    skills, null = learner.skills(ready, seen, plan, rng)
-    order = [skill.choice for skill in skills]
-    everything = next(choice for choice in order if not choice.group)
-    single = [choice for choice in order if choice.group][:TRIED]
-    best = learner.Choice("", "", np.unique(np.concatenate([choice.columns for choice in single[: TRIED // 2]])))
-    sharp = learner.predicted(ready, [*single, everything, best], seen, plan)
-    named_ones = [k for k, choice in enumerate(single) if choice.group != "interaction"] or [0]
-    named = single[max(named_ones, key=lambda number: sharp.gains[number])]
-    tries = [np.zeros(len(plan.rows)), sharp.values]
-    if max(sharp.gains) > LEAST_SHARE / 2.0:
-        tries.append(learner.predicted(plain(), [named, everything, best], seen, plan).values)
-    left = [float(np.sum((ready.target - values) ** 2)) for values in tries]
-    return _Learned(skills[0].surprise, null, max(sharp.gains), tries[int(np.argmin(left))], named)
+def _named(learner: Learner, tried: Sequence[Choice]) -> list[Choice]:
+    """Of each joint the set of columns with a name that predicts best."""
+    known = [each for each in tried if each.group != "interaction"]
+    left = [np.sum((learner.target - learner.predicted(each.columns)) ** 2, axis=0) for each in known]
+    return [known[k] for k in np.argmin(left, axis=0)]
 
 
-def _finding(joint: int, learned: _Learned, null: Numbers) -> Finding:
-    p_value = float(1 + np.sum(null >= learned.surprise)) / (1 + len(null))
-    return Finding(joint, learned.named.group, learned.named.subject, p_value)
-
-
-def _shares(
-    residual: Numbers, prediction: Numbers, plan: learner.Layout
-) -> tuple[tuple[float, ...], tuple[tuple[float, float], ...]]:
-    """1 − variance left over variance, per joint, with the interval of a ratio over blocks."""
-    share, interval = [], []
-    for joint in range(residual.shape[1]):
-        before, guess = residual[plan.rows, joint], prediction[plan.rows, joint]
-        whole = np.bincount(plan.block, before**2)
-        gain = np.bincount(plan.block, 2.0 * before * guess - guess**2)
-        ratio = float(gain.sum() / max(whole.sum(), 1e-300))
-        error = float(np.sqrt(np.sum((gain - ratio * whole) ** 2)) / max(whole.sum(), 1e-300))
-        share.append(ratio)
-        interval.append((ratio - 1.96 * error, ratio + 1.96 * error))
-    return tuple(share), tuple(interval)
+def _lines(series: Series, residual: Numbers, prediction: Numbers, findings: list[Finding]) -> list[float]:
+    """Adds steady oscillations to findings and prediction [B, n]; their p-values."""
+    filters, found = whitener(series, residual - prediction), []
+    joints = residual.shape[1]
+    for joint in range(joints):
+        own = Whitener(filters.coefficients[:, joint : joint + 1], filters.scale[joint : joint + 1], filters.valid)
+        lines, wave = find_lines(series, residual[:, joint] - prediction[:, joint], own, level=LEVEL / joints)
+        prediction[:, joint] += wave
+        findings += [Finding(joint + 1, "line", "", each) for each in lines]
+        found += [min(1.0, joints * each.p_value) for each in lines]
+    return found

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.signal import welch
 
 from tendonfmu.diagnosis_result import ResidualView
-from tendonfmu.remainder_learner import layout
+from tendonfmu.held_out_folds import make_folds
 
 if TYPE_CHECKING:
     from tendonfmu.diagnosis_series import Series
@@ -87,7 +87,7 @@ def _binned(kind: str, label: str, unit: str, x: Numbers, before: Numbers, after
 
 def _spectrum(series: Series, before: Numbers, after: Numbers, joint: int) -> ResidualView:
     """Welch's power density in N²m²/Hz, runs without a gap averaged by their length."""
-    rate, plan = 1.0 / series.step, layout(series, series.used)
+    rate, plan = 1.0 / series.step, make_folds(series)
     ends = np.flatnonzero(np.diff(plan.run, append=-1)) + 1
     runs = [plan.rows[begin:end] for begin, end in zip(np.append(0, ends[:-1]), ends, strict=True)]
     size = min(512, max((len(run) for run in runs), default=1))
@@ -110,7 +110,7 @@ def _autocorrelation(series: Series, before: Numbers, after: Numbers, joint: int
 
 def _correlations(series: Series, values: Numbers, lags: NDArray[np.int64]) -> Numbers:
     """Correlation of values [B] with themselves a few blocks later, pairs without a gap between them only."""
-    plan = layout(series, series.used)
+    plan = make_folds(series)
     seen = values[plan.rows] - (values[plan.rows].mean() if len(plan.rows) else 0.0)
     variance = float(np.mean(seen**2)) if len(seen) else 0.0
     found = []
