@@ -19,9 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
+from tendonfmu.block_grams import standard_error
 from tendonfmu.cause_gains import Verified, verify
 from tendonfmu.cause_search import residual_alone, series_of
-from tendonfmu.cause_selection import LEAST_SHARE
+from tendonfmu.cause_selection import CERTAIN, LEAST_SHARE
 from tendonfmu.contact_gain import detection_gain
 from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.diagnosis_evidence import evidence
@@ -214,7 +215,7 @@ class _Result:
             extended_data=verified.extended_data,
             warnings=(*case.warnings, *self._warnings()),
             tested=len({each.key for each in found.last.selection.hypotheses}),
-            event_gain=event_gain(verified.extended_data, case.whole, found.events, self._seed),
+            event_gain=event_gain(verified.extended_data, case.whole, found.events),
         )
 
     def _warnings(self) -> list[str]:
@@ -291,9 +292,8 @@ class _Result:
         shares = np.clip(np.array(left.share), 0.0, 1.0)
         whole = float(variance.sum())
         share = float(shares @ variance) / whole if whole > 0 else 0.0
-        # of what is predicted at several joints the errors are not independent: they add up
-        halves = np.array([(high - low) / 2.0 for low, high in left.interval])
-        half = float(halves @ variance) / whole if whole > 0 else 0.0
+        square = float(left.square.sum())
+        half = CERTAIN * standard_error(left.gain.sum(axis=1)) / square if square > 0 else 0.0
         gain = Interval(*(1.0 - float(np.sqrt(1.0 - min(each, 1.0))) for each in (share, share - half, share + half)))
         unknown = left.unknown and gain.value >= self._least_gain and gain.low > 0.0
         description = left.description if unknown else ""
