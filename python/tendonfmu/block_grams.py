@@ -75,13 +75,13 @@ class Grams:
 
     def _products(self) -> tuple[Numbers, list[Numbers]]:
         """[u + c + 1]² of all columns and the target, of everything and of each fold."""
-        size = self._table.shape[2] + 1
+        size, joints = self._table.shape[2] + 1, self._table.shape[1]
         found = [np.zeros((size, size)) for _ in range(self.folds.folds)]
         for number, total in enumerate(found):
             rows = np.flatnonzero(self.folds.fold == number)
             for begin in range(0, len(rows), _PIECE):
                 part = rows[begin : begin + _PIECE]
-                columns = self._table[part].reshape(-1, size - 1).astype(np.float64)
+                columns = self._table[part].reshape(len(part) * joints, size - 1).astype(np.float64)
                 both = np.concatenate([columns, self._target[part].reshape(-1, 1)], axis=1)
                 total += both.T @ both
         return np.sum(found, axis=0), found
@@ -126,7 +126,7 @@ class Grams:
 
     def _raw_energy(self) -> Numbers:
         if not hasattr(self, "_raw"):
-            values = self._table[:, :, self.nominal_count :].reshape(-1, self.count)
+            values = self._table[:, :, self.nominal_count :].reshape(self._target.size, self.count)
             self._raw = np.zeros((self.count, self.count))
             for begin in range(0, len(values), _PIECE):
                 part = values[begin : begin + _PIECE].astype(np.float64)

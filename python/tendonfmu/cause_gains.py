@@ -56,6 +56,8 @@ def verify(
         without = [bench.fit([*causes[:k], *causes[k + 1 :]]) for k in range(len(causes))]
         gains = bench.gains(fit, without)
         weak = [k for k, gain in enumerate(gains) if not (gain.low > 0.0 and gain.value >= least_gain)]
+        if not weak and causes and bench.gains(fit, [bench.nominal])[0].value < 0.0:
+            weak = list(range(len(causes)))  # each mends what another one spoils
         if not weak:
             break
         worst = min(weak, key=lambda k: gains[k].value)

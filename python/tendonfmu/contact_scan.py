@@ -37,9 +37,11 @@ WIDTHS = {
     0.4: 1.5,
     0.8: SLOW,
     1.6: SLOW,
+    3.2: 2 * SLOW,
 }  # s of a window → s of the running median it is held against
 JUMP = 8.0  # times the usual speed: a residual of LEAST is then enough, that rare a motion is in no learner's reach
 MERGED = 0.3  # s between parts of one event
+EXPLAINED = 0.5  # of the residual's variance, from which on what a flexible learner predicts of it is taken off
 PAD = 0.1  # s on either side
 MOST = 0.25  # of the time: what is there more often is no event
 MAD = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
@@ -57,7 +59,8 @@ def scan_events(
     learner = Learner(features(series, seed=seed), residual, splines, plan)
     left = np.array(series.target)
     guess = learner.predicted(learner.columns)
-    helps = learner.gains(guess).sum(axis=0) > 0.0
+    # what explains most is an effect; less may be the push itself, learned from its neighbours
+    helps = learner.gains(guess).sum(axis=0) > EXPLAINED * np.sum(learner.target**2, axis=0)
     left[plan.rows] -= np.where(helps, guess, 0.0)
     inside = _outlying(series, left, plan, np.zeros(left.shape, dtype=bool))
     if inside.any():

@@ -32,13 +32,16 @@ from tendonfmu.diagnosis_size import size_of
 from tendonfmu.effects import Candidate
 from tendonfmu.errors import InputError, own_fault
 from tendonfmu.extension_fit import Accepted, FitSettings
+from tendonfmu.fit_files import check_unseen
 from tendonfmu.fit_recordings import FitRecording, Held, prepare, require_noise
+from tendonfmu.gain import require_unseen
 from tendonfmu.hypotheses import HERE, Hypothesis
 from tendonfmu.next_experiment import Experiments, Question, plan_experiments
 from tendonfmu.phases import Phases, PhaseState
 from tendonfmu.recording import Recording, read_recording
 from tendonfmu.remainder import Remainder, measure_remainder
 from tendonfmu.residual_views import residual_views, whiteness
+from tendonfmu.signal_choice import choose
 
 Numbers = NDArray[np.float64]
 Finger = FingerDescription | str | os.PathLike[str]
@@ -48,8 +51,9 @@ HELD = Held(0.2, 10.0)  # of the recordings, for the gain, where no others are g
 LEAST_GAIN = 0.03
 MOST_RIVALS = 3  # of a cause, that an experiment is looked for
 MOST_UNSEEN = 6  # effects that are not visible, that an experiment is looked for
+SIGNALS = "signals, delay and presliding"
 PHASES = {
-    "signals, delay and presliding": 20.0,
+    SIGNALS: 20.0,
     "contact": 8.0,
     "causes": 30.0,
     "gain on unseen data": 20.0,
@@ -81,8 +85,10 @@ def diagnose(
     phases = Phases(PHASES, progress or (lambda state: None))
     with threadpool_limits(limits=max(jobs, 1)):
         case = _case(finger, recordings, tests, kinematics, least_gain)
-        with own_fault("diagnosis"):
-            found = search(case.finger, case.whole, least_gain=least_gain, seed=seed, threads=jobs, phases=phases)
+        with phases.start(SIGNALS):
+            chosen = choose(case.finger, case.whole, FitSettings(threads=jobs, path=case.finger.path))
+        with own_fault("diagnosis"):  # all that was given has been checked and fitted once
+            found = search(case.finger, case.whole, chosen, least_gain=least_gain, seed=seed, phases=phases)
             result = _Result(case, found, least_gain, seed, jobs, phases)
             return replace(result.diagnosis(), seconds=perf_counter() - begun)
 
@@ -126,6 +132,8 @@ def _case(
     training = [prepare(given, _read(each), kinematics, held) for each in recordings]
     unseen = [prepare(given, _read(each), kinematics, Held()) for each in tests]
     require_noise(given, training)
+    require_unseen(training, unseen)
+    check_unseen([each.recording for each in training], [each.recording for each in unseen])
     return _Case(given, training, unseen)
 
 
@@ -141,7 +149,7 @@ class _Result:
 
     def __init__(self, case: _Case, found: Search, least_gain: float, seed: int, jobs: int, phases: Phases) -> None:
         self._case, self._found, self._seed, self._phases = case, found, seed, phases
-        self._least_gain, self._settings = least_gain, FitSettings(threads=jobs)
+        self._least_gain, self._settings = least_gain, FitSettings(threads=jobs, path=case.finger.path)
         self._series = found.last.series
 
     def diagnosis(self) -> Diagnosis:
@@ -183,7 +191,7 @@ class _Result:
                 if each.effect not in {cause.effect for cause in verified.causes}
             ),
             invisible=invisible,
-            events=found.events,
+            events=self._events,
             unexplained=unexplained,
             experiment=experiments.best,
             views=residual_views(self._series, before, left, load=self._torque()),
@@ -214,9 +222,9 @@ class _Result:
     def _verified(self) -> Verified:
         found, case = self._found, self._case
         tests = case.tests
-        if tests and found.events:
-            # only where the training recordings had some: what disturbed one recording may disturb the next
-            tests = [without_events(each, self._events_in(each)) for each in tests]
+        unseen = [self._events_in(each) for each in tests]
+        tests = [without_events(each, events) for each, events in zip(tests, unseen, strict=True)]
+        self._events = (*found.events, *(event for events in unseen for event in events))
         training = [without_events(each, found.events) for each in case.training]
         return verify(case.finger, found, training, tests, self._least_gain, self._settings, self._seed)
 

@@ -185,8 +185,8 @@ class Diagnosis:
     signals: what was estimated from, in words. least_gain: of a cause. nominal_data, extended_data: the fitted
     descriptions. noise_floor: N·m per joint, what of the extended model's test_rms nothing predicts; floor_source: how
     that is known. steps: rms over all joints on unseen data, N·m, of the nominal model and after each cause, in the
-    order of `causes`. gain: over all joints on the test data; held_out: whether those are parts of the training recordings.
-    too_small: seen for certain, but not material, or not on unseen data.
+    order of `causes`. gain: over all joints on the test data; held_out: whether those are parts of the training
+    recordings. too_small: seen for certain, but not material, or not on unseen data.
     """
 
     finger: str

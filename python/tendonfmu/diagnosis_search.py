@@ -20,14 +20,17 @@ from tendonfmu.contact_scan import left_out, scan_events
 from tendonfmu.description import FingerDescription
 from tendonfmu.diagnosis_result import Event, Interval
 from tendonfmu.diagnosis_series import Grid
-from tendonfmu.effects import CANDIDATES, Candidate
+from tendonfmu.diagnosis_span import span_of
+from tendonfmu.effects import CANDIDATES, Candidate, Place
 from tendonfmu.extension_fit import Accepted, FitSettings, FittedModel, fit_extended, possible
+from tendonfmu.extensions import extended_row
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.hypotheses import Hypothesis, Key
 from tendonfmu.nominal_fit import fitted
 from tendonfmu.online_error import OnlineError
 from tendonfmu.phases import Phases, Step
-from tendonfmu.signal_choice import Estimation, choose
+from tendonfmu.signal_choice import Estimation
+from tendonfmu.starting_point import presliding_everywhere
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -101,16 +104,15 @@ def accepted_of(hypothesis: Hypothesis, magnitudes: Numbers) -> tuple[Accepted, 
 def search(
     given: FingerDescription,
     recordings: Sequence[FitRecording],
+    chosen: Estimation,
     *,
     least_gain: float,
     seed: int,
-    threads: int,
     phases: Phases,
 ) -> Search:
-    """given: the nominal description. recordings: as they were measured; `train` says where to look."""
-    settings = FitSettings(threads=threads)
-    with phases.start("signals, delay and presliding"):
-        chosen = choose(given, recordings, settings)
+    """given: the nominal description. recordings: as they were measured; chosen: what is
+    estimated from; `train` says where to look."""
+    settings = chosen.settings
     with phases.start("contact"):
         events, out = events_of(chosen.model.data, chosen.recordings, chosen.grid, seed)
     nominal = chosen.nominal
@@ -192,14 +194,14 @@ class _Rounds:
         self.models = [chosen.nominal]
         self._given, self._chosen, self._out, self._online = given, chosen, out, online
         self._least_gain, self._settings = least_gain, settings
+        self._has_tried_presliding = bool(chosen.start.presliding)
         # the start is fitted before anything is chosen: until then only what the nominal model leaves is asked for
         self.view = self.first = self._look(chosen.nominal, () if chosen.start.causes else CANDIDATES)
         self._left = self._online_error(chosen.nominal)
 
     def run(self, step: Step) -> None:
         for accepted in self._chosen.start.causes:
-            effect = accepted.candidate.name
-            self._take(NamedCause(effect, None, None, (accepted,), 0.0, 0.0, 1.0, ()))
+            self._take(_together(accepted))
         if self.view is self.first and not self.view.columns.proposals:
             self.view = self._look(self.models[0])
         while len(self.causes) < MOST_CAUSES and len(self.refused) < MOST_REFUSED:
@@ -207,10 +209,23 @@ class _Rounds:
             # what was refused explains something: no other effect is credited with that
             picked = self.view.beside({each.key for each in self.refused}).best(self._least_gain)
             if picked is None:
+                if self._tries_presliding():
+                    continue
                 break
             cause = self._named(picked)
             if cause.p_value >= SIGNIFICANCE or not self._take(cause):
                 self.refused.append(cause)
+
+    def _tries_presliding(self) -> bool:
+        """Once, at the end, where the start has none: its distance may be far below what the scan tries. True if it was
+        taken."""
+        if self._has_tried_presliding or any(each.effect == "presliding" for each in [*self.causes, *self.refused]):
+            return False
+        self._has_tried_presliding = True
+        chosen = self._chosen
+        span = span_of(self.models[-1].data, chosen.recordings)
+        tried = presliding_everywhere(self.models[-1].data, chosen.recordings[0].kinematics, span)
+        return bool(tried) and self._take(_together(tried[0]))
 
     def _named(self, picked: Pick) -> NamedCause:
         own = picked.hypothesis
@@ -228,6 +243,13 @@ class _Rounds:
         own = self._chosen.recordings
         clean = predicted_of(self.view.data, own, self._chosen.grid, self.view.series)
         model = fit_extended(self.models[0], accepted, clean, self._settings)
+        # again with the forces that the model with the cause predicts: those of the one before know nothing of it
+        clean = predicted_of(
+            model.data, own, self._chosen.grid, series_of(model.data, own, self._chosen.grid, self._out)
+        )
+        model = fitted(model.data, clean, self._settings, given=self.models[0].given)
+        if not self._resolved(cause, model):
+            return False
         left = self._online_error(model)
         if not self._pays(self._left, left):
             return False
@@ -242,6 +264,12 @@ class _Rounds:
         self.models.append(model)
         self.view, self._left = view, left
         return True
+
+    def _resolved(self, cause: NamedCause, model: FittedModel) -> bool:
+        """Whether the sensors can show a fitted play or delay of this size."""
+        own = [extended_row(model.data, cause.effect, each.place) for each in cause.accepted]
+        least = self._chosen.least
+        return all(least.shows(cause.effect, each.place, row) for each, row in zip(cause.accepted, own, strict=True))
 
     def _pays(self, before: Numbers, after: Numbers) -> bool:
         """Σ e² by stretch."""
@@ -268,6 +296,12 @@ class _Rounds:
             ):
                 found.append(_small(judged, gain, error, p_value))
         return found
+
+
+def _together(places: tuple[Accepted, ...]) -> NamedCause:
+    """A cause of the start, at one place or at all."""
+    place = places[0].place if len(places) == 1 else Place()
+    return NamedCause(places[0].candidate.name, place.joint, place.tendon, places, 0.0, 0.0, 1.0, ())
 
 
 def _small(judged: Judged, gain: float, error: float, p_value: float) -> NamedCause:

@@ -54,13 +54,14 @@ class Accepted:
 
 @dataclass(frozen=True)
 class FitSettings:
-    """Options of `FrictionFit`, method batch. threads 0: all cores."""
+    """Options of `FrictionFit`, method batch. threads 0: all cores. path: of the description, for messages."""
 
     choice: Choice = field(default_factory=Choice)
     prior: float = 1.0
     max_passes: int = 60
     tolerance: float = 0.3
     threads: int = 0
+    path: Path = Path("finger")
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,7 @@ def fit_numbers(
     origin = data if given is None else given
     every = -(-sum(int(recording.train.sum()) for recording in recordings) // MOST_SAMPLES)
     recordings = [_thinned(_with_own_target(data, recording), max(every, 1)) for recording in recordings]
-    structure = _with_scale(build_structure(_described(data), settings.choice), origin)
+    structure = _with_scale(build_structure(_described(data, settings.path), settings.choice), origin)
     options = {
         "prior": settings.prior,
         "max_passes": settings.max_passes,
@@ -142,7 +143,7 @@ def fit_extended(
     choice = settings.choice
     if choice.only:
         new = {path for own in added_paths(nominal.data, causes) for path in own}
-        structure = build_structure(_described(begin), Choice(choice.sides))
+        structure = build_structure(_described(begin, settings.path), Choice(choice.sides))
         known = {number.path for number in structure.numbers}
         choice = replace(choice, only=(*choice.only, *sorted(new & known)))
     return fit_numbers(begin, recordings, replace(settings, choice=choice), given=nominal.given)
@@ -213,12 +214,12 @@ def _thinned(recording: FitRecording, every: int) -> FitRecording:
     return replace(recording, train=recording.train & (np.arange(len(recording.train)) % every == 0))
 
 
-def _described(data: Mapping[str, Any]) -> FingerDescription:
+def _described(data: Mapping[str, Any], path: Path) -> FingerDescription:
     text = json.dumps(data).encode()
     try:
-        return FingerDescription(Path("finger"), text, data, native.image_from_json(text))
+        return FingerDescription(path, text, data, native.image_from_json(text))
     except native.NativeError as refused:
-        raise InputError(f"finger: {refused}") from None
+        raise InputError(f"{path}: {refused}") from None
 
 
 def _with_scale(structure: Structure, given: Mapping[str, Any]) -> Structure:

@@ -54,3 +54,10 @@ def place_of(row: Mapping[str, Any]) -> str:
     """`, of load_friction at joint 2, tendon 1`: which effect an extension is, as an appendix to a text."""
     where = ", ".join(f"{key} {row[key]}" for key in ("joint", "tendon") if row.get(key) is not None)
     return f", of {row['effect']}" + (f" at {where}" if where else "")
+
+
+def extended_row(data: Mapping[str, Any], effect: str, place: Any) -> Mapping[str, Any] | None:
+    """The last extension of an effect at a place (joint, tendon from 1 or None); None where there is none."""
+    own = [row for row in extension_rows(data) if row["effect"] == effect]
+    at = [row for row in own if (row.get("joint"), row.get("tendon")) == (place.joint, place.tendon)]
+    return at[-1] if at else None

@@ -108,6 +108,11 @@ def own_gains(
     return [gain_interval(test.squares_of(data), after, seed) for data in without]
 
 
+def require_unseen(training: Sequence[FitRecording], tests: Sequence[FitRecording]) -> None:
+    """Raises InputError where there is nothing to measure a gain on."""
+    _Test.of(training, tests)
+
+
 def _check_settings(nominal: Data, extended: Data) -> None:
     if _filter_of(nominal) != _filter_of(extended):
         raise InternalError("bias: not the same in both descriptions; rms would tell nothing")
@@ -232,7 +237,7 @@ class _Test:
         masks = [_judged(each, each.held_out if held_out else each.tracked) for each in recordings]
         if not any(mask.any() for mask in masks):
             raise InputError(
-                "no data to measure the gain on: expected test recordings, or a held-out part of the others"
+                f"{recordings[0].path}: no sample to measure the gain on; expected free motion of some seconds"
             )
         blocks = [blocks_of(each.time, mask) for each, mask in zip(recordings, masks, strict=True)]
         return cls(training, recordings, masks, blocks, held_out)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ Numbers = NDArray[np.float64]
 
 OF_NOISE = 4.0  # standard deviations of the position's noise
 OF_SAMPLE = 0.75  # sample: velocities are late by half of one
+BEFORE_FIT = 0.5  # of the least size: how large an effect is only the fit tells
 
 
 @dataclass(frozen=True)
@@ -46,12 +48,17 @@ class LeastSizes:
         least = self.least(candidate.name, place.joint, place.tendon)
         return least == 0.0 or LARGEST_SECANT * abs(float(next(iter(shape.values())))) >= least
 
+    def shows(self, effect: str, place: Place, row: Mapping[str, Any] | None) -> bool:
+        """Whether a fitted play or delay, a row of `extensions`, is large enough."""
+        number = {"backlash": "width", "time_delay": "delay"}.get(effect)
+        return row is None or number is None or abs(row[number]) >= self.least(effect, place.joint, place.tendon)
+
     def resolved(self, hypothesis: Hypothesis, magnitudes: Sequence[float] | Numbers) -> bool:
         """Whether a hypothesis with these magnitudes [d] is large enough."""
         if hypothesis.effect == "presliding":  # its size is the distance that was tried, not the magnitude
             return True
         least = self.least(hypothesis.effect, hypothesis.joint, hypothesis.tendon)
-        return least == 0.0 or _size(hypothesis, magnitudes) >= least
+        return least == 0.0 or _size(hypothesis, magnitudes) >= BEFORE_FIT * least
 
 
 def _size(hypothesis: Hypothesis, magnitudes: Sequence[float] | Numbers) -> float:

@@ -35,7 +35,7 @@ BETTER = 0.7  # of the error of smoothed signals, that raw ones have to be below
 @dataclass(frozen=True)
 class Estimation:
     """What is estimated from. recordings: `train` says where. least: sizes that the sensors can show. nominal: the
-    given structure fitted; start: delay and presliding that it begins with, model: fitted with them. error: rms, N·m,
+    given structure fitted, with these settings; start: delay and presliding that it begins with, model: fitted with them. error: rms, N·m,
     on unseen stretches.
     """
 
@@ -47,6 +47,7 @@ class Estimation:
     start: Start
     model: FittedModel
     error: float
+    settings: FitSettings
 
 
 def choose(given: FingerDescription, recordings: Sequence[FitRecording], settings: FitSettings) -> Estimation:
@@ -76,7 +77,7 @@ def _estimated(
     if known is None:
         starts = scan(nominal.data, own, grid, least.least("time_delay", None, None))
         # of a known delay the two best distances: the derivative of one need not lead to the better
-        tried = [starts[0], *[each for each in starts[1:] if each.presliding is not starts[0].presliding][:1]]
+        tried = [starts[0], *[each for each in starts[1:] if each.presliding != starts[0].presliding][:1]]
     else:
         tried = [known.start]
     cutoff = signals.cutoff or (known.signals.cutoff if known else None)
@@ -84,9 +85,11 @@ def _estimated(
     for start in tried:
         model = nominal
         if start.causes:
-            model = fit_extended(nominal, start.causes, own, settings)
+            model = fit_extended(nominal, start.accepted, own, settings)
         found.append(
-            Estimation(signals, own, grid, least, nominal, start, model, _error(model.data, own, grid, cutoff))
+            Estimation(
+                signals, own, grid, least, nominal, start, model, _error(model.data, own, grid, cutoff), settings
+            )
         )
     return min(found, key=lambda each: each.error)
 

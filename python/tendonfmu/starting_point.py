@@ -20,9 +20,8 @@ from tendonfmu.block_grams import Grams
 from tendonfmu.candidate_columns import candidate_columns, without_uncertainty
 from tendonfmu.cause_search import bias_of, blocks_of, nominal_scale, series_of
 from tendonfmu.diagnosis_series import Grid
-from tendonfmu.diagnosis_span import span_of
+from tendonfmu.diagnosis_span import Span, span_of
 from tendonfmu.effects import CANDIDATES, Place
-from tendonfmu.effects.presliding import EVERYWHERE
 from tendonfmu.extension_fit import Accepted, extended_description
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.held_out_folds import make_folds
@@ -32,6 +31,7 @@ Numbers = NDArray[np.float64]
 LONGEST_DELAY = 0.05  # s either way; docs/extensions.md
 FINE = 0.001  # s
 LARGE = 0.008  # s: smaller ones compete with other causes, by their derivative
+CLEAR_GAIN = 0.03  # of the rms that a delay has to take away, to be a start
 CLEAR = 0.25  # of the median over all delays, that the best one leaves at most
 _BY_NAME = {each.name: each for each in CANDIDATES}
 PRESLIDING, DELAY = _BY_NAME["presliding"], _BY_NAME["time_delay"]
@@ -39,43 +39,61 @@ PRESLIDING, DELAY = _BY_NAME["presliding"], _BY_NAME["time_delay"]
 
 @dataclass(frozen=True)
 class Start:
-    """One point of the scan: presliding everywhere or not, forces late by `delay` s; error: Σ e² on held-out folds."""
+    """One point of the scan: presliding at all places or none, forces late by `delay` s; error: Σ e² on held-out folds."""
 
-    presliding: Accepted | None
+    presliding: tuple[Accepted, ...]
     delay: float
     error: float
 
     @property
-    def causes(self) -> list[Accepted]:
-        late = [Accepted(DELAY, Place(), {"delay": self.delay}, (1.0,))] if self.delay else []
+    def causes(self) -> list[tuple[Accepted, ...]]:
+        """By effect, its places."""
+        late = [(Accepted(DELAY, Place(), {"delay": self.delay}, (1.0,)),)] if self.delay else []
         return [*late, *([self.presliding] if self.presliding else [])]
+
+    @property
+    def accepted(self) -> list[Accepted]:
+        return [each for cause in self.causes for each in cause]
 
 
 def scan(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, least_delay: float) -> list[Start]:
     """Every distance, and none, with the delay that suits it best and without one; the best first."""
-    span = span_of(data, recordings)
     source = recordings[0].kinematics
-    distances: list[Accepted | None] = [None]
-    if EVERYWHERE in PRESLIDING.places(data, source):
-        variants = PRESLIDING.variants(data, EVERYWHERE, span)
-        distances += [Accepted(PRESLIDING, EVERYWHERE, each.shape, (1.0,)) for each in variants]
-    found: list[Start] = []
+    span = span_of(data, recordings)
+    distances = [(), *presliding_everywhere(data, source, span)]
     delays, known = np.zeros(1), None
     if DELAY.places(data, source):
         known = delay_of_positions(data, recordings) if source == 1 else None
         if known is None:
             delays = _delays(span.step)
     moved = np.stack([_torque(recordings, grid, delay) - _torque(recordings, grid, 0.0) for delay in delays], axis=2)
+    found: list[Start] = []
     for presliding in distances:
-        errors = _errors(data if presliding is None else presliding.added_to(data), recordings, grid, moved)
-        best, still = int(np.argmin(errors)), int(np.argmin(np.abs(delays)))
-        found += [Start(presliding, float(delays[k]), float(errors[k])) for k in {best, still}]
+        errors = _errors(extended_description(data, presliding), recordings, grid, moved)
+        still = int(np.argmin(np.abs(delays)))
+        found.append(Start(presliding, 0.0, float(errors[still])))
+        best = int(np.argmin(errors))
+        if 0 < best < len(delays) - 1 and errors[best] < (1.0 - CLEAR_GAIN) ** 2 * errors[still]:
+            found.append(Start(presliding, float(delays[best]), float(errors[best])))
     if known is not None and abs(known) >= least_delay:
         for presliding in distances:
             start = Start(presliding, known, 0.0)
-            begin = extended_description(data, start.causes)
-            found.append(replace(start, error=float(_errors(begin, recordings, grid, moved)[0])))
+            begin = extended_description(data, start.accepted)
+            found.append(replace(start, error=float(_errors(begin, recordings, grid, moved[:, :, :1] * 0.0)[0])))
     return sorted(found, key=lambda each: each.error)
+
+
+def presliding_everywhere(data: Mapping[str, Any], source: int, span: Span) -> list[tuple[Accepted, ...]]:
+    """Presliding at all places with one distance, over a grid of distances: by one number, or, where a threshold of 0
+    gives that no scale, by a number of each place. Nothing where the description has some already."""
+    places = PRESLIDING.places(data, source)
+    if any(row["effect"] == PRESLIDING.name for row in data.get("extensions") or []):
+        return []
+    by_place = [
+        [Accepted(PRESLIDING, place, each.shape, (1.0,)) for each in PRESLIDING.variants(data, place, span)]
+        for place in places
+    ]
+    return [tuple(own) for own in zip(*(each for each in by_place if each), strict=False) if own]
 
 
 def _delays(step: float) -> Numbers:

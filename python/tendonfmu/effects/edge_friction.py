@@ -19,9 +19,9 @@ _ANGLES = ("angle_low", "angle_middle", "angle_high")
 
 
 def _edges(data: Data) -> dict[Place, bool]:
-    """Present edges -> whether they depend on the angle."""
+    """Present edges -> whether they have working points."""
     found = (effect for effect in effects(data) if effect.kind == "edge_friction")
-    return {Place(effect.joint, effect.tendon): len(effect.laws) > 1 for effect in found}
+    return {Place(effect.joint, effect.tendon): bool(effect.angles) for effect in found}
 
 
 def _places(data: Data, kinematics: int) -> list[Place]:
