@@ -91,16 +91,17 @@ std::string row(const char* effect, const char* key, int place, const char* numb
 
 std::string extension_rows(int joints, int tendons, Keys keys) {
   std::vector<std::string> rows;
+  const bool presliding = keys == Keys::presliding || keys == Keys::presliding_filtered;
   for (int j = 0; j < joints && keys == Keys::torques; ++j) {
     rows.push_back(row("gravity", "joint", j, R"("sine": 0.01, "cosine": 0.01)"));
     rows.push_back(row("inertia", "joint", j, R"("inertia": 1e-5)"));
     rows.push_back(row("cover_hardening", "joint", j, R"("stiffness": 0.01)"));
   }
-  for (int j = 0; j < joints && keys == Keys::presliding; ++j) {
+  for (int j = 0; j < joints && presliding; ++j) {
     rows.push_back(row("presliding", "joint", j, R"("displacement": 0.004)"));
   }
   for (int i = 0; i < tendons; ++i) {
-    if (keys == Keys::presliding) {
+    if (presliding) {
       rows.push_back(row("presliding", "tendon", i, R"("displacement": 4e-5)"));
     } else if (keys == Keys::torques) {
       rows.push_back(row("force_gain", "tendon", i, R"("correction": 0.02)"));
@@ -116,6 +117,7 @@ std::string extension_rows(int joints, int tendons, Keys keys) {
 
 std::string description(int joints, int tendons, int points, Keys keys) {
   const bool everything = keys == Keys::everything, detects = everything || keys == Keys::innovation;
+  const bool filtered = keys == Keys::filtered || keys == Keys::presliding_filtered;
   return R"({"format": "tendonfmu-finger-1", "name": "bench", "joints": )" +
          list(joints,
               [&](int j) {
@@ -129,6 +131,8 @@ std::string description(int joints, int tendons, int points, Keys keys) {
          (everything ? R"(, "velocity_threshold": {"hysteresis": 0.3}, "bias": {"forgetting": "absorption", )"
                        R"("entry_load": true})"
                      : "") +
+         (filtered ? R"(, "position_filter": {"noise": )" + list(joints, [](int) { return std::string("4e-4"); }) + "}"
+                   : "") +
          "}";
 }
 

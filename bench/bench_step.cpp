@@ -83,6 +83,8 @@ const auto* const registered = [] {
   add("step/avx2/4x8x5/shaking/everything", "avx2", 4, 8, 5, true, Keys::everything);
   add("step/avx2/4x8x5/torques", "avx2", 4, 8, 5, false, Keys::torques);
   add("step/avx2/4x8x5/presliding", "avx2", 4, 8, 5, false, Keys::presliding);
+  add("step/avx2/4x8x5/filtered", "avx2", 4, 8, 5, false, Keys::filtered);
+  add("step/avx2/4x8x5/presliding_filtered", "avx2", 4, 8, 5, false, Keys::presliding_filtered);
   add("step/avx2/4x8x5/delay", "avx2", 4, 8, 5, false, Keys::delay);
   add("step/sse2/4x8x5", "sse2", 4, 8, 5, false);
   add("step/plain/4x8x5", "plain", 4, 8, 5, false);

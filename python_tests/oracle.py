@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from oracle_detection import NEAR, Bounds, Detector, direction_above
 from oracle_extensions import Extensions
-from oracle_finger import Effect, Places, given, read_joints, read_tendons
+from oracle_finger import Effect, Places, given, read_joints, read_tendons, tendon_velocity
+from oracle_position_filter import read_position_filter
 
 Array = NDArray[Any]
 Key = tuple[Any, ...]
@@ -82,6 +83,7 @@ class FingerOracle:
         self.time = math.nan
         self.q = np.zeros(self.n)
         self.v = np.zeros(self.n)
+        self.travel: Array | None = None  # of the joints within the sample, rad, by the position filter
         self.b_eff = np.zeros(self.n)
         self.P = np.zeros(self.n)
         self.absorbed = 0.0  # Λ
@@ -114,6 +116,7 @@ class FingerOracle:
     def _read_settings(self, description: Mapping[str, Any]) -> None:
         bias = given(description, "bias", {})
         self.cutoff = float(given(description, "velocity_filter_cutoff", 20.0))
+        self.position_filter = read_position_filter(description, self.branches)
         self.drift_variance = float(given(bias, "drift_variance", 1e-6))
         self.noise_std = float(given(bias, "noise_std", 0.01))
         self.noise_std_per_force = float(given(bias, "noise_std_per_force", 0.0))
@@ -144,8 +147,10 @@ class FingerOracle:
             return chosen
 
         # 1. kinematics
-        q, v = self._kinematics(inputs, f0, dt, first)
-        x_dot = self._tendon_velocity(v)
+        q, v = self._kinematics(inputs, f0, dt, first, decide, out)
+        x_dot = tendon_velocity(self.R, v)
+        travel = v * dt if self.travel is None else self.travel
+        self.travelled = travel, tendon_velocity(self.R, travel)
         self.extensions.advance(q, v, x_dot, f0, dt, first, self.thresholds, decide, out)
         # 2. each friction effect: F, the increment b, and what stiction may hide
         F, b, hidden = self._effects(q, v, x_dot, time, dt, first, decide, out)
@@ -203,7 +208,9 @@ class FingerOracle:
         self.samples += 1
         return out
 
-    def _kinematics(self, inputs: Mapping[str, Array], f0: Array, dt: float, first: bool) -> tuple[Array, Array]:
+    def _kinematics(
+        self, inputs: Mapping[str, Array], f0: Array, dt: float, first: bool, decide: Callable[..., Any], out: Step
+    ) -> tuple[Array, Array]:
         if self.source == 1:
             k = np.array([tendon.stiffness for tendon in self.tendons])
             q = self.R_plus @ (np.asarray(inputs["tendon_position"], dtype=float) - self.extensions.stretch(f0, k))
@@ -212,20 +219,15 @@ class FingerOracle:
         q = self.extensions.play(q, first)
         if self.source == 3:
             return q, np.array(inputs["joint_velocity"], dtype=float)
+        if self.position_filter is not None:
+            v, self.travel = self.position_filter.take(q, dt, first, decide, out)
+            return q, v
         if first:
             return q, np.zeros(self.n)
         raw = (q - self.q) / dt
         if self.cutoff == 0.0:
             return q, raw
         return q, self.v + (1.0 - math.exp(-2.0 * math.pi * self.cutoff * dt)) * (raw - self.v)
-
-    def _tendon_velocity(self, v: Array) -> Array:
-        """eq. (5), [m, n + 1]; the last column is the velocity after the last joint, 0."""
-        x_dot = np.zeros((self.m, self.n + 1))
-        for i in range(self.m):
-            for j in range(self.n):
-                x_dot[i, j] = sum(self.R[i, after] * v[after] for after in range(j, self.n))
-        return x_dot
 
     def _effects(
         self, q: Array, v: Array, x_dot: Array, time: float, dt: float, first: bool,
@@ -238,7 +240,8 @@ class FingerOracle:
             factor = self.extensions.factor(rows, abs(velocity), time)
             displacement = self.extensions.slides(rows, effect.threshold)
             if displacement is not None:
-                taken = self._slide(effect, displacement, velocity, angle, dt, key), 0.0
+                travel = self._seen_by(kind, at, q, *self.travelled)[0]
+                taken = self._slide(effect, displacement, velocity, angle, travel, key), 0.0
                 direction = direction_above(velocity, effect.limit(self.hysteresis), key, decide, out)
                 effect.side, effect.rests = direction or effect.side, direction == 0
             else:
@@ -248,8 +251,8 @@ class FingerOracle:
                 getattr(hidden, kind)[at] = factor * abs(effect.value(effect.side or 1, abs(velocity), angle))
         return F, b, hidden
 
-    def _slide(self, effect: Effect, displacement: float, v: float, angle: float, dt: float, key: Key) -> float:
-        return self.extensions.sliding_friction(effect, displacement, key, v, angle, dt)
+    def _slide(self, effect: Effect, displacement: float, v: float, angle: float, travel: float, key: Key) -> float:
+        return self.extensions.sliding_friction(effect, displacement, key, v, angle, travel)
 
     def _seen_by(self, kind: str, at: tuple[int, ...], q: Array, v: Array, x_dot: Array) -> tuple[float, float, Key]:
         """Velocity and angle of one place, and the key of its decision: who sees the same velocity decides together."""

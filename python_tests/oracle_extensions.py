@@ -296,10 +296,10 @@ class Extensions:
         return self.sides.now[key] or effect.side or 1
 
     def sliding_friction(
-        self, effect: Effect, displacement: float, key: tuple[Any, ...], v: float, angle: float, dt: float
+        self, effect: Effect, displacement: float, key: tuple[Any, ...], v: float, angle: float, travel: float
     ) -> float:
-        """F of an effect with `presliding`. dt: 0 at the first sample, which leaves ζ at 0."""
-        effect.share = float(next_share(effect.share, v * dt, displacement))
+        """F of an effect with `presliding`. travel: Δ, 0 at the first sample, which leaves ζ at 0."""
+        effect.share = float(next_share(effect.share, travel, displacement))
         side = self.side_of(effect, key)
         self.branches["presliding_from_rest" if effect.side is None else "presliding"] += 1
         if effect.share * side < 0.0:

@@ -118,6 +118,16 @@ class Places:
         return np.asarray(np.cumsum(self.edge + self.pulley, axis=1))
 
 
+def tendon_velocity(R: Array, v: Array) -> Array:
+    """eq. (5), [m, n + 1]; the last column is the velocity after the last joint, 0."""
+    m, n = R.shape
+    x_dot = np.zeros((m, n + 1))
+    for i in range(m):
+        for j in range(n):
+            x_dot[i, j] = sum(R[i, after] * v[after] for after in range(j, n))
+    return x_dot
+
+
 def given(table: Mapping[str, Any] | None, key: str, default: Any) -> Any:
     """The entry, or the default when the table or the key is absent or null."""
     value = None if table is None else table.get(key)

@@ -108,10 +108,10 @@ class Recorder(oracle.FingerOracle):
         self.rows.setdefault(id(effect), []).append((direction, abs(v), angle, of_side[1], of_side[-1], 0.0))
         return F, b
 
-    def _slide(self, effect: Effect, displacement: float, v: float, angle: float, dt: float, key: Any) -> float:
+    def _slide(self, effect: Effect, displacement: float, v: float, angle: float, travel: float, key: Any) -> float:
         side = self.extensions.side_of(effect, key)
-        self.rows.setdefault(id(effect), []).append((side, abs(v), angle, 0.0, 0.0, v * dt))
-        return super()._slide(effect, displacement, v, angle, dt, key)
+        self.rows.setdefault(id(effect), []).append((side, abs(v), angle, 0.0, 0.0, travel))
+        return super()._slide(effect, displacement, v, angle, travel, key)
 
     def course(self, effect: Effect) -> Course:
         return Course(*np.array(self.rows[id(effect)], dtype=float).T)

@@ -29,6 +29,9 @@ BRANCHES = {
     "presliding",
     "presliding_from_rest",
     "presliding_turns",
+    "gate_open",
+    "gate_held",
+    "gate_pushed",
     "progressive_pull",
     "progressive_push",
     "inside_the_play",
@@ -86,6 +89,7 @@ def test_fingers_have_every_effect_at_every_place_and_take_every_branch() -> Non
         seen["friction bound"] += "friction_bound" in description["contact"]
         seen["hysteresis"] += bool(description.get("velocity_threshold", {}).get("hysteresis"))
         seen["links"] += "links" in description
+        seen["position_filter"] += "position_filter" in description
         seen["initial_torque"] += "initial_torque" in description.get("bias", {})
     assert not {name for name in BRANCHES if branches[name] < 10}
     wanted = {f"{effect}-{place}" for effect in CLOSED for place in ("joint", "tendon")}

@@ -58,6 +58,9 @@ BRANCHES = {
 
 # The same of docs/contract-additions.md.
 DETECTION_BRANCHES = {
+    "gate_open",
+    "gate_held",
+    "gate_pushed",
     "hysteresis_keeps_moving",
     "hysteresis_stays_stuck",
     "entry_load_taken_out",
@@ -204,6 +207,8 @@ def test_detection_fingers_have_every_key() -> None:
             seen[f"{len(directions or [])} directions"] += 1
         seen["extension"] += bool(description.get("extensions"))
         seen["no method"] += "method" not in contact
+        seen["position_filter"] += "position_filter" in description
+        seen["jerk_density"] += "jerk_density" in description.get("position_filter", {})
         seen["full hysteresis"] += places["velocity_threshold"].get("hysteresis") == 1.0
     expected = {
         "velocity_threshold.hysteresis", "bias.forgetting", "bias.entry_load", "contact.method", "contact.innovation",
@@ -212,7 +217,8 @@ def test_detection_fingers_have_every_key() -> None:
         "friction_bound.stuck_time",
         "contact.uncertainty", "contact.uncertainty_level", "contact.deviation", "contact.deviation_per_force",
         "contact.release_ratio", "contact.hold_time", "contact.release_time", "release_time 0", "release_time null",
-        "uncertainty null", "extension", "no method", "full hysteresis", *(f"{k} directions" for k in range(5)),
+        "uncertainty null", "extension", "no method", "full hysteresis", "position_filter",
+        "jerk_density", *(f"{k} directions" for k in range(5)),
     }  # fmt: skip
     assert not [name for name in expected if not seen[name]]
 

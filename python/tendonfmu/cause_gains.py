@@ -171,4 +171,4 @@ class _Bench:
         )
 
     def online(self, model: FittedModel) -> dict[str, Any]:
-        return self._signals.restored(model.data, self._given.data)
+        return self._found.estimation.online(model.data)

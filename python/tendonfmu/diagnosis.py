@@ -88,7 +88,7 @@ def diagnose(
         with phases.start(SIGNALS):
             chosen = choose(case.finger, case.whole, FitSettings(threads=jobs, path=case.finger.path))
         with own_fault("diagnosis"):  # all that was given has been checked and fitted once
-            found = search(case.finger, case.whole, chosen, least_gain=least_gain, seed=seed, phases=phases)
+            found = search(case.whole, chosen, least_gain=least_gain, seed=seed, phases=phases)
             result = _Result(case, found, least_gain, seed, jobs, phases)
             return replace(result.diagnosis(), seconds=perf_counter() - begun)
 
@@ -175,7 +175,7 @@ class _Result:
             held_out=gain.held_out,
             seconds=0.0,
             seed=self._seed,
-            signals=found.estimation.signals.words,
+            signals=found.estimation.words,
             least_gain=self._least_gain,
             nominal=gain.nominal,
             extended=gain.extended,
@@ -229,8 +229,7 @@ class _Result:
         return verify(case.finger, found, training, tests, self._least_gain, self._settings, self._seed)
 
     def _events_in(self, recording: FitRecording) -> Sequence[Event]:
-        estimation = self._found.estimation
-        data = estimation.signals.restored(self._found.extended.data, self._case.finger.data)
+        data = self._found.estimation.online(self._found.extended.data)
         return events_of(data, [recording], make_grid([recording]), self._seed)[0]
 
     # --- causes ---

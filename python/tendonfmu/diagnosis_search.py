@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from tendonfmu.cause_search import View, bias_of, look, predicted_of, residual_alone, series_of
 from tendonfmu.cause_selection import CERTAIN, Judged, Pick, rms_gain
 from tendonfmu.contact_scan import left_out, scan_events
-from tendonfmu.description import FingerDescription
 from tendonfmu.diagnosis_result import Event, Interval
 from tendonfmu.diagnosis_series import Grid
 from tendonfmu.diagnosis_span import span_of
@@ -102,7 +101,6 @@ def accepted_of(hypothesis: Hypothesis, magnitudes: Numbers) -> tuple[Accepted, 
 
 
 def search(
-    given: FingerDescription,
     recordings: Sequence[FitRecording],
     chosen: Estimation,
     *,
@@ -110,7 +108,7 @@ def search(
     seed: int,
     phases: Phases,
 ) -> Search:
-    """given: the nominal description. recordings: as they were measured; chosen: what is
+    """recordings: as they were measured; chosen: what is
     estimated from; `train` says where to look."""
     settings = chosen.settings
     with phases.start("contact"):
@@ -122,7 +120,7 @@ def search(
     chosen = replace(chosen, nominal=nominal, recordings=own)
     online = OnlineError([without_events(each, events) for each in recordings])
     with phases.start("causes", MOST_CAUSES) as step:
-        rounds = _Rounds(given.data, chosen, out, online, least_gain, settings)
+        rounds = _Rounds(chosen, out, online, least_gain, settings)
         rounds.run(step)
     if events:
         # what the causes explain was no event
@@ -182,7 +180,6 @@ class _Rounds:
 
     def __init__(
         self,
-        given: Mapping[str, Any],
         chosen: Estimation,
         out: Flags,
         online: OnlineError,
@@ -192,9 +189,8 @@ class _Rounds:
         self.causes: list[NamedCause] = []
         self.refused: list[NamedCause] = []
         self.models = [chosen.nominal]
-        self._given, self._chosen, self._out, self._online = given, chosen, out, online
+        self._chosen, self._out, self._online = chosen, out, online
         self._least_gain, self._settings = least_gain, settings
-        self._has_tried_presliding = bool(chosen.start.presliding)
         # the start is fitted before anything is chosen: until then only what the nominal model leaves is asked for
         self.view = self.first = self._look(chosen.nominal, () if chosen.start.causes else CANDIDATES)
         self._left = self._online_error(chosen.nominal)
@@ -204,25 +200,26 @@ class _Rounds:
             self._take(_together(accepted))
         if self.view is self.first and not self.view.columns.proposals:
             self.view = self._look(self.models[0])
+        self._search(step)
+        if self._tries_presliding():
+            self._search(step)
+
+    def _search(self, step: Step) -> None:
         while len(self.causes) < MOST_CAUSES and len(self.refused) < MOST_REFUSED:
             step(len(self.causes))
             # what was refused explains something: no other effect is credited with that
             picked = self.view.beside({each.key for each in self.refused}).best(self._least_gain)
             if picked is None:
-                if self._tries_presliding():
-                    continue
                 break
             cause = self._named(picked)
             if cause.p_value >= SIGNIFICANCE or not self._take(cause):
                 self.refused.append(cause)
 
     def _tries_presliding(self) -> bool:
-        """Once, at the end, where the start has none: its distance may be far below what the scan tries. True if it was
-        taken."""
-        if self._has_tried_presliding or any(each.effect == "presliding" for each in [*self.causes, *self.refused]):
-            return False
-        self._has_tried_presliding = True
+        """Where none was taken: its distance may be far below what the scan tries. True if it was taken."""
         chosen = self._chosen
+        if any(each.effect == "presliding" for each in [*self.causes, *self.refused]):
+            return False
         span = span_of(self.models[-1].data, chosen.recordings)
         tried = presliding_everywhere(self.models[-1].data, chosen.recordings[0].kinematics, span)
         return bool(tried) and self._take(_together(tried[0]))
@@ -277,7 +274,7 @@ class _Rounds:
         return gain >= self._least_gain and gain > CERTAIN * error
 
     def _online_error(self, model: FittedModel) -> Numbers:
-        return self._online.by_stretch(self._chosen.signals.restored(model.data, self._given))
+        return self._online.by_stretch(self._chosen.online(model.data))
 
     def _look(self, model: FittedModel, candidates: Sequence[Candidate] = CANDIDATES) -> View:
         chosen = self._chosen

@@ -76,12 +76,13 @@ class Signals:
             for key, default in (("noise_std", 0.01), ("noise_std_per_force", 0.0)):
                 value = default if bias.get(key) is None else float(bias[key])
                 bias[key] = value / np.sqrt(self.every)
-        return {**data, "velocity_filter_cutoff": 0.0, "bias": bias}
+        kept = {key: value for key, value in data.items() if key != "position_filter"}
+        return {**kept, "velocity_filter_cutoff": 0.0, "bias": bias}
 
     def restored(self, data: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
         """An estimated description with the settings of the given one, as it runs online."""
         found = dict(data)
-        for key in ("velocity_filter_cutoff", "bias"):
+        for key in ("velocity_filter_cutoff", "position_filter", "bias"):
             found.pop(key, None)
             if key in given:
                 found[key] = given[key]

@@ -105,7 +105,7 @@ def _numbered(finger: FingerDescription, numbers: Sequence[Unknown]) -> list[Unk
     return [
         replace(
             number,
-            value=float(get_number(finger.data, number.path)),
+            value=_value(finger.data, number.path),
             effect=None if number.effect is None else by_path[number.effect.path],
         )
         for number in numbers
@@ -328,6 +328,16 @@ def set_number(data: Any, path: str, value: float) -> None:
     for step in way:
         data = data[step]
     data[last] = value
+
+
+def _value(data: Any, path: str) -> float:
+    """0 for a number of an extension that is left out."""
+    try:
+        return float(get_number(data, path))
+    except KeyError:
+        if not path.startswith("extensions["):
+            raise
+        return 0.0
 
 
 def get_number(data: Any, path: str) -> Any:

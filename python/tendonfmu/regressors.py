@@ -21,6 +21,8 @@ from tendonfmu.fit_recordings import FitRecording
 
 Numbers = NDArray[np.float64]
 
+MOST_SHIFT = 10.0  # times the largest measured force
+
 
 def predicted_forces(
     data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, series: Series, residual: Numbers
@@ -35,9 +37,10 @@ def predicted_forces(
     pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
     found = []
     for number, recording in enumerate(recordings):
-        shift = _unexplained(data, recording, number, grid, series, residual) @ spread
         groups = dict(recording.recording.groups)
         force = groups["tendon_force"]
+        most = MOST_SHIFT * np.abs(force).max(initial=0.0)  # a model that explains nothing predicts no forces either
+        shift = np.clip(_unexplained(data, recording, number, grid, series, residual) @ spread, -most, most)
         predicted = np.where(pulls & (force > 0), np.maximum(force - shift, 0.0), force - shift)
         groups["tendon_force"] = predicted
         if "tendon_position" in groups:

@@ -16,6 +16,7 @@ from tendonfmu.balance import moment_arms
 from tendonfmu.block_grams import Grams
 from tendonfmu.candidate_columns import candidate_columns, without_uncertainty
 from tendonfmu.cause_search import bias_of, blocks_of, nominal_scale, series_of
+from tendonfmu.cause_selection import CERTAIN, rms_gain
 from tendonfmu.description import FingerDescription
 from tendonfmu.diagnosis_series import Grid, make_grid
 from tendonfmu.estimation_signals import Signals, smoothing_of, zero_phase
@@ -24,19 +25,24 @@ from tendonfmu.fit_recordings import FitRecording, Held, prepare
 from tendonfmu.held_out_folds import make_folds
 from tendonfmu.least_sizes import LeastSizes, noise_of
 from tendonfmu.nominal_fit import fitted
+from tendonfmu.online_error import OnlineError
+from tendonfmu.signal_noise import FEWEST as FEWEST_SAMPLES
+from tendonfmu.signal_noise import joint_position_noise
 from tendonfmu.starting_point import Start, scan
 
 Numbers = NDArray[np.float64]
 
 NOISE_CUTOFF = 15.0  # Hz: what positions of a hand do faster is noise
-BETTER = 0.7  # of the error of smoothed signals, that raw ones have to be below: with them comes the lag of the filter
+BETTER = 0.7  # of the error of smoothed signals, that raw ones have to be below: with them comes a filter's lag
 
 
 @dataclass(frozen=True)
 class Estimation:
-    """What is estimated from. recordings: `train` says where. least: sizes that the sensors can show. nominal: the
-    given structure fitted, with these settings; start: delay and presliding that it begins with, model: fitted with them. error: rms, N·m,
-    on unseen stretches.
+    """What is estimated from.
+
+    recordings: `train` says where. least: sizes that the sensors can show. nominal: the given structure fitted, with
+    these settings; start: delay and presliding that it begins with, model: fitted with them. error: rms, N·m, on unseen
+    stretches. given: the description as it was given, with the filter that suits it online.
     """
 
     signals: Signals
@@ -48,6 +54,17 @@ class Estimation:
     model: FittedModel
     error: float
     settings: FitSettings
+    given: Mapping[str, Any]
+
+    def online(self, data: Mapping[str, Any]) -> dict[str, Any]:
+        """An estimated description with the settings with which it runs on raw samples."""
+        return self.signals.restored(data, self.given)
+
+    @property
+    def words(self) -> str:
+        """Which signals are used, for the report."""
+        filtered = "position_filter" in self.given
+        return f"{self.signals.words}; online {'the position filter' if filtered else 'the velocity filter'}"
 
 
 def choose(given: FingerDescription, recordings: Sequence[FitRecording], settings: FitSettings) -> Estimation:
@@ -55,10 +72,28 @@ def choose(given: FingerDescription, recordings: Sequence[FitRecording], setting
     smoothing = smoothing_of([each.recording for each in recordings], given.data)
     raw = Signals()
     if smoothing is None:
-        return _estimated(given, recordings, raw, settings, None)
+        return _with_filter(_estimated(given, recordings, raw, settings, None), recordings)
     smooth = _estimated(given, recordings, smoothing, settings, None)
     rough = _estimated(given, recordings, raw, settings, smooth)
-    return rough if rough.error < BETTER * smooth.error else smooth
+    lags = any(each.kinematics != 3 for each in recordings)
+    chosen = rough if rough.error < (BETTER if lags else 1.0) * smooth.error else smooth
+    return _with_filter(chosen, recordings)
+
+
+def _with_filter(chosen: Estimation, recordings: Sequence[FitRecording]) -> Estimation:
+    """With a position filter online, where the models that are estimated then leave less of the raw samples than with
+    the description's own velocity filter. Raw signals are estimated from through the description's own filter."""
+    long_enough = all(len(each.time) >= FEWEST_SAMPLES for each in recordings)
+    if chosen.signals.cutoff is None or "position_filter" in chosen.given or not long_enough:
+        return chosen
+    if any(each.kinematics == 3 for each in recordings):
+        return chosen
+    noise = np.max([joint_position_noise(chosen.given, each) for each in recordings], axis=0)
+    filtered = replace(chosen, given={**chosen.given, "position_filter": {"noise": [float(value) for value in noise]}})
+    error = OnlineError(recordings)
+    before, after = (error.by_stretch(each.online(each.model.data)) for each in (chosen, filtered))
+    gain, spread = rms_gain(before, after)
+    return filtered if gain > CERTAIN * spread else chosen
 
 
 def _estimated(
@@ -86,11 +121,8 @@ def _estimated(
         model = nominal
         if start.causes:
             model = fit_extended(nominal, start.accepted, own, settings)
-        found.append(
-            Estimation(
-                signals, own, grid, least, nominal, start, model, _error(model.data, own, grid, cutoff), settings
-            )
-        )
+        error = _error(model.data, own, grid, cutoff)
+        found.append(Estimation(signals, own, grid, least, nominal, start, model, error, settings, given.data))
     return min(found, key=lambda each: each.error)
 
 

@@ -47,6 +47,7 @@ class Plan:
     joint: int | None = None
     tendon: int | None = None
     spatial: bool = False
+    loaded: bool = False  # the joints' friction grows with the tendon forces
     rate: float = 500.0  # Hz
     speed: float = 1.0  # of the motion, against that of the other cases
     add: Add = lambda physics: {}
@@ -67,7 +68,7 @@ PUSHES = ((8.0, 11.0, 0.7), (22.0, 24.5, 1.0), (41.0, 44.0, 0.8))  # s, s, N
 
 PLANS = (
     Plan("none", 2),
-    Plan("none", 2, spatial=True, rate=250.0),
+    Plan("none", 2, spatial=True, loaded=True, rate=250.0),
     Plan("gravity", 2, joint=1, add=lambda p: {"heavy": (1,), "load": 0.25}),
     Plan("gravity", 3, joint=2, spatial=True, add=lambda p: {"heavy": (2,), "load": 0.1}),
     Plan("cover_stiffness", 2, joint=1, add=lambda p: {"cover": at(p.cover, 0, 0.06)}),
@@ -85,8 +86,8 @@ PLANS = (
     Plan("unknown_hum", 2, joint=2, add=lambda p: {"hum": (2, 0.02, 1.7)}),
     Plan("unknown_creep", 3, joint=2, spatial=True, add=lambda p: {"creep": (2, 0.06, 2.0)}),
     Plan("none", 3, spatial=True, rate=1000.0),
-    Plan("none", 4),
-    Plan("stribeck", 2, add=lambda p: {"stribeck": (1.0, 0.004)}),
+    Plan("none", 4, loaded=True),
+    Plan("stribeck", 2, add=lambda p: {"stribeck": (1.6, 0.008)}),
     Plan("unknown_catch", 2, joint=1, add=lambda p: {"catch": (1, 0.06, 0.1)}),
     Plan("gravity", 4, rate=250.0, add=lambda p: {"heavy": (1, 2, 3, 4), "load": 0.03}),
     Plan("preload_friction", 2, tendon=3, add=lambda p: {"preload": (3, 2.0)}),
@@ -101,7 +102,7 @@ def make(number: int, train_seconds: float = TRAIN_SECONDS, test_seconds: float 
     plain = finger(plan, rng)
     physics = dataclasses.replace(plain, **plan.add(plain))
     truth = Truth(plan.hidden, plan.joints, plan.joint, plan.tendon, also=ALSO)
-    nominal = describe(plain if plan.hidden != "moment_arm_variation" else physics, plan, rng)
+    nominal = describe(plain, plan, rng)
     motions = [random_motion(plan.joints, rng, plan.speed) for _ in range(2)]
     still = dataclasses.replace(physics, pushes=())  # nobody pushes in the test recording
     train = run(physics, truth, motions[0], train_seconds + DELAY, plan.rate)
@@ -130,7 +131,7 @@ def finger(plan: Plan, rng: np.random.Generator) -> Physics:
         edge=entry if plan.spatial else entry + inner,
         pulley=passing if plan.spatial else 0 * passing,
         joint_friction=rng.uniform(0.004, 0.009, n),
-        load_friction=np.zeros(n),
+        load_friction=np.full(n, 1e-4 if plan.loaded else 0.0),
         damping=rng.uniform(0.001, 0.003, n),
         cover=rng.uniform(0.015, 0.03, n),
         rest_angle=rng.uniform(-0.05, 0.1, n),
@@ -145,6 +146,10 @@ def describe(physics: Physics, plan: Plan, rng: np.random.Generator) -> Nominal:
         friction = law(physics.joint_friction[j], 0.1, rng, viscous=physics.damping[j])
         cover = {"stiffness": rough(physics.cover[j], rng), "rest_angle": rough(physics.rest_angle[j], rng)}
         joints.append({"friction": friction, "cover": cover})
+        if plan.loaded:
+            # the law counts all tendons, the joint feels those that cross it
+            crossing = float((physics.arms[:, j] != 0.0).mean())
+            joints[j]["load_friction"] = law(crossing * physics.load_friction[j], 0.1, rng)
     tendons = []
     for i in range(physics.tendons):
         edge = [law(share, 0.005, rng) if share > 0.0 else None for share in physics.edge[i]]

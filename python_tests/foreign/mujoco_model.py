@@ -68,6 +68,10 @@ class Physics:
             rubs[self.preload[0] - 1, 0] += 1.0
         return [(i, j) for i in range(self.tendons) for j in range(self.reaches(i)) if rubs[i, j] > 0.0]
 
+    def preload_at(self, i: int, j: int) -> float:
+        """Constant friction of tendon i before joint j [N], both from 0."""
+        return self.preload[1] if self.preload and (self.preload[0] - 1, 0) == (i, j) else 0.0
+
     def rubbing(self) -> list[int]:
         """Joints (from 0) with friction of their own."""
         return [int(j) for j in np.flatnonzero((self.joint_friction > 0.0) | (self.load_friction > 0.0))]

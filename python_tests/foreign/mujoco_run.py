@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import mujoco
 import numpy as np
@@ -11,6 +12,7 @@ from mujoco_model import Physics, compiled
 
 STEP = 0.001  # s
 SETTLE = 1.5  # s before the recording begins
+TINY = 1e-9  # N; MuJoCo would leave out the row of a frictionloss of 0
 
 
 @dataclasses.dataclass
@@ -35,14 +37,16 @@ class Motion:
     pretension: float  # N
     breathing: tuple[float, float]  # share of the pretension, Hz
 
-    def angles(self, t: float) -> Array:
-        return np.asarray((self.amplitude * np.sin(2 * np.pi * self.frequency * t + self.phase)).sum(axis=1))
+    def angles(self, time: Array) -> Array:
+        """Angles that are aimed at [rad], (times, joints)."""
+        turn = 2 * np.pi * self.frequency * time[:, None, None] + self.phase
+        return np.asarray((self.amplitude * np.sin(turn)).sum(axis=2))
 
-    def motors(self, t: float, physics: Physics) -> Array:
-        """x0 of every tendon [m] that would hold the angles if nothing rubbed."""
+    def motors(self, time: Array, physics: Physics) -> Array:
+        """x0 of every tendon [m] that would hold the angles if nothing rubbed, (times, tendons)."""
         share, frequency = self.breathing
-        force = self.pretension * (1 + share * np.sin(2 * np.pi * frequency * t))
-        return np.asarray(physics.arms @ self.angles(t) + force / physics.stiffness)
+        force = self.pretension * (1 + share * np.sin(2 * np.pi * frequency * time))
+        return np.asarray(self.angles(time) @ physics.arms.T + force[:, None] / physics.stiffness)
 
 
 def random_motion(joints: int, rng: np.random.Generator, speed: float = 1.0) -> Motion:
@@ -67,8 +71,11 @@ class Runner:
         self.hinges = slice(m, m + n)
         self.drags = physics.drags()
         self.rubbing = physics.rubbing()
-        # per friction row of MuJoCo, joints before tendons: the share of its force that the description lacks
-        self.lacking = np.zeros(len(self.rubbing) + len(self.drags))
+        # per drag: share of the force, N of constant friction, and how drift and speed scale both
+        self.shares = [float(physics.edge[i, j] + (physics.pulley[i, j - 1] if j else 0.0)) for i, j in self.drags]
+        self.constants = [physics.preload_at(i, j) for i, j in self.drags]
+        self.factors = [1.0] * len(self.drags)
+        self.losses = [TINY] * len(self.drags)  # N
         self.crept = np.zeros(n)
         mujoco.mj_forward(self.model, self.data)
 
@@ -78,40 +85,39 @@ class Runner:
         stretch = self.data.ten_length[:m] - self.model.tendon_lengthspring[:m, 1]
         return np.asarray(self.physics.stiffness * np.maximum(0.0, stretch))
 
+    def drift(self, t: float) -> float:
+        p = self.physics
+        return 1.0 + p.drift[0] * (1 - math.exp(-max(t, 0.0) / p.drift[1])) if p.drift else 1.0
+
     def set_friction(self, t: float) -> None:
         """Frictionloss of tendons and joints in proportion to the force there, from proximal to distal."""
         p, m = self.physics, self.physics.tendons
-        drift = 1.0 + (p.drift[0] * (1 - np.exp(-max(t, 0.0) / p.drift[1])) if p.drift else 0.0)
-        losses = np.zeros(len(self.drags))
-        force = self.tension()  # falls (or grows) along the tendon by what rubbed in the step before
-        rubbed = self.data.efc_force[len(self.rubbing) : len(self.lacking)]
-        along = np.where(p.arms != 0.0, force[:, None], 0.0)
+        drift = self.drift(t)
+        force = self.tension().tolist()  # falls (or grows) along the tendon by what rubbed in the step before
+        rubbed = self.data.efc_force[len(self.rubbing) : len(self.rubbing) + len(self.drags)].tolist()
+        speed = self.data.ten_velocity[m : m + len(self.drags)].tolist()
+        load = [0.0] * p.joints
         for k, (i, j) in enumerate(self.drags):
-            share = p.edge[i, j] + (p.pulley[i, j - 1] if j else 0.0)
-            constant = p.preload[1] if p.preload and (p.preload[0] - 1, 0) == (i, j) else 0.0
-            stribeck = self.stribeck(k)
-            losses[k] = drift * stribeck * (share * force[i] + constant) + 1e-9  # a row of 0 would go
-            self.lacking[len(self.rubbing) + k] = self.lacks_here(i, j, drift, stribeck, constant / losses[k])
+            factor = drift * (1 + p.stribeck[0] * math.exp(-abs(speed[k]) / p.stribeck[1]) if p.stribeck else 1.0)
+            self.factors[k] = factor
+            self.losses[k] = factor * (self.shares[k] * force[i] + self.constants[k]) + TINY
             force[i] = max(force[i] - rubbed[k], 0.0)  # lengths count against x1
-            along[i, j:] = np.where(p.arms[i, j:] != 0.0, force[i], 0.0)
-        self.model.tendon_frictionloss[m : m + len(self.drags)] = losses
-        loss = drift * (p.joint_friction + p.load_friction * along.sum(axis=0))
-        self.model.dof_frictionloss[self.hinges] = loss
-        for k, j in enumerate(self.rubbing):
-            hidden = self.truth.hidden == "joint_friction" and self.truth.joint == j + 1
-            self.lacking[k] = 1.0 if hidden else 1 - 1 / drift
+            load[j] += force[i]
+        self.model.tendon_frictionloss[m : m + len(self.drags)] = self.losses
+        self.model.dof_frictionloss[self.hinges] = drift * (p.joint_friction + p.load_friction * load)
 
-    def lacks_here(self, i: int, j: int, drift: float, stribeck: float, constant: float) -> float:
-        """Share of a tendon's friction that the description lacks; `constant` is that of its preload friction."""
-        if self.truth.hidden == "edge_friction":
-            return float((self.truth.tendon, self.truth.joint) == (i + 1, j + 1))
-        return constant if self.truth.hidden == "preload_friction" else 1 - 1 / (drift * stribeck)
-
-    def stribeck(self, drag: int) -> float:
-        if not self.physics.stribeck:
-            return 1.0
-        share, speed = self.physics.stribeck
-        return float(1 + share * np.exp(-abs(self.data.ten_velocity[self.physics.tendons + drag]) / speed))
+    def lacking(self, t: float) -> Array:
+        """Share of each friction row that the description lacks; MuJoCo has the joints' rows before the tendons'."""
+        truth, drift = self.truth, self.drift(t)
+        joints = [
+            float(truth.joint == j + 1) if truth.hidden == "joint_friction" else 1 - 1 / drift for j in self.rubbing
+        ]
+        tendons = [1 - 1 / factor for factor in self.factors]
+        if truth.hidden == "edge_friction":
+            tendons = [float((truth.tendon, truth.joint) == (i + 1, j + 1)) for i, j in self.drags]
+        elif truth.hidden == "preload_friction":
+            tendons = [constant / loss for constant, loss in zip(self.constants, self.losses, strict=True)]
+        return np.array(joints + tendons)
 
     def disturbance(self, t: float) -> Array:
         """Torques on the joints that MuJoCo has no element for [N·m], as they act."""
@@ -145,10 +151,10 @@ class Runner:
         mujoco.mj_step(self.model, self.data)
         return extra
 
-    def balance(self, q: Array, v: Array, extra: Array) -> tuple[Array, Array]:
-        """What is described and what is hidden [N·m] at the start (q, v) of the step just made."""
+    def balance(self, t: float, q: Array, v: Array, extra: Array) -> tuple[Array, Array]:
+        """What is described and what is hidden [N·m] at the start (t, q, v) of the step just made."""
         d, h, p, truth = self.data, self.hinges, self.physics, self.truth
-        rows = len(self.lacking)
+        rows = len(self.rubbing) + len(self.drags)
         rubbed = d.efc_J.reshape(-1, self.model.nv)[:rows, h] * d.efc_force[:rows, None]
         inertia = np.zeros(self.model.nv)
         mujoco.mj_mulM(self.model, d, inertia, d.qacc)
@@ -158,7 +164,7 @@ class Runner:
         coupled = self.coupled(q)
         bent = self.tension() @ p.arms - (d.qfrc_spring[h] + cover + coupled)  # by arms that are not the described ones
         here = np.array([truth.joint in (None, j + 1) for j in range(p.joints)], float)
-        hidden = -self.lacking @ rubbed + coupled - extra - touching + bent
+        hidden = -self.lacking(t) @ rubbed + coupled - extra - touching + bent
         hidden += weight * bool(p.heavy) + cover * here * (truth.hidden == "cover_stiffness")
         hidden += damping * here * (truth.hidden == "viscous_friction")
         total = -rubbed.sum(axis=0) + coupled - extra - touching + bent + weight + cover + damping + inertia[h]
@@ -176,16 +182,17 @@ def run(physics: Physics, truth: Truth, motion: Motion, seconds: float, rate: fl
     """Simulates and samples; the first SETTLE seconds are left out."""
     runner = Runner(physics, truth)
     data = runner.data
-    data.qpos[runner.hinges] = motion.angles(-SETTLE)
-    data.qpos[runner.motors] = motion.motors(-SETTLE, physics)
+    times = STEP * np.arange(-round(SETTLE / STEP), round(seconds / STEP))
+    motors = motion.motors(times, physics)
+    data.qpos[runner.hinges] = motion.angles(times[:1])[0]
+    data.qpos[runner.motors] = motors[0]
     mujoco.mj_forward(runner.model, data)
     every = round(1 / (rate * STEP))
     rows: list[tuple[Array, ...]] = []
-    for k in range(-round(SETTLE / STEP), round(seconds / STEP)):
-        t = k * STEP
+    for k, t in enumerate(times.tolist(), start=-round(SETTLE / STEP)):
         q, v, x0 = data.qpos[runner.hinges].copy(), data.qvel[runner.hinges].copy(), data.qpos[runner.motors].copy()
-        extra = runner.advance(t, motion.motors(t, physics))
+        extra = runner.advance(t, motors[k + round(SETTLE / STEP)])
         if k >= 0 and k % every == 0:
-            rows.append((np.array([t]), q, runner.tension(), x0, *runner.balance(q, v, extra)))
+            rows.append((np.array([t]), q, runner.tension(), x0, *runner.balance(t, q, v, extra)))
     time, *others = (np.array(column) for column in zip(*rows, strict=True))
     return Trace(time[:, 0], *others)

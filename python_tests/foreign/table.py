@@ -95,7 +95,7 @@ def diagnose(program: str, folder: Path, limit: float) -> Run:
         messages.seek(0)
         said = [line.strip() for line in messages if line.strip()]
     kilobytes = usage.ru_maxrss / (1024 if sys.platform == "darwin" else 1)
-    message = f"ended after {limit:.0f} s" if late.is_set() else (said or [""])[-1]
+    message = f"ended after {limit:g} s" if late.is_set() else (said or [""])[-1]
     return Run(
         None if late.is_set() else process.returncode, message, usage.ru_utime + usage.ru_stime, kilobytes / 1024
     )

@@ -96,6 +96,15 @@ static void derive_joint(derivation* d, const model_item* item) {
   }
 }
 
+/* lanes without a joint have noise too, so that their variances stay finite */
+static void derive_position_noise(derivation* d, const model_item* item) {
+  double* to = d->finger->derived.position_variance;
+  for (size_t j = 0; j < d->finger->joint_lanes; ++j) {
+    const double noise = j < item->count ? d->values[item->first + j] : 1.0;
+    to[j] = noise * noise;
+  }
+}
+
 static void derive_finger(derivation* d, const model_item* item) {
   derived_numbers* to = &d->finger->derived;
   finger_settings* settings = &to->settings;
@@ -118,6 +127,8 @@ static void derive_finger(derivation* d, const model_item* item) {
     case ITEM_CONTACT_THRESHOLD: memcpy(to->contact_threshold, values, bytes); break;
     case ITEM_CONTACT_PER_FORCE: memcpy(to->contact_per_force, values, bytes); break;
     case ITEM_HYSTERESIS: settings->hysteresis = values[0]; break;
+    case ITEM_POSITION_NOISE: derive_position_noise(d, item); break;
+    case ITEM_JERK_DENSITY: settings->jerk_density = values[0]; break;
     default: break; /* extensions read their parameters where they are */
   }
 }
@@ -176,7 +187,7 @@ static int derive_item(void* context, const model_item* item) {
     derive_joint(d, item);
   } else if (item->kind <= ITEM_EDGE_FRICTION) {
     derive_tendon(d, item);
-  } else if (item->kind <= ITEM_HYSTERESIS || item->kind >= ITEM_EXTENSION) {
+  } else if (item->kind <= ITEM_JERK_DENSITY || item->kind >= ITEM_EXTENSION) {
     derive_finger(d, item);
   } else if (item->kind >= ITEM_LINK_AXIS) {
     derive_link(d, item);
@@ -239,6 +250,7 @@ void derive_numbers(tendonfmu_finger* finger, int routing_changed) {
                                                .release_time = -1.0,
                                                .forgets_by_absorption = (options & MODEL_FORGETS_BY_ABSORPTION) != 0,
                                                .remembers_entry_load = (options & MODEL_REMEMBERS_ENTRY_LOAD) != 0,
+                                               .filters_position = (options & MODEL_HAS_POSITION_FILTER) != 0,
                                                .bounds_friction = (options & MODEL_HAS_FRICTION_BOUND) != 0,
                                                .knows_uncertainty = (options & MODEL_HAS_UNCERTAINTY) != 0,
                                                .uses_innovation = (options & MODEL_DETECTS_BY_INNOVATION) != 0};

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "extensions.h"
+#include "extension_signals.h"
 #include "slot_view.h"
 
 /* A number and its derivative along the direction. */
@@ -30,6 +30,8 @@ static dual scaled(double factor, dual a) {
 typedef struct linearisation {
   const tendonfmu_finger* finger;
   dual angle[MODEL_MAX_JOINTS], speed[MODEL_MAX_JOINTS];
+  double motion[MODEL_MAX_JOINTS];  /* slope of what makes the travel: of the held angle with a position filter, else
+                                       speed */
   dual friction[MODEL_MAX_JOINTS];  /* T of eq. (10) */
   dual load[MODEL_MAX_JOINTS];      /* Σ f_B */
   dual bias_step[MODEL_MAX_JOINTS]; /* Δb */
@@ -64,11 +66,18 @@ static void input_direction(const tendonfmu_finger* f, const tendonfmu_inputs* d
 /* angle and velocity along a direction of the signals */
 static void linearise_kinematics(linearisation* l, const signal_derivative* d) {
   const finger_state* s = &l->finger->remembered;
-  const int given = (int)s->scalar[STATE_SOURCE] == TENDONFMU_JOINT_VELOCITIES;
+  const int given = (int)s->scalar[STATE_SOURCE] == TENDONFMU_JOINT_VELOCITIES, filtered = filters_position(l->finger);
   for (size_t j = 0; j < l->finger->joints; ++j) {
-    const double speed = given ? d->velocity[j] : s->scalar[STATE_VELOCITY_GAIN] * d->angle[j];
+    const double gain =
+        filtered ? filter_memory(l->finger, s->filter, FILTER_GAIN_1)[j] : s->scalar[STATE_VELOCITY_GAIN];
+    const double speed = given ? d->velocity[j] : gain * d->angle[j];
     l->angle[j] = (dual){s->angle[j], d->angle[j]};
     l->speed[j] = (dual){s->speed[j], speed};
+    l->motion[j] = speed;
+    if (filtered) {
+      const double carries = filter_memory(l->finger, s->filter, FILTER_CARRIES)[j];
+      l->motion[j] = carries * filter_memory(l->finger, s->filter, FILTER_GAIN_0)[j] * d->angle[j];
+    }
   }
 }
 
@@ -107,13 +116,14 @@ static dual magnitude_at(const effect_laws* laws, int negative, dual speed) {
 }
 
 /* F at the present velocity: 0 where the effect sticks */
-static dual friction_at(const linearisation* l, const effect_laws* laws, size_t slot, double threshold, dual velocity) {
+static dual friction_at(const linearisation* l, const effect_laws* laws, size_t slot, double threshold, dual velocity,
+                        double motion) {
   const finger_state* s = &l->finger->remembered;
   slot_grip grip = {.value = 1.0, .bias = 1.0};
   double slope = 0.0;
   if (l->gripped) {
     grip = slot_grip_of(l->finger, slot);
-    slope = slot_grip_slope(l->finger, slot, velocity.slope, l->memory_slope);
+    slope = slot_grip_slope(l->finger, slot, &(slot_direction){velocity.slope, motion}, l->memory_slope);
   }
   if (grip.slides) {
     const double sign = velocity.value < 0.0 ? -1.0 : 1.0;
@@ -133,7 +143,8 @@ static dual jump_grip(const linearisation* l, size_t slot, dual velocity) {
   if (!l->gripped || grip.slides) {
     return (dual){grip.bias, 0.0};
   }
-  return (dual){grip.bias, slot_grip_slope(l->finger, slot, velocity.slope, l->memory_slope)};
+  /* nothing that acts on b reads the travel */
+  return (dual){grip.bias, slot_grip_slope(l->finger, slot, &(slot_direction){velocity.slope, 0.0}, l->memory_slope)};
 }
 
 /* b of fig. 5 at the last sample */
@@ -185,16 +196,19 @@ static void linearise_tendon(linearisation* l, size_t i, double force_slope) {
   const size_t lanes = f->tendon_lanes;
   const double threshold = f->derived.settings.tendon_threshold;
   dual velocity[MODEL_MAX_JOINTS + 1] = {{0.0, 0.0}};
+  double motion[MODEL_MAX_JOINTS + 1] = {0.0};
   velocity[f->joints] = (dual){0.0, 0.0};
   for (size_t j = f->joints; j-- > 0;) {
-    velocity[j] = sum(velocity[j + 1], scaled(f->derived.moment_arm[j * lanes + i], l->speed[j]));
+    const double arm = f->derived.moment_arm[j * lanes + i];
+    velocity[j] = sum(velocity[j + 1], scaled(arm, l->speed[j]));
+    motion[j] = motion[j + 1] + arm * l->motion[j];
   }
   dual force = {f->remembered.force[i], force_slope}, lost = {0.0, 0.0}, jumped = {0.0, 0.0};
   dual acts = acting(f, i, &force);
   for (size_t j = 0; j < f->joints; ++j) {
     const size_t slot = j * lanes + i;
     const effect_laws edge = edge_laws(l, j, i);
-    const dual edge_loss = product(acts, friction_at(l, &edge, slot, threshold, velocity[j]));
+    const dual edge_loss = product(acts, friction_at(l, &edge, slot, threshold, velocity[j], motion[j]));
     const size_t place = 2 * (i * f->joints + j);
     jumped = sum(jumped, jump_at(l, place, acts, bias_at(l, &edge, slot, threshold, velocity[j])));
     lost = sum(lost, edge_loss);
@@ -203,7 +217,8 @@ static void linearise_tendon(linearisation* l, size_t i, double force_slope) {
     l->load[j] = sum(l->load[j], acts);
     if (j + 1 < f->joints) {
       const effect_laws pulley = {.below = f->derived.pulley_law + (slot + lanes) * LAW_NUMBERS};
-      const dual pulley_loss = product(acts, friction_at(l, &pulley, slot + lanes, threshold, velocity[j + 1]));
+      const dual pulley_loss =
+          product(acts, friction_at(l, &pulley, slot + lanes, threshold, velocity[j + 1], motion[j + 1]));
       const dual bias = bias_at(l, &pulley, slot + lanes, threshold, velocity[j + 1]);
       jumped = sum(jumped, jump_at(l, place + 1, acts, bias));
       lost = sum(lost, pulley_loss);
@@ -226,8 +241,8 @@ static void linearise_joints(linearisation* l) {
   for (size_t j = 0; j < f->joints; ++j) {
     const effect_laws own = {.below = f->derived.joint_law + j * LAW_NUMBERS};
     const effect_laws loaded = {.below = f->derived.load_law + j * LAW_NUMBERS};
-    const dual own_friction = friction_at(l, &own, joint_row + j, threshold, l->speed[j]);
-    const dual load_friction = friction_at(l, &loaded, joint_row + j, threshold, l->speed[j]);
+    const dual own_friction = friction_at(l, &own, joint_row + j, threshold, l->speed[j], l->motion[j]);
+    const dual load_friction = friction_at(l, &loaded, joint_row + j, threshold, l->speed[j], l->motion[j]);
     const dual own_bias = bias_at(l, &own, joint_row + j, threshold, l->speed[j]);
     const dual load_bias = bias_at(l, &loaded, joint_row + j, threshold, l->speed[j]);
     const dual cover = scaled(f->derived.cover_stiffness[j], l->angle[j]);
@@ -339,6 +354,7 @@ void torque_along(const tendonfmu_finger* finger, const state_direction* directi
   for (size_t j = 0; j < finger->joints; ++j) {
     l.angle[j] = (dual){finger->remembered.angle[j], direction->angle[j]};
     l.speed[j] = (dual){finger->remembered.speed[j], direction->speed[j]};
+    l.motion[j] = 0.0; /* it has come into the memory */
   }
   linearise_torques(&l, direction->force);
   for (size_t j = 0; j < finger->joints; ++j) {

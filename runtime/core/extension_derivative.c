@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "directional_derivative.h"
-#include "extensions.h"
+#include "extension_signals.h"
 
 static void add_plain(parameter_derivative* d, uint32_t parameter, const double* torque, const double* jump) {
   for (size_t j = 0; j < d->joints; ++j) {

@@ -107,156 +107,12 @@ const extension_row* extension_of(const tendonfmu_finger* f, uint32_t index) {
   return row;
 }
 
-/* --- signals --------------------------------------------------------------------------------------------------------
- */
-
-static effect_signals signal_direction(const tendonfmu_finger* f, signal_derivative* d) {
-  return (effect_signals){.joints = f->joints,
-                          .tendons = f->tendons,
-                          .source = (int)f->remembered.scalar[STATE_SOURCE],
-                          .force = d->force,
-                          .position = d->position,
-                          .angle = d->angle,
-                          .velocity = d->velocity,
-                          .position_behind = d->position_behind,
-                          .inverse_stiffness = f->derived.inverse_stiffness};
-}
-
-void angles_along(const tendonfmu_finger* f, signal_derivative* d) {
-  if ((int)f->remembered.scalar[STATE_SOURCE] != TENDONFMU_TENDON_POSITIONS) {
-    return;
-  }
-  for (size_t j = 0; j < f->joints; ++j) {
-    for (size_t i = 0; i < f->tendons; ++i) {
-      const double stretch = d->force[i] * f->derived.inverse_stiffness[i];
-      d->angle[j] += f->derived.inverse_routing[j * f->tendon_lanes + i] * (d->position[i] - stretch);
-    }
-  }
-}
-
-void shape_signals(tendonfmu_finger* f, double time, int late) {
-  const finger_scratch* s = &f->scratch;
-  effect_signals signals = {.joints = f->joints,
-                            .tendons = f->tendons,
-                            .first = f->remembered.scalar[STATE_INITIALISED] == 0.0,
-                            .source = (int)f->remembered.scalar[STATE_SOURCE],
-                            .late = late,
-                            .time = time,
-                            .force = s->force,
-                            .position = s->position,
-                            .angle = s->angle,
-                            .velocity = s->velocity + f->joints * f->tendon_lanes,
-                            .inverse_stiffness = f->derived.inverse_stiffness};
-  for (size_t n = 0; n < f->extensions.signals; ++n) {
-    const extension_row* row = signal_row(f, n);
-    row->effect->signal(row->place, row->parameters, &signals, row->memory, row->next);
-  }
-}
-
-static size_t slope_count(const tendonfmu_finger* f) {
-  return 2 * f->joints + f->tendons + f->shape.effect_memory;
-}
-
-const double* signal_slopes(const tendonfmu_finger* f, const extension_row* row, uint32_t k) {
-  return row->slopes + slope_count(f) * k;
-}
-
-static const double* memory_of(const extension_row* row, int in_step) {
-  return in_step ? row->next : row->memory;
-}
-
-void derive_signals(const tendonfmu_finger* f, size_t n, uint32_t k, int in_step, signal_derivative* d) {
-  const double* before = signal_slopes(f, signal_row(f, n), k);
-  memset(d, 0, sizeof *d);
-  effect_signals direction = signal_direction(f, d);
-  if (in_step) {
-    direction.angle_before = before;
-    direction.position_before = before + 2 * f->joints;
-  }
-  for (direction.late = 0; direction.late < 2; ++direction.late) {
-    for (size_t r = direction.late ? 0 : n; r < f->extensions.signals; ++r) {
-      const extension_row* row = signal_row(f, r);
-      if (r == n) {
-        row->effect->signal_slope(row->place, row->parameters, k, memory_of(row, in_step), &direction);
-      } else {
-        row->effect->signal_pass(row->place, row->parameters, memory_of(row, in_step), &direction);
-      }
-    }
-    if (!direction.late) {
-      angles_along(f, d);
-    }
-  }
-}
-
-void pass_signals(const tendonfmu_finger* f, signal_derivative* d, int late) {
-  effect_signals direction = signal_direction(f, d);
-  direction.late = late;
-  for (size_t r = 0; r < f->extensions.signals; ++r) {
-    const extension_row* row = signal_row(f, r);
-    row->effect->signal_pass(row->place, row->parameters, row->memory, &direction);
-  }
-}
-
-void follow_signals(tendonfmu_finger* f, double step, double velocity_gain) {
-  const size_t n = f->joints;
-  const int first = f->remembered.scalar[STATE_INITIALISED] == 0.0;
-  const int given = (int)f->remembered.scalar[STATE_SOURCE] == TENDONFMU_JOINT_VELOCITIES;
-  const double share = velocity_gain * step;
-  signal_derivative d;
-  for (size_t r = 0; r < f->extensions.signals; ++r) {
-    const extension_row* row = signal_row(f, r);
-    for (uint32_t k = 0; k < row->effect->parameter_count; ++k) {
-      const double* before = signal_slopes(f, row, k);
-      double* next = row->next_slopes + slope_count(f) * k;
-      derive_signals(f, r, k, 1, &d);
-      for (size_t j = 0; j < n; ++j) {
-        const double filtered = before[n + j] + velocity_gain * (d.angle[j] - before[j]) - share * before[n + j];
-        next[j] = d.angle[j];
-        next[n + j] = given ? d.velocity[j] : first ? 0.0 : filtered;
-      }
-      memcpy(next + 2 * n, d.position_behind, f->tendons * sizeof(double));
-    }
-  }
-}
-
 /* --- what the others remember ---------------------------------------------------------------------------------------
  */
 
-/* what number k of a signal row makes of what the others remember */
-static void follow_memory(const tendonfmu_finger* f, const extension_row* signal, uint32_t k) {
-  const size_t n = f->joints, lanes = f->tendon_lanes;
-  const size_t others = 2 * n + f->tendons;
-  const double* before = signal_slopes(f, signal, k) + others;
-  double *angle = signal->next_slopes + slope_count(f) * k, *after = angle + others;
-  double tendon_velocity[MODEL_MAX_JOINTS * MODEL_MAX_TENDONS];
-  for (size_t i = 0; i < lanes; ++i) {
-    double sum = 0.0;
-    for (size_t j = n; j-- > 0;) {
-      sum += f->derived.moment_arm[j * lanes + i] * angle[n + j];
-      tendon_velocity[j * lanes + i] = sum;
-    }
-  }
-  const effect_direction direction = {.angle = angle, .velocity = angle + n, .tendon_velocity = tendon_velocity};
-  for (size_t r = f->extensions.signals; r < f->shape.extension_count; ++r) {
-    const extension_row* row = f->extensions.row + r;
-    if (row->effect->advance_slope) {
-      row->effect->advance_slope(row->place, row->parameters, &f->scratch.sample, row->memory, &direction,
-                                 before + row->offset, after + row->offset);
-    }
-  }
-}
-
-static void follow_memories(const tendonfmu_finger* f) {
-  for (size_t r = 0; r < f->extensions.signals; ++r) {
-    const extension_row* row = signal_row(f, r);
-    for (uint32_t k = 0; k < row->effect->parameter_count; ++k) {
-      follow_memory(f, row, k);
-    }
-  }
-}
-
 void advance_extensions(tendonfmu_finger* f, double time, double step) {
   const finger_scratch* s = &f->scratch;
+  const int travels = filters_position(f);
   f->scratch.sample = (effect_sample){.joints = f->joints,
                                       .tendons = f->tendons,
                                       .lanes = f->tendon_lanes,
@@ -267,6 +123,8 @@ void advance_extensions(tendonfmu_finger* f, double time, double step) {
                                       .angle = s->angle,
                                       .velocity = s->velocity + f->joints * f->tendon_lanes,
                                       .tendon_velocity = s->velocity,
+                                      .travel = travels ? s->travel + f->joints * f->tendon_lanes : NULL,
+                                      .tendon_travel = travels ? s->travel : NULL,
                                       .force = s->force,
                                       .moment_arm = f->derived.moment_arm,
                                       .rest_angle = f->derived.cover_rest,
@@ -279,7 +137,6 @@ void advance_extensions(tendonfmu_finger* f, double time, double step) {
       row->effect->advance(row->place, row->parameters, &s->sample, row->memory, row->next);
     }
   }
-  follow_memories(f);
 }
 
 effect_sample remembered_sample(const tendonfmu_finger* f) {
@@ -356,7 +213,8 @@ slot_grip slot_grip_of(const tendonfmu_finger* f, size_t slot) {
   return found;
 }
 
-double slot_grip_slope(const tendonfmu_finger* f, size_t slot, double velocity_slope, const double* memory_slope) {
+double slot_grip_slope(const tendonfmu_finger* f, size_t slot, const slot_direction* direction,
+                       const double* memory_slope) {
   double value = 1.0, slope = 0.0;
   for (size_t r = 0; r < f->extensions.friction; ++r) {
     const extension_row* row = friction_row(f, r);
@@ -365,7 +223,7 @@ double slot_grip_slope(const tendonfmu_finger* f, size_t slot, double velocity_s
       continue;
     }
     const effect_grip own = row->effect->grip(row->place, row->parameters, row->memory, member);
-    double own_slope = own.by_velocity * velocity_slope;
+    double own_slope = own.by_velocity * direction->velocity + own.by_motion * direction->motion;
     if (memory_slope && row->effect->advance_slope) {
       own_slope = row->effect->grip(row->place, row->parameters, memory_slope + row->offset, member).value;
     }

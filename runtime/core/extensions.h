@@ -44,9 +44,16 @@ typedef struct slot_grip {
 } slot_grip;
 slot_grip slot_grip_of(const tendonfmu_finger* finger, size_t slot);
 
-/* Derivative of its value along a direction of its velocity, and of what the effects remember [effect_memory]; NULL:
- * what they remembered at the sample before is held fixed. */
-double slot_grip_slope(const tendonfmu_finger* finger, size_t slot, double velocity_slope, const double* memory_slope);
+/* A direction of what a slot's effects see: its velocity, and what makes its travel, with a position filter the travel
+ * itself, else the velocity. */
+typedef struct slot_direction {
+  double velocity, motion;
+} slot_direction;
+
+/* Derivative of its value along a direction, and of what the effects remember [effect_memory]; NULL: what they
+ * remembered at the sample before is held fixed. */
+double slot_grip_slope(const tendonfmu_finger* finger, size_t slot, const slot_direction* direction,
+                       const double* memory_slope);
 
 /* Side of the law of a slot that never sticks: 1 where it is the one for v < 0. */
 static inline int sliding_side(double velocity, double threshold, double side) {
@@ -54,12 +61,6 @@ static inline int sliding_side(double velocity, double threshold, double side) {
 }
 
 /* --- a step, in this order ---------------------------------------------------------------------------------------- */
-
-/* Signals in scratch, before the joint angles are known (late 0) and after (late 1); time of the sample, s. */
-void shape_signals(tendonfmu_finger* finger, double time, int late);
-
-/* ∂q and ∂q̇ by the numbers of the signal rows; the velocities are known. velocity_gain: ∂q̇/∂q of this sample. */
-void follow_signals(tendonfmu_finger* finger, double step, double velocity_gain);
 
 /* What every other effect will remember; angles, velocities and forces are known. */
 void advance_extensions(tendonfmu_finger* finger, double time, double step);
@@ -75,29 +76,6 @@ void add_extension_torques(tendonfmu_finger* finger);
 
 /* The sample is accepted. */
 void remember_extensions(tendonfmu_finger* finger);
-
-/* --- derivatives of the signals ----------------------------------------------------------------------------------- */
-
-/* A direction in the space of the signals, or what the effects make of one. */
-typedef struct signal_derivative {
-  double force[MODEL_MAX_TENDONS], position[MODEL_MAX_TENDONS], angle[MODEL_MAX_JOINTS], velocity[MODEL_MAX_JOINTS];
-  double position_behind[MODEL_MAX_TENDONS]; /* behind the play of a tendon */
-} signal_derivative;
-
-/* Adds what position and force make of the joint angles, where these come from them. */
-void angles_along(const tendonfmu_finger* finger, signal_derivative* derivative);
-
-/* By number k of the n-th signal row; velocity with source 3 only. in_step: of the sample being taken, else of the one
- * last remembered. */
-void derive_signals(const tendonfmu_finger* finger, size_t n, uint32_t k, int in_step, signal_derivative* derivative);
-
-/* By number k of a signal row, at the sample last remembered: [n] ∂q, [n] ∂q̇, [m] ∂z behind the play of
- * a tendon, [effect_memory]. */
-const double* signal_slopes(const tendonfmu_finger* finger, const extension_row* row, uint32_t k);
-
-/* Turns a direction of the inputs into that of what the signal rows made of them, at the sample last remembered; before
- * (late 0) and after the joint angles are known. */
-void pass_signals(const tendonfmu_finger* finger, signal_derivative* derivative, int late);
 
 /* --- of the sample last remembered -------------------------------------------------------------------------------- */
 

@@ -59,6 +59,7 @@ static void lay_out_derived(tendonfmu_finger* f, cursor* c) {
   d->load_law = take_numbers(c, joints * LAW_NUMBERS);
   d->cover_stiffness = take_numbers(c, joints);
   d->cover_rest = take_numbers(c, joints);
+  d->position_variance = take_numbers(c, f->shape.options & MODEL_HAS_POSITION_FILTER ? joints : 0);
   d->contact_threshold = take_numbers(c, joints);
   d->contact_per_force = take_numbers(c, joints);
   d->initial_torque = take_numbers(c, joints);
@@ -90,8 +91,9 @@ static void lay_out_state(tendonfmu_finger* f, cursor* c) {
   const size_t joints = f->joint_lanes, tendons = f->tendon_lanes, slots = f->slots;
   const size_t entries = f->shape.options & MODEL_REMEMBERS_ENTRY_LOAD ? slots : 0;
   const size_t parts = f->shape.options & MODEL_HAS_UNCERTAINTY ? f->joints * tendons + 3 * joints : 0;
+  const size_t filter = f->shape.options & MODEL_HAS_POSITION_FILTER ? FILTER_ROWS * joints : 0;
   f->state_count =
-      STATE_SCALARS + 17 * joints + 2 * tendons + 6 * slots + 2 * entries + parts + f->shape.extension_memory;
+      STATE_SCALARS + 17 * joints + 2 * tendons + 6 * slots + 2 * entries + parts + filter + f->shape.extension_memory;
   f->state = take_numbers(c, f->state_count);
   double* run = f->state;
   s->scalar = part(&run, STATE_SCALARS);
@@ -111,6 +113,7 @@ static void lay_out_state(tendonfmu_finger* f, cursor* c) {
   s->entry_edge = part(&run, entries);
   s->entry_pulley = part(&run, entries);
   s->part = part(&run, parts);
+  s->filter = part(&run, filter);
   s->extension = run;
 }
 
@@ -136,6 +139,9 @@ static void lay_out_scratch(tendonfmu_finger* f, cursor* c) {
     *slot_rows[i] = take_numbers(c, f->slots);
   }
   s->part = take_numbers(c, matrix + 3 * f->joint_lanes);
+  const int filtered = (f->shape.options & MODEL_HAS_POSITION_FILTER) != 0;
+  s->filter = take_numbers(c, filtered ? FILTER_ROWS * f->joint_lanes : 0);
+  s->travel = take_numbers(c, filtered ? f->slots : 0);
   s->velocity = take_numbers(c, f->slots);
   s->view = take(c, f->slots / 4 * sizeof *s->view);
 }

@@ -29,6 +29,8 @@ typedef struct finger_settings {
   double noise_time;       /* < 0: noise per sample */
   int has_initial_torque;
   double hysteresis;
+  int filters_position;
+  double jerk_density; /* rad²/s⁵ */
   int forgets_by_absorption, remembers_entry_load;
   /* the detector */
   int bounds_friction, knows_uncertainty, uses_innovation;
@@ -79,6 +81,7 @@ typedef struct derived_numbers {
   double *cover_stiffness, *cover_rest;                /* [N] */
   double *contact_threshold, *contact_per_force;       /* [N] */
   double* initial_torque;                              /* [N] */
+  double* position_variance;                           /* [N] rad², with a position filter only; 1 in spare lanes */
   double *innovation_threshold, *innovation_per_force; /* [N] */
   double *deviation, *deviation_per_force;             /* [N] */
   double* direction;   /* [n × (m + 3) × 4] relative errors, the directions of a joint side by side */
@@ -100,6 +103,26 @@ enum {
   STATE_ABSORBED_BEFORE, /* the same before the last sample's update */
   STATE_SCALARS = 12     /* the rest is 0 and keeps the rows aligned */
 };
+
+#define LONGEST_FILTER_STEP 1.0 /* s; after a longer one the position filter begins anew */
+
+/* Rows of joints that the position filter remembers, beside the velocity. */
+typedef enum filter_row_kind {
+  FILTER_ANGLE,        /* x, rad */
+  FILTER_ACCELERATION, /* a, rad/s² */
+  FILTER_HELD_ANGLE,   /* z behind the gate, rad */
+  FILTER_P00,          /* covariance of x, v, a */
+  FILTER_P01,
+  FILTER_P02,
+  FILTER_P11,
+  FILTER_P12,
+  FILTER_P22,
+  FILTER_GAIN_0, /* ∂x/∂q, ∂v/∂q, ∂a/∂q of the last sample; 0 of the first */
+  FILTER_GAIN_1,
+  FILTER_GAIN_2,
+  FILTER_CARRIES, /* ∂z/∂x of the last sample: 1 or 0 */
+  FILTER_ROWS
+} filter_row_kind;
 
 typedef struct finger_state {
   double* scalar; /* [STATE_SCALARS] */
@@ -124,6 +147,7 @@ typedef struct finger_state {
   double *entry_edge,
       *entry_pulley; /* e, as the effects came to rest: N; of joints T_jv0 and T_jvf·Σ f_B, N·m; with entry_load only */
   double* part;      /* [n × M + 3N] torques of tendons; T_jv0, T_jvf·Σ f_B, T_jq; with uncertainty only */
+  double* filter;    /* [FILTER_ROWS × N] with a position filter only */
   double* extension; /* as the extensions ask for */
 } finger_state;
 
@@ -157,6 +181,8 @@ typedef struct finger_scratch {
   double *edge_stuck, *pulley_stuck;    /* [n × M + N] |F| where the effect sticks, 0 elsewhere; joints T_jv0, T_jvf */
   double *stuck_friction, *uncertainty; /* [N] H of what sticks now, u */
   double* part;                         /* as in the state */
+  double* filter;                       /* as in the state, after this sample */
+  double* travel;                       /* [n × M + N] of what slides, by the position filter: m, rad; with it only */
   double* extension;                    /* the memory of the extensions after this sample */
   double *grip, *bias_grip, *slides;    /* [n × M + N] what friction rows make of F and b, 1 where a slot never sticks;
                                            with    such rows only */
@@ -183,6 +209,15 @@ struct tendonfmu_finger {
   void* allocation; /* of tendonfmu_create(), NULL in the caller's memory */
   char error[ERROR_BYTES];
 };
+
+/* 1 where the velocity comes from the position filter; then its row of the filter in memory */
+static inline int filters_position(const tendonfmu_finger* finger) {
+  return finger->derived.settings.filters_position &&
+         (int)finger->remembered.scalar[STATE_SOURCE] != TENDONFMU_JOINT_VELOCITIES;
+}
+static inline const double* filter_memory(const tendonfmu_finger* finger, const double* filter, filter_row_kind row) {
+  return filter + (size_t)row * finger->joint_lanes;
+}
 
 /* Exponent of forgetting of a slot at the last sample: exp(−this) of what it brought along when it came to rest counted
  * when it began to move. */

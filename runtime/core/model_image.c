@@ -96,6 +96,8 @@ static void walk_finger(walk* w) {
       {ITEM_CONTACT_THRESHOLD, n},
       {ITEM_CONTACT_PER_FORCE, n},
       {ITEM_HYSTERESIS, options & MODEL_HAS_HYSTERESIS ? 1 : 0},
+      {ITEM_POSITION_NOISE, options & MODEL_HAS_POSITION_FILTER ? n : 0},
+      {ITEM_JERK_DENSITY, options & MODEL_HAS_POSITION_FILTER ? 1 : 0},
   };
   emit_all(w, items, sizeof items / sizeof items[0]);
 }
@@ -157,8 +159,9 @@ static size_t own_memory(const effect_type* effect, const model_shape* shape, ef
 }
 
 size_t model_extension_memory(const effect_type* effect, const model_shape* shape, effect_place place) {
+  const size_t joint_rows = shape->options & MODEL_HAS_POSITION_FILTER ? 5 : 2;
   const size_t slopes =
-      effect->kind == EFFECT_SIGNAL ? 2 * (size_t)shape->joints + shape->tendons + shape->effect_memory : 0;
+      effect->kind == EFFECT_SIGNAL ? joint_rows * shape->joints + shape->tendons + shape->effect_memory : 0;
   return own_memory(effect, shape, place) + slopes * effect->parameter_count;
 }
 
@@ -270,7 +273,7 @@ static int read_counts(const void* image, size_t image_size, model_shape* shape,
     return refuse_value(message, "model image: extensions", shape->extension_count, "at most 1024");
   }
   if (shape->options & ~(uint32_t)MODEL_OPTION_BITS) {
-    return refuse_value(message, "model image: option bits", shape->options, "0 to 131071");
+    return refuse_value(message, "model image: option bits", shape->options, "0 to 262143");
   }
   if (check_options(shape)) {
     return refuse_value(message, "model image: option bits", shape->options, "ones that go together");

@@ -56,7 +56,8 @@ enum {
   MODEL_HAS_RELEASE = 1 << 14,
   MODEL_HAS_RELEASE_TIME = 1 << 15,
   MODEL_HAS_LINKS = 1 << 16,
-  MODEL_OPTION_BITS = (1 << 17) - 1
+  MODEL_HAS_POSITION_FILTER = 1 << 17,
+  MODEL_OPTION_BITS = (1 << 18) - 1
 };
 
 #define MODEL_EDGE_HAS_ANGLES 0x80000000u
@@ -99,6 +100,8 @@ typedef enum model_item_kind {
   ITEM_CONTACT_THRESHOLD,    /* n */
   ITEM_CONTACT_PER_FORCE,    /* n */
   ITEM_HYSTERESIS,           /* velocity_threshold.hysteresis */
+  ITEM_POSITION_NOISE,       /* n, position_filter.noise */
+  ITEM_JERK_DENSITY,         /* position_filter.jerk_density */
   ITEM_INNOVATION_TIME,      /* contact.… from here on */
   ITEM_INNOVATION_THRESHOLD, /* n */
   ITEM_INNOVATION_PER_FORCE, /* n */
@@ -137,7 +140,8 @@ typedef struct model_item {
 int model_visit(const model_shape* shape, int (*visit)(void* context, const model_item* item), void* context);
 
 /* Where row `index` of the extensions acts, and how many numbers it remembers: its own, and, where it changes signals,
- * by each of its numbers ∂q and ∂q̇ of every joint, ∂z of every tendon and the derivative of all effect_memory. */
+ * by each of its numbers ∂q and ∂q̇ of every joint, ∂z of every tendon, the derivative of all effect_memory, and with a
+ * position filter that of three rows of joints. */
 effect_place model_extension_place(const model_shape* shape, uint32_t index);
 size_t model_extension_memory(const effect_type* effect, const model_shape* shape, effect_place place);
 

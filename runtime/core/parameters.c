@@ -72,6 +72,8 @@ static void path_of_finger(message_line path, const model_item* item, uint32_t o
       [ITEM_CONTACT_THRESHOLD] = "contact.threshold",
       [ITEM_CONTACT_PER_FORCE] = "contact.threshold_per_force",
       [ITEM_HYSTERESIS] = "velocity_threshold.hysteresis",
+      [ITEM_POSITION_NOISE] = "position_filter.noise",
+      [ITEM_JERK_DENSITY] = "position_filter.jerk_density",
       [ITEM_INNOVATION_TIME] = "contact.innovation.time",
       [ITEM_INNOVATION_THRESHOLD] = "contact.innovation.threshold",
       [ITEM_INNOVATION_PER_FORCE] = "contact.innovation.threshold_per_force",
@@ -89,6 +91,7 @@ static void path_of_finger(message_line path, const model_item* item, uint32_t o
   };
   switch (item->kind) {
     case ITEM_INITIAL_TORQUE:
+    case ITEM_POSITION_NOISE:
     case ITEM_CONTACT_THRESHOLD:
     case ITEM_CONTACT_PER_FORCE:
     case ITEM_INNOVATION_THRESHOLD:
@@ -215,6 +218,8 @@ parameter_range parameter_range_of(const model_item* item, uint32_t index) {
       [ITEM_CONTACT_THRESHOLD] = {"N.m", 0.0, LARGE, 0, 1},
       [ITEM_CONTACT_PER_FORCE] = {"m", 0.0, LARGE, 0, 1},
       [ITEM_HYSTERESIS] = {"1", 0.0, 1.0, 0, 1},
+      [ITEM_POSITION_NOISE] = {"rad", 1e-6, 1e3, 0, 1}, /* below, the filter's variances would drown in rounding */
+      [ITEM_JERK_DENSITY] = {"rad2/s5", 0.0, LARGE, 1, 1},
       [ITEM_INNOVATION_TIME] = {"s", 0.0, LARGE, 1, 1},
       [ITEM_INNOVATION_THRESHOLD] = {"N.m", 0.0, LARGE, 0, 1},
       [ITEM_INNOVATION_PER_FORCE] = {"m", 0.0, LARGE, 0, 1},

@@ -87,6 +87,10 @@ HOT_INLINE quad quad_min(quad a, quad b) {
   return _mm256_min_pd(a, b);
 }
 
+HOT_INLINE quad quad_sqrt(quad a) {
+  return _mm256_sqrt_pd(a);
+}
+
 HOT_INLINE double quad_sum(quad a) {
   const __m128d s = _mm_add_pd(_mm256_castpd256_pd128(a), _mm256_extractf128_pd(a, 1));
   return _mm_cvtsd_f64(_mm_add_sd(s, _mm_unpackhi_pd(s, s)));

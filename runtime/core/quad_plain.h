@@ -3,6 +3,7 @@
 #ifndef TENDONFMU_QUAD_H
 #define TENDONFMU_QUAD_H
 
+#include <math.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -150,6 +151,11 @@ HOT_INLINE quad quad_drop(quad_mask m, quad a) {
 /* the smaller one; neither is NaN */
 HOT_INLINE quad quad_min(quad a, quad b) {
   QUAD_EACH(a.lane[i] = a.lane[i] < b.lane[i] ? a.lane[i] : b.lane[i]);
+  return a;
+}
+
+HOT_INLINE quad quad_sqrt(quad a) {
+  QUAD_EACH(a.lane[i] = sqrt(a.lane[i]));
   return a;
 }
 

@@ -97,6 +97,12 @@ HOT_INLINE quad quad_min(quad a, quad b) {
   return QUAD_BOTH_HALVES(_mm_min_pd, a, b);
 }
 
+HOT_INLINE quad quad_sqrt(quad a) {
+  a.low = _mm_sqrt_pd(a.low);
+  a.high = _mm_sqrt_pd(a.high);
+  return a;
+}
+
 HOT_INLINE double quad_sum(quad a) {
   const __m128d s = _mm_add_pd(a.low, a.high);
   return _mm_cvtsd_f64(_mm_add_sd(s, _mm_unpackhi_pd(s, s)));

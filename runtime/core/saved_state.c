@@ -134,9 +134,23 @@ static int slots_are_sound(const tendonfmu_finger* f, const unsigned char* state
       {s->stuck_since, slots, ROW_OF_SLOTS, absorbs ? 0.0 : -LARGEST_TIME, absorbs ? LARGEST_SQUARE : LARGEST_TIME, 0,
        1},
       {s->last_stuck, slots, ROW_OF_SLOTS, -LARGEST_TIME, LARGEST_TIME, 0, 1},
-      {s->entry_edge, rest, ROW_WITHOUT_LANES, -DBL_MAX, DBL_MAX, 0, 0}, /* entries, parts, extensions */
+      {s->entry_edge, rest, ROW_WITHOUT_LANES, -DBL_MAX, DBL_MAX, 0, 0}, /* entries, parts, filter, extensions */
   };
   return rows_are_sound(f, state, rules, sizeof rules / sizeof rules[0]);
+}
+
+static int filter_is_sound(const tendonfmu_finger* f, const unsigned char* state) {
+  const size_t n = f->joint_lanes;
+  for (size_t row = 0; f->derived.settings.filters_position && row < FILTER_ROWS; ++row) {
+    const int variance = row == FILTER_P00 || row == FILTER_P11 || row == FILTER_P22, flag = row == FILTER_CARRIES;
+    const int estimate = row <= FILTER_HELD_ANGLE || flag;
+    const row_rule rule = {f->remembered.filter + row * n, n,    ROW_OF_JOINTS, variance || flag ? 0.0 : -DBL_MAX,
+                           flag ? 1.0 : DBL_MAX,           flag, !estimate};
+    if (!row_is_sound(f, state, &rule)) {
+      return 0;
+    }
+  }
+  return 1;
 }
 
 /* nothing has rested for less than no time: exponents of forgetting are not negative */
@@ -169,7 +183,7 @@ static int check_bytes(tendonfmu_finger* f, const unsigned char* from, message_l
   }
   const unsigned char* state = from + HEADER_BYTES + 8 * p;
   if (!scalars_are_sound(f, state) || !joints_are_sound(f, state) || !slots_are_sound(f, state) ||
-      !rests_are_sound(f, state)) {
+      !filter_is_sound(f, state) || !rests_are_sound(f, state)) {
     return refuse(message, "damaged saved state: a number in it cannot be");
   }
   load_doubles(f->candidate, from + HEADER_BYTES, p);

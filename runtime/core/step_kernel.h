@@ -5,10 +5,11 @@
 
 #include "bias_tracker.h"
 #include "contact_detector.h"
-#include "extensions.h"
+#include "extension_signals.h"
 #include "force_propagation.h"
 #include "kernel_choice.h"
 #include "kinematics.h"
+#include "position_filter.h"
 
 HOT_INLINE int is_first(const tendonfmu_finger* f) {
   return f->remembered.scalar[STATE_INITIALISED] == 0.0;
@@ -37,7 +38,7 @@ HOT_INLINE int inputs_in_range(const tendonfmu_finger* f) {
           row_in_range(s->velocity + f->joints * f->tendon_lanes, f->joint_lanes));
 }
 
-/* joint angles and all velocities, into scratch; returns ∂v/∂q of this sample (1/s) */
+/* joint angles and all velocities, into scratch; returns ∂v/∂q of this sample (1/s), 0 with a position filter */
 HOT_INLINE double find_kinematics(tendonfmu_finger* f, double time, double step) {
   const finger_scratch* s = &f->scratch;
   double* joint_velocity = s->velocity + f->joints * f->tendon_lanes;
@@ -49,7 +50,12 @@ HOT_INLINE double find_kinematics(tendonfmu_finger* f, double time, double step)
   if (f->extensions.signals) {
     shape_signals(f, time, 1);
   }
-  if (source != TENDONFMU_JOINT_VELOCITIES) {
+  if (filters_position(f)) {
+    filter_positions(f, s->angle, step, joint_velocity, s->travel + f->joints * f->tendon_lanes);
+    if (f->extensions.friction) {
+      relative_velocities(f, s->travel);
+    }
+  } else if (source != TENDONFMU_JOINT_VELOCITIES) {
     if (is_first(f)) {
       for (size_t j = 0; j < f->joint_lanes; ++j) {
         joint_velocity[j] = 0.0;
@@ -94,7 +100,7 @@ HOT_INLINE int all_finite(const tendonfmu_finger* f) {
   for (size_t k = 0; k < f->shape.extension_memory; ++k) {
     probe += 0.0 * s->extension[k];
   }
-  return probe == 0.0;
+  return probe == 0.0 && (!filters_position(f) || filter_is_finite(f));
 }
 
 HOT_INLINE void copy_row(double* to, const double* from, size_t lanes) {
@@ -144,6 +150,9 @@ HOT_INLINE void remember_sample(tendonfmu_finger* f, double time, double velocit
   }
   if (f->derived.settings.knows_uncertainty) {
     copy_row(s->part, f->scratch.part, f->joints * f->tendon_lanes + 3 * f->joint_lanes);
+  }
+  if (filters_position(f)) {
+    copy_row(s->filter, f->scratch.filter, FILTER_ROWS * f->joint_lanes);
   }
   if (f->shape.extension_count) {
     remember_extensions(f);
@@ -220,6 +229,7 @@ static sample_result take_sample(tendonfmu_finger* f, double time) {
   if (f->shape.extension_count) {
     follow_signals(f, step, velocity_gain);
     advance_extensions(f, time, step);
+    follow_memories(f);
   }
   speed_thresholds(f, first);
   const int transitions = friction_values(f);

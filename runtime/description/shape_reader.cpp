@@ -256,6 +256,15 @@ std::uint32_t read_contact_options(const json_node& contact, std::uint32_t joint
          given(contact, {"release_time"}, MODEL_HAS_RELEASE_TIME);
 }
 
+std::uint32_t read_position_filter(const json_node& filter, std::uint32_t joints) {
+  if (filter.absent()) {
+    return 0u;
+  }
+  filter.expect_keys({"noise", "jerk_density"});
+  filter.member("noise").expect_list(joints, joints, "numbers in rad, one per joint");
+  return MODEL_HAS_POSITION_FILTER;
+}
+
 std::uint32_t read_links(const json_node& document, std::uint32_t joints) {
   const json_node links = document.member("links"), tip = document.member("tip");
   if (links.absent()) {
@@ -275,8 +284,8 @@ std::uint32_t read_links(const json_node& document, std::uint32_t joints) {
 }
 
 void check_top(const json_node& document) {
-  document.expect_keys({"format", "name", "joints", "tendons", "velocity_threshold", "velocity_filter_cutoff", "bias",
-                        "contact", "extensions", "links", "tip"});
+  document.expect_keys({"format", "name", "joints", "tendons", "velocity_threshold", "velocity_filter_cutoff",
+                        "position_filter", "bias", "contact", "extensions", "links", "tip"});
   const json_node format = document.member("format");
   if (format.absent() || format.value() != format_name) {
     format.refuse("\"" + std::string(format_name) + "\"");
@@ -307,6 +316,7 @@ finger_shape read_shape(const json_node& document) {
   finger.shape.options = read_bias_options(document.member("bias"), finger.shape.joints) |
                          read_contact_options(document.member("contact"), finger.shape.joints, finger.shape.tendons) |
                          given(document.member("velocity_threshold"), {"hysteresis"}, MODEL_HAS_HYSTERESIS) |
+                         read_position_filter(document.member("position_filter"), finger.shape.joints) |
                          read_links(document, finger.shape.joints);
   read_extensions(document.member("extensions"), finger.shape.joints, finger.shape.tendons, finger.extensions);
   finger.shape.extension_count = static_cast<std::uint32_t>(finger.extensions.size() / MODEL_EXTENSION_WORDS);

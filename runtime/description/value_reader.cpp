@@ -34,6 +34,8 @@ std::optional<double> default_value(const model_item& item, std::uint32_t offset
     case ITEM_LINK_OFFSET:
     case ITEM_UNCERTAINTY: return 0.0; /* joints with fewer directions than others */
     case ITEM_JUMP_TIME: return 0.06;
+    case ITEM_JERK_DENSITY:
+      return 1.0; /* a hand: least friction error on two families of fingers, docs/contract-additions.md */
     case ITEM_UNCERTAINTY_LEVEL: return 3.0;
     case ITEM_RELEASE_RATIO: return 1.0;
     case ITEM_EXTENSION:

@@ -40,7 +40,7 @@ typedef enum tendonfmu_status {
 
 typedef enum tendonfmu_kinematics_source {
   TENDONFMU_TENDON_POSITIONS = 1, /* q = R⁺(x0 − f0/k), q̇ by the velocity filter (eqs. 2, 4) */
-  TENDONFMU_JOINT_POSITIONS = 2,  /* q measured, q̇ by the velocity filter */
+  TENDONFMU_JOINT_POSITIONS = 2,  /* q measured, q̇ by the velocity or position filter */
   TENDONFMU_JOINT_VELOCITIES = 3  /* q and q̇ measured */
 } tendonfmu_kinematics_source;
 

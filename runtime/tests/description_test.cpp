@@ -91,6 +91,15 @@ TEST(Description, MinimalOneHasTheDefaults) {
   EXPECT_EQ(tendonfmu_parameter_count(finger.handle()), 11u);
 }
 
+TEST(Description, PositionFilter) {
+  EXPECT_FALSE(Described(small_finger()).has("position_filter.jerk_density"));
+  Described finger(with("/position_filter", {{"noise", {1e-4, 2e-4}}}));
+  EXPECT_EQ(finger["position_filter.noise[1]"], 1e-4);
+  EXPECT_EQ(finger["position_filter.noise[2]"], 2e-4);
+  EXPECT_EQ(finger["position_filter.jerk_density"], 1.0);
+  EXPECT_EQ(read(with("/position_filter", nullptr)).image, read(small_finger()).image);
+}
+
 TEST(Description, ViscousAndRestAngleDefaultToZero) {
   json finger = small_finger();
   finger["joints"][0]["cover"].erase("rest_angle");

@@ -306,7 +306,7 @@ TEST(DetectionKeys, OptionsThatDoNotGoTogetherAreRefused) {
   EXPECT_TRUE(refused_with(options & ~std::uint32_t{MODEL_HAS_UNCERTAINTY}));
   EXPECT_TRUE(refused_with(options | MODEL_UNCERTAINTY_DIRECTIONS)); /* seven directions */
   EXPECT_TRUE(refused_with(options & ~std::uint32_t{MODEL_DETECTS_BY_INNOVATION}));
-  EXPECT_TRUE(refused_with(options | 1u << 17));
+  EXPECT_TRUE(refused_with(options | 1u << 18));
 }
 
 // Every bit of the options, under a right checksum: refused, or a finger that takes samples.

@@ -428,7 +428,7 @@ TEST(Friction, BuildsUpEverywhereByThresholds) {
     const double ratio = sample.velocity[j] * 0.01 / (0.1 * 0.01), left = std::exp(-std::fabs(ratio));
     EXPECT_NEAR(grip_at(joints * tendons + j).value, std::copysign(1.0 - left, ratio), 1e-15);
     EXPECT_NEAR(grip_at(joints * tendons + j).by_parameter[0], -left * ratio / 0.1, 1e-13);
-    EXPECT_NEAR(grip_at(joints * tendons + j).by_velocity, left * 0.01 / (0.1 * 0.01), 1e-12);
+    EXPECT_NEAR(grip_at(joints * tendons + j).by_motion, left * 0.01 / (0.1 * 0.01), 1e-12);
   }
 }
 

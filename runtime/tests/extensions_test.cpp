@@ -14,7 +14,7 @@
 
 extern "C" {
 #include "bytes.h"
-#include "extensions.h"
+#include "extension_signals.h"
 }
 
 namespace {

@@ -55,9 +55,11 @@ inline std::string every_key() {
   return text;
 }
 
-// And with every effect of docs/extensions.md, at every kind of place.
+// And with a position filter and every effect of docs/extensions.md, at every kind of place.
 inline std::string every_effect() {
   std::string text = every_key();
+  const std::string name = "\"name\": \"test\",";
+  text.insert(text.find(name) + name.size(), R"("position_filter": {"noise": [2e-4, 3e-4], "jerk_density": 1e4},)");
   const std::string list = "\"extensions\": [";
   text.insert(text.find(list) + list.size(), R"({"effect": "gravity", "joint": 2, "sine": 0.02, "cosine": -0.03},
     {"effect": "inertia", "joint": 1, "inertia": 1e-4}, {"effect": "joint_coupling", "joint": 1, "stiffness": 0.05},

@@ -14,6 +14,7 @@ from tendonfmu.effects.friction_law_places import law_path, passes
 from tendonfmu.friction_places import effects
 
 _NARROW = 0.02  # rad; less motion of the joint before says nothing of an angle's influence
+_FARTHEST = 1e5  # rad; no joint turns as far
 _EXPECTED = 0.3  # of the friction, from the middle of the range to its end
 _ANGLES = ("angle_low", "angle_middle", "angle_high")
 
@@ -33,7 +34,7 @@ def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
     if place not in _edges(data):
         return [{}]
     low, high = (float(each) for each in span.angle[(place.joint or 2) - 2])
-    if not high - low > _NARROW:
+    if not high - low > _NARROW or max(abs(low), abs(high)) > _FARTHEST:
         return []
     return [dict(zip(_ANGLES, np.linspace(low, high, 3).tolist(), strict=True))]
 

@@ -50,23 +50,26 @@ static inline int is_everywhere(effect_place place) {
 /* What an effect sees of a finger and one sample. Rows of [n × lanes] have a row a joint. */
 typedef struct effect_sample {
   size_t joints, tendons, lanes;
-  int first;                                /* 1: the first sample */
-  int source;                               /* kinematics source 1, 2, 3 */
-  double time, step;                        /* s; step is meaningless at the first sample */
-  const double* angle;                      /* [n] rad */
-  const double* velocity;                   /* [n] rad/s */
-  const double* tendon_velocity;            /* [n × lanes] ẋ_ij, m/s; in advance() only */
-  const double* force;                      /* [m] f0, N */
-  const double* moment_arm;                 /* [n × lanes] r_ij, m */
-  const double* rest_angle;                 /* [n] of the covers, rad; 0 without one */
-  const double* axis_cosine;                /* [n × n] of the angle between the axes of two joints; 1 without links */
+  int first;                            /* 1: the first sample */
+  int source;                           /* kinematics source 1, 2, 3 */
+  double time, step;                    /* s; step is meaningless at the first sample */
+  const double* angle;                  /* [n] rad */
+  const double* velocity;               /* [n] rad/s */
+  const double* tendon_velocity;        /* [n × lanes] ẋ_ij, m/s; in advance() only */
+  const double *travel, *tendon_travel; /* [n] rad, [n × lanes] m since the sample before, as a position filter says;
+                                           NULL: velocity·step; in advance() only */
+  const double* force;                  /* [m] f0, N */
+  const double* moment_arm;             /* [n × lanes] r_ij, m */
+  const double* rest_angle;             /* [n] of the covers, rad; 0 without one */
+  const double* axis_cosine;            /* [n × n] of the angle between the axes of two joints; 1 without links */
   double tendon_threshold, joint_threshold; /* v_min: m/s, rad/s */
 } effect_sample;
 
 /* A direction in the space of what a torque depends on: for derivatives. NULL: 0. */
 typedef struct effect_direction {
   const double *angle, *velocity, *force; /* [n], [n], [m] */
-  const double* tendon_velocity;          /* [n × lanes]; in advance_slope() only */
+  const double *motion, *tendon_motion;   /* [n], [n × lanes] of the travel with a position filter, else of the
+                                             velocity; in advance_slope() only */
 } effect_direction;
 
 /* The signals of a sample while they are brought in order: rows that an effect may change. */
@@ -88,6 +91,7 @@ typedef struct effect_grip {
   int slides;         /* 1: never sticks */
   double value;       /* share or factor */
   double by_velocity; /* s/m or s/rad */
+  double by_motion;   /* the same, where it depends on the travel; with a position filter 1/m or 1/rad */
   double by_parameter[EFFECT_MAX_PARAMETERS];
 } effect_grip;
 

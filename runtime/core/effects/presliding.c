@@ -11,7 +11,7 @@
  * D is the displacement at a place; of a row without one displacement·v_min, v_min being the effect's threshold. */
 
 /* per velocity of the place */
-enum { SHARE, BY_DISPLACEMENT, BY_VELOCITY, MEMORY_ROWS };
+enum { SHARE, BY_DISPLACEMENT, BY_MOTION, MEMORY_ROWS }; /* motion: velocity, or travel by a position filter */
 
 static const effect_parameter parameters[] = {
     {.name = "displacement",
@@ -55,18 +55,19 @@ static member_of_place find_member(effect_place place, const effect_sample* samp
 }
 
 /* its travel within the sample */
-static double travel_of(member_of_place member, const effect_sample* sample) {
-  const double v = member.at_joint ? sample->velocity[member.at] : sample->tendon_velocity[member.at];
-  return sample->first ? 0.0 : v * sample->step;
+static double travel_of(const effect_sample* sample, int at_joint, size_t at) {
+  if (sample->travel) {
+    return at_joint ? sample->travel[at] : sample->tendon_travel[at];
+  }
+  return (at_joint ? sample->velocity[at] : sample->tendon_velocity[at]) * sample->step;
 }
 
-/* D */
-static double distance_of(effect_place place, member_of_place member, double displacement,
-                          const effect_sample* sample) {
+/* D of a velocity of a tendon (0) or joint (1) */
+static double distance_of(effect_place place, double displacement, const effect_sample* sample, int at_joint) {
   if (!is_everywhere(place)) {
     return displacement;
   }
-  const double distance = displacement * (member.at_joint ? sample->joint_threshold : sample->tendon_threshold);
+  const double distance = displacement * (at_joint ? sample->joint_threshold : sample->tendon_threshold);
   return distance > DBL_MIN ? distance : DBL_MIN;
 }
 
@@ -84,16 +85,18 @@ static void advance_member(double displacement, double distance, double travel, 
   const int lasts = ratio < 700.0;
   after[BY_DISPLACEMENT] =
       lasts ? bounded(kept * (before[BY_DISPLACEMENT] - bounded(left * ratio / displacement))) : 0.0;
-  after[BY_VELOCITY] = lasts && !sample->first ? bounded(left * kept * side * sample->step / distance) : 0.0;
+  const double by_travel = left * kept * side, by_motion = sample->travel ? by_travel : by_travel * sample->step;
+  after[BY_MOTION] = lasts && !sample->first ? bounded(by_motion / distance) : 0.0;
 }
 
 static void advance(effect_place place, const double* values, const effect_sample* sample, const double* before,
                     double* after) {
   const size_t count = member_count(place, sample->joints, sample->tendons);
+  const double distance[2] = {distance_of(place, values[0], sample, 0), distance_of(place, values[0], sample, 1)};
   for (size_t k = 0; k < count; ++k, before += MEMORY_ROWS, after += MEMORY_ROWS) {
     const member_of_place member = find_member(place, sample, k);
-    advance_member(values[0], distance_of(place, member, values[0], sample), travel_of(member, sample), sample, before,
-                   after);
+    const double travel = sample->first ? 0.0 : travel_of(sample, member.at_joint, member.at);
+    advance_member(values[0], distance[member.at_joint], travel, sample, before, after);
   }
 }
 
@@ -103,13 +106,14 @@ static void advance_slope(effect_place place, const double* values, const effect
   for (size_t k = 0; k < count; ++k) {
     const size_t row = MEMORY_ROWS * k;
     const member_of_place member = find_member(place, sample, k);
-    const double distance = distance_of(place, member, values[0], sample), travel = travel_of(member, sample);
-    const double slope = member.at_joint ? direction->velocity[member.at] : direction->tendon_velocity[member.at];
+    const double distance = distance_of(place, values[0], sample, member.at_joint);
+    const double travel = sample->first ? 0.0 : travel_of(sample, member.at_joint, member.at);
+    const double slope = member.at_joint ? direction->motion[member.at] : direction->tendon_motion[member.at];
     double after[MEMORY_ROWS];
     advance_member(values[0], distance, travel, sample, before + row, after);
     slope_after[row + SHARE] =
-        law_exponential(fabs(travel) / distance) * slope_before[row + SHARE] + after[BY_VELOCITY] * slope;
-    slope_after[row + BY_DISPLACEMENT] = slope_after[row + BY_VELOCITY] = 0.0; /* only the share is read */
+        law_exponential(fabs(travel) / distance) * slope_before[row + SHARE] + after[BY_MOTION] * slope;
+    slope_after[row + BY_DISPLACEMENT] = slope_after[row + BY_MOTION] = 0.0; /* only the share is read */
   }
 }
 
@@ -117,10 +121,8 @@ static effect_grip grip(effect_place place, const double* values, const double* 
   (void)place;
   (void)values;
   memory += MEMORY_ROWS * member;
-  return (effect_grip){.slides = 1,
-                       .value = memory[SHARE],
-                       .by_velocity = memory[BY_VELOCITY],
-                       .by_parameter = {memory[BY_DISPLACEMENT]}};
+  return (effect_grip){
+      .slides = 1, .value = memory[SHARE], .by_motion = memory[BY_MOTION], .by_parameter = {memory[BY_DISPLACEMENT]}};
 }
 
 const effect_type effect_presliding = {
