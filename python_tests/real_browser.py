@@ -60,6 +60,7 @@ addEventListener("load", () => {{
     const found = {{
       width: root.clientWidth, scroll: root.scrollWidth, height: root.scrollHeight,
       images: [...inside.images].map(image => [image.naturalWidth, image.width]),
+      drawings: [...inside.querySelectorAll("svg.panel")].map(drawing => drawing.getBoundingClientRect().width),
       out: out.map(e => e.outerHTML.slice(0, 80)),
       scrolled: [...inside.querySelectorAll(".scroll")].filter(e => e.scrollWidth > e.clientWidth).length,
       requests: document.getElementById("f").contentWindow.performance.getEntriesByType("resource").map(e => e.name),

@@ -124,7 +124,8 @@ def tells_the_same(page: str, out: str) -> None:
         sentence = re.search(pattern, told)
         assert sentence is not None and sentence[0] in text, pattern
     for section in ("run", "fit", "detect", "diagnose"):
-        assert "<img " in page.split(f'<section id="{section}">')[1].split("</section>")[0], section
+        drawn = "<svg " if section == "diagnose" else "<img "
+        assert drawn in page.split(f'<section id="{section}">')[1].split("</section>")[0], section
 
 
 def fits_screens(folder: Path, page: str) -> None:

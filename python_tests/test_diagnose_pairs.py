@@ -1,6 +1,6 @@
 """Descriptions and recordings that do not belong together well: a diagnosis that can be used, or a refusal that helps.
 
-`./test -m campaign python_tests/test_diagnose_pairs.py` runs all of them, the ordinary run a few.
+`./test --all python_tests/test_diagnose_pairs.py` runs all of them, the ordinary run a few.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ def faults_of_report(folder: Path) -> Iterator[str]:
 
 
 @pytest.mark.parametrize(
-    "seed", [pytest.param(seed, marks=[] if seed in USUAL else pytest.mark.campaign) for seed in range(COUNT)]
+    "seed", [pytest.param(seed, marks=[] if seed in USUAL else pytest.mark.long) for seed in range(COUNT)]
 )
 def test_a_pair_gets_a_diagnosis_or_a_refusal(seed: int, tmp_path: Path) -> None:
     pair = make_pair(seed)

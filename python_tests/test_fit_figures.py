@@ -20,9 +20,10 @@ from tendonfmu.fit_figures import SHOWN, fit_sheets, residual_sheets, rms, torqu
 from tendonfmu.fit_law_figures import law_sheets
 from tendonfmu.fit_laws import CONFIDENCE, LawBands
 from tendonfmu.fit_picture import FitPicture
-from tendonfmu.fit_plots import STYLES, draw_panel, png, size_of, write_sheet
+from tendonfmu.fit_plots import draw_panel, png, write_sheet
 from tendonfmu.fit_sheet import Curve, MatrixPanel, Panel, Sheet
 from tendonfmu.friction_places import Effect, effects
+from tendonfmu.panel_styles import STYLES, size_of
 
 MM, PERCENT, MILLI = 1e3, 1e2, 1e3
 

@@ -214,7 +214,7 @@ class Calls(RuleBasedStateMachine):
             assert set(flags) <= {0, 1}
 
 
-@pytest.mark.parametrize("examples", [pytest.param(60), pytest.param(3000, marks=pytest.mark.campaign)])
+@pytest.mark.parametrize("examples", [pytest.param(60), pytest.param(3000, marks=pytest.mark.long)])
 def test_random_calls(small_fmu: UnpackedFmu, examples: int) -> None:
     machine = type("CallsOfTheSmallFmu", (Calls,), {"fmu": small_fmu})
     run_state_machine_as_test(  # type: ignore[no-untyped-call]

@@ -206,7 +206,7 @@ def test_the_carriage_s_causes_are_named(tmp_path: Path) -> None:
 
 
 @davinci
-@pytest.mark.campaign
+@pytest.mark.long
 def test_the_jaw_s_causes_are_named_and_its_stall_is_an_event(tmp_path: Path) -> None:
     folder = DATA / "davinci_tool" / "Tool_4_Maryland_L_4"
     even, odd = (

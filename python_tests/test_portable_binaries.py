@@ -1,6 +1,6 @@
 """The cross-compiled libraries: what they export and need, and that they compute what the native one computes.
 
-The whole build takes a minute (zig's first build for Windows several), so it runs with `./test -m campaign`.
+The whole build takes a minute (zig's first build for Windows several), so it runs with `./test --all`.
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+
+pytestmark = pytest.mark.xdist_group("portable")  # one worker builds for all of them
 
 ROOT = Path(__file__).resolve().parent.parent
 HERE = Path(__file__).resolve().parent
@@ -159,7 +161,7 @@ EXPECTED = {
 }
 
 
-@pytest.mark.campaign
+@pytest.mark.long
 @pytest.mark.parametrize("platform", EXPECTED)
 def test_a_portable_library_keeps_its_promises(binaries: Path, platform: str) -> None:
     (library,) = (binaries / platform).iterdir()
@@ -171,7 +173,7 @@ def test_a_portable_library_keeps_its_promises(binaries: Path, platform: str) ->
     assert library.stat().st_size < 300_000 * len(found)
 
 
-@pytest.mark.campaign
+@pytest.mark.long
 def test_contents_agree_with_other_readers(binaries: Path) -> None:
     """PE by objdump, Mach-O by llvm-nm."""
     needs("objdump", "llvm-nm")
@@ -295,7 +297,7 @@ def test_neighbours_are_one_ulp_apart() -> None:
     assert ulps(values.view(np.uint64), values.view(np.uint64)) == 0
 
 
-@pytest.mark.campaign
+@pytest.mark.long
 def test_a_portable_fmu_yields_the_reference_trace(binaries: Path, tmp_path: Path) -> None:
     """Packed by the command with --binaries and run by fmpy: all platforms in one FMU."""
     fmu = tmp_path / "index_finger.fmu"
@@ -313,7 +315,7 @@ def test_a_portable_fmu_yields_the_reference_trace(binaries: Path, tmp_path: Pat
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-@pytest.mark.campaign
+@pytest.mark.long
 @pytest.mark.parametrize("platform", ["linux64", "aarch64-linux", "win64"])
 def test_a_portable_library_gives_the_bits_of_the_native_one(
     binaries: Path, fmu: Fmu, platform: str, tmp_path: Path

@@ -27,6 +27,7 @@ Single = NDArray[np.float32]
 Progress = Callable[[int, int], None]
 Worth = Callable[[Candidate, Place, Mapping[str, float]], bool]
 
+_LARGEST = 1e9  # of a non-linear number in any unit: docs/extensions.md
 _MOST_MEMORY = 8.0  # GB, of all columns
 
 
@@ -193,11 +194,16 @@ def _proposed(
 ) -> Iterator[tuple[Candidate, Place, list[Variant]]]:
     for candidate in candidates:
         for place in candidate.places(data, kinematics):
-            variants = candidate.variants(data, place, span)
+            variants = [each for each in candidate.variants(data, place, span) if _is_sane(each)]
             if worth is not None:
                 variants = [each for each in variants if worth(candidate, place, each.shape)]
             if variants:
                 yield candidate, place, variants
+
+
+def _is_sane(variant: Variant) -> bool:
+    """Whether a description takes its numbers: recordings of another scale lead to any."""
+    return all(abs(value) <= _LARGEST for value in variant.shape.values())
 
 
 def _bundles(secants: Sequence[tuple[Variant, int]]) -> list[list[tuple[Variant, int]]]:

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from tendonfmu.demo import Story
 from tendonfmu.demo_run import ABDUCTION, FLEXION, FREE, FREE_X4, PUSHES
-from tendonfmu.diagnosis_figures import diagnosis_sheets
 from tendonfmu.figure_data import CompensationFigure, JointCurves
 from tendonfmu.fit_figures import torque_sheets
 from tendonfmu.fit_law_figures import law_sheets
@@ -23,14 +22,13 @@ _HEIGHT = 270  # CSS pixels
 
 
 def story_sheets(story: Story) -> Iterator[Sheet]:
-    """All figures of the page, each in the section of its chapter."""
+    """All figures of the first three chapters, each in the section of its chapter."""
     yield _free_sheet(story)
     yield _push_sheet(story)
     if story.missing:
         return
     yield _error_sheet(story)
     yield from _fit_sheets(story)
-    yield from (sheet for sheet in diagnosis_sheets(story.diagnosis) if sheet.section != "views")
 
 
 # --- chapters 1 and 3 -------------------------------------------------------------------------------------------------

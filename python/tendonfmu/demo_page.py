@@ -10,9 +10,19 @@ from tendonfmu.demo_figures import story_sheets
 from tendonfmu.demo_run import FLEXION, FREE, FREE_X4, PUSHES
 from tendonfmu.demo_text import alarms, chapter_tables, fit_sentence, push_sentence
 from tendonfmu.diagnosis_page import PAGE as DIAGNOSIS_PAGE
-from tendonfmu.diagnosis_page import Tile, cards_of
+from tendonfmu.diagnosis_page import Tile, cards_of, drawn_sheets
 from tendonfmu.diagnosis_result import Diagnosis
-from tendonfmu.diagnosis_text import at_place, error_sentence, headline, names_of, percent, together, unit_of
+from tendonfmu.diagnosis_text import (
+    at_place,
+    error_sentence,
+    headline,
+    left_sentence,
+    names_of,
+    percent,
+    together,
+    unit_of,
+)
+from tendonfmu.diagnosis_waterfall import waterfall_of
 from tendonfmu.fit_page import PAGE as FIT_PAGE
 from tendonfmu.fit_page import PageFigure, draw_sheet, render
 from tendonfmu.fit_summary import residual_tables, rounded
@@ -95,10 +105,14 @@ def _detect(story: Story) -> dict[str, Any]:
 
 def _diagnosis(story: Story) -> dict[str, Any]:
     found = story.diagnosis
+    names = names_of(found)
     return {
         "headline": headline(found),
         "error": error_sentence(found),
-        "cards": cards_of(found, names_of(found)),
+        "left": left_sentence(found),
+        "fall": waterfall_of(found, names),
+        "cards": cards_of(found, names),
+        "figures": drawn_sheets(found),
         "tested": found.tested,
         "page": f"{DIAGNOSIS}/{DIAGNOSIS_PAGE}",
         "seconds": f"{found.seconds:.0f}",

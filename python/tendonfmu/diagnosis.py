@@ -19,18 +19,30 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
+from tendonfmu.block_grams import standard_error
 from tendonfmu.cause_gains import Verified, verify
 from tendonfmu.cause_search import residual_alone, series_of
-from tendonfmu.cause_selection import LEAST_SHARE
+from tendonfmu.cause_selection import CERTAIN, LEAST_SHARE
 from tendonfmu.contact_gain import detection_gain
 from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.diagnosis_evidence import evidence
-from tendonfmu.diagnosis_result import Cause, Diagnosis, Event, FoundPlace, Invisible, Unexplained, Where
+from tendonfmu.diagnosis_result import (
+    Cause,
+    Diagnosis,
+    Event,
+    FoundPlace,
+    Interval,
+    Invisible,
+    Unexplained,
+    Where,
+)
 from tendonfmu.diagnosis_search import NamedCause, Search, events_of, search, without_events
 from tendonfmu.diagnosis_series import make_grid
 from tendonfmu.diagnosis_size import size_of
 from tendonfmu.effects import Candidate
+from tendonfmu.effects.friction_law_places import thresholds
 from tendonfmu.errors import InputError, own_fault
+from tendonfmu.event_gain import event_gain
 from tendonfmu.extension_fit import Accepted, FitSettings
 from tendonfmu.fit_files import check_unseen
 from tendonfmu.fit_recordings import FitRecording, Held, prepare, require_noise
@@ -203,6 +215,7 @@ class _Result:
             extended_data=verified.extended_data,
             warnings=(*case.warnings, *self._warnings()),
             tested=len({each.key for each in found.last.selection.hypotheses}),
+            event_gain=event_gain(verified.extended_data, case.whole, found.events),
         )
 
     def _warnings(self) -> list[str]:
@@ -245,6 +258,10 @@ class _Result:
         everything = {path: value for own in parameters for path, value in own.items()}
         before = self._left(verified.without[k].data)
         candidate = named.accepted[0].candidate
+        places = tuple(
+            FoundPlace(each.place.joint, each.place.tendon, own)
+            for each, own in zip(named.accepted, parameters, strict=True)
+        )
         return Cause(
             where=Where(named.effect, named.joint, named.tendon),
             title=candidate.title,
@@ -253,12 +270,9 @@ class _Result:
             gain=verified.gains[k],
             confusable_with=_wheres(named.alike),
             parameters=everything,
-            size=size_of(candidate.name, parameters[0] if len(parameters) == 1 else everything),
-            places=tuple(
-                FoundPlace(each.place.joint, each.place.tendon, own)
-                for each, own in zip(named.accepted, parameters, strict=True)
-            ),
-            evidence=evidence(named.accepted[0], self._series, before, after),
+            size=size_of(candidate.name, places, thresholds(verified.extended_data)),
+            places=places,
+            evidence=evidence([each.place for each in named.accepted], candidate, self._series, before, after),
         )
 
     # --- what is left, and what to do next ---
@@ -278,9 +292,12 @@ class _Result:
         shares = np.clip(np.array(left.share), 0.0, 1.0)
         whole = float(variance.sum())
         share = float(shares @ variance) / whole if whole > 0 else 0.0
-        unknown = left.unknown and 1.0 - np.sqrt(1.0 - share) >= self._least_gain
+        square = float(left.square.sum())
+        half = CERTAIN * standard_error(left.gain.sum(axis=1)) / square if square > 0 else 0.0
+        gain = Interval(*(1.0 - float(np.sqrt(1.0 - min(each, 1.0))) for each in (share, share - half, share + half)))
+        unknown = left.unknown and gain.value >= self._least_gain and gain.low > 0.0
         description = left.description if unknown else ""
-        return Unexplained(share, description, tuple(shares.tolist()), left.p_value, bool(unknown))
+        return Unexplained(share, description, tuple(shares.tolist()), left.p_value, bool(unknown), gain)
 
     def _torque(self) -> Numbers:
         """[B, n] N·m: what is to be explained."""

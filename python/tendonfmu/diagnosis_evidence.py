@@ -2,36 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.diagnosis_result import Evidence
 from tendonfmu.diagnosis_series import Series
-from tendonfmu.extension_fit import Accepted
+from tendonfmu.effects.candidate import Candidate, Place
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 BINS = 24
+SHOWN = 4.0  # squared means of the bins, without the cause over with it
 _FEWEST = 10  # blocks of a bin
 
 
-def evidence(cause: Accepted, series: Series, before: Numbers, after: Numbers) -> tuple[Evidence, ...]:
-    """Of the joint where the cause changes most: over the effect's own coordinate, and over the torque that it adds.
+def evidence(
+    places: Sequence[Place], candidate: Candidate, series: Series, before: Numbers, after: Numbers
+) -> tuple[Evidence, ...]:
+    """Of the joint where the cause changes most: one picture over the effect's own coordinate. Where that shows little,
+    over the torque that the cause adds: without the cause the residual follows it with slope 1.
 
-    before, after: [B, n] N·m residual without and with the cause. The second is an added-variable plot: without the
-    cause the residual follows its torque with slope 1, with it nothing of that is left.
+    places: of the cause. before, after: [B, n] N·m residual without and with the cause.
     """
     change = np.sum((before - after)[series.used] ** 2, axis=0)
     joint = int(np.argmax(change))
-    own = (f"torque of this cause at joint {joint + 1}", "N·m", (before - after)[:, joint])
-    return tuple(
-        found
-        for label, unit, values in (_coordinate(cause, series, joint), own)
-        for found in _binned(label, unit, values, series, (before[:, joint], after[:, joint]), joint)
-    )
+    pair = (before[:, joint], after[:, joint])
+    own = _binned(*_coordinate(_nearest(places, joint), candidate.coordinate, series, joint), series, pair, joint)
+    if own and _shown(own[0]):
+        return own
+    added = (f"torque of this cause at joint {joint + 1}", "N·m", (before - after)[:, joint])
+    return _binned(*added, series, pair, joint) or own
+
+
+def _nearest(places: Sequence[Place], joint: int) -> Place:
+    """The place at that joint, if there is one."""
+    return next((each for each in places if each.joint == joint + 1), places[0])
+
+
+def _shown(found: Evidence) -> bool:
+    """Whether the cause takes away most of what the means of the bins were."""
+    return float(np.sum(found.before**2)) >= SHOWN * float(np.sum(found.after**2))
 
 
 def _binned(
@@ -61,11 +74,10 @@ def _standard_errors(values: Numbers, parts: list[NDArray[np.int64]], series: Se
     return np.array(found)
 
 
-def _coordinate(cause: Accepted, series: Series, joint: int) -> tuple[str, str, Numbers]:
+def _coordinate(place: Place, kind: str, series: Series, joint: int) -> tuple[str, str, Numbers]:
     """Label, unit, [B] values."""
-    own = joint if cause.place.joint is None else cause.place.joint - 1
-    tendon = None if cause.place.tendon is None else cause.place.tendon - 1
-    kind = cause.candidate.coordinate
+    own = joint if place.joint is None else place.joint - 1
+    tendon = None if place.tendon is None else place.tendon - 1
     if kind == "velocity" and tendon is not None:
         return f"velocity of tendon {tendon + 1}", "m/s", series.tendon_velocity[:, tendon, own]
     if kind in ("force", "load"):

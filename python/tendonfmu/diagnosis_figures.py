@@ -1,4 +1,4 @@
-"""What the figures of a diagnosis show: sheets of panels (`fit_sheet.py`), ready to be drawn by `fit_plots.py`."""
+"""What the figures of a diagnosis show: sheets of panels (`fit_sheet.py`), ready to be drawn."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.diagnosis_result import Cause, Diagnosis, Evidence, ResidualView
-from tendonfmu.diagnosis_text import Names, at_place, names_of, percent_interval, unit_of
-from tendonfmu.fit_sheet import Band, Bars, Curve, Dots, Panel, Sheet, Size
+from tendonfmu.diagnosis_text import Names, at_place, names_of, unit_of
+from tendonfmu.fit_sheet import Band, Bars, Curve, Dots, Panel, Sheet
 
 Numbers = NDArray[np.float64]
 TWO_SIDED = 1.96  # standard errors of a 95 % interval
@@ -28,88 +28,15 @@ _TITLES = {
 _BINNED = ("angle", "velocity", "tendon_force", "load", "travel")
 _BEFORE_AFTER = (("before", "nominal model, refitted"), ("after", "extended model"))
 _ROOM = 3.0  # times the largest mean: more of the scatter within bins would hide the means
-_NAME = 30  # letters of a row's name
-_NARROW = 20  # letters that leave room in a small panel
 
 
 def diagnosis_sheets(found: Diagnosis) -> list[Sheet]:
-    """Gain by cause and error by joint, then the evidence for each cause, then the residual at each joint."""
+    """The evidence for each cause, then the residual at each joint."""
     names = names_of(found)
     return [
-        _overview(found, names),
         *(_cause_sheet(found, names, k, cause) for k, cause in enumerate(found.causes, start=1) if cause.evidence),
         *(_joint_sheet(found, names, j, views) for j, views in _by_joint(found.views)),
     ]
-
-
-# --- how much ---------------------------------------------------------------------------------------------------------
-
-
-def _overview(found: Diagnosis, names: Names) -> Sheet:
-    panels = [_error_panel(found, names)]
-    keys = [("before_dots", "nominal model, refitted"), ("floor", "noise floor")]
-    if found.causes:
-        keys.insert(1, ("after_dots", "extended model"))
-        panels.append(_gain_panel(found))
-    rows = max(2, *(len(panel.rows) for panel in panels))
-    long = max(len(name) for panel in panels for name in panel.rows) > _NARROW
-    size: Size = "medium" if long else "small"
-    panels = [replace(panel, size=size, height=110 + 26 * rows) for panel in panels]  # side by side: as high
-    return Sheet("gain", "gain", "Error and gain on unseen data", "", tuple(keys), tuple(panels))
-
-
-def _error_panel(found: Diagnosis, names: Names) -> Panel:
-    factor, unit = unit_of(found)
-    rows = np.arange(len(found.nominal.test_rms), dtype=float)
-    dots = [
-        Dots(style, factor * np.array(values, dtype=float), rows[: len(values)])
-        for style, values in (
-            ("floor", found.noise_floor),
-            ("before_dots", found.nominal.test_rms),
-            ("after_dots", found.extended.test_rms),
-        )
-    ]
-    largest = max(float(np.nanmax(each.x, initial=0.0)) for each in dots)
-    before, after = dots[1].x, dots[2].x
-    if not found.causes:  # both are the same
-        del dots[2]
-    return Panel(
-        title="Error by joint",
-        alt="Error on unseen data by joint: nominal model, extended model and noise floor",
-        x_label=f"rms ({unit})",
-        y_label="",
-        bars=(Bars("data", rows, np.minimum(before, after), np.maximum(before, after), lying=True),),
-        dots=tuple(dots),
-        rows=tuple(_short(names.joint(j + 1)) for j in range(len(rows))),
-        x_limits=(0.0, 1.08 * largest or 1.0),
-    )
-
-
-def _gain_panel(found: Diagnosis) -> Panel:
-    gains = [cause.gain for cause in found.causes]
-    labels = [_short(f"{k}. {cause.where.effect.replace('_', ' ')}") for k, cause in enumerate(found.causes, start=1)]
-    if len(gains) > 1:
-        gains.append(found.gain)
-        labels.append("all together")
-    rows = np.arange(len(gains), dtype=float)
-    value, low, high = (100 * np.array([getattr(each, key) for each in gains]) for key in ("value", "low", "high"))
-    least = min(0.0, 1.05 * float(np.nanmin(low)))
-    return Panel(
-        title="Gain of each cause",
-        alt="Part of the error on unseen data that each cause takes away, with its 95 % interval: "
-        + "; ".join(f"{label} {percent_interval(gain)}" for label, gain in zip(labels, gains, strict=True)),
-        x_label="less error (%), 95 % interval",
-        y_label="",
-        bars=(Bars("after", rows, low, high, lying=True),),
-        dots=(Dots("after_dots", value, rows),),
-        rows=tuple(labels),
-        x_limits=(least, 1.08 * float(np.nanmax(high)) or 1.0),
-        line=0.0 if least < 0 else None,
-    )
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= _NAME else f"{text[: _NAME - 1]}…"
 
 
 # --- evidence for a cause ---------------------------------------------------------------------------------------------
@@ -136,7 +63,6 @@ def _evidence_panel(found: Evidence, names: Names, factor: float, unit: str) -> 
         alt=f"Mean residual at {names.joint(found.joint)} over {found.label}, without and with this cause in the model",
         x_label=f"{found.label} ({x_unit})",
         y_label=f"residual ({unit})",
-        size="medium",
         curves=tuple(Curve(f"{style}_line", x, factor * mean) for style, mean, _ in shown),
         bars=tuple(
             Bars(style, x, factor * (mean - TWO_SIDED * std), factor * (mean + TWO_SIDED * std))

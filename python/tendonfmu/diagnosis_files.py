@@ -19,7 +19,7 @@ from tendonfmu.interruption import uninterrupted
 from tendonfmu.packaging import build_fmu
 from tendonfmu.whole_file import check_output, check_output_folder, is_about
 
-_SUFFIXES = (".html", ".png", ".json", ".fmu")
+_SUFFIXES = (".html", ".json", ".fmu", ".png")  # figures of the versions that wrote them beside the page
 _NAMED = (REPORT, EXTENDED, EXTENDED_FMU, PAGE, NOMINAL)
 
 
@@ -32,7 +32,7 @@ def check_folder(folder: Path, inputs: Sequence[Path]) -> None:
 
 
 def write_diagnosis(found: Diagnosis, folder: Path) -> dict[Path, str]:
-    """Writes report, both descriptions, the FMU, page and figures. Returns file -> what is in it, in order of use.
+    """Writes report, both descriptions, the FMU and the page. Returns file -> what is in it, in order of use.
 
     Everything is made beside the folder and then moved into it, at once also for Ctrl-C; files that an earlier
     diagnosis left there are removed. Raises InputError where nothing can be written: the folder is then as before.
@@ -95,7 +95,7 @@ def _make(found: Diagnosis, folder: Path) -> dict[Path, str]:
     added = "nothing added" if causes == 0 else "its cause" if causes == 1 else f"its {causes} causes"
     for name, data in ((NOMINAL, found.nominal_data), (EXTENDED, found.extended_data)):
         write_text(folder / name, description_text(dict(data)))
-    build_fmu(folder / EXTENDED, folder / EXTENDED_FMU)
+    build_fmu(folder / EXTENDED, folder / EXTENDED_FMU, illustrated=False)  # a drawing takes longer than all the rest
     files = {
         folder / PAGE: page.pop(folder / PAGE),
         folder / REPORT: "the same numbers",

@@ -1,47 +1,56 @@
-"""The page of a diagnosis: its figures as PNG files, and one HTML file with all of them in it that needs nothing else.
+"""The page of a diagnosis: one HTML file with its figures in it that needs nothing else.
 
 Without scripts and without anything from elsewhere; every text is escaped.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from markupsafe import Markup
+
 from tendonfmu.diagnosis_figures import diagnosis_sheets
 from tendonfmu.diagnosis_result import Cause, DetectionGain, Diagnosis
+from tendonfmu.diagnosis_size import count_of, size_at
 from tendonfmu.diagnosis_text import (
     Names,
     at_place,
-    by_source,
     confusion_sentence,
-    count_of,
     error_rows,
     error_sentence,
     headline,
     hidden_sentences,
+    left_of,
+    left_sentence,
     names_of,
     next_sentence,
     parameter_rows,
     percent,
     percent_interval,
+    place_rows,
     probability,
     tested_sentence,
     title_of,
     together,
-    unexplained_sentence,
+    too_small_sentence,
     unit_of,
     unseen,
 )
-from tendonfmu.fit_page import PageFigure, draw_sheet, render
+from tendonfmu.diagnosis_waterfall import waterfall_of
+from tendonfmu.effects.friction_law_places import thresholds
+from tendonfmu.fit_page import keys_of, render
+from tendonfmu.fit_sheet import Panel, Sheet
 from tendonfmu.fit_summary import rounded
+from tendonfmu.reported_causes import CONTACT, UNKNOWN, reported_causes
+from tendonfmu.svg_panel import panel_svg
 from tendonfmu.whole_file import whole_file
 
 PAGE = "diagnosis.html"
 _MOST = 4  # pairs that are listed
+_LONG = 90  # letters of a size that is a sentence
 _TONES = {"adequate": "good", "explained": "good", "partly explained": "", "unexplained": "bad"}
 
 
@@ -54,35 +63,39 @@ class Tile:
     meaning: str
 
 
-def write_diagnosis_page(found: Diagnosis, folder: Path) -> dict[Path, str]:
-    """Writes one PNG per sheet and `diagnosis.html` into a folder that exists.
+@dataclass(frozen=True)
+class DrawnSheet:
+    """A sheet as the page shows it. keys: (CSS class, CSS colour, opacity, meaning). size: of its panels."""
 
-    Returns file -> what is in it. Files appear whole or not at all. Raises InputError where they cannot be written.
+    sheet: Sheet
+    keys: list[tuple[str, str, float, str]]
+    size: str
+    drawings: list[Markup]
+
+
+def write_diagnosis_page(found: Diagnosis, folder: Path) -> dict[Path, str]:
+    """Writes `diagnosis.html` into a folder that exists.
+
+    Returns file -> what is in it. It appears whole or not at all. Raises InputError where it cannot be written.
     """
-    figures, written = [], {}
-    for sheet in diagnosis_sheets(found):
-        file = folder / f"{sheet.name}.png"
-        figures.append(draw_sheet(sheet, file))
-        written[file] = sheet.title
     page = folder / PAGE
-    text = diagnosis_page(found, figures)
+    text = diagnosis_page(found)
     with whole_file(page) as partial:
         partial.write_text(text, encoding="utf-8")
-    return {page: "all of it, to be read in a browser"} | written
+    return {page: "all of it, to be read in a browser"}
 
 
-def diagnosis_page(found: Diagnosis, figures: Sequence[PageFigure]) -> str:
+def diagnosis_page(found: Diagnosis) -> str:
     """HTML text of the page."""
     names, (factor, unit) = names_of(found), unit_of(found)
-    by_section: dict[str, list[PageFigure]] = {}
-    for figure in figures:
-        by_section.setdefault(figure.sheet.section, []).append(figure)
     return render(
         "diagnosis.html.jinja",
         found=found,
         unit=unit,
         first=_first_screen(found, names),
+        fall=waterfall_of(found, names),
         cards=cards_of(found, names),
+        too_small=_too_small(found, names),
         errors=_errors(found, names, factor),
         events=_events(found, names, factor),
         detection=None if found.detection is None else _detection(found.detection, factor, unit),
@@ -91,7 +104,22 @@ def diagnosis_page(found: Diagnosis, figures: Sequence[PageFigure]) -> str:
             (each.title, names.place(each.where) or "everywhere", percent(each.surviving_share), each.experiment)
             for each in found.invisible
         ],
-        figures=by_section,
+        figures=drawn_sheets(found),
+    )
+
+
+def drawn_sheets(found: Diagnosis) -> dict[str, list[DrawnSheet]]:
+    """Section -> its figures: "cause_1" and so on, and "views"."""
+    figures: dict[str, list[DrawnSheet]] = {}
+    for sheet in diagnosis_sheets(found):
+        figures.setdefault(sheet.section, []).append(_drawn(sheet))
+    return figures
+
+
+def _drawn(sheet: Sheet) -> DrawnSheet:
+    panels = [panel for panel in sheet.panels if isinstance(panel, Panel)]
+    return DrawnSheet(
+        sheet, keys_of(sheet), panels[0].size if panels else "small", [panel_svg(each) for each in panels]
     )
 
 
@@ -103,11 +131,11 @@ def _first_screen(found: Diagnosis, names: Names) -> dict[str, Any]:
         "tone": _TONES[found.verdict],
         "headline": headline(found),
         "error": error_sentence(found),
+        "left": left_sentence(found),
         "tiles": list(_tiles(found)),
         "untold": list(_untold(found, names)),
         "next": next_sentence(found),
         "experiment": list(_experiment(found, names)),
-        "floor": by_source(found.floor_source),
     }
 
 
@@ -121,20 +149,16 @@ def _tiles(found: Diagnosis) -> Iterator[Tile]:
         yield Tile(percent(found.gain.value), "", f"less error, 95 % interval {low} to {high}")
     else:
         yield Tile(before, unit, f"error on {data}, all joints")
-    floor = together(found.noise_floor)
-    if math.isfinite(floor):
-        yield Tile(rounded(factor * floor), unit, f"noise floor, by {by_source(found.floor_source)}")
-    if math.isfinite(found.unexplained.share):
-        meaning = "of the residual's variance above the noise is explained by nothing"
-        yield Tile(percent(found.unexplained.share), "", meaning)
+    if left := left_of(found):
+        yield Tile(left.told(left.noise), unit, "of what is left is noise: nothing that was recorded predicts it")
+        if left.nameless > 0.0:
+            yield Tile(left.told(left.nameless), unit, "of what is left can be predicted, but has no name")
 
 
 def _untold(found: Diagnosis, names: Names) -> Iterator[str]:
     for k, cause in enumerate(found.causes, start=1):
         if text := confusion_sentence(cause, names):
             yield f"Cause {k}, {at_place(cause.title, cause.where, names)}: {text[0].lower()}{text[1:]}"
-    if text := unexplained_sentence(found):
-        yield text
     yield from hidden_sentences(found, names)
 
 
@@ -156,45 +180,54 @@ def _experiment(found: Diagnosis, names: Names) -> Iterator[str]:
 
 
 def cards_of(found: Diagnosis, names: Names) -> list[dict[str, Any]]:
-    """What a page tells of each cause."""
-    return [_card(cause, names) for cause in found.causes]
+    """What a page tells of each cause; contact and unknown, which have no term in the model, come last."""
+    return [_card(found, cause, names) for cause in reported_causes(found)]
 
 
-def _card(cause: Cause, names: Names) -> dict[str, Any]:
-    rows = [
-        ("less error on unseen data by this cause, the others kept", percent_interval(cause.gain)),
-        ("part of the nominal residual's variance", percent(cause.share)),
-        ("p-value, over all effects and places", probability(cause.p_value)),
-    ]
-    if cause.first_gain is not None:
-        rows.insert(1, ("the same alone, against the nominal model", percent_interval(cause.first_gain)))
+def _card(found: Diagnosis, cause: Cause, names: Names) -> dict[str, Any]:
+    """certainty: of the cause, small. places: (joint, tendon, size) where the cause has numbers."""
     certainty = f"p = {probability(cause.p_value)}".replace("= <", "<")
-    if cause.confusable_with:
-        certainty += f"; {count_of(len(cause.confusable_with), 'other')} would look the same in these data"
+    where = cause.where.effect
+    meaning = {
+        CONTACT: "less error on the training recordings without these stretches",
+        UNKNOWN: "less error if what can be predicted were known",
+    }
+    others = "" if len(found.causes) < 2 else ", the other causes kept"
+    numbers = thresholds(found.extended_data)
+    sizes = [size_at(where, each.parameters, numbers) for each in cause.places]
     return {
         "title": _capital(cause.title),
         "full": at_place(_capital(cause.title), cause.where, names),
-        "place": _capital(names.place(cause.where) or "the whole finger"),
+        "place": _capital(names.places(cause)),
         "size": cause.size,
-        "gain": f"{percent_interval(cause.gain)} less error on unseen data",
+        "long": len(cause.size) > _LONG,
+        "gain": f"{percent_interval(cause.gain)} {meaning.get(where, f'less error on unseen data{others}')}",
         "certainty": certainty,
         "explanation": cause.explanation,
         "confusion": confusion_sentence(cause, names),
-        "rows": rows,
+        "places": place_rows(cause, names, sizes) if cause.parameters else [],
         "parameters": parameter_rows(cause.parameters),
     }
 
 
+def _too_small(found: Diagnosis, names: Names) -> dict[str, Any]:
+    return {
+        "sentence": too_small_sentence(found),
+        "rows": [
+            (_capital(cause.title), names.places(cause), percent_interval(cause.gain), probability(cause.p_value))
+            for cause in found.too_small
+        ],
+    }
+
+
 def _errors(found: Diagnosis, names: Names, factor: float) -> list[dict[str, Any]]:
-    """A row per joint, and one of all together: rms, then the predictable share and the whiteness."""
+    """A row per joint, and one of all together: rms, then the whiteness."""
     rows = []
     for j, row in enumerate(error_rows(found, names, factor)):
         total = j == len(found.nominal.train_rms)
-        ceiling = percent(max(found.ceiling[j], 0.0)) if j < len(found.ceiling) and not total else ""
-        white = (
-            [rounded(value, 2) for value in found.whiteness[j]] if j < len(found.whiteness) and not total else ["", ""]
-        )
-        rows.append({"total": total, "cells": [*row, ceiling, *white]})
+        known = j < len(found.whiteness) and not total
+        white = [rounded(value, 2) for value in found.whiteness[j]] if known else ["", ""]
+        rows.append({"total": total, "cells": [*row, *white]})
     return rows
 
 
@@ -234,8 +267,10 @@ def _method(found: Diagnosis) -> Iterator[str]:
     """In sentences, with the numbers that count."""
     yield (
         "The given model was fitted first; a cause is what that cannot mend. Every effect, at every place where the "
-        "model lacks it, was then tested on the whitened residual, and named by what it gains on held-out data."
+        f"model lacks it, was then tried. A cause has to take away at least {percent(found.least_gain)} of the error "
+        "that is left without it, on data that it was not fitted to, and its 95 % interval has to lie above 0."
     )
+    yield f"The numbers were estimated from {found.signals}; errors and gains are those of the raw signals."
     if text := tested_sentence(found):
         yield text
     yield f"The gain was measured on {unseen(found)}, by running both models. Seed {found.seed}."

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.contact_scan import LEVEL as SCAN_LEVEL
 from tendonfmu.diagnosis_result import (
     Cause,
     DetectionGain,
@@ -17,27 +16,26 @@ from tendonfmu.diagnosis_result import (
     Event,
     Evidence,
     Experiment,
+    FoundPlace,
     Interval,
     Invisible,
     ResidualView,
     Where,
 )
+from tendonfmu.diagnosis_text import at_place, names_of
 from tendonfmu.finite_numbers import finite
+from tendonfmu.reported_causes import reported_causes
 
 FORMAT = "tendonfmu-diagnosis-1"
 REPORT, NOMINAL, EXTENDED, EXTENDED_FMU = "diagnosis.json", "nominal.json", "extended.json", "extended.fmu"
 DIGITS = 6  # of what is drawn
-UNMENDED = {
-    "contact": "the recording is not free of contact",
-    "unknown": "something that no effect of the list explains",
-}
-CONTACT = 6.0  # nominal residuals rms that an event's peak is, at least, to be called contact among the causes
 
 
 def build_report(found: Diagnosis, files: Sequence[str] = ()) -> dict[str, Any]:
     """The whole report: the contract's keys first. files: names of what stands beside it."""
     report = {
         "format": FORMAT,
+        "kind": "model",
         "verdict": found.verdict,
         "nominal": {
             "train_rms": found.nominal.train_rms,
@@ -53,13 +51,18 @@ def build_report(found: Diagnosis, files: Sequence[str] = ()) -> dict[str, Any]:
         },
         "noise_floor": found.noise_floor,
         "gain": _gain(found.gain),
-        "causes": [*(_cause(cause) for cause in found.causes), *_without_a_term(found)],
+        "causes": [_cause(cause) for cause in reported_causes(found)],
+        "too_small": [_cause(cause) for cause in found.too_small],
         "unexplained": {
             "share": found.unexplained.share,
             "description": found.unexplained.description,
             "by_joint": found.unexplained.by_joint,
+            "gain": _gain(found.unexplained.gain),
         },
         "next_experiment": found.experiment.sentence,
+        "waterfall": _waterfall(found),
+        "signals": found.signals,
+        "least_gain": found.least_gain,
         "finger": found.finger,
         "joints": [joint.get("name") for joint in found.nominal_data["joints"]],
         "tendons": [tendon.get("name") for tendon in found.nominal_data["tendons"]],
@@ -69,7 +72,6 @@ def build_report(found: Diagnosis, files: Sequence[str] = ()) -> dict[str, Any]:
         "seed": found.seed,
         "tested": found.tested,
         "floor_source": found.floor_source,
-        "ceiling": found.ceiling,
         "whiteness": [{"nominal": before, "extended": after} for before, after in found.whiteness],
         "invisible": [_invisible(each) for each in found.invisible],
         "events": [_event(event) for event in found.events],
@@ -120,47 +122,35 @@ def _cause(cause: Cause) -> dict[str, Any]:
         "p_value": cause.p_value,
         "gain": _gain(cause.gain),
         "confusable_with": [_where(other) for other in cause.confusable_with],
-        "parameters": {path: value for path, (value, _) in cause.parameters.items()},
-        "units": {path: unit for path, (_, unit) in cause.parameters.items()},
+        **_numbers_of(cause.parameters),
+        "places": [_place(each) for each in cause.places],
         "size": cause.size,
         "title": cause.title,
         "explanation": cause.explanation,
-        "share": cause.share,
-        "first_gain": None if cause.first_gain is None else _gain(cause.first_gain),
         "evidence": [_evidence(each) for each in cause.evidence],
     }
 
 
-def _without_a_term(found: Diagnosis) -> list[dict[str, Any]]:
-    """`contact` and `unknown`, which no term of the model mends: they gain nothing."""
-    causes = []
-    events = [event for event in found.events if event.peak >= CONTACT * max(found.nominal.train_rms)]
-    if events:
-        joints = {joint for event in events for joint in event.joints}
-        joint = joints.pop() if len(joints) == 1 else None
-        causes.append(_unmended("contact", joint, SCAN_LEVEL, events[0].description))
-    if found.unexplained.unknown:
-        shares = found.unexplained.by_joint
-        largest = int(np.argmax(shares)) + 1 if any(shares) else None
-        causes.append(_unmended("unknown", largest, found.unexplained.p_value, found.unexplained.description))
-    return causes
+def _place(found: FoundPlace) -> dict[str, Any]:
+    return {"joint": found.joint, "tendon": found.tendon, **_numbers_of(found.parameters)}
 
 
-def _unmended(effect: str, joint: int | None, p_value: float, size: str) -> dict[str, Any]:
+def _numbers_of(parameters: Mapping[str, tuple[float, str]]) -> dict[str, Any]:
     return {
-        **_where(Where(effect, joint)),
-        "p_value": p_value,
-        "gain": _gain(Interval(0.0, 0.0, 0.0)),
-        "confusable_with": [],
-        "parameters": {},
-        "units": {},
-        "size": size,
-        "title": UNMENDED[effect],
-        "explanation": "",
-        "share": 0.0,
-        "first_gain": None,
-        "evidence": [],
+        "parameters": {path: value for path, (value, _) in parameters.items()},
+        "units": {path: unit for path, (_, unit) in parameters.items()},
     }
+
+
+def _waterfall(found: Diagnosis) -> list[dict[str, Any]]:
+    """rms over all joints on unseen data: of the nominal model, then after each cause."""
+    names = names_of(found)
+    steps = [("nominal model", Where("", None, None))]
+    steps += [(at_place(cause.title, cause.where, names), cause.where) for cause in found.causes]
+    return [
+        {"label": label, "effect": where.effect or None, "joint": where.joint, "tendon": where.tendon, "rms": rms}
+        for (label, where), rms in zip(steps, found.steps, strict=True)
+    ]
 
 
 def _evidence(found: Evidence) -> dict[str, Any]:

@@ -110,7 +110,8 @@ class Unexplained:
     """What no effect explains.
 
     share: of the residual variance above the noise floor; by_joint: of each. p_value: of there being nothing,
-    family-wise. unknown: whether there is something material.
+    family-wise. unknown: whether there is something material and certain. gain: 1 − rms without what can be predicted
+    / rms with it, on unseen stretches.
     """
 
     share: float
@@ -118,6 +119,7 @@ class Unexplained:
     by_joint: tuple[float, ...] = ()
     p_value: float = 1.0
     unknown: bool = False
+    gain: Interval = Interval(0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -186,7 +188,8 @@ class Diagnosis:
     descriptions. noise_floor: N·m per joint, what of the extended model's test_rms nothing predicts; floor_source: how
     that is known. steps: rms over all joints on unseen data, N·m, of the nominal model and after each cause, in the
     order of `causes`. gain: over all joints on the test data; held_out: whether those are parts of the training
-    recordings. too_small: seen for certain, but not material, or not on unseen data.
+    recordings. too_small: seen for certain, but not material, or not on unseen data. event_gain: what leaving `events`
+    out takes away from the rms on the training recordings; None without events.
     """
 
     finger: str
@@ -218,3 +221,4 @@ class Diagnosis:
     extended_data: Mapping[str, Any]
     warnings: tuple[str, ...] = ()
     tested: int = 0  # effects at places
+    event_gain: Interval | None = None

@@ -117,6 +117,7 @@ def search(
     own = [without_blocks(each, k, chosen.grid, out) for k, each in enumerate(chosen.recordings)]
     clean = predicted_of(nominal.data, own, chosen.grid, series_of(nominal.data, own, chosen.grid, out))
     nominal = fitted(nominal.data, clean, settings, given=nominal.given)
+    touched = chosen.recordings  # with the events in them
     chosen = replace(chosen, nominal=nominal, recordings=own)
     online = OnlineError([without_events(each, events) for each in recordings])
     with phases.start("causes", MOST_CAUSES) as step:
@@ -124,7 +125,7 @@ def search(
         rounds.run(step)
     if events:
         # what the causes explain was no event
-        left, _ = events_of(rounds.models[-1].data, chosen.recordings, chosen.grid, seed)
+        left, _ = events_of(rounds.models[-1].data, touched, chosen.grid, seed)
         events = tuple(event for event in events if any(_overlap(event, other) for other in left))
     return Search(
         estimation=chosen,

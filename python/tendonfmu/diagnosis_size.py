@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
+from tendonfmu.diagnosis_result import FoundPlace
+
+Thresholds = tuple[float, float]
 Parameters = Mapping[str, tuple[float, str]]  # path -> (value, unit)
 Numbers = dict[str, list[tuple[float, str]]]  # last part of the path -> (value, unit) of each
 
@@ -15,8 +18,30 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _STEPS = ((0.1, 1.0, ""), (1e-4, 1e3, "m"), (0.0, 1e6, "µ"))  # from that magnitude on: factor, prefix
 
 
-def size_of(effect: str, parameters: Parameters) -> str:
-    """Such as "a play of 0.32 mm". parameters: of the cause in the extended description."""
+def size_of(effect: str, places: Sequence[FoundPlace], thresholds: Thresholds) -> str:
+    """Such as "a play of 0.32 mm"; of several places the largest, and how many there are.
+
+    thresholds: velocities at which tendons, m/s, and joints, rad/s, begin to move.
+    """
+    told = [each for each in places if each.parameters]
+    if not told:
+        return ""
+    sizes = list(dict.fromkeys(size_at(effect, each.parameters, thresholds) for each in told))
+    if len(told) == 1:
+        return sizes[0]
+    if len(sizes) == 1:
+        return f"{sizes[0]}, at each of {len(told)} places"
+    units = {_first(each)[1] for each in told}
+    if len(units) > 1:  # such as everywhere, and at a joint
+        return f"{sizes[0]}; other at {count_of(len(told) - 1, 'place')}"
+    largest = max(told, key=lambda each: abs(_first(each)[0]))
+    return f"{size_at(effect, largest.parameters, thresholds)} at the largest of {len(told)} places"
+
+
+def size_at(effect: str, parameters: Parameters, thresholds: Thresholds) -> str:
+    """The size at one place. parameters: of that place in the extended description."""
+    if effect == "presliding" and (told := _travel(parameters, thresholds)):
+        return told
     numbers: Numbers = {}
     for path, number in parameters.items():
         numbers.setdefault(path.rsplit(".", 1)[-1], []).append(number)
@@ -25,6 +50,24 @@ def size_of(effect: str, parameters: Parameters) -> str:
         return words(numbers) if words is not None else _listed(parameters)
     except (KeyError, ValueError):  # the effect has come as other numbers, such as a law instead of a row
         return _listed(parameters)
+
+
+def _travel(parameters: Parameters, thresholds: Thresholds) -> str:
+    """Of presliding everywhere, whose number is a time: it times the threshold of motion is a travel."""
+    if [unit for _, unit in parameters.values()] != ["s"]:
+        return ""
+    ((time, _),) = parameters.values()
+    tendon, joint = (quantity(time * each, unit) for each, unit in zip(thresholds, ("m", "rad"), strict=True))
+    return f"over {tendon} at tendons, {joint} at joints"
+
+
+def _first(place: FoundPlace) -> tuple[float, str]:
+    return next(iter(place.parameters.values()))
+
+
+def count_of(number: int, what: str) -> str:
+    """Such as "3 causes"."""
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 def quantity(value: float, unit: str, *, sign: bool = False) -> str:

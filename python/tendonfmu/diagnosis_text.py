@@ -6,17 +6,12 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from tendonfmu.diagnosis_result import Cause, Diagnosis, Interval, Invisible, Where
+from tendonfmu.diagnosis_result import Cause, Diagnosis, FoundPlace, Interval, Invisible, Where
 from tendonfmu.fit_summary import rounded
+from tendonfmu.reported_causes import CONTACT, TITLES, reported_causes
 
-UNKNOWN = "unknown"
 NBSP = "\u00a0"
 _NUMBERS = ("No", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine", "Ten")
-_OUTSIDE = {  # that are found, but are no term of a model
-    "contact": "something touches the finger",
-    UNKNOWN: "something that is no effect on the list",
-}
-
 _MOST_PLACES = 4  # that are listed
 _TOLD = 2  # effects that are told at length
 Row = tuple[str, ...]
@@ -38,6 +33,13 @@ class Names:
         """Such as "joint 2 (pip)"."""
         return _numbered("joint", number, self.joints)
 
+    def places(self, cause: Cause) -> str:
+        """Of a cause: its place, or how many it has; "everywhere" for the whole finger."""
+        place = self.place(cause.where)
+        if len(cause.places) < 2:
+            return place or "everywhere"
+        return f"{place}, {len(cause.places)} places" if place else f"{len(cause.places)} places"
+
 
 def _numbered(kind: str, number: int, names: Sequence[str]) -> str:
     name = names[number - 1] if 0 < number <= len(names) else ""
@@ -57,7 +59,7 @@ def title_of(effect: str) -> str:
     """A few plain words for an effect of contract section 7."""
     from tendonfmu.effects import CANDIDATES
 
-    titles = {candidate.name: candidate.title for candidate in CANDIDATES} | _OUTSIDE
+    titles = {candidate.name: candidate.title for candidate in CANDIDATES} | TITLES
     return titles.get(effect, effect.replace("_", " "))
 
 
@@ -65,11 +67,6 @@ def at_place(title: str, where: Where, names: Names) -> str:
     """Such as "friction grows with the force, at joint 1 (mcp)"."""
     place = names.place(where)
     return f"{title}, at {place}" if place else title
-
-
-def named(found: Diagnosis) -> list[Cause]:
-    """The causes that have a name."""
-    return [cause for cause in found.causes if cause.where.effect != UNKNOWN]
 
 
 # --- numbers ----------------------------------------------------------------------------------------------------------
@@ -121,11 +118,6 @@ def magnitude(value: float, unit: str) -> str:
     return f"{value:.4g}".replace("-", "−") + ("" if unit in ("", "1") else f"{NBSP}{told}")
 
 
-def count_of(number: int, what: str) -> str:
-    """Such as "3 causes"."""
-    return f"{number} {what}" if number == 1 else f"{number} {what}s"
-
-
 # --- sentences --------------------------------------------------------------------------------------------------------
 
 
@@ -136,12 +128,12 @@ _HEADLINES = {  # with no cause, one, several
         "The model is adequate: {many} were found, but what they explain hardly matters.",
     ),
     "explained": (
-        "What the model gets wrong is explained by events in the recordings, not by an effect that it lacks.",
+        "The model is adequate: these data show nothing that it lacks.",
         "One cause explains what the model gets wrong.",
         "{Many} together explain what the model gets wrong.",
     ),
     "partly explained": (
-        "What the model gets wrong is explained in part, by events in the recordings; the rest by no effect known.",
+        "The model gets something wrong, and no effect that is known explains it.",
         "One cause explains part of what the model gets wrong.",
         "{Many} together explain part of what the model gets wrong.",
     ),
@@ -154,34 +146,90 @@ _HEADLINES = {  # with no cause, one, several
 
 
 def headline(found: Diagnosis) -> str:
-    """The verdict, in one sentence."""
-    count = len(named(found))
+    """The verdict, in one sentence; a second one where something touches the finger."""
+    count = len(found.causes)
     many = f"{_NUMBERS[count] if count < len(_NUMBERS) else count} causes"
     text = _HEADLINES[found.verdict][min(count, 2)].format(Many=many, many=many.lower())
-    if count != 1:
-        return text
-    (cause,) = named(found)
-    return f"{text[:-1]}: {at_place(cause.title, cause.where, names_of(found))}."
+    if count == 1:
+        text = f"{text[:-1]}: {at_place(found.causes[0].title, found.causes[0].where, names_of(found))}."
+    for cause in reported_causes(found):
+        if cause.where.effect == CONTACT:
+            text += f" In some stretches {cause.title}: they were left out ({cause.size})."
+    return text
 
 
 def error_sentence(found: Diagnosis) -> str:
-    """Error before and after on unseen data, with the interval of the gain, beside floor and bias alone."""
+    """Error before and after on unseen data, with the interval of the gain, and what the bias alone would leave."""
     factor, unit = unit_of(found)
     nominal, extended = (together(each.test_rms) for each in (found.nominal, found.extended))
     where = unseen(found)
     if found.causes:
         text = (
-            f"On {where} its error falls from {rounded(factor * nominal)} to {rounded(factor * extended)} {unit} rms, "
+            f"On {where} the error falls from {rounded(factor * nominal)} to {rounded(factor * extended)} {unit} rms, "
             f"by {percent_interval(found.gain)}"
         )
     else:
-        text = f"On {where} its error is {rounded(factor * nominal)} {unit} rms"
-    floor, bias = together(found.noise_floor), together(found.bias_only_rms)
-    if math.isfinite(floor):
-        text += f"; the noise floor is {rounded(factor * floor)}, by {by_source(found.floor_source)}"
+        text = f"On {where} the error is {rounded(factor * nominal)} {unit} rms"
+    bias = together(found.bias_only_rms)
     if math.isfinite(bias):
-        text += f"; the bias alone, without any friction model, would leave {rounded(factor * bias)}"
+        text += f"; without any friction model it would be {rounded(factor * bias)}"
     return f"{text}."
+
+
+@dataclass(frozen=True)
+class Left:
+    """What is left on unseen data, in the unit of `unit_of`; the parts add up to the whole as they are shown.
+
+    whole: rms over all joints. noise: what nothing recorded predicts. nameless: the rest. digits: behind the point.
+    """
+
+    whole: float
+    noise: float
+    nameless: float
+    digits: int
+
+    def told(self, value: float) -> str:
+        return f"{value:.{self.digits}f}"
+
+
+def left_of(found: Diagnosis) -> Left | None:
+    """None where the noise floor is not known."""
+    factor, _ = unit_of(found)
+    whole, noise = factor * together(found.extended.test_rms), factor * together(found.noise_floor)
+    if not (math.isfinite(whole) and math.isfinite(noise)):
+        return None
+    digits = len(rounded(whole).partition(".")[2])
+    whole, noise = round(whole, digits), round(min(noise, whole), digits)
+    return Left(whole, noise, round(whole - noise, digits), digits)
+
+
+def left_sentence(found: Diagnosis) -> str:
+    """How much is left, how much of that could be predicted, and how much is noise; empty where that is not known."""
+    left, (_, unit) = left_of(found), unit_of(found)
+    if left is None:
+        return ""
+    whole = f"{left.told(left.whole)} {unit} are left"
+    if left.nameless <= 0.0:
+        return f"{whole}. Nothing that was recorded predicts any of it: to these sensors it is noise."
+    little = "" if found.unexplained.unknown else ", and is too little to matter"
+    return (
+        f"{whole}. {left.told(left.nameless)} of it can be predicted from what was recorded, but has no name{little}; "
+        f"the rest, {left.told(left.noise)}, is noise to these sensors."
+    )
+
+
+def unknown_sentence(found: Diagnosis) -> str:
+    """Where that lives which can be predicted and has no name; empty where it is too little to matter."""
+    where = found.unexplained.description.strip().rstrip(".") if found.unexplained.unknown else ""
+    return f"{where[0].upper()}{where[1:]}." if where else ""
+
+
+def too_small_sentence(found: Diagnosis) -> str:
+    """What stands in the list of what is too small."""
+    return (
+        f"Seen in these recordings, but on unseen data each of them takes away less than {percent(found.least_gain)} "
+        "of the error, or not for certain. They are not in the extended model."
+    )
 
 
 def unseen(found: Diagnosis) -> str:
@@ -196,8 +244,8 @@ def tested_sentence(found: Diagnosis) -> str:
     if not found.tested:
         return ""
     return (
-        f"{found.tested} effects at places were tested at once. A p-value says how often the strongest of them all "
-        "would look like that by chance, if nothing were missing."
+        f"{found.tested} effects at places were tried. A p-value says how often the strongest of all of them would "
+        "look like that by chance if nothing were missing."
     )
 
 
@@ -207,16 +255,6 @@ def confusion_sentence(cause: Cause, names: Names) -> str:
         return ""
     others = [at_place(title_of(other.effect), other, names) for other in cause.confusable_with]
     return f"These data cannot tell it from: {'; '.join(others)}."
-
-
-def unexplained_sentence(found: Diagnosis) -> str:
-    """What is left above the noise; empty where nothing is."""
-    rest = found.unexplained
-    if not math.isfinite(rest.share) or rest.share < 0.005:
-        return ""
-    text = f"{percent(rest.share)} of the residual's variance above the noise floor is explained by nothing"
-    where = rest.description.rstrip(".")
-    return f"{text}. {where[0].upper()}{where[1:]}." if where else f"{text}."
 
 
 @dataclass(frozen=True)
@@ -270,29 +308,23 @@ def next_sentence(found: Diagnosis) -> str:
     return f"{sentence}." if sentence else "No further experiment is needed: nothing is left to be told apart."
 
 
-def by_source(source: str) -> str:
-    """After "by": where the noise floor is from."""
-    return source if source.startswith(("the ", "repeats")) else f"the {source}"
-
-
 # --- printed ----------------------------------------------------------------------------------------------------------
 
 
 def tables(found: Diagnosis) -> Iterator[tuple[str, Row, list[Row]]]:
     """(title, headings, rows) of the causes and of the errors by joint."""
-    names = names_of(found)
-    if found.causes:
-        headings: Row = ("cause", "place", "size", "gain on unseen data", "p-value", "may also be")
+    names, causes = names_of(found), reported_causes(found)
+    if causes:
+        headings: Row = ("cause", "place", "size", "gain", "may also be")
         rows: list[Row] = [
             (
                 f"{k}. {cause.where.effect}",
-                names.place(cause.where) or "everywhere",
-                cause.size,
+                names.places(cause),
+                "see below" if cause.where.effect in TITLES else cause.size,
                 percent_interval(cause.gain),
-                probability(cause.p_value),
                 ", ".join(dict.fromkeys(other.effect for other in cause.confusable_with)) or "-",
             )
-            for k, cause in enumerate(found.causes, start=1)
+            for k, cause in enumerate(causes, start=1)
         ]
         yield f"{found.finger}: {found.verdict}", headings, rows
     factor, unit = unit_of(found)
@@ -323,7 +355,7 @@ def error_rows(found: Diagnosis, names: Names, factor: float) -> list[Row]:
 
 
 def lines(found: Diagnosis) -> Iterator[str]:
-    """Verdict, error, causes, what could not be told, and what to do next."""
+    """Verdict, error, causes, what is left, what could not be told, and what to do next."""
     names = names_of(found)
     yield headline(found)
     yield error_sentence(found)
@@ -331,12 +363,32 @@ def lines(found: Diagnosis) -> Iterator[str]:
         yield f"  {k}. {at_place(cause.title, cause.where, names)}: {cause.size}"
         if confusion := confusion_sentence(cause, names):
             yield f"     {confusion}"
-    if rest := unexplained_sentence(found):
-        yield rest
+    for sentence in (left_sentence(found), unknown_sentence(found)):
+        if sentence:
+            yield sentence
+    if found.too_small:
+        small = dict.fromkeys(at_place(each.where.effect, each.where, names) for each in found.too_small)
+        yield f"too small to matter: {'; '.join(small)}"
     yield from hidden_sentences(found, names)
     for event in found.events:
         yield f"left out: {event.recording}, {event.start:.2f} to {event.end:.2f} s: {event.description}"
+    yield f"estimated from {found.signals}"
     yield f"next: {next_sentence(found)}"
+
+
+def place_rows(cause: Cause, names: Names, sizes: Sequence[str]) -> list[tuple[str, str, str]]:
+    """(joint, tendon, size) of each place of a cause; sizes: of each."""
+    return [
+        (_at("joint", each, names), _at("tendon", each, names), size)
+        for each, size in zip(cause.places, sizes, strict=True)
+    ]
+
+
+def _at(kind: str, place: FoundPlace, names: Names) -> str:
+    number, all_names = (place.joint, names.joints) if kind == "joint" else (place.tendon, names.tendons)
+    if number is not None:
+        return _numbered(kind, number, all_names).removeprefix(f"{kind} ")
+    return "all" if place.joint is None and place.tendon is None else "–"
 
 
 def parameter_rows(parameters: Mapping[str, tuple[float, str]]) -> list[tuple[str, str]]:

@@ -17,6 +17,7 @@ from tendonfmu.fit_figures import fit_sheets
 from tendonfmu.fit_picture import FitPicture
 from tendonfmu.fit_sheet import MatrixPanel, Sheet
 from tendonfmu.fit_summary import Summary, rounded, summarise
+from tendonfmu.panel_styles import STYLES, size_of
 from tendonfmu.whole_file import whole_file
 
 PAGE = "report.html"
@@ -66,7 +67,7 @@ def write_fit_page(picture: FitPicture, folder: Path) -> dict[Path, str]:
 
 def draw_sheet(sheet: Sheet, file: Path | None = None) -> PageFigure:
     """Its panels as the page shows them; with a file, the sheet is written there as PNG too."""
-    from tendonfmu.fit_plots import STYLES, draw_panel, png, size_of, write_sheet
+    from tendonfmu.fit_plots import draw_panel, png, write_sheet
 
     pixels = [draw_panel(panel) for panel in sheet.panels]
     if file is not None:
@@ -75,8 +76,12 @@ def draw_sheet(sheet: Sheet, file: Path | None = None) -> PageFigure:
     for panel, drawn in zip(sheet.panels, pixels, strict=True):
         data = base64.b64encode(png(drawn, exact=isinstance(panel, MatrixPanel))).decode("ascii")
         images.append(EmbeddedImage(f"data:image/png;base64,{data}", panel.alt, *size_of(panel)))
-    keys = [(STYLES[style].shape, STYLES[style].colour, STYLES[style].alpha, meaning) for style, meaning in sheet.keys]
-    return PageFigure(sheet, sheet.panels[0].size, keys, images)
+    return PageFigure(sheet, sheet.panels[0].size, keys_of(sheet), images)
+
+
+def keys_of(sheet: Sheet) -> list[tuple[str, str, float, str]]:
+    """(CSS class, CSS colour, opacity, meaning) of what is drawn."""
+    return [(STYLES[style].shape, STYLES[style].colour, STYLES[style].alpha, meaning) for style, meaning in sheet.keys]
 
 
 def fit_page(picture: FitPicture, summary: Summary, figures: list[PageFigure]) -> str:

@@ -5,12 +5,11 @@ Panels have fixed margins, so that they align beside each other.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from io import BytesIO
 from math import ceil
 from pathlib import Path
 from textwrap import wrap
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -23,12 +22,12 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
 from tendonfmu.fit_sheet import MatrixPanel, Panel, Sheet
-from tendonfmu.plot_style import BLUE, DARK, GREEN, GREY, LIGHT, ORANGE, SKY, VERMILION, any_names, clean
+from tendonfmu.panel_styles import SIZES, STYLES, Style, size_of
+from tendonfmu.plot_style import DARK, GREY, LIGHT, any_names, clean
 from tendonfmu.whole_file import whole_file
 
 Pixels = NDArray[np.uint8]
 
-SIZES = {"small": (370, 250), "medium": (560, 250), "large": (560, 400)}  # CSS pixels
 COLUMNS = {"small": 3, "medium": 2, "large": 1}
 _DPI, _CSS = 150, 100  # pixels and CSS pixels per inch of the drawing
 _LEFT, _RIGHT, _BOTTOM, _TOP = 62, 18, 44, 28  # CSS pixels
@@ -36,59 +35,6 @@ _NAMES = 215.0  # CSS pixels, widest left margin with names in it
 _TITLE, _LABEL, _NUMBER = 10.0, 8.8, 8.4  # pt
 _WIDER = 1.12  # text of panels that narrow screens shrink
 
-
-@dataclass(frozen=True)
-class Style:
-    """Of a curve (colour, width, dashes), a band (alpha) or dots (marker, filled)."""
-
-    colour: str
-    width: float = 1.2
-    dash: Literal["-", "--", ":"] = "-"
-    alpha: float = 1.0
-    filled: bool = True
-    patch: bool = False
-
-    @property
-    def shape(self) -> str:
-        """CSS class of its key in the page."""
-        if self.patch:
-            return "patch"
-        if self.width == 0:
-            return "dot" if self.filled else "ring"
-        return {"-": "line", "--": "dashed", ":": "dotted"}[self.dash]
-
-
-STYLES = {
-    "measured": Style(DARK, 1.0),
-    "predicted": Style(SKY, 1.5),
-    "bias": Style(ORANGE, 0.8, alpha=0.8),
-    "fitted": Style(BLUE, 1.8),
-    "slow": Style(ORANGE, 1.8),
-    "negative": Style(VERMILION, 1.8),
-    "start": Style(GREY, 1.1, "--"),
-    "confidence": Style(BLUE, alpha=0.2, patch=True),
-    "fitted_confidence": Style(BLUE, alpha=0.2, patch=True),
-    "slow_limit": Style(ORANGE, 0.9, ":"),
-    "standstill": Style("#BDBDBD", alpha=0.35, patch=True),
-    "negative_confidence": Style(VERMILION, alpha=0.18, patch=True),
-    "median": Style(BLUE, 1.6),
-    "spread": Style(SKY, alpha=0.35, patch=True),
-    "held_out": Style(ORANGE, alpha=0.16, patch=True),
-    "data": Style("#BDBDBD", alpha=0.6, patch=True),
-    "identified": Style(BLUE, 0.0, alpha=0.7),
-    "unidentified": Style(VERMILION, 0.0, filled=False),
-    "before": Style(VERMILION, 1.0, alpha=0.9),
-    "after": Style(BLUE, 1.0),
-    "before_line": Style(VERMILION, 0.9, alpha=0.45),
-    "after_line": Style(BLUE, 0.9, alpha=0.45),
-    "before_dots": Style(VERMILION, 0.0),
-    "after_dots": Style(BLUE, 0.0),
-    "before_scatter": Style(VERMILION, alpha=0.13, patch=True),
-    "floor": Style(GREEN, 0.0, filled=False),
-    "positive": Style("#B2182B", patch=True),
-    "uncorrelated": Style("#FFFFFF", patch=True),
-    "opposed": Style("#2166AC", patch=True),
-}
 
 _DIVERGING = LinearSegmentedColormap.from_list("diverging", ["#2166AC", "#6BAED6", "#FFFFFF", "#F4895F", "#B2182B"])
 
@@ -114,12 +60,6 @@ def _room_for_names(panel: Panel | MatrixPanel) -> float:
     if isinstance(panel, MatrixPanel):
         return _NAMES
     return min(_NAMES, 18 + 6.4 * _enlarged(panel) * max(len(name) for name in panel.rows))
-
-
-def size_of(panel: Panel | MatrixPanel) -> tuple[int, int]:
-    """Width and height in CSS pixels."""
-    width, height = SIZES[panel.size]
-    return (width, panel.height) if isinstance(panel, Panel) and panel.height else (width, height)
 
 
 def png(pixels: Pixels, *, exact: bool = False) -> bytes:

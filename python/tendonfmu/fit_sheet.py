@@ -19,7 +19,7 @@ Size = Literal["small", "medium", "large"]
 
 @dataclass(frozen=True)
 class Curve:
-    """A line. style: a key of `fit_plots.STYLES`. x, y: [N], NaN breaks the line."""
+    """A line. style: a key of `panel_styles.STYLES`. x, y: [N], NaN breaks the line."""
 
     style: str
     x: Numbers

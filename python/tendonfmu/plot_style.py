@@ -1,7 +1,4 @@
-"""What all figures share: colours, clean axes, and PNG files of the same bytes for the same drawing.
-
-Colours are those of Okabe and Ito, which colour-blind readers tell apart.
-"""
+"""What all drawings by matplotlib share: clean axes, and PNG files of the same bytes for the same drawing."""
 
 from __future__ import annotations
 
@@ -16,10 +13,25 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
+from tendonfmu.panel_styles import BLUE, DARK, GREEN, GREY, LIGHT, ORANGE, PURPLE, SKIN, SKY, VERMILION
 from tendonfmu.whole_file import whole_file
 
-BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION = "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00"
-DARK, GREY, LIGHT, SKIN = "#222222", "#8A8A8A", "#D5D8DC", "#F4F1EC"
+__all__ = [
+    "BLUE",
+    "DARK",
+    "GREEN",
+    "GREY",
+    "LIGHT",
+    "ORANGE",
+    "PURPLE",
+    "SKIN",
+    "SKY",
+    "VERMILION",
+    "Target",
+    "any_names",
+    "clean",
+    "save",
+]
 
 Target = Path | IO[bytes]
 

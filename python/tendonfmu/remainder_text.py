@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,25 +28,42 @@ def described(
     sentences = []
     for joint in joints:
         own = [finding for finding in findings if finding.joint == joint]
-        what = " and ".join(dict.fromkeys(_what(finding) for finding in own[:3]))
-        rms = float(np.sqrt(np.mean(prediction[series.used, joint - 1] ** 2)))
+        what = " and ".join(dict.fromkeys(_what(own[:3])))
         where = _where(series, prediction[:, joint - 1], joint, own)
-        sentences.append(f"Joint {joint}: {_part(share[joint - 1], rms)} follows {what}{where}.")
+        sentences.append(f"Joint {joint}: {_part(share[joint - 1])} follows {what}{where}.")
     return " ".join(sentences)
 
 
-def _part(share: float, rms: float) -> str:
+def _part(share: float) -> str:
     if share < 0.01:
         return "a small but certain part of what is left, in its quick changes,"
-    return f"{100.0 * share:.0f} % of what is left ({1000.0 * rms:.2g} mN·m rms)"
+    return f"{100.0 * share:.0f} % of the variance of what is left"
 
 
-def _what(finding: Finding) -> str:
-    if finding.line is not None:
-        size = 1000.0 * finding.line.amplitude
-        return f"a steady oscillation at {finding.line.frequency:.3g} Hz of {size:.2g} mN·m, whatever the motion"
-    subject = f", {finding.subject}" if finding.subject else ""
-    return f"{GROUPS[finding.group]}{subject}"
+def _what(findings: Sequence[Finding]) -> Iterator[str]:
+    """What each follows; oscillations together, in the place of the first."""
+    lines = [finding.line for finding in findings if finding.line is not None]
+    told = False
+    for finding in findings:
+        if finding.line is None:
+            subject = f", {finding.subject}" if finding.subject else ""
+            yield f"{GROUPS[finding.group]}{subject}"
+        elif not told:
+            told = True
+            frequencies, sizes = (
+                _listed([f"{value:.{digits}g}" for value in values])
+                for values, digits in (
+                    ([line.frequency for line in lines], 3),
+                    ([1000.0 * line.amplitude for line in lines], 2),
+                )
+            )
+            steady = "a steady oscillation" if len(lines) == 1 else "steady oscillations"
+            yield f"{steady} at {frequencies} Hz of {sizes} mN·m, whatever the motion"
+
+
+def _listed(values: Sequence[str]) -> str:
+    """Such as "1, 2 and 3"."""
+    return " and ".join(filter(None, [", ".join(values[:-1]), values[-1]]))
 
 
 def _where(series: Series, part: Numbers, joint: int, findings: Sequence[Finding]) -> str:

@@ -32,7 +32,9 @@ from tendonfmu.starting_point import Start, scan
 
 Numbers = NDArray[np.float64]
 
+NOISIEST = 1000.0  # rad, that `position_filter` takes
 NOISE_CUTOFF = 15.0  # Hz: what positions of a hand do faster is noise
+ENOUGH = 90.0  # s of motion, to choose signals and a start by
 BETTER = 0.7  # of the error of smoothed signals, that raw ones have to be below: with them comes a filter's lag
 
 
@@ -41,8 +43,8 @@ class Estimation:
     """What is estimated from.
 
     recordings: `train` says where. least: sizes that the sensors can show. nominal: the given structure fitted, with
-    these settings; start: delay and presliding that it begins with, model: fitted with them. error: rms, N·m, on unseen
-    stretches. given: the description as it was given, with the filter that suits it online.
+    these settings; start: delay and presliding that it begins with, model: fitted with them. given: the description as
+    it was given, with the filter that suits it online.
     """
 
     signals: Signals
@@ -52,7 +54,6 @@ class Estimation:
     nominal: FittedModel
     start: Start
     model: FittedModel
-    error: float
     settings: FitSettings
     given: Mapping[str, Any]
 
@@ -68,16 +69,47 @@ class Estimation:
 
 
 def choose(given: FingerDescription, recordings: Sequence[FitRecording], settings: FitSettings) -> Estimation:
-    """recordings: as they were measured. Raises InputError."""
+    """recordings: as they were measured. Long ones are compared on a part. Raises InputError."""
     smoothing = smoothing_of([each.recording for each in recordings], given.data)
     raw = Signals()
+    part = _part_of(given, recordings)
     if smoothing is None:
-        return _with_filter(_estimated(given, recordings, raw, settings, None), recordings)
-    smooth = _estimated(given, recordings, smoothing, settings, None)
-    rough = _estimated(given, recordings, raw, settings, smooth)
-    lags = any(each.kinematics != 3 for each in recordings)
-    chosen = rough if rough.error < (BETTER if lags else 1.0) * smooth.error else smooth
+        signals, start = raw, _compared(given, part, raw, settings, None).start
+    else:
+        smooth = _compared(given, part, smoothing, settings, None)
+        rough = _compared(given, part, raw, settings, smooth)
+        lags = any(each.kinematics != 3 for each in recordings)
+        is_raw = rough.error < (BETTER if lags else 1.0) * smooth.error
+        signals, start = (raw, rough.start) if is_raw else (smoothing, smooth.start)
+    finger = replace(given, data=signals.description(given.data))
+    own = estimation_recordings(finger, recordings, signals)
+    nominal = fitted(finger.data, own, settings)
+    model = fit_extended(nominal, start.accepted, own, settings) if start.causes else nominal
+    least = least_sizes(given.data, recordings, float(np.median(np.diff(own[0].time))))
+    chosen = Estimation(signals, own, make_grid(own), least, nominal, start, model, settings, given.data)
     return _with_filter(chosen, recordings)
+
+
+def _part_of(given: FingerDescription, recordings: Sequence[FitRecording]) -> list[FitRecording]:
+    """Of each recording the first seconds, all together ENOUGH; signals and the start differ little along the way."""
+    share = ENOUGH / max(sum(each.duration for each in recordings), 1e-300)
+    if share >= 1.0:
+        return list(recordings)
+    found = []
+    for each in recordings:
+        end = int(np.searchsorted(each.time, each.time[0] + share * (each.time[-1] - each.time[0])))
+        if end < FEWEST_SAMPLES or not each.train[:end].any():
+            continue
+        whole = each.recording
+        part = replace(
+            whole,
+            time=whole.time[:end],
+            groups={name: values[:end] for name, values in whole.groups.items()},
+            contact=None if whole.contact is None else whole.contact[:end],
+        )
+        own = prepare(given, part, each.kinematics, Held())
+        found.append(replace(own, train=own.train & each.train[:end]))
+    return found or list(recordings)
 
 
 def _with_filter(chosen: Estimation, recordings: Sequence[FitRecording]) -> Estimation:
@@ -89,6 +121,8 @@ def _with_filter(chosen: Estimation, recordings: Sequence[FitRecording]) -> Esti
     if any(each.kinematics == 3 for each in recordings):
         return chosen
     noise = np.max([joint_position_noise(chosen.given, each) for each in recordings], axis=0)
+    if noise.max() > NOISIEST:
+        return chosen
     filtered = replace(chosen, given={**chosen.given, "position_filter": {"noise": [float(value) for value in noise]}})
     error = OnlineError(recordings)
     before, after = (error.by_stretch(each.online(each.model.data)) for each in (chosen, filtered))
@@ -96,20 +130,29 @@ def _with_filter(chosen: Estimation, recordings: Sequence[FitRecording]) -> Esti
     return filtered if gain > CERTAIN * spread else chosen
 
 
-def _estimated(
+@dataclass(frozen=True)
+class _Compared:
+    """A start with certain signals. error: rms on unseen stretches, N·m."""
+
+    signals: Signals
+    start: Start
+    error: float
+
+
+def _compared(
     given: FingerDescription,
     recordings: Sequence[FitRecording],
     signals: Signals,
     settings: FitSettings,
-    known: Estimation | None,
-) -> Estimation:
+    known: _Compared | None,
+) -> _Compared:
     """known: with other signals, whose starting point is taken over."""
     finger = replace(given, data=signals.description(given.data))
     own = estimation_recordings(finger, recordings, signals)
     grid = make_grid(own)
     nominal = fitted(finger.data, own, settings)
-    least = least_sizes(given.data, recordings, float(np.median(np.diff(own[0].time))))
     if known is None:
+        least = least_sizes(given.data, recordings, float(np.median(np.diff(own[0].time))))
         starts = scan(nominal.data, own, grid, least.least("time_delay", None, None))
         # of a known delay the two best distances: the derivative of one need not lead to the better
         tried = [starts[0], *[each for each in starts[1:] if each.presliding != starts[0].presliding][:1]]
@@ -118,11 +161,8 @@ def _estimated(
     cutoff = signals.cutoff or (known.signals.cutoff if known else None)
     found = []
     for start in tried:
-        model = nominal
-        if start.causes:
-            model = fit_extended(nominal, start.accepted, own, settings)
-        error = _error(model.data, own, grid, cutoff)
-        found.append(Estimation(signals, own, grid, least, nominal, start, model, error, settings, given.data))
+        model = fit_extended(nominal, start.accepted, own, settings) if start.causes else nominal
+        found.append(_Compared(signals, start, _error(model.data, own, grid, cutoff)))
     return min(found, key=lambda each: each.error)
 
 

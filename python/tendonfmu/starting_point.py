@@ -39,7 +39,10 @@ PRESLIDING, DELAY = _BY_NAME["presliding"], _BY_NAME["time_delay"]
 
 @dataclass(frozen=True)
 class Start:
-    """One point of the scan: presliding at all places or none, forces late by `delay` s. error: Σ e² on held-out folds."""
+    """One point of the scan.
+
+    presliding: at all places, or () for none. delay: s by which forces are late. error: Σ e² on held-out folds, (N·m)².
+    """
 
     presliding: tuple[Accepted, ...]
     delay: float

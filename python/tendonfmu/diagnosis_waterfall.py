@@ -1,0 +1,71 @@
+"""From the error of the nominal model to what is left: what each cause takes away, in rows ready to be shown."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from tendonfmu.diagnosis_result import Diagnosis
+from tendonfmu.diagnosis_text import Names, at_place, left_of, unit_of
+from tendonfmu.fit_summary import rounded
+
+
+@dataclass(frozen=True)
+class Part:
+    """Of a bar. tone: "nominal", "cause", "more", "noise" or "nameless". start, width: per cent of the widest bar."""
+
+    tone: str
+    start: float
+    width: float
+
+
+@dataclass(frozen=True)
+class Row:
+    """label: in plain words, with place. value: what the bar is long, with sign where it is taken away."""
+
+    label: str
+    value: str
+    parts: tuple[Part, ...]
+
+
+@dataclass(frozen=True)
+class Waterfall:
+    """unit: of the values. floor: per cent at which the noise floor is; None where it is not known."""
+
+    unit: str
+    rows: tuple[Row, ...]
+    floor: float | None
+
+
+def waterfall_of(found: Diagnosis, names: Names) -> Waterfall:
+    """Rows in the order of the causes; the values add up as they are shown."""
+    factor, unit = unit_of(found)
+    steps = [factor * each for each in found.steps]
+    left = left_of(found)
+    widest = max([each for each in steps if math.isfinite(each)], default=0.0) or 1.0
+    floor = None if left is None else min(100.0 * left.noise / widest, 100.0)
+    return Waterfall(unit, tuple(_rows(found, names, steps, widest)), floor)
+
+
+def _rows(found: Diagnosis, names: Names, steps: list[float], widest: float) -> Iterator[Row]:
+    digits = len(rounded(widest).partition(".")[2])
+    shown = [round(each, digits) for each in steps]
+
+    def part(tone: str, begin: float, end: float) -> Part:
+        low, high = sorted(min(100.0 * each / widest, 100.0) for each in (begin, end))
+        return Part(tone, round(low, 2), round(high - low, 2))
+
+    if found.causes:
+        yield Row("error of the nominal model", f"{shown[0]:.{digits}f}", (part("nominal", 0.0, steps[0]),))
+    for k, cause in enumerate(found.causes):
+        change = shown[k + 1] - shown[k]
+        tone, sign = ("cause", "−") if change <= 0 else ("more", "+")
+        label = f"{k + 1}. {at_place(cause.title, cause.where, names)}"
+        yield Row(label, f"{sign}{abs(change):.{digits}f}", (part(tone, steps[k], steps[k + 1]),))
+    left = left_of(found)
+    parts: tuple[Part, ...] = (part("nominal", 0.0, steps[-1]),)
+    if left is not None:
+        parts = (part("noise", 0.0, left.noise), part("nameless", left.noise, steps[-1]))
+    label = "what is left" if found.causes else "error of the model"
+    yield Row(label, f"{shown[-1]:.{digits}f}", parts)

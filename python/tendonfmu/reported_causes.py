@@ -1,0 +1,65 @@
+"""The causes that a report lists: those with a term in the extended model; then contact and unknown, without one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from tendonfmu.contact_scan import LEVEL as SCAN_LEVEL
+from tendonfmu.diagnosis_result import Cause, Diagnosis, Where
+
+CONTACT, UNKNOWN = "contact", "unknown"
+TITLES = {
+    CONTACT: "something touches the finger, or stops it",
+    UNKNOWN: "something that no effect on the list explains",
+}
+_EXPLANATIONS = {
+    CONTACT: "In some stretches a torque comes and goes that no friction explains. They are left out of the fit; the "
+    "gain is what leaving them out takes away from the error on the training recordings.",
+    UNKNOWN: "What is left can be predicted in part from what was recorded, but it has the shape of no effect on the "
+    "list. The gain is what predicting it takes away from the error in unseen stretches.",
+}
+LEAST_PEAK = 6.0  # nominal residuals rms that the peak of an event is, at least, to be called contact
+
+
+def reported_causes(found: Diagnosis) -> list[Cause]:
+    """In order of gain; contact and unknown at the end, each only where its gain is above 0 for certain."""
+    return [*found.causes, *_contact(found), *_unknown(found)]
+
+
+def _contact(found: Diagnosis) -> Iterator[Cause]:
+    events = [event for event in found.events if event.peak >= LEAST_PEAK * max(found.nominal.train_rms)]
+    gain = found.event_gain
+    if not events or gain is None or not gain.low > 0.0:
+        return
+    joints = {joint for event in events for joint in event.joints}
+    joint = joints.pop() if len(joints) == 1 else None
+    count = "one event" if len(events) == 1 else f"{len(events)} events"
+    seconds = sum(event.end - event.start for event in events)
+    yield Cause(
+        where=Where(CONTACT, joint),
+        title=TITLES[CONTACT],
+        explanation=_EXPLANATIONS[CONTACT],
+        p_value=SCAN_LEVEL,  # of any event where there is none
+        gain=gain,
+        confusable_with=(),
+        parameters={},
+        size=f"{count}, {seconds:.1f} s in all",
+    )
+
+
+def _unknown(found: Diagnosis) -> Iterator[Cause]:
+    rest = found.unexplained
+    if not rest.unknown or not rest.gain.low > 0.0:
+        return
+    yield Cause(
+        where=Where(UNKNOWN, int(np.argmax(rest.by_joint)) + 1 if any(rest.by_joint) else None),
+        title=TITLES[UNKNOWN],
+        explanation=_EXPLANATIONS[UNKNOWN],
+        p_value=rest.p_value,
+        gain=rest.gain,
+        confusable_with=(),
+        parameters={},
+        size=rest.description.rstrip("."),
+    )
