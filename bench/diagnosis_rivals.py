@@ -24,10 +24,14 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from tendonfmu.campaign_cases import Case
+from tendonfmu.cause_search import View, look
+from tendonfmu.description import read_finger
 from tendonfmu.diagnosis_result import Where
-from tendonfmu.diagnosis_series import Trial
+from tendonfmu.extension_fit import FitSettings
+from tendonfmu.fit_recordings import Held, prepare
 from tendonfmu.nuisance import basis, without
-from tendonfmu.significance import Problem, residual_of
+from tendonfmu.recording import read_recording
+from tendonfmu.signal_choice import choose
 
 Numbers = NDArray[np.float64]
 
@@ -35,6 +39,18 @@ SIGNIFICANCE = 0.01
 FOLDS = 10
 MOST_CAUSES = 4
 THRESHOLD = 0.1  # of STLSQ, both sides scaled to a standard deviation of 1
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A candidate at a place with one choice of its non-linear numbers, and its columns."""
+
+    where: Where
+    columns: slice
+
+    @property
+    def numbers(self) -> range:
+        return range(self.columns.start, self.columns.stop)
 
 
 @dataclass(frozen=True)
@@ -46,24 +62,26 @@ class Plain:
     trials: tuple[Trial, ...]
 
     def of(self, trial: Trial) -> Numbers:
-        return self.columns[:, trial.first : trial.first + trial.count]
+        return self.columns[:, trial.columns]
 
 
-def plain(problem: Problem) -> Plain:
+def plain(view: View) -> Plain:
     """What the rivals see: least squares and no more, as with independent samples."""
-    series = problem.series
-    nominal = np.asarray(problem.nominal, dtype=np.float64)
-    used, slow = series.used, basis(problem.splines[series.used])
-    target = residual_of(series, problem.splines, nominal)[used]
+    used = view.series.used
+    slow = basis(view.splines[used])
 
     def bare(values: NDArray[Any]) -> Numbers:
         wide = np.asarray(values[used], dtype=np.float64)
         return np.stack([without(wide[:, j], slow) for j in range(wide.shape[1])], axis=1)
 
-    own = bare(nominal)
+    own, columns = bare(view.columns.nominal), bare(view.columns.values)
     span = basis(own.reshape(-1, own.shape[2]))
-    columns = bare(problem.bank.columns.values)
-    return Plain(target.reshape(-1), without(columns.reshape(-1, columns.shape[2]), span), problem.bank.trials)
+    trials = tuple(
+        Trial(Where(proposal.candidate.name, proposal.place.joint, proposal.place.tendon), shape.columns)
+        for proposal in view.columns.proposals
+        for shape in proposal.shapes
+    )
+    return Plain(view.residual[used].reshape(-1), without(columns.reshape(-1, columns.shape[2]), span), trials)
 
 
 Choice = Callable[[Plain, Numbers], Trial | None]
@@ -79,7 +97,7 @@ def stepwise(data: Plain, choose: Choice) -> list[Trial]:
             break
         found.append(trial)
         span = basis(left.of(trial))
-        trials = tuple(each for each in left.trials if each.place != trial.place)
+        trials = tuple(each for each in left.trials if each.where != trial.where)
         left = Plain(without(left.target, span), without(left.columns, span), trials)
     return found
 
@@ -88,10 +106,10 @@ def by_correlation(data: Plain, power: Numbers) -> Trial | None:
     total = float(data.target @ data.target)
     product = data.target @ data.columns
     share = product**2 / np.maximum(power * total, 1e-300) * (power > _least(power))
-    best = max(data.trials, key=lambda each: float(share[each.first : each.first + each.count].max()), default=None)
+    best = max(data.trials, key=lambda each: float(share[each.columns].max()), default=None)
     if best is None:
         return None
-    r2 = min(float(share[best.first : best.first + best.count].max()), 1.0 - 1e-12)
+    r2 = min(float(share[best.columns].max()), 1.0 - 1e-12)
     freedom = len(data.target) - 2
     p_value = 2.0 * float(student.sf(np.sqrt(r2 * freedom / (1.0 - r2)), freedom)) * data.columns.shape[1]
     return best if p_value < SIGNIFICANCE else None
@@ -102,7 +120,7 @@ def by_bic(data: Plain, power: Numbers) -> Trial | None:
 
     def fall(trial: Trial) -> float:
         explained = float(np.sum((basis(data.of(trial)).T @ data.target) ** 2)) if _shows(trial, power) else 0.0
-        return -rows * np.log(max(1.0 - explained / total, 1e-12)) - trial.count * np.log(rows)
+        return -rows * np.log(max(1.0 - explained / total, 1e-12)) - len(trial.numbers) * np.log(rows)
 
     best = max(data.trials, key=fall, default=None)
     return best if best is not None and fall(best) > 0.0 else None
@@ -134,7 +152,7 @@ def by_sindy(data: Plain) -> list[Trial]:
     import pysindy
 
     power = np.einsum("rc,rc->c", data.columns, data.columns)
-    every = [(trial.first + k, trial) for trial in data.trials for k in range(trial.count)]
+    every = [(number, trial) for trial in data.trials for number in trial.numbers]
     numbers = [number for number, _ in every if power[number] > _least(power)]
     owner = [trial for number, trial in every if power[number] > _least(power)]
     scaled = data.columns[:, numbers] / np.sqrt(power[numbers] / len(data.target))
@@ -145,7 +163,7 @@ def by_sindy(data: Plain) -> list[Trial]:
     size = np.abs(model.coefficients()[0])
     found: list[Trial] = []
     for k in np.argsort(-size):
-        if size[k] > 0.0 and owner[k].place not in [each.place for each in found]:
+        if size[k] > 0.0 and owner[k].where not in [each.where for each in found]:
             found.append(owner[k])
     return found[:MOST_CAUSES]
 
@@ -155,12 +173,12 @@ def _least(power: Numbers) -> float:
 
 
 def _shows(trial: Trial, power: Numbers) -> bool:
-    return bool(power[trial.first : trial.first + trial.count].max() > _least(power))
+    return bool(power[trial.columns].max() > _least(power))
 
 
-def answers(problem: Problem) -> dict[str, list[Where]]:
+def answers(view: View) -> dict[str, list[Where]]:
     """What each rival names, first things first. sindy only where PySINDy is installed."""
-    data = plain(problem)
+    data = plain(view)
     found = {
         "correlation": stepwise(data, by_correlation),
         "bic": stepwise(data, by_bic),
@@ -168,12 +186,13 @@ def answers(problem: Problem) -> dict[str, list[Where]]:
     }
     with contextlib.suppress(ModuleNotFoundError):
         found["sindy"] = by_sindy(data)
-    return {name: [Where(*trial.place) for trial in trials] for name, trials in found.items()}
+    return {name: [trial.where for trial in trials] for name, trials in found.items()}
 
 
 def beside(case: Case) -> Mapping[str, list[Where]]:
-    """For `tendonfmu campaign --beside`: the rivals on a case."""
-    from tendonfmu.diagnosis import problem_of
-
+    """For `tendonfmu campaign --beside`: the rivals on a case, from the signals that `diagnose` chooses."""
     assert case.finger is not None
-    return answers(problem_of(case.finger, list(case.recordings), kinematics=case.kinematics, seed=case.seed))
+    finger = read_finger(case.finger)
+    recordings = [prepare(finger, read_recording(path), case.kinematics, Held()) for path in case.recordings]
+    chosen = choose(finger, recordings, FitSettings(threads=1))
+    return answers(look(chosen.nominal.data, chosen.recordings, chosen.grid, chosen.least))

@@ -18,6 +18,7 @@ from tendonfmu.diagnosis_result import (
     Cause,
     Diagnosis,
     Experiment,
+    FoundPlace,
     Interval,
     Invisible,
     ModelErrors,
@@ -27,18 +28,55 @@ from tendonfmu.diagnosis_result import (
 from tendonfmu.errors import InputError
 
 ERRORS = ModelErrors((0.002,), (0.002,))
+GAIN = Interval(0.1, 0.05, 0.15)
 
 
-def cause(effect: str, joint: int | None = 1, others: tuple[Where, ...] = ()) -> Cause:
-    where = Where(effect, joint, None)
-    return Cause(where, "", "", 1e-4, Interval(0.1, 0.05, 0.15), 0.5, others, {}, "")
+def cause(
+    effect: str, joint: int | None = 1, others: tuple[Where, ...] = (), places: tuple[FoundPlace, ...] = ()
+) -> Cause:
+    return Cause(
+        where=Where(effect, joint, None),
+        title="",
+        explanation="",
+        p_value=1e-4,
+        gain=GAIN,
+        confusable_with=others,
+        parameters={},
+        size="",
+        places=places or (FoundPlace(joint, None, {}),),
+    )
 
 
 def diagnosis(*causes: Cause, verdict: str = "explained", invisible: tuple[Invisible, ...] = ()) -> Diagnosis:
     return Diagnosis(
-        "finger", verdict, ("r",), (), True, 1.0, 0, ERRORS, ERRORS, (0.1,), (0.002,), "", (0.0,),
-        Interval(0.1, 0.05, 0.15), causes, invisible, (), Unexplained(0.0, ""), Experiment(""), (), (), None, {}, {},
-    )  # fmt: skip
+        finger="finger",
+        verdict=verdict,
+        recordings=("r",),
+        tests=(),
+        held_out=True,
+        seconds=1.0,
+        seed=0,
+        signals="raw signals",
+        least_gain=0.03,
+        nominal=ERRORS,
+        extended=ERRORS,
+        bias_only_rms=(0.1,),
+        noise_floor=(0.002,),
+        floor_source="",
+        gain=GAIN,
+        steps=(),
+        causes=causes,
+        too_small=(),
+        invisible=invisible,
+        events=(),
+        unexplained=Unexplained(0.0, ""),
+        experiment=Experiment(""),
+        views=(),
+        whiteness=(),
+        detection=None,
+        nominal_data={},
+        extended_data={},
+    )
 
 
 def case(group: str, *truth: Truth) -> Case:
@@ -160,6 +198,16 @@ def test_one_effect_named_first_in_a_set_or_not_at_all() -> None:
     assert (row["detected"], row["in_set"], row["first"], row["place"]) == (True, False, False, None)
     row = judge(case("single", truth), diagnosis(verdict="unexplained"))
     assert (row["detected"], row["in_set"], row["unknown"]) == (True, False, True)
+
+
+def test_one_effect_at_many_places_is_right_where_the_true_one_is_among_them() -> None:
+    truth = Truth("load_friction", 1, 2)
+    places = (FoundPlace(1, 1, {}), FoundPlace(1, 2, {}))
+    row = judge(case("single", truth), diagnosis(cause("load_friction", joint=1, places=places)))
+    assert row["place"]
+    assert json.loads(row["causes"])[0]["places"] == [{"joint": 1, "tendon": 1}, {"joint": 1, "tendon": 2}]
+    row = judge(case("single", truth), diagnosis(cause("load_friction", joint=1, places=places[:1])))
+    assert row["in_set"] and not row["place"]
 
 
 def test_rivals_are_asked_the_same(tmp_path: Path) -> None:

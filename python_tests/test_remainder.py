@@ -1,4 +1,4 @@
-"""What of a residual is explainable: silent on noise, sure of what no candidate is; floor and pictures."""
+"""What of a residual is explainable: silent on noise, sure of what no candidate is; and its pictures."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from scipy.signal import lfilter
 
 from synthetic_series import low_passed, make_series, nuisance_of, residual_of, with_effect
 from tendonfmu.diagnosis_series import Series
-from tendonfmu.noise_floor import REPEATS, WHITE, noise_floor
 from tendonfmu.remainder import measure_remainder
 from tendonfmu.residual_views import residual_views, whiteness
 
@@ -85,47 +84,6 @@ def test_too_short_is_not_judged() -> None:
     found = measure_remainder(series, residual_of(series, nuisance), nuisance)
     assert not found.unknown
     assert found.p_value == 1.0
-
-
-def repeated(series: Series, times: int) -> Series:
-    """The motion of a series several times over, measured with a little noise; time and target go on."""
-    rng = np.random.default_rng(0)
-    blocks = times * len(series.time)
-
-    def again(values: Numbers) -> Numbers:
-        whole = np.concatenate([values] * times)
-        return np.asarray(whole + 0.003 * values.std() * rng.standard_normal(whole.shape))
-
-    drive = rng.standard_normal((blocks, 2))
-    target = again(np.sin(9.0 * series.angle)) * 0.1 + 0.01 * lfilter([1.0], [1.0, -0.8], drive, axis=0)
-    return Series(
-        (np.arange(blocks) + 0.5) * series.step,
-        np.zeros(blocks, dtype=np.int64),
-        np.zeros(blocks, dtype=np.int64),
-        target,
-        np.ones(blocks, dtype=bool),
-        series.step,
-        *(again(each) for each in (series.angle, series.velocity, series.acceleration, series.force)),
-        again(series.tendon_velocity),
-        again(series.travel),
-    )
-
-
-def test_noise_floor_of_repeats_knows_nothing_of_the_model() -> None:
-    """What repeats with the motion, however wrong the model, is no noise: 17 mN·m of 70."""
-    cycles = repeated(make_series(2, seconds=12.0), 3)
-    found = noise_floor(cycles, cycles.target)
-    assert found.source == REPEATS
-    assert found.seconds > 20.0
-    np.testing.assert_allclose(found.rms, 0.01 / np.sqrt(1.0 - 0.8**2), rtol=0.1)
-
-
-def test_noise_floor_without_repeats_is_the_white_part() -> None:
-    series = make_series(2, seconds=30.0)
-    white = 0.01 * np.random.default_rng(1).standard_normal((len(series.time), 2))
-    found = noise_floor(series, np.asarray(lfilter([1.0], [1.0, -0.8], white, axis=0)))
-    assert found.source == WHITE
-    np.testing.assert_allclose(found.rms, 0.01, rtol=0.05)
 
 
 def test_views_show_the_curve_the_spectrum_and_the_memory() -> None:

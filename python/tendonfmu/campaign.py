@@ -13,14 +13,14 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tendonfmu.campaign_cases import Case, made, names_of, python_function
-from tendonfmu.campaign_judgement import judge, judge_causes, judge_names
+from tendonfmu.campaign_judgement import judge, judge_names
 from tendonfmu.diagnosis_result import Diagnosis
 from tendonfmu.errors import InputError
 from tendonfmu.whole_file import check_output_folder, whole_file
@@ -52,11 +52,9 @@ def _wanted(file: Path, failed_again: bool) -> bool:
 @dataclass(frozen=True)
 class How:
     """beside: FILE.py:FUNCTION, its file absolute, called as FUNCTION(case) -> name of a rival -> the causes that it
-    names. names_only: the search for causes alone, without gain, remainder and experiments; what these would answer
-    stays open."""
+    names."""
 
     beside: str | None = None
-    names_only: bool = False
 
 
 ALL_OF_IT = How()
@@ -78,27 +76,15 @@ def _answered(case: Case, how: How) -> Row:
     row: Row = {"rig": case.rig, "truth": json.dumps([vars(truth) for truth in case.truth])}
     if case.truth:
         row |= {f"true_{key}": value for key, value in vars(case.truth[0]).items()}
-    row |= dict(case.facts) | (_named(case) if how.names_only else _diagnosed(case))
+    row |= dict(case.facts) | _diagnosed(case)
     if how.beside is not None:
         for rival, names in python_function(how.beside, Path.cwd())(case).items():
             row |= {f"{rival}.{key}": value for key, value in judge_names(case, names).items()}
     return row
 
 
-def _named(case: Case) -> Row:
-    from tendonfmu.campaign_search import find_names
-
-    causes, events = find_names(case)
-    return judge_causes(case, causes) | {"events": len(events)}
-
-
 def _diagnosed(case: Case) -> Row:
-    from tendonfmu.diagnosis import diagnose
-
-    assert case.finger is not None
-    found = diagnose(
-        case.finger, list(case.recordings), tests=list(case.test), kinematics=case.kinematics, seed=case.seed
-    )
+    found = _diagnosis(case, case.recordings)
     row = judge(case, found)
     if case.reference:
         row["true_gain"] = true_gain(found.nominal_data, found.extended_data, case)
@@ -109,8 +95,6 @@ def _diagnosed(case: Case) -> Row:
 
 def named_after_experiment(case: Case, found: Diagnosis) -> bool:
     """Whether the hidden effect is named once what the diagnosis asks for, for its sake, has been recorded as well."""
-    from tendonfmu.campaign_search import find_names
-
     assert case.experiment is not None
     truth = case.truth[0]
     own = [each.motion for each in found.invisible if each.where.effect == truth.effect and each.motion]
@@ -119,8 +103,15 @@ def named_after_experiment(case: Case, found: Diagnosis) -> bool:
         return False
     folder = case.recordings[0].parent
     recording = folder / python_function(case.experiment, folder)(folder, motion, **case.arguments)
-    causes, _ = find_names(replace(case, recordings=(*case.recordings, recording)))
+    causes = _diagnosis(case, [*case.recordings, recording]).causes
     return any(truth.effect in (w.effect for w in (each.where, *each.confusable_with)) for each in causes)
+
+
+def _diagnosis(case: Case, recordings: Sequence[Path]) -> Diagnosis:
+    from tendonfmu.diagnosis import diagnose
+
+    assert case.finger is not None
+    return diagnose(case.finger, list(recordings), list(case.test), kinematics=case.kinematics, seed=case.seed)
 
 
 def true_gain(nominal: Mapping[str, Any], extended: Mapping[str, Any], case: Case) -> float:

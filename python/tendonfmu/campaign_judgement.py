@@ -4,24 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any
 
 from tendonfmu.campaign_cases import NOT_IN_MODEL, Case, Truth
-from tendonfmu.diagnosis_result import Diagnosis, Where
+from tendonfmu.diagnosis_result import Cause, Diagnosis, FoundPlace, Where
 
 ALARMS = ("unexplained", "partly explained")
 QUESTIONS = ("in_set", "first", "set_size", "place", "both", "exactly", "not_visible", "experiment")
-
-
-class NamedCause(Protocol):
-    """What is judged of a cause."""
-
-    @property
-    def where(self) -> Where: ...
-    @property
-    def confusable_with(self) -> tuple[Where, ...]: ...
-    @property
-    def p_value(self) -> float: ...
 
 
 def judge(case: Case, found: Diagnosis) -> dict[str, Any]:
@@ -51,12 +40,12 @@ def judge(case: Case, found: Diagnosis) -> dict[str, Any]:
     return row
 
 
-def judge_causes(case: Case, causes: Sequence[NamedCause]) -> dict[str, Any]:
+def judge_causes(case: Case, causes: Sequence[Cause]) -> dict[str, Any]:
     """What the names alone answer.
 
     detected: a cause is reported. in_set: the true effect is a cause or in the confusion set of one. first: it is the
-    first cause. set_size: effects of the set that has it, or of the first cause. place: of the named effect, joint and
-    tendon are the true ones. both, exactly: all that is hidden, and nothing else.
+    first cause. set_size: effects of the set that has it, or of the first cause. place: the true joint and tendon are
+    among the places of the named effect. both, exactly: all that is hidden, and nothing else.
     """
     own = [cause for cause in causes if cause.where.effect not in NOT_IN_MODEL]
     row: dict[str, Any] = {
@@ -94,23 +83,34 @@ def _hidden(case: Case) -> list[Truth]:
     return [truth for truth in case.truth if truth.effect not in NOT_IN_MODEL]
 
 
-def _listed(cause: NamedCause) -> dict[str, Any]:
-    return {**_place(cause.where), "p": cause.p_value, "set": [_place(each) for each in cause.confusable_with]}
+def _listed(cause: Cause) -> dict[str, Any]:
+    places = [{"joint": each.joint, "tendon": each.tendon} for each in cause.places]
+    return {
+        **_place(cause.where),
+        "p": cause.p_value,
+        "gain": cause.gain.value,
+        "places": places,
+        "set": [_place(each) for each in cause.confusable_with],
+    }
 
 
 def _place(where: Where) -> dict[str, Any]:
     return {"effect": where.effect, "joint": where.joint, "tendon": where.tendon}
 
 
-def _is_at(where: Where, truth: Truth) -> bool:
+def _is_at(where: Where | FoundPlace, truth: Truth) -> bool:
     return (where.joint, where.tendon) == (truth.joint, truth.tendon)
 
 
-def _names(cause: NamedCause, effect: str) -> bool:
+def _names(cause: Cause, effect: str) -> bool:
     return effect == cause.where.effect or any(each.effect == effect for each in cause.confusable_with)
 
 
-def _single(truth: Truth, causes: Sequence[NamedCause]) -> dict[str, Any]:
+def _of(wheres: Sequence[Where], effect: str) -> list[Where]:
+    return [each for each in wheres if each.effect == effect]
+
+
+def _single(truth: Truth, causes: Sequence[Cause]) -> dict[str, Any]:
     if not causes:
         return {"in_set": False, "first": False}
     holder = next((cause for cause in causes if _names(cause, truth.effect)), None)
@@ -118,9 +118,9 @@ def _single(truth: Truth, causes: Sequence[NamedCause]) -> dict[str, Any]:
     size = len({shown.where.effect, *(each.effect for each in shown.confusable_with)})
     row = {"in_set": holder is not None, "first": causes[0].where.effect == truth.effect, "set_size": size}
     if holder is not None:
-        named = [where for where in (holder.where, *holder.confusable_with) if where.effect == truth.effect]
         # what a cause says first is what counts
-        row["place"] = any(_is_at(w, truth) for w in (named[:1] if holder.where.effect == truth.effect else named))
+        own = holder.places if holder.where.effect == truth.effect else _of(holder.confusable_with, truth.effect)
+        row["place"] = any(_is_at(each, truth) for each in own)
     return row
 
 

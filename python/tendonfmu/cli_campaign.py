@@ -32,9 +32,6 @@ def campaign(
     beside: Annotated[
         str | None, typer.Option(metavar="FILE.py:FUNCTION", help="rivals, asked to name a cause for each case, too")
     ] = None,
-    names_only: Annotated[
-        bool, typer.Option("--names-only", help="the search for causes alone: ten times as fast, no gain, no verdict")
-    ] = False,
     again: Annotated[bool, typer.Option("--again", help="run cases that ended in an error once more")] = False,
     report: Annotated[Path | None, typer.Option(metavar="R.md", help="the tables as Markdown")] = None,
     progress: Annotated[
@@ -69,7 +66,7 @@ def campaign(
                 listed,
                 output,
                 client,
-                how=How(None if beside is None else str(Path(beside).absolute()), names_only),
+                how=How(None if beside is None else str(Path(beside).absolute())),
                 stop_after=stop_after,
                 failed_again=again,
                 progress=lambda done, total: bar.update(task, completed=done, total=total),

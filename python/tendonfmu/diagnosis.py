@@ -322,7 +322,9 @@ class _Result:
         unseen = self._unseen()
         nearest: dict[str, Hypothesis] = {}
         for hypothesis, _ in unseen:
-            nearest.setdefault(hypothesis.effect, hypothesis)
+            own = _ordinary(hypothesis)
+            if own.place in own.candidate.places(nominal, source):  # not at a law that a cause has brought
+                nearest.setdefault(hypothesis.effect, hypothesis)
         asked = list(nearest)[:MOST_UNSEEN]
         questions = [*rivals, *(Question(_ordinary(nearest[effect])) for effect in asked)]
         noise = self._left(self._found.extended.data)[self._series.used].std(axis=0)

@@ -30,7 +30,6 @@ NOISE_BAND = 0.7  # of half the sample rate: above it the spectrum is taken for 
 ABOVE_NOISE = 3.0  # times the noise's spectrum
 SAMPLES_PER_PERIOD = 10.0  # of the cutoff, that a smoothed recording keeps
 FEWEST = 64  # samples of a piece that can be smoothed
-_NEVER_SMOOTHED = ("contact",)
 
 
 @dataclass(frozen=True)
@@ -106,9 +105,9 @@ def smoothing_of(recordings: Sequence[Recording], data: Mapping[str, Any]) -> Si
     if not found:
         return None
     rate = min(rates)
-    cutoff = float(np.clip(OF_CROSSING * np.median(found), LOWEST, min(HIGHEST, OF_RATE * rate)))
-    if cutoff > OF_RATE * rate:
+    if OF_RATE * rate < LOWEST:
         return None
+    cutoff = float(np.clip(OF_CROSSING * np.median(found), LOWEST, min(HIGHEST, OF_RATE * rate)))
     return Signals(cutoff, max(1, int(rate / (SAMPLES_PER_PERIOD * cutoff))))
 
 
