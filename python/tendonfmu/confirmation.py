@@ -19,6 +19,9 @@ from tendonfmu.whitening import Whitener, whitener
 Numbers = NDArray[np.float64]
 Columns = NDArray[np.float32] | Numbers
 
+_RANK = 1e-9  # of the largest power: what columns in single precision can tell
+_PIECE, _CHUNK = 4096, 64  # rows, columns at a time
+
 
 class Confirmation:
     """The residual of a description, and what refitting it can mend."""
@@ -48,18 +51,31 @@ class _ClusterTest:
         stretch = np.full(len(series.time), -1, dtype=np.int64)
         stretch[folds.rows] = folds.stretch
         self._stretch = np.unique(np.repeat(stretch[self._rows], joints), return_inverse=True)[1]
-        bias = np.zeros((len(splines), joints, joints * splines.shape[1]), dtype=np.float32)
-        for j in range(joints):
-            bias[:, j, j * splines.shape[1] : (j + 1) * splines.shape[1]] = splines
-        self._span = basis(self._flat(np.concatenate([bias, nominal], axis=2)))
-        self._target = without(self._flat(series.target[:, :, None]), self._span)[:, 0]
+        bias = filters.apply(np.repeat(splines[:, None, :], joints, axis=1))[self._rows]
+        self._spans = [basis(bias[:, j]) for j in range(joints)]
+        self._nominal = self._flat(nominal)
+        gram = _product(self._nominal, self._nominal)
+        length = np.sqrt(np.maximum(np.diagonal(gram), 1e-300))
+        self._inverse = np.linalg.pinv(gram / (length[:, None] * length), rcond=_RANK, hermitian=True)
+        self._inverse /= length[:, None] * length
+        self._target = self._left(self._flat(series.target[:, :, None]))[:, 0]
 
-    def _flat(self, values: Columns) -> Numbers:
-        found = self._filters.apply(values)[self._rows]
-        return np.asarray(found.reshape(-1, values.shape[2]), dtype=np.float64)
+    def _flat(self, values: Columns) -> Columns:
+        """[R·n, d] filtered, without the bias."""
+        found = np.empty((len(self._rows), *values.shape[1:]), dtype=values.dtype)
+        for begin in range(0, values.shape[2], _CHUNK):
+            chunk = slice(begin, begin + _CHUNK)
+            found[:, :, chunk] = self._filters.apply(values[:, :, chunk])[self._rows]
+        for j, span in enumerate(self._spans):
+            found[:, j] = without(found[:, j], span)
+        return np.asarray(found.reshape(-1, values.shape[2]))
+
+    def _left(self, values: Columns) -> Numbers:
+        """[R·n, d] without what refitting the nominal numbers can mend."""
+        return np.asarray(values - self._nominal @ (self._inverse @ _product(self._nominal, values)), dtype=np.float64)
 
     def p_value(self, columns: Columns) -> float:
-        values = without(self._flat(columns), self._span)
+        values = self._left(self._flat(columns))
         length = np.sqrt(np.einsum("rd,rd->d", values, values))
         values = values[:, length > 0] / length[length > 0]
         power, turned = np.linalg.eigh(values.T @ values) if values.shape[1] else (np.zeros(0), np.zeros((0, 0)))
@@ -77,3 +93,12 @@ class _ClusterTest:
         spread += 1e-9 * np.trace(spread) * np.eye(size)
         statistic = float(estimate @ np.linalg.solve(spread, estimate))
         return float(fdtrc(size, count - size, statistic * (count - size) / (size * (count - 1))))
+
+
+def _product(one: Columns, other: Columns) -> Numbers:
+    """[d, e] in double precision, piece by piece: whole copies of many columns would not fit in memory."""
+    found = np.zeros((one.shape[1], other.shape[1]))
+    for begin in range(0, len(one), _PIECE):
+        part = slice(begin, begin + _PIECE)
+        found += one[part].astype(np.float64).T @ other[part].astype(np.float64)
+    return found

@@ -42,9 +42,9 @@ def waterfall_of(found: Diagnosis, names: Names) -> Waterfall:
     """Rows in the order of the causes; the values add up as they are shown."""
     factor, unit = unit_of(found)
     steps = [factor * each for each in found.steps]
-    left = left_of(found)
     widest = max([each for each in steps if math.isfinite(each)], default=0.0) or 1.0
-    floor = None if left is None else min(100.0 * left.noise / widest, 100.0)
+    noise = _noise(found, steps[-1])
+    floor = None if noise is None else 100.0 * noise / widest
     return Waterfall(unit, tuple(_rows(found, names, steps, widest)), floor)
 
 
@@ -53,7 +53,7 @@ def _rows(found: Diagnosis, names: Names, steps: list[float], widest: float) -> 
     shown = [round(each, digits) for each in steps]
 
     def part(tone: str, begin: float, end: float) -> Part:
-        low, high = sorted(min(100.0 * each / widest, 100.0) for each in (begin, end))
+        low, high = sorted((100.0 * begin / widest, 100.0 * end / widest))
         return Part(tone, round(low, 2), round(high - low, 2))
 
     if found.causes:
@@ -63,9 +63,17 @@ def _rows(found: Diagnosis, names: Names, steps: list[float], widest: float) -> 
         tone, sign = ("cause", "−") if change <= 0 else ("more", "+")
         label = f"{k + 1}. {at_place(cause.title, cause.where, names)}"
         yield Row(label, f"{sign}{abs(change):.{digits}f}", (part(tone, steps[k], steps[k + 1]),))
-    left = left_of(found)
+    noise = _noise(found, steps[-1])
     parts: tuple[Part, ...] = (part("nominal", 0.0, steps[-1]),)
-    if left is not None:
-        parts = (part("noise", 0.0, left.noise), part("nameless", left.noise, steps[-1]))
+    if noise is not None:
+        parts = (part("noise", 0.0, noise), part("nameless", noise, steps[-1]))
     label = "what is left" if found.causes else "error of the model"
     yield Row(label, f"{shown[-1]:.{digits}f}", parts)
+
+
+def _noise(found: Diagnosis, last: float) -> float | None:
+    """What of the last step nothing predicts; all of it where no difference would be shown."""
+    left = left_of(found)
+    if left is None:
+        return None
+    return min(left.noise, last) if left.nameless > 0.0 else last

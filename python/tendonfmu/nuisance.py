@@ -17,6 +17,7 @@ KNOTS = 2.0  # s: what a bias does
 TRENDS = (
     10.0  # s: of tests. What a bias does faster is noise that whitening sees: with knots of 2 s p-values are too small
 )
+_PIECE = 4096  # rows at a time
 _RANK = 1e-10  # of the largest power, columns scaled to length 1 before: derivatives are exact, rounding is far below
 
 
@@ -71,10 +72,22 @@ def residual_of(series: Series, splines: Numbers, nominal: Array) -> Numbers:
     span = basis(splines[used])
     target = without(series.target[used], span)
     if nominal.shape[2]:
-        wide = np.asarray(nominal[used], dtype=np.float64)
-        own = np.stack([without(wide[:, j], span) for j in range(wide.shape[1])], axis=1)
-        flat = basis(own.reshape(-1, own.shape[2]))
-        target = without(target.reshape(-1), flat).reshape(target.shape)
+        own = np.asarray(nominal[used]).copy()
+        for j in range(own.shape[1]):
+            own[:, j] = without(own[:, j], span)
+        target = target - _explained(own.reshape(-1, own.shape[2]), target.reshape(-1)).reshape(target.shape)
     found = series.target - np.mean(series.target[used], axis=0)
     found[used] = target
     return np.asarray(found)
+
+
+def _explained(columns: Array, target: Numbers) -> Numbers:
+    """[R] of a target [R] by least squares on columns [R, c], through their Gram matrix."""
+    gram, score = np.zeros((columns.shape[1], columns.shape[1])), np.zeros(columns.shape[1])
+    for begin in range(0, len(columns), _PIECE):
+        part = np.asarray(columns[begin : begin + _PIECE], dtype=np.float64)
+        gram += part.T @ part
+        score += part.T @ target[begin : begin + _PIECE]
+    length = np.sqrt(np.maximum(np.diagonal(gram), 1e-300))
+    inverse = np.linalg.pinv(gram / (length[:, None] * length), rcond=_RANK, hermitian=True)
+    return np.asarray(columns @ (inverse @ (score / length) / length))

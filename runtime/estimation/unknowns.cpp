@@ -372,7 +372,11 @@ void Unknowns::write(const double* unknowns, double* numbers) const {
   };
   for (std::uint32_t p = 0; p < start_.size(); ++p) {
     const SideColumns& side = sides_[p];
-    numbers[p] = at(plain_[p], numbers[p]);
+    if (plain_[p] >= 0) {
+      /* scaling back and forth may round a number at its bound beyond it */
+      const Unknown& unknown = list_[static_cast<std::size_t>(plain_[p])];
+      numbers[p] = std::clamp(unknowns[plain_[p]], unknown.lower, unknown.upper);
+    }
     if (side.column[2] >= 0) {
       numbers[p + 2] = 1.0 / unknowns[side.column[2]];
     }
