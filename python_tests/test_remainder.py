@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from scipy.signal import lfilter
 
 from synthetic_series import low_passed, make_series, nuisance_of, residual_of, with_effect
 from tendonfmu.diagnosis_series import Series
+from tendonfmu.nuisance import bias_splines
 from tendonfmu.remainder import measure_remainder
 from tendonfmu.residual_views import residual_views, whiteness
 
@@ -35,7 +37,7 @@ def oscillation(series: Series) -> Numbers:
 def test_noise_is_not_unknown(seed: int) -> None:
     series = make_series(100 + seed)
     nuisance = nuisance_of(series)
-    found = measure_remainder(series, residual_of(series, nuisance), nuisance)
+    found = measure_remainder(series, residual_of(series, nuisance), bias_splines(series))
     assert not found.unknown
     assert found.description == ""
     assert found.p_value > 0.01
@@ -43,20 +45,26 @@ def test_noise_is_not_unknown(seed: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("signal", "groups"), [(rubbing, {"rubbing", "tendon"}), (memory, None), (oscillation, {"line"})]
+    ("signal", "strength", "groups"),
+    [
+        (rubbing, 1.0, {"rubbing", "tendon", "velocity"}),
+        (memory, 4.0, {"memory of speed"}),
+        (oscillation, 0.3, {"line"}),
+    ],
 )
-def test_finds_what_no_candidate_is(signal: object, groups: set[str] | None) -> None:
+def test_finds_what_no_candidate_is(signal: Callable[[Series], Numbers], strength: float, groups: set[str]) -> None:
     series = make_series(7)
     nuisance = nuisance_of(series)
-    hidden = with_effect(series, nuisance, signal(series), joint=1, strength=0.3)  # type: ignore[operator]
-    found = measure_remainder(hidden, residual_of(hidden, nuisance), nuisance)
+    hidden = with_effect(series, nuisance, signal(series), joint=1, strength=strength)
+    found = measure_remainder(hidden, residual_of(hidden, nuisance), bias_splines(hidden))
     assert found.unknown
     assert found.findings[0].joint == 2
     assert "Joint 2" in found.description
-    assert groups is None or found.findings[0].group in groups
-    # all of it is 0.3 / 1.3 of the variance; of a shape that must be learned from 60 s a fifth at least
-    assert 0.3 / 1.3 / 5.0 < found.share[1] < 0.3 / 1.3 + 0.07
-    assert 0.0 < found.interval[1][0] < 0.3 / 1.3
+    assert found.findings[0].group in groups
+    # of all there is, a shape that must be learned from 60 s gives a fifth at least
+    whole = strength / (1.0 + strength)
+    assert whole / 5.0 < found.share[1] < whole + 0.07
+    assert found.gain[:, 1].sum() == pytest.approx(found.share[1] * found.square[1], rel=0.05)
     if signal is oscillation:
         line = found.findings[0].line
         assert line is not None
@@ -70,9 +78,9 @@ def test_blocks_that_are_not_used_do_not_matter_and_it_repeats() -> None:
     residual = residual_of(series, nuisance)
     gap = (series.time > 12.0) & (series.time < 15.0)
     masked = replace(series, used=~gap)
-    one = measure_remainder(masked, residual, nuisance, seed=5)
+    one = measure_remainder(masked, residual, bias_splines(masked), seed=5)
     spoilt = np.where(gap[:, None], 10.0, residual)
-    other = measure_remainder(masked, spoilt, nuisance, seed=5)
+    other = measure_remainder(masked, spoilt, bias_splines(masked), seed=5)
     assert other.p_value == one.p_value
     np.testing.assert_array_equal(other.prediction[~gap], one.prediction[~gap])
     assert not other.prediction[gap].any()
@@ -81,7 +89,7 @@ def test_blocks_that_are_not_used_do_not_matter_and_it_repeats() -> None:
 def test_too_short_is_not_judged() -> None:
     series = make_series(3, seconds=8.0)
     nuisance = nuisance_of(series)
-    found = measure_remainder(series, residual_of(series, nuisance), nuisance)
+    found = measure_remainder(series, residual_of(series, nuisance), bias_splines(series))
     assert not found.unknown
     assert found.p_value == 1.0
 
