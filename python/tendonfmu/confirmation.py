@@ -100,7 +100,7 @@ class _ClusterTest:
         found = left.reshape(-1, len(self._spans)).copy()
         for rows, j, directions, strength in self._given_back:
             found[rows, j] += directions @ (strength * (directions.T @ found[rows, j]))
-        return found.reshape(-1)
+        return np.asarray(found.reshape(-1))
 
     def p_value(self, columns: Columns) -> float:
         values = self._left(self._flat(columns))
