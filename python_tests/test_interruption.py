@@ -78,7 +78,7 @@ def compute(*_, **__):
     "the files are made": """
 def compute(*_, **__): return brief()
 whole = diagnosis_files.build_fmu
-def slow(*arguments): ready(); time.sleep(60)
+def slow(*arguments, **options): ready(); time.sleep(60)
 diagnosis_files.build_fmu = slow
 """,
 }

@@ -21,7 +21,7 @@ from tendonfmu.balance import moment_arms
 from tendonfmu.description import FingerDescription
 from tendonfmu.errors import InputError
 from tendonfmu.fit_files import description_text, with_values
-from tendonfmu.fit_methods import Learned, Watch, learn_batch
+from tendonfmu.fit_methods import Interrupted, Learned, Watch, learn_batch
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.fit_structure import Choice, Structure, build_structure, get_number
 from tendonfmu.fit_verdicts import slopes
@@ -110,7 +110,10 @@ def fit_numbers(
         "tolerance": settings.tolerance,
         "threads": settings.threads,
     }
-    learned = learn_batch(structure, recordings, Watch(None), options, None)
+    try:
+        learned = learn_batch(structure, recordings, Watch(None), options, None)
+    except Interrupted:  # a fit that is only a part of something has no use for what it has so far
+        raise KeyboardInterrupt from None
     numbers = np.asarray(learned.estimator.values(learned.z))
     finger = with_values(structure, numbers)
     at_bound = _at_bound(learned)
