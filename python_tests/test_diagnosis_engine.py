@@ -1,4 +1,4 @@
-"""Parts of a diagnosis on made recordings: predicted forces, starting points, errors online, and a search once whole."""
+"""Parts of a diagnosis on made recordings: predicted forces, starting points, errors online, and one whole search."""
 
 from __future__ import annotations
 
