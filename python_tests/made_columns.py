@@ -1,4 +1,4 @@
-"""Columns of candidates without recordings: a series of noise and waves, and proposals for whatever columns are made."""
+"""Columns of candidates without recordings: a series of noise and waves, and proposals for made columns."""
 
 from __future__ import annotations
 

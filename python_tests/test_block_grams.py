@@ -158,7 +158,8 @@ def test_bounded_is_bounded_least_squares(seed: int) -> None:
 def test_bounded_without_bounds_solves() -> None:
     a = np.random.default_rng(3).standard_normal((40, 4))
     b = a @ [1.0, -2.0, 3.0, 0.0]
-    assert bounded(a.T @ a, a.T @ b, *(np.full(4, s * np.inf) for s in (-1, 1))) == pytest.approx([1, -2, 3, 0], abs=1e-6)
+    found = bounded(a.T @ a, a.T @ b, np.full(4, -np.inf), np.full(4, np.inf))
+    assert found == pytest.approx([1, -2, 3, 0], abs=1e-6)
     assert len(bounded(np.zeros((0, 0)), np.zeros(0), np.zeros(0), np.zeros(0))) == 0
 
 

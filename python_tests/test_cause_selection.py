@@ -99,9 +99,7 @@ def test_an_effect_of_the_whole_finger_is_everywhere(columns: Numbers) -> None:
 
 def test_signs_bound_what_is_learned(columns: Numbers) -> None:
     made = [Made("cover_stiffness", 1, sign=1), Made("inertia", 1, sign=-1), Made("gravity", 1, sign=0)]
-    bounds = {
-        each.effect: (*each.low, *each.high) for each in hypotheses(candidate_columns(columns[:, :, :3], made))
-    }
+    bounds = {each.effect: (*each.low, *each.high) for each in hypotheses(candidate_columns(columns[:, :, :3], made))}
     assert bounds == {"cover_stiffness": (0.0, np.inf), "inertia": (-np.inf, 0.0), "gravity": (-np.inf, np.inf)}
 
 
@@ -255,7 +253,8 @@ def test_least_sizes_are_those_of_the_sensors() -> None:
     assert SENSORS.least("presliding", None, 3) == pytest.approx(OF_NOISE * 3e-6)
     assert SENSORS.least("gravity", 1, None) == 0.0
     shows = SENSORS.shows
-    assert not shows("backlash", Place(2), {"width": 3.9 * 2e-4}) and shows("backlash", Place(2), {"width": -4.1 * 2e-4})
+    assert not shows("backlash", Place(2), {"width": 3.9 * 2e-4})
+    assert shows("backlash", Place(2), {"width": -4.1 * 2e-4})
     assert not shows("time_delay", Place(), {"delay": -0.9 * delay}) and shows("time_delay", Place(), {"delay": delay})
     assert shows("gravity", Place(1), {"sine": 1e-9}) and shows("backlash", Place(2), None)
 

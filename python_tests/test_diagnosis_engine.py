@@ -1,4 +1,4 @@
-"""A diagnosis's parts on made recordings: forces as the model predicts them, starting points, and a cause once whole."""
+"""Parts of a diagnosis on made recordings: predicted forces, starting points, errors online, and one whole search."""
 
 from __future__ import annotations
 
@@ -67,8 +67,9 @@ def recorded(truth: Mapping[str, Any], seed: int, source: int, seconds: float = 
     groups = dict(made.recording)
     time = groups.pop("time")
     kept = slice(50, len(time) - 50)
-    late = {name: np.roll(values, delay, axis=0) if name == "tendon_force" else values for name, values in groups.items()}
-    recording = Recording(Path("made.parquet"), time[kept] - time[50], {name: each[kept] for name, each in late.items()})
+    groups["tendon_force"] = np.roll(groups["tendon_force"], delay, axis=0)
+    inner = {name: values[kept] for name, values in groups.items()}
+    recording = Recording(Path("made.parquet"), time[kept] - time[50], inner)
     return prepare(described(finger()), recording, source, Held())
 
 
@@ -179,7 +180,8 @@ def test_the_scan_starts_at_the_true_delay(samples: int, source: int) -> None:
 
 def test_the_scan_starts_with_presliding_where_there_is_some() -> None:
     distance = 0.1  # s times the thresholds: 0.4 mm, 8 mrad
-    starts = scanned(recorded(finger() | {"extensions": [{"effect": "presliding", "displacement": distance}]}, 25, 3, 20.0))
+    truth = finger() | {"extensions": [{"effect": "presliding", "displacement": distance}]}
+    starts = scanned(recorded(truth, 25, 3, 20.0))
     assert [each.place for each in starts[0].presliding] == [Place()]
     assert distance / 5.0 < starts[0].presliding[0].shape["displacement"] < 5.0 * distance
     without = min(each.error for each in starts if not each.presliding)

@@ -15,7 +15,7 @@ from tendonfmu.recording import Recording
 
 Numbers = NDArray[np.float64]
 RATE = 1000.0
-DATA: dict[str, Any] = {"tendons": [{"moment_arms": [0.01], "stiffness": 1e4}, {"moment_arms": [-0.01], "stiffness": 1e4}]}
+DATA: dict[str, Any] = {"tendons": [{"moment_arms": [arm], "stiffness": 1e4} for arm in (0.01, -0.01)]}
 
 
 def recording(seconds: float = 20.0, noise: float = 0.0, rate: float = RATE) -> Recording:
@@ -24,7 +24,8 @@ def recording(seconds: float = 20.0, noise: float = 0.0, rate: float = RATE) -> 
     wave = np.sin(2 * np.pi * 0.3 * time) + 0.5 * np.sin(2 * np.pi * 2.0 * time)
     rng = np.random.default_rng(1)
     force = 10.0 + 3.0 * np.column_stack([wave, -wave]) + noise * rng.standard_normal((len(time), 2))
-    return Recording(Path("made"), time, {"tendon_force": force, "tendon_position": 0.002 * np.column_stack([wave, -wave])})
+    position = 0.002 * np.column_stack([wave, -wave])
+    return Recording(Path("made"), time, {"tendon_force": force, "tendon_position": position})
 
 
 def late_by(one: Numbers, other: Numbers, rate: float) -> float:

@@ -21,7 +21,7 @@ from tendonfmu.diagnosis_result import Event, Interval
 from tendonfmu.diagnosis_series import Grid
 from tendonfmu.diagnosis_span import span_of
 from tendonfmu.effects import CANDIDATES, Candidate, Place
-from tendonfmu.extension_fit import Accepted, FitSettings, FittedModel, fit_extended, possible
+from tendonfmu.extension_fit import Accepted, FitSettings, FittedModel, extended_description, fit_extended, possible
 from tendonfmu.extensions import extended_row
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.hypotheses import SCALING, Hypothesis, Key
@@ -242,7 +242,9 @@ class _Rounds:
         if len(accepted) < len(everything):
             return False
         own = self._chosen.recordings
-        clean = predicted_of(self.view.data, own, self._chosen.grid, self.view.series)
+        # forces that the model without a delay predicts are not late: no fit would find it in them
+        begin = extended_description(self.models[-1].data, cause.accepted)
+        clean = predicted_of(begin, own, self._chosen.grid, series_of(begin, own, self._chosen.grid, self._out))
         model = fit_extended(self.models[0], accepted, clean, self._settings)
         # again with the forces that the model with the cause predicts: those of the one before know nothing of it
         clean = predicted_of(
