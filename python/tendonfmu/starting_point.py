@@ -105,7 +105,7 @@ def _delays(step: float) -> Numbers:
     """All that a description takes, 0 among them."""
     grid = max(2 * FINE, step / 2)
     count = int(LONGEST_DELAY / grid)
-    return grid * np.arange(-count, count + 1)
+    return np.asarray(grid * np.arange(-count, count + 1), dtype=np.float64)
 
 
 def delay_of_positions(data: Mapping[str, Any], recordings: Sequence[FitRecording]) -> float | None:

@@ -24,7 +24,8 @@ CANDIDATE = Candidate(
     title="this joint and the next pull at each other",
     explanation=(
         "A spring between this joint and the next one, which pulls when their angles differ: a shared cover, a "
-        "cable or a linkage; below 0 one that pulls at the sum of the angles, as a strap across both does. Move one joint by hand and see whether the other one follows."
+        "cable or a linkage. Below 0 it pulls at the sum of the angles, as a strap across both joints does. Move one "
+        "joint by hand and see whether the other one follows."
     ),
     sign=0,
     excited_by="strokes of this joint and the next one by turns, so that their angles differ",
