@@ -10,8 +10,9 @@ forces are found by fixed-point iteration over the whole series at once. Bias wa
 that act on the finger; encoders are quantised, force sensors have a little white noise of their own.
 
 "Matched": friction follows the velocity of the true angle (the nominal has no velocity filter, whose lag would be a
-delay of every recording), at rest the torque stays what it was (contract-additions, `entry_load`, forget_rate 0), or every effect has presliding in the form
-of docs/extensions.md. What remains to the tool is noise, wander, quantisation and what was hidden.
+delay of every recording), at rest the torque stays what it was (contract-additions, `entry_load`, forget_rate 0), or
+every effect has presliding in the form of docs/extensions.md. What remains to the tool is noise, wander, quantisation
+and what was hidden.
 """
 
 from __future__ import annotations
