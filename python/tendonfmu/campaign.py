@@ -52,9 +52,10 @@ def _wanted(file: Path, failed_again: bool) -> bool:
 @dataclass(frozen=True)
 class How:
     """beside: FILE.py:FUNCTION, its file absolute, called as FUNCTION(case) -> name of a rival -> the causes that it
-    names."""
+    names. least_gain: of a cause, as `diagnose` takes it."""
 
     beside: str | None = None
+    least_gain: float = 0.03
 
 
 ALL_OF_IT = How()
@@ -76,24 +77,24 @@ def _answered(case: Case, how: How) -> Row:
     row: Row = {"rig": case.rig, "truth": json.dumps([vars(truth) for truth in case.truth])}
     if case.truth:
         row |= {f"true_{key}": value for key, value in vars(case.truth[0]).items()}
-    row |= dict(case.facts) | _diagnosed(case)
+    row |= dict(case.facts) | _diagnosed(case, how)
     if how.beside is not None:
         for rival, names in python_function(how.beside, Path.cwd())(case).items():
             row |= {f"{rival}.{key}": value for key, value in judge_names(case, names).items()}
     return row
 
 
-def _diagnosed(case: Case) -> Row:
-    found = _diagnosis(case, case.recordings)
+def _diagnosed(case: Case, how: How) -> Row:
+    found = _diagnosis(case, case.recordings, how)
     row = judge(case, found)
     if case.reference:
         row["true_gain"] = true_gain(found.nominal_data, found.extended_data, case)
     if case.experiment is not None:
-        row["named_after_experiment"] = named_after_experiment(case, found)
+        row["named_after_experiment"] = named_after_experiment(case, found, how)
     return row
 
 
-def named_after_experiment(case: Case, found: Diagnosis) -> bool:
+def named_after_experiment(case: Case, found: Diagnosis, how: How = ALL_OF_IT) -> bool:
     """Whether the hidden effect is named once what the diagnosis asks for, for its sake, has been recorded as well."""
     assert case.experiment is not None
     truth = case.truth[0]
@@ -103,15 +104,22 @@ def named_after_experiment(case: Case, found: Diagnosis) -> bool:
         return False
     folder = case.recordings[0].parent
     recording = folder / python_function(case.experiment, folder)(folder, motion, **case.arguments)
-    causes = _diagnosis(case, [*case.recordings, recording]).causes
+    causes = _diagnosis(case, [*case.recordings, recording], how).causes
     return any(truth.effect in (w.effect for w in (each.where, *each.confusable_with)) for each in causes)
 
 
-def _diagnosis(case: Case, recordings: Sequence[Path]) -> Diagnosis:
+def _diagnosis(case: Case, recordings: Sequence[Path], how: How) -> Diagnosis:
     from tendonfmu.diagnosis import diagnose
 
     assert case.finger is not None
-    return diagnose(case.finger, list(recordings), list(case.test), kinematics=case.kinematics, seed=case.seed)
+    return diagnose(
+        case.finger,
+        list(recordings),
+        list(case.test),
+        kinematics=case.kinematics,
+        least_gain=how.least_gain,
+        seed=case.seed,
+    )
 
 
 def true_gain(nominal: Mapping[str, Any], extended: Mapping[str, Any], case: Case) -> float:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu import native
+from tendonfmu.balance import moment_arms
 from tendonfmu.block_averages import Blocks
 from tendonfmu.block_grams import Grams
 from tendonfmu.candidate_columns import CandidateColumns, candidate_columns, without_uncertainty
@@ -52,7 +53,7 @@ class View:
 
     @cached_property
     def selection(self) -> Selection:
-        return Selection(self.grams, hypotheses(self.columns), self.least)
+        return Selection(self.grams, hypotheses(self.columns, moment_arms(self.data)), self.least)
 
     def beside(self, keys: Collection[Key]) -> Selection:
         """What is missing if these hypotheses are taken as present, each with all its shapes at that place."""

@@ -7,7 +7,7 @@ taken where it is better than all places together.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -99,10 +99,10 @@ class Selection:
         whole = self.base if before is None else before
         return rms_gain(whole, judged.by_stretch)
 
-    def best(self, least_gain: float) -> Pick | None:
+    def best(self, least_gain: float, tried: Collection[str] = ()) -> Pick | None:
         """The effect that lowers the error most, at the coarsest place that is as good; None where none is material and
-        certain."""
-        ranked = self.ranked()
+        certain. tried: effects that are left out."""
+        ranked = [each for each in self.ranked() if each.hypothesis.effect not in tried]
         if not ranked:
             return None
         judged = self._refined(ranked[0].hypothesis.effect)

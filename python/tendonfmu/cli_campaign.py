@@ -29,6 +29,9 @@ def campaign(
     stop_after: Annotated[
         float, typer.Option(min=0.0, metavar="SECONDS", help="begin no case after that time; go on another day")
     ] = math.inf,
+    least_gain: Annotated[
+        float, typer.Option(min=0.0, max=0.5, metavar="SHARE", help="as of diagnose: least gain of a cause")
+    ] = 0.03,
     beside: Annotated[
         str | None, typer.Option(metavar="FILE.py:FUNCTION", help="rivals, asked to name a cause for each case, too")
     ] = None,
@@ -66,7 +69,7 @@ def campaign(
                 listed,
                 output,
                 client,
-                how=How(None if beside is None else str(Path(beside).absolute())),
+                how=How(None if beside is None else str(Path(beside).absolute()), least_gain),
                 stop_after=stop_after,
                 failed_again=again,
                 progress=lambda done, total: bar.update(task, completed=done, total=total),

@@ -24,7 +24,7 @@ from tendonfmu.effects import CANDIDATES, Candidate, Place
 from tendonfmu.extension_fit import Accepted, FitSettings, FittedModel, extended_description, fit_extended, possible
 from tendonfmu.extensions import extended_row
 from tendonfmu.fit_recordings import FitRecording
-from tendonfmu.hypotheses import Hypothesis, Key
+from tendonfmu.hypotheses import SCALING, Hypothesis, Key
 from tendonfmu.nominal_fit import fitted
 from tendonfmu.online_error import OnlineError
 from tendonfmu.phases import Phases, Step
@@ -36,7 +36,7 @@ Flags = NDArray[np.bool_]
 
 MOST_CAUSES = 8
 SIGNIFICANCE = 0.01  # family-wise
-MOST_REFUSED = 3  # effects that selection named and the fit, or the test, did not bear out
+MOST_REFUSED = 4  # effects that selection named and the fit, or the test, did not bear out
 
 
 @dataclass(frozen=True)
@@ -208,8 +208,11 @@ class _Rounds:
     def _search(self, step: Step) -> None:
         while len(self.causes) < MOST_CAUSES and len(self.refused) < MOST_REFUSED:
             step(len(self.causes))
-            # what was refused explains something: no other effect is credited with that
-            picked = self.view.beside({each.key for each in self.refused}).best(self._least_gain)
+            # what was refused explains something: no other effect is credited with that; but a correction of the torque
+            # itself lowers any error by shrinking the torque
+            known = {each.key for each in self.refused if each.effect not in SCALING}
+            tried = {each.effect for each in self.refused}
+            picked = self.view.beside(known).best(self._least_gain, tried)
             if picked is None:
                 break
             cause = self._named(picked)

@@ -33,6 +33,9 @@ SHARED = (
     "cover_stiffness",
     "cover_hardening",
 )
+# Corrections of what the torque itself is made of: a large one shrinks the torque, and with it all that is left of it.
+SCALING = ("force_gain", "moment_arm", "moment_arm_variation", "pulley_eccentricity")
+LARGEST_SCALING = 0.2  # of the tendon's largest arm, or of its force
 LARGEST_SECANT = 3.0  # times the step that its column was taken with: beyond, the column says nothing
 
 
@@ -66,25 +69,28 @@ class Hypothesis:
         return self.effect, self.joint, self.tendon
 
 
-def hypotheses(columns: CandidateColumns) -> list[Hypothesis]:
-    """All of them, the coarse ones first."""
+def hypotheses(columns: CandidateColumns, arms: Numbers) -> list[Hypothesis]:
+    """All of them, the coarse ones first. arms: [m, n] m."""
     count = columns.values.shape[2]
-    found = [_single(proposal, shape, count) for proposal in columns.proposals for shape in proposal.shapes]
+    found = [_single(proposal, shape, count, arms) for proposal in columns.proposals for shape in proposal.shapes]
     for effect in SHARED:
         own = [proposal for proposal in columns.proposals if proposal.candidate.name == effect]
         found += _groups(effect, own, count)
     return sorted(found, key=lambda each: each.level)
 
 
-def _single(proposal: Proposal, shape: Shape, count: int) -> Hypothesis:
+def _single(proposal: Proposal, shape: Shape, count: int, arms: Numbers) -> Hypothesis:
     size = shape.columns.stop - shape.columns.start
     mix = np.zeros((count, size))
     mix[shape.columns] = np.eye(size)
     low, high = _bounds(shape)
-    place = proposal.place
+    place, name = proposal.place, proposal.candidate.name
+    if name in SCALING and place.tendon is not None:
+        largest = LARGEST_SCALING * (1.0 if name == "force_gain" else float(np.abs(arms[place.tendon - 1]).max()))
+        low, high = np.maximum(low, -largest), np.minimum(high, largest)
     level = EVERYWHERE if place == Place() else HERE
     member = Member(proposal, shape, (1.0,) * size)
-    return Hypothesis(proposal.candidate.name, place.joint, place.tendon, level, (member,), mix, low, high)
+    return Hypothesis(name, place.joint, place.tendon, level, (member,), mix, low, high)
 
 
 def _bounds(shape: Shape) -> tuple[Numbers, Numbers]:

@@ -31,7 +31,7 @@ Numbers = NDArray[np.float64]
 LONGEST_DELAY = 0.05  # s either way; docs/extensions.md
 FINE = 0.001  # s
 LARGE = 0.008  # s: smaller ones compete with other causes, by their derivative
-CLEAR_GAIN = 0.03  # of the rms that a delay has to take away, to be a start
+CLEAR_GAIN = 0.1  # of the rms that a delay has to take away, to be a start: what else is missing looks like some delay
 CLEAR = 0.25  # of the median over all delays, that the best one leaves at most
 _BY_NAME = {each.name: each for each in CANDIDATES}
 PRESLIDING, DELAY = _BY_NAME["presliding"], _BY_NAME["time_delay"]
@@ -76,7 +76,9 @@ def scan(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid
         still = int(np.argmin(np.abs(delays)))
         found.append(Start(presliding, 0.0, float(errors[still])))
         best = int(np.argmin(errors))
-        if 0 < best < len(delays) - 1 and errors[best] < (1.0 - CLEAR_GAIN) ** 2 * errors[still]:
+        # at the edge it is no minimum; a small one competes with other causes, by its derivative
+        is_large = 0 < best < len(delays) - 1 and abs(delays[best]) >= LARGE
+        if is_large and errors[best] < (1.0 - CLEAR_GAIN) ** 2 * errors[still]:
             found.append(Start(presliding, float(delays[best]), float(errors[best])))
     if known is not None and abs(known) >= least_delay:
         for presliding in distances:
@@ -100,9 +102,10 @@ def presliding_everywhere(data: Mapping[str, Any], source: int, span: Span) -> l
 
 
 def _delays(step: float) -> Numbers:
-    """0, and what is too large for a derivative to find."""
-    delays = np.arange(-LONGEST_DELAY, LONGEST_DELAY + FINE / 2, max(FINE, step / 2))
-    return np.sort(np.append(delays[np.abs(delays) >= LARGE], 0.0))
+    """All that a description takes, 0 among them."""
+    grid = max(2 * FINE, step / 2)
+    count = int(LONGEST_DELAY / grid)
+    return np.asarray(grid * np.arange(-count, count + 1), dtype=np.float64)
 
 
 def delay_of_positions(data: Mapping[str, Any], recordings: Sequence[FitRecording]) -> float | None:

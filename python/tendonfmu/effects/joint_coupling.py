@@ -16,7 +16,7 @@ def _places(data: Data, kinematics: int) -> list[Place]:
 
 
 def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
-    return row_variant(data, NAME, place, shape, {"stiffness": 1})
+    return row_variant(data, NAME, place, shape, {"stiffness": 0})
 
 
 CANDIDATE = Candidate(
@@ -24,9 +24,10 @@ CANDIDATE = Candidate(
     title="this joint and the next pull at each other",
     explanation=(
         "A spring between this joint and the next one, which pulls when their angles differ: a shared cover, a "
-        "cable or a linkage. Move one joint by hand and see whether the other one follows."
+        "cable or a linkage. Below 0 it pulls at the sum of the angles, as a strap across both joints does. Move one "
+        "joint by hand and see whether the other one follows."
     ),
-    sign=1,
+    sign=0,
     excited_by="strokes of this joint and the next one by turns, so that their angles differ",
     confused_with=("cover_stiffness", "gravity", "moment_arm"),
     coordinate="angle",
