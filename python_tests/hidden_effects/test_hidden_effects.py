@@ -42,7 +42,7 @@ DEFAULT = {
     "gravity": (1.0, False),
     "time_delay": (1.0, False),
 }
-CAMPAIGN = {
+LONG = {
     "backlash": (0.3, True),
     "edge_friction": (0.3, False),
     "joint_friction": (0.3, False),
@@ -66,14 +66,14 @@ CAMPAIGN = {
 NOT_YET = ("joint_load_friction", "presliding", "moment_arm_variation", "pulley_eccentricity")
 
 
-def of_campaign(effect: str) -> Any:
+def of_long(effect: str) -> Any:
     unnamed = pytest.mark.xfail(reason="is in too_small", strict=False)
-    return pytest.param(effect, marks=[pytest.mark.campaign, *([unnamed] if effect in NOT_YET else [])])
+    return pytest.param(effect, marks=[pytest.mark.long, *([unnamed] if effect in NOT_YET else [])])
 
 
-@pytest.mark.parametrize("effect", [*DEFAULT, *map(of_campaign, CAMPAIGN)])
+@pytest.mark.parametrize("effect", [*DEFAULT, *map(of_long, LONG)])
 def test_one_hidden_effect_is_in_the_reported_set(effect: str, tmp_path: Path) -> None:
-    strength, presliding = (DEFAULT | CAMPAIGN)[effect]
+    strength, presliding = (DEFAULT | LONG)[effect]
     made = cases.single(tmp_path, effect, strength, 1, presliding=presliding, **SHORT)
     assert made["facts"]["surviving_share"] >= cases.VISIBLE
     found = diagnosed(tmp_path, made)
@@ -87,8 +87,8 @@ def test_one_hidden_effect_is_in_the_reported_set(effect: str, tmp_path: Path) -
     [
         (1, False, 1.0),
         (2, True, 3.0),
-        pytest.param(3, False, 3.0, marks=pytest.mark.campaign),
-        pytest.param(4, True, 1.0, marks=pytest.mark.campaign),
+        pytest.param(3, False, 3.0, marks=pytest.mark.long),
+        pytest.param(4, True, 1.0, marks=pytest.mark.long),
     ],
 )
 def test_nothing_is_named_where_nothing_is_hidden(seed: int, presliding: bool, wander: float, tmp_path: Path) -> None:
@@ -102,7 +102,7 @@ def test_nothing_is_named_where_nothing_is_hidden(seed: int, presliding: bool, w
     ("effects", "strength"),
     [
         (("preload_friction", "inertia"), 1.0),
-        pytest.param(("gravity", "load_friction"), 3.0, marks=pytest.mark.campaign),
+        pytest.param(("gravity", "load_friction"), 3.0, marks=pytest.mark.long),
     ],
 )
 def test_two_hidden_effects_are_both_found(effects: tuple[str, str], strength: float, tmp_path: Path) -> None:
@@ -110,7 +110,7 @@ def test_two_hidden_effects_are_both_found(effects: tuple[str, str], strength: f
     assert all(any(effect in names for names in found) for effect in effects)
 
 
-@pytest.mark.campaign
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["periodic", "ageing"])
 def test_what_the_list_lacks_is_called_unexplained(kind: str, tmp_path: Path) -> None:
     found = diagnosed(tmp_path, cases.single(tmp_path, kind, 3.0, 1, presliding=True, **SHORT))
@@ -133,7 +133,7 @@ def test_a_diagnosis_names_measures_and_extends(tmp_path: Path) -> None:
     assert found.gain.low > 0.0 and np.all(np.array(found.extended.test_rms) < np.array(found.nominal.test_rms))
 
 
-@pytest.mark.campaign
+@pytest.mark.long
 def test_absorbed_is_told_to_be_invisible(tmp_path: Path) -> None:
     """A force sensor's offset is a constant torque: the bias takes it."""
     found = diagnosed(tmp_path, cases.absorbed(tmp_path, "force_offset", 1, presliding=True, **SHORT))
