@@ -216,7 +216,7 @@ def test_the_jaw_s_causes_are_named_and_its_stall_is_an_event(tmp_path: Path) ->
     found = diagnose(ROOT / "examples" / "davinci" / "jaw_nominal.json", even, odd)
     growing = {"load_friction", "joint_load_friction", "edge_friction"}
     named = [cause.where.effect for cause in found.causes[:3]]
-    assert named[0] == "presliding" and growing & set(named)
+    assert "presliding" in named and growing & set(named)
     stalls = [event for event in found.events if Path(event.recording).stem == "07"]
     assert any(event.start < STALL[1] and event.end > STALL[0] for event in stalls)
     assert jaw_error(dict(found.extended_data)) <= JAW_LIMIT

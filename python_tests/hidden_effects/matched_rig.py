@@ -9,9 +9,10 @@ The torque balance is Rᵀ f = T(q, q̇, f) + bias + noise (+ what is hidden); f
 forces are found by fixed-point iteration over the whole series at once. Bias wander and coloured noise are torques
 that act on the finger; encoders are quantised, force sensors have a little white noise of their own.
 
-"Matched": friction follows the velocity that the nominal model's own filter makes of the true angle, at rest the
-torque stays what it was (contract-additions, `entry_load`, forget_rate 0), or every effect has presliding in the form
-of docs/extensions.md. What remains to the tool is noise, wander, quantisation and what was hidden.
+"Matched": friction follows the velocity of the true angle (the nominal has no velocity filter, whose lag would be a
+delay of every recording), at rest the torque stays what it was (contract-additions, `entry_load`, forget_rate 0), or
+every effect has presliding in the form of docs/extensions.md. What remains to the tool is noise, wander, quantisation
+and what was hidden.
 """
 
 from __future__ import annotations
@@ -158,7 +159,7 @@ def random_truth(rng: np.random.Generator, joints: int, presliding: bool) -> Des
         "joints": [{"name": f"joint_{j + 1}", **each} for j, each in enumerate(members)],
         "tendons": [{"name": f"tendon_{i + 1}", **each} for i, each in enumerate(tendons)],
         "velocity_threshold": {"tendon": 0.0004, "joint": 0.04},
-        "velocity_filter_cutoff": 20.0,
+        "velocity_filter_cutoff": 0.0,
         "bias": {"initial_variance": 1e-4, "forget_rate": 0.0, "entry_load": True},
         "contact": {"threshold": [1.0] * joints},
         "extensions": [],
