@@ -21,6 +21,7 @@ Numbers = NDArray[np.float64]
 
 CERTAIN = 2.0  # standard errors above 0
 ALIKE = 1.64  # standard errors of the paired difference within which two causes are not told apart
+SAME = 1e-3  # of the error: a smaller difference is none, however certain (of columns that are alike: rounding)
 FINER = 0.5  # standard errors by which a finer place has to be better: both have as many numbers
 LEAST_SHARE = 0.01  # of a candidate's variance that has to survive the refit for it to be visible
 
@@ -114,7 +115,7 @@ class Selection:
 
     def _is_alike(self, other: Judged, best: Judged) -> bool:
         behind = other.by_stretch - best.by_stretch
-        return bool(behind.sum() <= ALIKE * standard_error(behind))
+        return bool(behind.sum() <= max(ALIKE * standard_error(behind), SAME * best.error))
 
     def _refined(self, effect: str) -> Judged:
         """The best place at the coarsest level, then finer ones as long as they are certainly better."""
