@@ -205,12 +205,49 @@ def test_places_follow_the_structure(case: Case) -> None:
         "load_friction": {(1, 1), (1, 2), (1, 3), (2, 3), (1, 4), (2, 4)},
         "preload_friction": {(1, 1), (1, 2), (1, 3), (2, 3), (1, 4), (2, 4)},
         "friction_drift": {(None, None), (1, None), (2, None), (None, 1), (None, 3), (None, 4)},
-        "presliding": {(None, None), (1, None), (2, None), (None, 1), (None, 3), (None, 4)},
+        "presliding": {(None, None)},
         "force_gain": {(None, 1), (None, 2), (None, 3), (None, 4)},
     }
     for name, places in expected.items():
         found = {(place.joint, place.tendon) for place in by_name(name).places(case.data)}
         assert found == places, name
+
+
+def presliding_places(data: Data, rows: list[Data], **settings: Any) -> set[tuple[int | None, int | None]]:
+    places = by_name("presliding").places({**data, "extensions": rows, **settings})
+    return {(place.joint, place.tendon) for place in places}
+
+
+def test_presliding_is_everywhere_first_and_at_single_places_beside_it(case: Case) -> None:
+    whole = {"effect": "presliding", "displacement": 0.05}
+    own = {"effect": "presliding", "joint": 1, "displacement": 0.002}
+    single = {(1, None), (2, None), (None, 1), (None, 3), (None, 4)}
+    assert presliding_places(case.data, []) == {(None, None)}
+    assert presliding_places(case.data, [whole]) == single
+    assert presliding_places(case.data, [whole, own]) == single - {(1, None)}
+    # a threshold of 0 gives "everywhere" no scale
+    assert presliding_places(case.data, [], velocity_threshold={"tendon": 0.0, "joint": 0.05}) == single
+
+
+def test_distances_of_presliding_follow_the_motion_and_what_there_is(case: Case) -> None:
+    candidate = by_name("presliding")
+
+    def distances(data: Data, place: Place) -> list[float]:
+        return [each.shape["displacement"] for each in candidate.variants(data, place, case.span)]
+
+    thresholds = {"tendon": 0.0005, "joint": 0.05}
+    data = case.data | {"velocity_threshold": thresholds, "extensions": []}
+    times = [*(case.span.travel / 0.05), *(case.span.tendon_travel[[0, 2, 3]] / 0.0005)]
+    everywhere = distances(data, Place())
+    assert everywhere == sorted(everywhere) and len(everywhere) >= 3
+    assert everywhere[0] < 0.01 * np.median(times) and 0.05 * np.median(times) < everywhere[-1] < np.median(times)
+    slower = data | {"velocity_threshold": {key: 2.0 * value for key, value in thresholds.items()}}
+    assert distances(slower, Place()) == pytest.approx([each / 2.0 for each in everywhere])
+    # beside it a place is tried with less and with more than it has
+    known = data | {"extensions": [{"effect": "presliding", "displacement": 0.04}]}
+    for place, threshold in ((Place(1), 0.05), (Place(tendon=3), 0.0005)):
+        low, high = distances(known, place)
+        assert low < 0.04 * threshold < high
 
 
 def test_kinematics_decide_what_can_matter(case: Case) -> None:

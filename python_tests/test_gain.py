@@ -20,11 +20,18 @@ from tendonfmu import native
 from tendonfmu.contact_gain import detection_gain
 from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.effects import CANDIDATES, Place
-from tendonfmu.errors import InputError
+from tendonfmu.errors import InputError, InternalError
 from tendonfmu.estimation import HAS_ESTIMATION
-from tendonfmu.extension_fit import Accepted, FitSettings, extended_description, fit_extended, fit_numbers
+from tendonfmu.extension_fit import (
+    Accepted,
+    FitSettings,
+    cause_parameters,
+    extended_description,
+    fit_extended,
+    fit_numbers,
+)
 from tendonfmu.fit_recordings import FitRecording, Held, prepare
-from tendonfmu.gain import measure_gain, residual_of, run_both
+from tendonfmu.gain import measure_gain, own_gains, residual_of, run_both
 from tendonfmu.gain_interval import blocks_of, gain_interval
 from tendonfmu.recording import Recording, read_recording
 
@@ -186,27 +193,25 @@ def test_a_hidden_effect_is_fitted_and_its_gain_is_true() -> None:
         accepted("cover_hardening", Place(2), [0.001]),
     ]
     found = fit_extended(before, causes, [training], settings)
-    value, unit = found.parameters[0]["extensions[1].displacement"]
+    parameters = cause_parameters(before.data, causes, found)
+    value, unit = parameters[0]["extensions[1].displacement"]
     assert value == pytest.approx(0.02, rel=0.1) and unit == "rad"
-    assert found.vanished == (False, True)
-    result = measure_gain(
-        before.data,
-        found.model.data,
-        [training],
-        [test],
-        without=[each.data for each in found.without],
-        alone=[each.data for each in found.alone],
-    )
+    assert list(parameters[1]) == ["extensions[2].stiffness"]
+    without = [fit_extended(before, [other], [training], settings).data for other in causes[::-1]]
+    result = measure_gain(before.data, found.data, [training], [test], between=[without[1]])
     long = prepared(truth, 2, seconds=90.0)
-    squares = [np.nansum(residual_of(data, long) ** 2) for data in (before.data, found.model.data)]
+    squares = [np.nansum(residual_of(data, long) ** 2) for data in (before.data, found.data)]
     assert result.value.low <= 1 - np.sqrt(squares[1] / squares[0]) <= result.value.high
     assert result.value.low > 0.1
-    assert result.causes[0].low > 0.1 and result.causes[1].high < 0.02
-    assert result.alone[0].low > 0.1 and result.alone[1].high < 0.02
+    gains = own_gains(found.data, without, [training], [test])
+    assert gains[0].low > 0.1 and gains[1].high < 0.02
     assert not result.held_out and result.agreement < 1e-12
+    first, _, last = result.steps
+    assert 1 - last / first == pytest.approx(result.value.value)
+    assert result.steps[1] == pytest.approx(last, rel=0.02)
     assert all(a < b for a, b in zip(result.extended.test_rms, result.bias_only_rms, strict=True))
     assert np.allclose(result.extended.train_rms, NOISE, rtol=0.2)
-    blocks = measure_gain(before.data, found.model.data, [prepared(truth, 1, holdout=0.3)])
+    blocks = measure_gain(before.data, found.data, [prepared(truth, 1, holdout=0.3)])
     assert blocks.held_out and blocks.value.low > 0 and blocks.blocks >= 4
 
 
@@ -248,11 +253,11 @@ def test_forces_without_noise_explain_the_measured_torque() -> None:
 @needs_estimation
 def test_what_cannot_be_compared_is_refused() -> None:
     training = prepared(nominal(), 1)
-    with pytest.raises(InputError, match="no data to measure the gain on"):
+    with pytest.raises(InputError, match="no sample to measure the gain on"):
         measure_gain(nominal(), nominal(), [training])
     other = copy.deepcopy(nominal())
     other["bias"]["noise_std"] = 0.1
-    with pytest.raises(InputError, match="bias: not the same"):
+    with pytest.raises(InternalError, match="bias: not the same"):
         measure_gain(nominal(), other, [training], [prepared(nominal(), 2)])
 
 

@@ -62,8 +62,8 @@ LONG = {
     "moment_arm_variation": (3.0, True),
     "pulley_eccentricity": (3.0, False),
 }
-# 8 s of held-out data say too little, or presliding at one place alone is not looked for where there is none
-NOT_YET = ("joint_load_friction", "presliding", "moment_arm_variation", "pulley_eccentricity")
+# a fifth of 40 s held out says too little, or presliding at one place alone is not looked for where there is none
+NOT_YET = ("presliding", "moment_arm_variation", "pulley_eccentricity")
 
 
 def of_long(effect: str) -> Any:
@@ -111,9 +111,10 @@ def test_two_hidden_effects_are_both_found(effects: tuple[str, str], strength: f
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("kind", ["periodic", "ageing"])
-def test_what_the_list_lacks_is_called_unexplained(kind: str, tmp_path: Path) -> None:
-    found = diagnosed(tmp_path, cases.single(tmp_path, kind, 3.0, 1, presliding=True, **SHORT))
+@pytest.mark.parametrize(("kind", "strength"), [("periodic", 0.3), ("ageing", 1.0)])
+def test_what_the_list_lacks_is_called_unexplained(kind: str, strength: float, tmp_path: Path) -> None:
+    made = cases.single(tmp_path, kind, strength, 1, presliding=True, **(SHORT | {"seconds": 60.0}))
+    found = diagnosed(tmp_path, made)
     assert found.verdict in ("unexplained", "partly explained")
     assert found.unexplained.share > 0.05
 
