@@ -11,9 +11,18 @@ from numpy.typing import NDArray
 
 from made_columns import BLOCKS, JOINTS, UNSEEN, Made, candidate_columns, coloured, grams_of, waves
 from tendonfmu.block_grams import standard_error
+from tendonfmu.candidate_columns import CandidateColumns
 from tendonfmu.cause_selection import CERTAIN, Selection, rms_gain
 from tendonfmu.effects import Place, by_name
-from tendonfmu.hypotheses import EVERYWHERE, HERE, LARGEST_SECANT, SOMEWHERE, Hypothesis, hypotheses
+from tendonfmu.hypotheses import (
+    EVERYWHERE,
+    HERE,
+    LARGEST_SCALING,
+    LARGEST_SECANT,
+    SOMEWHERE,
+    Hypothesis,
+    hypotheses,
+)
 from tendonfmu.least_sizes import BEFORE_FIT, OF_NOISE, OF_SAMPLE, LeastSizes, noise_of
 
 Numbers = NDArray[np.float64]
@@ -38,10 +47,15 @@ def noise(seed: int) -> Numbers:
     return coloured(np.random.default_rng([seed, 4]))
 
 
+def hypotheses_of(columns: CandidateColumns) -> list[Hypothesis]:
+    """With arms so long that no correction of the torque is too large."""
+    return hypotheses(columns, np.full((4, JOINTS), 1e3))
+
+
 def selection_of(
     target: Numbers, nominal: Numbers, values: Numbers, made: Sequence[Made], least: LeastSizes = UNSEEN
 ) -> Selection:
-    found = hypotheses(candidate_columns(values, made))
+    found = hypotheses_of(candidate_columns(values, made))
     return Selection(grams_of(target, nominal, values), found, least)
 
 
@@ -55,7 +69,7 @@ def keys(found: Sequence[Hypothesis]) -> dict[tuple[object, ...], Hypothesis]:
 
 
 def test_an_effect_of_surfaces_is_asked_for_everywhere_at_joints_at_tendons_and_at_each_place(columns: Numbers) -> None:
-    found = hypotheses(candidate_columns(columns[:, :, :4], FOUR))
+    found = hypotheses_of(candidate_columns(columns[:, :, :4], FOUR))
     by_key = keys(found)
     name = "load_friction"
     assert set(by_key) == {
@@ -79,19 +93,19 @@ def test_an_effect_of_surfaces_is_asked_for_everywhere_at_joints_at_tendons_and_
 
 
 def test_a_joint_that_has_all_the_places_is_everywhere(columns: Numbers) -> None:
-    found = hypotheses(candidate_columns(columns[:, :, :2], FOUR[:2]))
+    found = hypotheses_of(candidate_columns(columns[:, :, :2], FOUR[:2]))
     assert [each.level for each in found] == [EVERYWHERE, HERE, HERE]
 
 
 @pytest.mark.parametrize("effect", ["gravity", "force_gain", "backlash", "pulley_eccentricity"])
 def test_effects_of_one_part_are_asked_for_at_single_places(effect: str, columns: Numbers) -> None:
-    found = hypotheses(candidate_columns(columns[:, :, :2], [Made(effect, 1), Made(effect, 2)]))
+    found = hypotheses_of(candidate_columns(columns[:, :, :2], [Made(effect, 1), Made(effect, 2)]))
     assert [each.level for each in found] == [HERE, HERE]
 
 
 def test_an_effect_of_the_whole_finger_is_everywhere(columns: Numbers) -> None:
     made = [Made("time_delay", shapes=({"delay": 0.01}, {"delay": -0.01}), secant=True)]
-    found = hypotheses(candidate_columns(columns[:, :, :2], made))
+    found = hypotheses_of(candidate_columns(columns[:, :, :2], made))
     assert [(each.level, each.key) for each in found] == [(EVERYWHERE, ("time_delay", None, None))] * 2
     # what a step of 10 ms says of one of 40 ms is nothing
     assert all(each.high == LARGEST_SECANT and each.low == -np.inf for each in found)
@@ -99,8 +113,20 @@ def test_an_effect_of_the_whole_finger_is_everywhere(columns: Numbers) -> None:
 
 def test_signs_bound_what_is_learned(columns: Numbers) -> None:
     made = [Made("cover_stiffness", 1, sign=1), Made("inertia", 1, sign=-1), Made("gravity", 1, sign=0)]
-    bounds = {each.effect: (*each.low, *each.high) for each in hypotheses(candidate_columns(columns[:, :, :3], made))}
+    bounds = {
+        each.effect: (*each.low, *each.high) for each in hypotheses_of(candidate_columns(columns[:, :, :3], made))
+    }
     assert bounds == {"cover_stiffness": (0.0, np.inf), "inertia": (-np.inf, 0.0), "gravity": (-np.inf, np.inf)}
+
+
+def test_corrections_of_the_torque_have_a_largest_size(columns: Numbers) -> None:
+    """A large one would shrink the torque, and with it all that is left of it."""
+    made = [Made("force_gain", None, 2), Made("moment_arm", 1, 2), Made("load_friction", 1, 2)]
+    arms = np.array([[0.01, 0.01], [0.004, -0.008]])
+    found = {each.effect: each for each in hypotheses(candidate_columns(columns[:, :, :3], made), arms)}
+    assert (found["force_gain"].low, found["force_gain"].high) == (-LARGEST_SCALING, LARGEST_SCALING)
+    assert found["moment_arm"].high == pytest.approx([LARGEST_SCALING * 0.008])
+    assert found["load_friction"].high == [np.inf]
 
 
 def test_alike_shapes_go_together_and_each_law_has_its_own(columns: Numbers) -> None:
@@ -108,7 +134,7 @@ def test_alike_shapes_go_together_and_each_law_has_its_own(columns: Numbers) -> 
     shapes = ({"stribeck_velocity": 0.1}, {"stribeck_velocity": 0.3}, {"rises": 1.0, "stribeck_velocity": 0.1})
     pulley = tuple({"pulley": 1.0, **shape} for shape in shapes[:2])
     made = [Made("stribeck", 1, 1, shapes=(*shapes, *pulley)), Made("stribeck", 2, 1, shapes=shapes)]
-    found = [each for each in hypotheses(candidate_columns(columns[:, :, :8], made)) if each.level == EVERYWHERE]
+    found = [each for each in hypotheses_of(candidate_columns(columns[:, :, :8], made)) if each.level == EVERYWHERE]
     assert [np.flatnonzero(each.mix[:, 0]).tolist() for each in found] == [[0, 3, 5], [1, 4, 6]]
 
 
@@ -132,6 +158,15 @@ def test_a_cause_is_found_with_its_size_and_its_gain(columns: Numbers, nominal: 
     share = 0.3**2 * columns[:, :, 2].var() / (1.0 + 0.3**2 * columns[:, :, 2].var())
     assert found.gain == pytest.approx(1.0 - np.sqrt(1.0 - share), rel=0.3)
     assert 0.0 < CERTAIN * found.error < found.gain
+
+
+def test_what_was_tried_is_left_out(columns: Numbers, nominal: Numbers) -> None:
+    target = noise(12) + 0.4 * columns[:, :, 2] + 0.3 * columns[:, :, 3]
+    selection = selection_of(target, nominal, columns[:, :, :5], APART)
+    for tried, effect in (((), "cover_stiffness"), (("cover_stiffness",), "inertia")):
+        found = selection.best(LEAST_GAIN, tried)
+        assert found is not None and found.hypothesis.effect == effect
+    assert selection.best(LEAST_GAIN, ("cover_stiffness", "inertia")) is None
 
 
 def test_what_is_certain_but_not_material_is_no_cause(columns: Numbers, nominal: Numbers) -> None:
@@ -274,7 +309,7 @@ def test_what_is_far_too_small_is_no_hypothesis(columns: Numbers) -> None:
         Made("presliding", 1, shapes=({"displacement": 1e-6},), secant=True),
         Made("gravity", 1),
     ]
-    found = {each.effect: each for each in hypotheses(candidate_columns(columns[:, :, :4], made))}
+    found = {each.effect: each for each in hypotheses_of(candidate_columns(columns[:, :, :4], made))}
     # before the fit half of the least size will do: 4 times 0.1 mrad of noise; three quarters of 4 ms, and 1 ms of lag
     for effect, step, least in (("backlash", 2e-4, 4e-4), ("time_delay", 0.01, 0.004)):
         for times, resolved in ((0.95, False), (1.05, True)):
