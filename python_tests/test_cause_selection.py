@@ -214,9 +214,9 @@ def test_what_cannot_be_told_apart_is_said(columns: Numbers, nominal: Numbers) -
 
 @pytest.mark.parametrize("seed", range(4))
 def test_columns_that_differ_by_rounding_are_alike(seed: int, columns: Numbers, nominal: Numbers) -> None:
-    values = np.stack([columns[:, :, 0], columns[:, :, 0] / -150.3], axis=2)
+    values = np.stack([10.0 * columns[:, :, 0], columns[:, :, 0] / -150.3], axis=2)
     made = [Made("force_gain", None, 1), Made("moment_arm", 1, 1)]
-    found = selection_of(noise(20 + seed) + 0.5 * values[:, :, 0], nominal, values, made).best(LEAST_GAIN)
+    found = selection_of(noise(20 + seed) + 0.05 * values[:, :, 0], nominal, values, made).best(LEAST_GAIN)
     assert found is not None and len(found.alike) == 1
 
 
