@@ -25,6 +25,7 @@ NAME = "two_joints"
 RECORDINGS = {f"{NAME}_training": (3, 60.0), f"{NAME}_unseen": (4, 40.0)}  # seed of the motion, s
 EFFECT, STRENGTH, SEED = "gravity", 10.0, 12
 RATE = 500.0  # Hz
+CUTOFF = 20.0  # Hz, of the velocity that friction sees
 FORCE_STEP, POSITION_STEP = 1e-4, 1e-7  # N, m; of the sensors
 
 
@@ -33,7 +34,7 @@ def true_hand() -> tuple[Any, dict[str, Any]]:
     from effects_hidden import hide
     from matched_rig import random_hand
 
-    hand = random_hand(SEED, joints=2, presliding=True, source=1, rate=RATE)
+    hand = random_hand(SEED, joints=2, presliding=True, source=1, rate=RATE, cutoff=CUTOFF)
     hand = replace(hand, noise=replace(hand.noise, tendon_step=POSITION_STEP))
     seed, seconds = RECORDINGS[f"{NAME}_training"]
     found: tuple[Any, dict[str, Any]] = hide(hand, EFFECT, STRENGTH, seed=SEED, motion=seed, seconds=seconds)
