@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from jaw_recordings import FAST, FAULT, data_folder, rms, torque_error
 
-from tendonfmu.console import phase_bar, print_tables, progress_bar
+from tendonfmu.console import PhaseDisplay, print_tables
 from tendonfmu.converters import convert_file
 from tendonfmu.diagnosis import diagnose
 from tendonfmu.diagnosis_files import write_diagnosis
@@ -63,14 +63,14 @@ def main() -> None:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         files = {name: converted(Path(scratch), name) for name in (*EVEN, *ODD, *FAST)}
-        with progress_bar(None) as bar:
+        with PhaseDisplay() as display:
             found = diagnose(
                 NOMINAL,
                 [files[name] for name in EVEN],
                 [files[name] for name in ODD],
                 seed=options.seed,
                 jobs=options.jobs,
-                progress=phase_bar(bar),
+                progress=display,
             )
         write_diagnosis(found, options.output)
         print_tables(tables(found), lines(found), left="may also be")

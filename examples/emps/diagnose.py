@@ -15,7 +15,7 @@ from pathlib import Path
 
 from emps_recordings import KINEMATICS, MASS, PULSES, TRAINING, data_folder, read_emps, relative_as_published
 
-from tendonfmu.console import phase_bar, print_tables, progress_bar
+from tendonfmu.console import PhaseDisplay, print_tables
 from tendonfmu.converters import convert_file
 from tendonfmu.diagnosis import diagnose
 from tendonfmu.diagnosis_files import write_diagnosis
@@ -37,11 +37,9 @@ def converted(folder: Path, name: str) -> Path:
 
 def run(names: list[str], seed: int, jobs: int) -> Diagnosis:
     """Diagnosis of the first, judged on the others."""
-    with tempfile.TemporaryDirectory() as scratch, progress_bar(None) as bar:
+    with tempfile.TemporaryDirectory() as scratch, PhaseDisplay() as display:
         training, *tests = [converted(Path(scratch), name) for name in names]
-        return diagnose(
-            NOMINAL, [training], tests, kinematics=KINEMATICS, seed=seed, jobs=jobs, progress=phase_bar(bar)
-        )
+        return diagnose(NOMINAL, [training], tests, kinematics=KINEMATICS, seed=seed, jobs=jobs, progress=display)
 
 
 def print_errors(found: Diagnosis, names: list[str]) -> None:

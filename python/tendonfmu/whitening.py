@@ -115,11 +115,3 @@ def _autoregression(values: Numbers, valid: Flags, most: int) -> Numbers:
         if score < best:
             best, chosen = score, fit
     return np.asarray(chosen)
-
-
-def common(whitened: Numbers, valid: Flags) -> Numbers:
-    """[n, n] M such that whitened [B, n] @ M has uncorrelated joints of variance 1."""
-    rows = whitened[valid]
-    covariance = rows.T @ rows / max(len(rows), 1)
-    power, direction = np.linalg.eigh(covariance)
-    return np.asarray(direction @ np.diag(1 / np.sqrt(np.maximum(power, 1e-3 * power[-1]))) @ direction.T)
