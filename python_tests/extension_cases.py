@@ -20,6 +20,7 @@ ROWS: list[dict[str, Any]] = [
     {"effect": "moment_arm", "joint": 1, "tendon": 3, "correction": 6e-4},
     {"effect": "moment_arm_variation", "joint": 2, "tendon": 2, "slope": -4e-4},
     {"effect": "pulley_eccentricity", "joint": 1, "tendon": 1, "sine": 5e-4, "cosine": 3e-4},
+    {"effect": "pulley_eccentricity", "joint": 2, "tendon": 2, "sine": -3e-4, "cosine": 2e-4, "turns": 6.5},
     {"effect": "presliding", "joint": 1, "displacement": 0.02},
     {"effect": "presliding", "tendon": 2, "displacement": 2e-4},
     {"effect": "friction_drift", "amplitude": 0.3, "time_constant": 20.0},

@@ -22,6 +22,7 @@ Array = NDArray[Any]
 
 HISTORY = 64  # samples that a delay looks back on
 OPTIONAL_NUMBERS = {"gravity": ("sine", "cosine"), "pulley_eccentricity": ("sine", "cosine")}
+MECHANISM = {"pulley_eccentricity": {"turns": 1.0}}  # left out: this
 DELAYED = {1: ("tendon_position",), 2: ("joint_position",), 3: ("joint_position", "joint_velocity")}
 
 
@@ -75,7 +76,7 @@ def read_rows(description: Mapping[str, Any]) -> list[Row]:
         joint, tendon = (
             None if given(entry, key, None) is None else int(entry[key]) - 1 for key in ("joint", "tendon")
         )
-        numbers = dict.fromkeys(OPTIONAL_NUMBERS.get(effect, ()), 0.0)
+        numbers = dict.fromkeys(OPTIONAL_NUMBERS.get(effect, ()), 0.0) | MECHANISM.get(effect, {})
         numbers |= {k: float(v) for k, v in entry.items() if k not in ("effect", "joint", "tendon") and v is not None}
         rows.append(Row(effect, joint, tendon, numbers))
     return rows
@@ -125,7 +126,8 @@ def torque_of(row: Row, numbers: Mapping[str, Any], at: Moment, R: Array, cosine
     elif row.effect == "moment_arm_variation":
         T[j] = -numbers["slope"] * at.q[j] * at.f0[i]
     elif row.effect == "pulley_eccentricity":
-        arm = numbers["sine"] * math.sin(at.q[j]) + numbers["cosine"] * math.cos(at.q[j])
+        turned = numbers["turns"] * at.q[j]
+        arm = numbers["sine"] * math.sin(turned) + numbers["cosine"] * math.cos(turned)
         T[j] = -arm * at.f0[i]
     return T
 

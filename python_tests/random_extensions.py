@@ -83,7 +83,9 @@ MAKE: dict[str, Make] = {
     "moment_arm": lambda rng, n, m, j, i: {"joint": j, "tendon": i, "correction": either(rng, 2e-3)},
     "moment_arm_variation": lambda rng, n, m, j, i: {"joint": j, "tendon": i, "slope": either(rng, 2e-3)},
     "pulley_eccentricity": lambda rng, n, m, j, i: (
-        {"joint": j, "tendon": i, "sine": either(rng, 1e-3)} | ({"cosine": either(rng, 1e-3)} if i % 2 else {})
+        {"joint": j, "tendon": i, "sine": either(rng, 1e-3)}
+        | ({"cosine": either(rng, 1e-3)} if i % 2 else {})
+        | ({"turns": float(rng.uniform(1.5, 9.0))} if j % 2 else {})
     ),
     "presliding": presliding,
     "friction_drift": drift,

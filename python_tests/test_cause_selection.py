@@ -49,7 +49,7 @@ def noise(seed: int) -> Numbers:
 
 def hypotheses_of(columns: CandidateColumns) -> list[Hypothesis]:
     """With arms so long that no correction of the torque is too large."""
-    return hypotheses(columns, np.full((4, JOINTS), 1e3))
+    return hypotheses(columns, np.full((4, JOINTS), 1e3), np.ones(JOINTS))
 
 
 def selection_of(
@@ -121,11 +121,18 @@ def test_signs_bound_what_is_learned(columns: Numbers) -> None:
 
 def test_corrections_of_the_torque_have_a_largest_size(columns: Numbers) -> None:
     """A large one would shrink the torque, and with it all that is left of it."""
-    made = [Made("force_gain", None, 2), Made("moment_arm", 1, 2), Made("load_friction", 1, 2)]
+    made = [
+        Made("force_gain", None, 2),
+        Made("moment_arm", 1, 2),
+        Made("load_friction", 1, 2),
+        Made("moment_arm_variation", 2, 2),
+    ]
     arms = np.array([[0.01, 0.01], [0.004, -0.008]])
-    found = {each.effect: each for each in hypotheses(candidate_columns(columns[:, :, :3], made), arms)}
+    reach = np.array([1.0, 0.5])
+    found = {each.effect: each for each in hypotheses(candidate_columns(columns[:, :, :4], made), arms, reach)}
     assert (found["force_gain"].low, found["force_gain"].high) == (-LARGEST_SCALING, LARGEST_SCALING)
     assert found["moment_arm"].high == pytest.approx([LARGEST_SCALING * 0.008])
+    assert found["moment_arm_variation"].high == pytest.approx([LARGEST_SCALING * 0.008 / 0.5])
     assert found["load_friction"].high == [np.inf]
 
 

@@ -88,7 +88,8 @@ def by_the_text(row: dict[str, Any], m: dict[str, Numbers]) -> Numbers:
         case "moment_arm_variation":
             torque[:, j] = -row["slope"] * q[:, j] * f[:, i]
         case "pulley_eccentricity":
-            torque[:, j] = -(row["sine"] * np.sin(q[:, j]) + row["cosine"] * np.cos(q[:, j])) * f[:, i]
+            turned = row.get("turns", 1.0) * q[:, j]
+            torque[:, j] = -(row["sine"] * np.sin(turned) + row["cosine"] * np.cos(turned)) * f[:, i]
     return np.asarray(torque)
 
 

@@ -31,8 +31,9 @@ from tendonfmu.extension_fit import (
     fit_numbers,
 )
 from tendonfmu.fit_recordings import FitRecording, Held, prepare
-from tendonfmu.gain import measure_gain, own_gains, residual_of, run_both
+from tendonfmu.gain import measure_gain, residual_of, run_both
 from tendonfmu.gain_interval import blocks_of, gain_interval
+from tendonfmu.online_error import OnlineError
 from tendonfmu.recording import Recording, read_recording
 
 Array = NDArray[Any]
@@ -203,7 +204,9 @@ def test_a_hidden_effect_is_fitted_and_its_gain_is_true() -> None:
     squares = [np.nansum(residual_of(data, long) ** 2) for data in (before.data, found.data)]
     assert result.value.low <= 1 - np.sqrt(squares[1] / squares[0]) <= result.value.high
     assert result.value.low > 0.1
-    gains = own_gains(found.data, without, [training], [test])
+    error = OnlineError(before.data, [test])
+    after = error.by_stretch(found.data)
+    gains = [gain_interval(error.by_stretch(each), after) for each in without]
     assert gains[0].low > 0.1 and gains[1].high < 0.02
     assert not result.held_out and result.agreement < 1e-12
     first, _, last = result.steps

@@ -53,7 +53,8 @@ class View:
 
     @cached_property
     def selection(self) -> Selection:
-        return Selection(self.grams, hypotheses(self.columns, moment_arms(self.data)), self.least)
+        reach = np.abs(self.series.angle[self.series.used]).max(axis=0, initial=0.0)
+        return Selection(self.grams, hypotheses(self.columns, moment_arms(self.data), reach), self.least)
 
     def beside(self, keys: Collection[Key]) -> Selection:
         """What is missing if these hypotheses are taken as present, each with all its shapes at that place."""
@@ -74,7 +75,7 @@ class View:
         """Of a hypothesis being chance, corrected for all that were tried."""
         used = np.flatnonzero(hypothesis.mix.any(axis=1))
         columns = self.columns.values[:, :, used].astype(np.float64) @ hypothesis.mix[used]
-        return self.confirmation.p_value(columns, len(self.columns.proposals))
+        return self.confirmation.p_value(columns, sum(len(each.shapes) for each in self.columns.proposals))
 
 
 def look(

@@ -21,7 +21,7 @@ Numbers = NDArray[np.float64]
 
 CERTAIN = 2.0  # standard errors above 0
 ALIKE = 1.64  # standard errors of the paired difference within which two causes are not told apart
-SAME = 1e-3  # of the error: a smaller difference is none, however certain (of columns that are alike: rounding)
+SAME = 0.015  # of the error, about a quarter of what is material: a smaller difference is none, however certain
 FINER = 0.5  # standard errors by which a finer place has to be better: both have as many numbers
 LEAST_SHARE = 0.01  # of a candidate's variance that has to survive the refit for it to be visible
 
@@ -76,7 +76,8 @@ class Selection:
             magnitudes = grams.magnitudes(*columns)[len(self._beside.low) :]
             if least.resolved(hypothesis, magnitudes):
                 error, by_fold = grams.error(*columns)
-                found.append((error, hypothesis, magnitudes, by_fold))
+                if error <= (1.0 - hypothesis.least_gain) ** 2 * self.base.sum():
+                    found.append((error, hypothesis, magnitudes, by_fold))
         self._found = sorted(found, key=lambda each: each[0])
         self._known: dict[int, Judged] = {}
 
@@ -106,18 +107,15 @@ class Selection:
         ranked = [each for each in self.ranked() if each.hypothesis.effect not in tried]
         if not ranked:
             return None
-        judged = self._refined(ranked[0].hypothesis.effect)
+        judged = self.refined(ranked[0].hypothesis.effect)
         gain, error = self.gain(judged)
         if gain < least_gain or gain <= CERTAIN * error:
             return None
-        alike = [each for each in ranked if each.hypothesis.effect != judged.hypothesis.effect]
-        return Pick(judged, gain, error, tuple(each.hypothesis for each in alike if self._is_alike(each, judged)))
+        others = [each for each in ranked if each.hypothesis.effect != judged.hypothesis.effect]
+        alike = [each.hypothesis for each in others if is_alike(each.by_stretch, judged.by_stretch)]
+        return Pick(judged, gain, error, tuple(alike))
 
-    def _is_alike(self, other: Judged, best: Judged) -> bool:
-        behind = other.by_stretch - best.by_stretch
-        return bool(behind.sum() <= max(ALIKE * standard_error(behind), SAME * best.error))
-
-    def _refined(self, effect: str) -> Judged:
+    def refined(self, effect: str) -> Judged:
         """The best place at the coarsest level, then finer ones as long as they are certainly better."""
         levels: dict[int, int] = {}
         for k, (_, hypothesis, _, _) in enumerate(self._found):
@@ -130,6 +128,12 @@ class Selection:
             if gain > FINER * error:
                 chosen = judged
         return chosen
+
+
+def is_alike(other: Numbers, best: Numbers) -> bool:
+    """Whether errors by stretch [K] cannot be told from those of the best."""
+    behind = other - best
+    return bool(behind.sum() <= max(ALIKE * standard_error(behind), SAME * best.sum()))
 
 
 class _Beside:

@@ -15,12 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.cause_search import View, bias_of, look, predicted_of, residual_alone, series_of
-from tendonfmu.cause_selection import CERTAIN, Judged, Pick, rms_gain
+from tendonfmu.cause_selection import CERTAIN, Judged, Pick, Selection, is_alike, rms_gain
 from tendonfmu.contact_scan import left_out, scan_events
 from tendonfmu.diagnosis_result import Event, Interval
 from tendonfmu.diagnosis_series import Grid
 from tendonfmu.diagnosis_span import span_of
 from tendonfmu.effects import CANDIDATES, Candidate, Place
+from tendonfmu.effects.presliding import is_spring
 from tendonfmu.extension_fit import Accepted, FitSettings, FittedModel, extended_description, fit_extended, possible
 from tendonfmu.extensions import extended_row
 from tendonfmu.fit_recordings import FitRecording
@@ -36,6 +37,8 @@ Flags = NDArray[np.bool_]
 
 MOST_CAUSES = 8
 SIGNIFICANCE = 0.01  # family-wise
+MOST_FITTED = 3  # effects that columns cannot tell apart
+WIDESPREAD = {"presliding"}  # in every finger, and different from place to place
 MOST_REFUSED = 4  # effects that selection named and the fit, or the test, did not bear out
 
 
@@ -54,6 +57,7 @@ class NamedCause:
     error: float
     p_value: float
     alike: tuple[Hypothesis, ...]
+    hypothesis: Hypothesis | None = None  # as it was selected; None: it is part of the start
     measured: Interval | None = None  # on unseen data, as it runs online
 
     @property
@@ -119,7 +123,7 @@ def search(
     nominal = fitted(nominal.data, clean, settings, given=nominal.given)
     touched = chosen.recordings  # with the events in them
     chosen = replace(chosen, nominal=nominal, recordings=own)
-    online = OnlineError([without_events(each, events) for each in recordings])
+    online = OnlineError(chosen.online(nominal.data), [without_events(each, events) for each in recordings])
     with phases.start("causes", MOST_CAUSES) as step:
         rounds = _Rounds(chosen, out, online, least_gain, settings)
         rounds.run(step)
@@ -176,6 +180,15 @@ def without_blocks(recording: FitRecording, number: int, grid: Grid, out: Flags)
     return replace(recording, train=train)
 
 
+@dataclass(frozen=True)
+class _Trial:
+    """A cause and the model fitted with it; None where there is none. error: [K] Σ e² on held-out folds, by stretch."""
+
+    cause: NamedCause
+    model: FittedModel | None
+    error: Numbers
+
+
 class _Rounds:
     """Cause after cause; models and views after each."""
 
@@ -194,13 +207,12 @@ class _Rounds:
         self._least_gain, self._settings = least_gain, settings
         # the start is fitted before anything is chosen: until then only what the nominal model leaves is asked for
         self.view = self.first = self._look(chosen.nominal, () if chosen.start.causes else CANDIDATES)
-        self._left = self._online_error(chosen.nominal)
 
     def run(self, step: Step) -> None:
         for accepted in self._chosen.start.causes:
-            self._take(_together(accepted))
-        if self.view is self.first and not self.view.columns.proposals:
-            self.view = self._look(self.models[0])
+            self._take(self._tried(_together(accepted)), ())
+        if not self.view.columns.proposals:
+            self.view = self._look(self.models[-1])
         self._search(step)
         if self._tries_presliding():
             self._search(step)
@@ -212,12 +224,28 @@ class _Rounds:
             # itself lowers any error by shrinking the torque
             known = {each.key for each in self.refused if each.effect not in SCALING}
             tried = {each.effect for each in self.refused}
-            picked = self.view.beside(known).best(self._least_gain, tried)
+            selection = self.view.beside(known)
+            picked = selection.best(self._least_gain, tried)
             if picked is None:
                 break
-            cause = self._named(picked)
-            if cause.p_value >= SIGNIFICANCE or not self._take(cause):
-                self.refused.append(cause)
+            trial = self._best_fitted(selection, picked)
+            if trial.cause.p_value >= SIGNIFICANCE or not self._take(trial):
+                self.refused.append(trial.cause)
+
+    def _best_fitted(self, selection: Selection, picked: Pick) -> _Trial:
+        """Columns of a wrong model mislead: of the effects that they cannot tell apart, the fitted models decide."""
+        own = self._named(picked.judged, selection)
+        rivals = [self._named(selection.refined(each.effect), selection) for each in _to_fit(picked)]
+        trials = [self._tried(each) for each in (own, *(each for each in rivals if each.p_value < SIGNIFICANCE))]
+        best = min(trials, key=lambda each: float(each.error.sum()))
+        same = [each for each in trials if each.model is not None and is_alike(each.error, best.error)]
+        # what is there already explains the data without a new name
+        widespread = WIDESPREAD & {each.effect for each in self.causes}
+        best = next((each for each in same if each.cause.effect in widespread), best)
+        fitted_effects = {each.cause.effect for each in trials}
+        alike = [each.cause.hypothesis for each in same if each is not best and each.cause.hypothesis is not None]
+        alike += [each for each in picked.alike if each.effect not in fitted_effects]
+        return replace(best, cause=replace(best.cause, alike=tuple(alike)))
 
     def _tries_presliding(self) -> bool:
         """Where none was taken: its distance may be far below what the scan tries. True if it was taken."""
@@ -226,21 +254,21 @@ class _Rounds:
             return False
         span = span_of(self.models[-1].data, chosen.recordings)
         tried = presliding_everywhere(self.models[-1].data, chosen.recordings[0].kinematics, span)
-        return bool(tried) and self._take(_together(tried[0]))
+        return bool(tried) and self._take(self._tried(_together(tried[0])))
 
-    def _named(self, picked: Pick) -> NamedCause:
-        own = picked.hypothesis
-        accepted = accepted_of(own, picked.judged.magnitudes)
+    def _named(self, judged: Judged, selection: Selection) -> NamedCause:
+        own = judged.hypothesis
+        accepted = accepted_of(own, judged.magnitudes)
+        gain, error = selection.gain(judged)
         p_value = self.view.p_value(own)
-        return NamedCause(own.effect, own.joint, own.tendon, accepted, picked.gain, picked.error, p_value, picked.alike)
+        return NamedCause(own.effect, own.joint, own.tendon, accepted, gain, error, p_value, (), own)
 
-    def _take(self, cause: NamedCause) -> bool:
-        """Fits the description with a further cause; keeps it where it lowers the error on unseen stretches, and that
-        of the model as it runs online, materially and certainly."""
+    def _tried(self, cause: NamedCause) -> _Trial:
+        """Fits the description with a further cause."""
         everything = [each for known in [*self.causes, cause] for each in known.accepted]
         accepted = possible(self.models[0].data, everything)
         if len(accepted) < len(everything):
-            return False
+            return _Trial(cause, None, np.array([np.inf]))
         own = self._chosen.recordings
         # forces that the model without a delay predicts are not late: no fit would find it in them
         begin = extended_description(self.models[-1].data, cause.accepted)
@@ -252,24 +280,33 @@ class _Rounds:
         )
         model = fitted(model.data, clean, self._settings, given=self.models[0].given)
         if not self._resolved(cause, model):
-            return False
-        left = self._online_error(model)
-        if not self._pays(self._left, left):
-            return False
-        view = self._look(model)
-        before, after = self.view.selection.base, view.selection.base
-        if not self._pays(before, after):
+            return _Trial(cause, None, np.array([np.inf]))
+        return _Trial(cause, model, self._look(model, ()).selection.base)
+
+    def _take(self, trial: _Trial, candidates: Sequence[Candidate] = CANDIDATES) -> bool:
+        """Keeps a further cause where it lowers the error on unseen stretches materially and certainly, and that of
+        the model as it runs online. candidates: looked at around the new model."""
+        before, after, model, cause = self.view.selection.base, trial.error, trial.model, trial.cause
+        if model is None or not self._pays(before, after) or not self._runs_better(model):
             return False
         if cause.p_value >= SIGNIFICANCE:  # of the start: a step that has no column in the view before
             cause = replace(cause, p_value=_step_p_value(before, after))
         gain, error = rms_gain(before, after)
         self.causes.append(replace(cause, gain=gain, error=error))
         self.models.append(model)
-        self.view, self._left = view, left
+        self.view = self._look(model, candidates)
         return True
 
+    def _runs_better(self, model: FittedModel) -> bool:
+        """Whether it leaves less than the last model as both run online, with a slow bias taken off and of r."""
+        before, after = (self._chosen.online(each.data) for each in (self.models[-1], model))
+        left, found = (self._online.by_stretch(each).sum() for each in (before, after))
+        return bool(found < left and self._online.square(after) < self._online.square(before))
+
     def _resolved(self, cause: NamedCause, model: FittedModel) -> bool:
-        """Whether the sensors can show a fitted play or delay of this size."""
+        """Whether the sensors can show a fitted play or delay of this size, and presliding is no spring."""
+        if cause.effect == "presliding" and is_spring(model.data, span_of(model.data, self._chosen.recordings)):
+            return False
         own = [extended_row(model.data, cause.effect, each.place) for each in cause.accepted]
         least = self._chosen.least
         return all(least.shows(cause.effect, each.place, row) for each, row in zip(cause.accepted, own, strict=True))
@@ -278,9 +315,6 @@ class _Rounds:
         """Σ e² by stretch."""
         gain, error = rms_gain(before, after)
         return gain >= self._least_gain and gain > CERTAIN * error
-
-    def _online_error(self, model: FittedModel) -> Numbers:
-        return self._online.by_stretch(self._chosen.online(model.data))
 
     def _look(self, model: FittedModel, candidates: Sequence[Candidate] = CANDIDATES) -> View:
         chosen = self._chosen
@@ -299,6 +333,13 @@ class _Rounds:
             ):
                 found.append(_small(judged, gain, error, p_value))
         return found
+
+
+def _to_fit(picked: Pick) -> list[Hypothesis]:
+    """What a pick cannot be told from and may be in its place. A correction of the torque itself may only stand for
+    another one: it lowers any error."""
+    scaling = picked.hypothesis.effect in SCALING
+    return [each for each in picked.alike if scaling or each.effect not in SCALING][: MOST_FITTED - 1]
 
 
 def _together(places: tuple[Accepted, ...]) -> NamedCause:

@@ -18,7 +18,7 @@ MAGNITUDES: Mapping[str, Mapping[str, float]] = {
     "force_offset": {"correction": 0.5},
     "moment_arm": {"correction": 5e-4},
     "moment_arm_variation": {"slope": 5e-4},
-    "pulley_eccentricity": {"sine": 5e-4, "cosine": 5e-4},
+    "pulley_eccentricity": {"sine": 5e-4, "cosine": 5e-4, "turns": 1.0},
     "presliding": {"displacement": 1e-4},
     "friction_drift": {"amplitude": 0.3, "time_constant": 100.0},
     "tendon_nonlinearity": {"hardening": 1e5},
@@ -28,14 +28,20 @@ MAGNITUDES: Mapping[str, Mapping[str, float]] = {
 }
 
 
+# What is taken where the description leaves a number out, if not 0. As long as it is that, a fit leaves it alone.
+LEFT_OUT: Mapping[str, float] = {"turns": 1.0}
+
+
 @dataclass(frozen=True)
 class ExtensionNumber:
-    """A number of an extension. path: as in the description. value: SI. magnitude: expected of such a number."""
+    """A number of an extension. path: as in the description. value: SI. magnitude: expected of such a number. left_out:
+    the description leaves it out, or might."""
 
     effect: str
     path: str
     value: float
     magnitude: float
+    left_out: bool = False
 
 
 def extension_rows(data: Mapping[str, Any]) -> list[Mapping[str, Any]]:
@@ -44,10 +50,13 @@ def extension_rows(data: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 
 
 def extension_numbers(data: Mapping[str, Any]) -> Iterator[ExtensionNumber]:
-    """All numbers of the extensions of a valid description, in the order of the FMU's parameters; left out: 0."""
+    """All numbers of the extensions of a valid description, in the order of the FMU's parameters."""
     for k, row in enumerate(extension_rows(data), start=1):
         for name, magnitude in MAGNITUDES[row["effect"]].items():
-            yield ExtensionNumber(row["effect"], f"extensions[{k}].{name}", float(row.get(name) or 0.0), magnitude)
+            missing = LEFT_OUT.get(name, 0.0)
+            value = missing if row.get(name) is None else float(row[name])
+            left_out = missing != 0.0 and value == missing
+            yield ExtensionNumber(row["effect"], f"extensions[{k}].{name}", value, magnitude, left_out)
 
 
 def place_of(row: Mapping[str, Any]) -> str:

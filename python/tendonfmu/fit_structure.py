@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from tendonfmu import native
 from tendonfmu.description import FingerDescription, sides
 from tendonfmu.errors import InputError
+from tendonfmu.extensions import LEFT_OUT
 from tendonfmu.friction_places import effects
 from tendonfmu.identifiability import Unknown, unknowns
 
@@ -331,13 +332,13 @@ def set_number(data: Any, path: str, value: float) -> None:
 
 
 def _value(data: Any, path: str) -> float:
-    """0 for a number of an extension that is left out."""
+    """Of an extension's number that is left out: what is taken for it."""
     try:
         return float(get_number(data, path))
     except KeyError:
         if not path.startswith("extensions["):
             raise
-        return 0.0
+        return LEFT_OUT.get(path.rpartition(".")[2], 0.0)
 
 
 def get_number(data: Any, path: str) -> Any:

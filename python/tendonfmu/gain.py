@@ -78,10 +78,12 @@ def measure_gain(
     """
     test = _Test.of(training, tests)
     _check_settings(nominal, extended)
-    runs = {name: [run_both(data, each) for each in test.recordings] for name, data in _both(nominal, extended)}
+    runs = {"nominal": [run_both(nominal, each) for each in test.recordings]}
+    same = extended == nominal
+    runs["extended"] = runs["nominal"] if same else [run_both(extended, each) for each in test.recordings]
     left = {name: [run.residual for run in found] for name, found in runs.items()}
     before, after = test.squares(left["nominal"]), test.squares(left["extended"])
-    sequence = [before, *(test.squares_of(data) for data in between), *([after] if extended is not nominal else [])]
+    sequence = [before, *(test.squares_of(data) for data in between), *([] if same else [after])]
     return Gain(
         nominal=ModelErrors(test.trained(nominal, left["nominal"]), test.tested(left["nominal"])),
         extended=ModelErrors(test.trained(extended, left["extended"]), test.tested(left["extended"])),
@@ -92,20 +94,6 @@ def measure_gain(
         held_out=test.held_out,
         agreement=max(run.agreement for found in runs.values() for run in found),
     )
-
-
-def own_gains(
-    extended: Data,
-    without: Sequence[Data],
-    training: Sequence[FitRecording],
-    tests: Sequence[FitRecording] = (),
-    *,
-    seed: int = 0,
-) -> list[Interval]:
-    """Of each cause on unseen data, the others kept. without: models that lack one each, fitted. By the core alone."""
-    test = _Test.of(training, tests)
-    after = test.squares_of(extended)
-    return [gain_interval(test.squares_of(data), after, seed) for data in without]
 
 
 def require_unseen(training: Sequence[FitRecording], tests: Sequence[FitRecording]) -> None:
@@ -214,10 +202,6 @@ def _difference(mine: Numbers, other: Numbers) -> float:
 
 
 # --- the samples of the test ------------------------------------------------------------------------------------------
-
-
-def _both(nominal: Data, extended: Data) -> list[tuple[str, Data]]:
-    return [("nominal", nominal), ("extended", extended)]
 
 
 @dataclass(frozen=True)

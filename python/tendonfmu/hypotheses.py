@@ -35,7 +35,8 @@ SHARED = (
 )
 # Corrections of what the torque itself is made of: a large one shrinks the torque, and with it all that is left of it.
 SCALING = ("force_gain", "moment_arm", "moment_arm_variation", "pulley_eccentricity")
-LARGEST_SCALING = 0.2  # of the tendon's largest arm, or of its force
+LARGEST_SCALING = 0.2  # of the tendon's largest arm, or of its force, anywhere on the joint's range
+LEAST_OF_FAST = 0.3  # gain of a pulley that turns faster than its joint: any feature of the angle is a little like that
 LARGEST_SECANT = 3.0  # times the step that its column was taken with: beyond, the column says nothing
 
 
@@ -52,7 +53,8 @@ class Member:
 class Hypothesis:
     """effect, joint, tendon: as reported; None where it is everywhere. level: EVERYWHERE, SOMEWHERE or HERE.
 
-    mix: [c, d] from magnitudes to candidate columns; low, high: [d] bounds of the magnitudes.
+    mix: [c, d] from magnitudes to candidate columns; low, high: [d] bounds of the magnitudes. least_gain: share of the
+    rms that it has to take away to be looked at.
     """
 
     effect: str
@@ -63,23 +65,26 @@ class Hypothesis:
     mix: Numbers
     low: Numbers
     high: Numbers
+    least_gain: float = 0.0
 
     @property
     def key(self) -> Key:
         return self.effect, self.joint, self.tendon
 
 
-def hypotheses(columns: CandidateColumns, arms: Numbers) -> list[Hypothesis]:
-    """All of them, the coarse ones first. arms: [m, n] m."""
+def hypotheses(columns: CandidateColumns, arms: Numbers, reach: Numbers) -> list[Hypothesis]:
+    """All of them, the coarse ones first. arms: [m, n] m. reach: [n] rad, largest angle of each joint."""
     count = columns.values.shape[2]
-    found = [_single(proposal, shape, count, arms) for proposal in columns.proposals for shape in proposal.shapes]
+    found = [
+        _single(proposal, shape, count, arms, reach) for proposal in columns.proposals for shape in proposal.shapes
+    ]
     for effect in SHARED:
         own = [proposal for proposal in columns.proposals if proposal.candidate.name == effect]
         found += _groups(effect, own, count)
     return sorted(found, key=lambda each: each.level)
 
 
-def _single(proposal: Proposal, shape: Shape, count: int, arms: Numbers) -> Hypothesis:
+def _single(proposal: Proposal, shape: Shape, count: int, arms: Numbers, reach: Numbers) -> Hypothesis:
     size = shape.columns.stop - shape.columns.start
     mix = np.zeros((count, size))
     mix[shape.columns] = np.eye(size)
@@ -87,10 +92,13 @@ def _single(proposal: Proposal, shape: Shape, count: int, arms: Numbers) -> Hypo
     place, name = proposal.place, proposal.candidate.name
     if name in SCALING and place.tendon is not None:
         largest = LARGEST_SCALING * (1.0 if name == "force_gain" else float(np.abs(arms[place.tendon - 1]).max()))
+        if name == "moment_arm_variation" and place.joint is not None:
+            largest /= max(float(reach[place.joint - 1]), 1e-9)
         low, high = np.maximum(low, -largest), np.minimum(high, largest)
     level = EVERYWHERE if place == Place() else HERE
     member = Member(proposal, shape, (1.0,) * size)
-    return Hypothesis(name, place.joint, place.tendon, level, (member,), mix, low, high)
+    least = LEAST_OF_FAST if shape.shape.get("turns", 1.0) != 1.0 else 0.0
+    return Hypothesis(name, place.joint, place.tendon, level, (member,), mix, low, high, least)
 
 
 def _bounds(shape: Shape) -> tuple[Numbers, Numbers]:

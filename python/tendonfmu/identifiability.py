@@ -75,8 +75,11 @@ def unknowns(data: Mapping[str, Any]) -> list[Unknown]:
         stiffness = (joint.get("cover") or {}).get("stiffness")
         if stiffness:
             found.append(Unknown(f"joints[{j}].cover.stiffness", float(stiffness)))
-    for number in extension_numbers(data):
-        found.append(Unknown(number.path, number.value, extension=number.effect, size=number.magnitude))
+    found += [
+        Unknown(each.path, each.value, extension=each.effect, size=each.magnitude)
+        for each in extension_numbers(data)
+        if not each.left_out
+    ]
     return found
 
 

@@ -20,7 +20,8 @@ _EXPLANATIONS = {
     UNKNOWN: "What is left can be predicted in part from what was recorded, but it has the shape of no effect on the "
     "list. The gain is what predicting it takes away from the error in unseen stretches.",
 }
-LEAST_PEAK = 6.0  # nominal residuals rms that the peak of an event is, at least, to be called contact
+LEAST_GAIN = 0.1  # of a contact, for certain: it is judged on the recordings that it was found in
+LEAST_PEAK = 6.0  # rms of what the extended model leaves, that the peak of a contact is at least
 
 
 def reported_causes(found: Diagnosis) -> list[Cause]:
@@ -29,9 +30,9 @@ def reported_causes(found: Diagnosis) -> list[Cause]:
 
 
 def _contact(found: Diagnosis) -> Iterator[Cause]:
-    events = [event for event in found.events if event.peak >= LEAST_PEAK * max(found.nominal.train_rms)]
+    events = [event for event in found.events if event.peak >= LEAST_PEAK * max(found.extended.train_rms)]
     gain = found.event_gain
-    if not events or gain is None or not gain.low > 0.0:
+    if not events or gain is None or not gain.low >= LEAST_GAIN:
         return
     joints = {joint for event in events for joint in event.joints}
     joint = joints.pop() if len(joints) == 1 else None

@@ -19,6 +19,8 @@ from tendonfmu.cause_search import bias_of, blocks_of, nominal_scale, series_of
 from tendonfmu.cause_selection import CERTAIN, rms_gain
 from tendonfmu.description import FingerDescription
 from tendonfmu.diagnosis_series import Grid, make_grid
+from tendonfmu.diagnosis_span import span_of
+from tendonfmu.effects.presliding import is_spring
 from tendonfmu.estimation_signals import Signals, smoothing_of, zero_phase
 from tendonfmu.extension_fit import FitSettings, FittedModel, fit_extended
 from tendonfmu.fit_recordings import FitRecording, Held, prepare
@@ -124,7 +126,7 @@ def _with_filter(chosen: Estimation, recordings: Sequence[FitRecording]) -> Esti
     if noise.max() > NOISIEST:
         return chosen
     filtered = replace(chosen, given={**chosen.given, "position_filter": {"noise": [float(value) for value in noise]}})
-    error = OnlineError(recordings)
+    error = OnlineError(chosen.online(chosen.nominal.data), recordings)
     before, after = (error.by_stretch(each.online(each.model.data)) for each in (chosen, filtered))
     gain, spread = rms_gain(before, after)
     return filtered if gain > CERTAIN * spread else chosen
@@ -159,9 +161,13 @@ def _compared(
     else:
         tried = [known.start]
     cutoff = signals.cutoff or (known.signals.cutoff if known else None)
+    span = span_of(nominal.data, own)
     found = []
     for start in tried:
         model = fit_extended(nominal, start.accepted, own, settings) if start.causes else nominal
+        if is_spring(model.data, span):  # a spring is missing, and would not be found beside it
+            start = replace(start, presliding=())
+            model = fit_extended(nominal, start.accepted, own, settings) if start.causes else nominal
         found.append(_Compared(signals, start, _error(model.data, own, grid, cutoff)))
     return min(found, key=lambda each: each.error)
 

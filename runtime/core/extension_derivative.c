@@ -21,8 +21,12 @@ static void read_torque_row(const tendonfmu_finger* f, const extension_row* row,
   for (uint32_t k = 0; k < row->effect->parameter_count; ++k) {
     double unit[EFFECT_MAX_PARAMETERS] = {0.0}, torque[MODEL_MAX_JOINTS] = {0.0};
     const double none[MODEL_MAX_JOINTS] = {0.0};
-    unit[k] = 1.0;
-    row->effect->torque(row->place, unit, &sample, row->memory, torque);
+    if (row->effect->by_parameter) {
+      row->effect->by_parameter(row->place, row->parameters, k, &sample, torque);
+    } else {
+      unit[k] = 1.0;
+      row->effect->torque(row->place, unit, &sample, row->memory, torque);
+    }
     add_plain(d, row->first_parameter + k, torque, none);
   }
 }

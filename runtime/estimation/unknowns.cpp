@@ -84,6 +84,13 @@ double scale_of(const model_item& item, std::uint32_t parameter) {
   return is_everywhere(item.place) && number.scale_everywhere > 0.0 ? number.scale_everywhere : number.scale;
 }
 
+/* a number of an extension that is a property of the mechanism, not 0 where nobody says it */
+bool left_out(const Structure& s, std::uint32_t parameter) {
+  const model_item item = parameter_item(&s.finger->shape, parameter);
+  const double missing = item.effect->parameters[parameter - item.first].missing_value;
+  return missing != 0.0 && s.finger->start[parameter] == missing;
+}
+
 /* what is present is estimated, what is absent stays absent (contract section 7) */
 std::vector<std::int32_t> present_groups(const Structure& s) {
   const double* value = s.finger->start;
@@ -92,7 +99,8 @@ std::vector<std::int32_t> present_groups(const Structure& s) {
     const auto p = static_cast<std::int32_t>(c.parameter);
     const bool rest_angle =
         c.kind == ITEM_COVER && parameter_item(&s.finger->shape, c.parameter).first + 1 == c.parameter;
-    const bool always = c.kind == ITEM_EXTENSION || c.kind == ITEM_INITIAL_TORQUE || c.role == Role::coulomb;
+    const bool always = (c.kind == ITEM_EXTENSION && !left_out(s, c.parameter)) || c.kind == ITEM_INITIAL_TORQUE ||
+                        c.role == Role::coulomb;
     const std::uint32_t first = c.parameter - (c.role == Role::rate ? 2 : 0);
     const bool stribeck = (c.role == Role::rate || c.role == Role::drop) && value[first] != value[first + 1];
     const bool other = c.role == Role::viscous || c.kind == ITEM_COVER;

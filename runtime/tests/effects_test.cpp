@@ -141,7 +141,8 @@ std::vector<Effect> all_torques() {
           {"force_offset", 0, 1, {-0.5}},
           {"moment_arm", 3, 1, {6e-4}},
           {"moment_arm_variation", 2, 2, {-4e-4}},
-          {"pulley_eccentricity", 3, 1, {5e-4, 3e-4}}};
+          {"pulley_eccentricity", 3, 1, {5e-4, 3e-4, 1.0}},
+          {"pulley_eccentricity", 2, 2, {5e-4, 3e-4, 7.5}}};
 }
 
 // --- values ----------------------------------------------------------------------------------------------------------
@@ -207,8 +208,9 @@ TEST(Torque, OfMomentArmsThatAreOthers) {
   const Sample s;
   expect_near(Effect("moment_arm", 3, 2, {1e-3}).torque(s), {0, 0, -0.03});
   expect_near(Effect("moment_arm_variation", 2, 1, {1e-3}).torque(s), {0, 0.008, 0});
-  expect_near(Effect("pulley_eccentricity", 1, 2, {1e-3, 0.0}).torque(s), {-0.03 * std::sin(0.3), 0, 0});
-  expect_near(Effect("pulley_eccentricity", 1, 2, {0.0, 1e-3}).torque(s), {-0.03 * std::cos(0.3), 0, 0});
+  expect_near(Effect("pulley_eccentricity", 1, 2, {1e-3, 0.0, 1.0}).torque(s), {-0.03 * std::sin(0.3), 0, 0});
+  expect_near(Effect("pulley_eccentricity", 1, 2, {0.0, 1e-3, 1.0}).torque(s), {-0.03 * std::cos(0.3), 0, 0});
+  expect_near(Effect("pulley_eccentricity", 1, 2, {1e-3, 0.0, 9.0}).torque(s), {-0.03 * std::sin(2.7), 0, 0});
 }
 
 // --- memory ----------------------------------------------------------------------------------------------------------
@@ -340,6 +342,9 @@ TEST(Torque, IsLinearInItsNumbers) {
   before.velocity = {0.1, 0.4, -0.3};
   for (Effect& effect : all_torques()) {
     SCOPED_TRACE(effect.type->name);
+    if (effect.type->by_parameter) {
+      continue;
+    }
     effect.accept(before);
     const std::vector<double> after = effect.advanced(Sample{});
     PerJoint sum{};
@@ -354,6 +359,29 @@ TEST(Torque, IsLinearInItsNumbers) {
     }
     expect_near(effect.torque(Sample{}, effect.numbers, after), sum, 1e-14);
   }
+}
+
+TEST(Torque, ThatIsNotLinearSaysItsDerivatives) {
+  const double h = 1e-6;
+  int checked = 0;
+  for (const Effect& effect : all_torques()) {
+    for (std::uint32_t k = 0; effect.type->by_parameter && k < effect.numbers.size(); ++k, ++checked) {
+      std::vector<double> above = effect.numbers, below = effect.numbers;
+      above[k] += h;
+      below[k] -= h;
+      const PerJoint high = effect.torque(Sample{}, above, {}), low = effect.torque(Sample{}, below, {});
+      PerJoint found{}, expected{};
+      Effect::see(Sample{}, [&](auto* seen) {
+        effect.type->by_parameter(effect.place, effect.numbers.data(), k, seen, found.data());
+      });
+      for (std::size_t j = 0; j < joints; ++j) {
+        expected[j] = (high[j] - low[j]) / (2.0 * h);
+      }
+      expect_near(found, expected, 1e-8);
+      EXPECT_NE(found, PerJoint{}) << effect.type->name << " " << k;
+    }
+  }
+  EXPECT_EQ(checked, 6);  // two of pulley_eccentricity
 }
 
 // --- friction --------------------------------------------------------------------------------------------------------

@@ -14,6 +14,7 @@ from tendonfmu.effects.friction_law_places import row_places, rubbing_joints, ru
 NAME = "presliding"
 EVERYWHERE = Place()
 OF_TRAVEL = (0.002, 0.008, 0.03, 0.12)  # distances that are tried, of the median travel between reversals
+LONGEST = 0.1  # of the median travel between reversals: what builds up over more is a spring
 _TIMES = (0.3, 3.0)  # distances at one place, times that of everywhere
 _SLOWEST = 1e-9  # m/s or rad/s: a threshold of 0 has no scale
 
@@ -58,6 +59,17 @@ def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
         return [{"displacement": factor * present} for factor in _TIMES]
     travel = _travel(place, span)
     return [{"displacement": share * travel} for share in OF_TRAVEL[1:]] if travel > 0 else []
+
+
+def is_spring(data: Data, span: Span) -> bool:
+    """Whether some presliding of a fitted description is so long that it stands for a spring."""
+    for row in data.get("extensions") or []:
+        if row["effect"] == NAME:
+            place = Place(row.get("joint"), row.get("tendon"))
+            travel = usual_time(data, span) if is_everywhere(row) else _travel(place, span)
+            if float(row["displacement"]) > LONGEST * travel > 0.0:
+                return True
+    return False
 
 
 def is_everywhere(row: Mapping[str, object]) -> bool:

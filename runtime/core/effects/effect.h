@@ -121,10 +121,14 @@ typedef struct effect_type {
   void (*advance_slope)(effect_place place, const double* parameters, const effect_sample* sample, const double* before,
                         const effect_direction* direction, const double* slope_before, double* slope_after);
 
-  /* --- EFFECT_TORQUE: linear in its parameters ----------------------------------------------------------------------
-   * torque() adds to torque [n], N·m; with the parameters replaced by a unit vector it is the derivative by one. */
+  /* --- EFFECT_TORQUE ------------------------------------------------------------------------------------------------
+   * torque() adds to torque [n], N·m; with the parameters replaced by a unit vector it is the derivative by one, where
+   * it is linear in them: */
   void (*torque)(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                  double* torque);
+  /* else this adds the derivative by parameter k; NULL: linear. */
+  void (*by_parameter)(effect_place place, const double* parameters, uint32_t k, const effect_sample* sample,
+                       double* torque);
   /* adds its derivative along a direction; the memory is held fixed except for what it says of this sample */
   void (*slope)(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                 const effect_direction* direction, double* slope);

@@ -5,27 +5,50 @@
 #include "effect_parts.h"
 #include "sine_cosine.h"
 
-/* A pulley off its centre, turning with the joint: the true moment arm is r_ij + sine·sin q_j + cosine·cos q_j, and
- * T_j = −(sine·sin q_j + cosine·cos q_j)·f0. */
+/* A pulley off its centre: with its angle p = turns·q_j the true moment arm is r_ij + sine·sin p + cosine·cos p, and
+ * T_j = −(sine·sin p + cosine·cos p)·f0. One that is fixed to the link turns with the joint; one that the tendon turns,
+ * by arm over radius as often. */
+
+enum { SINE, COSINE, TURNS };
 
 static const effect_parameter numbers[] = {
     {.name = "sine", .unit = "m", .minimum = -EFFECT_LARGE, .maximum = EFFECT_LARGE, .scale = 5e-4},
     {.name = "cosine", .unit = "m", .minimum = -EFFECT_LARGE, .maximum = EFFECT_LARGE, .scale = 5e-4},
+    {.name = "turns", .unit = "1", .minimum = 0.0, .maximum = 1000.0, .missing_value = 1.0, .scale = 1.0},
 };
+
+static sine_cosine pulley_at(effect_place place, const double* parameters, const effect_sample* sample) {
+  return sine_cosine_of(parameters[TURNS] * sample->angle[place.joint]);
+}
+
+/* dr/dp */
+static double arm_by_turn(const double* parameters, sine_cosine at) {
+  return parameters[SINE] * at.cosine - parameters[COSINE] * at.sine;
+}
 
 static void torque(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                    double* torque) {
   (void)memory;
-  const sine_cosine at = sine_cosine_of(sample->angle[place.joint]);
-  torque[place.joint] -= (parameters[0] * at.sine + parameters[1] * at.cosine) * sample->force[place.tendon];
+  const sine_cosine at = pulley_at(place, parameters, sample);
+  torque[place.joint] -=
+      (parameters[SINE] * at.sine + parameters[COSINE] * at.cosine) * sample->force[place.tendon];
+}
+
+static void by_parameter(effect_place place, const double* parameters, uint32_t k, const effect_sample* sample,
+                         double* torque) {
+  const sine_cosine at = pulley_at(place, parameters, sample);
+  const double arm = k == SINE     ? at.sine
+                     : k == COSINE ? at.cosine
+                                   : arm_by_turn(parameters, at) * sample->angle[place.joint];
+  torque[place.joint] -= arm * sample->force[place.tendon];
 }
 
 static void slope(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                   const effect_direction* direction, double* slope) {
   (void)memory;
-  const sine_cosine at = sine_cosine_of(sample->angle[place.joint]);
-  const double arm = parameters[0] * at.sine + parameters[1] * at.cosine;
-  const double arm_by_angle = parameters[0] * at.cosine - parameters[1] * at.sine;
+  const sine_cosine at = pulley_at(place, parameters, sample);
+  const double arm = parameters[SINE] * at.sine + parameters[COSINE] * at.cosine;
+  const double arm_by_angle = parameters[TURNS] * arm_by_turn(parameters, at);
   slope[place.joint] -= arm_by_angle * along(direction->angle, place.joint) * sample->force[place.tendon] +
                         arm * along(direction->force, place.tendon);
 }
@@ -36,8 +59,9 @@ const effect_type effect_pulley_eccentricity = {
     .kind = EFFECT_TORQUE,
     .joint = PLACE_REQUIRED,
     .tendon = PLACE_REQUIRED,
-    .parameter_count = 2,
+    .parameter_count = 3,
     .parameters = numbers,
     .torque = torque,
+    .by_parameter = by_parameter,
     .slope = slope,
 };
