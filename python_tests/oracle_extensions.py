@@ -22,7 +22,11 @@ Array = NDArray[Any]
 
 HISTORY = 64  # samples that a delay looks back on
 OPTIONAL_NUMBERS = {"gravity": ("sine", "cosine"), "pulley_eccentricity": ("sine", "cosine")}
-MECHANISM = {"pulley_eccentricity": {"turns": 1.0}}  # left out: this
+MECHANISM = {
+    "pulley_eccentricity": {"turns": 1.0},
+    "joint_coupling": {"reaction": 1.0},
+    "preload_friction": {"beyond": 1.0},
+}  # left out: this
 DELAYED = {1: ("tendon_position",), 2: ("joint_position",), 3: ("joint_position", "joint_velocity")}
 
 
@@ -110,11 +114,12 @@ def torque_of(row: Row, numbers: Mapping[str, Any], at: Moment, R: Array, cosine
     elif row.effect == "joint_coupling":
         assert j is not None
         c = numbers["stiffness"] * ((at.q[j] - at.rest[j]) - (at.q[j + 1] - at.rest[j + 1]))
-        T[j], T[j + 1] = c, -c
+        T[j], T[j + 1] = c, -numbers["reaction"] * c
     elif row.effect == "preload_friction":
         for before in range(n) if j is None else [j]:
             for each in range(before, n):
-                T[each] += R[i, each] * numbers["coulomb"] * at.tendon_side[i, before]
+                share = 1.0 if each == before else numbers["beyond"]
+                T[each] += R[i, each] * numbers["coulomb"] * share * at.tendon_side[i, before]
     elif row.effect == "load_friction":
         T[j] = numbers["coulomb"] * abs(at.f0[i]) * at.joint_side[j]
     elif row.effect == "force_gain":

@@ -40,7 +40,8 @@ def gravity(rng: np.random.Generator, n: int, m: int, j: int, i: int) -> Row:
 
 def load_at(rng: np.random.Generator, n: int, m: int, j: int, i: int) -> Row:
     place = {"joint": j} if rng.random() < 0.5 else {}
-    return place | {"tendon": i, "coulomb": either(rng, 0.5)}
+    share = {"beyond": float(rng.uniform(-0.5, 1.5))} if rng.random() < 0.5 else {}
+    return place | {"tendon": i, "coulomb": either(rng, 0.5)} | share
 
 
 def distance(rng: np.random.Generator, rad: float, m: float) -> tuple[float, float]:
@@ -75,7 +76,10 @@ MAKE: dict[str, Make] = {
     "cover_hardening": lambda rng, n, m, j, i: {"joint": j, "stiffness": either(rng, 0.1)},
     "gravity": gravity,
     "inertia": lambda rng, n, m, j, i: {"joint": j, "inertia": either(rng, 1e-3)},
-    "joint_coupling": lambda rng, n, m, j, i: {"joint": 1 + (j - 1) % max(n - 1, 1), "stiffness": either(rng, 0.05)},
+    "joint_coupling": lambda rng, n, m, j, i: (
+        {"joint": 1 + (j - 1) % max(n - 1, 1), "stiffness": either(rng, 0.05)}
+        | ({"reaction": float(rng.uniform(-1.0, 2.0))} if i % 2 else {})
+    ),
     "preload_friction": load_at,
     "load_friction": lambda rng, n, m, j, i: {"joint": j, "tendon": i, "coulomb": either(rng, 1e-3)},
     "force_gain": lambda rng, n, m, j, i: {"tendon": i, "correction": either(rng, 0.2)},

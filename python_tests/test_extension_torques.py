@@ -72,11 +72,12 @@ def by_the_text(row: dict[str, Any], m: dict[str, Numbers]) -> Numbers:
             torque[1:, j] = row["inertia"] * np.diff(v[:, j]) / np.diff(m["time"])
         case "joint_coupling":
             spring = row["stiffness"] * ((q - REST)[:, j] - (q - REST)[:, j + 1])
-            torque[:, j], torque[:, j + 1] = spring, -spring
+            torque[:, j], torque[:, j + 1] = spring, -row.get("reaction", 1.0) * spring
         case "preload_friction":
             for before in [j] if "joint" in row else range(len(REST)):
                 side = held_sign(v[:, before:] @ ARMS[i, before:], V_MIN["tendon"])
-                torque[:, before:] += row["coulomb"] * side[:, None] * ARMS[i, before:]
+                share = np.where(np.arange(before, len(REST)) == before, 1.0, row.get("beyond", 1.0))
+                torque[:, before:] += row["coulomb"] * side[:, None] * share * ARMS[i, before:]
         case "load_friction":
             torque[:, j] = row["coulomb"] * np.abs(f[:, i]) * held_sign(v[:, j], V_MIN["joint"])
         case "force_gain":

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.cause_search import predicted_of, series_of
+from tendonfmu.cause_selection import names_with
 from tendonfmu.description import FingerDescription
 from tendonfmu.diagnosis_result import Interval
 from tendonfmu.diagnosis_search import NamedCause, Search
@@ -62,10 +63,11 @@ def verify(
         fit = bench.fit(causes)
         without = [bench.fit([*causes[:k], *causes[k + 1 :]]) for k in range(len(causes))]
         gains = bench.gains(fit, without)
+        names = _names(causes, gains)
         weak = [
             k
             for k, gain in enumerate(gains)
-            if not (gain.low > 0.0 and gain.value >= least_gain and bench.runs_better(fit, without[k]))
+            if not (gain.low > 0.0 and gain.value >= least_gain * names[k] and bench.runs_better(fit, without[k]))
         ]
         if not weak and causes and not bench.runs_better(fit, bench.nominal):
             weak = list(range(len(causes)))  # each mends what another one spoils
@@ -90,6 +92,15 @@ def verify(
         extended_data=extended,
         extended=fit.data,
     )
+
+
+def _names(causes: Sequence[NamedCause], gains: Sequence[Interval]) -> list[int]:
+    """Of each cause how many names there are with it, the largest gain first."""
+    found, named = [1] * len(causes), list[str]()
+    for k in sorted(range(len(causes)), key=lambda k: -gains[k].value):
+        found[k] = names_with(causes[k].effect, named)
+        named.append(causes[k].effect)
+    return found
 
 
 def merged(causes: Sequence[NamedCause]) -> list[NamedCause]:

@@ -22,6 +22,7 @@ Numbers = NDArray[np.float64]
 CERTAIN = 2.0  # standard errors above 0
 ALIKE = 1.64  # standard errors of the paired difference within which two causes are not told apart
 SAME = 0.015  # of the error, about a quarter of what is material: a smaller difference is none, however certain
+COMMON = {"presliding", "time_delay"}  # of every finger, and of how it was recorded
 FINER = 0.5  # standard errors by which a finer place has to be better: both have as many numbers
 LEAST_SHARE = 0.01  # of a candidate's variance that has to survive the refit for it to be visible
 
@@ -128,6 +129,13 @@ class Selection:
             if gain > FINER * error:
                 chosen = judged
         return chosen
+
+
+def names_with(effect: str, named: Collection[str]) -> int:
+    """How many names there are with this one: a model that is a little wrong everywhere can always be given one more,
+    so that each name has to pay more than the one before. COMMON ones, and further places of one, do not count."""
+    others = set(named) - COMMON
+    return 1 if effect in COMMON or effect in others else 1 + len(others)
 
 
 def is_alike(other: Numbers, best: Numbers) -> bool:

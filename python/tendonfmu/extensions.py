@@ -11,8 +11,8 @@ MAGNITUDES: Mapping[str, Mapping[str, float]] = {
     "cover_hardening": {"stiffness": 0.05},
     "gravity": {"sine": 0.005, "cosine": 0.005},
     "inertia": {"inertia": 1e-5},
-    "joint_coupling": {"stiffness": 0.02},
-    "preload_friction": {"coulomb": 0.2},
+    "joint_coupling": {"stiffness": 0.02, "reaction": 1.0},
+    "preload_friction": {"coulomb": 0.2, "beyond": 1.0},
     "load_friction": {"coulomb": 1e-4},
     "force_gain": {"correction": 0.05},
     "force_offset": {"correction": 0.5},
@@ -29,7 +29,7 @@ MAGNITUDES: Mapping[str, Mapping[str, float]] = {
 
 
 # What is taken where the description leaves a number out, if not 0. As long as it is that, a fit leaves it alone.
-LEFT_OUT: Mapping[str, float] = {"turns": 1.0}
+LEFT_OUT: Mapping[str, float] = {"turns": 1.0, "reaction": 1.0, "beyond": 1.0}
 
 
 @dataclass(frozen=True)

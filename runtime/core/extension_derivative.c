@@ -22,7 +22,7 @@ static void read_torque_row(const tendonfmu_finger* f, const extension_row* row,
     double unit[EFFECT_MAX_PARAMETERS] = {0.0}, torque[MODEL_MAX_JOINTS] = {0.0};
     const double none[MODEL_MAX_JOINTS] = {0.0};
     if (row->effect->by_parameter) {
-      row->effect->by_parameter(row->place, row->parameters, k, &sample, torque);
+      row->effect->by_parameter(row->place, row->parameters, k, &sample, row->memory, torque);
     } else {
       unit[k] = 1.0;
       row->effect->torque(row->place, unit, &sample, row->memory, torque);

@@ -85,10 +85,12 @@ TEST(Described, EachEffectIsARowOfTheImage) {
   }
   // what is left out
   const std::size_t last = model.values.size();
-  const std::vector<double> numbers(model.values.end() - 29, model.values.end());
+  const std::vector<double> numbers(model.values.end() - 33, model.values.end());
   EXPECT_EQ(numbers.front(), 0.3);
   EXPECT_EQ(numbers[1], 0.0);   // gravity's sine
   EXPECT_EQ(numbers[2], 0.01);  // its cosine
+  EXPECT_EQ(numbers[5], 1.0);   // joint_coupling's reaction
+  EXPECT_EQ(numbers[7], 1.0);   // preload_friction's beyond
   EXPECT_EQ(model.values[last - 1], -0.001);
 }
 

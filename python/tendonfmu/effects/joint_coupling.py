@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from tendonfmu.effects.candidate import Candidate, Data, Place, Variant, no_shape
+from tendonfmu.diagnosis_span import Span
+from tendonfmu.effects.candidate import Candidate, Data, Place, Variant
 from tendonfmu.effects.extension_row import row_variant
 from tendonfmu.effects.friction_law_places import all_joints, without_rows
 
@@ -15,8 +16,13 @@ def _places(data: Data, kinematics: int) -> list[Place]:
     return without_rows(data, NAME, all_joints(data)[:-1])
 
 
+def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
+    """The next joint feels it too, or nothing of it."""
+    return [{}, {"reaction": 0.0}]
+
+
 def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
-    return row_variant(data, NAME, place, shape, {"stiffness": 0})
+    return row_variant(data, NAME, place, shape, {"stiffness": 0}, shape)
 
 
 CANDIDATE = Candidate(
@@ -34,6 +40,6 @@ CANDIDATE = Candidate(
     unit="N.m/rad",
     number="stiffness",
     find_places=_places,
-    find_shapes=no_shape,
+    find_shapes=_shapes,
     make=_variant,
 )

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from tendonfmu.effects.candidate import Candidate, Data, Place, Variant, no_shape
+from tendonfmu.diagnosis_span import Span
+from tendonfmu.effects.candidate import Candidate, Data, Place, Variant
 from tendonfmu.effects.extension_row import row_variant
 from tendonfmu.effects.friction_law_places import passes, row_places, without_rows
 
@@ -19,8 +20,14 @@ def _places(data: Data, kinematics: int) -> list[Place]:
     ]
 
 
+def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
+    """The joints beyond feel it too, or, where there are some, nothing of it."""
+    arms = data["tendons"][(place.tendon or 1) - 1]["moment_arms"]
+    return [{}, {"beyond": 0.0}] if any(arms[place.joint or 0 :]) else [{}]
+
+
 def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
-    return row_variant(data, NAME, place, shape, {"coulomb": 1})
+    return row_variant(data, NAME, place, shape, {"coulomb": 1}, shape)
 
 
 CANDIDATE = Candidate(
@@ -37,6 +44,6 @@ CANDIDATE = Candidate(
     unit="N",
     number="friction force",
     find_places=_places,
-    find_shapes=no_shape,
+    find_shapes=_shapes,
     make=_variant,
 )

@@ -128,7 +128,7 @@ typedef struct effect_type {
                  double* torque);
   /* else this adds the derivative by parameter k; NULL: linear. */
   void (*by_parameter)(effect_place place, const double* parameters, uint32_t k, const effect_sample* sample,
-                       double* torque);
+                       const double* memory, double* torque);
   /* adds its derivative along a direction; the memory is held fixed except for what it says of this sample */
   void (*slope)(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                 const effect_direction* direction, double* slope);

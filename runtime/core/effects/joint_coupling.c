@@ -4,8 +4,11 @@
 
 #include "effect_parts.h"
 
-/* A spring between a joint and the next one, at rest where both covers are: T_j = c, T_{j+1} = −c with
- * c = stiffness·((q_j − rest_j) − (q_{j+1} − rest_{j+1})). */
+/* A spring between a joint and the next one, at rest where both covers are: T_j = c, T_{j+1} = −reaction·c with
+ * c = stiffness·((q_j − rest_j) − (q_{j+1} − rest_{j+1})). With reaction 0 something else takes what the next joint
+ * does not: a strap that ends before it, a hose that its motion stiffens. */
+
+enum { STIFFNESS, REACTION };
 
 static const effect_parameter numbers[] = {
     {.name = "stiffness",
@@ -14,15 +17,32 @@ static const effect_parameter numbers[] = {
      .maximum = EFFECT_LARGE,
      .required = 1,
      .scale = 0.02},
+    {.name = "reaction", .unit = "1", .minimum = -10.0, .maximum = 10.0, .missing_value = 1.0, .scale = 1.0},
 };
+
+static double bend_of(effect_place place, const effect_sample* sample) {
+  const size_t j = place.joint;
+  return (sample->angle[j] - sample->rest_angle[j]) - (sample->angle[j + 1] - sample->rest_angle[j + 1]);
+}
 
 static void torque(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                    double* torque) {
   (void)memory;
-  const size_t j = place.joint;
-  const double bend = sample->angle[j] - sample->rest_angle[j], next = sample->angle[j + 1] - sample->rest_angle[j + 1];
-  torque[j] += parameters[0] * (bend - next);
-  torque[j + 1] -= parameters[0] * (bend - next);
+  const double pull = parameters[STIFFNESS] * bend_of(place, sample);
+  torque[place.joint] += pull;
+  torque[place.joint + 1] -= parameters[REACTION] * pull;
+}
+
+static void by_parameter(effect_place place, const double* parameters, uint32_t k, const effect_sample* sample,
+                         const double* memory, double* torque) {
+  (void)memory;
+  const double bend = bend_of(place, sample);
+  if (k == STIFFNESS) {
+    torque[place.joint] += bend;
+    torque[place.joint + 1] -= parameters[REACTION] * bend;
+  } else {
+    torque[place.joint + 1] -= parameters[STIFFNESS] * bend;
+  }
 }
 
 static void slope(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
@@ -30,9 +50,9 @@ static void slope(effect_place place, const double* parameters, const effect_sam
   (void)sample;
   (void)memory;
   const size_t j = place.joint;
-  const double apart = along(direction->angle, j) - along(direction->angle, j + 1);
-  slope[j] += parameters[0] * apart;
-  slope[j + 1] -= parameters[0] * apart;
+  const double pull = parameters[STIFFNESS] * (along(direction->angle, j) - along(direction->angle, j + 1));
+  slope[j] += pull;
+  slope[j + 1] -= parameters[REACTION] * pull;
 }
 
 const effect_type effect_joint_coupling = {
@@ -41,8 +61,9 @@ const effect_type effect_joint_coupling = {
     .kind = EFFECT_TORQUE,
     .joint = PLACE_REQUIRED,
     .rule = PLACES_NOT_LAST_JOINT,
-    .parameter_count = 1,
+    .parameter_count = 2,
     .parameters = numbers,
     .torque = torque,
+    .by_parameter = by_parameter,
     .slope = slope,
 };

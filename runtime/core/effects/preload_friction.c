@@ -5,11 +5,15 @@
 #include "effect_parts.h"
 
 /* Friction of a tendon that does not scale with its force (a tight sheath, a seal): before joint j' the tendon loses
- * coulomb·s, s the sign of ẋ_ij' when it last moved, so T_j = r_ij·coulomb·s for all j >= j'. Without a joint, before
- * every joint that the tendon reaches; where no moment arm is left ẋ is 0 and so is s. */
+ * coulomb·s, s the sign of ẋ_ij' when it last moved, so T_j' = r_ij'·coulomb·s and T_j = beyond·r_ij·coulomb·s for all
+ * j > j'. Without a joint, before every joint that the tendon reaches; where no moment arm is left ẋ is 0 and so is s.
+ * With beyond 0 it rubs within the joint, and the next ones feel nothing of it. */
+
+enum { COULOMB, BEYOND };
 
 static const effect_parameter numbers[] = {
     {.name = "coulomb", .unit = "N", .minimum = -EFFECT_LARGE, .maximum = EFFECT_LARGE, .required = 1, .scale = 0.2},
+    {.name = "beyond", .unit = "1", .minimum = -10.0, .maximum = 10.0, .missing_value = 1.0, .scale = 1.0},
 };
 
 static size_t state_count(size_t joints, size_t tendons, effect_place place) {
@@ -32,13 +36,29 @@ static void advance(effect_place place, const double* parameters, const effect_s
   }
 }
 
+/* adds own times what is lost before each joint itself, and before times what is lost before the joints before it */
+static void add_lost(effect_place place, const effect_sample* sample, const double* memory, double own, double before,
+                     double* torque) {
+  const size_t from = from_joint(place), count = state_count(sample->joints, sample->tendons, place);
+  double lost_before = 0.0;
+  for (size_t j = from; j < sample->joints; ++j) {
+    const double lost = j - from < count ? memory[j - from] : 0.0;
+    torque[j] += arm_at(sample, j, place.tendon) * (own * lost + before * lost_before);
+    lost_before += lost;
+  }
+}
+
 static void torque(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                    double* torque) {
-  const size_t from = from_joint(place), count = state_count(sample->joints, sample->tendons, place);
-  double lost = 0.0;
-  for (size_t j = from; j < sample->joints; ++j) {
-    lost += j - from < count ? memory[j - from] : 0.0;
-    torque[j] += arm_at(sample, j, place.tendon) * parameters[0] * lost;
+  add_lost(place, sample, memory, parameters[COULOMB], parameters[COULOMB] * parameters[BEYOND], torque);
+}
+
+static void by_parameter(effect_place place, const double* parameters, uint32_t k, const effect_sample* sample,
+                         const double* memory, double* torque) {
+  if (k == COULOMB) {
+    add_lost(place, sample, memory, 1.0, parameters[BEYOND], torque);
+  } else {
+    add_lost(place, sample, memory, 0.0, parameters[COULOMB], torque);
   }
 }
 
@@ -58,10 +78,11 @@ const effect_type effect_preload_friction = {
     .kind = EFFECT_TORQUE,
     .joint = PLACE_OPTIONAL,
     .tendon = PLACE_REQUIRED,
-    .parameter_count = 1,
+    .parameter_count = 2,
     .parameters = numbers,
     .state_count = state_count,
     .advance = advance,
     .torque = torque,
+    .by_parameter = by_parameter,
     .slope = slope,
 };

@@ -30,12 +30,12 @@ static void torque(effect_place place, const double* parameters, const effect_sa
                    double* torque) {
   (void)memory;
   const sine_cosine at = pulley_at(place, parameters, sample);
-  torque[place.joint] -=
-      (parameters[SINE] * at.sine + parameters[COSINE] * at.cosine) * sample->force[place.tendon];
+  torque[place.joint] -= (parameters[SINE] * at.sine + parameters[COSINE] * at.cosine) * sample->force[place.tendon];
 }
 
 static void by_parameter(effect_place place, const double* parameters, uint32_t k, const effect_sample* sample,
-                         double* torque) {
+                         const double* memory, double* torque) {
+  (void)memory;
   const sine_cosine at = pulley_at(place, parameters, sample);
   const double arm = k == SINE     ? at.sine
                      : k == COSINE ? at.cosine
