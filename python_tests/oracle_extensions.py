@@ -132,7 +132,7 @@ def torque_of(row: Row, numbers: Mapping[str, Any], at: Moment, R: Array, cosine
         T[j] = -numbers["slope"] * at.q[j] * at.f0[i]
     elif row.effect == "pulley_eccentricity":
         turned = numbers["turns"] * at.q[j]
-        arm = numbers["sine"] * math.sin(turned) + numbers["cosine"] * math.cos(turned)
+        arm = numbers["sine"] * np.sin(turned) + numbers["cosine"] * np.cos(turned)
         T[j] = -arm * at.f0[i]
     return T
 

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import oracle
-from oracle_extensions import distance_of, factor_of, next_share, torque_of
+from oracle_extensions import Row, distance_of, factor_of, next_share, torque_of
 from oracle_finger import Effect, given
 
 Array = NDArray[Any]
@@ -197,15 +197,23 @@ class Trace:
         return weights, sides
 
     def _unit_torques(self, finger: Recorder) -> dict[str, Array]:
-        """[N, n] torque of step 4 by each number of the extensions, but for springs (their rest angles may change)."""
+        """[N, n] torque of step 4 by each number of the extensions, but for springs (their rest angles may change) and
+        for what is not linear; of a preload friction what its own joint feels, and what joints beyond feel.
+        """
+
+        def series(row: Row, numbers: Mapping[str, float]) -> Array:
+            cosines = finger.extensions.cosines
+            return np.array([torque_of(row, numbers, moment, self.R, cosines) for moment in finger.moments])
+
         found = {}
         for k, row in enumerate(self.rows):
-            if row.effect not in SPRINGS:
+            if row.effect == "preload_friction":
+                found[f"{k}.own"] = series(row, {"coulomb": 1.0, "beyond": 0.0})
+                found[f"{k}.beyond"] = series(row, {"coulomb": 1.0, "beyond": 1.0}) - found[f"{k}.own"]
+            elif row.effect not in (*SPRINGS, "pulley_eccentricity"):
                 for name in row.numbers:
                     unit = dict.fromkeys(row.numbers, 0.0) | {name: 1.0}
-                    cosines = finger.extensions.cosines
-                    series = [torque_of(row, unit, moment, self.R, cosines) for moment in finger.moments]
-                    found[f"extensions[{k + 1}].{name}"] = np.array(series)
+                    found[f"extensions[{k + 1}].{name}"] = series(row, unit)
         return found
 
     def _numbers(self, k: int, theta: Values) -> dict[str, Any]:
@@ -326,8 +334,21 @@ class Trace:
                 if row.effect == "cover_hardening":
                     torque[..., row.joint] += stiffness * bend(row.joint) ** 3
                 else:
-                    torque[..., row.joint] += stiffness * (bend(row.joint) - bend(row.joint + 1))
-                    torque[..., row.joint + 1] -= stiffness * (bend(row.joint) - bend(row.joint + 1))
+                    pull = stiffness * (bend(row.joint) - bend(row.joint + 1))
+                    torque[..., row.joint] += pull
+                    torque[..., row.joint + 1] -= self._numbers(k, theta)["reaction"] * pull
+            elif row.effect == "pulley_eccentricity":
+                assert row.joint is not None
+                numbers = self._numbers(k, theta)
+                turned = numbers["turns"] * q[:, row.joint]
+                arm = numbers["sine"] * np.sin(turned) + numbers["cosine"] * np.cos(turned)
+                torque[..., row.joint] -= arm * self.force[samples, row.tendon]
+            elif row.effect == "preload_friction":
+                beyond = np.asarray(theta[f"extensions[{k + 1}].beyond"])[..., None]
+                torque += np.asarray(theta[f"extensions[{k + 1}].coulomb"])[..., None] * (
+                    self.units[f"{k}.own"][samples] + beyond * self.units[f"{k}.beyond"][samples]
+                )
         for path, unit in self.units.items():
-            torque += np.asarray(theta[path])[..., None] * unit[samples]
+            if path in theta:
+                torque += np.asarray(theta[path])[..., None] * unit[samples]
         return torque

@@ -40,7 +40,7 @@ def gravity(rng: np.random.Generator, n: int, m: int, j: int, i: int) -> Row:
 
 def load_at(rng: np.random.Generator, n: int, m: int, j: int, i: int) -> Row:
     place = {"joint": j} if rng.random() < 0.5 else {}
-    share = {"beyond": float(rng.uniform(-0.5, 1.5))} if rng.random() < 0.5 else {}
+    share = {"beyond": 0.4 * i - 0.5} if (i + j) % 2 else {}
     return place | {"tendon": i, "coulomb": either(rng, 0.5)} | share
 
 
@@ -78,7 +78,7 @@ MAKE: dict[str, Make] = {
     "inertia": lambda rng, n, m, j, i: {"joint": j, "inertia": either(rng, 1e-3)},
     "joint_coupling": lambda rng, n, m, j, i: (
         {"joint": 1 + (j - 1) % max(n - 1, 1), "stiffness": either(rng, 0.05)}
-        | ({"reaction": float(rng.uniform(-1.0, 2.0))} if i % 2 else {})
+        | ({"reaction": 0.3 * i - 0.5} if i % 2 else {})
     ),
     "preload_friction": load_at,
     "load_friction": lambda rng, n, m, j, i: {"joint": j, "tendon": i, "coulomb": either(rng, 1e-3)},
@@ -89,7 +89,7 @@ MAKE: dict[str, Make] = {
     "pulley_eccentricity": lambda rng, n, m, j, i: (
         {"joint": j, "tendon": i, "sine": either(rng, 1e-3)}
         | ({"cosine": either(rng, 1e-3)} if i % 2 else {})
-        | ({"turns": float(rng.uniform(1.5, 9.0))} if j % 2 else {})
+        | ({"turns": 1.2 + 0.9 * i} if j % 2 else {})
     ),
     "presliding": presliding,
     "friction_drift": drift,
