@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.cause_search import View, bias_of, look, predicted_of, residual_alone, series_of
-from tendonfmu.cause_selection import CERTAIN, Judged, Pick, Selection, is_alike, names_with, rms_gain
+from tendonfmu.cause_selection import CERTAIN, Judged, Pick, Selection, is_alike, rms_gain
 from tendonfmu.contact_scan import left_out, scan_events
 from tendonfmu.diagnosis_result import Event, Interval
 from tendonfmu.diagnosis_series import Grid
@@ -287,10 +287,8 @@ class _Rounds:
         """Keeps a further cause where it lowers the error on unseen stretches materially and certainly, and that of
         the model as it runs online. candidates: looked at around the new model."""
         before, after, model, cause = self.view.selection.base, trial.error, trial.model, trial.cause
-        named = [each.effect for each in self.causes]
-        least = self._least_gain * names_with(cause.effect, named)
         gain, error = rms_gain(before, after) if model is not None else (0.0, 0.0)
-        if model is None or gain < least or gain <= CERTAIN * error or not self._runs_better(model):
+        if model is None or gain < self._least_gain or gain <= CERTAIN * error or not self._runs_better(model):
             return False
         if cause.p_value >= SIGNIFICANCE:  # of the start: a step that has no column in the view before
             cause = replace(cause, p_value=_step_p_value(before, after))

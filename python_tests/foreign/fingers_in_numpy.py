@@ -36,6 +36,7 @@ class Plan:
     hidden: str
     joint: int | None = None
     tendon: int | None = None
+    survives: float | None = None
 
 
 PLANS = (
@@ -45,7 +46,7 @@ PLANS = (
     Plan(numpy_boucwen, "none"),
     Plan(numpy_capstan, "none"),
     Plan(numpy_tanh, "gravity", joint=1),
-    Plan(numpy_karnopp, "gravity", joint=2),
+    Plan(numpy_karnopp, "gravity", joint=2, survives=0.00),
     Plan(numpy_maxwell, "edge_friction", joint=2, tendon=5),
     Plan(numpy_boucwen, "cover_stiffness", joint=1),
     Plan(numpy_capstan, "viscous_friction"),
@@ -58,7 +59,7 @@ PLANS = (
     Plan(numpy_karnopp, "unknown_hum", joint=1),
     Plan(numpy_maxwell, "joint_coupling", joint=2),
     Plan(numpy_boucwen, "unknown_creep", joint=2),
-    Plan(numpy_capstan, "joint_load_friction", joint=1),
+    Plan(numpy_capstan, "joint_load_friction", joint=1, survives=0.07),
     Plan(numpy_tanh, "none"),
     Plan(numpy_capstan, "unknown_catch", joint=2),
 )
@@ -79,6 +80,7 @@ def make(number: int, train_seconds: float = TRAIN_SECONDS, test_seconds: float 
         tendon=plan.tendon,
         also=ALSO.get(simulator, ()),
         rms=rms(train["hidden"]),
+        survives=plan.survives,
     )
     return Case(FAMILY, number, simulator.describe(plan.hidden), recording(train), recording(test), truth, inside)
 

@@ -29,6 +29,8 @@ class Truth:
     joints: number of joints of the finger.
     also: effects that the simulator has as well although the description lacks them: naming them is not false.
     rms: of the hidden term over the training recording [N·m], largest over the joints; None where it is not known.
+    survives: variance of what refitting leaves of the hidden term over that of the residual, where it is little
+    (visibility.py); None: not known, or much.
     """
 
     hidden: str
@@ -37,6 +39,7 @@ class Truth:
     tendon: int | None = None
     also: tuple[str, ...] = ()
     rms: float | None = None
+    survives: float | None = None
 
 
 @dataclasses.dataclass(frozen=True)

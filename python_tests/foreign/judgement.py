@@ -18,6 +18,8 @@ Cause = Mapping[str, Any]
 NEUTRAL = {"presliding", "unknown"}
 TERMLESS = {"unknown", "contact"}  # findings without a term in the extended model have no gain of their own
 
+VISIBLE = 0.1  # of the residual's variance: README of the recorded cases
+
 # Effects that refitting the description's own numbers takes up, so that less than 0.1 of the residual's variance is
 # left to see. Not naming them is right, naming them is right too; a wrong name counts as false as anywhere.
 ABSORBED = {
@@ -96,9 +98,14 @@ def judge(report: Report, truth: Truth) -> Judgement:
 
 
 def visibility(truth: Truth) -> bool | None:
-    """True where an effect of the list is hidden and survives refitting, else None. The name of the effect decides."""
+    """True where an effect of the list is hidden and survives refitting, else None. The name of the effect decides, or
+    where it was measured how much survives, that."""
     outside = truth.hidden.startswith("unknown")
-    return None if truth.hidden == "none" or outside or truth.hidden in ABSORBED else True
+    return None if truth.hidden == "none" or outside or is_absorbed(truth) else True
+
+
+def is_absorbed(truth: Truth) -> bool:
+    return truth.hidden in ABSORBED or (truth.survives is not None and truth.survives < VISIBLE)
 
 
 def is_certain(cause: Cause) -> bool:

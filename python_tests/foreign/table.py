@@ -23,7 +23,7 @@ from typing import Any
 
 import recorded
 from foreign_case import Case
-from judgement import ABSORBED, judge, visibility
+from judgement import is_absorbed, judge, visibility
 from table_text import markdown, summary
 
 FAMILIES = {"recorded": "recorded", "mujoco": "fingers_in_mujoco", "numpy": "fingers_in_numpy"}
@@ -115,7 +115,7 @@ def row_of(module: ModuleType, number: int, folder: Path, limit: float) -> dict[
         "family": case.family,
         "truth": dataclasses.asdict(case.truth),
         "visible": visibility(case.truth),
-        "absorbed": case.truth.hidden in ABSORBED,
+        "absorbed": is_absorbed(case.truth),
         "run": dataclasses.asdict(run),
         "report": short(report) if report is not None else None,
         "judgement": dataclasses.asdict(judgement) if judgement is not None else None,

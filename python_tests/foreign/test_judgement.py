@@ -90,6 +90,13 @@ def test_contact_is_false_where_nobody_pushed_and_right_where_somebody_did() -> 
     assert judged.in_set and judged.first and judged.false == ()
 
 
+def test_what_survives_refitting_by_less_than_a_tenth_of_the_residual_need_not_be_named() -> None:
+    truth = Truth("gravity", joints=2, joint=2)
+    assert visibility(truth) is True
+    assert visibility(dataclasses.replace(truth, survives=0.2)) is True
+    assert visibility(dataclasses.replace(truth, survives=0.05)) is None
+
+
 @pytest.mark.parametrize("hidden", ABSORBED)
 def test_what_refitting_absorbs_need_not_be_named(hidden: str) -> None:
     truth = Truth(hidden, 2, tendon=2)
