@@ -315,7 +315,7 @@ def three_causes() -> Diagnosis:
         too_small=(SMALL,),
         invisible=INVISIBLE,
         events=(STALL, replace(STALL, start=41.0, end=41.8, joints=(1, 2), peak=0.051)),
-        event_gain=Interval(0.21, 0.08, 0.33),
+        event_gain=Interval(0.21, 0.12, 0.33),
         unexplained=Unexplained(
             share=0.21,
             description="mostly at joint 1 (mcp), at 2 to 4 Hz, while tendon 2 (fds) moves at small angles",

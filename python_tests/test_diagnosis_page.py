@@ -129,7 +129,7 @@ def test_contact_and_unknown_are_causes_only_where_their_gain_is_certain() -> No
     assert reported_causes(full)[-2].where.joint is None  # events at both joints
     one = replace(full, events=(full.events[0], replace(full.events[1], peak=0.01)))
     assert reported_causes(one)[-2].where.joint == 2  # of the one event that is large enough
-    doubtful = replace(full, event_gain=Interval(0.2, -0.01, 0.4), unexplained=replace(full.unexplained, unknown=False))
+    doubtful = replace(full, event_gain=Interval(0.2, 0.05, 0.4), unexplained=replace(full.unexplained, unknown=False))
     assert reported_causes(doubtful) == list(full.causes)
     small = replace(full, events=(replace(full.events[0], peak=0.01),))
     assert "contact" not in {each.where.effect for each in reported_causes(small)}
@@ -194,6 +194,17 @@ def test_every_verdict_reads_right(verdict: str, count: int) -> None:
     [
         ("load_friction", {"coulomb": (8.1e-5, "m")}, "81 µN·m of friction for each newton of tendon force"),
         ("preload_friction", {"coulomb": (0.2, "N")}, "0.2 N of friction"),
+        (
+            "preload_friction",
+            {"coulomb": (0.2, "N"), "beyond": (-0.1, "1")},
+            "0.2 N of friction, −0.1 times as much at the joints beyond",
+        ),
+        (
+            "pulley_eccentricity",
+            {"sine": (3e-4, "m"), "cosine": (4e-4, "m"), "turns": (8.97, "1")},
+            "the arm goes up and down by 0.5 mm, 8.97 times while the joint would turn once",
+        ),
+        ("pulley_eccentricity", {"sine": (3e-4, "m"), "turns": (1.0, "1")}, "the arm goes up and down by 0.3 mm"),
         ("gravity", {"sine": (0.03, "N.m"), "cosine": (-0.04, "N.m")}, "50 mN·m at most"),
         ("presliding", {"displacement": (3.2e-4, "m")}, "over 0.32 mm"),
         ("presliding", {"displacement": (0.03, "s")}, "over 15 µm at tendons, 0.3 mrad at joints"),

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 
 from tendonfmu.diagnosis_result import FoundPlace
+from tendonfmu.extensions import LEFT_OUT
 
 Thresholds = tuple[float, float]
 Parameters = Mapping[str, tuple[float, str]]  # path -> (value, unit)
@@ -116,6 +117,16 @@ def _wave(text: str) -> Callable[[Numbers], str]:
     return words
 
 
+def _with(words: Callable[[Numbers], str], name: str, more: str) -> Callable[[Numbers], str]:
+    """The words, and more where the mechanism's number is there and not the usual one."""
+
+    def found(numbers: Numbers) -> str:
+        value = numbers.get(name, [(LEFT_OUT[name], "1")])[0][0]
+        return words(numbers) + ("" if value == LEFT_OUT[name] else more.format(f"{value:.3g}".replace("-", "−")))
+
+    return found
+
+
 def _correction(what: str) -> Callable[[Numbers], str]:
     """More or less than what the description says."""
 
@@ -178,7 +189,7 @@ _WORDS: Mapping[str, Callable[[Numbers], str]] = {
     "pulley_friction": _of("up to {} of the tendon force", "coulomb"),
     "joint_friction": _of("{} of friction", "coulomb"),
     "joint_load_friction": _per_force("all tendon forces"),
-    "preload_friction": _of("{} of friction", "coulomb"),
+    "preload_friction": _with(_of("{} of friction", "coulomb"), "beyond", ", {} times as much at the joints beyond"),
     "load_friction": _per_force("tendon force"),
     "cover_stiffness": _of("a spring of {}", "stiffness"),
     "cover_hardening": _of("a cubic spring of {}", "stiffness"),
@@ -191,9 +202,15 @@ _WORDS: Mapping[str, Callable[[Numbers], str]] = {
     "time_delay": _delay,
     "moment_arm": _arm,
     "moment_arm_variation": _of("the arm changes by {}", "slope"),
-    "pulley_eccentricity": _wave("the arm goes up and down by {}"),
+    "pulley_eccentricity": _with(
+        _wave("the arm goes up and down by {}"), "turns", ", {} times while the joint would turn once"
+    ),
     "tendon_nonlinearity": _of("the spring stiffens by {}", "hardening"),
-    "joint_coupling": _of("a spring of {} between the joints", "stiffness"),
+    "joint_coupling": _with(
+        _of("a spring of {} between the joints", "stiffness"),
+        "reaction",
+        ", of which the next joint feels {} times as much",
+    ),
     "backlash": _of("a play of {}", "width"),
     "asymmetric_friction": _sides,
 }
