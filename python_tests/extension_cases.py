@@ -15,7 +15,7 @@ ROWS: list[dict[str, Any]] = [
     {"effect": "joint_coupling", "joint": 1, "stiffness": 0.05, "reaction": 0.3},
     {"effect": "preload_friction", "tendon": 1, "coulomb": 0.4},
     {"effect": "preload_friction", "joint": 2, "tendon": 2, "coulomb": 0.4},
-    {"effect": "preload_friction", "joint": 1, "tendon": 3, "coulomb": 0.4, "beyond": 0.25},
+    {"effect": "preload_friction", "joint": 1, "tendon": 2, "coulomb": 0.4, "beyond": 0.25},
     {"effect": "load_friction", "joint": 2, "tendon": 1, "coulomb": 2e-4},
     {"effect": "force_gain", "tendon": 2, "correction": 0.07},
     {"effect": "force_offset", "tendon": 1, "correction": -0.5},

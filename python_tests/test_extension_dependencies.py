@@ -136,11 +136,12 @@ def test_a_delay_leaves_no_fixed_factor(tmp_path: Path) -> None:
 def test_numbers_say_of_which_effect_they_are(tmp_path: Path) -> None:
     found = {variable["name"]: variable for variable in described(ROWS, tmp_path)["variables"]}
     numbers = {name: found[name] for name in found if name.startswith("extensions[")}
-    assert len(numbers) == 33
+    assert len(numbers) == 44
     assert (
-        numbers["extensions[8].coulomb"]["description"] == "Extension 8: coulomb, of load_friction at joint 2, tendon 1"
+        numbers["extensions[10].coulomb"]["description"]
+        == "Extension 10: coulomb, of load_friction at joint 2, tendon 1"
     )
-    assert numbers["extensions[22].delay"]["description"] == "Extension 22: delay, of time_delay"
+    assert numbers["extensions[25].delay"]["description"] == "Extension 25: delay, of time_delay"
     for number in numbers.values():
         assert number["variability"] == "tunable" and number["causality"] == "parameter"
-    assert {numbers[f"extensions[{k}].displacement"]["unit"] for k in (14, 15, 25)} == {"rad", "m", "s"}
+    assert {numbers[f"extensions[{k}].displacement"]["unit"] for k in (17, 18, 28)} == {"rad", "m", "s"}
