@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from made_columns import BLOCKS, JOINTS, UNSEEN, Made, candidate_columns, coloured, grams_of, waves
 from tendonfmu.block_grams import standard_error
 from tendonfmu.candidate_columns import CandidateColumns
-from tendonfmu.cause_selection import CERTAIN, Selection, rms_gain
+from tendonfmu.cause_selection import CERTAIN, Selection, names_with, rms_gain
 from tendonfmu.effects import Place, by_name
 from tendonfmu.hypotheses import (
     EVERYWHERE,
@@ -225,6 +225,23 @@ def test_columns_that_differ_by_rounding_are_alike(seed: int, columns: Numbers, 
     made = [Made("force_gain", None, 1), Made("moment_arm", 1, 1)]
     found = selection_of(noise(20 + seed) + 0.05 * values[:, :, 0], nominal, values, made).best(LEAST_GAIN)
     assert found is not None and len(found.alike) == 1
+
+
+def test_each_further_name_counts_and_what_every_finger_has_does_not() -> None:
+    assert names_with("gravity", []) == names_with("gravity", ["presliding", "time_delay"]) == 1
+    assert names_with("gravity", ["stribeck", "presliding"]) == 2
+    assert names_with("gravity", ["stribeck", "inertia"]) == 3
+    assert names_with("presliding", ["stribeck", "inertia"]) == 1
+    assert names_with("stribeck", ["stribeck", "inertia"]) == 1  # a further place of it
+
+
+def test_a_fast_pulley_has_to_take_away_much(columns: Numbers, nominal: Numbers) -> None:
+    """Any feature of the angle is a little like it."""
+    for turns, size, found in ((9.0, 0.4, False), (9.0, 3.0, True), (1.0, 0.4, True)):
+        made = [Made("pulley_eccentricity", 1, 1, shapes=({"turns": turns},))]
+        values = columns[:, :, :1] * 1.0
+        best = selection_of(noise(9) + size * values[:, :, 0], nominal, values, made).best(LEAST_GAIN)
+        assert (best is not None) == found, (turns, size)
 
 
 def test_what_is_beside_explains_nothing_else(columns: Numbers, nominal: Numbers) -> None:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import copy
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,10 +22,12 @@ from tendonfmu.cause_search import bias_of, blocks_of, predicted_of, series_of
 from tendonfmu.description import FingerDescription
 from tendonfmu.diagnosis import PHASES
 from tendonfmu.diagnosis_result import Interval
-from tendonfmu.diagnosis_search import NamedCause, search
+from tendonfmu.diagnosis_search import NamedCause, _Rounds, _Trial, search
 from tendonfmu.diagnosis_series import block_prediction, exact_model, make_grid
+from tendonfmu.diagnosis_span import span_of
 from tendonfmu.effects import Place, by_name
-from tendonfmu.extension_fit import Accepted, FitSettings
+from tendonfmu.effects.presliding import is_spring, usual_time
+from tendonfmu.extension_fit import Accepted, FitSettings, FittedModel
 from tendonfmu.fit_recordings import FitRecording, Held, prepare
 from tendonfmu.gain import residual_of as online_residual
 from tendonfmu.hypotheses import HERE, Hypothesis
@@ -269,3 +272,68 @@ def test_a_hidden_spring_is_found_and_fitted(hidden: FitRecording) -> None:
     used = found.last.series.used
     assert np.mean(found.last.residual[used] ** 2) < np.mean(found.first.residual[used] ** 2)
     assert "causes" in seen and "contact" in seen
+
+
+class Fitted(_Rounds):
+    """Rounds whose fits leave what is said here, by effect; None: the fit bears nothing out."""
+
+    def __init__(self, errors: Mapping[str, float | None], causes: Sequence[str] = ()) -> None:
+        self.errors, self.tried = errors, list[str]()
+        self.causes = [named(each, Place(), 1e-9) for each in causes]
+
+    def _named(self, judged: Any, selection: Any) -> NamedCause:
+        return replace(named(judged.hypothesis.effect, Place(1), 1e-9), hypothesis=judged.hypothesis)
+
+    def _tried(self, cause: NamedCause) -> _Trial:
+        self.tried.append(cause.effect)
+        error = self.errors[cause.effect]
+        noise = np.random.default_rng(3).uniform(0.9, 1.1, 20)
+        model = None if error is None else FittedModel({}, {}, {}, {}, 0.0)
+        return _Trial(cause, model, np.array([np.inf]) if error is None else error * noise)
+
+
+def decided(rounds: Fitted, first: str, *alike: str) -> tuple[str, list[str]]:
+    """The cause that is taken, and its rivals, where columns cannot tell the first from the others."""
+
+    def of(effect: str) -> Hypothesis:
+        return Hypothesis(effect, 1, None, HERE, (), *np.zeros((3, 1)))
+
+    class Columns:
+        def refined(self, effect: str) -> Any:
+            return SimpleNamespace(hypothesis=of(effect))
+
+    picked: Any = SimpleNamespace(judged=Columns().refined(first), hypothesis=of(first), alike=tuple(map(of, alike)))
+    cause = rounds._best_fitted(Columns(), picked).cause  # type: ignore[arg-type]
+    return cause.effect, [each.effect for each in cause.alike]
+
+
+def test_fitted_models_decide_between_what_columns_cannot_tell_apart() -> None:
+    rounds = Fitted({"preload_friction": 3.0, "cover_stiffness": 1.0, "gravity": 1.001, "moment_arm": 0.1})
+    found = decided(rounds, "preload_friction", "cover_stiffness", "moment_arm", "gravity", "stribeck")
+    # the worse fit is no rival any more; what was not fitted still is, and a correction of the torque may not stand in
+    assert found == ("cover_stiffness", ["gravity", "moment_arm", "stribeck"])
+    assert rounds.tried == ["preload_friction", "cover_stiffness", "gravity"]
+
+
+def test_a_fit_that_bears_nothing_out_is_no_rival() -> None:
+    assert decided(Fitted({"gravity": 2.0, "backlash": None}), "gravity", "backlash") == ("gravity", [])
+    assert decided(Fitted({"gravity": None, "backlash": None}), "gravity", "backlash")[0] == "gravity"
+
+
+def test_presliding_that_is_there_goes_before_a_new_name() -> None:
+    errors = {"load_friction": 1.0, "presliding": 1.002}
+    assert decided(Fitted(errors), "load_friction", "presliding") == ("load_friction", ["presliding"])
+    known = decided(Fitted(errors, ["presliding"]), "load_friction", "presliding")
+    assert known == ("presliding", ["load_friction"])
+    better = Fitted({**errors, "presliding": 1.5}, ["presliding"])
+    assert decided(better, "load_friction", "presliding") == ("load_friction", [])
+
+
+def test_presliding_as_long_as_the_motion_is_a_spring(hidden: FitRecording) -> None:
+    span = span_of(finger(), [hidden])
+    for share, spring in ((0.01, False), (0.3, True)):
+        everywhere = {"effect": "presliding", "displacement": share * usual_time(finger(), span)}
+        assert is_spring({**finger(), "extensions": [everywhere]}, span) == spring
+        joint = {"effect": "presliding", "joint": 1, "displacement": share * float(span.travel[0])}
+        assert is_spring({**finger(), "extensions": [joint]}, span) == spring
+    assert not is_spring(finger(), span)

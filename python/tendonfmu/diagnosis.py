@@ -88,10 +88,10 @@ def diagnose(
     """Finds what a description lacks.
 
     finger: description, or its file. recordings: of contact-free motion; samples labelled contact are left out. tests:
-    recordings that the gain is measured on; without them every fifth stretch of 10 s of `recordings`, that the numbers
-    are then not fitted to, though the choice of causes has seen it. kinematics: source, 1 to 3. least_gain: share of
-    what is left of the rms that a cause has to take away, 0 to 0.5. jobs: threads of the fits. progress: called with
-    what is being done. Raises InputError where a file or an option is at fault.
+    recordings that the gain is measured on. Without them that is every fifth stretch of 10 s of `recordings`, that the
+    numbers are not fitted to, and causes are judged on up to eight parts of all of it, held out in turn. kinematics:
+    source, 1 to 3. least_gain: share of what is left of the rms that a cause has to take away, 0 to 0.5. jobs: threads
+    of the fits. progress: called with what is being done. Raises InputError where a file or an option is at fault.
     """
     begun = perf_counter()
     phases = Phases(PHASES, progress or (lambda state: None))

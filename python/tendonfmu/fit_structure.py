@@ -324,7 +324,10 @@ def _with_equal_values(data: Mapping[str, Any], numbers: Sequence[Unknown], owne
 
 
 def set_number(data: Any, path: str, value: float) -> None:
-    """Writes a number of a parsed description, in place. path: as in contract section 4, indices from 1."""
+    """Writes a number of a parsed description, in place.
+
+    path: such as `tendons[1].edge_friction[2].coulomb`, indices from 1.
+    """
     *way, last = _steps(path)
     for step in way:
         data = data[step]

@@ -1,10 +1,10 @@
 """What an extension is worth: both FMUs run over data that neither was fitted to, and their residuals compared.
 
-An FMU has r of contract section 5, step 5, among its outputs only after the update, as compensated_torque = (1 − K)·r.
-So the core runs over the same samples beside it: where all outputs of both agree, its r is that of the FMU, and tells
-how the bias jumped. A known external torque, labelled contact and gaps need the bias filter once more, over y − T
-(`fit_residuals.track`), with the T that the FMU put out; in a recording without them that is r of the core again, and
-both are compared.
+The residual r is τ less T of eq. (10) and less the bias before it has seen the sample. It is no output of an FMU:
+compensated_torque = (1 − K)·r is what the update leaves of it. So the core runs over the same samples beside it: where
+all outputs of both agree, its r is that of the FMU, and tells how the bias jumped. A known external torque, labelled
+contact and gaps need the bias filter once more, over y − T (`fit_residuals.track`), with the T that the FMU put out; in
+a recording without them that is r of the core again, and both are compared.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Data = Mapping[str, Any]
 
-AGREEMENT = 1e-9  # of the largest value of an output's series, contract section 5
+AGREEMENT = 1e-9  # of the largest value of an output's series: what any two implementations may differ by
 _NEVER = 1e9  # N·m; no contact threshold is ever passed
 _THRESHOLD = re.compile(r"contact\.(innovation\.)?threshold\[")
-_TINY = 1e-12  # N·m, as in contract section 5
+_TINY = 1e-12  # N·m, of a series that is 0
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ def _filter_of(data: Data) -> BiasSettings:
 
 
 def residual_of(data: Data, recording: FitRecording) -> Numbers:
-    """[N, n] r of contract section 5, step 5, N·m, by the core alone: of the whole recording, whose friction remembers
+    """[N, n] r before the bias update, N·m, by the core alone: of the whole recording, whose friction remembers
     across gaps as an FMU does, while the bias begins anew after them; NaN where there is none.
     """
     return residuals(data, recording, _model(data, recording, _core_outputs(data, recording))).residual

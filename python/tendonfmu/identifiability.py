@@ -2,7 +2,7 @@
 bias filter.
 
 Assumed: the joint torques τ carry independent white noise of the description's `bias.noise_std` (+ per force), the bias
-is a random walk of `bias.drift_variance` (contract section 5, step 6), so slow changes tell little. The derivatives of
+is a random walk of `bias.drift_variance`, so slow changes tell little. The derivatives of
 T_eff by the parameters are differences of runs of the C core itself, with the jumps of fig. 5 in them.
 """
 
@@ -25,7 +25,7 @@ Progress = Callable[[int, int], None]
 
 STEP = 1e-4  # of a value: T is linear in three of the four numbers of a law, and nearly so in the fourth over this
 _ELEMENTS = 4_000_000  # sensitivities in memory at a time
-_DEFAULTS = {"noise_std": 0.01, "noise_std_per_force": 0.0, "drift_variance": 1e-6}  # contract section 2
+_DEFAULTS = {"noise_std": 0.01, "noise_std_per_force": 0.0, "drift_variance": 1e-6}  # as in the core
 
 
 @dataclass(frozen=True)

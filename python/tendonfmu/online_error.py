@@ -37,7 +37,7 @@ class OnlineError:
         self._measured = series.target[self._rows] + block_prediction(data, recordings, self._grid)[self._rows]
 
     def square(self, data: Mapping[str, Any]) -> float:
-        """Σ r² over all joints, (N·m)², of contract section 5, step 5: every sample, before the bias has seen it."""
+        """Σ r² over all joints, (N·m)²: every sample, before the bias has seen it."""
         left = (residual_of(data, each)[each.train] for each in self._recordings)
         return float(sum(np.nansum(each**2) for each in left))
 
