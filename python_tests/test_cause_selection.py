@@ -293,6 +293,17 @@ def test_an_effect_of_some_places_is_named_there(
     assert found.hypothesis.key == ("load_friction", *place)
 
 
+def test_places_that_differ_little_are_near(columns: Numbers, nominal: Numbers) -> None:
+    """Next to what the effect takes away: for its fits to decide."""
+    twin = columns[:, :, 0] + 0.2 * columns[:, :, 5]
+    values = np.stack([columns[:, :, 0], twin, columns[:, :, 1]], axis=2)
+    made = [Made("moment_arm_variation", 1, tendon) for tendon in (1, 2, 3)]
+    selection = selection_of(noise(11) + 0.5 * values[:, :, 0], nominal, values, made)
+    best = selection.refined("moment_arm_variation")
+    assert best.hypothesis.tendon == 1
+    assert [each.hypothesis.tendon for each in selection.near(best)] == [2]
+
+
 # --- gains ------------------------------------------------------------------------------------------------------------
 
 

@@ -135,8 +135,9 @@ def test_the_cutoff_is_where_the_torque_meets_its_noise(noise: float) -> None:
     assert LOWEST <= found.cutoff <= HIGHEST
     cutoffs = {0.003: (55.0, HIGHEST), 0.03: (25.0, 60.0), 0.3: (6.0, 20.0)}
     assert cutoffs[noise][0] <= found.cutoff <= cutoffs[noise][1]
-    # no slower than ten samples a period
-    assert RATE / found.every >= 10.0 * found.cutoff > RATE / (found.every + 1)
+    # ten samples a period, or five where that is 250 a second
+    least = min(10.0 * found.cutoff, max(5.0 * found.cutoff, 250.0))
+    assert RATE / found.every >= least > RATE / (found.every + 1)
 
 
 def test_slow_or_short_recordings_are_not_smoothed() -> None:
@@ -150,3 +151,10 @@ def test_slow_or_short_recordings_are_not_smoothed() -> None:
 def test_short_pieces_can_be_smoothed() -> None:
     values = np.random.default_rng(3).standard_normal((10, 2))
     assert zero_phase(values, 5.0, 100.0).shape == (10, 2)
+
+
+@pytest.mark.parametrize(("rate", "every"), [(1000.0, 3), (500.0, 1), (250.0, 1)])
+def test_samples_are_dropped_where_the_signals_are_slow_and_enough_are_left(rate: float, every: int) -> None:
+    found = smoothing_of([recording(noise=0.0, rate=rate)], DATA)
+    assert found is not None and found.cutoff == pytest.approx(min(HIGHEST, OF_RATE * rate))
+    assert found.every == every

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.block_grams import Grams, standard_error
-from tendonfmu.hypotheses import Hypothesis
+from tendonfmu.hypotheses import Hypothesis, Key
 from tendonfmu.least_sizes import LeastSizes
 
 Numbers = NDArray[np.float64]
@@ -24,6 +24,7 @@ ALIKE = 1.64  # standard errors of the paired difference within which two causes
 SAME = 0.015  # of the error, about a quarter of what is material: a smaller difference is none, however certain
 COMMON = {"presliding", "time_delay"}  # of every finger, and of how it was recorded
 FINER = 0.5  # standard errors by which a finer place has to be better: both have as many numbers
+NEAR = 0.1  # of what an effect takes away: derivatives of it tell its places apart no better
 LEAST_SHARE = 0.01  # of a candidate's variance that has to survive the refit for it to be visible
 
 
@@ -129,6 +130,16 @@ class Selection:
             if gain > FINER * error:
                 chosen = judged
         return chosen
+
+    def near(self, judged: Judged) -> list[Judged]:
+        """The same effect at other places of the same level that is nearly as good, the best first."""
+        own = judged.hypothesis
+        most = judged.error + NEAR * (float(self.base.sum()) - judged.error)
+        seen: dict[Key, int] = {}
+        for k, (error, each, _, _) in enumerate(self._found):
+            if (each.effect, each.level) == (own.effect, own.level) and each.key != own.key and error <= most:
+                seen.setdefault(each.key, k)
+        return [self._judged(k) for k in seen.values()]
 
 
 def names_with(effect: str, named: Collection[str]) -> int:

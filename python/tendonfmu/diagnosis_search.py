@@ -245,7 +245,17 @@ class _Rounds:
         fitted_effects = {each.cause.effect for each in trials}
         alike = [each.cause.hypothesis for each in same if each is not best and each.cause.hypothesis is not None]
         alike += [each for each in picked.alike if each.effect not in fitted_effects]
+        best = self._at_best_place(best, selection)
         return replace(best, cause=replace(best.cause, alike=tuple(alike)))
+
+    def _at_best_place(self, trial: _Trial, selection: Selection) -> _Trial:
+        """Derivatives tell the places of a large effect apart less well than the models that are fitted with it."""
+        judged = selection.refined(trial.cause.effect)
+        if trial.cause.hypothesis is not judged.hypothesis:
+            return trial
+        others = [self._named(each, selection) for each in selection.near(judged)[: MOST_FITTED - 1]]
+        trials = [trial, *(self._tried(each) for each in others if each.p_value < SIGNIFICANCE)]
+        return min(trials, key=lambda each: float(each.error.sum()))
 
     def _tries_presliding(self) -> bool:
         """Where none was taken: its distance may be far below what the scan tries. True if it was taken."""

@@ -28,7 +28,8 @@ LOWEST, HIGHEST = 5.0, 60.0  # Hz
 OF_RATE = 0.2  # of the sample rate, at most
 NOISE_BAND = 0.7  # of half the sample rate: above it the spectrum is taken for noise
 ABOVE_NOISE = 3.0  # times the noise's spectrum
-SAMPLES_PER_PERIOD = 10.0  # of the cutoff, that a smoothed recording keeps
+SAMPLES_PER_PERIOD = 10.0  # of the cutoff, that a smoothed recording keeps,
+FAST = (5.0, 250.0)  # or as many samples of it and a second, where that is fewer
 FEWEST = 64  # samples of a piece that can be smoothed
 
 
@@ -108,7 +109,7 @@ def smoothing_of(recordings: Sequence[Recording], data: Mapping[str, Any]) -> Si
     if OF_RATE * rate < LOWEST:
         return None
     cutoff = float(np.clip(OF_CROSSING * np.median(found), LOWEST, min(HIGHEST, OF_RATE * rate)))
-    return Signals(cutoff, max(1, int(rate / (SAMPLES_PER_PERIOD * cutoff))))
+    return Signals(cutoff, max(1, int(rate / min(SAMPLES_PER_PERIOD * cutoff, max(FAST[0] * cutoff, FAST[1])))))
 
 
 def _crossing(torque: Numbers, rate: float) -> float:
