@@ -21,7 +21,6 @@ pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eige
 import diagnosis_examples as examples
 from command import Call
 from tendonfmu import diagnosis
-from tendonfmu.cli_diagnose import several_tests
 from tendonfmu.diagnosis_files import write_diagnosis
 from tendonfmu.diagnosis_result import Diagnosis
 from tendonfmu.effects import CANDIDATES
@@ -29,6 +28,7 @@ from tendonfmu.errors import InputError, InternalError
 from tendonfmu.fit_files import check_unseen
 from tendonfmu.phases import PhaseState
 from tendonfmu.recording import Recording
+from tendonfmu.several_values import several_values
 from tendonfmu.tables import read_table
 
 PAGE = (Path(__file__).resolve().parents[1] / "docs" / "diagnose.md").read_text(encoding="utf-8")
@@ -170,7 +170,7 @@ def test_bad_usage_is_one_line(call: Call, tmp_path: Path, arguments: tuple[str,
     ],
 )
 def test_several_tests_after_the_recordings(given: str, read: str) -> None:
-    assert several_tests(given.split(), {"--test", "-o", "--seed"}) == read.split()
+    assert several_values(given.split(), {"--test", "-o", "--seed"}) == read.split()
 
 
 def test_least_gain_is_three_percent(call: Call, answering: Callable[[Diagnosis], Called]) -> None:

@@ -14,7 +14,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from tendonfmu import cli_campaign, cli_detect, cli_diagnose
+from tendonfmu import cli_calibrate, cli_campaign, cli_detect, cli_diagnose
 from tendonfmu.console import fit_bar, leave, phase_bar, print_tables, progress_bar, say
 from tendonfmu.errors import InputError, line_of
 from tendonfmu.fault_report import is_own_file, write_fault_report
@@ -450,6 +450,7 @@ def fit(
             say(f"{path}: {what}")
 
 
+cli_calibrate.register(app)
 cli_diagnose.register(app)
 cli_detect.register(app)
 cli_campaign.register(app)

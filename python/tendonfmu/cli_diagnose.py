@@ -2,51 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from typer.core import TyperCommand
 
 from tendonfmu.console import PhaseDisplay, print_tables, say
 from tendonfmu.errors import InputError
-
-
-class _SeveralTests(TyperCommand):
-    """Takes `--test A B` for `--test A --test B`."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        valued = {name for each in self.params if not getattr(each, "is_flag", False) for name in each.opts}
-        return super().parse_args(ctx, several_tests(args, valued))
-
-
-def several_tests(args: Sequence[str], valued: set[str]) -> list[str]:
-    """The arguments with `--test` before each test: once finger and a recording are given, all that follow `--test` up
-    to the next option are tests. valued: options that take a value.
-    """
-    found: list[str] = []
-    free, testing = 0, False  # arguments of no option so far; whether the next one is a test
-    rest = list(args)
-    while rest and rest[0] != "--":
-        word = rest.pop(0)
-        name, equals, _ = word.partition("=")
-        if word.startswith("-") and word != "-":
-            found.append(word)
-            if name in valued and not equals and rest:
-                found.append(rest.pop(0))
-            testing = name == "--test" and free > 1
-        elif testing:
-            found += ["--test", word]
-        else:
-            found.append(word)
-            free += 1
-    return found + rest
+from tendonfmu.several_values import SeveralValues
 
 
 def register(app: typer.Typer) -> None:
     """Adds the command."""
-    app.command(cls=_SeveralTests)(diagnose)
+    app.command(cls=SeveralValues)(diagnose)
 
 
 def diagnose(

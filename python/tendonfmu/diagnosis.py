@@ -216,6 +216,7 @@ class _Result:
             warnings=(*case.warnings, *self._warnings()),
             tested=len({each.key for each in found.last.selection.hypotheses}),
             event_gain=event_gain(verified.extended_data, case.whole, found.events),
+            smoothing=found.estimation.signals,
         )
 
     def _warnings(self) -> list[str]:

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.estimation_signals import Signals
+
 Numbers = NDArray[np.float64]
 
 
@@ -189,7 +191,7 @@ class Diagnosis:
     that is known. steps: rms over all joints on unseen data, N·m, of the nominal model and after each cause, in the
     order of `causes`. gain: over all joints on the test data; held_out: whether those are parts of the training
     recordings. too_small: seen for certain, but not material, or not on unseen data. event_gain: what leaving `events`
-    out takes away from the rms on the training recordings; None without events.
+    out takes away from the rms on the training recordings; None without events. smoothing: what `signals` says.
     """
 
     finger: str
@@ -222,3 +224,4 @@ class Diagnosis:
     warnings: tuple[str, ...] = ()
     tested: int = 0  # effects at places
     event_gain: Interval | None = None
+    smoothing: Signals = field(default_factory=Signals)

@@ -101,19 +101,7 @@ def fit_numbers(
     noise, which a term that scales with the force would fit by shrinking it). Raises InputError.
     """
     origin = data if given is None else given
-    every = -(-sum(int(recording.train.sum()) for recording in recordings) // MOST_SAMPLES)
-    recordings = [_thinned(_with_own_target(data, recording), max(every, 1)) for recording in recordings]
-    structure = _with_scale(build_structure(_described(data, settings.path), settings.choice), origin)
-    options = {
-        "prior": settings.prior,
-        "max_passes": settings.max_passes,
-        "tolerance": settings.tolerance,
-        "threads": settings.threads,
-    }
-    try:
-        learned = learn_batch(structure, recordings, Watch(None), options, None)
-    except Interrupted:  # a fit that is only a part of something has no use for what it has so far
-        raise KeyboardInterrupt from None
+    structure, learned = learn_numbers(data, recordings, settings, given=origin)
     numbers = np.asarray(learned.estimator.values(learned.z))
     finger = with_values(structure, numbers)
     at_bound = _at_bound(learned)
@@ -127,6 +115,25 @@ def fit_numbers(
         at_bound=at_bound,
         warnings=tuple(learned.warnings),
     )
+
+
+def learn_numbers(
+    data: Mapping[str, Any], recordings: Sequence[FitRecording], settings: FitSettings, *, given: Mapping[str, Any]
+) -> tuple[Structure, Learned]:
+    """What `fit_numbers` learns, with all that is known of it."""
+    every = -(-sum(int(recording.train.sum()) for recording in recordings) // MOST_SAMPLES)
+    recordings = [_thinned(_with_own_target(data, recording), max(every, 1)) for recording in recordings]
+    structure = _with_scale(build_structure(_described(data, settings.path), settings.choice), given)
+    options = {
+        "prior": settings.prior,
+        "max_passes": settings.max_passes,
+        "tolerance": settings.tolerance,
+        "threads": settings.threads,
+    }
+    try:
+        return structure, learn_batch(structure, recordings, Watch(None), options, None)
+    except Interrupted:  # a fit that is only a part of something has no use for what it has so far
+        raise KeyboardInterrupt from None
 
 
 def fit_extended(

@@ -1,0 +1,382 @@
+"""From recordings of free motion to a tuned finger: structure, numbers, thresholds, and what they are worth.
+
+from tendonfmu.calibration import calibrate
+
+found = calibrate("finger.json", ["free_10N.parquet", "free_30N.parquet"], "calibrated", pushes=["pushes.parquet"])
+found.report["error"], found.report["detection"], found.data
+
+Its steps are those of `diagnose`, of a fit to all recordings, of `tune` and of `score`, in this order; their results
+stay in the folder, so that a call that is repeated goes on where the one before ended.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu import native
+from tendonfmu.calibrated_fit import fit_all
+from tendonfmu.calibration_parts import stretches_for_diagnosis
+from tendonfmu.calibration_steps import Steps, digest_of_file
+from tendonfmu.description import FingerDescription, read_finger
+from tendonfmu.detection_tuning import ContactTuning, TuneWarning
+from tendonfmu.diagnosis import diagnose
+from tendonfmu.diagnosis_files import write_diagnosis
+from tendonfmu.diagnosis_page import cards_of
+from tendonfmu.diagnosis_result import Diagnosis
+from tendonfmu.diagnosis_text import names_of
+from tendonfmu.errors import InputError
+from tendonfmu.estimation_signals import Signals
+from tendonfmu.extension_fit import FitSettings
+from tendonfmu.finite_numbers import finite
+from tendonfmu.fit_evaluation import residuals
+from tendonfmu.fit_files import check_given_once, check_unseen, description_text
+from tendonfmu.fit_recordings import FitRecording, Held, prepare, require_noise
+from tendonfmu.fit_residuals import rms
+from tendonfmu.gain import residual_of
+from tendonfmu.phases import Phases, PhaseState
+from tendonfmu.push_sizes import by_size
+from tendonfmu.recording import Recording, read_recording
+from tendonfmu.score_report import build_report as score_report
+from tendonfmu.scoring import score_recordings
+from tendonfmu.tune_report import build_report as tune_report
+
+Numbers = NDArray[np.float64]
+Data = Mapping[str, Any]
+
+FORMAT = "tendonfmu-calibration-1"
+DIAGNOSIS = "diagnosis"  # folder of the full diagnosis
+HELD = Held(0.2, 10.0)  # of the recordings, for the errors, where there are no tests
+PHASES = {
+    "reading": 3.0,
+    "what the model lacks": 45.0,
+    "all its numbers": 20.0,
+    "thresholds of contact": 30.0,
+    "pushes": 8.0,
+}
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """data: the calibrated description. report: `calibration.json`, but for the files."""
+
+    data: Data
+    report: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Options:
+    """As `calibrate` takes them."""
+
+    kinematics: int = 1
+    false_alarms_per_hour: float = 6.0
+    confidence: float = 0.9
+    seed: int = 0
+    jobs: int = 1
+
+    def entry(self) -> dict[str, Any]:
+        """What shapes the result."""
+        return {name: value for name, value in vars(self).items() if name != "jobs"}
+
+
+def calibrate(
+    finger: Path | str,
+    free: Sequence[Path | str],
+    folder: Path | str,
+    *,
+    tests: Sequence[Path | str] = (),
+    pushes: Sequence[Path | str] = (),
+    options: Options = Options(),
+    progress: Callable[[PhaseState], None] | None = None,
+) -> Calibration:
+    """finger: description, its structure as given. free: recordings of free motion. folder: for the results of the
+    steps and the page of the diagnosis. tests: free motion that errors are measured on; without them that is every
+    fifth stretch of 10 s of `free`, which no number is fitted to. pushes: recordings with labelled contact, to count
+    what is found. progress: called with what is being done. Raises InputError.
+    """
+    begun = perf_counter()
+    phases = Phases(PHASES, progress or (lambda state: None))
+    given = [[Path(each) for each in group] for group in (free, tests, pushes)]
+    with phases.start("reading"):
+        case = _read(Path(finger), given[0], given[1], given[2], options)
+    run = _Run(case, Path(folder), options, phases)
+    report, data = run.report()
+    return Calibration(
+        data, {key: finite(value) for key, value in {**report, "seconds": perf_counter() - begun}.items()}
+    )
+
+
+# --- what is given ----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Case:
+    """free: prepared, with held-out stretches where there are no tests."""
+
+    finger: FingerDescription
+    free: list[FitRecording]
+    tests: list[FitRecording]
+    pushes: list[Path]
+
+    @property
+    def judged(self) -> list[FitRecording]:
+        return self.tests or self.free
+
+    @property
+    def made_from(self) -> dict[str, Any]:
+        from tendonfmu import __version__
+
+        files = [each.path for each in (*self.free, *self.tests)]
+        return {
+            "version": __version__,
+            "finger": digest_of_file(self.finger.path),
+            "recordings": [(file.name, digest_of_file(file)) for file in files],
+            "tests": len(self.tests),
+        }
+
+
+def _read(finger: Path, free: Sequence[Path], tests: Sequence[Path], pushes: Sequence[Path], options: Options) -> _Case:
+    if not free:
+        raise InputError("no recording; expected at least one of free motion")
+    check_given_once(free, tests, "a test")
+    check_given_once(free, pushes, "one with pushes")
+    given = read_finger(finger)
+    own = [prepare(given, read_recording(each), options.kinematics, Held() if tests else HELD) for each in free]
+    unseen = [prepare(given, read_recording(each), options.kinematics, Held()) for each in tests]
+    require_noise(given, own)
+    check_unseen([each.recording for each in own], [each.recording for each in unseen])
+    return _Case(given, own, unseen, list(pushes))
+
+
+# --- the steps --------------------------------------------------------------------------------------------------------
+
+
+class _Run:
+    """One calibration: each step from the results of those before it."""
+
+    def __init__(self, case: _Case, folder: Path, options: Options, phases: Phases) -> None:
+        self._case, self._folder, self._options, self._phases = case, folder, options, phases
+        self._steps = Steps(folder, {**case.made_from, **options.entry()})
+        self._seconds: dict[str, float] = {}
+
+    def report(self) -> tuple[dict[str, Any], Data]:
+        """And the calibrated description."""
+        case, steps = self._case, self._steps
+        lacks = self._step("what the model lacks", "diagnosis", {}, self._diagnosis)
+        fitted = self._step("all its numbers", "fit", {}, lambda step: self._fit(lacks))
+        tuned = self._step("thresholds of contact", "tune", {}, lambda step: self._tune(fitted, step))
+        pushed = None
+        if case.pushes:
+            files = {"pushes": [(file.name, digest_of_file(file)) for file in case.pushes]}
+            pushed = self._step(
+                "pushes", "score", files, lambda step: self._score(tuned, fitted["error"]["calibrated"], step)
+            )
+        report = {
+            "format": FORMAT,
+            "finger": case.finger.name,
+            "joints": case.finger.joint_names,
+            "recordings": [_recording(each) for each in case.free],
+            "tests": [_recording(each) for each in case.tests],
+            "error": fitted["error"],
+            "structure": {key: value for key, value in lacks.items() if key not in ("extended", "nominal", "warnings")},
+            "detection": {key: value for key, value in tuned.items() if key not in ("finger", "warnings")},
+            "pushes": pushed,
+            "next": list(_next(lacks, tuned)),
+            "warnings": [
+                *(f"{each.path.name}: {text}" for each in (*case.free, *case.tests) for text in each.warnings),
+                *lacks["warnings"],
+                *fitted["warnings"],
+                *tuned["warnings"],
+                *([] if pushed is None else pushed["warnings"]),
+            ],
+            "options": self._options.entry(),
+            "steps": {"seconds": self._seconds, "repeated": steps.repeated},
+        }
+        return report, tuned["finger"]
+
+    def _step(
+        self,
+        words: str,
+        name: str,
+        made_from: Mapping[str, Any],
+        compute: Callable[[Callable[[float], None]], dict[str, Any]],
+    ) -> dict[str, Any]:
+        begun = perf_counter()
+        with self._phases.start(words, 100) as step:
+            found = self._steps.result(name, made_from, lambda: compute(lambda share: step(int(100 * share))))
+        self._seconds[name] = perf_counter() - begun
+        return found
+
+    def _diagnosis(self, step: Callable[[float], None]) -> dict[str, Any]:
+        case, options = self._case, self._options
+        seen, judged = stretches_for_diagnosis(
+            [each.recording for each in case.free], [each.recording for each in case.tests]
+        )
+
+        def show(state: PhaseState) -> None:
+            part = state.done / state.total if state.total else 0.0
+            step((state.number - 1 + part) / state.count)
+
+        found = diagnose(
+            case.finger,
+            seen,
+            judged,
+            kinematics=options.kinematics,
+            seed=options.seed,
+            jobs=options.jobs,
+            progress=show,
+        )
+        write_diagnosis(found, self._folder / DIAGNOSIS)
+        return _structure(found)
+
+    def _fit(self, lacks: dict[str, Any]) -> dict[str, Any]:
+        case, options = self._case, self._options
+        extended = _described(lacks["extended"], case.finger.path)
+        found = fit_all(
+            extended,
+            case.free,
+            Signals(**lacks["smoothing"]),
+            FitSettings(threads=options.jobs, path=case.finger.path),
+            given=case.finger.data,
+            seed=options.seed,
+        )
+        error = {
+            "held_out": not case.tests,
+            "as_given": _errors(case.finger.data, case.judged, not case.tests),
+            "fitted": _errors(lacks["nominal"], case.judged, not case.tests),
+            "calibrated": _errors(found.data, case.judged, not case.tests),
+            "bias_only": _errors(None, case.judged, not case.tests, case.finger.data),
+        }
+        touched = [
+            f"{event.recording}: {event.start:.2f} to {event.end:.2f} s: {event.description}; left out of the fit"
+            for event in found.events
+        ]
+        return {"finger": found.data, "error": error, "warnings": [*found.warnings, *touched]}
+
+    def _tune(self, fitted: dict[str, Any], step: Callable[[float], None]) -> dict[str, Any]:
+        case, options = self._case, self._options
+        tuning = ContactTuning(
+            _described(fitted["finger"], case.finger.path),
+            false_alarms_per_hour=options.false_alarms_per_hour,
+            confidence=options.confidence,
+            kinematics=options.kinematics,
+            progress=lambda done, total: step(done / max(total, 1)),
+        )
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", TuneWarning)  # they are in the report
+            tuning.tune([_free(each) for each in (*case.free, *case.tests)])
+        report = tune_report(tuning)
+        keys = ("method", "false_alarms_per_hour", "confidence", "minutes", "held_out", "closed_loop", "pretensions")
+        return {
+            "finger": tuning.description_.data,
+            "warnings": report["warnings"],
+            **{key: report[key] for key in keys},
+            "smallest_torque": smallest_torque(tuning),
+        }
+
+    def _score(self, tuned: dict[str, Any], left: Sequence[float], step: Callable[[float], None]) -> dict[str, Any]:
+        file = self._folder / ".steps" / "tuned.json"
+        file.write_text(description_text(tuned["finger"]), encoding="utf-8")
+        scored = score_recordings(
+            file,
+            self._case.pushes,
+            kinematics=self._options.kinematics,
+            seed=self._options.seed,
+            progress=lambda done, total: step(done / max(total, 1)),
+        )
+        report = score_report(scored)
+        keys = (
+            "events",
+            "found",
+            "false_alarms",
+            "free_minutes",
+            "median_delay_s",
+            "found_share",
+            "free_rms",
+            "overhang",
+        )
+        return {
+            **{key: report[key] for key in keys},
+            "sizes": by_size(scored, left),
+            "warnings": list(scored.warnings),
+        }
+
+
+# --- parts ------------------------------------------------------------------------------------------------------------
+
+
+def _structure(found: Diagnosis) -> dict[str, Any]:
+    shown = ("title", "place", "size", "gain", "explanation")
+    return {
+        "verdict": found.verdict,
+        "causes": [{key: card[key] for key in shown} for card in cards_of(found, names_of(found))[: len(found.causes)]],
+        "signals": found.signals,
+        "smoothing": {"cutoff": found.smoothing.cutoff, "every": found.smoothing.every},
+        "recordings": [Path(each).name for each in found.recordings],
+        "tests": [Path(each).name for each in found.tests],
+        "unexplained": found.unexplained.description,
+        "next_experiment": found.experiment.sentence if found.experiment.motion else "",
+        "nominal": found.nominal_data,
+        "extended": found.extended_data,
+        "warnings": list(found.warnings),
+    }
+
+
+def _described(data: Data, path: Path) -> FingerDescription:
+    text = json.dumps(data).encode()
+    return FingerDescription(path, text, data, native.image_from_json(text))
+
+
+def _errors(
+    data: Data | None, recordings: Sequence[FitRecording], held_out: bool, settings: Data | None = None
+) -> list[float]:
+    """[n] N·m: rms of r on the samples that nothing was fitted to. data None: of no friction, with these settings."""
+    found, masks = [], []
+    for each in recordings:
+        left = residuals(settings or {}, each, None).residual if data is None else residual_of(data, each)
+        found.append(left)
+        masks.append((each.held_out if held_out else each.tracked) & np.isfinite(left).all(axis=1))
+    return list(rms(np.concatenate(found), np.concatenate(masks)))
+
+
+def _free(recording: FitRecording) -> Recording:
+    """Without what tells of contact: there is none in free motion."""
+    return replace(recording.recording, contact=None)
+
+
+def smallest_torque(tuning: ContactTuning) -> dict[str, list[float]]:
+    """[n] N·m by joint: the sudden change that exceeds the bounds in half of the time, and in nine tenths of it."""
+    name = "innovation" if "innovation" in tuning.bounds_ else "residual"
+    bound, search = tuning.bounds_[name], tuning.searches_[name]
+    whole = bound.own(tuning.cells_.force)
+    whole = whole + bound.stuck_share * search.mean_stuck + bound.jump_share * search.mean_jump
+    return {
+        "median": [float(value) for value in np.quantile(whole, 0.5, axis=0)],
+        "nine_tenths": [float(value) for value in np.quantile(whole, 0.9, axis=0)],
+    }
+
+
+def _recording(each: FitRecording) -> dict[str, Any]:
+    return {"path": str(each.path), "minutes": each.duration / 60.0, "mean_force": each.mean_force}
+
+
+def _next(lacks: Mapping[str, Any], tuned: Mapping[str, Any]) -> list[str]:
+    """What to record, the most useful first."""
+    found = []
+    limit, wished = tuned["closed_loop"]["limit"], tuned["false_alarms_per_hour"]
+    if limit is None or not math.isfinite(limit) or limit > wished:
+        found.append("more free motion, so that the rate of false alarms can be lower")
+    if len(tuned["pretensions"]) == 1:
+        found.append("the same motion at another pretension: what grows with the force is not known yet")
+    if lacks["next_experiment"]:
+        found.append(lacks["next_experiment"])
+    return found

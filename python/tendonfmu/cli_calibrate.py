@@ -1,0 +1,76 @@
+"""The command that leads from free motion to a tuned FMU: `register` adds it to the program of `cli.py`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tendonfmu.console import PhaseDisplay, print_tables, say
+from tendonfmu.several_values import SeveralValues
+
+
+def register(app: typer.Typer) -> None:
+    """Adds the command."""
+    app.command(cls=SeveralValues)(calibrate)
+
+
+def calibrate(
+    finger: Annotated[Path, typer.Argument(metavar="FINGER.json", help="finger description, its structure as given")],
+    recordings: Annotated[
+        list[Path], typer.Argument(metavar="FREE", help="free motion at several pretensions, .csv or .parquet")
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder for page, finger and FMU")],
+    test: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FREE",
+            help="free motion that the errors are measured on; may be repeated, or several at once after the "
+            "recordings \\[default: parts of the recordings]",
+        ),
+    ] = None,
+    pushes: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="LABELLED", help="with labelled contact: what is found is counted; as --test"),
+    ] = None,
+    false_alarms_per_hour: Annotated[
+        float, typer.Option(min=1e-3, max=3600.0, metavar="RATE", help="at most, in free motion like the recorded one")
+    ] = 6.0,
+    confidence: Annotated[float, typer.Option(min=0.5, max=0.9999, help="that the rate is at most that")] = 0.9,
+    kinematics: Annotated[
+        int,
+        typer.Option(
+            min=1, max=3, help="1: tendon positions, 2: measured joint positions, 3: joint positions and velocities"
+        ),
+    ] = 1,
+    seed: Annotated[int, typer.Option(min=0, max=2**53, help="of all that is drawn at random")] = 0,
+    jobs: Annotated[int, typer.Option(min=1, max=64, help="processor cores to use; the result is the same")] = 1,
+    progress: Annotated[
+        bool | None, typer.Option("--progress/--no-progress", help="progress bar; by default on a terminal")
+    ] = None,
+) -> None:
+    """From free motion to a tuned FMU: what the model lacks, all its numbers, and what decides on contact.
+
+    DIR gets the page calibration.html, finger.json, finger.fmu, calibration.json and the diagnosis. A call that is
+    repeated with the same files goes on where the one before ended.
+    """
+    from tendonfmu.calibration import Options
+    from tendonfmu.calibration import calibrate as run
+    from tendonfmu.calibration_files import check_folder, write_calibration
+    from tendonfmu.calibration_text import lines, tables
+
+    tests, labelled = test or [], pushes or []
+    check_folder(output, [finger, *recordings, *tests, *labelled])
+    options = Options(kinematics, false_alarms_per_hour, confidence, seed, jobs)
+    with PhaseDisplay(progress) as display:
+        found = run(finger, recordings, output, tests=tests, pushes=labelled, options=options, progress=display)
+        display.note("writing the files")
+        written = write_calibration(found, output)
+    for sentence in found.report["warnings"]:
+        say(f"tendonfmu: warning: {sentence}")
+    if found.report["steps"]["repeated"]:
+        say(f"unchanged, not done again: {', '.join(found.report['steps']['repeated'])}")
+    print_tables(tables(found.report), lines(found.report), left="model")
+    for path, what in written.items():
+        say(f"{path}: {what}")
