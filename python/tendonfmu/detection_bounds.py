@@ -25,7 +25,7 @@ Flags = NDArray[np.bool_]
 SHARES = ((0.4, 0.4),)
 TAILS = (4.0, 16.0)  # times the wished rate: how far out the tails are that shape a bound
 COMPARED = 12  # alarms at which bounds are compared, if fewer are allowed: single extremes say little of a shape
-_LEAST = 0.02  # of a signal's rms; a base is never smaller
+_LEAST = 0.02  # of a signal's rms; the part of a bound that is not friction is nowhere smaller
 WORTH_STUCK, WORTH_JUMP = 0.25, 5.0  # parts of H and J that stand in the way of a push, see `Search.in_the_way`
 _EVERY = 10  # every so many'th cell for the mean logarithm
 _FACTORS = (0.9, 1.1)
@@ -49,6 +49,10 @@ class Bound:
     def own(self, force: Numbers) -> Numbers:
         """[c, n] N·m: base + per_force·f, at mean forces [c]."""
         return np.asarray(self.base + force[:, None] * self.per_force)
+
+    def at_least(self, least: Numbers, force: float) -> Bound:
+        """With bases raised until every joint's own part is at least `least` [n] N·m at a mean force and above it."""
+        return replace(self, base=np.maximum(self.base, least - force * self.per_force))
 
 
 @dataclass(frozen=True)
@@ -91,7 +95,7 @@ class Search:
     """What a search needs of all counted samples: [n, N] signal, H, J and L·u in N·m, and means [c, n] of
     each cell; mean_square of the signal.
 
-    rate: 1/h, of alarms. least: [n] N·m, of a base. shares: pairs to try.
+    rate: 1/h, of alarms. least: [n] N·m, of base + per_force·f at any recorded force f.
     """
 
     cells: Cells
@@ -119,6 +123,17 @@ class Search:
     def statistic(self, bound: Bound) -> Numbers:
         """[c] largest ratio over joints of the excess to base + per_force·f; above 1 is an alarm."""
         return statistic(self.excess(bound.stuck_share, bound.jump_share), bound, self.cells.force)
+
+    def sound(self, bound: Bound) -> Bound:
+        """The bound, raised where its own part falls below `least` at a recorded force."""
+        return bound.at_least(self.least, float(self.cells.force.min()))
+
+    def least_factor(self, bound: Bound) -> float:
+        """The smallest factor on a sound bound that keeps it sound, at most 1 but for rounding.
+
+        Where friction alone explains the signal the excess is negative, and so is the level that alarms ask for.
+        """
+        return float(np.max(self.least / bound.own(self.cells.force.min(keepdims=True))[0]))
 
     def in_the_way(self, bound: Bound, rows: Any) -> Numbers:
         """[k, n] N·m: what a push has to pass in each of the cells in rows.
@@ -203,7 +218,7 @@ def _best_tail(search: Search, pair: tuple[float, float], over: Signal, subset: 
     found: Choice | None = None
     for tail in TAILS:
         force, level = tail_levels(search.cells, over, subset, tail * search.rate)
-        shape = Bound(*lines_through(force, np.maximum(level, search.least)), *pair)
+        shape = search.sound(Bound(*lines_through(force, np.maximum(level, search.least)), *pair))
         bound, worth = _at_level(search, shape, over, subset, allowed)
         if found is None or worth < found.mean_log:
             found = Choice(bound, worth, [])
@@ -214,7 +229,7 @@ def _best_tail(search: Search, pair: tuple[float, float], over: Signal, subset: 
 def _at_level(search: Search, shape: Bound, over: Signal, subset: Flags, allowed: int) -> tuple[Bound, float]:
     """A shape at the least level with the allowed alarms, and the mean logarithm of what it finds."""
     level = level_for(statistic(over, shape, search.cells.force[subset]), search.cells.order[subset], allowed)
-    return _worth(search, shape.scaled(max(level, 1e-6)), subset)
+    return _worth(search, shape.scaled(max(level, search.least_factor(shape))), subset)
 
 
 def _worth(search: Search, bound: Bound, subset: Flags) -> tuple[Bound, float]:
@@ -240,7 +255,7 @@ def _refined(search: Search, choice: Choice, over: Signal, subset: Flags, allowe
             scale[j] = factor
             shape = replace(best.bound, base=scale * best.bound.base, per_force=scale * best.bound.per_force)
             level = level_for(statistic(over, shape, force), order, allowed)
-            bound, worth = _worth(search, shape.scaled(max(level, 1e-6)), subset)
+            bound, worth = _worth(search, shape.scaled(max(level, search.least_factor(shape))), subset)
             if worth < best.mean_log:
                 best = replace(best, bound=bound, mean_log=worth)
         if before - best.mean_log < 1e-3:

@@ -30,7 +30,7 @@ class Line:
     """A way to an alarm: a signal and its bound, at the number of alarms at which shapes are compared.
 
     statistic: [c] by how much the base has to be scaled for no alarm in a cell. held: the same by the bound that was
-    chosen on the other half of the blocks.
+    chosen on the other half of the blocks. least: the smallest factor that leaves a bound (`Search.least_factor`).
     """
 
     bound: Bound
@@ -38,6 +38,7 @@ class Line:
     statistic: Numbers
     held: Numbers
     tried: Sequence[Tried]
+    least: float = 0.0
 
     @property
     def shares(self) -> list[tuple[float, float]]:
@@ -91,14 +92,14 @@ def _line(search: Search, choices: Sequence[Choice]) -> Line:
     fold = search.cells.fold
     # what was chosen on fold 0 is counted on fold 1
     held = np.where(fold == 1, search.statistic(first), search.statistic(second))
-    return Line(whole, (first, second), search.statistic(whole), held, choices[0].tried)
+    return Line(whole, (first, second), search.statistic(whole), held, choices[0].tried, search.least_factor(whole))
 
 
 def level_of(line: Line, cells: Cells, allowed: int, others: Index | None = None, held: Index | None = None) -> Level:
     """others, held: cells in which another line alarms anyway, in sample and held out."""
     return Level(
-        in_sample=level_for(line.statistic, cells.order, allowed, others),
-        held_out=level_for(line.held, cells.order, allowed, held),
+        in_sample=max(level_for(line.statistic, cells.order, allowed, others), line.least),
+        held_out=max(level_for(line.held, cells.order, allowed, held), line.least),
     )
 
 
@@ -118,7 +119,8 @@ def evidence_line(search: Search, line: Line, parts: Sequence[FreePart], time: f
             critical[alarm] = above  # the next scale is without an alarm there
         found.append(critical)
     whole, first, second = found
-    return Line(line.bound, line.halves, whole, np.where(search.cells.fold == 1, first, second), line.tried)
+    held = np.where(search.cells.fold == 1, first, second)
+    return Line(line.bound, line.halves, whole, held, line.tried, line.least)
 
 
 def _sample_steps(cells: Cells, parts: Sequence[FreePart]) -> tuple[Numbers, Numbers, Index]:

@@ -20,6 +20,7 @@ Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 BINS = 8  # of mean force, within each pretension's cells
+_LEAST = 0.02  # of the residual's spread; a standard deviation is nowhere smaller at the recorded forces
 _TINY = 1e-30
 
 
@@ -160,12 +161,15 @@ def _calibrated(left: Numbers, other: Numbers, cells: Cells, rows: Flags) -> tup
     for j in range(joints):
         square, known = left[rows, j], np.maximum(other[rows, j], _TINY)
         spread = np.array([np.sqrt(square[group == g].mean()) for g in present])
-        shape = _line(at, np.maximum(spread, 1e-9))
+        line, per = _line(at, np.maximum(spread, 1e-9))
+        shape = (max(line, _LEAST * float(spread.min()) - per * float(force.min()), 1e-9), per)
 
         def surplus(scale: float, square: Numbers = square, known: Numbers = known, shape: Any = shape) -> float:
             return float(np.mean(square / (known + (scale * (shape[0] + shape[1] * force)) ** 2))) - 1.0
 
         too_wide[j] = surplus(0.0) <= 0
-        scale = 0.0 if too_wide[j] else brentq(surplus, 0.0, 10.0, xtol=1e-6)
+        # with this scale the mean is 1 even if nothing else is known
+        most = float(np.sqrt(np.mean(square / (shape[0] + shape[1] * force) ** 2)))
+        scale = 0.0 if too_wide[j] else brentq(surplus, 0.0, most * (1.0 + 1e-9), xtol=1e-6 * most)
         base[j], per_force[j] = scale * shape[0], scale * shape[1]
     return base, per_force, too_wide
