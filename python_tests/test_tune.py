@@ -39,7 +39,7 @@ from tendonfmu.free_motion import FreePart, FreeRun
 from tendonfmu.native import Finger
 from tendonfmu.tables import read_table, write_table
 from tendonfmu.tuning_level import Line, evidence_line, given_line, level_of, searched_line
-from tendonfmu.tuning_noise import bias_noise, drift_variance, time_constant
+from tendonfmu.tuning_noise import bias_noise, deviation, drift_variance, time_constant
 
 ROOT = Path(__file__).resolve().parents[1]
 INDEX = ROOT / "examples" / "fingers" / "index_finger.json"
@@ -267,12 +267,61 @@ def test_the_alarms_are_those_of_the_finger(tuned: tuple[Path, str, str]) -> Non
         assert part["at_start"] == sum(t < 2.0 for t in begins)
 
 
-def test_too_little_motion_is_refused_with_what_is_missing(call: Call) -> None:
-    answer = call("tune", INDEX, FREE, "-o", "t.json")
+def test_little_motion_is_tuned_for_the_rate_that_it_supports(call: Call) -> None:
+    answer = call("tune", INDEX, FREE, "-o", "t.json", "--report", "r.json")
+    assert answer.status == 0 and Path("t.json").exists(), answer
+    report = json.loads(Path("r.json").read_text())
+    schema = json.loads(files_of("tendonfmu").joinpath("schema", "tune_report.schema.json").read_text())
+    jsonschema.validate(report, schema, cls=jsonschema.Draft202012Validator)
+    hours = report["minutes"] / 60
+    assert report["tuned_for_per_hour"] == pytest.approx(rate_limit(0, hours, 0.9)) and report["allowed_alarms"] == 0
+    assert report["more_minutes"] == pytest.approx(60 * (least_hours(6.0, 0.9) - hours))
+    said = next(line for line in answer.err.splitlines() if "false alarms an hour" in line)
+    assert re.search(r"at most 143 false alarms an hour with 90 % confidence; 22\.\d min more for 6", said)
+    assert report["closed_loop"]["alarms"] == 0 and report["held_out"]["alarms"] == 0
+    # one pretension: thresholds are constants, and the forces that they hold for are said
+    held = report["holds_for"]
+    assert held["pretensions"] == 1 and 9 < held["lowest_force"] < held["highest_force"] < 11
+    said = next(line for line in answer.err.splitlines() if "one pretension" in line)
+    assert f"{held['lowest_force']:.3g} to {held['highest_force']:.3g} N" in said
+    assert not any(report["contact"]["innovation"]["threshold_per_force"])
+
+
+def test_too_little_motion_is_refused_where_that_is_asked_for(call: Call) -> None:
+    answer = call("tune", INDEX, FREE, "-o", "t.json", "--strict")
     assert answer.status == 1 and not Path("t.json").exists() and len(answer.err.splitlines()) == 1, answer
     more = float(re.findall(r"([0-9.]+) min more", answer.err)[0])
     assert more == pytest.approx(60 * least_hours(6.0, 0.9) - 58 / 60, abs=0.1)
     assert "at 9.97 N" in answer.err or "at 10 N" in answer.err
+
+
+def test_friction_that_explains_everything_leaves_a_threshold() -> None:
+    """Signals far below the share of stiction: the level that alarms ask for is negative, the bound is not."""
+    runs, cells = made_up(0, hours=0.05)
+    for run in runs:
+        run.stuck[:] = 1.0
+    search = search_for(runs, cells, "innovation", 60.0)
+    line = searched_line(search, 10)
+    level = level_of(line, cells, 10)
+    own = line.bound.scaled(level.factor).own(cells.force)
+    rms = np.sqrt(search.mean_square.mean(axis=0))
+    assert (search.excess(*SHARES[0]) < 0).all()
+    assert (own >= 0.02 * rms * (1 - 1e-9)).all()
+    # and it is no higher than that at one joint: nothing asks for more
+    assert (own.min(axis=0) / (0.02 * rms)).min() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("low", [1e-3, 1.0])
+def test_a_standard_deviation_is_found_for_any_growth_with_the_force(low: float) -> None:
+    """Residuals that fall with the force fit no line that rises: the mean of r²/std² is 1 nevertheless."""
+    runs, cells = made_up(0, hours=0.05)
+    draws = np.random.default_rng(2)
+    for run, spread in zip(runs, (1.0, low, low), strict=True):
+        run.residual[:] = spread * draws.standard_normal(run.residual.shape)
+    found = deviation(runs, cells, Bound(np.ones(2), np.zeros(2)))
+    square = cells.mean(np.concatenate([run.residual.T**2 for run in runs], axis=1))
+    std = found.base + cells.force[:, None] * found.per_force
+    assert (square / std**2).mean(axis=0) == pytest.approx(np.ones(2), rel=1e-3)
 
 
 @pytest.fixture(scope="module")

@@ -47,21 +47,26 @@ def tune(
     report: Annotated[Path | None, typer.Option(metavar="R.json", help="everything that is known of it")] = None,
     figures: Annotated[Path | None, typer.Option(metavar="DIR", help="folder for figures")] = None,
     kinematics: Kinematics = 1,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="exit 1 and no file if there is too little free motion for RATE")
+    ] = False,
     progress: Annotated[
         bool | None, typer.Option("--progress/--no-progress", help="progress bar; by default on a terminal")
     ] = None,
 ) -> None:
     """Choose what decides on contact, from free motion, for a stated rate of false alarms.
 
-    Noise and drift of the bias, bounds of the detection and the standard deviation of the estimated torque. Exit 1, and
-    no file, when there is too little free motion for the rate: it says how much more is needed.
+    Noise and drift of the bias, bounds of the detection and the standard deviation of the estimated torque. With too
+    little free motion for the rate it tunes for the rate that there is enough for, and says which and how much more is
+    needed; with --strict it exits with 1 and writes no file.
     """
     import warnings
 
-    from tendonfmu.detection_tuning import ContactTuning, NotEnough, TuneWarning
+    from tendonfmu.detection_tuning import ContactTuning, TuneWarning
     from tendonfmu.fit_files import check_outputs, write_text
     from tendonfmu.tune_report import build_report, report_text
     from tendonfmu.tune_text import lines, tables
+    from tendonfmu.tuning_support import NotEnough
 
     check_outputs(output, report, figures, [finger, *recordings])
     with progress_bar(progress) as bar:
@@ -74,6 +79,7 @@ def tune(
             bias_time=bias_time,
             release_time=release_time,
             kinematics=kinematics,
+            strict=strict,
             progress=lambda done, total: bar.update(task, completed=done, total=total),
         )
         try:

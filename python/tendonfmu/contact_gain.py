@@ -117,7 +117,12 @@ def _pieces(recording: Recording, contact: Flags) -> list[Recording]:
 def _tuned(data: Data, free: Sequence[Recording], kinematics: int, rate: float) -> Data:
     method = str((data["contact"] or {}).get("method") or "innovation")
     tuning = ContactTuning(
-        _described(data), false_alarms_per_hour=rate, confidence=CONFIDENCE, method=method, kinematics=kinematics
+        _described(data),
+        false_alarms_per_hour=rate,
+        confidence=CONFIDENCE,
+        method=method,
+        kinematics=kinematics,
+        strict=True,
     )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", TuneWarning)

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu import native
-from tendonfmu.alarm_level import alarms_above, allowed_alarms, cells_of, least_hours, rate_limit
+from tendonfmu.alarm_level import alarms_above, cells_of, least_hours, rate_limit
 from tendonfmu.constructor_arguments import ConstructorArguments
 from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.detection_bounds import Bound, Search, search_for
@@ -35,6 +35,7 @@ from tendonfmu.recording import Recording, read_recording
 from tendonfmu.tuned_loop import LoopAlarms, count_loop
 from tendonfmu.tuning_level import SECOND_SHARE, Level, Line, evidence_line, given_line, level_of, searched_line
 from tendonfmu.tuning_noise import BiasNoise, Deviation, bias_noise, deviation, wanted_time
+from tendonfmu.tuning_support import NotEnough, hours_by_pretension, supported
 
 Numbers = NDArray[np.float64]
 Source = str | os.PathLike[str] | Recording
@@ -53,14 +54,6 @@ _DIGITS = 6
 
 class TuneWarning(UserWarning):
     """What a tuning has to say about its recordings and its result."""
-
-
-class NotEnough(InputError):
-    """Too little free motion for the rate. more: minutes that are missing."""
-
-    def __init__(self, message: str, more: float) -> None:
-        super().__init__(message)
-        self.more = more
 
 
 @dataclass(frozen=True)
@@ -84,11 +77,13 @@ class ContactTuning(ConstructorArguments):
     bias_time: s, time constant of the bias; None: as in the description, at the recordings' mean force.
     release_time: s in contact after which the bias learns again; math.inf: never.
     kinematics: 1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
+    strict: too little free motion for the rate is refused; else the tuning is for the rate that it supports.
     innovation_time, jump_time, stuck_time, evidence_time: s, written as such. progress: called with (steps done, all).
 
     After `tune`: description_ (tuned), bias_, lines_, levels_, bounds_ (by "innovation" and "residual"), deviation_,
-    cells_, runs_, pretensions_, held_out_ (alarms, 1/h upper limit), loop_ (alarms of the finger as it runs), allowed_,
-    hours_, level_raised_, warnings_, seconds_.
+    cells_, runs_, pretensions_, held_out_ (alarms, 1/h upper limit), loop_ (alarms of the finger as it runs), rate_
+    (1/h that it is tuned for), more_minutes_ (missing for the wished rate), allowed_, hours_, forces_ (N, the lowest
+    and the highest recorded mean force), level_raised_, warnings_, seconds_.
     """
 
     def __init__(
@@ -101,6 +96,7 @@ class ContactTuning(ConstructorArguments):
         bias_time: float | None = None,
         release_time: float = RELEASE_TIME,
         kinematics: int = 1,
+        strict: bool = False,
         innovation_time: float = INNOVATION_TIME,
         jump_time: float = JUMP_TIME,
         stuck_time: float = STUCK_TIME,
@@ -114,6 +110,7 @@ class ContactTuning(ConstructorArguments):
         self.bias_time = bias_time
         self.release_time = release_time
         self.kinematics = kinematics
+        self.strict = strict
         self.innovation_time = innovation_time
         self.jump_time = jump_time
         self.stuck_time = stuck_time
@@ -121,15 +118,18 @@ class ContactTuning(ConstructorArguments):
         self.progress = progress
 
     def tune(self, recordings: Source | Sequence[Source]) -> ContactTuning:
-        """Learns from recordings of free motion. Raises InputError: contact in them, or not sound; NotEnough."""
+        """Learns from recordings of free motion.
+
+        Raises InputError: contact in them, or not sound; NotEnough: no free motion, or with `strict` too little.
+        """
         begin = perf_counter()
         self._check_options()
         self.start_ = _read(self.finger)
         parts = self._parts(_listed(recordings))
         self.hours_ = sum(part.hours for part in parts)
-        self.allowed_ = allowed_alarms(self.hours_, self.false_alarms_per_hour, self.confidence)
         self.cells_ = cells_of(parts)
-        self._refuse_too_little()
+        self.forces_ = (float(self.cells_.force.min()), float(self.cells_.force.max()))
+        self._support()
         self._run(parts)
         self._choose()
         self._close_the_loop(parts)
@@ -174,27 +174,10 @@ class ContactTuning(ConstructorArguments):
             raise NotEnough("no free motion beyond the first 2 s of a recording; expected minutes of it", 0.0)
         return parts
 
-    def _refuse_too_little(self) -> None:
-        if self.allowed_ >= 0:
-            return
-        needed = least_hours(self.false_alarms_per_hour, self.confidence)
-        share = needed / self.cells_.groups
-        thin = [(force, hours) for force, hours in self._hours_by_pretension() if hours < share]
-        where = ", ".join(f"{60 * (share - hours):.1f} min at {force:.3g} N" for force, hours in thin)
-        more = 60 * (needed - self.hours_)
-        raise NotEnough(
-            f"{60 * self.hours_:.1f} min of free motion: even without any alarm in them the rate may be "
-            f"{rate_limit(0, self.hours_, self.confidence):.3g} per hour at confidence {self.confidence:g}; expected "
-            f"{60 * needed:.1f} min for {self.false_alarms_per_hour:g} per hour, {more:.1f} min more (evenly: {where})",
-            more,
-        )
-
-    def _hours_by_pretension(self) -> list[tuple[float, float]]:
-        cells = self.cells_
-        return [
-            (float(cells.force[cells.group == g].mean()), float(cells.hours[cells.group == g].sum()))
-            for g in range(cells.groups)
-        ]
+    def _support(self) -> None:
+        found = supported(self.cells_, self.hours_, self.false_alarms_per_hour, self.confidence, self.strict)
+        self.rate_, self.allowed_, self.more_minutes_ = found.rate, found.allowed, found.more
+        self.warnings_ += [found.sentence] if found.sentence else []
 
     # --- bias, bounds, levels -----------------------------------------------------------------------------------------
 
@@ -220,8 +203,7 @@ class ContactTuning(ConstructorArguments):
         uncertainty = contact.get("uncertainty_level")
         level = 3.0 if uncertainty is None else float(uncertainty)
         second = self.allowed_ // SECOND_SHARE
-        rate = self.false_alarms_per_hour
-        slow = search_for(self.runs_, self.cells_, "residual", rate, level)
+        slow = search_for(self.runs_, self.cells_, "residual", self.rate_, level)
         self.searches_: dict[str, Search] = {"residual": slow}
         self.lines_: dict[str, Line] = {}
         self.levels_: dict[str, Level] = {}
@@ -231,7 +213,7 @@ class ContactTuning(ConstructorArguments):
             self.lines_["residual"] = given_line(slow, [pair] * 3, self.allowed_)
             self.levels_["residual"] = level_of(self.lines_["residual"], self.cells_, self.allowed_)
             return
-        fast = search_for(self.runs_, self.cells_, "innovation", rate)
+        fast = search_for(self.runs_, self.cells_, "innovation", self.rate_)
         line = searched_line(fast, self.allowed_, self._tick)
         self.lines_["residual"] = behind = given_line(slow, line.shares, second)
         self.levels_["residual"] = above = level_of(behind, self.cells_, second)
@@ -323,7 +305,7 @@ class ContactTuning(ConstructorArguments):
     def _by_pretension(self) -> list[Pretension]:
         found = []
         square = self.searches_["residual"].mean_square
-        for g, (force, hours) in enumerate(self._hours_by_pretension()):
+        for g, (force, hours) in enumerate(hours_by_pretension(self.cells_)):
             rows = self.cells_.group == g
             alarms = sum(each.alarms_in(self.cells_, g) for each in self.loop_)
             rms = [float(value) for value in np.sqrt(square[rows].mean(axis=0))]
@@ -347,7 +329,7 @@ class ContactTuning(ConstructorArguments):
 
     def _sentences(self) -> list[str]:
         found = []
-        least = least_hours(self.false_alarms_per_hour, self.confidence)
+        least = least_hours(self.rate_, self.confidence)
         for each in self.pretensions_:
             if each.hours < least and len(self.pretensions_) > 1:
                 found.append(
@@ -356,9 +338,11 @@ class ContactTuning(ConstructorArguments):
                     "min more they might"
                 )
         if len(self.pretensions_) == 1:
+            low, high = self.forces_
             found.append(
                 f"one pretension, {self.pretensions_[0].force:.3g} N: what grows with the force is not known, "
-                "thresholds and noise are constants; expected recordings at several pretensions"
+                f"thresholds are constants and hold for mean tendon forces of {low:.3g} to {high:.3g} N; below they "
+                "miss more, above they raise more false alarms; expected recordings at several pretensions"
             )
         start = sum(each.at_start for each in self.loop_)
         if start:

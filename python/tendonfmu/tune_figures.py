@@ -111,7 +111,7 @@ def tail_figure(tuning: ContactTuning) -> TailFigure:
         held_out=np.array([each.value for each in rates]),
         low=np.array([each.low for each in rates]),
         high=np.array([each.high for each in rates]),
-        wished=tuning.false_alarms_per_hour,
+        wished=tuning.rate_,
         limit=rate_limit(tuning.held_out_[0], tuning.hours_, tuning.confidence),
         confidence=tuning.confidence,
         least=1.0 / tuning.hours_,
@@ -126,7 +126,7 @@ def bound_figure(tuning: ContactTuning) -> BoundFigure:
     name = _main(tuning)
     search, bound, cells = tuning.searches_[name], tuning.bounds_[name], tuning.cells_
     over = search.excess(bound.stuck_share, bound.jump_share)
-    at, levels = tail_levels(cells, over, np.ones(len(cells.order), dtype=bool), tuning.false_alarms_per_hour)
+    at, levels = tail_levels(cells, over, np.ones(len(cells.order), dtype=bool), tuning.rate_)
     added = bound.stuck_share * search.mean_stuck + bound.jump_share * search.mean_jump
     friction = np.array([added[cells.group == g].mean(axis=0) for g in range(cells.groups)])
     force = np.linspace(0.0, 1.1 * float(at.max()), 60)

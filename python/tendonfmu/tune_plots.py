@@ -29,7 +29,7 @@ def draw_tail(data: TailFigure, target: Target) -> None:
     axes.text(
         float(data.factors[-1]),
         data.wished,
-        f"wished: {data.wished:g} per hour",
+        f"tuned for {data.wished:.3g} per hour",
         ha="right",
         va="bottom",
         color=VERMILION,

@@ -29,6 +29,9 @@ def build_report(tuning: ContactTuning) -> dict[str, Any]:
         "method": tuning.method,
         "false_alarms_per_hour": tuning.false_alarms_per_hour,
         "confidence": tuning.confidence,
+        "tuned_for_per_hour": tuning.rate_,
+        "more_minutes": tuning.more_minutes_,
+        "holds_for": _holds_for(tuning),
         "minutes": 60.0 * tuning.hours_,
         "allowed_alarms": tuning.allowed_,
         "warnings": list(tuning.warnings_),
@@ -45,6 +48,12 @@ def build_report(tuning: ContactTuning) -> dict[str, Any]:
         "seconds": tuning.seconds_,
     }
     return {key: finite(value) for key, value in found.items()}
+
+
+def _holds_for(tuning: ContactTuning) -> dict[str, Any]:
+    """Mean tendon forces (N) that the thresholds were chosen on, and whether anything is known of their growth."""
+    low, high = tuning.forces_
+    return {"lowest_force": low, "highest_force": high, "pretensions": len(tuning.pretensions_)}
 
 
 def report_text(report: Mapping[str, Any]) -> str:

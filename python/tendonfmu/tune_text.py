@@ -67,8 +67,10 @@ def lines(tuning: ContactTuning) -> Iterator[str]:
         yield f"longest alarm {longest:.3g} s; {100 * share:.2g} % of the time in alarm"
     yield (
         f"held out: {held} in blocks that the bounds were not chosen on, at most {limit:.3g} per hour; "
-        f"{tuning.allowed_} are allowed for {tuning.false_alarms_per_hour:g}"
+        f"{tuning.allowed_} are allowed for {tuning.rate_:.3g}"
     )
+    low, high = tuning.forces_
+    yield f"chosen at mean tendon forces of {low:.3g} to {high:.3g} N; beyond them thresholds are extrapolated"
     bias = tuning.bias_
     yield (
         f"bias: noise {1e3 * bias.noise_std:.3g} mN·m + {1e3 * bias.noise_std_per_force:.3g} mN·m per N, "
