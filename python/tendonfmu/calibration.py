@@ -12,7 +12,6 @@ stay in the folder, so that a call that is repeated goes on where the one before
 from __future__ import annotations
 
 import json
-import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -24,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu import native
-from tendonfmu.calibrated_fit import fit_all
+from tendonfmu.calibrated_fit import CalibratedFit, fit_all
 from tendonfmu.calibration_parts import stretches_for_diagnosis
 from tendonfmu.calibration_steps import Steps, digest_of_file
 from tendonfmu.description import FingerDescription, read_finger
@@ -83,9 +82,15 @@ class Options:
     seed: int = 0
     jobs: int = 1
 
-    def entry(self) -> dict[str, Any]:
-        """What shapes the result."""
-        return {name: value for name, value in vars(self).items() if name != "jobs"}
+    @property
+    def of_alarms(self) -> dict[str, float]:
+        """What shapes the thresholds alone."""
+        return {"false_alarms_per_hour": self.false_alarms_per_hour, "confidence": self.confidence}
+
+    @property
+    def of_all(self) -> dict[str, int]:
+        """What shapes all results."""
+        return {"kinematics": self.kinematics, "seed": self.seed}
 
 
 def calibrate(
@@ -165,7 +170,7 @@ class _Run:
 
     def __init__(self, case: _Case, folder: Path, options: Options, phases: Phases) -> None:
         self._case, self._folder, self._options, self._phases = case, folder, options, phases
-        self._steps = Steps(folder, {**case.made_from, **options.entry()})
+        self._steps = Steps(folder, {**case.made_from, **options.of_all})
         self._seconds: dict[str, float] = {}
 
     def report(self) -> tuple[dict[str, Any], Data]:
@@ -173,7 +178,9 @@ class _Run:
         case, steps = self._case, self._steps
         lacks = self._step("what the model lacks", "diagnosis", {}, self._diagnosis)
         fitted = self._step("all its numbers", "fit", {}, lambda step: self._fit(lacks))
-        tuned = self._step("thresholds of contact", "tune", {}, lambda step: self._tune(fitted, step))
+        tuned = self._step(
+            "thresholds of contact", "tune", self._options.of_alarms, lambda step: self._tune(fitted, step)
+        )
         pushed = None
         if case.pushes:
             files = {"pushes": [(file.name, digest_of_file(file)) for file in case.pushes]}
@@ -198,7 +205,7 @@ class _Run:
                 *tuned["warnings"],
                 *([] if pushed is None else pushed["warnings"]),
             ],
-            "options": self._options.entry(),
+            "options": {**self._options.of_all, **self._options.of_alarms},
             "steps": {"seconds": self._seconds, "repeated": steps.repeated},
         }
         return report, tuned["finger"]
@@ -239,28 +246,33 @@ class _Run:
         return _structure(found)
 
     def _fit(self, lacks: dict[str, Any]) -> dict[str, Any]:
-        case, options = self._case, self._options
-        extended = _described(lacks["extended"], case.finger.path)
-        found = fit_all(
-            extended,
-            case.free,
-            Signals(**lacks["smoothing"]),
-            FitSettings(threads=options.jobs, path=case.finger.path),
-            given=case.finger.data,
-            seed=options.seed,
-        )
+        case = self._case
+        held_out = not case.tests
+        nominal, found = (self._fitted(lacks, name) for name in ("nominal", "extended"))
         error = {
-            "held_out": not case.tests,
-            "as_given": _errors(case.finger.data, case.judged, not case.tests),
-            "fitted": _errors(lacks["nominal"], case.judged, not case.tests),
-            "calibrated": _errors(found.data, case.judged, not case.tests),
-            "bias_only": _errors(None, case.judged, not case.tests, case.finger.data),
+            "held_out": held_out,
+            "bias_only": _errors(None, case.judged, held_out, case.finger.data),
+            "as_given": _errors(case.finger.data, case.judged, held_out),
+            "fitted": _errors(nominal.data, case.judged, held_out),
+            "calibrated": _errors(found.data, case.judged, held_out),
         }
         touched = [
             f"{event.recording}: {event.start:.2f} to {event.end:.2f} s: {event.description}; left out of the fit"
             for event in found.events
         ]
         return {"finger": found.data, "error": error, "warnings": [*found.warnings, *touched]}
+
+    def _fitted(self, lacks: dict[str, Any], name: str) -> CalibratedFit:
+        """The nominal or the extended description, to all recordings."""
+        case, options = self._case, self._options
+        return fit_all(
+            _described(lacks[name], case.finger.path),
+            case.free,
+            Signals(**lacks["smoothing"]),
+            FitSettings(threads=options.jobs, path=case.finger.path),
+            given=case.finger.data,
+            seed=options.seed,
+        )
 
     def _tune(self, fitted: dict[str, Any], step: Callable[[float], None]) -> dict[str, Any]:
         case, options = self._case, self._options
@@ -275,7 +287,17 @@ class _Run:
             warnings.simplefilter("ignore", TuneWarning)  # they are in the report
             tuning.tune([_free(each) for each in (*case.free, *case.tests)])
         report = tune_report(tuning)
-        keys = ("method", "false_alarms_per_hour", "confidence", "minutes", "held_out", "closed_loop", "pretensions")
+        keys = (
+            "method",
+            "false_alarms_per_hour",
+            "tuned_for_per_hour",
+            "more_minutes",
+            "confidence",
+            "minutes",
+            "held_out",
+            "closed_loop",
+            "pretensions",
+        )
         return {
             "finger": tuning.description_.data,
             "warnings": report["warnings"],
@@ -372,9 +394,11 @@ def _recording(each: FitRecording) -> dict[str, Any]:
 def _next(lacks: Mapping[str, Any], tuned: Mapping[str, Any]) -> list[str]:
     """What to record, the most useful first."""
     found = []
-    limit, wished = tuned["closed_loop"]["limit"], tuned["false_alarms_per_hour"]
-    if limit is None or not math.isfinite(limit) or limit > wished:
-        found.append("more free motion, so that the rate of false alarms can be lower")
+    if tuned["more_minutes"]:
+        found.append(
+            f"{tuned['more_minutes']:.0f} min more of free motion: thresholds are then for "
+            f"{tuned['false_alarms_per_hour']:g} false alarms an hour in place of {tuned['tuned_for_per_hour']:.3g}"
+        )
     if len(tuned["pretensions"]) == 1:
         found.append("the same motion at another pretension: what grows with the force is not known yet")
     if lacks["next_experiment"]:

@@ -19,14 +19,14 @@ def stretches_for_diagnosis(
     free: Sequence[Recording], tests: Sequence[Recording]
 ) -> tuple[list[Recording], list[Recording]]:
     """Of each recording a stretch to find the structure in; of the tests, or of what is left of the recordings, one to
-    judge it on. Nothing to judge on where the recordings are short: a diagnosis then holds out parts of them.
+    judge it on. Short recordings are taken whole, with nothing to judge on: a diagnosis then holds out parts of them.
     """
     whole = sum(_seconds(each) for each in free)
     if tests:
         total = sum(_seconds(each) for each in tests)
         return _cut(free, 0.0, DIAGNOSED / whole), _cut(tests, 0.0, JUDGED / total)
-    if whole < 1.5 * (DIAGNOSED + JUDGED):
-        return _cut(free, 0.0, DIAGNOSED / whole), []
+    if whole < 2.0 * (DIAGNOSED + JUDGED):
+        return list(free), []
     return _cut(free, 0.0, DIAGNOSED / whole), _cut(free, 0.5, JUDGED / whole)
 
 

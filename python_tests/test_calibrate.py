@@ -1,0 +1,249 @@
+"""From free motion to a tuned FMU: what the folder holds, what is done again, and what the sentences say."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+from dataclasses import replace
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
+
+from tendonfmu import calibration
+from tendonfmu.calibration import Calibration, Options, calibrate
+from tendonfmu.calibration_files import write_calibration
+from tendonfmu.calibration_parts import DIAGNOSED, JUDGED, stretches_for_diagnosis
+from tendonfmu.calibration_steps import Steps
+from tendonfmu.calibration_text import size_rows, together, verdict
+from tendonfmu.errors import InputError
+from tendonfmu.recording import Recording, read_recording
+from tendonfmu.several_values import several_values
+from tendonfmu.tables import write_table
+
+Numbers = NDArray[np.float64]
+
+PUSH = 0.06  # N·m
+FINGER, FREE, UNSEEN = "two_joints.json", "two_joints_training.parquet", "two_joints_unseen.parquet"
+
+
+def pushed(recording: Recording, data: dict[str, Any]) -> tuple[dict[str, Numbers], int]:
+    """The recording as it would be with pushes of `PUSH` on joint 1 for 0.5 s every 3 s, and how many there are: the
+    forces that bear them, and springs stretched by these."""
+    arms = np.array([tendon["moment_arms"] for tendon in data["tendons"]])
+    stiffness = np.array([tendon["stiffness"] for tendon in data["tendons"]])
+    since = (recording.time - recording.time[0]) % 3.0
+    touched = (since >= 2.0) & (since < 2.5)
+    torque = np.zeros((len(recording), arms.shape[1]))
+    torque[:, 0] = PUSH * np.minimum((since - 2.0) / 0.02, 1.0) * touched
+    change = torque @ np.linalg.pinv(arms)
+    columns: dict[str, Numbers] = {"time": recording.time, "contact": touched.astype(float)}
+    force, position = (
+        recording.groups["tendon_force"] + change,
+        recording.groups["tendon_position"] + change / stiffness,
+    )
+    for i in range(len(stiffness)):
+        columns[f"tendon_force[{i + 1}]"] = force[:, i]
+        columns[f"tendon_position[{i + 1}]"] = position[:, i]
+    for j in range(arms.shape[1]):
+        columns[f"external_torque[{j + 1}]"] = torque[:, j]
+    return columns, int((np.diff(touched.astype(int)) == 1).sum())
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Finger, free motion, a test and pushes."""
+    found = tmp_path_factory.mktemp("finger")
+    with as_file(files("tendonfmu") / "data") as data:
+        for name in (FINGER, FREE, UNSEEN):
+            shutil.copy(data / name, found / name)
+    columns, _ = pushed(read_recording(found / UNSEEN), json.loads((found / FINGER).read_text()))
+    write_table(found / "pushes.parquet", columns)
+    return found
+
+
+@pytest.fixture(scope="module")
+def calibrated(folder: Path) -> tuple[Calibration, Path]:
+    """The result, and the folder that it is written to."""
+    out = folder / "out"
+    found = calibrate(
+        folder / FINGER, [folder / FREE], out, tests=[folder / UNSEEN], pushes=[folder / "pushes.parquet"]
+    )
+    write_calibration(found, out)
+    return found, out
+
+
+def test_the_missing_weight_is_built_in_and_the_error_falls(calibrated: tuple[Calibration, Path]) -> None:
+    report = calibrated[0].report
+    assert report["structure"]["verdict"] == "explained"
+    assert [each["title"] for each in report["structure"]["causes"]] == ["The link's weight"]
+    rms = {name: together(report["error"][name]) for name in ("bias_only", "as_given", "fitted", "calibrated")}
+    assert rms["bias_only"] > rms["as_given"] > rms["fitted"] > 1.2 * rms["calibrated"]
+
+
+def test_pushes_are_found(calibrated: tuple[Calibration, Path], folder: Path) -> None:
+    pushes = calibrated[0].report["pushes"]
+    _, count = pushed(read_recording(folder / UNSEEN), json.loads((folder / FINGER).read_text()))
+    assert pushes["events"] == count and pushes["found"] >= 0.9 * count and pushes["false_alarms"] == 0
+    assert sum(each["events"] for each in pushes["sizes"]) == count
+    assert pushes["sizes"][-1]["from"] == 6.0, "they are large"
+
+
+def test_little_motion_supports_a_higher_rate_and_says_what_is_missing(calibrated: tuple[Calibration, Path]) -> None:
+    report = calibrated[0].report
+    assert report["detection"]["false_alarms_per_hour"] == 6.0 < report["detection"]["tuned_for_per_hour"] < 200.0
+    assert any("min more of free motion" in sentence for sentence in report["next"])
+
+
+def test_the_folder_holds_finger_fmu_page_and_report(calibrated: tuple[Calibration, Path]) -> None:
+    from tendonfmu.description import read_finger
+    from tendonfmu.fmu import run_fmu
+
+    found, out = calibrated
+    finger = read_finger(out / "finger.json")
+    assert finger.data == json.loads(json.dumps(found.data)) and "gravity" in (out / "finger.json").read_text()
+    report = json.loads((out / "calibration.json").read_text(encoding="utf-8"))
+    assert report["format"] == "tendonfmu-calibration-1" and report["error"] == found.report["error"]
+    page = (out / "calibration.html").read_text(encoding="utf-8")
+    assert verdict(report)[1] in page and page.count("The link&#39;s weight") == 1
+    assert all((out / file).is_file() for file in report["files"])
+    recording = read_recording(out.parent / UNSEEN)
+    short = replace(
+        recording, time=recording.time[:50], groups={key: each[:50] for key, each in recording.groups.items()}
+    )
+    assert "compensated_torque[2]" in run_fmu(out / "finger.fmu", short)
+
+
+def test_what_is_unchanged_is_not_done_again(
+    calibrated: tuple[Calibration, Path], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found, out = calibrated
+
+    def never(*given: Any, **options: Any) -> Any:
+        raise AssertionError("done again")
+
+    for name in ("diagnose", "fit_all"):
+        monkeypatch.setattr(calibration, name, never)
+    again = calibrate(
+        folder / FINGER, [folder / FREE], out, tests=[folder / UNSEEN], pushes=[folder / "pushes.parquet"]
+    )
+    assert again.report["steps"]["repeated"] == ["diagnosis", "fit", "tune", "score"]
+    assert again.data == found.data
+    other = calibrate(
+        folder / FINGER,
+        [folder / FREE],
+        out,
+        tests=[folder / UNSEEN],
+        options=Options(false_alarms_per_hour=360.0),
+    )
+    assert other.report["steps"]["repeated"] == ["diagnosis", "fit"] and other.report["pushes"] is None
+    with pytest.raises(AssertionError, match="done again"):
+        calibrate(folder / FINGER, [folder / UNSEEN], out)
+
+
+@pytest.mark.parametrize(
+    ("free", "tests", "words"),
+    [([], [], "no recording"), ([FREE], [FREE], "a test"), ([FREE, FREE], [], "twice")],
+)
+def test_recordings_that_cannot_be_are_refused(
+    free: list[str], tests: list[str], words: str, folder: Path, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError, match=words):
+        calibrate(folder / FINGER, [folder / each for each in free], tmp_path, tests=[folder / each for each in tests])
+
+
+@pytest.mark.parametrize(
+    ("given", "read", "options"),
+    [
+        ("f a --test b c --pushes d e -o o", "f a --test b --test c --pushes d --pushes e -o o", "--test --pushes -o"),
+        ("f a --pushes d e", "f a --pushes d e", "--test"),  # of a command without pushes
+    ],
+)
+def test_several_tests_and_pushes_after_the_recordings(given: str, read: str, options: str) -> None:
+    assert several_values(given.split(), set(options.split())) == read.split()
+
+
+# --- steps ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_step_belongs_to_what_it_was_made_from_and_to_the_steps_before_it(tmp_path: Path) -> None:
+    done: list[str] = []
+
+    def results(given: str, option: int) -> list[dict[str, Any]]:
+        steps = Steps(tmp_path, {"given": given})
+        return [
+            steps.result("one", {}, lambda: done.append("one") or {"value": [given]}),  # type: ignore[func-returns-value]
+            steps.result("two", {"option": option}, lambda: done.append("two") or {"value": option}),  # type: ignore[func-returns-value]
+        ]
+
+    first = results("a", 1)
+    assert results("a", 1) == first == [{"value": ["a"]}, {"value": 1}] and done == ["one", "two"]
+    assert results("a", 2)[1] == {"value": 2} and done == ["one", "two", "two"]
+    results("b", 2)
+    assert done[3:] == ["one", "two"]
+    (tmp_path / ".steps" / "two.json").write_text('{"format": "tendonfmu-calibration-step-1", "key":')  # cut off
+    results("b", 2)
+    assert done[5:] == ["two"]
+
+
+# --- stretches that are diagnosed -------------------------------------------------------------------------------------
+
+
+def motion(seconds: float, name: str = "a.parquet") -> Recording:
+    time = np.arange(0.0, seconds, 0.1)
+    return Recording(
+        Path(name), time, {"tendon_force": np.ones((len(time), 2)), "tendon_position": np.ones((len(time), 2))}
+    )
+
+
+def test_long_recordings_are_diagnosed_in_part_and_judged_on_another() -> None:
+    free = [motion(500.0), motion(1000.0, "b.parquet")]
+    seen, judged = stretches_for_diagnosis(free, [])
+    assert sum(each.time[-1] - each.time[0] for each in seen) == pytest.approx(DIAGNOSED, abs=1.0)
+    assert sum(each.time[-1] - each.time[0] for each in judged) == pytest.approx(JUDGED, abs=16.0)
+    for one, other in zip(seen, judged, strict=False):
+        assert not set(one.time) & set(other.time) or one.path.stem[0] != other.path.stem[0]
+    assert seen[0].path.name == "a, 0 to 30 s.parquet"
+
+
+def test_short_recordings_are_diagnosed_whole() -> None:
+    free = [motion(100.0)]
+    assert stretches_for_diagnosis(free, []) == (free, [])
+    seen, judged = stretches_for_diagnosis(free, [motion(30.0, "t.parquet")])
+    assert len(judged[0].time) == 300 and seen[0].time[-1] == pytest.approx(DIAGNOSED, abs=0.2)
+
+
+# --- sentences --------------------------------------------------------------------------------------------------------
+
+
+def report(given: float, calibrated: float, causes: int, limit: float) -> dict[str, Any]:
+    return {
+        "error": {"as_given": [given, given], "calibrated": [calibrated, calibrated]},
+        "structure": {"causes": [{}] * causes},
+        "detection": {"held_out": {"limit": limit}},
+    }
+
+
+def test_the_verdict_is_one_sentence_with_the_figures() -> None:
+    tone, sentence = verdict(report(0.0142, 0.00614, 3, 5.33))
+    assert tone == "good" and "from 14.2 to 6.14 mN·m" in sentence and "3 causes" in sentence and "5.33" in sentence
+    tone, sentence = verdict(report(0.005, 0.006, 0, 5.33))
+    assert tone == "bad" and "no better" in sentence
+
+
+def test_pushes_are_told_by_size() -> None:
+    rows = [
+        {"from": 0.0, "below": 1.5, "events": 4, "found": 1, "interval": [0.1, 0.8]},
+        {"from": 1.5, "below": 3.0, "events": 4, "found": 2, "interval": [0.1, 0.8]},
+        {"from": 6.0, "below": None, "events": 4, "found": 4, "interval": [0.4, 1.0]},
+    ]
+    found = size_rows({"pushes": {"sizes": rows}})
+    assert [row[0] for row in found] == ["below 1.5 times", "1.5 to 3 times", "6 times and more"]
+    assert found[2][1:] == ("4 of 4", "40 to 100 %")
+    assert size_rows({"pushes": None}) == [] and math.isclose(together([3.0, 4.0]), math.sqrt(12.5))
