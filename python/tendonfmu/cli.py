@@ -14,7 +14,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from tendonfmu import cli_calibrate, cli_campaign, cli_detect, cli_diagnose
+from tendonfmu import cli_calibrate, cli_campaign, cli_check, cli_detect, cli_diagnose
 from tendonfmu.console import fit_bar, leave, phase_bar, print_tables, progress_bar, say
 from tendonfmu.errors import InputError, line_of
 from tendonfmu.fault_report import is_own_file, write_fault_report
@@ -29,6 +29,8 @@ app = typer.Typer(
 
 FAULT = 3
 INTERRUPTED = 130
+
+cli_check.register(app)
 
 FingerFile = Annotated[Path, typer.Argument(metavar="FINGER.json", help="finger description")]
 
@@ -98,29 +100,6 @@ def options(
     ] = False,
 ) -> None:
     """Friction of tendon-driven robot fingers: what the finger feels, without a tactile sensor."""
-
-
-@app.command()
-def check(
-    file: Annotated[Path, typer.Argument(metavar="FINGER.json|RIG.json", help="finger description, or rig")],
-) -> None:
-    """Validate a finger description or a rig and say what it is. Exit 1 when it is refused."""
-    from tendonfmu.description import read_finger
-    from tendonfmu.plant import require_plant
-    from tendonfmu.rig import is_rig
-    from tendonfmu.rig_summary import describe_rig
-
-    rig = is_rig(file)
-    if rig:
-        require_plant()
-    try:
-        lines = describe_rig(file) if rig else read_finger(file).summary()
-    except InputError as refused:
-        # the question was whether the description is sound; a file that cannot be read is bad input
-        say(f"tendonfmu: {refused}")
-        raise typer.Exit(1 if file.is_file() else 2) from None
-    for line in lines:
-        print(line)
 
 
 @app.command()

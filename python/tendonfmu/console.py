@@ -19,6 +19,11 @@ def say(message: str) -> None:
     print(message, file=sys.stderr)
 
 
+def show(line: str) -> None:
+    """A line of a result, on standard output."""
+    print(line)
+
+
 def leave(status: int) -> NoReturn:
     """Ends the program, without waiting for threads that still compute."""
     if any(not thread.daemon for thread in threading.enumerate() if thread is not threading.main_thread()):

@@ -121,27 +121,49 @@ def sense_sentences(target: Numbers, angle: Numbers, speed: Numbers, names: Sequ
 
 def stuck_sensors(recording: Recording, finger: FingerDescription) -> list[StuckSensor]:
     """Channels that repeat one value for more than `STUCK` while the other channels say that they should change."""
-    groups = recording.groups
-    arms = np.asarray(finger.moment_arms, dtype=float)
-    stiffness = np.array([float(tendon["stiffness"]) for tendon in finger.data["tendons"]])
-    stretch = groups["tendon_force"] / stiffness
     found: list[StuckSensor] = []
-    angle = (groups["tendon_position"] - stretch) @ np.linalg.pinv(arms).T
     for name, k, runs in _still(recording):
         if name == "tendon_force":
-            found += _stuck_force(groups["tendon_force"], k, runs)
+            found += _stuck_force(recording.groups["tendon_force"], k, runs)
             continue
-        expected: Numbers | None
-        if name == "tendon_position":
-            expected = _position_by_others(groups, arms, stretch, k)
-        elif name == "joint_position":
-            expected = angle[:, k]
-        else:  # what the given velocity does not account for
-            step = np.diff(recording.time, prepend=recording.time[0])
-            expected = groups.get("joint_position", angle)[:, k] - np.cumsum(groups[name][:, k] * step)
+        expected = expected_values(recording, finger, name, k)
         if expected is not None:
-            found += _stuck(name, groups[name], k, expected, runs)
+            found += _stuck(name, recording.groups[name], k, expected, runs)
     return found
+
+
+def expected_values(recording: Recording, finger: FingerDescription, group: str, k: int) -> Numbers | None:
+    """What a channel should read, up to a constant, by the other channels.
+
+    Parameters
+    ----------
+    group: `tendon_position`, `joint_position` or `joint_velocity`. Of a velocity: what it does not account for [rad].
+    k: element from 0.
+
+    Returns
+    -------
+    [N] in the unit of the group (of `joint_velocity` rad); None where the other channels do not tell.
+    """
+    groups = recording.groups
+    if group == "tendon_position":
+        return _position_by_others(groups, np.asarray(finger.moment_arms, dtype=float), _stretch(recording, finger), k)
+    angle = tendon_angles(recording, finger)
+    if group == "joint_position":
+        return np.asarray(angle[:, k])
+    step = np.diff(recording.time, prepend=recording.time[0])
+    return np.asarray(groups.get("joint_position", angle)[:, k] - np.cumsum(groups[group][:, k] * step))
+
+
+def tendon_angles(recording: Recording, finger: FingerDescription) -> Numbers:
+    """[N, n] rad: joint angles by tendon positions and forces, R⁺(x0 − f0/k)."""
+    position = recording.groups["tendon_position"] - _stretch(recording, finger)
+    return np.asarray(position @ np.linalg.pinv(np.asarray(finger.moment_arms, dtype=float)).T)
+
+
+def _stretch(recording: Recording, finger: FingerDescription) -> Numbers:
+    """[N, m] m: of the tendons' springs."""
+    stiffness = np.array([float(tendon["stiffness"]) for tendon in finger.data["tendons"]])
+    return np.asarray(recording.groups["tendon_force"] / stiffness)
 
 
 def _still(recording: Recording) -> Iterator[tuple[str, int, Runs]]:

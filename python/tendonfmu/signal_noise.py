@@ -144,10 +144,11 @@ def _of_blocks(variance: Numbers) -> float:
 
 def _rounding(values: Numbers) -> Numbers:
     """[c] standard deviation of the rounding of columns whose values come in equal steps; else 0."""
-    return np.asarray(np.array([_step(column) for column in values.T]) / np.sqrt(12.0))
+    return np.asarray(np.array([value_step(column) for column in values.T]) / np.sqrt(12.0))
 
 
-def _step(column: Numbers) -> float:
+def value_step(column: Numbers) -> float:
+    """Width of the equal steps in which a column's [N] values come, in its unit; 0 if they come in none."""
     levels = np.unique(column)
     if len(levels) < 2 or len(levels) > MOST_LEVELS * len(column):
         return 0.0

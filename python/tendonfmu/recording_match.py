@@ -1,0 +1,285 @@
+"""Do recordings belong to a finger description? Said before any fit, with what to write into the map of columns.
+
+`belongs` answers for all recordings. Errors are what makes every number of a fit wrong: signs, order and units of
+columns, sensors that are dead. Warnings are what makes it worse: a poor clock, sensors that clip now and then.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu import recording_match_text as text
+from tendonfmu.description import FingerDescription
+from tendonfmu.errors import InputError
+from tendonfmu.recording import GROUP_PER, Recording
+from tendonfmu.recording_channels import (
+    clipped_channels,
+    coarse_channels,
+    held_channels,
+    read_clock,
+)
+from tendonfmu.recording_faults import STUCK, TURNS, tendon_angles
+from tendonfmu.recording_findings import Finding
+from tendonfmu.recording_kinematics import FEWEST, GAIN, SAME, Balance, Correction, Repair, repairs, tells
+from tendonfmu.recording_velocity import velocity_corrections
+
+Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+UNFIT, POOR = 0.15, 0.03  # share of variance that the equations may leave: beyond the first nothing fits
+HALF = 0.5  # of the samples: a fit refuses a sensor that is stuck in more
+MUCH_CLIPPED = 0.2  # of the samples
+NEGATIVE = 0.8  # of the samples: a tendon that pushes as often has a wrong sign or zero
+PUSHES = 0.01  # of the samples
+WINDOW = 0.02  # s; power is that of motion slower than this
+FEWEST_WINDOWS = 50
+MOST_COMPARED = 12  # corrections
+AGAINST = 0.15  # of the power at a joint; sound recordings have 0.6 and more, those with a wrong sign -0.3 and less
+OPPOSED = 0.5  # of what forces and reference leave of each other, when their sum leaves less
+LEAST_KEPT = 0.2  # of the samples, for the equations
+
+
+def belongs(finger: FingerDescription, recordings: Sequence[Recording]) -> list[Finding]:
+    """What says that recordings do not belong to a finger, or are poor; nothing for sound ones.
+
+    Parameters
+    ----------
+    finger: a valid description.
+    recordings: as `read_recording` gives them.
+
+    Returns
+    -------
+    Findings in the order of the recordings, errors of each before its warnings.
+    """
+    found: list[Finding] = []
+    for recording in recordings:
+        of_this = _findings(finger, recording)
+        found += sorted(of_this, key=lambda finding: finding.severity != "error")
+    return found
+
+
+def refuse_errors(findings: Sequence[Finding]) -> list[str]:
+    """For commands that go on with a recording: raises InputError for the first error, returns the warnings' lines."""
+    for finding in findings:
+        if finding.severity == "error":
+            raise InputError(finding.line())
+    return [finding.line() for finding in findings]
+
+
+def _findings(finger: FingerDescription, recording: Recording) -> list[Finding]:
+    counts = {"tendon": len(finger.tendon_names), "joint": len(finger.joint_names)}
+    wrong = [name for name, values in recording.groups.items() if values.shape[1] != counts[GROUP_PER[name]]]
+    if wrong:
+        return [text.columns(recording.path, name, recording.groups[name].shape[1], counts) for name in wrong]
+    found = list(_of_clock(recording))
+    clock = next((finding for finding in found if finding.kind == "clock"), None)
+    unit = clock.entries.get("time", {}).get("scale") if clock else None
+    if isinstance(unit, float):
+        recording = replace(recording, time=recording.time * unit)
+    kinematic, mended = _of_kinematics(finger, recording)
+    held = [
+        text.held(recording.path, each, "error" if each.share > HALF else "warning")
+        for each in held_channels(mended, finger)
+    ]
+    dead = any(finding.severity == "error" for finding in held)
+    if not dead:  # of a dead sensor no equation holds
+        found += kinematic
+        mended = _with_velocities(finger, mended, found)
+        found += _of_pushing(finger, mended, {column for finding in kinematic for column in finding.columns})
+        if not any(finding.severity == "error" for finding in found):
+            found += list(_of_power(finger, mended)) or list(_of_reference(finger, mended))
+    found += _of_channels(finger, mended, held)
+    return found
+
+
+# --- clock and channels -----------------------------------------------------------------------------------------------
+
+
+def _of_clock(recording: Recording) -> Iterator[Finding]:
+    clock = read_clock(recording.time)
+    if clock is None:
+        return
+    if clock.senseless:
+        yield text.senseless_rate(recording.path, clock, len(recording))
+    yield from text.clock_warnings(recording.path, clock, recording.time)
+
+
+def _of_channels(finger: FingerDescription, recording: Recording, held: Sequence[Finding]) -> Iterator[Finding]:
+    coarse = list(coarse_channels(recording))
+    clipped = list(clipped_channels(recording, finger))
+    steps = {each.column for each in coarse}
+    often = {each.column for each in clipped if each.runs > 1}
+    stands = [finding for finding in held if finding.severity == "error" or finding.columns[0] not in steps | often]
+    if stands or coarse:  # what the others say of a position is worth nothing then
+        clipped = [each for each in clipped if each.column.startswith("tendon_force")]
+    yield from stands
+    said = {finding.columns[0] for finding in stands}
+    for each in clipped:
+        if each.column not in said:
+            yield text.clipped(recording.path, each, "error" if each.share > MUCH_CLIPPED else "warning")
+    yield from (text.coarse(recording.path, each) for each in coarse if each.column not in said)
+
+
+# --- what the columns say of each other -------------------------------------------------------------------------------
+
+
+def _of_kinematics(finger: FingerDescription, recording: Recording) -> tuple[list[Finding], Recording]:
+    """Findings about signs, order and units of columns, and the recording as it would be with them mended."""
+    groups = {name: values for name, values in recording.groups.items() if name in text.KINEMATIC}
+    rows = _changing(recording, groups)
+    if len(recording) < FEWEST:
+        return [], recording
+    balance = Balance(finger, {name: values[rows] for name, values in groups.items()})
+    found: list[Finding] = []
+    if tells(finger, "joint_position" in groups):
+        done, left = repairs(balance)
+        if len(done) == 1:
+            done = [_likeliest(finger, recording, done[0])]
+        if left > UNFIT:  # what mends a part of it only is a guess
+            return [text.unfit(recording.path, done[0].misfit if done else left, "error", balance)], recording
+        found = [text.repair(recording.path, each) for each in done]
+        for each in done:
+            recording = _mended(recording, each.correction)
+        if left > POOR:
+            found.append(text.unfit(recording.path, left, "warning", balance))
+    turn = np.ptp(tendon_angles(recording, finger), axis=0)
+    if turn.max() > TURNS:
+        correction = balance.plausible_scale() if not found else None
+        found.append(text.turns(recording.path, turn, finger.joint_names, correction))
+        if correction is not None:
+            recording = _mended(recording, correction)
+    return found, recording
+
+
+def _likeliest(finger: FingerDescription, recording: Recording, found: Repair) -> Repair:
+    """Of corrections that the equations cannot tell apart, first the one that suits velocities and friction."""
+    corrections = [found.correction, *found.alternatives]
+    if len(corrections) == 1 or len(corrections) > MOST_COMPARED:
+        return found
+    contradicted = []
+    for correction in corrections:
+        mended = _mended(recording, correction)
+        share = power_shares(finger, mended)
+        braked = 0 if share is None else int((share < 0.0).sum())
+        contradicted.append(sum(1 for _ in velocity_corrections(mended, finger)) + braked)
+    best = [each for each, count in zip(corrections, contradicted, strict=True) if count == min(contradicted)]
+    return replace(found, correction=best[0], alternatives=tuple(best[1:]))
+
+
+def _changing(recording: Recording, groups: Mapping[str, Numbers]) -> Flags:
+    """[N] samples in which no channel holds a value for long; all where too few are left."""
+    changing = np.ones(len(recording), dtype=bool)
+    for values in groups.values():
+        for column in values.T:
+            bounds = np.concatenate([[0], np.flatnonzero(np.diff(column)) + 1, [len(column)]])
+            for k in np.flatnonzero(recording.time[bounds[1:] - 1] - recording.time[bounds[:-1]] > STUCK):
+                changing[bounds[k] : bounds[k + 1]] = False
+    enough = max(FEWEST, LEAST_KEPT * len(recording))
+    return changing if changing.sum() >= enough else np.ones(len(recording), dtype=bool)
+
+
+def _mended(recording: Recording, correction: Correction) -> Recording:
+    groups = {name: values.copy() for name, values in recording.groups.items()}
+    if correction.kind == "exchange":
+        for column, source in correction.pairs:
+            (name, k), (_, other) = text.element(column), text.element(source)
+            groups[name][:, k] = recording.groups[name][:, other]
+    else:
+        for column in correction.columns:
+            name, k = text.element(column)
+            groups[name][:, k] *= correction.factor
+    return replace(recording, groups=groups)
+
+
+def _with_velocities(finger: FingerDescription, recording: Recording, found: list[Finding]) -> Recording:
+    """Adds findings about joint velocities; the recording as it would be with them mended."""
+    for correction, slope in velocity_corrections(recording, finger):
+        found.append(text.velocity(recording.path, correction, slope))
+        recording = _mended(recording, correction)
+    return recording
+
+
+def _of_pushing(finger: FingerDescription, recording: Recording, mended: set[str]) -> Iterator[Finding]:
+    """About tendons that pull only and have negative forces. mended: columns of which something is said already."""
+    share = (recording.groups["tendon_force"] < 0.0).mean(axis=0)
+    for i, tendon in enumerate(finger.data["tendons"]):
+        column = f"tendon_force[{i + 1}]"
+        if tendon.get("bidirectional") or share[i] <= PUSHES:
+            continue
+        force = recording.groups["tendon_force"][:, i]
+        is_zero = share[i] <= NEGATIVE or column in mended or _is_sign_right(finger, recording, i)
+        yield text.pushing(recording.path, column, finger.tendon_names[i], float(share[i]), float(force.min()), is_zero)
+
+
+def _is_sign_right(finger: FingerDescription, recording: Recording, i: int) -> bool:
+    """Whether the equations say that tendon i's force grows as its spring stretches."""
+    groups = {name: values for name, values in recording.groups.items() if name in text.KINEMATIC}
+    if not tells(finger, "joint_position" in groups) or len(recording) < FEWEST:
+        return False
+    balance = Balance(finger, groups)
+    flipped = balance.transform(Correction("sign", (f"tendon_force[{i + 1}]",), -1.0))
+    return balance.misfit(np.eye(len(balance.columns))) * GAIN < balance.misfit(flipped)
+
+
+def _of_reference(finger: FingerDescription, recording: Recording) -> Iterator[Finding]:
+    """About external torques that the tendons do not hold: friction is what is left of the two (eq. 9)."""
+    external = recording.groups.get("external_torque")
+    if external is None:
+        return
+    torque = recording.groups["tendon_force"] @ np.asarray(finger.moment_arms, dtype=float)
+    left, opposed = (np.sqrt(((torque - sign * external) ** 2).mean(axis=0)) for sign in (1.0, -1.0))
+    for j in np.flatnonzero(opposed < OPPOSED * left):
+        yield text.reference(recording.path, f"external_torque[{j + 1}]", float(left[j]), float(opposed[j]))
+
+
+def _of_power(finger: FingerDescription, recording: Recording) -> Iterator[Finding]:
+    """About joints that move against the pull of their tendons, which friction cannot make them do."""
+    share = power_shares(finger, recording)
+    if share is not None and share.min() < -AGAINST:
+        yield text.against(recording.path, share, finger.joint_names, _turning(finger, recording))
+
+
+def _turning(finger: FingerDescription, recording: Recording) -> list[Correction]:
+    """Signs and exchanges that the equations do not see and that let every joint follow its tendons."""
+    balance = Balance(finger, {name: values for name, values in recording.groups.items() if name in text.KINEMATIC})
+    given = np.eye(len(balance.columns))
+    most, pushing = max(2 * balance.misfit(given), SAME), balance.pushing(given)
+    found: list[tuple[int, int, Correction]] = []
+    for correction in balance.corrections():
+        with_it = balance.transform(correction)
+        if correction.kind == "scale" or balance.pushing(with_it) > pushing or balance.misfit(with_it) > most:
+            continue
+        mended = _mended(recording, correction)
+        share = power_shares(finger, mended)
+        if share is not None and share.min() > 0.0:
+            found.append((sum(1 for _ in _of_reference(finger, mended)), len(correction.columns), correction))
+        if len(found) >= MOST_COMPARED:
+            break
+    found.sort(key=lambda each: each[:2])
+    return [correction for opposed, _, correction in found if opposed == found[0][0]]
+
+
+def power_shares(finger: FingerDescription, recording: Recording) -> Numbers | None:
+    """[n] work that the tendons do on each joint over all that goes to and fro: friction makes it 1, springs 0."""
+    external, angle = (recording.groups.get(name) for name in ("external_torque", "joint_position"))
+    torque = recording.groups["tendon_force"] @ np.asarray(finger.moment_arms, dtype=float)
+    if external is not None:
+        torque = torque - external
+    torque = torque - torque.mean(axis=0)  # a constant pull comes back all that it does
+    if angle is None:
+        angle = tendon_angles(recording, finger)
+    every = max(1, round(WINDOW / float(np.median(np.diff(recording.time))))) if len(torque) > FEWEST else len(torque)
+    count = len(torque) // every
+    if count < FEWEST_WINDOWS:
+        return None
+    pull, turn = (values[: count * every].reshape(count, every, -1).mean(axis=1) for values in (torque, angle))
+    work = (pull[1:] + pull[:-1]) / 2 * np.diff(turn, axis=0)
+    if recording.contact is not None and external is None:
+        touched = np.asarray(recording.contact[: count * every].reshape(count, every).any(axis=1))
+        work = work[~(touched[1:] | touched[:-1])]
+    total = np.abs(work).sum(axis=0)
+    return np.asarray(work.sum(axis=0) / np.where(total > 0.0, total, 1.0))
