@@ -158,6 +158,17 @@ def test_recordings_that_cannot_be_are_refused(
         calibrate(folder / FINGER, [folder / each for each in free], tmp_path, tests=[folder / each for each in tests])
 
 
+def test_a_recording_of_another_finger_is_refused_before_any_fit(folder: Path, tmp_path: Path) -> None:
+    recording = read_recording(folder / FREE)
+    columns = {"time": recording.time}
+    for name, values in recording.groups.items():
+        for i in range(values.shape[1]):
+            columns[f"{name}[{i + 1}]"] = values[:, i] * (-1.0 if name == "tendon_position" and i == 1 else 1.0)
+    write_table(tmp_path / "turned.parquet", columns)
+    with pytest.raises(InputError, match=r"tendon_position\[2\].*sign"):
+        calibrate(folder / FINGER, [tmp_path / "turned.parquet"], tmp_path / "out")
+
+
 @pytest.mark.parametrize(
     ("given", "read", "options"),
     [

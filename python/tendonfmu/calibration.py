@@ -45,6 +45,7 @@ from tendonfmu.gain import residual_of
 from tendonfmu.phases import Phases, PhaseState
 from tendonfmu.push_sizes import by_size
 from tendonfmu.recording import Recording, read_recording
+from tendonfmu.recording_match import belongs, refuse_errors
 from tendonfmu.score_report import build_report as score_report
 from tendonfmu.scoring import score_recordings
 from tendonfmu.tune_report import build_report as tune_report
@@ -125,12 +126,13 @@ def calibrate(
 
 @dataclass(frozen=True)
 class _Case:
-    """free: prepared, with held-out stretches where there are no tests."""
+    """free: prepared, with held-out stretches where there are no tests. sentences: about the recordings."""
 
     finger: FingerDescription
     free: list[FitRecording]
     tests: list[FitRecording]
     pushes: list[Path]
+    sentences: list[str]
 
     @property
     def judged(self) -> list[FitRecording]:
@@ -155,11 +157,13 @@ def _read(finger: Path, free: Sequence[Path], tests: Sequence[Path], pushes: Seq
     check_given_once(free, tests, "a test")
     check_given_once(free, pushes, "one with pushes")
     given = read_finger(finger)
-    own = [prepare(given, read_recording(each), options.kinematics, Held() if tests else HELD) for each in free]
-    unseen = [prepare(given, read_recording(each), options.kinematics, Held()) for each in tests]
+    read, others, touched = ([read_recording(each) for each in group] for group in (free, tests, pushes))
+    sentences = refuse_errors(belongs(given, [*read, *others, *touched]))
+    own = [prepare(given, each, options.kinematics, Held() if tests else HELD) for each in read]
+    unseen = [prepare(given, each, options.kinematics, Held()) for each in others]
     require_noise(given, own)
     check_unseen([each.recording for each in own], [each.recording for each in unseen])
-    return _Case(given, own, unseen, list(pushes))
+    return _Case(given, own, unseen, list(pushes), sentences)
 
 
 # --- the steps --------------------------------------------------------------------------------------------------------
@@ -199,6 +203,7 @@ class _Run:
             "pushes": pushed,
             "next": list(_next(lacks, tuned)),
             "warnings": [
+                *case.sentences,
                 *(f"{each.path.name}: {text}" for each in (*case.free, *case.tests) for text in each.warnings),
                 *lacks["warnings"],
                 *fitted["warnings"],
