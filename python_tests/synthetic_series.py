@@ -82,7 +82,7 @@ def travelled(angle: Numbers, velocity: Numbers) -> Numbers:
 
 def nuisance_of(series: Series) -> list[Numbers]:
     """Bias splines and the columns of an ordinary nominal model, of each joint."""
-    splines = bias_splines(series)
+    splines = bias_splines(series).toarray()
     found = []
     for joint in range(2):
         side = np.tanh(series.velocity[:, joint] / 0.02)

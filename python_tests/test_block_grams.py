@@ -34,7 +34,7 @@ def brute_force(
 ) -> tuple[float, Numbers]:
     """Σ e² on each fold in turn with everything refitted without it, and its part of each stretch."""
     series = series_with(target)
-    folds, splines = make_folds(series), basis(bias_splines(series))
+    folds, splines = make_folds(series), basis(bias_splines(series).toarray())
     bare = [np.stack([without(each[:, j], splines) for j in range(JOINTS)], axis=1) for each in (nominal, chosen)]
     y = np.stack([without(target[:, j], splines) for j in range(JOINTS)], axis=1)
     columns, u = np.concatenate(bare, axis=2), nominal.shape[2]
@@ -90,7 +90,7 @@ def test_surviving_share_is_what_refitting_leaves(made: tuple[Numbers, Numbers, 
     target, nominal, values = made
     twin = 2.0 * nominal[:, :, 0] + 0.1 * values[:, :, 0]
     grams = grams_of(target, nominal, np.concatenate([values, twin[:, :, None]], axis=2))
-    splines = basis(bias_splines(series_with(target)))
+    splines = basis(bias_splines(series_with(target)).toarray())
 
     def bare(columns: Numbers) -> Numbers:
         return np.stack([without(columns[:, j], splines) for j in range(JOINTS)], axis=1).reshape(-1, columns.shape[2])
@@ -112,7 +112,7 @@ def test_residual_and_magnitudes_are_those_of_one_fit_of_everything(made: tuple[
     found = grams.magnitudes(np.eye(6), np.full(6, -np.inf), np.full(6, np.inf))
     assert found[2] == pytest.approx(0.4, abs=0.05)
     assert np.abs(np.delete(found, 2)).max() < 0.1
-    splines = basis(bias_splines(series_with(target)))
+    splines = basis(bias_splines(series_with(target)).toarray())
     y = np.stack([without(target[:, j], splines) for j in range(JOINTS)], axis=1)
     own = np.stack([without(nominal[:, j], splines) for j in range(JOINTS)], axis=1).reshape(-1, 4)
     left = without(y.reshape(-1), basis(own)).reshape(y.shape)

@@ -13,17 +13,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 from scipy.linalg import cho_factor, cho_solve
 
 from tendonfmu.held_out_folds import Folds
+from tendonfmu.nuisance import Span, Splines
 
 Numbers = NDArray[np.float64]
 Array = NDArray[Any]
 
 MEMORY = 20.0  # blocks that noise remembers, about: so many rows count as one against what is known beforehand
 _PIECE = 4096  # rows at a time
-_LOST = 1e-9  # of a column's square, below which the projection left rounding only
 
 
 @dataclass(frozen=True)
@@ -46,14 +45,14 @@ class Grams:
     """Products of a target, of the nominal model's columns and of candidates', by fold."""
 
     def __init__(
-        self, folds: Folds, target: Numbers, nominal: Array, values: Array, splines: Numbers, scale: Numbers
+        self, folds: Folds, target: Numbers, nominal: Array, values: Array, splines: Splines, scale: Numbers
     ) -> None:
         """target: [B, n] N·m. nominal: [B, n, u], values: [B, n, c]: derivatives. splines: [B, s] of the slow bias.
         scale: [u] how far each nominal number may be expected to move: a ridge that decides where the data do not.
         """
         self.folds, self.nominal_count, self.count = folds, nominal.shape[2], values.shape[2]
         rows, joints = folds.rows, target.shape[1]
-        span = self._span = _Span(splines[rows])
+        span = self._span = Span(splines[rows])
         columns = self.nominal_count + self.count
         self._table = np.empty((len(rows), joints, columns), dtype=np.float32)
         for j in range(joints):
@@ -219,27 +218,6 @@ def _solved(matrix: Numbers, right: Numbers) -> Numbers:
     scaled = matrix / (length[:, None] * length) + 1e-12 * np.eye(len(length))
     factor = cho_factor(scaled, lower=True, check_finite=False)
     return np.asarray(cho_solve(factor, right / length[:, None], check_finite=False) / length[:, None])
-
-
-class _Span:
-    """Takes what lies in the span of sparse columns off others."""
-
-    def __init__(self, splines: Numbers) -> None:
-        matrix = sparse.csr_array(splines)
-        alive = np.flatnonzero(np.asarray(abs(matrix).sum(axis=0)).ravel() > 0)
-        self._matrix = sparse.csr_array(matrix[:, alive])
-        gram = np.asarray((self._matrix.T @ self._matrix).todense())
-        self._inverse = np.linalg.pinv(gram, rcond=1e-10, hermitian=True) if gram.size else gram
-
-    def without(self, columns: Array) -> Array:
-        """[R, d] less their part in the span; a column of which nothing but rounding is left becomes 0."""
-        values = np.asarray(columns, dtype=np.float64)
-        if not self._matrix.shape[1]:
-            return values
-        left = values - self._matrix @ (self._inverse @ (self._matrix.T @ values))
-        gone = np.einsum("rc,rc->c", left, left) <= _LOST * np.einsum("rc,rc->c", values, values)
-        left[:, gone] = 0.0
-        return np.asarray(left)
 
 
 def standard_error(gains: Sequence[float] | Numbers) -> float:

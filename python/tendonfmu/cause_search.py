@@ -26,7 +26,7 @@ from tendonfmu.fit_residuals import bias_settings
 from tendonfmu.held_out_folds import Folds, make_folds
 from tendonfmu.hypotheses import Hypothesis, Key, hypotheses
 from tendonfmu.least_sizes import LeastSizes
-from tendonfmu.nuisance import KNOTS, TRENDS, bias_splines, constant_bias, residual_of
+from tendonfmu.nuisance import KNOTS, TRENDS, Splines, bias_splines, constant_bias, residual_of
 from tendonfmu.regressors import predicted_forces
 
 Numbers = NDArray[np.float64]
@@ -45,7 +45,7 @@ class View:
     recordings: Sequence[FitRecording]
     predicted: Sequence[FitRecording]
     series: Series
-    splines: Numbers
+    splines: Splines
     columns: CandidateColumns
     folds: Folds
     grams: Grams
@@ -130,7 +130,7 @@ def residual_alone(data: Mapping[str, Any], series: Series) -> Numbers:
     return residual_of(series, bias_of(data, series), np.zeros((*series.target.shape, 0)))
 
 
-def bias_of(data: Mapping[str, Any], series: Series, knots: float = KNOTS) -> Numbers:
+def bias_of(data: Mapping[str, Any], series: Series, knots: float = KNOTS) -> Splines:
     """[B, s]: splines, or constants where the description says that the bias does not wander. knots: s apart."""
     return bias_splines(series, knots) if bias_settings(data).drift > 0 else constant_bias(series)
 

@@ -17,7 +17,7 @@ from scipy.special import fdtrc
 
 from tendonfmu.diagnosis_series import Series
 from tendonfmu.held_out_folds import Folds
-from tendonfmu.nuisance import basis, residual_of, without
+from tendonfmu.nuisance import Splines, basis, residual_of, without
 from tendonfmu.whitening import Whitener, whitener
 
 Numbers = NDArray[np.float64]
@@ -32,7 +32,7 @@ _MOST_LEVERAGE = 0.999  # of a direction in a stretch: beyond, nothing is left t
 class Confirmation:
     """The residual of a description, and what refitting it can mend."""
 
-    def __init__(self, series: Series, folds: Folds, splines: Numbers, trends: Numbers, nominal: Columns) -> None:
+    def __init__(self, series: Series, folds: Folds, splines: Splines, trends: Splines, nominal: Columns) -> None:
         """splines: [B, s] of the slow bias; trends: [B, t] slower ones, for the white residual, whose filter sees what
         the bias does faster. nominal: [B, n, u] derivatives by the description's own numbers."""
         joints = series.target.shape[1]
@@ -51,7 +51,7 @@ class Confirmation:
 class _ClusterTest:
     """Wald's test of a regression with a covariance that stretches of time give."""
 
-    def __init__(self, series: Series, folds: Folds, splines: Numbers, nominal: Columns, filters: Whitener) -> None:
+    def __init__(self, series: Series, folds: Folds, splines: Splines, nominal: Columns, filters: Whitener) -> None:
         joints = series.target.shape[1]
         self._filters, self._rows = filters, np.flatnonzero(filters.valid)
         stretch = np.full(len(series.time), -1, dtype=np.int64)
@@ -59,7 +59,7 @@ class _ClusterTest:
         own = np.unique(stretch[self._rows], return_inverse=True)[1]
         self._stretch = np.repeat(own, joints)
         self._rows_of_stretches = [np.flatnonzero(own == number) for number in range(own.max(initial=-1) + 1)]
-        bias = filters.apply(np.repeat(splines[:, None, :], joints, axis=1))[self._rows]
+        bias = filters.apply(np.repeat(splines.toarray()[:, None, :], joints, axis=1))[self._rows]
         self._spans = [basis(bias[:, j]) for j in range(joints)]
         self._nominal = self._flat(nominal)
         gram = _product(self._nominal, self._nominal)

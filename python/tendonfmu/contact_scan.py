@@ -18,6 +18,7 @@ from scipy.ndimage import median_filter, uniform_filter1d
 
 from tendonfmu.diagnosis_result import Event
 from tendonfmu.held_out_folds import Folds, make_folds
+from tendonfmu.nuisance import Splines
 from tendonfmu.remainder_features import features
 from tendonfmu.remainder_learner import Learner
 
@@ -48,7 +49,7 @@ MAD = 1.4826  # standard deviation of a normal distribution over its median abso
 
 
 def scan_events(
-    series: Series, residual: Numbers, splines: Numbers, recordings: Sequence[str], *, seed: int = 0
+    series: Series, residual: Numbers, splines: Splines, recordings: Sequence[str], *, seed: int = 0
 ) -> tuple[Event, ...]:
     """residual: [B, n] N·m of the nominal model. splines: [B, s] of the bias, whose span was taken from it.
     recordings: names, by number. In order of recording and time."""

@@ -6,22 +6,25 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 from scipy.interpolate import BSpline
 
 from tendonfmu.diagnosis_series import Series
 
 Numbers = NDArray[np.float64]
 Array = NDArray[Any]
+Splines = Any  # scipy.sparse.csr_array [B, s], which comes without types
 
 KNOTS = 2.0  # s: what a bias does
 TRENDS = (
     10.0  # s: of tests. What a bias does faster is noise that whitening sees: with knots of 2 s p-values are too small
 )
 _PIECE = 4096  # rows at a time
+_LOST = 1e-9  # of a column's square, below which the projection left rounding only
 _RANK = 1e-10  # of the largest power, columns scaled to length 1 before: derivatives are exact, rounding is far below
 
 
-def bias_splines(series: Series, knots: float = KNOTS) -> Numbers:
+def bias_splines(series: Series, knots: float = KNOTS) -> Splines:
     """[B, s] cubic B-splines in time, of each stretch without a gap its own, knots about `knots` s apart."""
     blocks = []
     for number in np.unique(series.segment):
@@ -32,18 +35,34 @@ def bias_splines(series: Series, knots: float = KNOTS) -> Numbers:
         width = inner[1] - inner[0]
         outer = width * np.arange(1, 4)
         knot = np.concatenate([inner[0] - outer[::-1], inner, inner[-1] + outer])
-        blocks.append(BSpline.design_matrix(time, knot, 3).toarray())
-    found = np.zeros((len(series.time), sum(block.shape[1] for block in blocks)))
-    row = column = 0
-    for block in blocks:
-        found[row : row + len(block), column : column + block.shape[1]] = block
-        row, column = row + len(block), column + block.shape[1]
-    return found
+        blocks.append(BSpline.design_matrix(time, knot, 3))
+    return sparse.csr_array(sparse.block_diag(blocks, format="csr"))
 
 
-def constant_bias(series: Series) -> Numbers:
+def constant_bias(series: Series) -> Splines:
     """[B, s] a constant for every stretch without a gap."""
-    return np.asarray(series.segment[:, None] == np.unique(series.segment), dtype=np.float64)
+    return sparse.csr_array((series.segment[:, None] == np.unique(series.segment)).astype(np.float64))
+
+
+class Span:
+    """Takes what lies in the span of splines off other columns."""
+
+    def __init__(self, splines: Splines) -> None:
+        """splines: [R, s]."""
+        alive = np.flatnonzero(np.asarray(abs(splines).sum(axis=0)).ravel() > 0)
+        self._matrix = sparse.csr_array(splines[:, alive])
+        gram = np.asarray((self._matrix.T @ self._matrix).todense())
+        self._inverse = np.linalg.pinv(gram, rcond=_RANK, hermitian=True) if gram.size else gram
+
+    def without(self, columns: Array) -> Numbers:
+        """[R, d] less their part in the span; a column of which nothing but rounding is left becomes 0."""
+        values = np.asarray(columns, dtype=np.float64)
+        if not self._matrix.shape[1]:
+            return values
+        left = values - self._matrix @ (self._inverse @ (self._matrix.T @ values))
+        gone = np.einsum("rc,rc->c", left, left) <= _LOST * np.einsum("rc,rc->c", values, values)
+        left[:, gone] = 0.0
+        return np.asarray(left)
 
 
 def basis(columns: Array) -> Numbers:
@@ -66,15 +85,15 @@ def without(columns: Array, span: Numbers) -> Array:
     return np.asarray(columns - own @ (own.T @ columns))
 
 
-def residual_of(series: Series, splines: Numbers, nominal: Array) -> Numbers:
+def residual_of(series: Series, splines: Splines, nominal: Array) -> Numbers:
     """[B, n] N·m: target less bias and all that `nominal` [B, n, u] explains by least squares; unused rows as found."""
     used = series.used
-    span = basis(splines[used])
-    target = without(series.target[used], span)
+    span = Span(splines[used])
+    target = span.without(series.target[used])
     if nominal.shape[2]:
         own = np.asarray(nominal[used]).copy()
         for j in range(own.shape[1]):
-            own[:, j] = without(own[:, j], span)
+            own[:, j] = span.without(own[:, j])
         target = target - _explained(own.reshape(-1, own.shape[2]), target.reshape(-1)).reshape(target.shape)
     found = series.target - np.mean(series.target[used], axis=0)
     found[used] = target

@@ -18,7 +18,7 @@ from tendonfmu.diagnosis_series import block_prediction, make_grid
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.gain import residual_of
 from tendonfmu.held_out_folds import make_folds
-from tendonfmu.nuisance import basis, without
+from tendonfmu.nuisance import Span
 
 Numbers = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ class OnlineError:
         series = series_of(data, recordings, self._grid)
         folds = make_folds(series)
         self._rows, self._stretch, self._stretches = folds.rows, folds.stretch, folds.stretches
-        self._span = basis(bias_of(data, series)[self._rows])
+        self._span = Span(bias_of(data, series)[self._rows])
         self._measured = series.target[self._rows] + block_prediction(data, recordings, self._grid)[self._rows]
 
     def square(self, data: Mapping[str, Any]) -> float:
@@ -44,6 +44,6 @@ class OnlineError:
     def by_stretch(self, data: Mapping[str, Any]) -> Numbers:
         """[K] Σ e² over all joints, (N·m)², by stretches of about 2 s."""
         predicted = block_prediction(data, self._recordings, self._grid)[self._rows]
-        left = without(self._measured - predicted, self._span)
+        left = self._span.without(self._measured - predicted)
         sums = np.bincount(self._stretch, np.sum(left**2, axis=1), minlength=self._stretches)
         return np.asarray(sums, dtype=np.float64)

@@ -16,6 +16,7 @@ from scipy.stats import ttest_1samp
 
 from tendonfmu.block_grams import standard_error
 from tendonfmu.held_out_folds import make_folds
+from tendonfmu.nuisance import Splines
 from tendonfmu.remainder_features import features
 from tendonfmu.remainder_learner import Choice, Learner, choices
 from tendonfmu.remainder_text import described
@@ -65,7 +66,7 @@ class Remainder:
 
 
 def measure_remainder(
-    series: Series, residual: Numbers, splines: Numbers, *, force: Numbers | None = None, seed: int = 0
+    series: Series, residual: Numbers, splines: Splines, *, force: Numbers | None = None, seed: int = 0
 ) -> Remainder:
     """residual: [B, n] N·m. splines: [B, s] of the bias, whose span was taken from it. force: [B, m] N predicted by the
     model, for the learner; without it only what makes no torque of the measured one.

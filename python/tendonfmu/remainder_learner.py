@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve
 
 from tendonfmu.held_out_folds import Folds
-from tendonfmu.nuisance import basis, without
+from tendonfmu.nuisance import Span, Splines
 from tendonfmu.remainder_features import Features
 
 Numbers = NDArray[np.float64]
@@ -44,13 +44,13 @@ def choices(seen: Features) -> list[Choice]:
 class Learner:
     """Residuals of all joints, and the columns that may predict them; the slow bias taken off both."""
 
-    def __init__(self, seen: Features, residual: Numbers, splines: Numbers, folds: Folds) -> None:
+    def __init__(self, seen: Features, residual: Numbers, splines: Splines, folds: Folds) -> None:
         """residual: [B, n] N·m. splines: [B, s] of the bias."""
-        span = basis(splines[folds.rows])
-        table = without(seen.values[folds.rows].astype(np.float32), span)
+        span = Span(splines[folds.rows])
+        table = span.without(seen.values[folds.rows]).astype(np.float32)
         spread = table.std(axis=0)
         self._table = table / np.where(spread > 1e-4, spread, np.inf)
-        self.target = np.asarray(without(residual[folds.rows], span))
+        self.target = span.without(residual[folds.rows])
         self.folds = folds
         self.columns = np.arange(table.shape[1])
         own = [folds.fold == number for number in range(folds.folds)]
