@@ -7,7 +7,7 @@ count: covariances know no offsets.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, permutations
 
@@ -18,6 +18,7 @@ from tendonfmu.description import FingerDescription
 from tendonfmu.recording_faults import TURNS
 
 Numbers = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 FEWEST = 200  # samples; fewer tell no covariance
 MISFIT = 5e-4  # share of variance below which the equations fit: arms and springs are not known better than 2 %
@@ -26,8 +27,10 @@ ALIKE = 1.5  # times the best correction's misfit: both are named
 SAME = 2e-4  # share of variance below which two corrections are as good as each other
 NOTHING = 1e-6  # of the largest terms of an equation; one with smaller ones says nothing
 MOST_SUBSETS, MOST_ORDERS, MOST_CIRCLES = 8, 6, 16  # columns of which all subsets, orders, circles of three are tried
+NOISY = 10.0  # times the variance of its noise: an equation with less motion says nothing
 ROUNDS = 8  # corrections of one recording
 STRONGEST = 5000.0  # N; a tendon of a finger breaks before
+EQUATED = ("tendon_force", "tendon_position", "joint_position")  # groups of the equation, in the order of its columns
 # Units in which columns are often written, as factors to ours
 UNITS: dict[str, tuple[tuple[float, str], ...]] = {
     "tendon_position": ((1e-3, "mm"), (1e-2, "cm"), (1e-6, "µm"), (0.0254, "inch")),
@@ -79,40 +82,40 @@ class Balance:
     """Second moments of a recording's columns, and the equations they have to satisfy.
 
     columns: names. rows: [e, c] equations in m, 0 when satisfied. covariance: [c, c]. largest: [c] largest magnitudes.
+    tendons: indices of those that have a force at all; the others are left out.
     """
 
-    def __init__(self, finger: FingerDescription, groups: dict[str, Numbers]) -> None:
-        """groups: `tendon_force`, `tendon_position`, and `joint_position` where it is measured; sound samples only."""
-        arms = np.asarray(finger.moment_arms, dtype=float)
-        tendons, joints = arms.shape
-        compliance = np.diag([1.0 / float(tendon["stiffness"]) for tendon in finger.data["tendons"]])
-        used = [name for name in ("tendon_force", "tendon_position", "joint_position") if name in groups]
+    def __init__(
+        self, finger: FingerDescription, groups: Mapping[str, Numbers], noise: Mapping[str, Numbers] | None = None
+    ) -> None:
+        """groups: `tendon_force`, `tendon_position`, and `joint_position` where it is measured; sound samples only.
+
+        noise: standard deviation of each column's noise, by group; None: none.
+        """
+        used = [name for name in EQUATED if name in groups]
         self.columns = [f"{name}[{k + 1}]" for name in used for k in range(groups[name].shape[1])]
         values = np.concatenate([groups[name] for name in used], axis=1)
         self.covariance = np.cov(values, rowvar=False)
         self.largest = np.abs(values).max(axis=0)
         self._range = np.ptp(values, axis=0)
         self._median = np.median(values, axis=0)
+        self._noise = np.concatenate([noise[name] for name in used]) ** 2 if noise else np.zeros(len(self.columns))
         pulls = [not tendon.get("bidirectional") for tendon in finger.data["tendons"]]
         self._pulls = np.flatnonzero(pulls)  # columns of forces, which come first
-        elastic = np.concatenate([-compliance, np.eye(tendons)], axis=1)
-        inverse = np.linalg.pinv(arms)
-        self._angle = np.zeros((joints, len(self.columns)))
-        self._angle[:, : 2 * tendons] = inverse @ elastic
-        if "joint_position" in groups:
-            self.rows = np.concatenate([elastic, -arms], axis=1)
-        else:
-            self.rows = (np.eye(tendons) - arms @ inverse) @ elastic
+        self.tendons = taut_tendons(groups["tendon_force"])
+        self.rows, self._angle = _equations(finger, self.tendons, "joint_position" in groups)
 
     def misfits(self, transform: Numbers) -> Numbers:
-        """[e] share of the variance that each equation leaves; NaN for those that say nothing.
+        """[e] share of the variance, noise apart, that each equation leaves; NaN for those that say nothing.
 
         transform: [c, c], from the columns as they are to what they should be.
         """
         rows = self.rows @ transform
-        terms = rows**2 @ np.diag(self.covariance)
-        left = ((rows @ self.covariance) * rows).sum(axis=1)
-        says = terms > NOTHING * terms.max(initial=0.0)
+        squares = rows**2
+        terms = squares @ np.diag(self.covariance)
+        noise = squares @ self._noise
+        left = np.maximum(((rows @ self.covariance) * rows).sum(axis=1) - noise, 0.0)
+        says = (terms > NOTHING * terms.max(initial=0.0)) & (terms > NOISY * noise)
         return np.where(says, left / np.where(says, terms, 1.0), np.nan)
 
     def misfit(self, transform: Numbers) -> float:
@@ -143,7 +146,7 @@ class Balance:
 
     def worst_tendon(self) -> int:
         """Index from 0 of the tendon whose equation leaves most."""
-        return int(np.argmax(np.einsum("ij,jk,ik->i", self.rows, self.covariance, self.rows)))
+        return int(self.tendons[np.argmax(((self.rows @ self.covariance) * self.rows).sum(axis=1))])
 
     def transform(self, correction: Correction) -> Numbers:
         """[c, c] what a correction does."""
@@ -180,9 +183,28 @@ class Balance:
         return [column for column in self.columns if column.startswith(f"{name}[")]
 
 
-def tells(finger: FingerDescription, measured: bool) -> bool:
-    """Whether the equation tells anything. measured: joint angles are."""
-    return measured or len(finger.tendon_names) > len(finger.joint_names)
+def _equations(finger: FingerDescription, tendons: Indices, measured: bool) -> tuple[Numbers, Numbers]:
+    """[e, c] rows that are 0, and [n, c] joint angles by the tendons; columns as in `Balance`."""
+    arms = np.asarray(finger.moment_arms, dtype=float)
+    compliance = np.diag([1.0 / float(tendon["stiffness"]) for tendon in finger.data["tendons"]])
+    elastic = np.concatenate([-compliance, np.eye(len(arms))], axis=1)[tendons]
+    arms = arms[tendons]
+    inverse = np.linalg.pinv(arms)
+    angle = inverse @ elastic
+    if not measured:
+        return (np.eye(len(arms)) - arms @ inverse) @ elastic, angle
+    joints = np.zeros((len(angle), arms.shape[1]))
+    return np.concatenate([elastic, -arms], axis=1), np.concatenate([angle, joints], axis=1)
+
+
+def taut_tendons(force: Numbers) -> Indices:
+    """Indices from 0 of tendons with any force. force: [N, m]."""
+    return np.flatnonzero(force.any(axis=0))
+
+
+def tells(finger: FingerDescription, groups: Mapping[str, Numbers]) -> bool:
+    """Whether the equation tells anything: more of them than unknown joint angles."""
+    return "joint_position" in groups or len(taut_tendons(groups["tendon_force"])) > len(finger.joint_names)
 
 
 def repairs(balance: Balance) -> tuple[list[Repair], float]:
@@ -201,11 +223,11 @@ def repairs(balance: Balance) -> tuple[list[Repair], float]:
         if not np.isfinite(least):
             break
         alike = np.flatnonzero(scores <= max(ALIKE * least, SAME))
-        rank = [(balance.pushing(transform @ balance.transform(tried[k])), _size(tried[k]), scores[k]) for k in alike]
+        rank = [(balance.pushing(balance.transform(tried[k]) @ transform), _size(tried[k]), scores[k]) for k in alike]
         best = int(alike[min(range(len(alike)), key=lambda k: rank[k])])
         others = tuple(tried[k] for k, key in zip(alike, rank, strict=True) if k != best and key[0] == min(rank)[0])
         done.append(Repair(tried[best], others, misfit, float(scores[best])))
-        transform = transform @ balance.transform(tried[best])
+        transform = balance.transform(tried[best]) @ transform
         misfit = float(scores[best])
     return done, misfit
 
@@ -218,7 +240,7 @@ def _scores(balance: Balance, tried: Sequence[Correction], transform: Numbers) -
     for k, correction in enumerate(tried):
         if not was and correction.kind != "scale":
             continue
-        with_it = transform @ balance.transform(correction)
+        with_it = balance.transform(correction) @ transform
         after = balance.misfits(with_it)
         changed = np.abs(after - before) > NOTHING
         if not changed.any() or _mean(after[changed]) * GAIN >= _mean(before[changed]) or _mean(after) >= whole:

@@ -24,8 +24,9 @@ from tendonfmu.recording_channels import (
 )
 from tendonfmu.recording_faults import STUCK, TURNS, tendon_angles
 from tendonfmu.recording_findings import Finding
-from tendonfmu.recording_kinematics import FEWEST, GAIN, SAME, Balance, Correction, Repair, repairs, tells
+from tendonfmu.recording_kinematics import EQUATED, FEWEST, GAIN, SAME, Balance, Correction, Repair, repairs, tells
 from tendonfmu.recording_velocity import velocity_corrections
+from tendonfmu.signal_noise import white_noise
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -39,6 +40,8 @@ WINDOW = 0.02  # s; power is that of motion slower than this
 FEWEST_WINDOWS = 50
 MOST_COMPARED = 12  # corrections
 AGAINST = 0.15  # of the power at a joint; sound recordings have 0.6 and more, those with a wrong sign -0.3 and less
+STILL = 0.02  # rad; with less motion nothing is told
+SLACK = 0.01  # of the largest force of a tendon; a slack one does not follow its joints
 OPPOSED = 0.5  # of what forces and reference leave of each other, when their sum leaves less
 LEAST_KEPT = 0.2  # of the samples, for the equations
 
@@ -81,16 +84,18 @@ def _findings(finger: FingerDescription, recording: Recording) -> list[Finding]:
     if isinstance(unit, float):
         recording = replace(recording, time=recording.time * unit)
     kinematic, mended = _of_kinematics(finger, recording)
+    stands = held_channels(mended, finger)
     held = [
-        text.held(recording.path, each, "error" if each.share > HALF else "warning")
-        for each in held_channels(mended, finger)
+        text.held(recording.path, each, "error" if each.share > HALF and each.value != 0.0 else "warning")
+        for each in stands
     ]
     dead = any(finding.severity == "error" for finding in held)
+    silent = any(each.share > HALF for each in stands)
     if not dead:  # of a dead sensor no equation holds
         found += kinematic
         mended = _with_velocities(finger, mended, found)
         found += _of_pushing(finger, mended, {column for finding in kinematic for column in finding.columns})
-        if not any(finding.severity == "error" for finding in found):
+        if not silent and not any(finding.severity == "error" for finding in found):
             found += list(_of_power(finger, mended)) or list(_of_reference(finger, mended))
     found += _of_channels(finger, mended, held)
     return found
@@ -129,18 +134,16 @@ def _of_channels(finger: FingerDescription, recording: Recording, held: Sequence
 
 def _of_kinematics(finger: FingerDescription, recording: Recording) -> tuple[list[Finding], Recording]:
     """Findings about signs, order and units of columns, and the recording as it would be with them mended."""
-    groups = {name: values for name, values in recording.groups.items() if name in text.KINEMATIC}
-    rows = _changing(recording, groups)
     if len(recording) < FEWEST:
         return [], recording
-    balance = Balance(finger, {name: values[rows] for name, values in groups.items()})
     found: list[Finding] = []
-    if tells(finger, "joint_position" in groups):
+    balance, moves = _balance(finger, recording)
+    if moves and tells(finger, recording.groups):
         done, left = repairs(balance)
-        if len(done) == 1:
-            done = [_likeliest(finger, recording, done[0])]
         if left > UNFIT:  # what mends a part of it only is a guess
             return [text.unfit(recording.path, done[0].misfit if done else left, "error", balance)], recording
+        if len(done) == 1:
+            done = [_likeliest(finger, recording, done[0])]
         found = [text.repair(recording.path, each) for each in done]
         for each in done:
             recording = _mended(recording, each.correction)
@@ -170,16 +173,36 @@ def _likeliest(finger: FingerDescription, recording: Recording, found: Repair) -
     return replace(found, correction=best[0], alternatives=tuple(best[1:]))
 
 
-def _changing(recording: Recording, groups: Mapping[str, Numbers]) -> Flags:
-    """[N] samples in which no channel holds a value for long; all where too few are left."""
+def _balance(finger: FingerDescription, recording: Recording) -> tuple[Balance, bool]:
+    """The equations over the samples that serve, and whether any joint moves in them."""
+    groups = {name: values for name, values in recording.groups.items() if name in EQUATED}
+    rows = _serving(finger, recording, groups)
+    kept = {name: values[rows] for name, values in groups.items()}
+    try:
+        noise = {name: white_noise(recording.time, values) for name, values in groups.items()}
+    except InputError:  # gaps everywhere
+        noise = {name: np.zeros(values.shape[1]) for name, values in groups.items()}
+    angles = [tendon_angles(recording, finger)[rows], *([kept["joint_position"]] if "joint_position" in kept else [])]
+    moves = any(float(np.ptp(angle, axis=0).max()) > STILL for angle in angles)
+    return Balance(finger, kept, noise), moves
+
+
+def _serving(finger: FingerDescription, recording: Recording, groups: Mapping[str, Numbers]) -> Flags:
+    """[N] samples in which no channel holds a value for long and no tendon is slack; all where too few are left."""
     changing = np.ones(len(recording), dtype=bool)
     for values in groups.values():
         for column in values.T:
             bounds = np.concatenate([[0], np.flatnonzero(np.diff(column)) + 1, [len(column)]])
             for k in np.flatnonzero(recording.time[bounds[1:] - 1] - recording.time[bounds[:-1]] > STUCK):
                 changing[bounds[k] : bounds[k + 1]] = False
+    force = np.abs(groups["tendon_force"])
+    pulls = [not tendon.get("bidirectional") for tendon in finger.data["tendons"]]
+    taut = ((force >= SLACK * force.max(axis=0)) | ~np.array(pulls)).all(axis=1)
     enough = max(FEWEST, LEAST_KEPT * len(recording))
-    return changing if changing.sum() >= enough else np.ones(len(recording), dtype=bool)
+    for serving in (changing & taut, taut, changing):
+        if serving.sum() >= enough:
+            return np.asarray(serving)
+    return np.ones(len(recording), dtype=bool)
 
 
 def _mended(recording: Recording, correction: Correction) -> Recording:
@@ -217,10 +240,9 @@ def _of_pushing(finger: FingerDescription, recording: Recording, mended: set[str
 
 def _is_sign_right(finger: FingerDescription, recording: Recording, i: int) -> bool:
     """Whether the equations say that tendon i's force grows as its spring stretches."""
-    groups = {name: values for name, values in recording.groups.items() if name in text.KINEMATIC}
-    if not tells(finger, "joint_position" in groups) or len(recording) < FEWEST:
+    if not tells(finger, recording.groups) or len(recording) < FEWEST:
         return False
-    balance = Balance(finger, groups)
+    balance, _ = _balance(finger, recording)
     flipped = balance.transform(Correction("sign", (f"tendon_force[{i + 1}]",), -1.0))
     return balance.misfit(np.eye(len(balance.columns))) * GAIN < balance.misfit(flipped)
 
@@ -245,7 +267,7 @@ def _of_power(finger: FingerDescription, recording: Recording) -> Iterator[Findi
 
 def _turning(finger: FingerDescription, recording: Recording) -> list[Correction]:
     """Signs and exchanges that the equations do not see and that let every joint follow its tendons."""
-    balance = Balance(finger, {name: values for name, values in recording.groups.items() if name in text.KINEMATIC})
+    balance, _ = _balance(finger, recording)
     given = np.eye(len(balance.columns))
     most, pushing = max(2 * balance.misfit(given), SAME), balance.pushing(given)
     found: list[tuple[int, int, Correction]] = []
@@ -255,7 +277,7 @@ def _turning(finger: FingerDescription, recording: Recording) -> list[Correction
             continue
         mended = _mended(recording, correction)
         share = power_shares(finger, mended)
-        if share is not None and share.min() > 0.0:
+        if share is not None and share.min() >= 0.0:
             found.append((sum(1 for _ in _of_reference(finger, mended)), len(correction.columns), correction))
         if len(found) >= MOST_COMPARED:
             break
@@ -264,7 +286,10 @@ def _turning(finger: FingerDescription, recording: Recording) -> list[Correction
 
 
 def power_shares(finger: FingerDescription, recording: Recording) -> Numbers | None:
-    """[n] work that the tendons do on each joint over all that goes to and fro: friction makes it 1, springs 0."""
+    """[n] work that the tendons do on each joint over all that goes to and fro: friction makes it 1, springs 0.
+
+    0 too for joints that do not move. None for a recording that is too short.
+    """
     external, angle = (recording.groups.get(name) for name in ("external_torque", "joint_position"))
     torque = recording.groups["tendon_force"] @ np.asarray(finger.moment_arms, dtype=float)
     if external is not None:
@@ -281,5 +306,6 @@ def power_shares(finger: FingerDescription, recording: Recording) -> Numbers | N
     if recording.contact is not None and external is None:
         touched = np.asarray(recording.contact[: count * every].reshape(count, every).any(axis=1))
         work = work[~(touched[1:] | touched[:-1])]
+    work = np.where(np.ptp(angle, axis=0) > STILL, work, 0.0)
     total = np.abs(work).sum(axis=0)
     return np.asarray(work.sum(axis=0) / np.where(total > 0.0, total, 1.0))

@@ -14,7 +14,6 @@ from tendonfmu.recording_findings import Finding
 from tendonfmu.recording_kinematics import Balance, Correction, Repair
 
 Numbers = NDArray[np.float64]
-KINEMATIC = ("tendon_force", "tendon_position", "joint_position")
 EQUATION = "position − force/stiffness = moment arms × joint angles"
 _REASONS = {
     "tendon_force": "the force falls where its spring stretches",
@@ -162,7 +161,7 @@ def against(path: Path, share: Numbers, joints: Sequence[str], turning: Sequence
     by_hand = "a finger that was moved by hand"
     if not turning:
         write = "write sign -1 into the map of columns for what is reversed, or record without touching the finger"
-        return Finding("error", "against", path, ("tendon_force", "tendon_position"), seen, by_hand, write)
+        return Finding("warning", "against", path, ("tendon_force", "tendon_position"), seen, by_hand, write)
     others = "".join(f", or as likely {_in_words(other)}" for other in turning[1:4])
     return _of_correction(path, turning[0], seen, f"{_cause(turning[0])}{others}, or {by_hand}")
 
