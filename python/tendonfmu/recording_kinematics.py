@@ -21,7 +21,7 @@ Numbers = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 FEWEST = 200  # samples; fewer tell no covariance
-MISFIT = 5e-4  # share of variance below which the equations fit: arms and springs are not known better than 2 %
+MISFIT = 5e-4  # share of variance below which an equation fits: arms and springs are not known better than 2 %
 GAIN = 4.0  # times less misfit that a correction must bring
 ALIKE = 1.5  # times the best correction's misfit: both are named
 SAME = 2e-4  # share of variance below which two corrections are as good as each other
@@ -122,6 +122,10 @@ class Balance:
         """Mean share over the equations that say something."""
         return _mean(self.misfits(transform))
 
+    def worst(self, transform: Numbers) -> float:
+        """Largest share of an equation that says something."""
+        return float(np.nan_to_num(self.misfits(transform)).max(initial=0.0))
+
     def is_plausible(self, transform: Numbers) -> bool:
         """Joints that turn less than `TURNS`, forces of at most `STRONGEST`."""
         turn = np.abs(self._angle @ transform) @ self._range
@@ -216,8 +220,8 @@ def repairs(balance: Balance) -> tuple[list[Repair], float]:
     done: list[Repair] = []
     transform = np.eye(len(balance.columns))
     misfit = balance.misfit(transform)
-    tried = list(balance.corrections()) if misfit > MISFIT else []
-    while misfit > MISFIT and len(done) < ROUNDS:
+    tried = list(balance.corrections()) if balance.worst(transform) > MISFIT else []
+    while tried and balance.worst(transform) > MISFIT and len(done) < ROUNDS:
         scores = _scores(balance, tried, transform)
         least = float(scores.min(initial=np.inf))
         if not np.isfinite(least):
