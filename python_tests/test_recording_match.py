@@ -1,6 +1,6 @@
 """`tendonfmu check FINGER.json RECORDING`: signs, order and units of columns, clocks and sensors.
 
-The systematic table is `foreign/recording_check_table.py`.
+The systematic table is `bench/recording_check.py`.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""How often `tendonfmu check` finds what is wrong with a recording: python recording_check_table.py --half even -o T.md
+"""How often `tendonfmu check` finds what is wrong with a recording: python bench/recording_check.py --half even -o T.md
 
-Each sound test recording of the foreign cases is corrupted in every way of `corruptions.py` and checked; sound ones
-are checked as they are, without their joint angles, and against descriptions with rough numbers. Constants of the
-product are chosen on odd cases; figures that are published come from even ones.
+Each sound test recording of the foreign cases is corrupted in every way of `python_tests/foreign/corruptions.py` and
+checked; sound ones are checked as they are, without their joint angles, and against descriptions with rough numbers.
+Constants of the product are chosen on odd cases; figures that are published come from even ones.
 """
 
 from __future__ import annotations
@@ -20,13 +20,16 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from corruptions import Corruption, applicable, columns_of, corrupt, corruptions
-from foreign_case import Nominal
 
 from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.recording import GROUPS, Recording
 from tendonfmu.recording_findings import Finding
 from tendonfmu.recording_match import belongs
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "python_tests" / "foreign"))
+
+from corruptions import Corruption, applicable, columns_of, corrupt, corruptions
+from foreign_case import Nominal
 
 FAMILIES = {"recorded": "recorded", "mujoco": "fingers_in_mujoco", "numpy": "fingers_in_numpy"}
 ROUGH = (0.05, 0.15)  # relative errors of moment arms and stiffness, standard deviation
