@@ -65,6 +65,9 @@ def test_the_small_recording_gives_the_angles_it_was_made_of(folder: Path) -> No
     recording = read_recording(folder / "two_joints.csv")
     said = shell(blocks(RECORDING_PAGE, "sh")[0], folder)
     assert "1000 samples in 1.998 s" in said and "-0.3 to 0.3 rad" in said
+    shell(f"{blocks(RECORDING_PAGE, 'sh')[1].strip()} > answer.txt", folder)
+    answer = (folder / "answer.txt").read_text(encoding="utf-8")
+    assert "two_joints.csv: belongs to this finger" in answer and "nothing found" in answer
     found = read_table(folder / "two_joints_out.csv", lambda *_: None)
     assert np.allclose(found["joint_angle[1]"], 0.3 * np.sin(3 * recording.time), atol=1e-12)
     assert np.allclose(found["joint_angle[2]"], 0.2 * np.sin(2 * recording.time), atol=1e-12)

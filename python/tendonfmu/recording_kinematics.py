@@ -69,7 +69,7 @@ class Correction:
 class Repair:
     """A correction that makes the equations fit, and the others that do so as well.
 
-    misfit, left: share of the variance that the equations leave before and after it.
+    misfit, left: share of the variance that the equations leave that it changes, before and after it.
     """
 
     correction: Correction
@@ -230,8 +230,11 @@ def repairs(balance: Balance) -> tuple[list[Repair], float]:
         rank = [(balance.pushing(balance.transform(tried[k]) @ transform), _size(tried[k]), scores[k]) for k in alike]
         best = int(alike[min(range(len(alike)), key=lambda k: rank[k])])
         others = tuple(tried[k] for k, key in zip(alike, rank, strict=True) if k != best and key[0] == min(rank)[0])
-        done.append(Repair(tried[best], others, misfit, float(scores[best])))
+        before = balance.misfits(transform)
         transform = balance.transform(tried[best]) @ transform
+        after = balance.misfits(transform)
+        changed = np.abs(after - before) > NOTHING
+        done.append(Repair(tried[best], others, _mean(before[changed]), _mean(after[changed])))
         misfit = float(scores[best])
     return done, misfit
 
