@@ -162,7 +162,7 @@ def _calibrated(left: Numbers, other: Numbers, cells: Cells, rows: Flags) -> tup
         square, known = left[rows, j], np.maximum(other[rows, j], _TINY)
         spread = np.array([np.sqrt(square[group == g].mean()) for g in present])
         line, per = _line(at, np.maximum(spread, 1e-9))
-        shape = (max(line, _LEAST * float(spread.min()) - per * float(force.min()), 1e-9), per)
+        shape = (max(line, _LEAST * float(spread.min()) - per * float(force.min())), per)
 
         def surplus(scale: float, square: Numbers = square, known: Numbers = known, shape: Any = shape) -> float:
             return float(np.mean(square / (known + (scale * (shape[0] + shape[1] * force)) ** 2))) - 1.0
