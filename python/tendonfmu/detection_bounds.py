@@ -95,7 +95,8 @@ class Search:
     """What a search needs of all counted samples: [n, N] signal, H, J and L·u in N·m, and means [c, n] of
     each cell; mean_square of the signal.
 
-    rate: 1/h, of alarms. least: [n] N·m, of base + per_force·f at any recorded force f.
+    rate: 1/h, of alarms. least: [n] N·m, of base + per_force·f at any recorded force f, the lowest of
+    which is lowest_force, N.
     """
 
     cells: Cells
@@ -109,6 +110,7 @@ class Search:
     mean_square: Numbers
     rate: float
     least: Numbers
+    lowest_force: float
 
     def excess(self, stuck_share: float, jump_share: float) -> Signal:
         """[c, n] N·m: by how much |signal| exceeds c_H·H + c_J·J + L·u in each cell, at most."""
@@ -126,14 +128,14 @@ class Search:
 
     def sound(self, bound: Bound) -> Bound:
         """The bound, raised where its own part falls below `least` at a recorded force."""
-        return bound.at_least(self.least, float(self.cells.force.min()))
+        return bound.at_least(self.least, self.lowest_force)
 
     def least_factor(self, bound: Bound) -> float:
         """The smallest factor on a sound bound that keeps it sound, at most 1 but for rounding.
 
         Where friction alone explains the signal the excess is negative, and so is the level that alarms ask for.
         """
-        return float(np.max(self.least / bound.own(self.cells.force.min(keepdims=True))[0]))
+        return float(np.max(self.least / bound.own(np.array([self.lowest_force]))[0]))
 
     def in_the_way(self, bound: Bound, rows: Any) -> Numbers:
         """[k, n] N·m: what a push has to pass in each of the cells in rows.
@@ -169,6 +171,9 @@ def search_for(runs: Sequence[FreeRun], cells: Cells, signal: str, rate: float, 
         mean_square=mean_square,
         rate=rate,
         least=np.maximum(_LEAST * np.sqrt(mean_square.mean(axis=0)), 1e-9),
+        lowest_force=min(
+            float(run.part.mean_force[rows].min()) for run, rows in zip(runs, cells.rows, strict=True) if len(rows)
+        ),
     )
 
 
