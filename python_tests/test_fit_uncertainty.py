@@ -136,8 +136,13 @@ def test_residuals_that_last_count_for_more() -> None:
     recording.groups["external_torque"] = (
         recording.groups["external_torque"] - np.repeat(noise, 20, axis=0)[: len(recording)]
     )
+    plain = fitted(moved_start(), recording, effective_samples=False)
+    assert all(2.2 < each < 20.0 for each in plain.report_["uncertainty"]["inflation"])
+    # the effective number of samples, which comes from the residuals alone, leaves nothing to inflate but by chance
     found = fitted(moved_start(), recording)
-    assert all(2.2 < each < 20.0 for each in found.report_["uncertainty"]["inflation"])
+    assert all(0.4 < each < 1.8 for each in found.report_["uncertainty"]["inflation"])
+    std = [np.array(each.report_["uncertainty"]["train"]["std"]) for each in (plain, found)]
+    assert std[1] == pytest.approx(std[0], rel=0.1)
 
 
 def test_the_directions_cover_the_difference_of_two_fits(fit: FrictionFit) -> None:

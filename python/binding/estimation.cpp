@@ -52,6 +52,20 @@ class Estimator {
     return index;
   }
 
+  void set_weights(std::size_t recording, const Numbers& weight) {
+    if (weight.shape(0) != joints()) {
+      throw nb::value_error(("weight: expected " + std::to_string(joints()) + " numbers, one a joint").c_str());
+    }
+    expect(tendonfmu_estimator_set_weights(get(), recording, weight.data()));
+  }
+
+  void set_known(const Rows& information) {
+    if (information.shape(0) != unknowns() || information.shape(1) != unknowns()) {
+      throw nb::value_error("information: expected a row and a column for each unknown");
+    }
+    expect(tendonfmu_estimator_set_known(get(), information.data()));
+  }
+
   nb::tuple evaluate(const Numbers& z, std::size_t stride, unsigned threads) const {
     expect_unknowns(z);
     const std::size_t u = unknowns();
@@ -181,6 +195,8 @@ NB_MODULE(_estimation, m) {
            nb::arg("tendon_position") = nb::none(), nb::arg("joint_position") = nb::none(),
            nb::arg("joint_velocity") = nb::none(), nb::arg("kinematics_source") = 1,
            nb::arg("external_torque") = nb::none(), nb::arg("use") = nb::none())
+      .def("set_weights", &Estimator::set_weights, nb::arg("recording"), nb::arg("weight"))
+      .def("set_known", &Estimator::set_known, nb::arg("information"))
       .def("evaluate", &Estimator::evaluate, nb::arg("z"), nb::arg("stride") = 1, nb::arg("threads") = 0)
       .def("jacobian", &Estimator::jacobian)
       .def("innovations", &Estimator::innovations)

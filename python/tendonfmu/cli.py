@@ -356,6 +356,19 @@ def fit(
     scale: Annotated[
         list[str] | None, typer.Option(metavar="PATTERN=VALUE", help="expected magnitude, if not the description's")
     ] = None,
+    previous: Annotated[
+        Path | None,
+        typer.Option("--from", metavar="PREVIOUS.json", help="report of an earlier fit, or its description: the prior"),
+    ] = None,
+    change: Annotated[
+        float, typer.Option(min=1e-6, max=10.0, help="with --from: how much numbers may have changed since, relative")
+    ] = 0.02,
+    effective_samples: Annotated[
+        bool,
+        typer.Option(
+            "--effective-samples/--no-effective-samples", help="residuals that last count as fewer samples, or as all"
+        ),
+    ] = True,
     passes: Annotated[
         int | None, typer.Option(min=1, help="most passes over the data \\[default: 60, of ekf 2]")
     ] = None,
@@ -382,7 +395,7 @@ def fit(
     from tendonfmu.fit_text import lines, tables
     from tendonfmu.fitting import FitWarning, FrictionFit
 
-    inputs = [finger, *recordings, *(compare or []), *([] if resume is None else [resume])]
+    inputs = [finger, *recordings, *(compare or []), *(each for each in (previous, resume) if each is not None)]
     check_outputs(output, report, figures, inputs)
     with progress_bar(progress) as bar:
         fitting = FrictionFit(
@@ -397,6 +410,9 @@ def fit(
             share=share or [],
             prior=prior,
             scale=scale or [],
+            previous=previous,
+            change=change,
+            effective_samples=effective_samples,
             max_passes=passes,
             tolerance=tolerance,
             parameter_drift=drift,

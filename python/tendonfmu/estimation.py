@@ -172,8 +172,24 @@ class Estimator:
                 )
             )
 
+    def set_weights(self, recording: int, weight: Array) -> None:
+        """Lets each sample of a recording count as a part of one in `evaluate` and `fit`.
+
+        weight: [n] by joint, above 0 and at most 1; 1 until set.
+        """
+        with _refusals():
+            self._estimator.set_weights(recording, np.ascontiguousarray(weight, dtype=np.float64))
+
+    def set_known(self, information: Array) -> None:
+        """What an earlier fit knows, which `fit` adds to its prior.
+
+        information: [u, u] of the unknowns about the description's numbers, symmetric, positive semidefinite.
+        """
+        with _refusals():
+            self._estimator.set_known(np.ascontiguousarray(information, dtype=np.float64))
+
     def evaluate(self, z: Array, stride: int = 1, threads: int = 0) -> tuple[float, Numbers, Numbers]:
-        """Cost ½ Σ e²/S of the data at z, gradient [u], information [u, u]; without prior.
+        """Cost ½ Σ w e²/S of the data at z, gradient [u], information [u, u]; without prior.
 
         stride: only every stride-th sample is looked at, each for `stride`.
         threads: 0 for all cores; any number gives the same result.

@@ -21,7 +21,7 @@ from tendonfmu.balance import moment_arms
 from tendonfmu.description import FingerDescription
 from tendonfmu.errors import InputError
 from tendonfmu.fit_files import description_text, with_values
-from tendonfmu.fit_methods import Interrupted, Learned, Watch, learn_batch
+from tendonfmu.fit_methods import Interrupted, Learned, Settings, Watch, learn_batch
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.fit_structure import Choice, Structure, build_structure, get_number
 from tendonfmu.fit_verdicts import slopes
@@ -124,12 +124,13 @@ def learn_numbers(
     every = -(-sum(int(recording.train.sum()) for recording in recordings) // MOST_SAMPLES)
     recordings = [_thinned(_with_own_target(data, recording), max(every, 1)) for recording in recordings]
     structure = _with_scale(build_structure(_described(data, settings.path), settings.choice), given)
-    options = {
-        "prior": settings.prior,
-        "max_passes": settings.max_passes,
-        "tolerance": settings.tolerance,
-        "threads": settings.threads,
-    }
+    options = Settings(
+        prior=settings.prior,
+        max_passes=settings.max_passes,
+        tolerance=settings.tolerance,
+        threads=settings.threads,
+        effective=False,  # a diagnosis has its own noise model (`whitening`)
+    )
     try:
         return structure, learn_batch(structure, recordings, Watch(None), options, None)
     except Interrupted:  # a fit that is only a part of something has no use for what it has so far

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tendonfmu import native
 from tendonfmu.description import FingerDescription
+from tendonfmu.effective_number import effective_samples
 from tendonfmu.finite_numbers import finite
 from tendonfmu.fit_evaluation import Evaluation, residual_entry
 from tendonfmu.fit_residuals import consistency, whiteness
@@ -39,8 +40,8 @@ class Outcome:
     """A finished fit.
 
     names: [u] "path.role" of the unknowns. covariance: [u, u] of them. innovations: [N, n] standardised, of each
-    recording, NaN where not trained on. training, comparisons: judged recordings. uncertainty: of the modelled friction
-    torque, None where not asked for.
+    recording, NaN where not trained on. weights: [N, n] of each, what a sample counts for. training, comparisons:
+    judged recordings. uncertainty: of the modelled friction torque, None where not asked for.
     """
 
     fitted: FingerDescription
@@ -51,6 +52,7 @@ class Outcome:
     names: Sequence[str]
     covariance: Numbers
     innovations: Sequence[Numbers]
+    weights: Sequence[Numbers]
     training: Sequence[Evaluation]
     comparisons: Sequence[Evaluation]
     uncertainty: Mapping[str, Any] | None
@@ -74,14 +76,18 @@ def build_report(found: Outcome) -> dict[str, Any]:
         "warnings": list(found.warnings),
         "recordings": [each.recording.entry() for each in found.training],
         "parameters": [_parameter(number, units) for number in found.numbers],
-        "correlation": {"paths": list(found.names), "matrix": _correlation(found.covariance)},
+        "correlation": {
+            "paths": list(found.names),
+            "standard_errors": np.sqrt(np.maximum(np.diag(found.covariance), 0.0)).tolist(),
+            "matrix": _correlation(found.covariance),
+        },
         "identified": {"count": sum(number.identified for number in found.numbers), "of": len(found.numbers)},
         "residual": {
             "train": residual_entry(found.training, "train"),
             "held_out": residual_entry(found.training, "held_out"),
             "comparisons": [_comparison(each) for each in found.comparisons],
         },
-        "innovations": {"nis": consistency(found.innovations), "whiteness": whiteness(found.innovations)},
+        "innovations": _innovations(found),
         "uncertainty": found.uncertainty,
     }
     return {key: finite(value) for key, value in report.items()}
@@ -94,7 +100,8 @@ def report_text(report: Mapping[str, Any]) -> str:
         if key == "parameters":
             text = _lines(value)
         elif key == "correlation":
-            text = f'{{"paths": {_lines(value["paths"])},\n  "matrix": {_lines(value["matrix"])}}}'
+            keys = ("paths", "standard_errors", "matrix")
+            text = "{" + ",\n  ".join(f"{json.dumps(own)}: {_lines(value[own])}" for own in keys) + "}"
         else:
             text = json.dumps(value, ensure_ascii=False, allow_nan=False)
         parts.append(f" {json.dumps(key)}: {text}")
@@ -117,6 +124,17 @@ def _parameter(number: Fitted, units: Mapping[str, str]) -> dict[str, Any]:
         "reason": number.cause or None,
         "explanation": number.reason or None,
         "advice": number.advice or None,
+    }
+
+
+def _innovations(found: Outcome) -> dict[str, Any]:
+    """What the residuals of the samples trained on are like, and how many independent ones they are worth."""
+    samples, worth = effective_samples(found.innovations, found.weights)
+    share = float(worth.sum() / samples.sum()) if samples.sum() else 1.0
+    return {
+        "nis": consistency(found.innovations, share),
+        "whiteness": whiteness(found.innovations),
+        "effective": {"samples": samples.tolist(), "worth": worth.tolist()},
     }
 
 

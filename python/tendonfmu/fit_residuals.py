@@ -214,21 +214,22 @@ def rms(values: Numbers, chosen: Flags) -> list[float]:
     return [float(value) for value in np.sqrt(np.mean(picked**2, axis=0))]
 
 
-def consistency(standardised: Sequence[Numbers]) -> dict[str, Any]:
+def consistency(standardised: Sequence[Numbers], share: float = 1.0) -> dict[str, Any]:
     """NIS: the mean of the squared standardised innovations, 1 for a consistent filter, and its chi-square interval.
 
-    standardised: [N, n] each, NaN where not used. Quantiles of χ²_k by Wilson and Hilferty (1931), within 1e-3 of the
-    interval's width from 30 innovations on.
+    standardised: [N, n] each, NaN where not used. share: independent ones among them, above 0, at most 1. Quantiles of
+    χ²_k by Wilson and Hilferty (1931), within 1e-3 of the interval's width from 30 innovations on.
     """
     values = np.concatenate([each[~np.isnan(each)] for each in standardised])
     if not len(values):
         return {"mean": math.nan, "interval": [math.nan, math.nan], "consistent": False}
     mean = float(np.mean(values**2))
-    low, high = (_mean_chi_square(len(values), p) for p in ((1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2))
+    count = max(share * len(values), 1.0)
+    low, high = (_mean_chi_square(count, p) for p in ((1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2))
     return {"mean": mean, "interval": [low, high], "consistent": bool(low <= mean <= high)}
 
 
-def _mean_chi_square(count: int, probability: float) -> float:
+def _mean_chi_square(count: float, probability: float) -> float:
     """Quantile of χ²_count/count."""
     part = 2 / (9 * count)
     return float((1 - part + NormalDist().inv_cdf(probability) * math.sqrt(part)) ** 3)

@@ -37,10 +37,17 @@ class Scores:
     block_time: float
 
 
-def block_scores(estimator: Estimator, z: Numbers, data: Mapping[str, Any], training: Sequence[Evaluation]) -> Scores:
+def block_scores(
+    estimator: Estimator,
+    z: Numbers,
+    data: Mapping[str, Any],
+    training: Sequence[Evaluation],
+    weights: Sequence[Numbers],
+) -> Scores:
     """At the estimate z [u] of a fitted description, over the samples trained on.
 
-    estimator: of the start's description; the blocks are added to its recordings.
+    estimator: of the start's description; the blocks are added to its recordings. weights: [N, n] by recording, what
+    each sample counts for.
 
     Every so many'th sample is looked at, with the bias filter of that rate; each block's bias begins anew.
     """
@@ -51,8 +58,8 @@ def block_scores(estimator: Estimator, z: Numbers, data: Mapping[str, Any], trai
     length = min(max(seconds / BLOCKS, SHORTEST), seconds / FEWEST)
     settings = _settings(data, every)
     found = [
-        _score(estimator, z, settings, evaluation, rows)
-        for evaluation in training
+        _score(estimator, z, settings, evaluation, rows, own)
+        for evaluation, own in zip(training, weights, strict=True)
         for rows in _blocks(evaluation, length, every)
     ]
     scores = np.array(found).reshape(len(found), len(z))
@@ -80,7 +87,12 @@ def _blocks(found: Evaluation, length: float, every: int) -> Iterator[NDArray[np
 
 
 def _score(
-    estimator: Estimator, z: Numbers, settings: BiasSettings, found: Evaluation, rows: NDArray[np.intp]
+    estimator: Estimator,
+    z: Numbers,
+    settings: BiasSettings,
+    found: Evaluation,
+    rows: NDArray[np.intp],
+    weights: Numbers,
 ) -> Numbers:
     """[u] of one block. The filter is linear, so it takes y − T and its derivatives alike."""
     recording = found.recording
@@ -93,7 +105,7 @@ def _score(
     mean_force = np.abs(recording.recording.groups["tendon_force"][rows]).mean(axis=1)
     left = track(settings, time, mean_force, remainder, jumps, learns, [slice(0, len(rows))])
     chosen = learns & ~np.isnan(left.residual).any(axis=1)
-    residual = left.residual[chosen, :joints] / left.variance[chosen, None]
+    residual = left.residual[chosen, :joints] / left.variance[chosen, None] * weights[rows][chosen]
     slopes = left.residual[chosen, joints:].reshape(-1, joints, len(z))
     return np.asarray(np.tensordot(residual, slopes, axes=((0, 1), (0, 1))))
 

@@ -65,7 +65,7 @@ class Choice:
 def build_structure(finger: FingerDescription, choice: Choice) -> Structure:
     """Raises InputError where a pattern matches nothing, nothing is left to estimate, or shared laws differ in kind."""
     data = _without_uncertainty(with_sides(finger.data, choice.sides))
-    numbers = _all_numbers(data)
+    numbers = estimable_numbers(data)
     if not numbers:
         raise InputError(f"{finger.path}: nothing to estimate: no friction, cover or extension; expected at least one")
     chosen = _chosen(numbers, choice)
@@ -119,7 +119,8 @@ def own_copy(data: Mapping[str, Any]) -> dict[str, Any]:
     return copied
 
 
-def _all_numbers(data: Mapping[str, Any]) -> list[Unknown]:
+def estimable_numbers(data: Mapping[str, Any]) -> list[Unknown]:
+    """What a fit of a parsed description may estimate: all that is present, `bias.initial_torque` last."""
     return [*unknowns(data), *_initial_torques(data)]
 
 

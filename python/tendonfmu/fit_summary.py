@@ -306,9 +306,17 @@ def _consistency(picture: FitPicture) -> list[str]:
     if strong:
         sentences.append(
             f"Autocorrelation from sample to sample: {', '.join(strong)}. White innovations have none: what is left "
-            "has a shape in time that the model lacks, and the standard errors count each sample as new."
+            f"has a shape in time that the model lacks, and {_counted(found)}."
         )
     return sentences
+
+
+def _counted(innovations: Mapping[str, Any]) -> str:
+    effective = innovations.get("effective") or {"samples": [0.0], "worth": [0.0]}
+    samples, worth = sum(effective["samples"]), sum(effective["worth"])
+    if worth < samples:
+        return f"estimates and standard errors count the {samples:.0f} samples as {worth:.0f}"
+    return "the standard errors count each sample as new"
 
 
 def _uncertainty(picture: FitPicture) -> list[UncertaintyRow]:

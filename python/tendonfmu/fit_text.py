@@ -86,6 +86,10 @@ def lines(fit: FrictionFit) -> Iterator[str]:
             f"innovations: NIS {innovations['nis']['mean']:.3g} ({low:.3f} to {high:.3f} where the noise settings "
             f"hold), autocorrelation at lag one {lags}"
         )
+    samples, worth = (innovations["effective"][key] for key in ("samples", "worth"))
+    if sum(worth) < sum(samples):
+        by_joint = ", ".join(f"{each:.0f}" for each in worth)
+        yield f"effective number of samples by joint: {by_joint} of {samples[0]:.0f}"
     if report["uncertainty"]:
         yield _uncertainty(report["uncertainty"])
     for cause, count in Counter(number.cause for number in numbers if number.cause).most_common():

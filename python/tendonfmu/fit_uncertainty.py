@@ -90,7 +90,7 @@ def parameter_uncertainty(
     """Of a finished fit. data: the fitted description. training: judged recordings."""
     known = known_of(learned.covariance, learned.information)
     estimator = Estimator(structure.start.image, structure.group, structure.scale)
-    blocks = block_scores(estimator, learned.z, data, training)
+    blocks = block_scores(estimator, learned.z, data, training, learned.weights)
     scores = blocks.scores @ known.factor
     motion = Motion(estimator, learned.z, data, known)
     trained, held = ([np.flatnonzero(getattr(each.recording, which)) for each in training] for which in ROLES)

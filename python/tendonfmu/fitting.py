@@ -36,7 +36,7 @@ from tendonfmu.fit_files import (
     with_uncertainty,
     with_values,
 )
-from tendonfmu.fit_methods import Interrupted, Learned, Watch, learn_batch, learn_ekf, unknown_names
+from tendonfmu.fit_methods import Interrupted, Learned, Settings, Watch, learn_batch, learn_ekf, unknown_names
 from tendonfmu.fit_picture import FitPicture, FitSeries
 from tendonfmu.fit_recordings import (
     FitRecording,
@@ -52,6 +52,7 @@ from tendonfmu.fit_residuals import bias_settings
 from tendonfmu.fit_structure import Choice, build_structure
 from tendonfmu.fit_uncertainty import parameter_uncertainty
 from tendonfmu.fit_verdicts import Fitted, Knowledge, judge_numbers
+from tendonfmu.previous_fit import CHANGE, PreviousFit, read_previous_fit, with_previous_values
 from tendonfmu.recording import Recording, read_recording
 
 Numbers = NDArray[np.float64]
@@ -84,6 +85,11 @@ class FrictionFit(ConstructorArguments):
         errors), threads (0: all cores): of "batch".
     uncertainty: whether the fitted description says what is not known of its friction (`contact.uncertainty`).
     parameter_drift: of the filter, relative variance per s with which the parameters may wander.
+    effective_samples: whether samples count for their share of an effective number where the residuals are not white
+        (`effective_number`); otherwise each counts as one.
+    previous: report of an earlier fit, or the description that it wrote: its numbers and their errors are start and
+        prior (`previous_fit`), and `prior` is for what it does not have. change: relative standard deviation of what
+        may have changed since.
     start: file of an interrupted fit to go on from. progress: called with a `fit_methods.Progress`; False stops.
 
     After `fit`: description_ (fitted), parameters_ and standard_errors_ (by path), covariance_ [p, p] in their order,
@@ -109,6 +115,9 @@ class FrictionFit(ConstructorArguments):
         threads: int = 0,
         uncertainty: bool = True,
         parameter_drift: float = 0.0,
+        effective_samples: bool = True,
+        previous: str | os.PathLike[str] | None = None,
+        change: float = CHANGE,
         start: str | os.PathLike[str] | None = None,
         progress: Callable[[Any], bool | None] | None = None,
     ) -> None:
@@ -128,6 +137,9 @@ class FrictionFit(ConstructorArguments):
         self.threads = threads
         self.uncertainty = uncertainty
         self.parameter_drift = parameter_drift
+        self.effective_samples = effective_samples
+        self.previous = previous
+        self.change = change
         self.start = start
         self.progress = progress
 
@@ -148,6 +160,9 @@ class FrictionFit(ConstructorArguments):
         self.finished_ = False
         self.unfinished_: Unfinished | None = None
         finger = _read_finger(self.finger)
+        previous = None if self.previous is None else read_previous_fit(Path(self.previous))
+        if previous is not None:
+            finger = with_previous_values(finger, previous)
         chosen = (self.only, self.fix, self.share, self.scale)
         structure = build_structure(finger, Choice(self.sides, *map(_listed_text, chosen)))
         self.structure_, self.start_ = structure, structure.start
@@ -160,7 +175,7 @@ class FrictionFit(ConstructorArguments):
         compared = [self._prepared(each, Held()) for each in others]
         require_noise(self.start_, self.recordings_)
         found = self._motion_warnings()
-        learned = self._learn(Watch(self.progress))
+        learned = self._learn(previous, Watch(self.progress))
         if learned is None:
             return self
         # what was estimated is not lost when judging it is interrupted
@@ -184,6 +199,7 @@ class FrictionFit(ConstructorArguments):
             ),
             (self.max_passes is None or self.max_passes >= 1, "max_passes", self.max_passes, "at least 1"),
             (0 < self.tolerance < 1, "tolerance", self.tolerance, "between 0 and 1"),
+            (0 < self.change <= 10, "change", self.change, "above 0 and at most 10, relative to the previous values"),
             (0 <= self.parameter_drift <= 1, "parameter_drift", self.parameter_drift, "0 to 1, per s"),
             (
                 self.parameter_drift == 0 or self.method == "ekf",
@@ -211,20 +227,24 @@ class FrictionFit(ConstructorArguments):
         ]
         return [*found, *refuse_stillness(self.start_, self.recordings_, moves)]
 
-    def _learn(self, watch: Watch) -> Learned | None:
+    def _learn(self, previous: PreviousFit | None, watch: Watch) -> Learned | None:
         """None where it was stopped."""
         begin = perf_counter()
         learn, passes = METHODS[self.method]
-        options = {
-            "prior": self.prior,
-            "max_passes": passes if self.max_passes is None else self.max_passes,
-            "tolerance": self.tolerance,
-            "threads": self.threads,
-            "parameter_drift": self.parameter_drift,
-        }
+        settings = Settings(
+            prior=self.prior,
+            max_passes=passes if self.max_passes is None else self.max_passes,
+            tolerance=self.tolerance,
+            threads=self.threads,
+            parameter_drift=self.parameter_drift,
+            effective=self.effective_samples,
+            previous=previous,
+            change=self.change,
+            noise=bias_settings(self.start_.data).noise,
+        )
         start = None if self.start is None else partial(resumed_start, Path(self.start))
         try:
-            learned = learn(self.structure_, self.recordings_, watch, options, start)
+            learned = learn(self.structure_, self.recordings_, watch, settings, start)
         except Interrupted as stopped:
             self.unfinished_ = self._unfinished(stopped)
             if stopped.by_user:
@@ -286,6 +306,7 @@ class FrictionFit(ConstructorArguments):
                 names=unknown_names(learned.estimator),
                 covariance=learned.covariance,
                 innovations=innovations,
+                weights=learned.weights,
                 training=self.training_,
                 comparisons=self.comparisons_,
                 uncertainty=uncertainty,
@@ -413,9 +434,11 @@ def _noise_sentences(innovations: Mapping[str, Any]) -> list[str]:
         )
     far = max((abs(value) for value in lag_one if value is not None), default=0.0)
     if far > MOST_LAG_ONE:
+        samples, worth = (sum(innovations["effective"][key]) for key in ("samples", "worth"))
+        counted = f"{samples:.0f} samples count as {worth:.0f}" if worth < samples else "each sample counts as new"
         found.append(
             f"residuals are not white (autocorrelation {far:.2f} from one sample to the next): the model misses "
-            "something, or the noise is not that of single samples; take the standard errors with care"
+            f"something, or the noise is not that of single samples; {counted}, take the standard errors with care"
         )
     return found
 

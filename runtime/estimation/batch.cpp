@@ -24,6 +24,11 @@ double prior_weight(double prior_std) {
   return std::isinf(prior_std) ? 0.0 : 1.0 / (prior_std * prior_std);
 }
 
+/* information of unknowns, of unknowns divided by their scales; empty: none */
+MatrixXd scaled(const MatrixXd& information, const ScaledBox& box) {
+  return information.size() > 0 ? MatrixXd(box.scale.asDiagonal() * information * box.scale.asDiagonal()) : MatrixXd();
+}
+
 /* A point and what a pass over the data found there. */
 struct Point {
   VectorXd x;
@@ -34,7 +39,11 @@ struct Point {
 class Search {
  public:
   Search(const Problem& problem, const BatchOptions& options, const BatchWatch& watch)
-      : problem_(problem), options_(options), watch_(watch), box_(problem.unknowns) {}
+      : problem_(problem),
+        options_(options),
+        watch_(watch),
+        box_(problem.unknowns),
+        prior_(prior_weight(options.prior_std), scaled(problem.known, box_)) {}
 
   BatchResult run(const std::vector<double>& start) {
     best_.x = box_.clip(
@@ -49,7 +58,7 @@ class Search {
     result_.cost = best_.cost;
     result_.prior_cost = best_.prior_cost;
     if (best_.data.complete) {
-      result_.covariance = posterior_covariance(problem_.unknowns, best_.data.information, options_.prior_std);
+      result_.covariance = posterior_covariance(problem_, best_.data.information, options_.prior_std);
     }
     result_.at = std::move(best_.data);
     return std::move(result_);
@@ -66,7 +75,7 @@ class Search {
     }
     best_ = std::move(here);
     while (result_.passes < options_.most_passes) {
-      const LocalModel model(problem_, box_, best_.data, best_.x, prior_weight(options_.prior_std));
+      const LocalModel model(problem_, box_, best_.data, best_.x, prior_);
       const VectorXd step = model.best_step(box_.around(best_.x, share), 0.05 * tolerance * tolerance);
       const double expected = best_.cost - model.cost(step);
       ++result_.steps;
@@ -110,7 +119,7 @@ class Search {
     }
     ++result_.passes;
     point->x = x;
-    point->prior_cost = 0.5 * prior_weight(options_.prior_std) * (x - box_.start).squaredNorm();
+    point->prior_cost = prior_.cost(x - box_.start);
     point->cost = found.cost + point->prior_cost;
     point->data = std::move(found);
     return true;
@@ -120,19 +129,20 @@ class Search {
   const BatchOptions& options_;
   const BatchWatch& watch_;
   const ScaledBox box_;
+  const Prior prior_;
   Point best_;
   BatchResult result_;
 };
 
 }  // namespace
 
-MatrixXd posterior_covariance(const Unknowns& unknowns, const MatrixXd& information, double prior_std) {
-  const ScaledBox box(unknowns);
+MatrixXd posterior_covariance(const Problem& problem, const MatrixXd& information, double prior_std) {
+  const ScaledBox box(problem.unknowns);
   /* never nothing: what neither data nor prior know must not come out as known exactly */
   const double weight = std::max(prior_weight(prior_std), least_prior_weight);
   const Eigen::Index p = information.rows();
   MatrixXd h = box.scale.asDiagonal() * information * box.scale.asDiagonal();
-  h.diagonal().array() += weight;
+  Prior(weight, scaled(problem.known, box)).add_to(&h);
   const Eigen::LDLT<MatrixXd> factor(h);
   const MatrixXd inverse = factor.solve(MatrixXd::Identity(p, p));
   return box.scale.asDiagonal() * (0.5 * (inverse + inverse.transpose())) * box.scale.asDiagonal();

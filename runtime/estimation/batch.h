@@ -37,8 +37,8 @@ struct BatchResult {
 BatchResult fit_batch(const Problem& problem, const std::vector<double>& start, const BatchOptions& options,
                       const BatchWatch& watch);
 
-/* (information + prior)^-1 for unknowns of these scales */
-Eigen::MatrixXd posterior_covariance(const Unknowns& unknowns, const Eigen::MatrixXd& information, double prior_std);
+/* (information + prior)^-1, problem.known included */
+Eigen::MatrixXd posterior_covariance(const Problem& problem, const Eigen::MatrixXd& information, double prior_std);
 
 }  // namespace tendonfmu::estimation
 

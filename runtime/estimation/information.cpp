@@ -100,7 +100,7 @@ class Worker {
     for (std::size_t j = 0; j < joints_.size(); ++j) {
       const double torque = rows_.measured(j) - recording.external_torque(k, j);
       joints_[j].rows.add(residual_column, torque - rows_.torque(j));
-      joints_[j].filter(gains.gain[k], gains.weight[k]);
+      joints_[j].filter(gains.gain[k], gains.weight[k] * recording.weight_root(j));
     }
   }
 

@@ -42,12 +42,13 @@ struct Problem {
   Unknowns unknowns;
   Columns columns;
   std::vector<Recording> recordings;
+  Eigen::MatrixXd known; /* information [u × u] about the start from before the recordings; empty: none */
 
   std::size_t joints() const { return finger.get()->joints; }
   std::size_t samples() const;
 };
 
-/* ½ Σ e²/S over all recordings, its derivative, and Σ ν νᵀ. */
+/* ½ Σ w e²/S over all recordings, its derivative, and Σ w ν νᵀ; w the recordings' weights. */
 struct Evaluation {
   double cost = 0.0;
   Eigen::VectorXd gradient;

@@ -29,8 +29,8 @@ void add_pair(double rr, double rd, Index r, Index d, double sign, MatrixXd* h) 
 }  // namespace
 
 LocalModel::LocalModel(const Problem& problem, const ScaledBox& box, const Evaluation& evaluation, const VectorXd& x,
-                       double prior_weight)
-    : problem_(problem), box_(box), gram_(evaluation.gram), x_(x), prior_weight_(prior_weight) {
+                       Prior prior)
+    : problem_(problem), box_(box), gram_(evaluation.gram), x_(x), prior_(std::move(prior)) {
   const auto column = [&problem](Index unknown) {
     return static_cast<Index>(problem.columns.unknown[static_cast<std::size_t>(unknown)]);
   };
@@ -94,7 +94,7 @@ MatrixXd LocalModel::slopes(const MatrixXd& matrix, const VectorXd& step) const 
 
 double LocalModel::cost(const VectorXd& step) const {
   const VectorXd w = weights(step);
-  return 0.5 * w.dot(gram_ * w) + 0.5 * prior_weight_ * (x_ + step - box_.start).squaredNorm();
+  return 0.5 * w.dot(gram_ * w) + prior_.cost(x_ + step - box_.start);
 }
 
 /* second derivatives of the weights, times what pulls on them: what makes the cost more convex, and less */
@@ -128,10 +128,10 @@ MatrixXd LocalModel::positive(const MatrixXd& convex, const MatrixXd& concave) c
 /* gradient and Gauss-Newton matrix of the model, prior included */
 void LocalModel::linearise(const VectorXd& step, VectorXd* pull, VectorXd* gradient, MatrixXd* gauss) const {
   *pull = gram_ * weights(step);
-  *gradient = slopes(pull->transpose(), step).transpose() + prior_weight_ * (x_ + step - box_.start);
+  *gradient = slopes(pull->transpose(), step).transpose() + prior_.gradient(x_ + step - box_.start);
   const MatrixXd half = slopes(slopes(gram_, step).transpose(), step);
   *gauss = 0.5 * (half + half.transpose());
-  gauss->diagonal().array() += prior_weight_;
+  prior_.add_to(gauss);
 }
 
 /* the best of all unknowns but the rates: with these held the model is a parabola */

@@ -4,6 +4,7 @@
 #define TENDONFMU_ESTIMATION_LOCAL_MODEL_H
 
 #include "information.h"
+#include "prior.h"
 #include "scaled_box.h"
 
 namespace tendonfmu::estimation {
@@ -11,9 +12,9 @@ namespace tendonfmu::estimation {
 /* In unknowns divided by their scales; the prior is in it. */
 class LocalModel {
  public:
-  /* evaluation: at x. prior_weight: 1/prior_std². All must outlive the model. */
+  /* evaluation: at x. All but the prior must outlive the model. */
   LocalModel(const Problem& problem, const ScaledBox& box, const Evaluation& evaluation, const Eigen::VectorXd& x,
-             double prior_weight);
+             Prior prior);
 
   /* cost of x + step */
   double cost(const Eigen::VectorXd& step) const;
@@ -45,7 +46,7 @@ class LocalModel {
   const ScaledBox& box_;
   const Eigen::MatrixXd& gram_;
   const Eigen::VectorXd& x_;
-  double prior_weight_;
+  Prior prior_;
   std::vector<Stribeck> sides_;
 };
 

@@ -98,7 +98,10 @@ std::vector<double> copied(const double* values, std::size_t count) {
 }  // namespace
 
 Recording::Recording(FreeFinger* finger, const RecordingArrays& a)
-    : joints_(finger->get()->joints), tendons_(finger->get()->tendons), source_(a.kinematics_source) {
+    : joints_(finger->get()->joints),
+      tendons_(finger->get()->tendons),
+      weight_root_(finger->get()->joints, 1.0),
+      source_(a.kinematics_source) {
   const finger_settings& settings = finger->get()->derived.settings;
   if (a.samples < 2) {
     throw refused(std::to_string(a.samples) + " samples: expected at least 2");
@@ -150,6 +153,16 @@ Recording::Recording(FreeFinger* finger, const RecordingArrays& a)
   if (used_count_ < 2) {
     throw refused(std::to_string(used_count_) + " samples to learn from: expected at least 2");
   }
+}
+
+void Recording::set_weights(const double* weight) {
+  for (std::size_t j = 0; j < joints_; ++j) {
+    if (!(weight[j] > 0.0 && weight[j] <= 1.0)) {
+      throw refused("weight[" + std::to_string(j + 1) + "] = " + std::to_string(weight[j]) +
+                    ": expected above 0 and at most 1");
+    }
+  }
+  std::transform(weight, weight + joints_, weight_root_.begin(), [](double share) { return std::sqrt(share); });
 }
 
 tendonfmu_inputs Recording::inputs(std::size_t row) const {

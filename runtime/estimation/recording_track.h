@@ -78,6 +78,9 @@ class Recording {
   double noise(std::size_t row) const { return noise_[row] * noise_scale_[row]; }
   double plain_noise(std::size_t row) const { return noise_[row]; }
   double mean_force() const { return mean_force_; } /* N */
+  /* [n] √ of the share of a sample that each sample counts for; 1 until set. Throws refused. */
+  double weight_root(std::size_t joint) const { return weight_root_[joint]; }
+  void set_weights(const double* weight);
 
   /* Rows at which the finger's state is kept: 0, length, 2·length, … */
   std::size_t segment_length() const { return segment_length_; }
@@ -90,6 +93,7 @@ class Recording {
   SegmentStates states_;
   std::size_t joints_, tendons_, used_count_ = 0, segment_length_ = 0;
   double mean_force_ = 0.0;
+  std::vector<double> weight_root_;
   int source_;
 };
 

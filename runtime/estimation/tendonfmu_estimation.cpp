@@ -1,6 +1,7 @@
 /* The C interface of the batch, tendonfmu_estimation.h. */
 #include "tendonfmu_estimation.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -84,15 +85,34 @@ const SegmentStates& states_at(tendonfmu_estimator* estimator, std::size_t recor
   return last.states;
 }
 
+void known_recording(const Problem& problem, std::size_t recording) {
+  if (recording >= problem.recordings.size()) {
+    throw refused("recording " + std::to_string(recording) + ": expected below " +
+                  std::to_string(problem.recordings.size()));
+  }
+}
+
+/* [u × u] symmetric, without a direction that is known less than nothing, a rounding aside */
+Eigen::MatrixXd checked_information(const double* information, Eigen::Index u) {
+  const Eigen::MatrixXd given = Eigen::Map<const Eigen::MatrixXd>(information, u, u);
+  if (u == 0) {
+    return {};
+  }
+  const Eigen::VectorXd size = given.diagonal().cwiseAbs().cwiseSqrt().cwiseMax(1e-150).cwiseInverse();
+  const Eigen::MatrixXd unit = size.asDiagonal() * given * size.asDiagonal();
+  if (!unit.allFinite() || (unit - unit.transpose()).cwiseAbs().maxCoeff() > 1e-6 ||
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(unit).eigenvalues()[0] < -1e-6) {
+    throw refused("information: expected a symmetric, positive semidefinite matrix");
+  }
+  return 0.5 * (given + given.transpose());
+}
+
 /* the finger over the samples of a recording from `first` on, with a call after each */
 template <typename Body>
 void replay(tendonfmu_estimator* estimator, std::size_t recording, const std::vector<double>& z, std::size_t first,
             std::size_t count, FreeFinger* finger, SampleRows* rows, const Body& body) {
   const Problem& problem = estimator->problem;
-  if (recording >= problem.recordings.size()) {
-    throw refused("recording " + std::to_string(recording) + ": expected below " +
-                  std::to_string(problem.recordings.size()));
-  }
+  known_recording(problem, recording);
   const Recording& r = problem.recordings[recording];
   if (first > r.samples() || count > r.samples() - first) {
     throw refused("samples up to " + std::to_string(first + count) + ": expected at most " +
@@ -245,6 +265,27 @@ tendonfmu_status tendonfmu_estimator_add_recording(tendonfmu_estimator* estimato
     if (index) {
       *index = problem.recordings.size() - 1;
     }
+  });
+}
+
+tendonfmu_status tendonfmu_estimator_set_weights(tendonfmu_estimator* estimator, size_t recording,
+                                                 const double* weight) {
+  if (!estimator || !weight) {
+    return estimator ? fail(estimator, TENDONFMU_BAD_ARGUMENT, missing) : TENDONFMU_BAD_ARGUMENT;
+  }
+  return guarded(estimator, TENDONFMU_BAD_ARGUMENT, [&] {
+    known_recording(estimator->problem, recording);
+    estimator->problem.recordings[recording].set_weights(weight);
+  });
+}
+
+tendonfmu_status tendonfmu_estimator_set_known(tendonfmu_estimator* estimator, const double* information) {
+  if (!estimator) {
+    return TENDONFMU_BAD_ARGUMENT;
+  }
+  return guarded(estimator, TENDONFMU_BAD_ARGUMENT, [&] {
+    const auto u = static_cast<Eigen::Index>(estimator->problem.unknowns.count());
+    estimator->problem.known = checked_information(information, information ? u : 0);
   });
 }
 

@@ -80,6 +80,17 @@ tendonfmu_status tendonfmu_estimator_add_recording(tendonfmu_estimator* estimato
                                                    const double* external_torque, const unsigned char* use,
                                                    size_t* index);
 
+/* Lets each sample of a recording count as a part of one, by joint: cost, gradient, information and fit then have
+ * w e²/S in place of e²/S. Residuals that last for several samples tell as little as fewer of them (tendonfmu fit sets
+ * their effective number over their number); the bias filter, innovations and variances stay as they are.
+ *   weight  [n] above 0, at most 1; 1 until set */
+tendonfmu_status tendonfmu_estimator_set_weights(tendonfmu_estimator* estimator, size_t recording,
+                                                 const double* weight);
+
+/* What an earlier fit knows: information [u × u] of the unknowns about the description's start, symmetric and positive
+ * semidefinite. The fit adds it to the prior of its options. NULL: none any more. */
+tendonfmu_status tendonfmu_estimator_set_known(tendonfmu_estimator* estimator, const double* information);
+
 /* Called on the caller's thread now and then. best [u]: the unknowns with the least cost so far. Returning 0 stops. */
 typedef struct tendonfmu_fit_progress {
   size_t pass, stride; /* of the pass that runs: it looks at every stride-th sample */
@@ -89,7 +100,7 @@ typedef struct tendonfmu_fit_progress {
 } tendonfmu_fit_progress;
 typedef int (*tendonfmu_fit_watch)(void* context, const tendonfmu_fit_progress* progress);
 
-/* One pass over all samples: cost ½ Σ e²/S, its gradient [u] and Σ ν νᵀ [u × u], without prior. NULL: not wanted.
+/* One pass over all samples: cost ½ Σ w e²/S, its gradient [u] and Σ w ν νᵀ [u × u], without prior. NULL: not wanted.
  * stride: only every stride-th sample, each for `stride` of them. threads 0: all cores; the result does not depend on
  * it. */
 tendonfmu_status tendonfmu_estimator_evaluate(tendonfmu_estimator* estimator, const double* z, size_t stride,
