@@ -1,0 +1,77 @@
+"""How many independent samples a series is worth: white noise, coloured noise whose answer is known, gaps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from tendonfmu.effective_number import correlation_time, effective_samples, sample_weights
+
+Numbers = NDArray[np.float64]
+
+
+def coloured(seed: int, samples: int, memory: float) -> Numbers:
+    """e_k = memory·e_(k−1) + white noise: τ = (1 + memory)/(1 − memory)."""
+    noise = np.random.default_rng(seed).standard_normal(samples)
+    found = np.empty(samples)
+    state = 0.0
+    for k, value in enumerate(noise):
+        found[k] = state = memory * state + value
+    return found
+
+
+@pytest.mark.parametrize("samples", [50, 2000, 20000])
+def test_white_noise_is_worth_every_sample(samples: int) -> None:
+    found = [correlation_time(np.random.default_rng(seed).standard_normal(samples)) for seed in range(100)]
+    # one of 740 is beyond three standard deviations by chance; such a one loses little
+    assert sum(each == 1.0 for each in found) >= 98
+    assert max(found) < 2.0
+
+
+@pytest.mark.parametrize(("memory", "expected"), [(0.5, 3.0), (0.9, 19.0), (0.98, 99.0)])
+def test_the_time_of_coloured_noise_is_the_one_of_its_equation(memory: float, expected: float) -> None:
+    found = [correlation_time(coloured(seed, 20000, memory)) for seed in range(20)]
+    assert np.mean(found) == pytest.approx(expected, rel=0.15)
+
+
+def test_the_mean_of_coloured_noise_varies_as_that_of_fewer_samples() -> None:
+    series = [coloured(seed, 4000, 0.95) for seed in range(200)]
+    worth = np.mean([4000 / correlation_time(each) for each in series])
+    variance = np.mean([np.mean(each**2) for each in series])
+    assert np.mean([np.mean(each) ** 2 for each in series]) == pytest.approx(variance / worth, rel=0.3)
+
+
+def test_a_white_sensor_over_a_slow_error_is_worth_less() -> None:
+    slow = coloured(1, 20000, 0.99)
+    series = np.random.default_rng(2).standard_normal(20000) + 0.3 * slow / slow.std()
+    assert 1 + 0.5 * 2 * 0.083 * 99 < correlation_time(series) < 1 + 2 * 2 * 0.083 * 99
+
+
+def test_noise_that_alternates_is_worth_no_more_than_its_samples() -> None:
+    assert correlation_time(coloured(3, 5000, -0.7)) == 1.0
+
+
+def test_samples_left_out_change_little() -> None:
+    series = coloured(4, 40000, 0.9)
+    series[np.arange(40000) // 500 % 4 == 0] = np.nan
+    assert correlation_time(series) == pytest.approx(19.0, rel=0.25)
+
+
+@pytest.mark.parametrize("series", [np.zeros(0), np.zeros(500), np.full(500, np.nan), np.ones(10)])
+def test_what_tells_nothing_counts_as_it_is(series: Numbers) -> None:
+    assert correlation_time(series) == 1.0
+
+
+def test_a_constant_is_worth_one_sample_or_so() -> None:
+    assert correlation_time(np.ones(1000)) > 500
+
+
+def test_each_joint_has_its_own_share() -> None:
+    both = np.stack([np.random.default_rng(5).standard_normal(8000), coloured(6, 8000, 0.9)], axis=1)
+    weights = sample_weights(both)
+    assert weights[0] == 1.0 and weights[1] == pytest.approx(1 / 19, rel=0.3)
+    both[:1000, 1] = np.nan
+    samples, worth = effective_samples([both], [np.broadcast_to(weights, both.shape)])
+    assert samples.tolist() == [8000.0, 7000.0]
+    assert worth == pytest.approx([8000.0, 7000.0 * weights[1]])
