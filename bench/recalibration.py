@@ -73,7 +73,10 @@ def ways(changes: Sequence[float]) -> list[Way]:
         Way("each sample counts, prior 0.1", plain | {"prior": 0.1}, plain),
     ]
     for source in ("report", "description"):
-        found += [Way(f"from the {source}, change {change:g}", {"change": change}, {}, source) for change in changes]
+        found += [
+            Way(f"from the {source}, change {change:g}", {"change": change}, {"effective_samples": True}, source)
+            for change in changes
+        ]
     return found
 
 

@@ -139,7 +139,7 @@ def test_residuals_that_last_count_for_more() -> None:
     plain = fitted(moved_start(), recording, effective_samples=False)
     assert all(2.2 < each < 20.0 for each in plain.report_["uncertainty"]["inflation"])
     # the effective number of samples, which comes from the residuals alone, leaves nothing to inflate but by chance
-    found = fitted(moved_start(), recording)
+    found = fitted(moved_start(), recording, effective_samples=True)
     assert all(0.4 < each < 1.8 for each in found.report_["uncertainty"]["inflation"])
     std = [np.array(each.report_["uncertainty"]["train"]["std"]) for each in (plain, found)]
     assert std[1] == pytest.approx(std[0], rel=0.1)

@@ -364,11 +364,12 @@ def fit(
         float, typer.Option(min=1e-6, max=10.0, help="with --from: how much numbers may have changed since, relative")
     ] = 0.02,
     effective_samples: Annotated[
-        bool,
+        bool | None,
         typer.Option(
-            "--effective-samples/--no-effective-samples", help="residuals that last count as fewer samples, or as all"
+            "--effective-samples/--no-effective-samples",
+            help="residuals that last count as fewer samples, or as all \\[default: fewer with --from]",
         ),
-    ] = True,
+    ] = None,
     passes: Annotated[
         int | None, typer.Option(min=1, help="most passes over the data \\[default: 60, of ekf 2]")
     ] = None,

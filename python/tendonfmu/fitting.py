@@ -86,7 +86,7 @@ class FrictionFit(ConstructorArguments):
     uncertainty: whether the fitted description says what is not known of its friction (`contact.uncertainty`).
     parameter_drift: of the filter, relative variance per s with which the parameters may wander.
     effective_samples: whether samples count for their share of an effective number where the residuals are not white
-        (`effective_number`); otherwise each counts as one.
+        (`effective_number`); otherwise each counts as one. None: with `previous` alone.
     previous: report of an earlier fit, or the description that it wrote: its numbers and their errors are start and
         prior (`previous_fit`), and `prior` is for what it does not have. change: relative standard deviation of what
         may have changed since.
@@ -115,7 +115,7 @@ class FrictionFit(ConstructorArguments):
         threads: int = 0,
         uncertainty: bool = True,
         parameter_drift: float = 0.0,
-        effective_samples: bool = True,
+        effective_samples: bool | None = None,
         previous: str | os.PathLike[str] | None = None,
         change: float = CHANGE,
         start: str | os.PathLike[str] | None = None,
@@ -237,7 +237,7 @@ class FrictionFit(ConstructorArguments):
             tolerance=self.tolerance,
             threads=self.threads,
             parameter_drift=self.parameter_drift,
-            effective=self.effective_samples,
+            effective=previous is not None if self.effective_samples is None else self.effective_samples,
             previous=previous,
             change=self.change,
             noise=bias_settings(self.start_.data).noise,
