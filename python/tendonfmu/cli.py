@@ -365,10 +365,7 @@ def fit(
     ] = 0.02,
     effective_samples: Annotated[
         bool | None,
-        typer.Option(
-            "--effective-samples/--no-effective-samples",
-            help="residuals that last count as fewer samples, or as all \\[default: fewer with --from]",
-        ),
+        typer.Option(help="residuals that last count as fewer samples, or as all \\[default: fewer with --from]"),
     ] = None,
     passes: Annotated[
         int | None, typer.Option(min=1, help="most passes over the data \\[default: 60, of ekf 2]")
