@@ -79,6 +79,10 @@ int model_has_links(const model* m) {
   return tendonfmu_has_links(m->finger);
 }
 
+int model_watches_rest(const model* m) {
+  return tendonfmu_watches_rest(m->finger);
+}
+
 const char* model_last_error(const model* m) {
   return tendonfmu_last_error(m->finger);
 }
@@ -160,7 +164,9 @@ tendonfmu_outputs variables_outputs(const variables* v) {
                              .fingertip_force = v->number[GROUP_FINGERTIP_FORCE],
                              .fingertip_force_std = v->number[GROUP_FINGERTIP_FORCE_STD],
                              .fingertip_force_observable = v->flag[GROUP_FINGERTIP_FORCE_OBSERVABLE],
-                             .fingertip_force_misfit = v->number[GROUP_FINGERTIP_FORCE_MISFIT]};
+                             .fingertip_force_misfit = v->number[GROUP_FINGERTIP_FORCE_MISFIT],
+                             .contact_change = v->number[GROUP_CONTACT_CHANGE],
+                             .contact_at_rest = v->flag[GROUP_CONTACT_AT_REST]};
 }
 
 void model_fetch_outputs(const model* m, variables* values) {

@@ -44,7 +44,9 @@ DETECTION_OUTPUTS = (
     "friction_jump",
     "friction_parts",
 )
+REST_OUTPUTS = ("contact_change",)  # with contact.rest, also of the FMU
 BOOLEAN_OUTPUTS = ("joint_contact", "contact", "slack")
+OPTIONAL_FLAGS = ("contact_at_rest",)  # with contact.rest
 FLIPS_TRIED_TOGETHER = 6  # more near decisions in one sample are tried one by one
 MOST_FOLLOWED = 10  # more near decisions in one recording than any rule allows: give up
 NEAR_SAMPLES_TRIED = 3  # how many near samples before a difference may explain it
@@ -85,15 +87,16 @@ def tolerance(reference: Mapping[str, Array], name: str) -> Array:
 def excess(reference: Mapping[str, Array], candidate: Mapping[str, Array]) -> dict[str, Array]:
     """Per output: |difference| / tolerance, [N, columns]; infinite for NaN and unequal Booleans."""
     found = {}
-    optional = tuple(name for name in DETECTION_OUTPUTS if name in candidate and name in reference)
-    for name in REAL_OUTPUTS + optional + BOOLEAN_OUTPUTS:
+    optional = tuple(name for name in DETECTION_OUTPUTS + REST_OUTPUTS if name in candidate and name in reference)
+    flags = BOOLEAN_OUTPUTS + tuple(name for name in OPTIONAL_FLAGS if name in candidate and name in reference)
+    for name in REAL_OUTPUTS + optional + flags:
         expected, got = np.asarray(reference[name]), np.asarray(candidate[name])
-        if name == "contact":
+        if name in ("contact", *OPTIONAL_FLAGS):
             expected, got = expected.reshape(-1, 1), got.reshape(-1, 1)
         if expected.shape != got.shape:
             raise AssertionError(f"{name}: expected shape {expected.shape}, got {got.shape}")
         expected, got = expected.reshape(len(expected), -1), got.reshape(len(got), -1)
-        if name in BOOLEAN_OUTPUTS:
+        if name in flags:
             found[name] = np.where(expected.astype(bool) == got.astype(bool), 0.0, np.inf)
         else:
             ratio = np.abs(got - expected) / tolerance(reference, name).reshape(-1)

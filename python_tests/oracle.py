@@ -75,7 +75,7 @@ class FingerOracle:
         self.branches: Counter[str] = Counter()
         self._read_structure(description)
         self._read_settings(description)
-        self.detector = Detector(description, self.n, self.m, self.branches)
+        self.detector = Detector(description, self.R, self.branches)
         self.extensions = Extensions(description, self.n, self.m, self.R, self.joints, kinematics_source, self.branches)
         self.grips = [self.extensions.rows_at(kind, at) for kind, at, _ in self.places]
         # state
@@ -136,6 +136,7 @@ class FingerOracle:
         first = self.samples == 0
         dt = 0.0 if first else time - self.time
         out = Step()
+        x0 = inputs.get("tendon_position")
         inputs = self.extensions.signals(time, inputs, first)
         f0 = np.asarray(inputs["tendon_force"], dtype=float)
 
@@ -173,6 +174,7 @@ class FingerOracle:
         # 4a. what friction may differ by
         change = np.zeros(self.n) if first else T_eff - self.last.values["friction_torque"]
         bounds = self.detector.bounds(self._at_joints(hidden * f, np.abs(self.R)), self._parts(F * f, q), change, dt)
+        self.detector.watch(f0, x0, mean_force, time, dt, first, decide, out)
         joint_contact, r, y = np.zeros(self.n, dtype=bool), np.zeros(self.n), np.zeros(self.n)
         if not first:
             # 5. contact, 6. bias update or its inhibition
@@ -203,7 +205,7 @@ class FingerOracle:
             "stuck_friction": bounds.H,
             "friction_jump": bounds.J,
             "friction_parts": bounds.parts,
-        }
+        } | self.detector.at_rest()
         self.q, self.v, self.time, self.last = q, v, time, out
         self.samples += 1
         return out

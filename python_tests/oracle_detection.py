@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oracle_finger import given
+from oracle_rest import RestWatch
 
 Array = NDArray[Any]
 
@@ -44,9 +45,11 @@ class Bounds:
 
 
 class Detector:
-    """Decides on contact. `bounds`, `contact`, `update` and `std` are called once a sample, in this order."""
+    """Decides on contact. `bounds`, `watch`, `contact`, `update`, `std` and `at_rest` are called once a sample,
+    in this order."""
 
-    def __init__(self, description: Mapping[str, Any], n: int, m: int, branches: Counter[str]) -> None:
+    def __init__(self, description: Mapping[str, Any], R: Array, branches: Counter[str]) -> None:
+        m, n = R.shape
         self.n, self.m, self.branches = n, m, branches
         contact = description["contact"]
 
@@ -75,6 +78,8 @@ class Detector:
         self.release_ratio = float(given(contact, "release_ratio", 1.0))
         self.hold_time = float(given(contact, "hold_time", 0.0))
         self.release_time = given(contact, "release_time", None)
+        rests = given(contact, "rest", None) is not None
+        self.rest = RestWatch(description, R, branches) if rests else None
         # state
         self.H = np.zeros(n)
         self.J = np.zeros(n)
@@ -111,15 +116,30 @@ class Detector:
         self.branches["uncertain_joint" if self.uncertainty[j] else "certain_joint"] += 1
         return self.uncertainty[j] or []
 
+    def watch(
+        self, f0: Array, x0: Array | None, mean_force: float, time: float, dt: float, first: bool,
+        decide: Callable[..., Any], out: Any,
+    ) -> None:  # fmt: skip
+        """Step 5a, of contact.rest. x0: the tendon positions as they are given."""
+        if self.rest is not None:
+            self.rest.take(f0, np.array(x0, dtype=float), mean_force, time, dt, first, decide, out)
+
+    def at_rest(self) -> dict[str, Array]:
+        """The outputs of contact.rest; none without it."""
+        if self.rest is None:
+            return {}
+        return {"contact_change": self.rest.change, "contact_at_rest": np.asarray(self.rest.at_rest.any())}
+
     def contact(
         self, r: Array, bounds: Bounds, mean_force: float, time: float, dt: float,
         decide: Callable[..., Any], out: Any,
     ) -> tuple[Array, Array]:  # fmt: skip
-        """Step 5: joint_contact [n] and y [n] (0 with the method `threshold`)."""
+        """Step 5: joint_contact [n] and y [n] (0 with the method `threshold`), after `watch`."""
         y = np.zeros(self.n) if self.method == "threshold" else r - self.filtered
         found = np.zeros(self.n, dtype=bool)
+        loaded = np.zeros(self.n, dtype=bool) if self.rest is None else self.rest.loaded(r, decide, out)
         for j in range(self.n):
-            if self._exceeds(j, r[j], y[j], bounds, mean_force, dt, decide, out):
+            if self._exceeds(j, r[j], y[j], bounds, mean_force, dt, decide, out) or loaded[j]:
                 found[j] = True
                 self.last_exceeded[j] = time
             # times are inputs: every implementation subtracts the same two numbers, so this is never "near"
@@ -129,7 +149,7 @@ class Detector:
         self.in_contact = found
         if not found.any():
             self.contact_since = None
-        elif self.contact_since is None:
+        elif self.contact_since is None or (self.rest is not None and self.rest.at_rest.any()):
             self.contact_since = time
         return found, y
 

@@ -18,7 +18,7 @@ import numpy as np
 from tendonfmu import native
 from tendonfmu.description import FingerDescription
 from tendonfmu.extensions import extension_rows
-from tendonfmu.signals import PLACE
+from tendonfmu.signals import PLACE, REST
 
 # Extensions whose torque at their joint follows from its angle, or from its velocity.
 BY_OWN_ANGLE = frozenset({"cover_hardening", "moment_arm_variation", "pulley_eccentricity"})
@@ -95,7 +95,19 @@ def dependencies(structure: Structure) -> Dependencies:
         result |= {name: [place] * (3 if name in VECTORS else 1) for name in PLACE}
     for name in ("compensated_torque", "compensated_torque_std", "friction_torque", "bias_torque", "joint_contact"):
         result[name] = by_joint
-    return result
+    return result | _at_rest(structure, result)
+
+
+def _at_rest(structure: Structure, others: Dependencies) -> Dependencies:
+    """With contact.rest: whether the finger rests depends on all motors and forces, and so does what contact does."""
+    if (structure.data.get("contact") or {}).get("rest") is None:
+        return {}
+    tendons = list(range(structure.tendons))
+    watched = {"tendon_force": tendons, "tendon_position": tendons}
+    found: Dependencies = {
+        name: [element | watched for element in others[name]] for name in ("joint_contact", "contact")
+    }
+    return found | {name: [watched] * (structure.joints if name == REST[0] else 1) for name in REST}
 
 
 def _inputs(structure: Structure, motion: Motion, forces: set[int]) -> dict[str, list[int]]:

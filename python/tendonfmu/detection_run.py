@@ -19,7 +19,7 @@ from tendonfmu.errors import InputError
 from tendonfmu.fit_residuals import model_alone
 from tendonfmu.recording import Recording
 from tendonfmu.running import check_model, run_model
-from tendonfmu.signals import INPUTS_OF_SOURCE
+from tendonfmu.signals import inputs_used
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -27,6 +27,7 @@ Flags = NDArray[np.bool_]
 # what decides, in the description's `contact`
 THRESHOLDS = ("threshold", "threshold_per_force")
 SHARES = ("stuck_share", "jump_share")
+REST_BOUNDS = (*THRESHOLDS, "creep")
 UNCERTAINTY_LEVEL = ("uncertainty_level", 3.0)  # key and default
 LARGEST = {"stuck_share": 10.0, "jump_share": 10.0, "uncertainty_level": 100.0}
 
@@ -102,7 +103,7 @@ def run_track(subject: Subject, recording: Recording, kinematics: int, force: st
     """force: column with the sensed force, or None. Raises InputError where the recording does not fit the finger."""
     data = subject.finger.data
     joints, tendons = len(data["joints"]), len(data["tendons"])
-    recording.require(joints, tendons, INPUTS_OF_SOURCE[kinematics])
+    recording.require(joints, tendons, inputs_used(kinematics, data["contact"].get("rest") is not None))
     if subject.packed:
         outputs = _grouped(run_model(subject.path, recording, kinematics_source=kinematics))
     else:
@@ -178,12 +179,13 @@ def _between_known(values: Numbers, chosen: Flags) -> Numbers:
 def scaled_detection(data: Mapping[str, Any], factor: float) -> dict[str, Any]:
     """The description with every bound that decides on contact times a factor, as far as its range goes.
 
-    These are the thresholds of the torque and of the innovation, with the parts that friction and its uncertainty add
-    (docs/contract-additions.md, step 5): the whole right side of |r| > threshold, and of |y| > B.
+    These are the thresholds of the torque and of the innovation, with the parts that friction and its uncertainty add,
+    and of the change at rest (docs/contract-additions.md, steps 5a and 5): the whole right side of |r| > threshold, of
+    |y| > B and of |c| > D.
     """
     contact = dict(data["contact"])
     _scale(contact, THRESHOLDS, factor)
-    for part, keys in (("innovation", THRESHOLDS), ("friction_bound", SHARES)):
+    for part, keys in (("innovation", THRESHOLDS), ("friction_bound", SHARES), ("rest", REST_BOUNDS)):
         if contact.get(part) is not None:
             contact[part] = dict(contact[part])
             _scale(contact[part], keys, factor)

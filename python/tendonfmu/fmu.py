@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
 from tendonfmu.recording import Recording
-from tendonfmu.signals import FLAGS, INPUTS, INPUTS_OF_SOURCE, NUMBERS, OPTIONAL_NUMBERS, PLACE
+from tendonfmu.signals import FLAGS, INPUTS, NUMBERS, OPTIONAL_NUMBERS, PLACE, REST, inputs_used
 
 Progress = Callable[[int], None]
 
@@ -68,7 +68,7 @@ def run_fmu(
     """
     with _unpacked(path) as folder:
         run = _Run(path, folder, parameters or {})
-        recording.require(run.variables.joints, run.variables.tendons, INPUTS_OF_SOURCE[kinematics_source])
+        recording.require(run.variables.joints, run.variables.tendons, run.inputs(kinematics_source))
         return run.over(recording, kinematics_source, progress)
 
 
@@ -111,8 +111,8 @@ class _Run:
         if description.fmiVersion != "2.0" or description.coSimulation is None:
             raise InputError(f"{path}: FMI {description.fmiVersion}; expected an FMI 2.0 co-simulation FMU")
         self._all = {variable.name: variable for variable in description.modelVariables}
-        missing = {group for group in (*OPTIONAL_NUMBERS, *PLACE) if not self._has(group)}
-        present = [group for group in (*NUMBERS, *OPTIONAL_NUMBERS, *FLAGS, *PLACE) if group not in missing]
+        missing = {group for group in (*OPTIONAL_NUMBERS, *PLACE, *REST) if not self._has(group)}
+        present = [group for group in (*NUMBERS, *OPTIONAL_NUMBERS, *FLAGS, *PLACE, *REST) if group not in missing]
         outputs = {group: self._group(group) for group in present}
         types = {group: str(self._all[next(iter(names))].type) for group, names in outputs.items()}
         self.variables = Variables(outputs, types)
@@ -123,6 +123,10 @@ class _Run:
             modelIdentifier=description.coSimulation.modelIdentifier,
             instanceName=description.modelName,
         )
+
+    def inputs(self, source: int) -> tuple[str, ...]:
+        """Groups of inputs that the FMU uses."""
+        return inputs_used(source, self._has(REST[-1]))
 
     def _has(self, group: str) -> bool:
         return group in self._all or f"{group}[1]" in self._all
@@ -187,7 +191,7 @@ class _Run:
         try:
             with self._refusals():
                 self._initialise(float(recording.time[0]), source)
-                columns = self._step(recording, INPUTS_OF_SOURCE[source], progress)
+                columns = self._step(recording, self.inputs(source), progress)
                 self._slave.terminate()
         finally:
             self._slave.freeInstance()

@@ -38,7 +38,8 @@ def describe_model(description: FingerDescription, table: VariableTable) -> dict
     """
     finger = native.Finger(description.image)
     sizes = group_sizes(finger.joints, finger.tendons)
-    groups = present_groups(table, {"links"} if description.data.get("links") is not None else set())
+    has = {"links": finger.has_links, "rest": finger.watches_rest}
+    groups = present_groups(table, {need for need, given in has.items() if given})
     variables = [variable for group in groups for variable in elements(group, sizes)]
     variables += _parameters(finger.parameters(), table, description.data)
     index = {variable["name"]: k for k, variable in enumerate(variables, start=1)}

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu import _native
-from tendonfmu.signals import DETECTION, FLAGS, INPUTS, NUMBERS, PLACE
+from tendonfmu.signals import DETECTION, FLAGS, INPUTS, NUMBERS, PLACE, REST
 
 Array = NDArray[Any]
 
@@ -94,6 +94,11 @@ class Finger:
         return self._finger.has_links
 
     @property
+    def watches_rest(self) -> bool:
+        """Whether the description has contact.rest; then tendon positions are needed with every source."""
+        return self._finger.watches_rest
+
+    @property
     def kernel(self) -> str:
         """Instruction set of the step: "plain", "sse2" or "avx2"; all give the same bits."""
         return self._finger.kernel
@@ -158,7 +163,8 @@ class Finger:
         Returns [N, n], `slack` [N, m], `contact` [N]; flags are bool. Beyond section 4, as docs/contract-additions.md
         has them: `compensated_torque_std`, `residual`, `innovation`, `stuck_friction`, `friction_jump`, N·m. With
         links also `fingertip_force` and `fingertip_force_std` [N, 3] (N, base frame), and [N]
-        `fingertip_force_observable`, `fingertip_force_misfit`, `contact_link`.
+        `fingertip_force_observable`, `fingertip_force_misfit`, `contact_link`. With contact.rest also `contact_change`
+        [N, n] (N·m) and `contact_at_rest` [N].
         A later call goes on where this one ended.
         """
         inputs = [
@@ -168,7 +174,8 @@ class Finger:
         with _refusals():
             time = np.ascontiguousarray(recording["time"], dtype=np.float64)
             arrays = self._finger.run(time, inputs[0], inputs[1], inputs[2], inputs[3], parts)
-        optional = (*(("friction_parts",) if parts else ()), *(PLACE if self.has_links else ()))
+        place, rest = PLACE if self.has_links else (), REST if self.watches_rest else ()
+        optional = (*(("friction_parts",) if parts else ()), *place, *rest)
         names = (*NUMBERS, *FLAGS, *DETECTION, *optional)
         outputs: dict[str, Array] = dict(zip(names, arrays, strict=True))
         flags = (name for name in outputs if outputs[name].dtype == np.uint8)

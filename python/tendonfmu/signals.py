@@ -19,9 +19,18 @@ PLACE = (
     "contact_link",
 )
 
+# of fingers with contact.rest, and of their FMUs
+REST = ("contact_change", "contact_at_rest")
+
 # inputs that a kinematics source uses
 INPUTS_OF_SOURCE = {
     1: ("tendon_force", "tendon_position"),
     2: ("tendon_force", "joint_position"),
     3: ("tendon_force", "joint_position", "joint_velocity"),
 }
+
+
+def inputs_used(source: int, watches_rest: bool) -> tuple[str, ...]:
+    """Inputs that a kinematics source uses, and contact.rest where the finger has it: it watches the motors."""
+    used = INPUTS_OF_SOURCE[source]
+    return used if "tendon_position" in used or not watches_rest else (*used, "tendon_position")

@@ -3,7 +3,7 @@
 #ifndef TENDONFMU_CONTACT_DETECTOR_H
 #define TENDONFMU_CONTACT_DETECTOR_H
 
-#include "friction_bound.h"
+#include "contact_at_rest.h"
 
 /* base_j + per_force_j·mean|f0| */
 HOT_INLINE quad force_dependent(const double* base, const double* per_force, size_t j, double mean_force) {
@@ -77,6 +77,9 @@ HOT_INLINE int detect_contact(tendonfmu_finger* f, double mean_force, double tim
     if (settings->uses_innovation) {
       exceeds = quad_either(exceeds, innovation_exceeds(f, j, ratio, mean_force, step));
     }
+    if (settings->watches_rest) {
+      exceeds = quad_either(exceeds, loaded_since_rest(f, j));
+    }
     const quad exceeded_at = quad_select(exceeds, now, quad_load(s->exceeded_at + j));
     const quad_mask recent = quad_at_least(quad_set(settings->hold_time), quad_sub(now, exceeded_at));
     const quad_mask contact = quad_either(exceeds, quad_both(before, recent));
@@ -87,11 +90,12 @@ HOT_INLINE int detect_contact(tendonfmu_finger* f, double mean_force, double tim
   return any != 0;
 }
 
-/* whether the bias is updated at this sample: without contact, or in one that has lasted too long */
+/* whether the bias is updated at this sample: without contact, or in one that has lasted too long; time in contact at
+ * rest does not count */
 HOT_INLINE int bias_is_updated(tendonfmu_finger* f, int contact, double time) {
   const finger_state* s = &f->remembered;
   const double release_time = f->derived.settings.release_time;
-  if (contact && s->scalar[STATE_CONTACT] == 0.0) {
+  if (contact && (s->scalar[STATE_CONTACT] == 0.0 || s->scalar[STATE_CONTACT_AT_REST] != 0.0)) {
     s->scalar[STATE_CONTACT_SINCE] = time;
   }
   return !contact || (release_time >= 0.0 && time - s->scalar[STATE_CONTACT_SINCE] >= release_time);

@@ -165,6 +165,24 @@ static void derive_detection(derivation* d, const model_item* item) {
   }
 }
 
+static void derive_rest(derivation* d, const model_item* item) {
+  derived_numbers* to = &d->finger->derived;
+  finger_settings* settings = &to->settings;
+  const double* values = d->values + item->first;
+  const size_t bytes = item->count * sizeof(double);
+  switch (item->kind) {
+    case ITEM_REST_TRAVEL: settings->rest_travel = values[0]; break;
+    case ITEM_REST_SETTLE_TIME: settings->rest_settle_time = values[0]; break;
+    case ITEM_REST_AVERAGING_TIME:
+      settings->rest_averaging_rate = values[0] > 0.0 ? bounded_inverse(values[0]) : -1.0;
+      break;
+    case ITEM_REST_THRESHOLD: memcpy(to->rest_threshold, values, bytes); break;
+    case ITEM_REST_PER_FORCE: memcpy(to->rest_per_force, values, bytes); break;
+    case ITEM_REST_CREEP: memcpy(to->rest_creep, values, bytes); break;
+    default: settings->rest_fall_share = values[0]; break;
+  }
+}
+
 static void derive_link(derivation* d, const model_item* item) {
   const link_geometry* to = &d->finger->derived.links;
   const double* values = d->values + item->first;
@@ -191,6 +209,8 @@ static int derive_item(void* context, const model_item* item) {
     derive_finger(d, item);
   } else if (item->kind >= ITEM_LINK_AXIS) {
     derive_link(d, item);
+  } else if (item->kind >= ITEM_REST_TRAVEL) {
+    derive_rest(d, item);
   } else {
     derive_detection(d, item);
   }
@@ -253,7 +273,8 @@ void derive_numbers(tendonfmu_finger* finger, int routing_changed) {
                                                .filters_position = (options & MODEL_HAS_POSITION_FILTER) != 0,
                                                .bounds_friction = (options & MODEL_HAS_FRICTION_BOUND) != 0,
                                                .knows_uncertainty = (options & MODEL_HAS_UNCERTAINTY) != 0,
-                                               .uses_innovation = (options & MODEL_DETECTS_BY_INNOVATION) != 0};
+                                               .uses_innovation = (options & MODEL_DETECTS_BY_INNOVATION) != 0,
+                                               .watches_rest = (options & MODEL_HAS_REST) != 0};
   clear_grids(finger);
   model_visit(&finger->shape, derive_item, &d);
   derive_flags(finger);

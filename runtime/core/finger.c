@@ -163,6 +163,10 @@ int tendonfmu_has_links(const tendonfmu_finger* finger) {
   return finger && (finger->shape.options & MODEL_HAS_LINKS) != 0;
 }
 
+int tendonfmu_watches_rest(const tendonfmu_finger* finger) {
+  return finger && (finger->shape.options & MODEL_HAS_REST) != 0;
+}
+
 /* --- samples --------------------------------------------------------------------------------------------------------
  */
 

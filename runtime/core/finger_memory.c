@@ -67,6 +67,10 @@ static void lay_out_derived(tendonfmu_finger* f, cursor* c) {
   d->innovation_per_force = take_numbers(c, joints);
   d->deviation = take_numbers(c, joints);
   d->deviation_per_force = take_numbers(c, joints);
+  const size_t resting = f->shape.options & MODEL_HAS_REST ? joints : 0;
+  d->rest_threshold = take_numbers(c, resting);
+  d->rest_per_force = take_numbers(c, resting);
+  d->rest_creep = take_numbers(c, resting);
   const size_t links = f->shape.options & MODEL_HAS_LINKS ? n : 0;
   d->links.axis = take_numbers(c, 3 * links);
   d->links.offset = take_numbers(c, 3 * links);
@@ -92,8 +96,9 @@ static void lay_out_state(tendonfmu_finger* f, cursor* c) {
   const size_t entries = f->shape.options & MODEL_REMEMBERS_ENTRY_LOAD ? slots : 0;
   const size_t parts = f->shape.options & MODEL_HAS_UNCERTAINTY ? f->joints * tendons + 3 * joints : 0;
   const size_t filter = f->shape.options & MODEL_HAS_POSITION_FILTER ? FILTER_ROWS * joints : 0;
-  f->state_count =
-      STATE_SCALARS + 17 * joints + 2 * tendons + 6 * slots + 2 * entries + parts + filter + f->shape.extension_memory;
+  const size_t rests = f->shape.options & MODEL_HAS_REST ? 1 : 0;
+  f->state_count = STATE_SCALARS + 17 * joints + 2 * tendons + 6 * slots + 2 * entries + parts + filter +
+                   rests * (4 * joints + 3 * tendons) + f->shape.extension_memory;
   f->state = take_numbers(c, f->state_count);
   double* run = f->state;
   s->scalar = part(&run, STATE_SCALARS);
@@ -114,6 +119,14 @@ static void lay_out_state(tendonfmu_finger* f, cursor* c) {
   s->entry_pulley = part(&run, entries);
   s->part = part(&run, parts);
   s->filter = part(&run, filter);
+  double** const rest_of_joints[] = {&s->contact_change, &s->rest_contact, &s->rest_extreme, &s->carried_load};
+  for (size_t i = 0; i < sizeof rest_of_joints / sizeof rest_of_joints[0]; ++i) {
+    *rest_of_joints[i] = part(&run, rests * joints);
+  }
+  double** const rest_of_tendons[] = {&s->smooth_force, &s->mark_force, &s->mark_position};
+  for (size_t i = 0; i < sizeof rest_of_tendons / sizeof rest_of_tendons[0]; ++i) {
+    *rest_of_tendons[i] = part(&run, rests * tendons);
+  }
   s->extension = run;
 }
 
@@ -142,6 +155,10 @@ static void lay_out_scratch(tendonfmu_finger* f, cursor* c) {
   const int filtered = (f->shape.options & MODEL_HAS_POSITION_FILTER) != 0;
   s->filter = take_numbers(c, filtered ? FILTER_ROWS * f->joint_lanes : 0);
   s->travel = take_numbers(c, filtered ? f->slots : 0);
+  const int resting = (f->shape.options & MODEL_HAS_REST) != 0;
+  s->motor_position = take_numbers(c, resting ? f->tendon_lanes : 0);
+  s->force_change = take_numbers(c, resting ? f->tendon_lanes : 0);
+  s->rest_bound = take_numbers(c, resting ? f->joint_lanes : 0);
   s->velocity = take_numbers(c, f->slots);
   s->view = take(c, f->slots / 4 * sizeof *s->view);
 }

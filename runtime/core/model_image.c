@@ -107,7 +107,7 @@ static void walk_detection(walk* w) {
   const uint32_t n = w->shape->joints, options = w->shape->options;
   const uint32_t innovation = options & MODEL_DETECTS_BY_INNOVATION ? 1 : 0;
   const uint32_t bound = options & MODEL_HAS_FRICTION_BOUND ? 1 : 0, deviation = options & MODEL_HAS_DEVIATION ? n : 0;
-  const uint32_t release = options & MODEL_HAS_RELEASE ? 1 : 0;
+  const uint32_t release = options & MODEL_HAS_RELEASE ? 1 : 0, rest = options & MODEL_HAS_REST ? 1 : 0;
   const item_size before[] = {
       {ITEM_INNOVATION_TIME, innovation},
       {ITEM_INNOVATION_THRESHOLD, n * innovation},
@@ -125,6 +125,13 @@ static void walk_detection(walk* w) {
       {ITEM_RELEASE_RATIO, release},
       {ITEM_HOLD_TIME, release},
       {ITEM_RELEASE_TIME, options & MODEL_HAS_RELEASE_TIME ? 1 : 0},
+      {ITEM_REST_TRAVEL, rest},
+      {ITEM_REST_SETTLE_TIME, rest},
+      {ITEM_REST_AVERAGING_TIME, rest},
+      {ITEM_REST_THRESHOLD, n * rest},
+      {ITEM_REST_PER_FORCE, n * rest},
+      {ITEM_REST_CREEP, n * rest},
+      {ITEM_REST_FALL_SHARE, rest},
   };
   emit_all(w, before, sizeof before / sizeof before[0]);
   for (uint32_t j = 0; j < n; ++j) {

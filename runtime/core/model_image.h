@@ -57,7 +57,8 @@ enum {
   MODEL_HAS_RELEASE_TIME = 1 << 15,
   MODEL_HAS_LINKS = 1 << 16,
   MODEL_HAS_POSITION_FILTER = 1 << 17,
-  MODEL_OPTION_BITS = (1 << 18) - 1
+  MODEL_HAS_REST = 1 << 18,
+  MODEL_OPTION_BITS = (1 << 19) - 1
 };
 
 #define MODEL_EDGE_HAS_ANGLES 0x80000000u
@@ -117,6 +118,13 @@ typedef enum model_item_kind {
   ITEM_RELEASE_RATIO,
   ITEM_HOLD_TIME,
   ITEM_RELEASE_TIME,
+  ITEM_REST_TRAVEL, /* contact.rest.… */
+  ITEM_REST_SETTLE_TIME,
+  ITEM_REST_AVERAGING_TIME,
+  ITEM_REST_THRESHOLD, /* n */
+  ITEM_REST_PER_FORCE, /* n */
+  ITEM_REST_CREEP,     /* n */
+  ITEM_REST_FALL_SHARE,
   ITEM_LINK_AXIS,   /* 3, of one joint */
   ITEM_LINK_OFFSET, /* 3, of one joint */
   ITEM_TIP,         /* 3 */

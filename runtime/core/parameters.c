@@ -88,6 +88,13 @@ static void path_of_finger(message_line path, const model_item* item, uint32_t o
       [ITEM_RELEASE_RATIO] = "contact.release_ratio",
       [ITEM_HOLD_TIME] = "contact.hold_time",
       [ITEM_RELEASE_TIME] = "contact.release_time",
+      [ITEM_REST_TRAVEL] = "contact.rest.travel",
+      [ITEM_REST_SETTLE_TIME] = "contact.rest.settle_time",
+      [ITEM_REST_AVERAGING_TIME] = "contact.rest.averaging_time",
+      [ITEM_REST_THRESHOLD] = "contact.rest.threshold",
+      [ITEM_REST_PER_FORCE] = "contact.rest.threshold_per_force",
+      [ITEM_REST_CREEP] = "contact.rest.creep",
+      [ITEM_REST_FALL_SHARE] = "contact.rest.fall_share",
   };
   switch (item->kind) {
     case ITEM_INITIAL_TORQUE:
@@ -97,7 +104,10 @@ static void path_of_finger(message_line path, const model_item* item, uint32_t o
     case ITEM_INNOVATION_THRESHOLD:
     case ITEM_INNOVATION_PER_FORCE:
     case ITEM_DEVIATION:
-    case ITEM_DEVIATION_PER_FORCE: path_index(path, names[item->kind], offset); break;
+    case ITEM_DEVIATION_PER_FORCE:
+    case ITEM_REST_THRESHOLD:
+    case ITEM_REST_PER_FORCE:
+    case ITEM_REST_CREEP: path_index(path, names[item->kind], offset); break;
     default: message_text(path, names[item->kind]); break;
   }
 }
@@ -235,6 +245,13 @@ parameter_range parameter_range_of(const model_item* item, uint32_t index) {
       [ITEM_RELEASE_RATIO] = {"1", 0.0, 1.0, 1, 1},
       [ITEM_HOLD_TIME] = {"s", 0.0, LARGE, 0, 1},
       [ITEM_RELEASE_TIME] = {"s", 0.0, LARGE, 0, 1},
+      [ITEM_REST_TRAVEL] = {"m", 0.0, LARGE, 0, 1},
+      [ITEM_REST_SETTLE_TIME] = {"s", 0.0, LARGE, 0, 1},
+      [ITEM_REST_AVERAGING_TIME] = {"s", 0.0, LARGE, 0, 1},
+      [ITEM_REST_THRESHOLD] = {"N.m", 0.0, LARGE, 1, 1}, /* a load of no size has no direction */
+      [ITEM_REST_PER_FORCE] = {"m", 0.0, LARGE, 0, 1},
+      [ITEM_REST_CREEP] = {"N.m", 0.0, LARGE, 0, 1},
+      [ITEM_REST_FALL_SHARE] = {"1", 0.0, 1.0, 0, 1},
       [ITEM_LINK_AXIS] = {"1", -1e6, 1e6, 0, 0},
       [ITEM_LINK_OFFSET] = {"m", -10.0, 10.0, 0, 0},
       [ITEM_TIP] = {"m", -10.0, 10.0, 0, 0},

@@ -8,6 +8,8 @@
 #include "contact_place.h"
 #include "kernel_choice.h"
 
+enum { MOST_ROWS = 4 };
+
 typedef struct input_row {
   const char* name;
   const char* unit;
@@ -16,19 +18,24 @@ typedef struct input_row {
   double* to;
 } input_row;
 
-/* the rows that the kinematics source uses; returns how many */
-static size_t used_rows(const tendonfmu_finger* f, const tendonfmu_inputs* inputs, input_row rows[3]) {
+/* the rows that the kinematics source and contact.rest use; returns how many */
+static size_t used_rows(const tendonfmu_finger* f, const tendonfmu_inputs* inputs, input_row rows[MOST_ROWS]) {
   const finger_scratch* s = &f->scratch;
   const int source = (int)f->remembered.scalar[STATE_SOURCE];
   const size_t m = f->tendons, n = f->joints;
-  rows[0] = (input_row){"tendon_force", "N", inputs->tendon_force, m, s->force};
-  if (source == TENDONFMU_TENDON_POSITIONS) {
-    rows[1] = (input_row){"tendon_position", "m", inputs->tendon_position, m, s->position};
-    return 2;
+  size_t count = 0;
+  rows[count++] = (input_row){"tendon_force", "N", inputs->tendon_force, m, s->force};
+  if (source == TENDONFMU_TENDON_POSITIONS || f->derived.settings.watches_rest) {
+    rows[count++] = (input_row){"tendon_position", "m", inputs->tendon_position, m, s->position};
   }
-  rows[1] = (input_row){"joint_position", "rad", inputs->joint_position, n, s->angle};
-  rows[2] = (input_row){"joint_velocity", "rad/s", inputs->joint_velocity, n, s->velocity + n * f->tendon_lanes};
-  return source == TENDONFMU_JOINT_VELOCITIES ? 3 : 2;
+  if (source != TENDONFMU_TENDON_POSITIONS) {
+    rows[count++] = (input_row){"joint_position", "rad", inputs->joint_position, n, s->angle};
+  }
+  if (source == TENDONFMU_JOINT_VELOCITIES) {
+    double* speed = s->velocity + n * f->tendon_lanes;
+    rows[count++] = (input_row){"joint_velocity", "rad/s", inputs->joint_velocity, n, speed};
+  }
+  return count;
 }
 
 static int check_time(const tendonfmu_finger* f, double time, message_line message) {
@@ -49,7 +56,7 @@ static int check_time(const tendonfmu_finger* f, double time, message_line messa
 }
 
 int samples_take_inputs(tendonfmu_finger* finger, double time, const tendonfmu_inputs* inputs, message_line message) {
-  input_row rows[3];
+  input_row rows[MOST_ROWS];
   const size_t count = used_rows(finger, inputs, rows);
   if (check_time(finger, time, message)) {
     return -1;
@@ -57,7 +64,7 @@ int samples_take_inputs(tendonfmu_finger* finger, double time, const tendonfmu_i
   for (size_t k = 0; k < count; ++k) {
     if (!rows[k].values) {
       message_start(message, rows[k].name);
-      message_text(message, " is missing: this kinematics source needs it");
+      message_text(message, " is missing: this kinematics source, or contact.rest, needs it");
       return -1;
     }
     memcpy(rows[k].to, rows[k].values, rows[k].count * sizeof(double));
@@ -67,7 +74,7 @@ int samples_take_inputs(tendonfmu_finger* finger, double time, const tendonfmu_i
 
 void samples_name_bad_input(const tendonfmu_finger* finger, double time, const tendonfmu_inputs* inputs,
                             message_line message) {
-  input_row rows[3];
+  input_row rows[MOST_ROWS];
   const size_t count = used_rows(finger, inputs, rows);
   for (size_t k = 0; k < count; ++k) {
     for (size_t i = 0; i < rows[k].count; ++i) {
@@ -119,6 +126,18 @@ static void give_parts(double* to, const tendonfmu_finger* f, size_t row) {
   }
 }
 
+/* contact at rest; 0 without contact.rest */
+static void give_rest(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs, size_t row) {
+  const finger_state* s = &finger->remembered;
+  const size_t n = finger->joints;
+  give_flags(outputs->contact_at_rest, s->scalar + STATE_CONTACT_AT_REST, 1, row);
+  if (outputs->contact_change && finger->derived.settings.watches_rest) {
+    give_numbers(outputs->contact_change, s->contact_change, n, row);
+  } else if (outputs->contact_change) {
+    memset(outputs->contact_change + row * n, 0, n * sizeof(double));
+  }
+}
+
 static void give_place(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs, size_t row) {
   if (!outputs->fingertip_force && !outputs->fingertip_force_std && !outputs->fingertip_force_observable &&
       !outputs->fingertip_force_misfit && !outputs->contact_link) {
@@ -155,6 +174,7 @@ void samples_give_outputs(const tendonfmu_finger* finger, const tendonfmu_output
   give_numbers(outputs->friction_jump, s->friction_jump, n, row);
   give_parts(outputs->friction_parts, finger, row);
   give_place(finger, outputs, row);
+  give_rest(finger, outputs, row);
 }
 
 static const double* row_of(const double* values, size_t row, size_t count) {

@@ -82,6 +82,7 @@ static int rows_are_sound(const tendonfmu_finger* f, const unsigned char* state,
 
 static int scalars_are_sound(const tendonfmu_finger* f, const unsigned char* state) {
   const double* s = f->remembered.scalar;
+  const double rests = f->derived.settings.watches_rest ? 1.0 : 0.0;
   const row_rule rules[] = {
       {s + STATE_INITIALISED, 1, ROW_WITHOUT_LANES, 0.0, 1.0, 1, 0},
       {s + STATE_SOURCE, 1, ROW_WITHOUT_LANES, 1.0, 3.0, 1, 0},
@@ -91,7 +92,9 @@ static int scalars_are_sound(const tendonfmu_finger* f, const unsigned char* sta
       {s + STATE_CONTACT, 1, ROW_WITHOUT_LANES, 0.0, 1.0, 1, 0},
       {s + STATE_CONTACT_SINCE, 1, ROW_WITHOUT_LANES, -LARGEST_TIME, LARGEST_TIME, 0, 0},
       {s + STATE_ABSORBED, 2, ROW_WITHOUT_LANES, 0.0, LARGEST_SQUARE, 0, 0}, /* and the one before */
-      {s + STATE_ABSORBED_BEFORE + 1, STATE_SCALARS - STATE_ABSORBED_BEFORE - 1, ROW_WITHOUT_LANES, 0.0, 0.0, 0, 0},
+      {s + STATE_STANDING, 1, ROW_WITHOUT_LANES, 0.0, rests, 1, 0},
+      {s + STATE_MARKED_AT, 1, ROW_WITHOUT_LANES, -LARGEST_TIME * rests, LARGEST_TIME * rests, 0, 0},
+      {s + STATE_CONTACT_AT_REST, 1, ROW_WITHOUT_LANES, 0.0, rests, 1, 0},
   };
   return rows_are_sound(f, state, rules, sizeof rules / sizeof rules[0]);
 }
@@ -134,7 +137,7 @@ static int slots_are_sound(const tendonfmu_finger* f, const unsigned char* state
       {s->stuck_since, slots, ROW_OF_SLOTS, absorbs ? 0.0 : -LARGEST_TIME, absorbs ? LARGEST_SQUARE : LARGEST_TIME, 0,
        1},
       {s->last_stuck, slots, ROW_OF_SLOTS, -LARGEST_TIME, LARGEST_TIME, 0, 1},
-      {s->entry_edge, rest, ROW_WITHOUT_LANES, -DBL_MAX, DBL_MAX, 0, 0}, /* entries, parts, filter, extensions */
+      {s->entry_edge, rest, ROW_WITHOUT_LANES, -DBL_MAX, DBL_MAX, 0, 0}, /* entries, parts, filter, rest, extensions */
   };
   return rows_are_sound(f, state, rules, sizeof rules / sizeof rules[0]);
 }
@@ -151,6 +154,23 @@ static int filter_is_sound(const tendonfmu_finger* f, const unsigned char* state
     }
   }
   return 1;
+}
+
+static int motors_rest_is_sound(const tendonfmu_finger* f, const unsigned char* state) {
+  const finger_state* s = &f->remembered;
+  const size_t n = f->joint_lanes, m = f->tendon_lanes;
+  const row_rule rules[] = {
+      {s->contact_change, n, ROW_OF_JOINTS, -LARGEST_SUM, LARGEST_SUM, 0, 0},
+      {s->rest_contact, n, ROW_OF_JOINTS, 0.0, 1.0, 1, 0},
+      {s->rest_extreme, n, ROW_OF_JOINTS, -LARGEST_SUM, LARGEST_SUM, 0, 0},
+      {s->carried_load, n, ROW_OF_JOINTS, -LARGEST_SUM, LARGEST_SUM, 0, 0},
+      {s->smooth_force, m, ROW_OF_TENDONS, -LARGEST_SUM, LARGEST_SUM, 0, 0},
+      {s->mark_force, m, ROW_OF_TENDONS, -LARGEST_SUM, LARGEST_SUM, 0, 0},
+      {s->mark_position, m, ROW_OF_TENDONS, -LARGEST_SUM, LARGEST_SUM, 0, 0},
+  };
+  const double marked_at = load_f64(state + 8 * STATE_MARKED_AT), time = load_f64(state + 8 * STATE_TIME);
+  return !f->derived.settings.watches_rest ||
+         (marked_at <= time && rows_are_sound(f, state, rules, sizeof rules / sizeof rules[0]));
 }
 
 /* nothing has rested for less than no time: exponents of forgetting are not negative */
@@ -183,7 +203,7 @@ static int check_bytes(tendonfmu_finger* f, const unsigned char* from, message_l
   }
   const unsigned char* state = from + HEADER_BYTES + 8 * p;
   if (!scalars_are_sound(f, state) || !joints_are_sound(f, state) || !slots_are_sound(f, state) ||
-      !filter_is_sound(f, state) || !rests_are_sound(f, state)) {
+      !filter_is_sound(f, state) || !motors_rest_is_sound(f, state) || !rests_are_sound(f, state)) {
     return refuse(message, "damaged saved state: a number in it cannot be");
   }
   load_doubles(f->candidate, from + HEADER_BYTES, p);

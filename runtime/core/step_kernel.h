@@ -27,7 +27,8 @@ HOT_INLINE int row_in_range(const double* row, size_t lanes) {
 HOT_INLINE int inputs_in_range(const tendonfmu_finger* f) {
   const finger_scratch* s = &f->scratch;
   const int source = (int)f->remembered.scalar[STATE_SOURCE];
-  if (!row_in_range(s->force, f->tendon_lanes)) {
+  if (!row_in_range(s->force, f->tendon_lanes) ||
+      (f->derived.settings.watches_rest && !row_in_range(s->position, f->tendon_lanes))) {
     return 0;
   }
   if (source == TENDONFMU_TENDON_POSITIONS) {
@@ -177,6 +178,9 @@ HOT_INLINE void begin_tracking(tendonfmu_finger* f, double time, double mean_for
     s->variance[j] = variance;
     s->gain[j] = s->joint_contact[j] = 0.0;
   }
+  if (settings->watches_rest) {
+    begin_rest(f, time);
+  }
   effective_friction(f, s->friction);
   if (!settings->has_initial_torque) {
     copy_row(s->friction, s->torque, f->joint_lanes); /* to the last bit */
@@ -196,6 +200,9 @@ HOT_INLINE void track_sample(tendonfmu_finger* f, double time, double step, doub
     quad_store(s->bias + j, quad_add(quad_load(s->bias + j), quad_load(f->scratch.bias_step + j)));
   }
   leave_residual(f, step);
+  if (settings->watches_rest) {
+    watch_rest(f, mean_force, time, step);
+  }
   const int contact = detect_contact(f, mean_force, time, step);
   s->scalar[STATE_ABSORBED_BEFORE] = s->scalar[STATE_ABSORBED];
   if (bias_is_updated(f, contact, time)) {
@@ -221,6 +228,9 @@ static sample_result take_sample(tendonfmu_finger* f, double time) {
 
   if (!inputs_in_range(f)) {
     return SAMPLE_OUT_OF_RANGE;
+  }
+  if (f->derived.settings.watches_rest) {
+    copy_row(f->scratch.motor_position, f->scratch.position, f->tendon_lanes);
   }
   if (f->extensions.signals) {
     shape_signals(f, time, 0);

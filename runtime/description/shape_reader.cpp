@@ -238,10 +238,22 @@ std::uint32_t read_uncertainty(const json_node& contact, std::uint32_t joints, s
   return unsigned{MODEL_HAS_UNCERTAINTY} | most << 10;
 }
 
+std::uint32_t read_rest(const json_node& contact, std::uint32_t joints) {
+  const json_node rest = contact.member("rest");
+  if (rest.absent()) {
+    return 0u;
+  }
+  rest.expect_keys(
+      {"travel", "settle_time", "averaging_time", "threshold", "threshold_per_force", "creep", "fall_share"});
+  check_thresholds(rest, joints);
+  check_optional_list(rest.member("creep"), joints, "numbers in N.m, one per joint");
+  return MODEL_HAS_REST;
+}
+
 std::uint32_t read_contact_options(const json_node& contact, std::uint32_t joints, std::uint32_t tendons) {
   contact.expect_keys({"threshold", "threshold_per_force", "method", "innovation", "friction_bound", "uncertainty",
                        "uncertainty_level", "deviation", "deviation_per_force", "release_ratio", "hold_time",
-                       "release_time"});
+                       "release_time", "rest"});
   check_thresholds(contact, joints);
   const json_node bound = contact.member("friction_bound");
   if (!bound.absent()) {
@@ -253,7 +265,7 @@ std::uint32_t read_contact_options(const json_node& contact, std::uint32_t joint
          given(contact, {"friction_bound"}, MODEL_HAS_FRICTION_BOUND) |
          given(contact, {"deviation", "deviation_per_force"}, MODEL_HAS_DEVIATION) |
          given(contact, {"release_ratio", "hold_time"}, MODEL_HAS_RELEASE) |
-         given(contact, {"release_time"}, MODEL_HAS_RELEASE_TIME);
+         given(contact, {"release_time"}, MODEL_HAS_RELEASE_TIME) | read_rest(contact, joints);
 }
 
 std::uint32_t read_position_filter(const json_node& filter, std::uint32_t joints) {

@@ -32,12 +32,17 @@ std::optional<double> default_value(const model_item& item, std::uint32_t offset
     case ITEM_DEVIATION_PER_FORCE:
     case ITEM_HOLD_TIME:
     case ITEM_LINK_OFFSET:
+    case ITEM_REST_PER_FORCE:
+    case ITEM_REST_CREEP:
     case ITEM_UNCERTAINTY: return 0.0; /* joints with fewer directions than others */
     case ITEM_JUMP_TIME: return 0.06;
     case ITEM_JERK_DENSITY:
       return 1.0; /* a hand: least friction error on two families of fingers, docs/contract-additions.md */
     case ITEM_UNCERTAINTY_LEVEL: return 3.0;
     case ITEM_RELEASE_RATIO: return 1.0;
+    case ITEM_REST_SETTLE_TIME: return 0.3;     /* a servo's ringing and most of what relaxes after a stop */
+    case ITEM_REST_AVERAGING_TIME: return 0.03; /* noise falls, and a push is late by no more than a touch takes */
+    case ITEM_REST_FALL_SHARE: return 0.1;
     case ITEM_EXTENSION:
       return item.effect->parameters[offset].required
                  ? std::nullopt

@@ -87,13 +87,18 @@ size_t tendonfmu_tendon_count(const tendonfmu_finger* finger);
 /* 1 when the description has links, so that outputs from fingertip_force on mean something. */
 int tendonfmu_has_links(const tendonfmu_finger* finger);
 
+/* 1 when the description has contact.rest, so that contact_change and contact_at_rest mean something; tendon_position
+ * is then needed with every kinematics source. */
+int tendonfmu_watches_rest(const tendonfmu_finger* finger);
+
 /* One line about the last call that failed on this finger, "" when none has. Valid until the next call. */
 const char* tendonfmu_last_error(const tendonfmu_finger* finger);
 
 /* --- Samples --------------------------------------------------------------------------------------------------- */
 
 /* Inputs of one sample, or of many (tendonfmu_run): row-major [samples × m] or [samples × n].
- * joint_position may be NULL for source 1, joint_velocity for sources 1 and 2, tendon_position for 2 and 3. */
+ * joint_position may be NULL for source 1, joint_velocity for sources 1 and 2, tendon_position for 2 and 3 without
+ * contact.rest. */
 typedef struct tendonfmu_inputs {
   const double* tendon_force;    /* [m] N    f0, tension at the spring; negative only on bidirectional tendons */
   const double* tendon_position; /* [m] m    x0, motor side */
@@ -126,6 +131,9 @@ typedef struct tendonfmu_outputs {
   unsigned char* fingertip_force_observable; /* [1]       all three directions of it follow from the torques */
   double* fingertip_force_misfit;            /* [1]       χ² per degree of freedom of one force at the tip */
   int* contact_link;                         /* [1]       contact on this link or beyond; 0 none, −1 not observable */
+  /* of fingers with contact.rest, else 0 */
+  double* contact_change;         /* [n] N·m   change of the joint torque since the motors came to rest; 0 in motion */
+  unsigned char* contact_at_rest; /* [1]       a change of some joint exceeds its bound */
 } tendonfmu_outputs;
 
 /* Chooses where joint angles and velocities come from. Default 1. Before tendonfmu_initialise() only. */

@@ -1,0 +1,144 @@
+"""The oracle's contact at rest: step 5a of docs/contract-additions.md.
+
+Part of the oracle (see oracle.py): naive, for tests alone, sharing no code with the runtime. Joints are counted from 0.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from oracle_finger import given
+
+Array = NDArray[Any]
+
+NEAR = 1e-9
+
+
+class RestWatch:
+    """Watches motors and torques. `take` once a sample, then `loaded` from the second sample on."""
+
+    def __init__(self, description: Mapping[str, Any], R: Array, branches: Counter[str]) -> None:
+        contact = description["contact"]
+        rest = contact["rest"]
+        n = R.shape[1]
+        self.R, self.branches = R, branches
+        self.travel = float(rest["travel"])
+        self.settle_time = float(given(rest, "settle_time", 0.3))
+        self.averaging_time = float(given(rest, "averaging_time", 0.03))
+        self.threshold = np.array(rest["threshold"], dtype=float)
+        self.per_force = np.array(given(rest, "threshold_per_force", [0.0] * n), dtype=float)
+        self.creep = np.array(given(rest, "creep", [0.0] * n), dtype=float)
+        self.fall_share = float(given(rest, "fall_share", 0.1))
+        self.release_ratio = float(given(contact, "release_ratio", 1.0))
+        # state
+        self.standing = False
+        self.f = np.zeros(0)  # smoothed forces
+        self.mark: tuple[float, Array, Array] = (0.0, self.f, self.f)  # time, x0, smoothed forces
+        self.change = np.zeros(n)  # c_j, as given out
+        self.at_rest = np.zeros(n, dtype=bool)
+        self.extreme = np.zeros(n)
+        self.carried = np.zeros(n)  # signed bound of a load from the rest before
+
+    def take(
+        self, f0: Array, x0: Array, mean_force: float, time: float, dt: float, first: bool,
+        decide: Callable[..., Any], out: Any,
+    ) -> None:  # fmt: skip
+        """One sample."""
+        if first:
+            self.f = f0.copy()
+            self._mark(x0, time, False)
+            return
+        share = 1.0 if self.averaging_time == 0.0 else 1.0 - math.exp(-dt / self.averaging_time)
+        self.f = self.f + share * (f0 - self.f)
+        since, x_mark, f_mark = self.mark
+        change = self.R.T @ (self.f - f_mark)
+        rested = time - since if self.standing else 0.0
+        D = self.threshold + self.per_force * mean_force + self.creep * math.sqrt(rested)
+
+        def above(name: tuple[Any, ...], value: float, limit: float) -> bool:
+            margin = abs(value - limit)
+            out.residual_margin = min(out.residual_margin, margin)
+            exceeds = bool(value > limit)
+            return bool(decide(("rest", *name), exceeds, [not exceeds] if margin < NEAR else []))
+
+        # x0 and the travel are inputs: every implementation subtracts and compares the same numbers
+        far = np.abs(x0 - x_mark) > self.travel
+        if not self.standing:
+            changed = [above(("changed", j), abs(change[j]), D[j]) for j in range(len(D))]
+            if far.any() or any(changed):
+                self.branches["rest_not_yet"] += 1
+                self._mark(x0, time, False)
+            elif time - since >= self.settle_time:
+                self.branches["rest_begins"] += 1
+                self._mark(x0, time, True)
+            return
+        if self._drives(far, x0 - x_mark, self.f - f_mark, decide, out):
+            for j in np.flatnonzero(self.at_rest):
+                self.carried[j] = math.copysign(D[j], self.extreme[j])
+                self.branches["load_carried"] += 1
+            self.branches["rest_ends"] += 1
+            self._mark(x0, time, False)
+        elif self._gone(change, D, above):
+            self.branches["load_gone"] += 1
+            self._mark(x0, time, False)
+        else:
+            self.change = change
+            self._decide(change, D, above)
+
+    def _mark(self, x0: Array, time: float, standing: bool) -> None:
+        self.mark = time, x0.copy(), self.f.copy()
+        self.standing = standing
+        self.change = np.zeros_like(self.threshold)
+        self.at_rest = np.zeros(len(self.threshold), dtype=bool)
+        self.extreme = np.zeros_like(self.threshold)
+
+    def _drives(self, far: Array, moved: Array, pulled: Array, decide: Callable[..., Any], out: Any) -> bool:
+        """Any motor that moves as its force changes; one that gives way does not."""
+        found = False
+        for i in np.flatnonzero(far):
+            out.force_margin = min(out.force_margin, abs(pulled[i]))
+            drives = bool(moved[i] * pulled[i] >= 0.0)
+            near = abs(pulled[i]) < NEAR
+            if decide(("drives", int(i)), drives, [not drives] if near else []):
+                found = True
+            else:
+                self.branches["motor_gives_way"] += 1
+        return found
+
+    def _gone(self, change: Array, D: Array, above: Callable[..., bool]) -> bool:
+        gone = False
+        for j in np.flatnonzero(self.extreme != 0.0):
+            size = abs(self.extreme[j])
+            fallen = size - math.copysign(1.0, self.extreme[j]) * change[j]
+            gone |= above(("gone", int(j)), fallen, D[j] + self.fall_share * size)
+        return gone
+
+    def _decide(self, change: Array, D: Array, above: Callable[..., bool]) -> None:
+        for j in range(len(D)):
+            ratio = self.release_ratio if self.at_rest[j] else 1.0
+            exceeds = above(("at_rest", j), abs(change[j]), ratio * D[j])
+            if exceeds and self.extreme[j] * change[j] > 0.0:
+                self.extreme[j] = max(abs(self.extreme[j]), abs(change[j])) * math.copysign(1.0, change[j])
+            else:
+                self.extreme[j] = change[j] if exceeds else 0.0
+            self.branches["contact_at_rest"] += exceeds
+            self.at_rest[j] = exceeds
+
+    def loaded(self, r: Array, decide: Callable[..., Any], out: Any) -> Array:
+        """[n] in contact at rest, or with a load from the rest before that the residual still shows."""
+        for j in np.flatnonzero(self.carried != 0.0):
+            level = abs(self.carried[j])
+            felt = math.copysign(1.0, self.carried[j]) * r[j]
+            margin = abs(felt - level)
+            out.residual_margin = min(out.residual_margin, margin)
+            lasts = bool(felt > level)
+            if not decide(("carried", int(j)), lasts, [not lasts] if margin < NEAR else []):
+                self.carried[j] = 0.0
+                self.branches["carried_load_ends"] += 1
+        return np.asarray(self.at_rest | (self.carried != 0.0))

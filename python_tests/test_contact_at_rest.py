@@ -1,0 +1,294 @@
+"""Contact at rest (docs/contract-additions.md, contact.rest): by hand, and random fingers against the oracle.
+
+By hand: one joint, one tendon of arm 0.01 m without friction, τ = 0.01 m · f0. Times are multiples of 1/8 s.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import agreement
+import oracle
+from analytic_cases import ARM, NO_UPDATE, Array, Outputs, close, finger
+from analytic_cases import recording as at_times
+from random_fingers import random_case
+from runners import NATIVE, ORACLE, RUNNERS, Runner, product
+
+DT = 0.125
+TRAVEL = 1e-5  # m
+QUICK = {"travel": TRAVEL, "settle_time": 2 * DT, "averaging_time": 0.0, "threshold": [0.005], "fall_share": 0.1}
+LEARNS = {"drift_variance": 1.0, "noise_std": 0.1, "initial_variance": 0.0}  # K = 0.92 and more
+SEEDS = range(300, 324)
+
+
+@pytest.fixture(params=[ORACLE, NATIVE], ids=lambda runner: runner.name)
+def runner(request: pytest.FixtureRequest) -> Runner:
+    chosen: Runner = request.param
+    return chosen
+
+
+def run(
+    runner: Runner, force: Any, position: Any = 0.0, rest: Any = None, bias: Any = NO_UPDATE, **contact: Any
+) -> Outputs:
+    description = finger(
+        [{"moment_arms": [ARM]}],
+        bias=bias,
+        contact={"threshold": [1e6], "rest": QUICK | (rest or {})} | contact,
+    )
+    count = len(np.atleast_1d(force)) if np.ndim(force) else len(position)
+    return runner(description, at_times(np.arange(count) * DT, force, 0.0, position=position), 3)
+
+
+def flags(out: Outputs) -> list[int]:
+    assert (np.ravel(out["contact"]) == out["joint_contact"].any(axis=1)).all()
+    assert not (np.ravel(out["contact_at_rest"]) & ~np.ravel(out["contact"])).any()
+    return [int(each) for each in np.ravel(out["contact_at_rest"])]
+
+
+def contacts(out: Outputs) -> list[int]:
+    return [int(each) for each in np.ravel(out["contact"])]
+
+
+# --- the rest and the change
+
+
+def test_the_change_counts_from_the_begin_of_the_rest(runner: Runner) -> None:
+    """Marked at sample 0, standing from sample 2 on: 0 there, then 0.01 m · (f0 − f0 of sample 2)."""
+    out = run(runner, [10.0, 10.1, 10.2, 10.3, 10.6, 11.0, 10.2])
+    close(out["contact_change"][:, 0], ARM * np.array([0.0, 0.0, 0.0, 0.1, 0.4, 0.8, 0.0]))
+    assert flags(out) == [0, 0, 0, 0, 0, 1, 0]
+    assert contacts(out) == flags(out)
+
+
+def test_a_load_that_is_there_before_the_rest_is_not_seen(runner: Runner) -> None:
+    out = run(runner, [10.0, 20.0, 20.0, 20.0, 20.0, 20.0])
+    assert flags(out) == [0] * 6
+    close(out["contact_change"], 0.0)
+
+
+def test_torque_and_motor_postpone_the_rest(runner: Runner) -> None:
+    """A change of 0.6 N at sample 2, or a motor that moves there: the wait begins again, the rest at sample 4."""
+    stepped = run(runner, [10.0, 10.0, 10.6, 10.6, 10.6, 11.2])
+    moved = run(runner, [10.0, 10.0, 10.0, 10.0, 10.0, 10.6], [0.0, 0.0, 2e-5, 2e-5, 2e-5, 2e-5])
+    for out in (stepped, moved):
+        assert flags(out) == [0, 0, 0, 0, 0, 1]
+        close(out["contact_change"][:, 0], ARM * np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.6]))
+
+
+def test_the_bound_grows_with_force_and_the_root_of_the_time(runner: Runner) -> None:
+    """Standing from sample 2: D = 0.005 + 0.001·11 + 0.016·√t at 11 N, 0.024 at t = 0.25 s and 0.032 at 1 s."""
+    rest = {"threshold_per_force": [0.001], "creep": [0.016]}
+    force = np.array([8.0, 8.0, 8.0, 11.0, 11.0, 11.0])  # 0.03 of change, D = 0.0217, 0.024, 0.0258
+    assert flags(run(runner, force, rest=rest)) == [0, 0, 0, 1, 1, 1]
+    later = np.array([8.0] * 11 + [11.0, 11.0])  # t = 1.125 s
+    assert flags(run(runner, later, rest=rest)) == [0] * 13
+
+
+def test_averaging(runner: Runner) -> None:
+    """The mean of the forces follows a step by 1 − exp(−t/T); no rest while it still changes is asked for here."""
+    out = run(runner, [10.0] * 3 + [11.0] * 5, rest={"averaging_time": 0.2, "threshold": [1.0]})
+    t = np.arange(1, 6) * DT
+    close(out["contact_change"][3:, 0], 0.01 * (1.0 - np.exp(-t / 0.2)))
+
+
+# --- what ends it
+
+
+def test_a_motor_that_gives_way_still_stands(runner: Runner) -> None:
+    """Force up and motor back is a push; force up and motor forth is a move, which ends the rest."""
+    force = [10.0, 10.0, 10.0, 11.0, 11.0, 11.0]
+    yields = run(runner, force, [0.0, 0.0, 0.0, -1e-4, -1e-4, -1e-4])
+    drives = run(runner, force, [0.0, 0.0, 0.0, 1e-4, 1e-4, 1e-4])
+    assert flags(yields) == [0, 0, 0, 1, 1, 1]
+    assert flags(drives) == [0, 0, 0, 0, 0, 0]
+
+
+def test_a_load_that_goes_ends_the_contact_and_another_rest_begins(runner: Runner) -> None:
+    """From 0.02 N·m down to 0.012: more than 0.005 + 0.1·0.02. The rest of it is the new rest's own."""
+    out = run(runner, [10.0, 10.0, 10.0, 12.0, 12.0, 11.2, 11.2, 11.2, 11.2, 12.0])
+    assert flags(out) == [0, 0, 0, 1, 1, 0, 0, 0, 0, 1]
+    close(out["contact_change"][4:, 0], ARM * np.array([2.0, 0.0, 0.0, 0.0, 0.0, 0.8]))
+    held = run(runner, [10.0, 10.0, 10.0, 12.0, 12.0, 11.4, 11.4])  # by 0.006, within 0.007
+    assert flags(held) == [0, 0, 0, 1, 1, 1, 1]
+
+
+def test_the_release_ratio_holds_what_falls_below_the_bound(runner: Runner) -> None:
+    force = [10.0, 10.0, 10.0, 10.6, 10.4, 10.2]
+    assert flags(run(runner, force)) == [0, 0, 0, 1, 0, 0]
+    assert flags(run(runner, force, release_ratio=0.5)) == [0, 0, 0, 1, 1, 0]
+
+
+# --- the bias and the load
+
+
+def test_the_bias_does_not_learn_the_load_of_a_rest(runner: Runner) -> None:
+    """Neither at rest, however long, nor as the motor moves on, until release_time after the rest; without the key it
+    does so at once."""
+    force, position = [10.0] * 4 + [12.0] * 12, [0.0] * 10 + [2e-5 * k for k in range(1, 7)]
+    out = run(runner, force, position, bias=LEARNS, release_time=4 * DT)
+    assert flags(out) == [0] * 4 + [1] * 6 + [0] * 6
+    assert contacts(out)[4:13] == [1] * 9
+    close(out["bias_torque"][4:13, 0], 0.1)
+    close(out["compensated_torque"][4:13, 0], 0.02)
+    assert out["bias_torque"][-1, 0] > 0.119 and contacts(out)[-1] == 0
+
+
+def test_a_carried_load_ends_with_its_torque(runner: Runner) -> None:
+    """The motor moves on at sample 5 with 0.02 N·m on the joint; at sample 7 the residual is back at 0."""
+    force = [10.0, 10.0, 10.0, 12.0, 12.0, 12.0, 12.0, 10.0, 10.0]
+    out = run(runner, force, [0.0] * 5 + [1e-4 * k for k in range(1, 5)], bias=LEARNS | {"drift_variance": 0.0})
+    assert flags(out) == [0, 0, 0, 1, 1, 0, 0, 0, 0]
+    assert contacts(out) == [0, 0, 0, 1, 1, 1, 1, 0, 0]
+
+
+def test_no_rest_no_outputs_and_nothing_else_changes() -> None:
+    description, recording = random_case(300, 300, detection=True)
+    plain = NATIVE(description, recording, 1)
+    assert not {"contact_change", "contact_at_rest"} & set(plain)
+    never = {"travel": 0.0, "threshold": [1e9] * len(description["joints"]), "settle_time": 1e9}
+    watched = NATIVE(with_rest(description, never), recording, 1)
+    for name, values in plain.items():
+        np.testing.assert_array_equal(watched[name], values, err_msg=name)
+
+
+def test_positions_are_needed_with_every_source() -> None:
+    native = product("native")
+    description, recording = random_case(301, 60)
+    n = len(description["joints"])
+    without = {name: values for name, values in recording.items() if name != "tendon_position"}
+    native.Finger.from_description(description, 2).run(without)
+    watched = native.Finger.from_description(with_rest(description, QUICK | {"threshold": [1.0] * n}), 2)
+    with pytest.raises(
+        native.NativeError, match=r"tendon_position is missing: this kinematics source, or contact\.rest"
+    ):
+        watched.run(without)
+    bad = recording | {"tendon_position": recording["tendon_position"] * np.nan}
+    with pytest.raises(native.NativeError, match=r"tendon_position\[1\] = "):
+        watched.run(bad)
+
+
+@pytest.mark.parametrize(
+    ("rest", "message"),
+    [
+        ({"threshold": [0.1]}, r"contact\.rest\.travel"),
+        ({"travel": 1e-5}, r"contact\.rest\.threshold"),
+        ({"travel": 1e-5, "threshold": [0.0]}, r"contact\.rest\.threshold\[1\] = 0: expected above 0"),
+        ({"travel": 1e-5, "threshold": [0.1, 0.1]}, r"contact\.rest\.threshold"),
+        ({"travel": 1e-5, "threshold": [0.1], "creep": [-1.0]}, r"contact\.rest\.creep\[1\] = -1"),
+        ({"travel": 1e-5, "threshold": [0.1], "fall_share": 2.0}, r"contact\.rest\.fall_share = 2"),
+        ({"travel": 1e-5, "threshold": [0.1], "speed": 1.0}, r"contact\.rest\.speed"),
+    ],
+)
+def test_refusals(rest: Any, message: str) -> None:
+    native = product("native")
+    with pytest.raises(native.NativeError, match=message):
+        native.image_from_json(json.dumps(finger([{"moment_arms": [ARM]}], contact={"threshold": [1.0], "rest": rest})))
+
+
+# --- random fingers that stand now and then
+
+
+def with_rest(description: Any, rest: Any) -> Any:
+    return description | {"contact": description["contact"] | {"rest": rest}}
+
+
+def resting_case(seed: int) -> tuple[Any, dict[str, Array]]:
+    """A random finger whose motors stand in blocks, with steps of its forces there; motors give way in some."""
+    description, recording = random_case(seed, 400, detection=True)
+    rng = np.random.default_rng([seed, 11])
+    samples, m = recording["tendon_force"].shape
+    arms = np.array([tendon["moment_arms"] for tendon in description["tendons"]])
+    scale = np.abs(arms).sum(axis=0) * float(np.abs(recording["tendon_force"]).mean()) * 0.02
+    step = float(np.median(np.diff(recording["time"])))
+    for begin in range(20, samples - 60, 70):
+        rows = slice(begin, begin + 50)
+        force, position = recording["tendon_force"][begin].copy(), recording["tendon_position"][begin].copy()
+        load = np.zeros((50, m))
+        for first in rng.integers(8, 45, 3):
+            load[first:] += rng.normal(0.0, 0.1, m) * np.abs(force).mean()
+        gives_way = 1e-4 * (rng.random() < 0.5) * rng.choice([1.0, 0.1])
+        recording["tendon_force"][rows] = force + load + rng.normal(0.0, 1e-3, (50, m))
+        recording["tendon_position"][rows] = position - gives_way * load + rng.normal(0.0, 1e-7, (50, m))
+    rest: dict[str, Any] = {"travel": 2e-6, "threshold": (scale * rng.uniform(0.3, 1.5, arms.shape[1])).tolist()}
+    rest["settle_time"] = step * rng.uniform(0.5, 5.0)
+    optional = {
+        "averaging_time": 0.0 if rng.random() < 0.2 else step * rng.uniform(0.5, 3.0),
+        "threshold_per_force": rng.uniform(0.0, 1e-4, arms.shape[1]).tolist(),
+        "creep": (scale * rng.uniform(0.0, 3.0, arms.shape[1])).tolist(),
+        "fall_share": rng.uniform(0.0, 0.6),
+    }
+    return with_rest(
+        description, rest | {key: value for key, value in optional.items() if rng.random() < 0.7}
+    ), recording
+
+
+REST_BRANCHES = {
+    "rest_not_yet", "rest_begins", "rest_ends", "contact_at_rest", "load_gone", "load_carried", "carried_load_ends",
+    "motor_gives_way",
+}  # fmt: skip
+
+
+def test_random_fingers_take_every_branch_of_the_rest() -> None:
+    seen: Counter[str] = Counter()
+    for seed in SEEDS:
+        description, recording = resting_case(seed)
+        seen += oracle.run(description, recording, 1 + seed % 3).branches
+    assert not [name for name in REST_BRANCHES if seen[name] < 5], {name: seen[name] for name in REST_BRANCHES}
+
+
+@pytest.mark.parametrize("runner", [each for each in RUNNERS if each is not ORACLE], ids=lambda runner: runner.name)
+def test_agrees_with_the_oracle(runner: Runner) -> None:
+    results, wrong = [], []
+    for seed in SEEDS[::6] if runner.name == "fmu" else SEEDS:  # packing takes its time
+        description, recording = resting_case(seed)
+        source = 1 + seed % 3
+        outputs = runner(description, recording, source)
+        assert {"contact_change", "contact_at_rest"} <= set(outputs)
+        found = agreement.agree_with_oracle(description, recording, source, outputs)
+        results.append(found)
+        if not found.agrees:
+            wrong.append(f"finger {seed}, source {source}: {found}")
+    assert not wrong, "\n".join(wrong[:10])
+    assert agreement.few_left_out(results)
+
+
+# --- the FMU and the saved state
+
+
+def test_the_fmu_has_the_outputs_only_with_the_key(tmp_path: Path) -> None:
+    fmpy = pytest.importorskip("fmpy")
+    description, _recording = resting_case(300)
+    plain = description | {"contact": {k: v for k, v in description["contact"].items() if k != "rest"}}
+    names = {}
+    for name, data in (("rest", description), ("plain", plain)):
+        (tmp_path / f"{name}.json").write_text(json.dumps(data), encoding="utf-8")
+        fmu = product("packaging").build_fmu(tmp_path / f"{name}.json", tmp_path / f"{name}.fmu")
+        variables = fmpy.read_model_description(str(fmu)).modelVariables
+        names[name] = {variable.name: variable for variable in variables}
+    added = set(names["rest"]) - set(names["plain"])
+    n = len(description["joints"])
+    assert {"contact_at_rest", *(f"contact_change[{j + 1}]" for j in range(n))} <= added
+    assert all(each.startswith(("contact.rest.", "contact_change[", "contact_at_rest")) for each in added)
+    assert names["rest"]["contact_change[1]"].unit == "N.m" and names["rest"]["contact_at_rest"].type == "Boolean"
+    assert names["rest"]["contact.rest.travel"].unit == "m"
+
+
+def test_a_saved_rest_goes_on(tmp_path: Path) -> None:
+    """Saved in contact at rest, in the middle of a load that has been carried, and anywhere else."""
+    native = product("native")
+    description, recording = resting_case(303)
+    whole = NATIVE(description, recording, 1)
+    for k in (30, 60, 61, 75, 100, 140, 200, 300):
+        head, tail = ({name: values[part] for name, values in recording.items()} for part in (slice(k), slice(k, None)))
+        one, other = (native.Finger.from_description(description, 1) for _ in range(2))
+        one.run(head)
+        other.restore_state(one.save_state())
+        found = other.run(tail)
+        for name in ("contact_change", "contact_at_rest", "contact", "bias_torque"):
+            np.testing.assert_array_equal(found[name], whole[name][k:], err_msg=f"{name} from {k}")
