@@ -35,12 +35,18 @@ class RestWatch:
         self.per_force = np.array(given(rest, "threshold_per_force", [0.0] * n), dtype=float)
         self.creep = np.array(given(rest, "creep", [0.0] * n), dtype=float)
         self.fall_share = float(given(rest, "fall_share", 0.1))
+        innovation = given(rest, "innovation", None)
+        self.time = None if innovation is None else float(innovation["time"])
+        self.sudden = None if innovation is None else np.array(innovation["threshold"], dtype=float)
         self.release_ratio = float(given(contact, "release_ratio", 1.0))
         # state
         self.standing = False
         self.f = np.zeros(0)  # smoothed forces
         self.mark: tuple[float, Array, Array] = (0.0, self.f, self.f)  # time, x0, smoothed forces
+        self.recent = self.mark  # the same of late
+        self.stiffness = np.array([tendon["stiffness"] for tendon in description["tendons"]], dtype=float)
         self.change = np.zeros(n)  # c_j, as given out
+        self.followed = np.zeros(n)  # m_j
         self.at_rest = np.zeros(n, dtype=bool)
         self.extreme = np.zeros(n)
         self.carried = np.zeros(n)  # signed bound of a load from the rest before
@@ -60,6 +66,7 @@ class RestWatch:
         change = self.R.T @ (self.f - f_mark)
         rested = time - since if self.standing else 0.0
         D = self.threshold + self.per_force * mean_force + self.creep * math.sqrt(rested)
+        B = D if self.sudden is None else self.sudden
 
         def above(name: tuple[Any, ...], value: float, limit: float) -> bool:
             margin = abs(value - limit)
@@ -78,55 +85,78 @@ class RestWatch:
                 self.branches["rest_begins"] += 1
                 self._mark(x0, time, True)
             return
-        if self._drives(far, x0 - x_mark, self.f - f_mark, decide, out):
+        if self._drives(x0, decide, out):
             for j in np.flatnonzero(self.at_rest):
-                self.carried[j] = math.copysign(D[j], self.extreme[j])
+                self.carried[j] = math.copysign(B[j], self.extreme[j])
                 self.branches["load_carried"] += 1
             self.branches["rest_ends"] += 1
             self._mark(x0, time, False)
-        elif self._gone(change, D, above):
+        elif self._gone(change - self.followed, B, above):
             self.branches["load_gone"] += 1
             self._mark(x0, time, False)
         else:
             self.change = change
-            self._decide(change, D, above)
+            self._decide(change, D, B, above)
+            if self.time is not None:
+                followed = self.followed + (1.0 - math.exp(-dt / self.time)) * (change - self.followed)
+                self.followed = np.where(self.at_rest, self.followed, followed)
+            if time - self.recent[0] >= self.settle_time:
+                self.recent = time, x0.copy(), self.f.copy()
 
     def _mark(self, x0: Array, time: float, standing: bool) -> None:
-        self.mark = time, x0.copy(), self.f.copy()
+        self.mark = self.recent = time, x0.copy(), self.f.copy()
         self.standing = standing
         self.change = np.zeros_like(self.threshold)
+        self.followed = np.zeros_like(self.threshold)
         self.at_rest = np.zeros(len(self.threshold), dtype=bool)
         self.extreme = np.zeros_like(self.threshold)
 
-    def _drives(self, far: Array, moved: Array, pulled: Array, decide: Callable[..., Any], out: Any) -> bool:
-        """Any motor that moves as its force changes; one that gives way does not."""
+    def _drives(self, x0: Array, decide: Callable[..., Any], out: Any) -> bool:
+        """Any motor that its force cannot have moved; one that gives way does not drive."""
+        _, x_mark, f_mark = self.mark
+        _, x_recent, f_recent = self.recent
         found = False
-        for i in np.flatnonzero(far):
-            out.force_margin = min(out.force_margin, abs(pulled[i]))
-            drives = bool(moved[i] * pulled[i] >= 0.0)
-            near = abs(pulled[i]) < NEAR
-            if decide(("drives", int(i)), drives, [not drives] if near else []):
+        for i in range(len(x0)):
+            pulled, moved = self.f[i] - f_recent[i], x0[i] - x_recent[i]
+            if abs(moved) > self.travel:
+                out.force_margin = min(out.force_margin, abs(pulled))
+                pulls = bool(moved * pulled >= 0.0)
+                if decide(("pulls", i), pulls, [not pulls] if abs(pulled) < NEAR else []):
+                    found = True
+                else:
+                    self.branches["motor_gives_way"] += 1
+            soft = self.travel + abs(self.f[i] - f_mark[i]) / self.stiffness[i]
+            margin = abs(abs(x0[i] - x_mark[i]) - soft)
+            # in N at the tendon: lengths of some micrometres are never 1e-9 m apart
+            out.force_margin = min(out.force_margin, margin * self.stiffness[i])
+            beyond = bool(abs(x0[i] - x_mark[i]) > soft)
+            near = margin * self.stiffness[i] < NEAR
+            if decide(("beyond", i), beyond, [not beyond] if near else []):
+                self.branches["motor_beyond_yield"] += 1
                 found = True
-            else:
-                self.branches["motor_gives_way"] += 1
         return found
 
-    def _gone(self, change: Array, D: Array, above: Callable[..., bool]) -> bool:
+    def _gone(self, late: Array, B: Array, above: Callable[..., bool]) -> bool:
         gone = False
         for j in np.flatnonzero(self.extreme != 0.0):
             size = abs(self.extreme[j])
-            fallen = size - math.copysign(1.0, self.extreme[j]) * change[j]
-            gone |= above(("gone", int(j)), fallen, D[j] + self.fall_share * size)
+            fallen = size - math.copysign(1.0, self.extreme[j]) * late[j]
+            gone |= above(("gone", int(j)), fallen, B[j] + self.fall_share * size)
         return gone
 
-    def _decide(self, change: Array, D: Array, above: Callable[..., bool]) -> None:
+    def _decide(self, change: Array, D: Array, B: Array, above: Callable[..., bool]) -> None:
+        late = change - self.followed
         for j in range(len(D)):
             ratio = self.release_ratio if self.at_rest[j] else 1.0
-            exceeds = above(("at_rest", j), abs(change[j]), ratio * D[j])
-            if exceeds and self.extreme[j] * change[j] > 0.0:
-                self.extreme[j] = max(abs(self.extreme[j]), abs(change[j])) * math.copysign(1.0, change[j])
+            slowly = above(("at_rest", j), abs(change[j]), ratio * D[j])
+            suddenly = above(("sudden", j), abs(late[j]), ratio * B[j])
+            if slowly != suddenly:
+                self.branches["sudden_alone" if suddenly else "slow_alone"] += 1
+            exceeds = slowly or suddenly
+            if exceeds and self.extreme[j] * late[j] > 0.0:
+                self.extreme[j] = max(abs(self.extreme[j]), abs(late[j])) * math.copysign(1.0, late[j])
             else:
-                self.extreme[j] = change[j] if exceeds else 0.0
+                self.extreme[j] = late[j] if exceeds else 0.0
             self.branches["contact_at_rest"] += exceeds
             self.at_rest[j] = exceeds
 

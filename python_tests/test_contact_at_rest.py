@@ -124,6 +124,17 @@ def test_the_release_ratio_holds_what_falls_below_the_bound(runner: Runner) -> N
     assert flags(run(runner, force, release_ratio=0.5)) == [0, 0, 0, 1, 1, 0]
 
 
+def test_what_changes_suddenly_is_found_beside_what_creeps(runner: Runner) -> None:
+    """m follows c with T = 0.25 s: a ramp of 0.004 N·m a sample stays below y = 0.02, a step of 0.03 does not."""
+    rest = {"threshold": [0.5], "innovation": {"time": 0.25, "threshold": [0.02]}}
+    ramp = 10.0 + 0.4 * np.maximum(np.arange(14) - 2, 0)
+    out = run(runner, ramp, rest=rest)
+    assert flags(out) == [0] * 14
+    close(out["contact_change"][2:, 0], 0.004 * np.arange(12))
+    stepped = ramp + 3.0 * (np.arange(14) >= 10)
+    assert flags(run(runner, stepped, rest=rest)) == [0] * 10 + [1] * 4
+
+
 # --- the bias and the load
 
 
@@ -222,6 +233,10 @@ def resting_case(seed: int) -> tuple[Any, dict[str, Array]]:
         "threshold_per_force": rng.uniform(0.0, 1e-4, arms.shape[1]).tolist(),
         "creep": (scale * rng.uniform(0.0, 3.0, arms.shape[1])).tolist(),
         "fall_share": rng.uniform(0.0, 0.6),
+        "innovation": {
+            "time": step * rng.uniform(2.0, 30.0),
+            "threshold": (scale * rng.uniform(0.2, 1.0, arms.shape[1])).tolist(),
+        },
     }
     return with_rest(
         description, rest | {key: value for key, value in optional.items() if rng.random() < 0.7}
@@ -230,7 +245,7 @@ def resting_case(seed: int) -> tuple[Any, dict[str, Array]]:
 
 REST_BRANCHES = {
     "rest_not_yet", "rest_begins", "rest_ends", "contact_at_rest", "load_gone", "load_carried", "carried_load_ends",
-    "motor_gives_way",
+    "motor_gives_way", "motor_beyond_yield", "sudden_alone", "slow_alone",
 }  # fmt: skip
 
 

@@ -32,6 +32,7 @@ from tendonfmu.fit_files import check_given_once, description_text
 from tendonfmu.fit_structure import own_copy
 from tendonfmu.free_motion import Clock, FreePart, FreeRun, free_parts, run_free
 from tendonfmu.recording import Recording, read_recording
+from tendonfmu.rest_tuning import RestRule, learn_rest
 from tendonfmu.tuned_loop import LoopAlarms, count_loop
 from tendonfmu.tuning_level import SECOND_SHARE, Level, Line, evidence_line, given_line, level_of, searched_line
 from tendonfmu.tuning_noise import BiasNoise, Deviation, bias_noise, deviation, wanted_time
@@ -81,9 +82,9 @@ class ContactTuning(ConstructorArguments):
     innovation_time, jump_time, stuck_time, evidence_time: s, written as such. progress: called with (steps done, all).
 
     After `tune`: description_ (tuned), bias_, lines_, levels_, bounds_ (by "innovation" and "residual"), deviation_,
-    cells_, runs_, pretensions_, held_out_ (alarms, 1/h upper limit), loop_ (alarms of the finger as it runs), rate_
-    (1/h that it is tuned for), more_minutes_ (missing for the wished rate), allowed_, hours_, forces_ (N, the lowest
-    and the highest recorded mean force), level_raised_, warnings_, seconds_.
+    cells_, runs_, pretensions_, rest_ (None: no rests), held_out_ (alarms, 1/h upper limit), loop_ (alarms of the
+    finger as it runs), rate_ (1/h that it is tuned for), more_minutes_ (missing for the wished rate), allowed_, hours_,
+    forces_ (N, the lowest and the highest recorded mean force), level_raised_, warnings_, seconds_.
     """
 
     def __init__(
@@ -132,6 +133,7 @@ class ContactTuning(ConstructorArguments):
         self._support()
         self._run(parts)
         self._choose()
+        self._learn_rest(parts)
         self._close_the_loop(parts)
         self.pretensions_ = self._by_pretension()
         self.seconds_ = perf_counter() - begin
@@ -233,6 +235,12 @@ class ContactTuning(ConstructorArguments):
     def _bounds(self, raised: float) -> dict[str, Bound]:
         return {name: line.bound.scaled(raised * self.levels_[name].factor) for name, line in self.lines_.items()}
 
+    def _learn_rest(self, parts: Sequence[FreePart]) -> None:
+        rate, confidence = self.false_alarms_per_hour, self.confidence
+        self.rest_: RestRule | None
+        self.rest_, sentences = learn_rest(self.start_.data, parts, self.kinematics, rate, confidence)
+        self.warnings_ += sentences
+
     # --- the finger as it runs ----------------------------------------------------------------------------------------
 
     def _close_the_loop(self, parts: Sequence[FreePart]) -> None:
@@ -282,6 +290,8 @@ class ContactTuning(ConstructorArguments):
         contact.pop("release_time", None)
         if math.isfinite(self.release_time):
             contact["release_time"] = self.release_time
+        if self.rest_ is not None:
+            contact["rest"] = dict(self.rest_.keys)
         return {**data, "contact": contact}
 
     # --- what it is worth ---------------------------------------------------------------------------------------------

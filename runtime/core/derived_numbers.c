@@ -179,7 +179,9 @@ static void derive_rest(derivation* d, const model_item* item) {
     case ITEM_REST_THRESHOLD: memcpy(to->rest_threshold, values, bytes); break;
     case ITEM_REST_PER_FORCE: memcpy(to->rest_per_force, values, bytes); break;
     case ITEM_REST_CREEP: memcpy(to->rest_creep, values, bytes); break;
-    default: settings->rest_fall_share = values[0]; break;
+    case ITEM_REST_FALL_SHARE: settings->rest_fall_share = values[0]; break;
+    case ITEM_REST_INNOVATION_TIME: settings->rest_innovation_rate = bounded_inverse(values[0]); break;
+    default: memcpy(to->rest_innovation, values, bytes); break;
   }
 }
 
@@ -268,6 +270,7 @@ void derive_numbers(tendonfmu_finger* finger, int routing_changed) {
                                                .evidence_time = -1.0,
                                                .release_ratio = 1.0,
                                                .release_time = -1.0,
+                                               .rest_innovation_rate = -1.0,
                                                .forgets_by_absorption = (options & MODEL_FORGETS_BY_ABSORPTION) != 0,
                                                .remembers_entry_load = (options & MODEL_REMEMBERS_ENTRY_LOAD) != 0,
                                                .filters_position = (options & MODEL_HAS_POSITION_FILTER) != 0,

@@ -71,6 +71,7 @@ static void lay_out_derived(tendonfmu_finger* f, cursor* c) {
   d->rest_threshold = take_numbers(c, resting);
   d->rest_per_force = take_numbers(c, resting);
   d->rest_creep = take_numbers(c, resting);
+  d->rest_innovation = take_numbers(c, resting);
   const size_t links = f->shape.options & MODEL_HAS_LINKS ? n : 0;
   d->links.axis = take_numbers(c, 3 * links);
   d->links.offset = take_numbers(c, 3 * links);
@@ -98,7 +99,7 @@ static void lay_out_state(tendonfmu_finger* f, cursor* c) {
   const size_t filter = f->shape.options & MODEL_HAS_POSITION_FILTER ? FILTER_ROWS * joints : 0;
   const size_t rests = f->shape.options & MODEL_HAS_REST ? 1 : 0;
   f->state_count = STATE_SCALARS + 17 * joints + 2 * tendons + 6 * slots + 2 * entries + parts + filter +
-                   rests * (4 * joints + 3 * tendons) + f->shape.extension_memory;
+                   rests * (5 * joints + 5 * tendons) + f->shape.extension_memory;
   f->state = take_numbers(c, f->state_count);
   double* run = f->state;
   s->scalar = part(&run, STATE_SCALARS);
@@ -119,11 +120,13 @@ static void lay_out_state(tendonfmu_finger* f, cursor* c) {
   s->entry_pulley = part(&run, entries);
   s->part = part(&run, parts);
   s->filter = part(&run, filter);
-  double** const rest_of_joints[] = {&s->contact_change, &s->rest_contact, &s->rest_extreme, &s->carried_load};
+  double** const rest_of_joints[] = {&s->contact_change, &s->rest_tracked, &s->rest_contact, &s->rest_extreme,
+                                     &s->carried_load};
   for (size_t i = 0; i < sizeof rest_of_joints / sizeof rest_of_joints[0]; ++i) {
     *rest_of_joints[i] = part(&run, rests * joints);
   }
-  double** const rest_of_tendons[] = {&s->smooth_force, &s->mark_force, &s->mark_position};
+  double** const rest_of_tendons[] = {&s->smooth_force, &s->mark_force, &s->mark_position, &s->recent_force,
+                                      &s->recent_position};
   for (size_t i = 0; i < sizeof rest_of_tendons / sizeof rest_of_tendons[0]; ++i) {
     *rest_of_tendons[i] = part(&run, rests * tendons);
   }
@@ -159,6 +162,7 @@ static void lay_out_scratch(tendonfmu_finger* f, cursor* c) {
   s->motor_position = take_numbers(c, resting ? f->tendon_lanes : 0);
   s->force_change = take_numbers(c, resting ? f->tendon_lanes : 0);
   s->rest_bound = take_numbers(c, resting ? f->joint_lanes : 0);
+  s->rest_sudden_bound = take_numbers(c, resting ? f->joint_lanes : 0);
   s->velocity = take_numbers(c, f->slots);
   s->view = take(c, f->slots / 4 * sizeof *s->view);
 }

@@ -42,6 +42,7 @@ typedef struct finger_settings {
   double release_time; /* < 0: never */
   int watches_rest;
   double rest_travel, rest_settle_time, rest_fall_share; /* m, s, 1 */
+  double rest_innovation_rate;                           /* 1/T, 1/s; < 0: none */
   double rest_averaging_rate;                            /* 1/s; < 0: none */
 } finger_settings;
 
@@ -81,13 +82,13 @@ typedef struct derived_numbers {
   uint32_t* edge_record;  /* [n × M] first record of the edge; 0 holds zeros for edges without friction */
   double* joint_law;      /* [N × LAW_NUMBERS] T_jv0 */
   double* load_law;       /* [N × LAW_NUMBERS] T_jvf */
-  double *cover_stiffness, *cover_rest;                 /* [N] */
-  double *contact_threshold, *contact_per_force;        /* [N] */
-  double* initial_torque;                               /* [N] */
-  double* position_variance;                            /* [N] rad², with a position filter only; 1 in spare lanes */
-  double *innovation_threshold, *innovation_per_force;  /* [N] */
-  double *deviation, *deviation_per_force;              /* [N] */
-  double *rest_threshold, *rest_per_force, *rest_creep; /* [N] with contact.rest only */
+  double *cover_stiffness, *cover_rest;                /* [N] */
+  double *contact_threshold, *contact_per_force;       /* [N] */
+  double* initial_torque;                              /* [N] */
+  double* position_variance;                           /* [N] rad², with a position filter only; 1 in spare lanes */
+  double *innovation_threshold, *innovation_per_force; /* [N] */
+  double *deviation, *deviation_per_force;             /* [N] */
+  double *rest_threshold, *rest_per_force, *rest_creep, *rest_innovation; /* [N] with contact.rest only */
   double* direction;   /* [n × (m + 3) × 4] relative errors, the directions of a joint side by side */
   link_geometry links; /* arrays NULL without links */
   int* least_link;     /* [n] of find_least_links() */
@@ -108,7 +109,8 @@ enum {
   STATE_STANDING,        /* 1 in a rest of the motors; this and what follows: with contact.rest, else 0 */
   STATE_MARKED_AT,       /* s, begin of the rest, or of the wait for one */
   STATE_CONTACT_AT_REST, /* 0 or 1 */
-  STATE_SCALARS          /* a multiple of 4 keeps the rows aligned */
+  STATE_RECENT_AT,       /* s, from which on motion counts as recent */
+  STATE_SCALARS = 16     /* the rest is 0 and keeps the rows aligned */
 };
 
 #define LONGEST_FILTER_STEP 1.0 /* s; after a longer one the position filter begins anew */
@@ -156,11 +158,13 @@ typedef struct finger_state {
   double* part;      /* [n × M + 3N] torques of tendons; T_jv0, T_jvf·Σ f_B, T_jq; with uncertainty only */
   double* filter;    /* [FILTER_ROWS × N] with a position filter only */
   /* with contact.rest only */
-  double* contact_change;                            /* [N] c, N·m; 0 outside a rest */
-  double* rest_contact;                              /* [N] 1 or 0: in contact at rest */
-  double* rest_extreme;                              /* [N] N·m, largest change of the contact at rest; 0 without */
-  double* carried_load;                              /* [N] ± N·m, bound of a load from the rest before; 0: none */
+  double* contact_change; /* [N] c, N·m; 0 outside a rest */
+  double* rest_tracked;   /* [N] m, N·m, what y = c − m is taken from; 0 without innovation */
+  double* rest_contact;   /* [N] 1 or 0: in contact at rest */
+  double* rest_extreme;   /* [N] N·m, largest change of the contact at rest; 0 without */
+  double* carried_load;   /* [N] ± N·m, bound of a load from the rest before; 0: none */
   double *smooth_force, *mark_force, *mark_position; /* [M] f̄, f̄ and x0 at the mark */
+  double *recent_force, *recent_position;            /* [M] f̄ and x0 at the recent mark */
   double* extension;                                 /* as the extensions ask for */
 } finger_state;
 
@@ -197,8 +201,8 @@ typedef struct finger_scratch {
   double* filter;                       /* as in the state, after this sample */
   double* travel;                       /* [n × M + N] of what slides, by the position filter: m, rad; with it only */
   double *motor_position, *force_change; /* [M] x0 as it was given, f̄ less that of the mark; with contact.rest only */
-  double* rest_bound;                    /* [N] D; with contact.rest only */
-  double* extension;                     /* the memory of the extensions after this sample */
+  double *rest_bound, *rest_sudden_bound; /* [N] D, B; with contact.rest only */
+  double* extension;                      /* the memory of the extensions after this sample */
   double *grip, *bias_grip, *slides;    /* [n × M + N] what friction rows make of F and b, 1 where a slot never sticks;
                                            with    such rows only */
   effect_sample sample;                 /* as the extensions see it */

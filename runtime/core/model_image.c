@@ -108,6 +108,7 @@ static void walk_detection(walk* w) {
   const uint32_t innovation = options & MODEL_DETECTS_BY_INNOVATION ? 1 : 0;
   const uint32_t bound = options & MODEL_HAS_FRICTION_BOUND ? 1 : 0, deviation = options & MODEL_HAS_DEVIATION ? n : 0;
   const uint32_t release = options & MODEL_HAS_RELEASE ? 1 : 0, rest = options & MODEL_HAS_REST ? 1 : 0;
+  const uint32_t of_late = options & MODEL_HAS_REST_INNOVATION ? 1 : 0;
   const item_size before[] = {
       {ITEM_INNOVATION_TIME, innovation},
       {ITEM_INNOVATION_THRESHOLD, n * innovation},
@@ -132,6 +133,8 @@ static void walk_detection(walk* w) {
       {ITEM_REST_PER_FORCE, n * rest},
       {ITEM_REST_CREEP, n * rest},
       {ITEM_REST_FALL_SHARE, rest},
+      {ITEM_REST_INNOVATION_TIME, of_late},
+      {ITEM_REST_INNOVATION_THRESHOLD, n * of_late},
   };
   emit_all(w, before, sizeof before / sizeof before[0]);
   for (uint32_t j = 0; j < n; ++j) {
@@ -244,7 +247,8 @@ static int check_options(const model_shape* shape) {
   const uint32_t options = shape->options, directions = model_direction_count(shape);
   const int cusum = (options & MODEL_DETECTS_BY_CUSUM) != 0, innovation = (options & MODEL_DETECTS_BY_INNOVATION) != 0;
   const int uncertain = (options & MODEL_HAS_UNCERTAINTY) != 0;
-  return directions > MODEL_MAX_DIRECTIONS || (directions && !uncertain) || (cusum && !innovation) ? -1 : 0;
+  const int alone = (options & MODEL_HAS_REST_INNOVATION) && !(options & MODEL_HAS_REST);
+  return directions > MODEL_MAX_DIRECTIONS || (directions && !uncertain) || (cusum && !innovation) || alone ? -1 : 0;
 }
 
 static int read_counts(const void* image, size_t image_size, model_shape* shape, message_line message) {

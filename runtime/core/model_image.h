@@ -58,7 +58,8 @@ enum {
   MODEL_HAS_LINKS = 1 << 16,
   MODEL_HAS_POSITION_FILTER = 1 << 17,
   MODEL_HAS_REST = 1 << 18,
-  MODEL_OPTION_BITS = (1 << 19) - 1
+  MODEL_HAS_REST_INNOVATION = 1 << 19, /* beside the bit before */
+  MODEL_OPTION_BITS = (1 << 20) - 1
 };
 
 #define MODEL_EDGE_HAS_ANGLES 0x80000000u
@@ -125,10 +126,12 @@ typedef enum model_item_kind {
   ITEM_REST_PER_FORCE, /* n */
   ITEM_REST_CREEP,     /* n */
   ITEM_REST_FALL_SHARE,
-  ITEM_LINK_AXIS,   /* 3, of one joint */
-  ITEM_LINK_OFFSET, /* 3, of one joint */
-  ITEM_TIP,         /* 3 */
-  ITEM_EXTENSION    /* as many as the effect has */
+  ITEM_REST_INNOVATION_TIME,
+  ITEM_REST_INNOVATION_THRESHOLD, /* n */
+  ITEM_LINK_AXIS,                 /* 3, of one joint */
+  ITEM_LINK_OFFSET,               /* 3, of one joint */
+  ITEM_TIP,                       /* 3 */
+  ITEM_EXTENSION                  /* as many as the effect has */
 } model_item_kind;
 
 typedef struct model_item {

@@ -95,6 +95,8 @@ static void path_of_finger(message_line path, const model_item* item, uint32_t o
       [ITEM_REST_PER_FORCE] = "contact.rest.threshold_per_force",
       [ITEM_REST_CREEP] = "contact.rest.creep",
       [ITEM_REST_FALL_SHARE] = "contact.rest.fall_share",
+      [ITEM_REST_INNOVATION_TIME] = "contact.rest.innovation.time",
+      [ITEM_REST_INNOVATION_THRESHOLD] = "contact.rest.innovation.threshold",
   };
   switch (item->kind) {
     case ITEM_INITIAL_TORQUE:
@@ -107,7 +109,8 @@ static void path_of_finger(message_line path, const model_item* item, uint32_t o
     case ITEM_DEVIATION_PER_FORCE:
     case ITEM_REST_THRESHOLD:
     case ITEM_REST_PER_FORCE:
-    case ITEM_REST_CREEP: path_index(path, names[item->kind], offset); break;
+    case ITEM_REST_CREEP:
+    case ITEM_REST_INNOVATION_THRESHOLD: path_index(path, names[item->kind], offset); break;
     default: message_text(path, names[item->kind]); break;
   }
 }
@@ -252,6 +255,8 @@ parameter_range parameter_range_of(const model_item* item, uint32_t index) {
       [ITEM_REST_PER_FORCE] = {"m", 0.0, LARGE, 0, 1},
       [ITEM_REST_CREEP] = {"N.m", 0.0, LARGE, 0, 1},
       [ITEM_REST_FALL_SHARE] = {"1", 0.0, 1.0, 0, 1},
+      [ITEM_REST_INNOVATION_TIME] = {"s", 0.0, LARGE, 1, 1},
+      [ITEM_REST_INNOVATION_THRESHOLD] = {"N.m", 0.0, LARGE, 1, 1},
       [ITEM_LINK_AXIS] = {"1", -1e6, 1e6, 0, 0},
       [ITEM_LINK_OFFSET] = {"m", -10.0, 10.0, 0, 0},
       [ITEM_TIP] = {"m", -10.0, 10.0, 0, 0},

@@ -95,6 +95,8 @@ static int scalars_are_sound(const tendonfmu_finger* f, const unsigned char* sta
       {s + STATE_STANDING, 1, ROW_WITHOUT_LANES, 0.0, rests, 1, 0},
       {s + STATE_MARKED_AT, 1, ROW_WITHOUT_LANES, -LARGEST_TIME * rests, LARGEST_TIME * rests, 0, 0},
       {s + STATE_CONTACT_AT_REST, 1, ROW_WITHOUT_LANES, 0.0, rests, 1, 0},
+      {s + STATE_RECENT_AT, 1, ROW_WITHOUT_LANES, -LARGEST_TIME * rests, LARGEST_TIME * rests, 0, 0},
+      {s + STATE_RECENT_AT + 1, STATE_SCALARS - STATE_RECENT_AT - 1, ROW_WITHOUT_LANES, 0.0, 0.0, 0, 0},
   };
   return rows_are_sound(f, state, rules, sizeof rules / sizeof rules[0]);
 }
@@ -161,12 +163,15 @@ static int motors_rest_is_sound(const tendonfmu_finger* f, const unsigned char* 
   const size_t n = f->joint_lanes, m = f->tendon_lanes;
   const row_rule rules[] = {
       {s->contact_change, n, ROW_OF_JOINTS, -LARGEST_SUM, LARGEST_SUM, 0, 0},
+      {s->rest_tracked, n, ROW_OF_JOINTS, -LARGEST_SUM, LARGEST_SUM, 0, 0},
       {s->rest_contact, n, ROW_OF_JOINTS, 0.0, 1.0, 1, 0},
       {s->rest_extreme, n, ROW_OF_JOINTS, -LARGEST_SUM, LARGEST_SUM, 0, 0},
       {s->carried_load, n, ROW_OF_JOINTS, -LARGEST_SUM, LARGEST_SUM, 0, 0},
       {s->smooth_force, m, ROW_OF_TENDONS, -LARGEST_SUM, LARGEST_SUM, 0, 0},
       {s->mark_force, m, ROW_OF_TENDONS, -LARGEST_SUM, LARGEST_SUM, 0, 0},
       {s->mark_position, m, ROW_OF_TENDONS, -LARGEST_SUM, LARGEST_SUM, 0, 0},
+      {s->recent_force, m, ROW_OF_TENDONS, -LARGEST_SUM, LARGEST_SUM, 0, 0},
+      {s->recent_position, m, ROW_OF_TENDONS, -LARGEST_SUM, LARGEST_SUM, 0, 0},
   };
   const double marked_at = load_f64(state + 8 * STATE_MARKED_AT), time = load_f64(state + 8 * STATE_TIME);
   return !f->derived.settings.watches_rest ||

@@ -243,11 +243,17 @@ std::uint32_t read_rest(const json_node& contact, std::uint32_t joints) {
   if (rest.absent()) {
     return 0u;
   }
-  rest.expect_keys(
-      {"travel", "settle_time", "averaging_time", "threshold", "threshold_per_force", "creep", "fall_share"});
+  rest.expect_keys({"travel", "settle_time", "averaging_time", "threshold", "threshold_per_force", "creep",
+                    "fall_share", "innovation"});
   check_thresholds(rest, joints);
   check_optional_list(rest.member("creep"), joints, "numbers in N.m, one per joint");
-  return MODEL_HAS_REST;
+  const json_node innovation = rest.member("innovation");
+  if (innovation.absent()) {
+    return MODEL_HAS_REST;
+  }
+  innovation.expect_keys({"time", "threshold"});
+  innovation.member("threshold").expect_list(joints, joints, "numbers in N.m, one per joint");
+  return unsigned{MODEL_HAS_REST} | unsigned{MODEL_HAS_REST_INNOVATION};
 }
 
 std::uint32_t read_contact_options(const json_node& contact, std::uint32_t joints, std::uint32_t tendons) {
