@@ -34,7 +34,7 @@ class RestWatch:
         self.threshold = np.array(rest["threshold"], dtype=float)
         self.per_force = np.array(given(rest, "threshold_per_force", [0.0] * n), dtype=float)
         self.creep = np.array(given(rest, "creep", [0.0] * n), dtype=float)
-        self.fall_share = float(given(rest, "fall_share", 0.1))
+        self.fall_share = float(given(rest, "fall_share", 0.05))
         innovation = given(rest, "innovation", None)
         self.time = None if innovation is None else float(innovation["time"])
         self.sudden = None if innovation is None else np.array(innovation["threshold"], dtype=float)
@@ -65,7 +65,8 @@ class RestWatch:
         since, x_mark, f_mark = self.mark
         change = self.R.T @ (self.f - f_mark)
         rested = time - since if self.standing else 0.0
-        D = self.threshold + self.per_force * mean_force + self.creep * math.sqrt(rested)
+        noise = self.threshold + self.per_force * mean_force
+        D = noise + self.creep * math.sqrt(rested)
         B = D if self.sudden is None else self.sudden
 
         def above(name: tuple[Any, ...], value: float, limit: float) -> bool:
@@ -91,7 +92,7 @@ class RestWatch:
                 self.branches["load_carried"] += 1
             self.branches["rest_ends"] += 1
             self._mark(x0, time, False)
-        elif self._gone(change - self.followed, B, above):
+        elif self._gone(change - self.followed, noise, above):
             self.branches["load_gone"] += 1
             self._mark(x0, time, False)
         else:
@@ -136,12 +137,12 @@ class RestWatch:
                 found = True
         return found
 
-    def _gone(self, late: Array, B: Array, above: Callable[..., bool]) -> bool:
+    def _gone(self, late: Array, noise: Array, above: Callable[..., bool]) -> bool:
         gone = False
         for j in np.flatnonzero(self.extreme != 0.0):
             size = abs(self.extreme[j])
             fallen = size - math.copysign(1.0, self.extreme[j]) * late[j]
-            gone |= above(("gone", int(j)), fallen, B[j] + self.fall_share * size)
+            gone |= above(("gone", int(j)), fallen, noise[j] + self.fall_share * size)
         return gone
 
     def _decide(self, change: Array, D: Array, B: Array, above: Callable[..., bool]) -> None:

@@ -6,6 +6,8 @@ forces are noisy. Nothing of the product makes these recordings.
 
 from __future__ import annotations
 
+import warnings
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -127,3 +129,18 @@ def test_a_rate_that_the_rests_do_not_support_is_said() -> None:
     rule, sentences = learned(made(6.0, 1))
     assert rule is not None and rule.limit > 6.0
     assert "support at most" in sentences[0] and "not 6" in sentences[0]
+
+
+def test_tune_writes_the_rule_and_keeps_its_rate() -> None:
+    tuning, recording = product("detection_tuning"), product("recording")
+    sources = []
+    for seed in (1, 2):
+        groups = made(13.0, seed)
+        sources.append(recording.Recording(Path(f"free_{seed}"), groups.pop("time"), groups))
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        tuned = tuning.ContactTuning(FINGER, false_alarms_per_hour=10.0).tune(sources)
+    contact = tuned.description_.data["contact"]
+    assert contact["rest"] == tuned.rest_.keys and contact["rest"]["travel"] == pytest.approx(2.0 * RESOLUTION)
+    assert sum(each.alarms for each in tuned.loop_) <= tuned.allowed_
+    assert not any("left out" in str(each.message) for each in said)

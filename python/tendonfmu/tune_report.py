@@ -42,6 +42,7 @@ def build_report(tuning: ContactTuning) -> dict[str, Any]:
         "in_sample": _counted(tuning, tuning.tail(np.ones(1))[0][1]),
         "held_out": _counted(tuning, tuning.held_out_[0]),
         "closed_loop": _loop(tuning),
+        "rest": _rest(tuning),
         "pretensions": [_pretension(tuning, g) for g in range(len(tuning.pretensions_))],
         "tail": [_point(tuning, *each) for each in tuning.tail(FACTORS)],
         "tried": _tried(tuning),
@@ -83,6 +84,15 @@ def _counted(tuning: ContactTuning, alarms: int, hours: float | None = None) -> 
         "interval": [found.low, found.high],
         "limit": rate_limit(alarms, span, tuning.confidence),
     }
+
+
+def _rest(tuning: ContactTuning) -> dict[str, Any] | None:
+    """What contact.rest was learned from, and its alarms; None without rests."""
+    rule = tuning.rest_
+    if rule is None:
+        return None
+    counted = {"alarms": rule.alarms, "held_out": rule.held_out, "limit": rule.limit}
+    return {"rests": rule.rests, "minutes": 60.0 * rule.hours, **counted}
 
 
 def _level(tuning: ContactTuning, name: str) -> dict[str, Any]:

@@ -58,7 +58,8 @@ HOT_INLINE void change_since_mark(tendonfmu_finger* f, double step) {
   }
 }
 
-/* D: what noise, and creep since the rest began, make of it; B: of what has changed of late, D without innovation */
+/* N: what noise makes of a change; D: what noise, and creep since the rest began, make of it; B: of what has changed of
+ * late, D without innovation */
 HOT_INLINE void bound_change(tendonfmu_finger* f, double mean_force, double rested) {
   const derived_numbers* d = &f->derived;
   const quad force = quad_set(mean_force), growth = quad_set(sqrt(rested));
@@ -66,6 +67,7 @@ HOT_INLINE void bound_change(tendonfmu_finger* f, double mean_force, double rest
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     const quad noise = quad_add(quad_load(d->rest_threshold + j), quad_mul(quad_load(d->rest_per_force + j), force));
     const quad bound = quad_add(noise, quad_mul(quad_load(d->rest_creep + j), growth));
+    quad_store(f->scratch.rest_noise + j, noise);
     quad_store(f->scratch.rest_bound + j, bound);
     quad_store(f->scratch.rest_sudden_bound + j, has_innovation ? quad_load(d->rest_innovation + j) : bound);
   }
@@ -115,7 +117,7 @@ HOT_INLINE int motor_drives(const tendonfmu_finger* f) {
   return any;
 }
 
-/* any load that has fallen from its extreme by more than its bound and a share of the extreme */
+/* any load that has fallen from its extreme by more than noise and a share of the extreme */
 HOT_INLINE int load_has_gone(const tendonfmu_finger* f) {
   const finger_state* s = &f->remembered;
   const quad one = quad_set(1.0), zero = quad_set(0.0), share = quad_set(f->derived.settings.rest_fall_share);
@@ -123,7 +125,7 @@ HOT_INLINE int load_has_gone(const tendonfmu_finger* f) {
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     const quad extreme = quad_load(s->rest_extreme + j), size = quad_abs(extreme);
     const quad left = quad_mul(quad_with_sign(one, extreme), change_of_late(f, j));
-    const quad allowed = quad_add(quad_load(f->scratch.rest_sudden_bound + j), quad_mul(share, size));
+    const quad allowed = quad_add(quad_load(f->scratch.rest_noise + j), quad_mul(share, size));
     const quad_mask fell = quad_greater(quad_sub(size, left), allowed);
     any |= quad_mask_bits(quad_both(quad_greater(size, zero), fell));
   }

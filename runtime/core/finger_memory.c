@@ -161,6 +161,7 @@ static void lay_out_scratch(tendonfmu_finger* f, cursor* c) {
   const int resting = (f->shape.options & MODEL_HAS_REST) != 0;
   s->motor_position = take_numbers(c, resting ? f->tendon_lanes : 0);
   s->force_change = take_numbers(c, resting ? f->tendon_lanes : 0);
+  s->rest_noise = take_numbers(c, resting ? f->joint_lanes : 0);
   s->rest_bound = take_numbers(c, resting ? f->joint_lanes : 0);
   s->rest_sudden_bound = take_numbers(c, resting ? f->joint_lanes : 0);
   s->velocity = take_numbers(c, f->slots);

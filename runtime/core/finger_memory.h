@@ -201,8 +201,8 @@ typedef struct finger_scratch {
   double* filter;                       /* as in the state, after this sample */
   double* travel;                       /* [n × M + N] of what slides, by the position filter: m, rad; with it only */
   double *motor_position, *force_change; /* [M] x0 as it was given, f̄ less that of the mark; with contact.rest only */
-  double *rest_bound, *rest_sudden_bound; /* [N] D, B; with contact.rest only */
-  double* extension;                      /* the memory of the extensions after this sample */
+  double *rest_noise, *rest_bound, *rest_sudden_bound; /* [N] N, D, B; with contact.rest only */
+  double* extension;                                   /* the memory of the extensions after this sample */
   double *grip, *bias_grip, *slides;    /* [n × M + N] what friction rows make of F and b, 1 where a slot never sticks;
                                            with    such rows only */
   effect_sample sample;                 /* as the extensions see it */

@@ -42,7 +42,8 @@ std::optional<double> default_value(const model_item& item, std::uint32_t offset
     case ITEM_RELEASE_RATIO: return 1.0;
     case ITEM_REST_SETTLE_TIME: return 0.3;     /* a servo's ringing and most of what relaxes after a stop */
     case ITEM_REST_AVERAGING_TIME: return 0.03; /* noise falls, and a push is late by no more than a touch takes */
-    case ITEM_REST_FALL_SHARE: return 0.1;
+    case ITEM_REST_FALL_SHARE:
+      return 0.05; /* of the virtual hand's pushes at rest, few holds break and most ends show */
     case ITEM_EXTENSION:
       return item.effect->parameters[offset].required
                  ? std::nullopt
