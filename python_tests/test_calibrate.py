@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
 
 from tendonfmu import calibration
-from tendonfmu.calibration import Calibration, Options, calibrate
+from tendonfmu.calibration import Calibration, Options, calibrate, rms_of
 from tendonfmu.calibration_files import write_calibration
 from tendonfmu.calibration_parts import DIAGNOSED, JUDGED, stretches_for_diagnosis
 from tendonfmu.calibration_steps import Steps
-from tendonfmu.calibration_text import size_rows, together, verdict
+from tendonfmu.calibration_text import size_rows, verdict
 from tendonfmu.errors import InputError
 from tendonfmu.recording import Recording, read_recording
 from tendonfmu.several_values import several_values
@@ -83,7 +83,7 @@ def test_the_missing_weight_is_built_in_and_the_error_falls(calibrated: tuple[Ca
     report = calibrated[0].report
     assert report["structure"]["verdict"] == "explained"
     assert [each["title"] for each in report["structure"]["causes"]] == ["The link's weight"]
-    rms = {name: together(report["error"][name]) for name in ("bias_only", "as_given", "fitted", "calibrated")}
+    rms = {name: rms_of(report["error"][name]) for name in ("bias_only", "as_given", "fitted", "calibrated")}
     assert rms["bias_only"] > rms["as_given"] > rms["fitted"] > 1.2 * rms["calibrated"]
 
 
@@ -145,6 +145,36 @@ def test_what_is_unchanged_is_not_done_again(
     assert other.report["steps"]["repeated"] == ["diagnosis", "fit"] and other.report["pushes"] is None
     with pytest.raises(AssertionError, match="done again"):
         calibrate(folder / FINGER, [folder / UNSEEN], out)
+
+
+def test_an_earlier_calibration_is_the_prior_of_little_data(
+    calibrated: tuple[Calibration, Path], folder: Path, tmp_path: Path
+) -> None:
+    """Its structure stays and nothing is diagnosed; unseen motion is no worse."""
+    _, out = calibrated
+    recording = read_recording(folder / FREE)
+    columns: dict[str, Numbers] = {"time": recording.time[:5000]}
+    for name, values in recording.groups.items():
+        columns |= {f"{name}[{i + 1}]": values[:5000, i] for i in range(values.shape[1])}
+    write_table(tmp_path / "short.parquet", columns)
+    again = calibrate(
+        folder / FINGER,
+        [tmp_path / "short.parquet"],
+        tmp_path / "again",
+        tests=[folder / UNSEEN],
+        previous=out / "finger.json",
+    )
+    write_calibration(again, tmp_path / "again")
+    error = again.report["error"]
+    assert rms_of(error["calibrated"]) <= rms_of(error["previous"]) < rms_of(error["bias_only"])
+    assert "gravity" in json.dumps(again.data["extensions"]) and again.report["structure"]["causes"] == []
+    page = (tmp_path / "again" / "calibration.html").read_text(encoding="utf-8")
+    assert "the earlier calibration" in page and "diagnosis.html" not in page
+    other = json.loads((out / "finger.json").read_text())
+    other["joints"][0]["name"] = "thumb"
+    (tmp_path / "other.json").write_text(json.dumps(other))
+    with pytest.raises(InputError, match=r"joints thumb.*expected joint_1"):
+        calibrate(folder / FINGER, [folder / FREE], tmp_path / "no", previous=tmp_path / "other.json")
 
 
 @pytest.mark.parametrize(
@@ -257,4 +287,4 @@ def test_pushes_are_told_by_size() -> None:
     found = size_rows({"pushes": {"sizes": rows}})
     assert [row[0] for row in found] == ["below 1.5 times", "1.5 to 3 times", "6 times and more"]
     assert found[2][1:] == ("4 of 4", "40 to 100 %")
-    assert size_rows({"pushes": None}) == [] and math.isclose(together([3.0, 4.0]), math.sqrt(12.5))
+    assert size_rows({"pushes": None}) == [] and math.isclose(rms_of([3.0, 4.0]), math.sqrt(12.5))

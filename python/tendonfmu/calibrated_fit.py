@@ -1,19 +1,21 @@
 """The numbers of a diagnosed finger, fitted to all of its free motion, and what is not known of them.
 
 A diagnosis finds the structure on a part of the recordings; its numbers are then worth more the more motion they are
-learned from.
+learned from. Where there is little motion, an earlier calibration is the prior.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tendonfmu.cause_search import predicted_of, series_of
-from tendonfmu.description import FingerDescription
+from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.diagnosis_result import Event
 from tendonfmu.diagnosis_search import events_of, without_blocks
 from tendonfmu.diagnosis_series import make_grid
@@ -22,8 +24,12 @@ from tendonfmu.extension_fit import FitSettings, learn_numbers
 from tendonfmu.fit_evaluation import evaluate
 from tendonfmu.fit_files import with_uncertainty, with_values
 from tendonfmu.fit_recordings import FitRecording
+from tendonfmu.fit_report import FORMAT as FIT_REPORT
 from tendonfmu.fit_uncertainty import parameter_uncertainty
+from tendonfmu.fitting import FitWarning, FrictionFit
 from tendonfmu.identifiability import unknowns
+from tendonfmu.json_node import read_json
+from tendonfmu.previous_fit import read_previous_fit, with_previous_values
 from tendonfmu.signal_choice import estimation_recordings
 
 Data = Mapping[str, Any]
@@ -69,3 +75,30 @@ def fit_all(
         level = (finger.data["contact"] or {}).get("uncertainty_level")
         online = with_uncertainty(online, known.directions, level)
     return CalibratedFit(online.data, events, tuple(learned.warnings))
+
+
+def earlier_finger(given: FingerDescription, previous: Path) -> FingerDescription:
+    """The description of an earlier calibration; of a fit's report the given one with its values. Raises InputError."""
+    if read_json(previous, "an earlier calibration").get("format") == FIT_REPORT:
+        return with_previous_values(given, read_previous_fit(previous))
+    return read_finger(previous)
+
+
+def fit_again(
+    finger: FingerDescription,
+    previous: Path,
+    recordings: Sequence[FitRecording],
+    *,
+    share: float,
+    kinematics: int,
+    threads: int,
+) -> CalibratedFit:
+    """An earlier calibration fitted to new motion: its values and what is not known of them are the prior.
+
+    share: of the recordings' time that is held out. Raises InputError.
+    """
+    fitting = FrictionFit(finger, previous=previous, kinematics=kinematics, holdout=share, threads=threads)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FitWarning)  # they are in the report
+        fitting.fit([each.recording for each in recordings])
+    return CalibratedFit(fitting.description_.data, (), tuple(fitting.warnings_))

@@ -12,6 +12,7 @@ stay in the folder, so that a call that is repeated goes on where the one before
 from __future__ import annotations
 
 import json
+import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,9 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu import native
-from tendonfmu.calibrated_fit import CalibratedFit, fit_all
+from tendonfmu.calibrated_fit import CalibratedFit, earlier_finger, fit_again, fit_all
 from tendonfmu.calibration_parts import stretches_for_diagnosis
-from tendonfmu.calibration_steps import Steps, digest_of_file
+from tendonfmu.calibration_steps import Steps, digest_of, digest_of_file
 from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.detection_tuning import ContactTuning, TuneWarning
 from tendonfmu.diagnosis import diagnose
@@ -56,6 +57,15 @@ Data = Mapping[str, Any]
 FORMAT = "tendonfmu-calibration-1"
 DIAGNOSIS = "diagnosis"  # folder of the full diagnosis
 HELD = Held(0.2, 10.0)  # of the recordings, for the errors, where there are no tests
+NOTHING_ASKED: dict[str, Any] = {
+    "verdict": "not asked: the structure of the earlier calibration",
+    "causes": [],
+    "recordings": [],
+    "tests": [],
+    "unexplained": "",
+    "next_experiment": "",
+    "warnings": [],
+}
 PHASES = {
     "reading": 3.0,
     "what the model lacks": 45.0,
@@ -101,19 +111,22 @@ def calibrate(
     *,
     tests: Sequence[Path | str] = (),
     pushes: Sequence[Path | str] = (),
+    previous: Path | str | None = None,
     options: Options = Options(),
     progress: Callable[[PhaseState], None] | None = None,
 ) -> Calibration:
     """finger: description, its structure as given. free: recordings of free motion. folder: for the results of the
     steps and the page of the diagnosis. tests: free motion that errors are measured on; without them that is every
     fifth stretch of 10 s of `free`, which no number is fitted to. pushes: recordings with labelled contact, to count
-    what is found. progress: called with what is being done. Raises InputError.
+    what is found. previous: description or fit report of an earlier calibration, for little data: its structure stays,
+    its numbers are the prior. progress: called with what is being done. Raises InputError.
     """
     begun = perf_counter()
     phases = Phases(PHASES, progress or (lambda state: None))
     given = [[Path(each) for each in group] for group in (free, tests, pushes)]
     with phases.start("reading"):
-        case = _read(Path(finger), given[0], given[1], given[2], options)
+        start = _start(Path(finger), None if previous is None else Path(previous))
+        case = _read(start, given[0], given[1], given[2], options)
     run = _Run(case, Path(folder), options, phases)
     report, data = run.report()
     return Calibration(
@@ -125,14 +138,40 @@ def calibrate(
 
 
 @dataclass(frozen=True)
+class _Start:
+    """finger: what to begin with. previous: file of an earlier calibration, or None."""
+
+    finger: FingerDescription
+    previous: Path | None
+
+
+def _start(finger: Path, previous: Path | None) -> _Start:
+    given = read_finger(finger)
+    if previous is None:
+        return _Start(given, None)
+    earlier = earlier_finger(given, previous)
+    for what, names, other in (
+        ("joints", given.joint_names, earlier.joint_names),
+        ("tendons", given.tendon_names, earlier.tendon_names),
+    ):
+        if names != other:
+            raise InputError(f"{previous}: {what} {', '.join(other)}; expected {', '.join(names)} as of {finger}")
+    return _Start(earlier, previous)
+
+
+@dataclass(frozen=True)
 class _Case:
     """free: prepared, with held-out stretches where there are no tests. sentences: about the recordings."""
 
-    finger: FingerDescription
+    start: _Start
     free: list[FitRecording]
     tests: list[FitRecording]
     pushes: list[Path]
     sentences: list[str]
+
+    @property
+    def finger(self) -> FingerDescription:
+        return self.start.finger
 
     @property
     def judged(self) -> list[FitRecording]:
@@ -145,25 +184,28 @@ class _Case:
         files = [each.path for each in (*self.free, *self.tests)]
         return {
             "version": __version__,
-            "finger": digest_of_file(self.finger.path),
+            "finger": digest_of({"data": self.finger.data}),
+            "previous": None if self.start.previous is None else digest_of_file(self.start.previous),
             "recordings": [(file.name, digest_of_file(file)) for file in files],
             "tests": len(self.tests),
         }
 
 
-def _read(finger: Path, free: Sequence[Path], tests: Sequence[Path], pushes: Sequence[Path], options: Options) -> _Case:
+def _read(
+    start: _Start, free: Sequence[Path], tests: Sequence[Path], pushes: Sequence[Path], options: Options
+) -> _Case:
     if not free:
         raise InputError("no recording; expected at least one of free motion")
     check_given_once(free, tests, "a test")
     check_given_once(free, pushes, "one with pushes")
-    given = read_finger(finger)
+    given = start.finger
     read, others, touched = ([read_recording(each) for each in group] for group in (free, tests, pushes))
     sentences = refuse_errors(belongs(given, [*read, *others, *touched]))
     own = [prepare(given, each, options.kinematics, Held() if tests else HELD) for each in read]
     unseen = [prepare(given, each, options.kinematics, Held()) for each in others]
     require_noise(given, own)
     check_unseen([each.recording for each in own], [each.recording for each in unseen])
-    return _Case(given, own, unseen, list(pushes), sentences)
+    return _Case(start, own, unseen, list(pushes), sentences)
 
 
 # --- the steps --------------------------------------------------------------------------------------------------------
@@ -180,8 +222,12 @@ class _Run:
     def report(self) -> tuple[dict[str, Any], Data]:
         """And the calibrated description."""
         case, steps = self._case, self._steps
-        lacks = self._step("what the model lacks", "diagnosis", {}, self._diagnosis)
-        fitted = self._step("all its numbers", "fit", {}, lambda step: self._fit(lacks))
+        if case.start.previous is None:
+            lacks = self._step("what the model lacks", "diagnosis", {}, self._diagnosis)
+            fitted = self._step("all its numbers", "fit", {}, lambda step: self._fit(lacks))
+        else:
+            lacks = NOTHING_ASKED
+            fitted = self._step("all its numbers", "refit", {}, lambda step: self._refit())
         tuned = self._step(
             "thresholds of contact", "tune", self._options.of_alarms, lambda step: self._tune(fitted, step)
         )
@@ -266,6 +312,37 @@ class _Run:
             for event in found.events
         ]
         return {"finger": found.data, "error": error, "warnings": [*found.warnings, *touched]}
+
+    def _refit(self) -> dict[str, Any]:
+        """The previous numbers are the prior; they stay where the new ones are no better on unseen motion."""
+        case, options = self._case, self._options
+        found = fit_again(
+            case.finger,
+            case.start.previous or Path(),
+            case.free,
+            share=0.0 if case.tests else HELD.share,
+            kinematics=options.kinematics,
+            threads=options.jobs,
+        )
+        held_out = not case.tests
+        before, after = (_errors(data, case.judged, held_out) for data in (case.finger.data, found.data))
+        error = {
+            "held_out": held_out,
+            "bias_only": _errors(None, case.judged, held_out, case.finger.data),
+            "previous": before,
+            "calibrated": after,
+        }
+        if sum(each**2 for each in after) <= sum(each**2 for each in before):
+            return {"finger": found.data, "error": error, "warnings": list(found.warnings)}
+        kept = (
+            f"the numbers fitted again leave {1e3 * rms_of(after):.3g} mN·m of motion that they were not fitted to, "
+            f"the earlier ones {1e3 * rms_of(before):.3g}: those are kept"
+        )
+        return {
+            "finger": case.finger.data,
+            "error": {**error, "calibrated": before},
+            "warnings": [*found.warnings, kept],
+        }
 
     def _fitted(self, lacks: dict[str, Any], name: str) -> CalibratedFit:
         """The nominal or the extended description, to all recordings."""
@@ -373,6 +450,11 @@ def _errors(
         found.append(left)
         masks.append((each.held_out if held_out else each.tracked) & np.isfinite(left).all(axis=1))
     return list(rms(np.concatenate(found), np.concatenate(masks)))
+
+
+def rms_of(values: Sequence[float]) -> float:
+    """Of all joints together."""
+    return math.sqrt(sum(value**2 for value in values) / len(values))
 
 
 def _free(recording: FitRecording) -> Recording:

@@ -24,13 +24,18 @@ from tendonfmu.packaging import build_fmu
 from tendonfmu.whole_file import check_output, check_output_folder
 
 FINGER, FMU, PAGE, REPORT = "finger.json", "finger.fmu", "calibration.html", "calibration.json"
-WHAT = {
+_WHAT = {
     PAGE: "all of it, to be read in a browser",
     FINGER: "the calibrated description",
     FMU: "the same as an FMU",
     REPORT: "the numbers of the page",
-    f"{DIAGNOSIS}/diagnosis.html": "what the description lacked, and how that was found",
 }
+_DIAGNOSED = {f"{DIAGNOSIS}/diagnosis.html": "what the description lacked, and how that was found"}
+
+
+def files_of(report: Mapping[str, Any]) -> dict[str, str]:
+    """Name in the folder -> what is in it."""
+    return _WHAT | (_DIAGNOSED if report["structure"]["recordings"] else {})
 
 
 def check_folder(folder: Path, inputs: Sequence[Path]) -> None:
@@ -47,10 +52,11 @@ def write_calibration(found: Calibration, folder: Path) -> dict[Path, str]:
     write_text(folder / FINGER, description_text(dict(found.data)))
     build_fmu(folder / FINGER, folder / FMU)
     write_text(folder / PAGE, calibration_page(found.report))
-    report = {**found.report, "files": list(WHAT)}
+    written = files_of(found.report)
+    report = {**found.report, "files": list(written)}
     text = ",\n".join(f" {json.dumps(key)}: {json.dumps(value, ensure_ascii=False)}" for key, value in report.items())
     write_text(folder / REPORT, f"{{\n{text}\n}}\n")
-    return {folder / name: what for name, what in WHAT.items()}
+    return {folder / name: what for name, what in written.items()}
 
 
 def calibration_page(report: Mapping[str, Any]) -> str:
@@ -68,5 +74,5 @@ def calibration_page(report: Mapping[str, Any]) -> str:
         push=push_sentence(report) if report["pushes"] is not None else "",
         sizes=size_rows(report),
         recordings=recording_rows(report),
-        files=WHAT,
+        files=files_of(report),
     )

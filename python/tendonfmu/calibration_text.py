@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
+from tendonfmu.calibration import rms_of
 from tendonfmu.fit_summary import rounded
 
 Report = Mapping[str, Any]
@@ -14,19 +14,15 @@ Row = tuple[str, ...]
 MODELS = {
     "bias_only": "no friction model, the bias alone",
     "as_given": "the description as given",
+    "previous": "the earlier calibration",
     "fitted": "its numbers fitted",
     "calibrated": "calibrated",
 }
 
 
-def together(values: Sequence[float]) -> float:
-    """rms over all joints."""
-    return math.sqrt(sum(value**2 for value in values) / len(values))
-
-
 def verdict(report: Report) -> tuple[str, str]:
     """Tone, "good", "" or "bad", and one sentence."""
-    before, after = (together(report["error"][name]) for name in ("as_given", "calibrated"))
+    before, after = (rms_of(report["error"][name]) for name in (_first(report), "calibrated"))
     less = 1.0 - after / before if before > 0 else 0.0
     error = f"The error on motion that nothing was fitted to fell from {mnm(before)} to {mnm(after)} mN·m"
     causes = len(report["structure"]["causes"])
@@ -35,10 +31,15 @@ def verdict(report: Report) -> tuple[str, str]:
     if less < 0:
         return (
             "bad",
-            f"The calibrated model is no better than the description as given: {mnm(before)} mN·m before, {mnm(after)} "
+            f"The calibrated model is no better than {MODELS[_first(report)]}: {mnm(before)} mN·m before, {mnm(after)} "
             f"now{alarms}",
         )
     return "good" if less > 0.1 else "", f"{error}{built}{alarms}"
+
+
+def _first(report: Report) -> str:
+    """What was there before: the description as given, or an earlier calibration."""
+    return "previous" if "previous" in report["error"] else "as_given"
 
 
 def mnm(value: float) -> str:
@@ -54,9 +55,9 @@ def per_hour(report: Report) -> str:
 def tiles(report: Report) -> Iterator[tuple[str, str, str]]:
     """(value, unit, meaning), those that matter first."""
     error, detection = report["error"], report["detection"]
-    before, after = (mnm(together(error[name])) for name in ("as_given", "calibrated"))
+    before, after = (mnm(rms_of(error[name])) for name in (_first(report), "calibrated"))
     data = "held-out parts" if error["held_out"] else "test recordings"
-    yield f"{before} → {after}", "mN·m", f"error on {data}, all joints: the description as given, and calibrated"
+    yield f"{before} → {after}", "mN·m", f"error on {data}, all joints: {MODELS[_first(report)]}, and calibrated"
     yield f"≤ {per_hour(report)}", "per hour", f"false alarms, with {100 * detection['confidence']:.0f} % confidence"
     least = min(detection["smallest_torque"]["median"])
     yield mnm(least), "mN·m", "smallest sudden change of a joint torque that is reported, half of the time"
@@ -71,7 +72,9 @@ def error_rows(report: Report) -> list[Row]:
     """A row per model: rms in mN·m by joint, and of all joints together."""
     error = report["error"]
     return [
-        (words, *(mnm(value) for value in error[name]), mnm(together(error[name]))) for name, words in MODELS.items()
+        (words, *(mnm(value) for value in error[name]), mnm(rms_of(error[name])))
+        for name, words in MODELS.items()
+        if name in error
     ]
 
 

@@ -34,6 +34,15 @@ def calibrate(
         list[Path] | None,
         typer.Option(metavar="LABELLED", help="with labelled contact: what is found is counted; as --test"),
     ] = None,
+    previous: Annotated[
+        Path | None,
+        typer.Option(
+            "--from",
+            metavar="PREVIOUS.json",
+            help="an earlier calibration's finger.json, or the report of a fit: its structure stays, its numbers are "
+            "the prior; for little data",
+        ),
+    ] = None,
     false_alarms_per_hour: Annotated[
         float, typer.Option(min=1e-3, max=3600.0, metavar="RATE", help="at most, in free motion like the recorded one")
     ] = 6.0,
@@ -61,10 +70,19 @@ def calibrate(
     from tendonfmu.calibration_text import lines, tables
 
     tests, labelled = test or [], pushes or []
-    check_folder(output, [finger, *recordings, *tests, *labelled])
+    check_folder(output, [finger, *recordings, *tests, *labelled, *([] if previous is None else [previous])])
     options = Options(kinematics, false_alarms_per_hour, confidence, seed, jobs)
     with PhaseDisplay(progress) as display:
-        found = run(finger, recordings, output, tests=tests, pushes=labelled, options=options, progress=display)
+        found = run(
+            finger,
+            recordings,
+            output,
+            tests=tests,
+            pushes=labelled,
+            previous=previous,
+            options=options,
+            progress=display,
+        )
         display.note("writing the files")
         written = write_calibration(found, output)
     for sentence in found.report["warnings"]:
