@@ -33,7 +33,7 @@ from tendonfmu.whole_file import whole_file  # noqa: E402
 Numbers = NDArray[np.float64]
 
 PRETENSIONS = (15.0, 30.0)  # N, each breathing by 30 %
-SECONDS = {"train": 60.0, "free": 420.0, "push": 300.0, "slow": 480.0}  # s, of one recording
+SECONDS = {"train": 60.0, "free": 420.0, "push": 300.0, "slow": 240.0}  # s, of one recording
 SLOT = {"push": 6.0, "slow": 20.0}  # s, of one push
 EARLIEST, LATEST = 0.5, 4.4  # s into its slot that a push begins
 FORCE = (0.1, 2.0)  # N
