@@ -8,7 +8,7 @@ chooses those of the innovation, for the same rate of false alarms; no share of 
 
     python bench/slow_pushes.py -o FOLDER --fingers 3 4       # FOLDER: of detection_mujoco.py
 
-Pairs of times are tried on odd fingers; figures of even ones are those of a pair that was chosen there.
+Every pair of times is shown; none is chosen.
 """
 
 from __future__ import annotations
