@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
 
 from tendonfmu import calibration
-from tendonfmu.calibration import Calibration, Options, calibrate, rms_of
+from tendonfmu.calibration import Calibration, Options, calibrate
 from tendonfmu.calibration_files import write_calibration
 from tendonfmu.calibration_parts import DIAGNOSED, JUDGED, stretches_for_diagnosis
+from tendonfmu.calibration_report import rms_of
 from tendonfmu.calibration_steps import Steps
 from tendonfmu.calibration_text import size_rows, verdict
 from tendonfmu.errors import InputError

@@ -12,7 +12,6 @@ stay in the folder, so that a call that is repeated goes on where the one before
 from __future__ import annotations
 
 import json
-import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -26,30 +25,24 @@ from numpy.typing import NDArray
 from tendonfmu import native
 from tendonfmu.calibrated_fit import CalibratedFit, earlier_finger, fit_again, fit_all
 from tendonfmu.calibration_parts import stretches_for_diagnosis
+from tendonfmu.calibration_report import errors_of, record_next, recording_of, rms_of, structure_of, tuning_of
 from tendonfmu.calibration_steps import Steps, digest_of, digest_of_file
 from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.detection_tuning import ContactTuning, TuneWarning
 from tendonfmu.diagnosis import diagnose
 from tendonfmu.diagnosis_files import write_diagnosis
-from tendonfmu.diagnosis_page import cards_of
-from tendonfmu.diagnosis_result import Diagnosis
-from tendonfmu.diagnosis_text import names_of
 from tendonfmu.errors import InputError
 from tendonfmu.estimation_signals import Signals
 from tendonfmu.extension_fit import FitSettings
 from tendonfmu.finite_numbers import finite
-from tendonfmu.fit_evaluation import residuals
 from tendonfmu.fit_files import check_given_once, check_unseen, description_text
 from tendonfmu.fit_recordings import FitRecording, Held, prepare, require_noise
-from tendonfmu.fit_residuals import rms
-from tendonfmu.gain import residual_of
 from tendonfmu.phases import Phases, PhaseState
 from tendonfmu.push_sizes import by_size
 from tendonfmu.recording import Recording, read_recording
 from tendonfmu.recording_match import belongs, refuse_errors
 from tendonfmu.score_report import build_report as score_report
 from tendonfmu.scoring import score_recordings
-from tendonfmu.tune_report import build_report as tune_report
 
 Numbers = NDArray[np.float64]
 Data = Mapping[str, Any]
@@ -241,13 +234,13 @@ class _Run:
             "format": FORMAT,
             "finger": case.finger.name,
             "joints": case.finger.joint_names,
-            "recordings": [_recording(each) for each in case.free],
-            "tests": [_recording(each) for each in case.tests],
+            "recordings": [recording_of(each) for each in case.free],
+            "tests": [recording_of(each) for each in case.tests],
             "error": fitted["error"],
             "structure": {key: value for key, value in lacks.items() if key not in ("extended", "nominal", "warnings")},
             "detection": {key: value for key, value in tuned.items() if key not in ("finger", "warnings")},
             "pushes": pushed,
-            "next": list(_next(lacks, tuned)),
+            "next": list(record_next(lacks, tuned)),
             "warnings": [
                 *case.sentences,
                 *(f"{each.path.name}: {text}" for each in (*case.free, *case.tests) for text in each.warnings),
@@ -294,7 +287,7 @@ class _Run:
             progress=show,
         )
         write_diagnosis(found, self._folder / DIAGNOSIS)
-        return _structure(found)
+        return structure_of(found)
 
     def _fit(self, lacks: dict[str, Any]) -> dict[str, Any]:
         case = self._case
@@ -302,10 +295,10 @@ class _Run:
         nominal, found = (self._fitted(lacks, name) for name in ("nominal", "extended"))
         error = {
             "held_out": held_out,
-            "bias_only": _errors(None, case.judged, held_out, case.finger.data),
-            "as_given": _errors(case.finger.data, case.judged, held_out),
-            "fitted": _errors(nominal.data, case.judged, held_out),
-            "calibrated": _errors(found.data, case.judged, held_out),
+            "bias_only": errors_of(None, case.judged, held_out, case.finger.data),
+            "as_given": errors_of(case.finger.data, case.judged, held_out),
+            "fitted": errors_of(nominal.data, case.judged, held_out),
+            "calibrated": errors_of(found.data, case.judged, held_out),
         }
         touched = [
             f"{event.recording}: {event.start:.2f} to {event.end:.2f} s: {event.description}; left out of the fit"
@@ -325,10 +318,10 @@ class _Run:
             threads=options.jobs,
         )
         held_out = not case.tests
-        before, after = (_errors(data, case.judged, held_out) for data in (case.finger.data, found.data))
+        before, after = (errors_of(data, case.judged, held_out) for data in (case.finger.data, found.data))
         error = {
             "held_out": held_out,
-            "bias_only": _errors(None, case.judged, held_out, case.finger.data),
+            "bias_only": errors_of(None, case.judged, held_out, case.finger.data),
             "previous": before,
             "calibrated": after,
         }
@@ -368,24 +361,7 @@ class _Run:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", TuneWarning)  # they are in the report
             tuning.tune([_free(each) for each in (*case.free, *case.tests)])
-        report = tune_report(tuning)
-        keys = (
-            "method",
-            "false_alarms_per_hour",
-            "tuned_for_per_hour",
-            "more_minutes",
-            "confidence",
-            "minutes",
-            "held_out",
-            "closed_loop",
-            "pretensions",
-        )
-        return {
-            "finger": tuning.description_.data,
-            "warnings": report["warnings"],
-            **{key: report[key] for key in keys},
-            "smallest_torque": smallest_torque(tuning),
-        }
+        return tuning_of(tuning)
 
     def _score(self, tuned: dict[str, Any], left: Sequence[float], step: Callable[[float], None]) -> dict[str, Any]:
         file = self._folder / ".steps" / "tuned.json"
@@ -418,76 +394,11 @@ class _Run:
 # --- parts ------------------------------------------------------------------------------------------------------------
 
 
-def _structure(found: Diagnosis) -> dict[str, Any]:
-    shown = ("title", "place", "size", "gain", "explanation")
-    return {
-        "verdict": found.verdict,
-        "causes": [{key: card[key] for key in shown} for card in cards_of(found, names_of(found))[: len(found.causes)]],
-        "signals": found.signals,
-        "smoothing": {"cutoff": found.smoothing.cutoff, "every": found.smoothing.every},
-        "recordings": [Path(each).name for each in found.recordings],
-        "tests": [Path(each).name for each in found.tests],
-        "unexplained": found.unexplained.description,
-        "next_experiment": found.experiment.sentence if found.experiment.motion else "",
-        "nominal": found.nominal_data,
-        "extended": found.extended_data,
-        "warnings": list(found.warnings),
-    }
-
-
 def _described(data: Data, path: Path) -> FingerDescription:
     text = json.dumps(data).encode()
     return FingerDescription(path, text, data, native.image_from_json(text))
 
 
-def _errors(
-    data: Data | None, recordings: Sequence[FitRecording], held_out: bool, settings: Data | None = None
-) -> list[float]:
-    """[n] N·m: rms of r on the samples that nothing was fitted to. data None: of no friction, with these settings."""
-    found, masks = [], []
-    for each in recordings:
-        left = residuals(settings or {}, each, None).residual if data is None else residual_of(data, each)
-        found.append(left)
-        masks.append((each.held_out if held_out else each.tracked) & np.isfinite(left).all(axis=1))
-    return list(rms(np.concatenate(found), np.concatenate(masks)))
-
-
-def rms_of(values: Sequence[float]) -> float:
-    """Of all joints together."""
-    return math.sqrt(sum(value**2 for value in values) / len(values))
-
-
 def _free(recording: FitRecording) -> Recording:
     """Without what tells of contact: there is none in free motion."""
     return replace(recording.recording, contact=None)
-
-
-def smallest_torque(tuning: ContactTuning) -> dict[str, list[float]]:
-    """[n] N·m by joint: the sudden change that exceeds the bounds in half of the time, and in nine tenths of it."""
-    name = "innovation" if "innovation" in tuning.bounds_ else "residual"
-    bound, search = tuning.bounds_[name], tuning.searches_[name]
-    whole = bound.own(tuning.cells_.force)
-    whole = whole + bound.stuck_share * search.mean_stuck + bound.jump_share * search.mean_jump
-    return {
-        "median": [float(value) for value in np.quantile(whole, 0.5, axis=0)],
-        "nine_tenths": [float(value) for value in np.quantile(whole, 0.9, axis=0)],
-    }
-
-
-def _recording(each: FitRecording) -> dict[str, Any]:
-    return {"path": str(each.path), "minutes": each.duration / 60.0, "mean_force": each.mean_force}
-
-
-def _next(lacks: Mapping[str, Any], tuned: Mapping[str, Any]) -> list[str]:
-    """What to record, the most useful first."""
-    found = []
-    if tuned["more_minutes"]:
-        found.append(
-            f"{tuned['more_minutes']:.0f} min more of free motion: thresholds are then for "
-            f"{tuned['false_alarms_per_hour']:g} false alarms an hour in place of {tuned['tuned_for_per_hour']:.3g}"
-        )
-    if len(tuned["pretensions"]) == 1:
-        found.append("the same motion at another pretension: what grows with the force is not known yet")
-    if lacks["next_experiment"]:
-        found.append(lacks["next_experiment"])
-    return found

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from tendonfmu.calibration import rms_of
+from tendonfmu.calibration_report import rms_of
 from tendonfmu.fit_summary import rounded
 
 Report = Mapping[str, Any]

@@ -24,6 +24,7 @@ Numbers = NDArray[np.float64]
 SETTLE_TIME = 0.3  # s; the default of contact.rest.settle_time
 INNOVATION_TIME = 0.5  # s; a touch rises within that, and what creeps meanwhile is little
 LEAST_REST = 0.5  # s; shorter rests are not learned from: a stop in passing
+LEFT_OUT = "contact.rest is left out: "  # and why
 LEAST_MINUTES, LEAST_RESTS = 2.0, 20  # in all; from fewer no bound can be held out
 STANDING_SHARE = 0.05  # of all windows; the span of positions at this quantile is that of standing motors
 TRAVEL_SPANS = 2.0  # spans of standing motors that a motor may be from the mark, which is a noisy sample itself
@@ -120,7 +121,7 @@ def learn_rest(
 
 
 def _left_out(why: str) -> str:
-    return f"contact.rest is left out: {why}"
+    return f"{LEFT_OUT}{why}"
 
 
 # --- motors -----------------------------------------------------------------------------------------------------------
