@@ -46,7 +46,15 @@ ONLY = {
     "dask": "campaign.py",
     "distributed": "campaign.py",
 }
-COMMANDS = {"cli.py", "cli_campaign.py", "cli_check.py", "cli_detect.py", "cli_diagnose.py"}  # what a user may call
+COMMANDS = {
+    "cli.py",
+    "cli_calibrate.py",
+    "cli_campaign.py",
+    "cli_check.py",
+    "cli_detect.py",
+    "cli_diagnose.py",
+    "several_values.py",
+}  # what a user may call
 # those that draw, and what they share
 DRAWING = {"fit_plots.py", "plot_style.py", "plots.py", "score_plots.py", "tune_plots.py"}
 
