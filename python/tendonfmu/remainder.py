@@ -78,19 +78,20 @@ def measure_remainder(
         return Remainder((0.0,) * joints, nothing, np.zeros(joints), 1.0, False, "", np.zeros_like(residual), ())
     seen = features(series, force=force, seed=seed)
     learner = Learner(seen, residual, splines, folds)
-    looks = _looks(learner, choices(seen))
+    tried = choices(seen)
+    everything = learner.predicted(tried[0].columns)
     prediction, findings, p_values = np.zeros_like(residual), [], []
     for joint in range(joints):
-        best, p_value = _best_look(looks, joint, joints)
-        p_values.append(p_value)
-        if best is None:
-            continue
-        prediction[folds.rows, joint] = best.prediction[:, joint]
-        if _share(learner.target[:, joint], best.prediction[:, joint]) >= LEAST_SHARE:
-            named = max(looks[1:], key=lambda look: float(look.gain[:, joint].sum()))
-            findings.append(Finding(joint + 1, named.choice.group, named.choice.subject))
+        gain = learner.gains(everything)[:, joint]
+        p_values.append(_p_value(gain))
+        if gain.sum() > CERTAIN * standard_error(gain):
+            prediction[folds.rows, joint] = everything[:, joint]
+    large = [_share(learner.target[:, j], prediction[folds.rows, j]) >= LEAST_SHARE for j in range(joints)]
+    if any(large):
+        named = _named(learner, tried[1:])
+        findings += [Finding(j + 1, named[j].group, named[j].subject) for j in range(joints) if large[j]]
     lines = _lines(series, residual, prediction, findings)
-    p_value = min([1.0, *p_values, *lines])
+    p_value = min([1.0, *(joints * each for each in p_values), *lines])
     gain = learner.gains(prediction[folds.rows])
     share = tuple(_share(learner.target[:, j], prediction[folds.rows, j]) for j in range(joints))
     certain = [each for each in findings if share[each.joint - 1] >= LEAST_SHARE]
@@ -111,35 +112,11 @@ def _p_value(gain: Numbers) -> float:
     return float(ttest_1samp(gain, 0.0, alternative="greater").pvalue)
 
 
-@dataclass(frozen=True)
-class _Look:
-    """What a choice of columns predicts on unseen folds, [R, n] N·m, and gains by stretch, [K, n] (N·m)²."""
-
-    choice: Choice
-    prediction: Numbers
-    gain: Numbers
-
-
-def _looks(learner: Learner, tried: Sequence[Choice]) -> list[_Look]:
-    """Everything first, then each set of columns with a name."""
-    known = [tried[0], *(each for each in tried[1:] if each.group != "interaction")]
-    predictions = [learner.predicted(each.columns) for each in known]
-    return [_Look(each, found, learner.gains(found)) for each, found in zip(known, predictions, strict=True)]
-
-
-def _best_look(looks: Sequence[_Look], joint: int, joints: int) -> tuple[_Look | None, float]:
-    """What predicts a joint (from 0) for certain, and the p-value of there being nothing, for all joints.
-
-    Everything together is one look. Its many columns cost more than a cause of few is worth in a minute of motion, so
-    each group is a look of its own, and has to be certain for as many as there are.
-    """
-    everything, named = looks[0], [look for look in looks[1:] if not look.choice.subject]
-    own = everything.gain[:, joint]
-    certain = [everything] if own.sum() > CERTAIN * standard_error(own) else []
-    p_values = [_p_value(each.gain[:, joint]) * len(named) * joints for each in named]
-    certain += [each for each, p_value in zip(named, p_values, strict=True) if p_value < LEVEL]
-    best = max(certain, key=lambda look: float(look.gain[:, joint].sum()), default=None)
-    return best, min([_p_value(own) * joints, *p_values])
+def _named(learner: Learner, tried: Sequence[Choice]) -> list[Choice]:
+    """Of each joint the set of columns with a name that predicts best."""
+    known = [each for each in tried if each.group != "interaction"]
+    left = [np.sum((learner.target - learner.predicted(each.columns)) ** 2, axis=0) for each in known]
+    return [known[k] for k in np.argmin(left, axis=0)]
 
 
 def _lines(series: Series, residual: Numbers, prediction: Numbers, findings: list[Finding]) -> list[float]:
