@@ -306,7 +306,8 @@ TEST(DetectionKeys, OptionsThatDoNotGoTogetherAreRefused) {
   EXPECT_TRUE(refused_with(options & ~std::uint32_t{MODEL_HAS_UNCERTAINTY}));
   EXPECT_TRUE(refused_with(options | MODEL_UNCERTAINTY_DIRECTIONS)); /* seven directions */
   EXPECT_TRUE(refused_with(options & ~std::uint32_t{MODEL_DETECTS_BY_INNOVATION}));
-  EXPECT_TRUE(refused_with(options | 1u << 18));
+  EXPECT_TRUE(refused_with(options | std::uint32_t{MODEL_HAS_REST_INNOVATION})); /* without rest */
+  EXPECT_TRUE(refused_with(options | (MODEL_OPTION_BITS + 1u)));
 }
 
 // Every bit of the options, under a right checksum: refused, or a finger that takes samples.
