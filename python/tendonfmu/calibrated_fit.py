@@ -54,9 +54,11 @@ def fit_all(
     *,
     given: Data,
     seed: int,
+    uncertainty: bool = True,
 ) -> CalibratedFit:
     """finger: as a diagnosis extended it, with numbers to begin at. recordings: of free motion, as they were measured.
-    given: the description that says how large its numbers may be. Raises InputError.
+    given: the description that says how large its numbers may be. uncertainty: whether to say what is not known of
+    them. Raises InputError.
     """
     data = signals.description(finger.data)
     if not unknowns(data):
@@ -69,7 +71,7 @@ def fit_all(
     structure, learned = learn_numbers(data, clean, settings, given=signals.description(given))
     fitted = with_values(structure, np.asarray(learned.estimator.values(learned.z)))
     online = replace(fitted, data=signals.restored(fitted.data, finger.data))
-    if np.isfinite(learned.covariance).all():
+    if uncertainty and np.isfinite(learned.covariance).all():
         judged = [evaluate(data, fitted.data, each) for each in own]
         known = parameter_uncertainty(structure, learned, fitted.data, judged)
         level = (finger.data["contact"] or {}).get("uncertainty_level")

@@ -347,6 +347,7 @@ class _Run:
             FitSettings(threads=options.jobs, path=case.finger.path),
             given=case.finger.data,
             seed=options.seed,
+            uncertainty=name == "extended",
         )
 
     def _tune(self, fitted: dict[str, Any], step: Callable[[float], None]) -> dict[str, Any]:
