@@ -178,6 +178,12 @@ def test_an_earlier_calibration_is_the_prior_of_little_data(
         calibrate(folder / FINGER, [folder / FREE], tmp_path / "no", previous=tmp_path / "other.json")
 
 
+def test_touched_motion_is_no_free_motion(folder: Path, tmp_path: Path) -> None:
+    """Said before anything is fitted, not by the thresholds at the end."""
+    with pytest.raises(InputError, match=r"pushes.parquet: column contact"):
+        calibrate(folder / FINGER, [folder / "pushes.parquet"], tmp_path)
+
+
 @pytest.mark.parametrize(
     ("free", "tests", "words"),
     [([], [], "no recording"), ([FREE], [FREE], "a test"), ([FREE, FREE], [], "twice")],
@@ -216,12 +222,17 @@ def test_several_tests_and_pushes_after_the_recordings(given: str, read: str, op
 
 def test_a_step_belongs_to_what_it_was_made_from_and_to_the_steps_before_it(tmp_path: Path) -> None:
     done: list[str] = []
+    (tmp_path / "page").touch()
+
+    def make(name: str, value: Any) -> dict[str, Any]:
+        done.append(name)
+        return {"value": value}
 
     def results(given: str, option: int) -> list[dict[str, Any]]:
         steps = Steps(tmp_path, {"given": given})
         return [
-            steps.result("one", {}, lambda: done.append("one") or {"value": [given]}),  # type: ignore[func-returns-value]
-            steps.result("two", {"option": option}, lambda: done.append("two") or {"value": option}),  # type: ignore[func-returns-value]
+            steps.result("one", {}, lambda: make("one", [given])),
+            steps.result("two", {"option": option}, lambda: make("two", option), tmp_path / "page"),
         ]
 
     first = results("a", 1)
@@ -232,6 +243,9 @@ def test_a_step_belongs_to_what_it_was_made_from_and_to_the_steps_before_it(tmp_
     (tmp_path / ".steps" / "two.json").write_text('{"format": "tendonfmu-calibration-step-1", "key":')  # cut off
     results("b", 2)
     assert done[5:] == ["two"]
+    (tmp_path / "page").unlink()
+    results("b", 2)
+    assert done[6:] == ["two"], "the page that it writes was gone"
 
 
 # --- stretches that are diagnosed -------------------------------------------------------------------------------------

@@ -11,10 +11,9 @@ stay in the folder, so that a call that is repeated goes on where the one before
 
 from __future__ import annotations
 
-import json
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -22,24 +21,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu import native
 from tendonfmu.calibrated_fit import CalibratedFit, earlier_finger, fit_again, fit_all
 from tendonfmu.calibration_parts import stretches_for_diagnosis
 from tendonfmu.calibration_report import errors_of, record_next, recording_of, rms_of, structure_of, tuning_of
-from tendonfmu.calibration_steps import Steps, digest_of, digest_of_file
+from tendonfmu.calibration_steps import FOLDER, Steps, digest_of, digest_of_file
 from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.detection_tuning import ContactTuning, TuneWarning
 from tendonfmu.diagnosis import diagnose
 from tendonfmu.diagnosis_files import write_diagnosis
+from tendonfmu.diagnosis_page import PAGE
 from tendonfmu.errors import InputError
 from tendonfmu.estimation_signals import Signals
 from tendonfmu.extension_fit import FitSettings
 from tendonfmu.finite_numbers import finite
-from tendonfmu.fit_files import check_given_once, check_unseen, description_text
+from tendonfmu.fit_files import check_given_once, check_unseen, description_text, write_text
 from tendonfmu.fit_recordings import FitRecording, Held, prepare, require_noise
+from tendonfmu.fit_structure import described
+from tendonfmu.free_motion import require_no_contact
 from tendonfmu.phases import Phases, PhaseState
 from tendonfmu.push_sizes import by_size
-from tendonfmu.recording import Recording, read_recording
+from tendonfmu.recording import read_recording
 from tendonfmu.recording_match import belongs, refuse_errors
 from tendonfmu.score_report import build_report as score_report
 from tendonfmu.scoring import score_recordings
@@ -193,6 +194,8 @@ def _read(
     check_given_once(free, pushes, "one with pushes")
     given = start.finger
     read, others, touched = ([read_recording(each) for each in group] for group in (free, tests, pushes))
+    for each in (*read, *others):
+        require_no_contact(each)
     sentences = refuse_errors(belongs(given, [*read, *others, *touched]))
     own = [prepare(given, each, options.kinematics, Held() if tests else HELD) for each in read]
     unseen = [prepare(given, each, options.kinematics, Held()) for each in others]
@@ -216,7 +219,8 @@ class _Run:
         """And the calibrated description."""
         case, steps = self._case, self._steps
         if case.start.previous is None:
-            lacks = self._step("what the model lacks", "diagnosis", {}, self._diagnosis)
+            page = self._folder / DIAGNOSIS / PAGE
+            lacks = self._step("what the model lacks", "diagnosis", {}, self._diagnosis, page)
             fitted = self._step("all its numbers", "fit", {}, lambda step: self._fit(lacks))
         else:
             lacks = NOTHING_ASKED
@@ -260,10 +264,11 @@ class _Run:
         name: str,
         made_from: Mapping[str, Any],
         compute: Callable[[Callable[[float], None]], dict[str, Any]],
+        page: Path | None = None,
     ) -> dict[str, Any]:
         begun = perf_counter()
         with self._phases.start(words, 100) as step:
-            found = self._steps.result(name, made_from, lambda: compute(lambda share: step(int(100 * share))))
+            found = self._steps.result(name, made_from, lambda: compute(lambda share: step(int(100 * share))), page)
         self._seconds[name] = perf_counter() - begun
         return found
 
@@ -341,7 +346,7 @@ class _Run:
         """The nominal or the extended description, to all recordings."""
         case, options = self._case, self._options
         return fit_all(
-            _described(lacks[name], case.finger.path),
+            described(case.finger, lacks[name]),
             case.free,
             Signals(**lacks["smoothing"]),
             FitSettings(threads=options.jobs, path=case.finger.path),
@@ -353,7 +358,7 @@ class _Run:
     def _tune(self, fitted: dict[str, Any], step: Callable[[float], None]) -> dict[str, Any]:
         case, options = self._case, self._options
         tuning = ContactTuning(
-            _described(fitted["finger"], case.finger.path),
+            described(case.finger, fitted["finger"]),
             false_alarms_per_hour=options.false_alarms_per_hour,
             confidence=options.confidence,
             kinematics=options.kinematics,
@@ -361,12 +366,12 @@ class _Run:
         )
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", TuneWarning)  # they are in the report
-            tuning.tune([_free(each) for each in (*case.free, *case.tests)])
+            tuning.tune([each.recording for each in (*case.free, *case.tests)])
         return tuning_of(tuning)
 
     def _score(self, tuned: dict[str, Any], left: Sequence[float], step: Callable[[float], None]) -> dict[str, Any]:
-        file = self._folder / ".steps" / "tuned.json"
-        file.write_text(description_text(tuned["finger"]), encoding="utf-8")
+        file = self._folder / FOLDER / "tuned.json"
+        write_text(file, description_text(tuned["finger"]))
         scored = score_recordings(
             file,
             self._case.pushes,
@@ -390,16 +395,3 @@ class _Run:
             "sizes": by_size(scored, left),
             "warnings": list(scored.warnings),
         }
-
-
-# --- parts ------------------------------------------------------------------------------------------------------------
-
-
-def _described(data: Data, path: Path) -> FingerDescription:
-    text = json.dumps(data).encode()
-    return FingerDescription(path, text, data, native.image_from_json(text))
-
-
-def _free(recording: FitRecording) -> Recording:
-    """Without what tells of contact: there is none in free motion."""
-    return replace(recording.recording, contact=None)

@@ -26,12 +26,20 @@ class Steps:
         self._before = digest_of(made_from)
         self.repeated: list[str] = []  # names of the steps whose results were there
 
-    def result(self, name: str, made_from: Mapping[str, Any], compute: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """Of this step, computed unless it is there already. made_from: what it depends on beside the steps before."""
+    def result(
+        self,
+        name: str,
+        made_from: Mapping[str, Any],
+        compute: Callable[[], dict[str, Any]],
+        page: Path | None = None,
+    ) -> dict[str, Any]:
+        """Of this step, computed unless it is there already. made_from: what it depends on beside the steps before.
+        page: a file that the step writes, too: it has to be there.
+        """
         key = self._before = digest_of({"before": self._before, "name": name, **made_from})
         file = self._folder / f"{name}.json"
         found = _read(file, key)
-        if found is not None:
+        if found is not None and (page is None or page.is_file()):
             self.repeated.append(name)
             return found
         result = compute()

@@ -24,7 +24,7 @@ def verdict(report: Report) -> tuple[str, str]:
     """Tone, "good", "" or "bad", and one sentence."""
     before, after = (rms_of(report["error"][name]) for name in (_first(report), "calibrated"))
     less = 1.0 - after / before if before > 0 else 0.0
-    error = f"The error on motion that nothing was fitted to fell from {mnm(before)} to {mnm(after)} mN·m"
+    error = f"The error on motion that no number was fitted to fell from {mnm(before)} to {mnm(after)} mN·m"
     causes = len(report["structure"]["causes"])
     built = f", with {'one cause' if causes == 1 else f'{causes} causes'} built into the model" if causes else ""
     alarms = f"; at most {per_hour(report)} false alarms an hour are expected in such motion."

@@ -81,7 +81,7 @@ class Clock:
 
 def free_parts(finger: FingerDescription, recording: Recording, kinematics: int) -> tuple[list[FreePart], list[str]]:
     """The parts of a recording, and sentences about it. Raises InputError: in contact, without motion, or unsound."""
-    _refuse_contact(recording)
+    require_no_contact(recording)
     groups = {name: values for name, values in recording.groups.items() if name != "external_torque"}
     prepared = prepare(finger, replace(recording, groups=groups, contact=None), kinematics, Held())
     _refuse_stillness(finger, recording, prepared.model.joint_speed)
@@ -97,7 +97,8 @@ def free_parts(finger: FingerDescription, recording: Recording, kinematics: int)
     return parts, sentences
 
 
-def _refuse_contact(recording: Recording) -> None:
+def require_no_contact(recording: Recording) -> None:
+    """Raises InputError where a label or a reference sensor says that something touches the finger."""
     label = recording.contact
     if label is not None and label.any():
         first = int(np.flatnonzero(label)[0])
