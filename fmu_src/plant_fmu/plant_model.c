@@ -303,8 +303,8 @@ static int change_inputs(model* m, const double* inputs) {
   return plant_take_inputs(m, inputs);
 }
 
-/* Inputs are part of the plant's state: after a step that failed it has those of before. That no command had come yet,
- * only a whole state can say. */
+/* Inputs are part of the plant's state: after a step that failed they are as they were. Whether any command
+ * has come yet only a whole state can say. */
 static void change_inputs_back(model* m) {
   if (m->first_command) {
     tendonfmu_plant_restore_state(m->plant, m->scratch, m->plant_state_size);

@@ -2,7 +2,7 @@
 
 They follow from the finger's structure: which friction exists, which tendon passes which joint (a moment arm of 0 in
 the description is a tendon that does not pass), which angles R⁺ takes from which tendon. They hold for all three
-kinematics sources and all values of the tunable parameters, with branch decisions frozen (contract section 5): that a
+kinematics sources and all values of the tunable parameters, with branch decisions frozen: that a
 contact elsewhere stops the bias of a joint makes no dependency.
 """
 

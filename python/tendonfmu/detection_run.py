@@ -136,7 +136,7 @@ def _grouped(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
 def residual_of(
     data: Mapping[str, Any], recording: Recording, outputs: Mapping[str, NDArray[Any]], kinematics: int
 ) -> Numbers:
-    """[N, n] r of contract section 5, step 5, N·m, NaN for the first sample.
+    """[N, n] residual before the bias has seen the sample, N·m, NaN for the first sample.
 
     What the update took from it is in the bias: r = compensated + (b − b before), wherever the bias did not jump by
     itself. Where it did, at the start and end of stiction, r = compensated/(1 − K) with the gain between those of the

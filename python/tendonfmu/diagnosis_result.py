@@ -126,7 +126,7 @@ class Unexplained:
 
 @dataclass(frozen=True)
 class ModelErrors:
-    """rms of r of contract section 5, step 5, per joint, N·m; signals for the figures. path: of the description."""
+    """rms of the residual r before the bias has seen the sample, per joint, N·m; signals for the figures. path: of the description."""
 
     train_rms: tuple[float, ...]
     test_rms: tuple[float, ...]

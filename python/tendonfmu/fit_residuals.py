@@ -1,6 +1,6 @@
 """What a finger leaves of the torque of a recording: residuals before the bias update, and what is random in them.
 
-T of eq. (10) and the jumps Δb of fig. 5 come from the C core; the bias filter of contract section 5, step 6 runs here,
+T of eq. (10) and the jumps Δb of fig. 5 come from the C core; the bias filter of fig. 5 runs here,
 without contact detection, over the samples that it may learn from.
 """
 
@@ -25,7 +25,7 @@ LAGS = 20  # of the Ljung-Box test; even, so that the chi-square tail is a finit
 CONFIDENCE = 0.95
 _BLOCK, _SMALL = 64, 1e-30
 _NEVER = 1e9  # N·m; no contact threshold is ever passed
-_BIAS = {"noise_std": 0.01, "noise_std_per_force": 0.0, "drift_variance": 1e-6}  # contract section 2
+_BIAS = {"noise_std": 0.01, "noise_std_per_force": 0.0, "drift_variance": 1e-6}  # defaults of the finger description
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class Residuals:
 
 @dataclass(frozen=True)
 class BiasSettings:
-    """Of a description, with the defaults: see contract section 2. initial_torque: [n] N·m or None."""
+    """Of a description, with the defaults: see docs/finger_description.md. initial_torque: [n] N·m or None."""
 
     drift: float
     noise: float

@@ -63,7 +63,7 @@ def run_fmu(
     The FMU is stepped by hand: the inputs of sample k are set, fmi2DoStep takes it at t_k, and the outputs after it
     belong to t_k; the last step goes one sample beyond the recording.
 
-    parameters: start values by path, beside `kinematics_source` (contract section 4).
+    parameters: start values by path, beside `kinematics_source`.
     Returns column name -> [N], `time` first. Raises InputError, with the FMU's own words where it refuses something.
     """
     with _unpacked(path) as folder:

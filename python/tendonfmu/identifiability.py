@@ -264,7 +264,7 @@ def noise_of(data: Mapping[str, Any], sample_time: float) -> Noise:
 def information(parts: Iterable[Numbers], time: Numbers, mean_force: Numbers, noise: Noise) -> Numbers:
     """[p, p] Fisher information of the innovations about relative changes of the numbers.
 
-    parts: of `sensitivities`. time: [N] s. mean_force: [N] N. The bias filter of contract section 5, step 6 runs over
+    parts: of `sensitivities`. time: [N] s. mean_force: [N] N. The bias filter of fig. 5 runs over
     every column; it takes the first sample as it is.
     """
     step = np.diff(time, prepend=time[0])

@@ -40,7 +40,7 @@ WINDOW = 0.02  # s; power is that of motion slower than this
 FEWEST_WINDOWS = 50
 MOST_COMPARED = 12  # corrections
 AGAINST = 0.15  # of the power at a joint; sound recordings have 0.6 and more, those with a wrong sign -0.3 and less
-STILL = 0.02  # rad; with less motion nothing is told
+STILL = 0.02  # rad; less motion says nothing
 SLACK = 0.01  # of the largest force of a tendon; a slack one does not follow its joints
 OPPOSED = 0.5  # of what forces and reference leave of each other, when their sum leaves less
 LEAST_KEPT = 0.2  # of the samples, for the equations
@@ -286,7 +286,7 @@ def _turning(finger: FingerDescription, recording: Recording) -> list[Correction
 
 
 def power_shares(finger: FingerDescription, recording: Recording) -> Numbers | None:
-    """[n] work that the tendons do on each joint over all that goes to and fro: friction makes it 1, springs 0.
+    """[n] work that the tendons do on each joint over closed motions: friction makes it 1, springs 0.
 
     0 too for joints that do not move. None for a recording that is too short.
     """

@@ -7,7 +7,7 @@ NUMBERS = ("compensated_torque", "joint_torque", "friction_torque", "bias_torque
 FLAGS = ("joint_contact", "contact", "slack")
 
 # beyond the contract (docs/contract-additions.md); the FMU has the first one only
-OPTIONAL_NUMBERS = ("compensated_torque_std",)  # FMUs of before have none
+OPTIONAL_NUMBERS = ("compensated_torque_std",)  # older FMUs have none
 DETECTION = ("compensated_torque_std", "residual", "innovation", "stuck_friction", "friction_jump")
 
 # of fingers with links, and of their FMUs
