@@ -17,13 +17,19 @@ from numpy.typing import NDArray
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
 
 from tendonfmu import calibration
+from tendonfmu.calibrated_fit import fit_all
 from tendonfmu.calibration import Calibration, Options, calibrate
 from tendonfmu.calibration_files import write_calibration
 from tendonfmu.calibration_parts import DIAGNOSED, JUDGED, stretches_for_diagnosis
-from tendonfmu.calibration_report import rms_of
+from tendonfmu.calibration_report import errors_of, rms_of
 from tendonfmu.calibration_steps import Steps
 from tendonfmu.calibration_text import size_rows, verdict
+from tendonfmu.description import read_finger
 from tendonfmu.errors import InputError
+from tendonfmu.estimation_signals import Signals
+from tendonfmu.extension_fit import FitSettings
+from tendonfmu.fit_recordings import Held, prepare
+from tendonfmu.fit_structure import described
 from tendonfmu.recording import Recording, read_recording
 from tendonfmu.several_values import several_values
 from tendonfmu.tables import write_table
@@ -88,11 +94,25 @@ def test_the_missing_weight_is_built_in_and_the_error_falls(calibrated: tuple[Ca
     assert rms["bias_only"] > rms["as_given"] > rms["fitted"] > 1.2 * rms["calibrated"]
 
 
+def test_all_numbers_are_fitted_to_all_motion(calibrated: tuple[Calibration, Path], folder: Path) -> None:
+    """From covers that are twice too stiff it finds back."""
+    data = json.loads((calibrated[1] / "finger.json").read_text())
+    data["contact"] = {"threshold": data["contact"]["threshold"]}
+    for joint in data["joints"]:
+        joint["cover"]["stiffness"] *= 2.0
+    start = described(read_finger(calibrated[1] / "finger.json"), data)
+    free = [prepare(start, read_recording(folder / FREE), 1, Held())]
+    found = fit_all(start, free, Signals(30.0, 1), FitSettings(), given=data, seed=0)
+    wrong, right = (rms_of(errors_of(each, free, False)) for each in (data, found.data))
+    assert right < 0.9 * wrong and "uncertainty" in found.data["contact"]
+
+
 def test_pushes_are_found(calibrated: tuple[Calibration, Path], folder: Path) -> None:
     pushes = calibrated[0].report["pushes"]
     _, count = pushed(read_recording(folder / UNSEEN), json.loads((folder / FINGER).read_text()))
     assert pushes["events"] == count and pushes["found"] >= 0.9 * count and pushes["false_alarms"] == 0
     assert sum(each["events"] for each in pushes["sizes"]) == count
+    assert sum(each["found"] for each in pushes["sizes"]) == pushes["found"]
     assert pushes["sizes"][-1]["from"] == 6.0, "they are large"
 
 
@@ -103,7 +123,6 @@ def test_little_motion_supports_a_higher_rate_and_says_what_is_missing(calibrate
 
 
 def test_the_folder_holds_finger_fmu_page_and_report(calibrated: tuple[Calibration, Path]) -> None:
-    from tendonfmu.description import read_finger
     from tendonfmu.fmu import run_fmu
 
     found, out = calibrated

@@ -126,7 +126,7 @@ class Unexplained:
 
 @dataclass(frozen=True)
 class ModelErrors:
-    """rms of the residual r before the bias has seen the sample, per joint, N·m; signals for the figures. path: of the description."""
+    """rms per joint, N·m, of the residual before the bias has seen the sample."""
 
     train_rms: tuple[float, ...]
     test_rms: tuple[float, ...]
