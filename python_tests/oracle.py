@@ -16,10 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from oracle_detection import NEAR, Bounds, Detector, direction_above
+from oracle_detection import NEAR, Detector, direction_above
 from oracle_extensions import Extensions
 from oracle_finger import Effect, Places, given, read_joints, read_tendons, tendon_velocity
 from oracle_position_filter import read_position_filter
+from oracle_start import StartFriction, gain_of
 
 Array = NDArray[Any]
 Key = tuple[Any, ...]
@@ -126,6 +127,7 @@ class FingerOracle:
         self.noise_time = given(bias, "noise_time", None)
         self.by_absorption = given(bias, "forgetting", "time") == "absorption"
         self.has_entry_load = bool(given(bias, "entry_load", False))
+        self.start = StartFriction(given(bias, "start_share", None), self.n, self.branches)
 
     def step(self, time: float, inputs: Mapping[str, Array], forced: Mapping[Key, Any] | None = None) -> Step:
         """Takes one sample. `forced` fixes single decisions (by key) instead of deciding them."""
@@ -171,15 +173,17 @@ class FingerOracle:
         else:
             self.b_eff = self.b_eff + db
         T_eff = self.b_eff + T
+        self.start.turn(self.places, Places.zeros(self.m, self.n), f, lambda p: self._at_joints(p, np.abs(self.R)))
         # 4a. what friction may differ by
         change = np.zeros(self.n) if first else T_eff - self.last.values["friction_torque"]
         bounds = self.detector.bounds(self._at_joints(hidden * f, np.abs(self.R)), self._parts(F * f, q), change, dt)
+        bounds.E = bounds.E + self.start.unlearned
         self.detector.watch(f0, x0, mean_force, time, dt, first, decide, out)
         joint_contact, r, y = np.zeros(self.n, dtype=bool), np.zeros(self.n), np.zeros(self.n)
         if not first:
             # 5. contact, 6. bias update or its inhibition
             r = tau - T_eff
-            joint_contact, y = self._contact(r, bounds, mean_force, time, dt, decide, out)
+            joint_contact, y = self.detector.contact(r, bounds, mean_force, time, dt, decide, out)
             if self.detector.updates(time):
                 correction = self._gain(dt, noise) * r
                 self.b_eff = self.b_eff + correction
@@ -199,7 +203,7 @@ class FingerOracle:
             "joint_contact": joint_contact,
             "contact": np.asarray(joint_contact.any()),
             "slack": slack,
-            "compensated_torque_std": self.detector.std(self.P, bounds, mean_force),
+            "compensated_torque_std": self.detector.std(self.P + self.start.variance(), bounds, mean_force),
             "residual": r,
             "innovation": y,
             "stuck_friction": bounds.H,
@@ -244,10 +248,13 @@ class FingerOracle:
             if displacement is not None:
                 travel = self._seen_by(kind, at, q, *self.travelled)[0]
                 taken = self._slide(effect, displacement, velocity, angle, travel, key), 0.0
+                whole = abs(effect.value(self.extensions.side_of(effect, key), abs(velocity), angle))
+                self.start.slides(effect, travel, displacement, factor * whole, first)
                 direction = direction_above(velocity, effect.limit(self.hysteresis), key, decide, out)
                 effect.side, effect.rests = direction or effect.side, direction == 0
             else:
                 taken = self._take_effect(effect, velocity, angle, time, first, key, decide, out)
+                self.start.sticks(effect, factor * taken[0], first)
             getattr(F, kind)[at], getattr(b, kind)[at] = factor * taken[0], factor * taken[1]
             if effect.stuck and self.detector.friction_bound is not None:
                 getattr(hidden, kind)[at] = factor * abs(effect.value(effect.side or 1, abs(velocity), angle))
@@ -415,28 +422,20 @@ class FingerOracle:
         """T_jq and the torques of `extensions`."""
         return self._covers(q) + self.extensions.torques()
 
-    def _contact(
-        self, r: Array, bounds: Bounds, mean_force: float, time: float, dt: float,
-        decide: Callable[..., Any], out: Step,
-    ) -> tuple[Array, Array]:  # fmt: skip
-        """Step 5: joint_contact and y, [n]."""
-        return self.detector.contact(r, bounds, mean_force, time, dt, decide, out)
-
     def _gain(self, dt: float, noise: float) -> Array:
         """Kalman gain per joint; updates P."""
         if self.noise_time is not None:
             noise = noise * float(self.noise_time) / dt
             self.branches["noise_time"] += 1
-        K = np.zeros(self.n)
+        K, own = np.zeros(self.n), np.zeros(self.n)
         for j in range(self.n):
             self.P[j] += self.drift_variance * dt
-            if self.P[j] + noise != 0.0:
-                K[j] = self.P[j] / (self.P[j] + noise)
-            else:
-                self.branches["gain_zero_of_zero"] += 1
-            self.P[j] = (1.0 - K[j]) * self.P[j]
-        # all joints have one K: one start, one drift, one noise
-        self.absorbed += LARGEST_ABSORPTION if K[0] >= 1.0 else min(LARGEST_ABSORPTION, -math.log(1.0 - K[0]))
+            own[j], K[j] = gain_of(self.P[j], noise), gain_of(self.P[j] + self.start.variance()[j], noise)
+            self.branches["gain_zero_of_zero"] += self.P[j] + noise == 0.0
+            self.P[j] = (1.0 - own[j]) * self.P[j]
+        self.start.learn(K)
+        # all joints have one K of P: one start, one drift, one noise
+        self.absorbed += LARGEST_ABSORPTION if own[0] >= 1.0 else min(LARGEST_ABSORPTION, -math.log(1.0 - own[0]))
         return K
 
     def _inhibit(self, time: float) -> None:

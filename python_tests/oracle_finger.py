@@ -48,6 +48,9 @@ class Effect:
     taken_out: float = 0.0  # κ·e
     share: float = 0.0  # ζ of the extension `presliding`; with it an effect never sticks, though it
     rests: bool | None = None  # may be slower than what counts as motion
+    start_left: float = 0.0  # of `bias.start_share`: share of how it stood at the start that motion has not turned over
+    turned: float = 0.0  # of the present sample alone, like
+    whole: float = 0.0  # by how much it may stand otherwise than the model took it
 
     def limit(self, hysteresis: float) -> float:
         """The |v| above which the effect moves at this sample."""

@@ -79,9 +79,11 @@ class Recorder(oracle.FingerOracle):
         self.moments: list[Any] = []  # what torques of extensions see
         self.residuals: list[Array] = []  # r of step 5, from the second sample on
 
-    def _contact(self, r: Array, *others: Any) -> Array:
-        self.residuals.append(r)
-        return super()._contact(r, *others)
+    def step(self, *arguments: Any) -> oracle.Step:
+        out = super().step(*arguments)
+        if self.samples > 1:
+            self.residuals.append(out.values["residual"])
+        return out
 
     def _total(self, *arguments: Array) -> Array:
         self.totals.append(super()._total(*arguments))

@@ -334,6 +334,8 @@ def random_detection(seed: int, finger: Description) -> Description:
         bias["entry_load"] = bool(rng.random() < 0.8)
     if rng.random() < 0.6:
         bias["forgetting"] = "absorption" if rng.random() < 0.8 else "time"
+    if rng.random() < 0.5:
+        bias["start_share"] = float(rng.choice([0.0, 1.0, rng.uniform(0.1, 1.0)]))
     if bias:
         finger["bias"] = bias
     if rng.random() < 0.6:

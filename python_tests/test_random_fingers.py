@@ -78,6 +78,8 @@ DETECTION_BRANCHES = {
     "release_ratio_holds",
     "held",
     "update_in_contact",
+    "start_turned",
+    "start_stands",
 }
 
 
@@ -211,7 +213,7 @@ def test_detection_fingers_have_every_key() -> None:
         seen["jerk_density"] += "jerk_density" in description.get("position_filter", {})
         seen["full hysteresis"] += places["velocity_threshold"].get("hysteresis") == 1.0
     expected = {
-        "velocity_threshold.hysteresis", "bias.forgetting", "bias.entry_load", "contact.method", "contact.innovation",
+        "velocity_threshold.hysteresis", "bias.forgetting", "bias.entry_load", "bias.start_share", "contact.method", "contact.innovation",
         "innovation.time", "innovation.threshold", "innovation.threshold_per_force", "innovation.evidence_time",
         "contact.friction_bound", "friction_bound.stuck_share", "friction_bound.jump_share", "friction_bound.jump_time",
         "friction_bound.stuck_time",

@@ -229,7 +229,8 @@ def test_the_demo_tuned_and_drawn(tuned: tuple[Path, str, str]) -> None:
     before, after = json.loads(INDEX.read_text()), json.loads((folder / "t.json").read_text())
     for key in set(before) - {"bias", "contact"}:
         assert after[key] == before[key], key
-    changed = {"noise_std", "noise_std_per_force", "drift_variance"}
+    changed = {"noise_std", "noise_std_per_force", "drift_variance", "start_share"}
+    assert after["bias"]["start_share"] == 1
     assert {key: value for key, value in after["bias"].items() if key not in changed} == {
         key: value for key, value in before["bias"].items() if key not in changed
     }

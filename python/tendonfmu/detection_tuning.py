@@ -49,6 +49,7 @@ STUCK_TIME = 0.25  # s, T_H
 EVIDENCE_TIME = 0.02  # s, τ_e
 RELEASE = {"release_ratio": 1.0, "hold_time": 0.05}  # 1, s
 RELEASE_TIME = 2.0  # s
+START_SHARE = 1.0  # bias.start_share: all friction may stand either way before the start
 _STEP, _STEPS = 1.05, 12  # by which the level is raised, and how often, until the running finger keeps the rate
 _DIGITS = 6
 
@@ -191,7 +192,9 @@ class ContactTuning(ConstructorArguments):
             jump, stuck = float(given.get("jump_time") or jump), float(given.get("stuck_time") or 0.0)
         clock = Clock(self.innovation_time, jump, stuck)
         time = wanted_time(self.start_.data, parts, self.bias_time)
-        data = self.start_.data
+        bias = self.start_.data.get("bias") or {}
+        start = START_SHARE if bias.get("start_share") is None else bias["start_share"]
+        data = {**self.start_.data, "bias": {**bias, "start_share": start}}
         for _ in range(2):
             self.runs_: list[FreeRun] = run_free(data, parts, self.kinematics, clock)
             self.bias_: BiasNoise = bias_noise(data, self.runs_, self.cells_, time)

@@ -243,26 +243,52 @@ HOT_INLINE double noise_variance(const finger_settings* settings, double mean_fo
   return noise * noise * scale;
 }
 
+/* P⁻ + V²/3, four joints: what of the start is not learned counts as evenly distributed */
+HOT_INLINE quad with_unlearned(const tendonfmu_finger* f, size_t j, quad variance) {
+  if (!f->derived.settings.has_start_share) {
+    return variance;
+  }
+  const quad unlearned = quad_load(f->remembered.unlearned + j);
+  return quad_add(variance, quad_mul(quad_mul(unlearned, unlearned), quad_set(1.0 / 3.0)));
+}
+
+/* Λ: what the filter absorbs, counted without what is not learned of the start */
+HOT_INLINE void count_absorbed(tendonfmu_finger* f, double left) {
+  const double absorbed = left > 0.0 ? -log(left) : 700.0;
+  f->remembered.scalar[STATE_ABSORBED] += absorbed < 700.0 ? absorbed : 700.0;
+}
+
+/* K, 0 where nothing is known to be uncertain */
+HOT_INLINE quad kalman_gain(quad predicted, quad noise) {
+  const quad total = quad_add(predicted, noise), zero = quad_set(0.0);
+  const quad_mask known = quad_greater(total, zero);
+  return quad_keep(known, quad_div(predicted, quad_select(known, total, quad_set(1.0))));
+}
+
 /* one Kalman step per joint on the residual r = τ − T_eff; friction and bias take their share of it */
 HOT_INLINE void track_bias(tendonfmu_finger* f, double step, double noise) {
   const finger_state* s = &f->remembered;
-  const quad zero = quad_set(0.0), one = quad_set(1.0);
+  const quad one = quad_set(1.0), noise_variance = quad_set(noise);
+  _Alignas(32) double own_gain[4] = {0.0}; /* without V: the same at all joints */
   const quad drift = quad_set(f->derived.settings.drift_variance * step);
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     const quad predicted = quad_add(quad_load(s->variance + j), drift);
-    const quad total = quad_add(predicted, quad_set(noise));
-    const quad_mask known = quad_greater(total, zero);
-    const quad gain = quad_keep(known, quad_div(predicted, quad_select(known, total, one)));
+    const quad own = kalman_gain(predicted, noise_variance);
+    quad gain = own;
+    if (f->derived.settings.has_start_share) {
+      gain = kalman_gain(with_unlearned(f, j, predicted), noise_variance);
+      double* unlearned = s->unlearned + j;
+      quad_store(unlearned, quad_mul(quad_sub(one, gain), quad_load(unlearned)));
+    }
     const quad correction = quad_mul(gain, quad_sub(quad_load(s->torque + j), quad_load(s->friction + j)));
     quad_store(s->bias + j, quad_add(quad_load(s->bias + j), correction));
     quad_store(s->friction + j, quad_add(quad_load(s->friction + j), correction));
-    quad_store(s->variance + j, quad_mul(quad_sub(one, gain), predicted));
+    quad_store(s->variance + j, quad_mul(quad_sub(one, own), predicted));
     quad_store(s->gain + j, gain);
+    quad_store(own_gain, own);
   }
   if (f->derived.settings.forgets_by_absorption) {
-    const double left = 1.0 - s->gain[0]; /* the gain is the same at all joints */
-    const double absorbed = left > 0.0 ? -log(left) : 700.0;
-    s->scalar[STATE_ABSORBED] += absorbed < 700.0 ? absorbed : 700.0;
+    count_absorbed(f, 1.0 - own_gain[0]);
   }
 }
 

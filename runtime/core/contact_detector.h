@@ -15,7 +15,8 @@ HOT_INLINE quad hidden_torque(const tendonfmu_finger* f, size_t j) {
   const finger_settings* settings = &f->derived.settings;
   const quad stuck = quad_mul(quad_set(settings->stuck_share), quad_load(f->remembered.stuck_friction + j));
   const quad jump = quad_mul(quad_set(settings->jump_share), quad_load(f->remembered.friction_jump + j));
-  return quad_add(stuck, jump);
+  const quad hidden = quad_add(stuck, jump);
+  return settings->has_start_share ? quad_add(hidden, quad_load(f->remembered.unlearned + j)) : hidden;
 }
 
 /* g of the CUSUM: time, weighted by how far the innovation is beyond its bound */
@@ -53,7 +54,7 @@ HOT_INLINE quad_mask innovation_exceeds(tendonfmu_finger* f, size_t j, quad rati
 HOT_INLINE quad_mask residual_exceeds(const tendonfmu_finger* f, size_t j, quad ratio, double mean_force) {
   const finger_settings* settings = &f->derived.settings;
   quad bound = force_dependent(f->derived.contact_threshold, f->derived.contact_per_force, j, mean_force);
-  if (settings->bounds_friction) {
+  if (settings->bounds_friction || settings->has_start_share) {
     bound = quad_add(bound, hidden_torque(f, j));
   }
   if (settings->knows_uncertainty) {
@@ -119,7 +120,7 @@ HOT_INLINE void estimate_variance(tendonfmu_finger* f, double mean_force) {
   const quad third = quad_set(1.0 / 3.0); /* variance of an even distribution within ±1 */
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     const quad deviation = force_dependent(f->derived.deviation, f->derived.deviation_per_force, j, mean_force);
-    quad total = quad_add(quad_load(s->variance + j), quad_mul(deviation, deviation));
+    quad total = quad_add(with_unlearned(f, j, quad_load(s->variance + j)), quad_mul(deviation, deviation));
     if (settings->knows_uncertainty) {
       const quad uncertainty = quad_load(f->scratch.uncertainty + j);
       total = quad_add(total, quad_mul(uncertainty, uncertainty));

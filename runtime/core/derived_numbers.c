@@ -120,6 +120,7 @@ static void derive_finger(derivation* d, const model_item* item) {
     case ITEM_INITIAL_VARIANCE: settings->initial_variance = values[0]; break;
     case ITEM_FORGET_RATE: settings->forget_rate = values[0]; break;
     case ITEM_NOISE_TIME: settings->noise_time = values[0]; break;
+    case ITEM_START_SHARE: settings->start_share = values[0]; break;
     case ITEM_INITIAL_TORQUE:
       settings->has_initial_torque = 1;
       memcpy(to->initial_torque, values, bytes);
@@ -272,6 +273,7 @@ void derive_numbers(tendonfmu_finger* finger, int routing_changed) {
                                                .release_time = -1.0,
                                                .rest_innovation_rate = -1.0,
                                                .forgets_by_absorption = (options & MODEL_FORGETS_BY_ABSORPTION) != 0,
+                                               .has_start_share = (options & MODEL_HAS_START_SHARE) != 0,
                                                .remembers_entry_load = (options & MODEL_REMEMBERS_ENTRY_LOAD) != 0,
                                                .filters_position = (options & MODEL_HAS_POSITION_FILTER) != 0,
                                                .bounds_friction = (options & MODEL_HAS_FRICTION_BOUND) != 0,

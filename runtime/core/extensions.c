@@ -237,7 +237,7 @@ double slot_grip_slope(const tendonfmu_finger* f, size_t slot, const slot_direct
 static void find_grips(tendonfmu_finger* f) {
   finger_scratch* s = &f->scratch;
   for (size_t slot = 0; slot < f->slots; ++slot) {
-    s->grip[slot] = s->bias_grip[slot] = 1.0;
+    s->grip[slot] = s->bias_grip[slot] = s->others[slot] = 1.0;
     s->slides[slot] = 0.0;
   }
   for (size_t r = 0; r < f->extensions.friction; ++r) {
@@ -251,7 +251,12 @@ static void find_grips(tendonfmu_finger* f) {
       const effect_grip grip = row->effect->grip(row->place, row->parameters, row->next, k);
       s->grip[slot] *= grip.value;
       s->bias_grip[slot] *= grip.slides ? 0.0 : grip.value;
-      s->slides[slot] = grip.slides ? 1.0 : s->slides[slot];
+      if (grip.slides) {
+        s->slides[slot] = 1.0;
+        s->kept[slot] = grip.kept;
+      } else {
+        s->others[slot] *= grip.value;
+      }
     }
   }
 }
@@ -293,18 +298,19 @@ static slot_values values_of(const tendonfmu_finger* f, size_t slot) {
 static void slide(tendonfmu_finger* f, size_t slot, const slot_values* at) {
   const derived_numbers* d = &f->derived;
   const size_t joint_row = f->joints * f->tendon_lanes;
-  const double v = f->scratch.velocity[slot], share = f->scratch.grip[slot], speed = fabs(v);
+  const finger_scratch* s = &f->scratch;
+  const double v = s->velocity[slot], share = s->grip[slot], others = s->others[slot], speed = fabs(v);
   const double threshold = slot < joint_row ? d->settings.tendon_threshold : d->settings.joint_threshold;
   const int negative = sliding_side(v, threshold, f->remembered.side[slot]);
-  if (slot < joint_row) {
-    *at->friction[0] = share * edge_magnitude(f, slot, negative, speed);
-    if (at->friction[1]) {
-      *at->friction[1] = share * magnitude(d->pulley_law + slot * LAW_NUMBERS, negative, speed);
-    }
-  } else {
-    const size_t law = (slot - joint_row) * LAW_NUMBERS;
-    *at->friction[0] = share * magnitude(d->joint_law + law, negative, speed);
-    *at->friction[1] = share * magnitude(d->load_law + law, negative, speed);
+  const int own = slot >= joint_row;
+  const size_t law = (own ? slot - joint_row : slot) * LAW_NUMBERS;
+  const double first = own ? magnitude(d->joint_law + law, negative, speed) : edge_magnitude(f, slot, negative, speed);
+  *at->friction[0] = share * first;
+  s->whole_edge[slot] = others * first;
+  if (at->friction[1]) {
+    const double second = magnitude((own ? d->load_law : d->pulley_law) + law, negative, speed);
+    *at->friction[1] = share * second;
+    s->whole_pulley[slot] = others * second;
   }
   *at->stuck[0] = *at->stuck[1] = 0.0;
 }

@@ -88,6 +88,10 @@ static void lay_out_extensions(tendonfmu_finger* f, cursor* c) {
   f->scratch.grip = take_numbers(c, slots);
   f->scratch.bias_grip = take_numbers(c, slots);
   f->scratch.slides = take_numbers(c, slots);
+  f->scratch.kept = take_numbers(c, slots);
+  f->scratch.others = take_numbers(c, slots);
+  f->scratch.whole_edge = take_numbers(c, slots);
+  f->scratch.whole_pulley = take_numbers(c, slots);
   f->extensions.is_named = take(c, slots);
 }
 
@@ -98,8 +102,9 @@ static void lay_out_state(tendonfmu_finger* f, cursor* c) {
   const size_t parts = f->shape.options & MODEL_HAS_UNCERTAINTY ? f->joints * tendons + 3 * joints : 0;
   const size_t filter = f->shape.options & MODEL_HAS_POSITION_FILTER ? FILTER_ROWS * joints : 0;
   const size_t rests = f->shape.options & MODEL_HAS_REST ? 1 : 0;
+  const size_t starts = f->shape.options & MODEL_HAS_START_SHARE ? 1 : 0;
   f->state_count = STATE_SCALARS + 17 * joints + 2 * tendons + 6 * slots + 2 * entries + parts + filter +
-                   rests * (5 * joints + 5 * tendons) + f->shape.extension_memory;
+                   starts * (slots + joints) + rests * (5 * joints + 5 * tendons) + f->shape.extension_memory;
   f->state = take_numbers(c, f->state_count);
   double* run = f->state;
   s->scalar = part(&run, STATE_SCALARS);
@@ -118,6 +123,8 @@ static void lay_out_state(tendonfmu_finger* f, cursor* c) {
   }
   s->entry_edge = part(&run, entries);
   s->entry_pulley = part(&run, entries);
+  s->start_left = part(&run, starts * slots);
+  s->unlearned = part(&run, starts * joints);
   s->part = part(&run, parts);
   s->filter = part(&run, filter);
   double** const rest_of_joints[] = {&s->contact_change, &s->rest_tracked, &s->rest_contact, &s->rest_extreme,
@@ -158,6 +165,11 @@ static void lay_out_scratch(tendonfmu_finger* f, cursor* c) {
   const int filtered = (f->shape.options & MODEL_HAS_POSITION_FILTER) != 0;
   s->filter = take_numbers(c, filtered ? FILTER_ROWS * f->joint_lanes : 0);
   s->travel = take_numbers(c, filtered ? f->slots : 0);
+  const int starts = (f->shape.options & MODEL_HAS_START_SHARE) != 0;
+  s->edge_turned = take_numbers(c, starts ? f->slots : 0);
+  s->pulley_turned = take_numbers(c, starts ? f->slots : 0);
+  s->start_left = take_numbers(c, starts ? f->slots : 0);
+  s->turned = take_numbers(c, starts ? f->joint_lanes : 0);
   const int resting = (f->shape.options & MODEL_HAS_REST) != 0;
   s->motor_position = take_numbers(c, resting ? f->tendon_lanes : 0);
   s->force_change = take_numbers(c, resting ? f->tendon_lanes : 0);

@@ -27,6 +27,8 @@ typedef struct finger_settings {
   double drift_variance, noise_std, noise_std_per_force, forget_rate;
   double initial_variance; /* < 0: from the noise at the first sample */
   double noise_time;       /* < 0: noise per sample */
+  int has_start_share;
+  double start_share; /* of friction as it stood before the first sample */
   int has_initial_torque;
   double hysteresis;
   int filters_position;
@@ -155,8 +157,10 @@ typedef struct finger_state {
   double *stuck_since, *last_stuck; /* s */
   double *entry_edge,
       *entry_pulley; /* e, as the effects came to rest: N; of joints T_jv0 and T_jvf·Σ f_B, N·m; with entry_load only */
-  double* part;      /* [n × M + 3N] torques of tendons; T_jv0, T_jvf·Σ f_B, T_jq; with uncertainty only */
-  double* filter;    /* [FILTER_ROWS × N] with a position filter only */
+  double *start_left, *unlearned; /* [n × M + N] share of how an effect stood at the start that motion has not turned
+                                     over, [N] V, N·m; with start_share only */
+  double* part;   /* [n × M + 3N] torques of tendons; T_jv0, T_jvf·Σ f_B, T_jq; with uncertainty only */
+  double* filter; /* [FILTER_ROWS × N] with a position filter only */
   /* with contact.rest only */
   double* contact_change; /* [N] c, N·m; 0 outside a rest */
   double* rest_tracked;   /* [N] m, N·m, what y = c − m is taken from; 0 without innovation */
@@ -194,15 +198,21 @@ typedef struct finger_scratch {
   double* slack;      /* [M] */
   double *torque, *friction, *bias_step, *load;                    /* [N] τ, T, Δb, Σ f_B */
   double *joint_friction, *load_friction, *joint_bias, *load_bias; /* [N] T_jv0, T_jvf and their b */
-  double *edge_kept, *pulley_kept;      /* [n × M + N] −κ·e of an effect that leaves rest; with entry_load only */
-  double *edge_stuck, *pulley_stuck;    /* [n × M + N] |F| where the effect sticks, 0 elsewhere; joints T_jv0, T_jvf */
-  double *stuck_friction, *uncertainty; /* [N] H of what sticks now, u */
-  double* part;                         /* as in the state */
-  double* filter;                       /* as in the state, after this sample */
-  double* travel;                       /* [n × M + N] of what slides, by the position filter: m, rad; with it only */
+  double *edge_kept, *pulley_kept;   /* [n × M + N] −κ·e of an effect that leaves rest; with entry_load only */
+  double *edge_stuck, *pulley_stuck; /* [n × M + N] |F| where the effect sticks, 0 elsewhere; joints T_jv0, T_jvf */
+  double *edge_turned, *pulley_turned, *start_left; /* [n × M + N] |F| whose start this sample turns over, what is left
+                                                       of the start after it; with start_share only */
+  double* turned;                                   /* [N] G, N·m; with start_share only */
+  double *stuck_friction, *uncertainty;             /* [N] H of what sticks now, u */
+  double* part;                                     /* as in the state */
+  double* filter;                                   /* as in the state, after this sample */
+  double* travel;                        /* [n × M + N] of what slides, by the position filter: m, rad; with it only */
   double *motor_position, *force_change; /* [M] x0 as it was given, f̄ less that of the mark; with contact.rest only */
   double *rest_noise, *rest_bound, *rest_sudden_bound; /* [N] N, D, B; with contact.rest only */
   double* extension;                                   /* the memory of the extensions after this sample */
+  double *kept, *others, *whole_edge, *whole_pulley;   /* [n × M + N] of what slides: share left of where it was before
+                                                          this   sample, what the other rows make of F, that times |F| of
+                                                          the   law; with such rows only */
   double *grip, *bias_grip, *slides;    /* [n × M + N] what friction rows make of F and b, 1 where a slot never sticks;
                                            with    such rows only */
   effect_sample sample;                 /* as the extensions see it */

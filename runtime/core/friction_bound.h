@@ -7,8 +7,9 @@
 
 #include <math.h>
 
-/* H: |r_ij|·Σ f·|F| of the stuck effects of every tendon, with the forces already propagated; the joint's own to it */
-HOT_INLINE void stuck_friction(tendonfmu_finger* f) {
+/* |r_ij|·Σ f·|F| of every tendon, with the forces already propagated, and the joint's own to it, from |F| of both
+ * effects of each slot [n × M + N]; to [n] */
+HOT_INLINE void held_torque(const tendonfmu_finger* f, const double* edge, const double* pulley, double* to) {
   const finger_scratch* s = &f->scratch;
   const size_t n = f->joints, lanes = f->tendon_lanes, joint_row = n * lanes;
   quad total[MODEL_MAX_JOINTS];
@@ -18,16 +19,15 @@ HOT_INLINE void stuck_friction(tendonfmu_finger* f) {
   for (size_t i = 0; i < lanes; i += 4) {
     quad held = quad_set(0.0);
     for (size_t at = i, j = 0; j < n; at += lanes, ++j) {
-      held = quad_add(held, quad_mul(quad_load(s->force_at + at), quad_load(s->edge_stuck + at)));
+      held = quad_add(held, quad_mul(quad_load(s->force_at + at), quad_load(edge + at)));
       if (j + 1 < n) {
-        held = quad_add(held, quad_mul(quad_load(s->force_between + at), quad_load(s->pulley_stuck + at + lanes)));
+        held = quad_add(held, quad_mul(quad_load(s->force_between + at), quad_load(pulley + at + lanes)));
       }
       total[j] = quad_add(total[j], quad_mul(quad_abs(quad_load(f->derived.moment_arm + at)), held));
     }
   }
   for (size_t j = 0; j < n; ++j) {
-    s->stuck_friction[j] =
-        quad_sum(total[j]) + (s->edge_stuck[joint_row + j] + s->pulley_stuck[joint_row + j] * s->load[j]);
+    to[j] = quad_sum(total[j]) + (edge[joint_row + j] + pulley[joint_row + j] * s->load[j]);
   }
 }
 
@@ -79,7 +79,7 @@ HOT_INLINE void parameter_uncertainty(tendonfmu_finger* f) {
 /* after the forces are known, before anything is remembered */
 HOT_INLINE void bound_friction(tendonfmu_finger* f) {
   if (f->derived.settings.bounds_friction) {
-    stuck_friction(f);
+    held_torque(f, f->scratch.edge_stuck, f->scratch.pulley_stuck, f->scratch.stuck_friction); /* S */
   }
   if (f->derived.settings.knows_uncertainty) {
     torque_parts(f);

@@ -93,6 +93,7 @@ static void walk_finger(walk* w) {
       {ITEM_FORGET_RATE, 1},
       {ITEM_INITIAL_TORQUE, options & MODEL_HAS_INITIAL_TORQUE ? n : 0},
       {ITEM_NOISE_TIME, options & MODEL_HAS_NOISE_TIME ? 1 : 0},
+      {ITEM_START_SHARE, options & MODEL_HAS_START_SHARE ? 1 : 0},
       {ITEM_CONTACT_THRESHOLD, n},
       {ITEM_CONTACT_PER_FORCE, n},
       {ITEM_HYSTERESIS, options & MODEL_HAS_HYSTERESIS ? 1 : 0},
@@ -284,7 +285,7 @@ static int read_counts(const void* image, size_t image_size, model_shape* shape,
     return refuse_value(message, "model image: extensions", shape->extension_count, "at most 1024");
   }
   if (shape->options & ~(uint32_t)MODEL_OPTION_BITS) {
-    return refuse_value(message, "model image: option bits", shape->options, "0 to 262143");
+    return refuse_value(message, "model image: option bits", shape->options, "a sum of known ones");
   }
   if (check_options(shape)) {
     return refuse_value(message, "model image: option bits", shape->options, "ones that go together");

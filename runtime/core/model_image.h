@@ -59,7 +59,8 @@ enum {
   MODEL_HAS_POSITION_FILTER = 1 << 17,
   MODEL_HAS_REST = 1 << 18,
   MODEL_HAS_REST_INNOVATION = 1 << 19, /* beside the bit before */
-  MODEL_OPTION_BITS = (1 << 20) - 1
+  MODEL_HAS_START_SHARE = 1 << 20,
+  MODEL_OPTION_BITS = (1 << 21) - 1
 };
 
 #define MODEL_EDGE_HAS_ANGLES 0x80000000u
@@ -99,6 +100,7 @@ typedef enum model_item_kind {
   ITEM_FORGET_RATE,
   ITEM_INITIAL_TORQUE, /* n */
   ITEM_NOISE_TIME,
+  ITEM_START_SHARE,
   ITEM_CONTACT_THRESHOLD,    /* n */
   ITEM_CONTACT_PER_FORCE,    /* n */
   ITEM_HYSTERESIS,           /* velocity_threshold.hysteresis */

@@ -129,6 +129,7 @@ static int slots_are_sound(const tendonfmu_finger* f, const unsigned char* state
   const finger_state* s = &f->remembered;
   const size_t slots = f->slots, lanes = f->tendon_lanes, rest = (size_t)(f->state + f->state_count - s->entry_edge);
   const int absorbs = f->derived.settings.forgets_by_absorption;
+  const size_t starts = f->derived.settings.has_start_share ? 1 : 0;
   const row_rule rules[] = {
       {s->force, lanes, ROW_OF_TENDONS, -DBL_MAX, DBL_MAX, 0, 0},
       {s->slack, lanes, ROW_OF_TENDONS, 0.0, 1.0, 1, 0},
@@ -139,7 +140,9 @@ static int slots_are_sound(const tendonfmu_finger* f, const unsigned char* state
       {s->stuck_since, slots, ROW_OF_SLOTS, absorbs ? 0.0 : -LARGEST_TIME, absorbs ? LARGEST_SQUARE : LARGEST_TIME, 0,
        1},
       {s->last_stuck, slots, ROW_OF_SLOTS, -LARGEST_TIME, LARGEST_TIME, 0, 1},
-      {s->entry_edge, rest, ROW_WITHOUT_LANES, -DBL_MAX, DBL_MAX, 0, 0}, /* entries, parts, filter, rest, extensions */
+      {s->entry_edge, rest, ROW_WITHOUT_LANES, -DBL_MAX, DBL_MAX, 0, 0}, /* entries, start, parts, filter, rest, … */
+      {s->start_left, starts * slots, ROW_OF_SLOTS, 0.0, 1.0, 0, 1},
+      {s->unlearned, starts * f->joint_lanes, ROW_OF_JOINTS, 0.0, LARGEST_SUM, 0, 0},
   };
   return rows_are_sound(f, state, rules, sizeof rules / sizeof rules[0]);
 }

@@ -10,6 +10,7 @@
 #include "kernel_choice.h"
 #include "kinematics.h"
 #include "position_filter.h"
+#include "unlearned_friction.h"
 
 HOT_INLINE int is_first(const tendonfmu_finger* f) {
   return f->remembered.scalar[STATE_INITIALISED] == 0.0;
@@ -94,7 +95,8 @@ HOT_INLINE int all_finite(const tendonfmu_finger* f) {
   double probe = 0.0; /* stays 0 unless something is infinite or NaN */
   for (size_t j = 0; j < f->joints; ++j) {
     const double sum = fabs(s->torque[j]) + fabs(s->friction[j]) + fabs(s->bias_step[j]) + fabs(f->remembered.bias[j]) +
-                       s->stuck_friction[j] + s->uncertainty[j];
+                       s->stuck_friction[j] + s->uncertainty[j] +
+                       (f->derived.settings.has_start_share ? s->turned[j] : 0.0);
     probe += 0.0 * (1e160 * sum); /* infinite above 1.8e148 */
     probe += 0.0 * s->angle[j] + 0.0 * joint_velocity[j];
   }
@@ -149,6 +151,9 @@ HOT_INLINE void remember_sample(tendonfmu_finger* f, double time, double velocit
   if (f->derived.settings.bounds_friction) {
     remember_stuck(f, is_first(f) ? 0.0 : time - s->scalar[STATE_TIME]);
   }
+  if (f->derived.settings.has_start_share) {
+    copy_row(s->start_left, f->scratch.start_left, f->slots);
+  }
   if (f->derived.settings.knows_uncertainty) {
     copy_row(s->part, f->scratch.part, f->joints * f->tendon_lanes + 3 * f->joint_lanes);
   }
@@ -200,6 +205,9 @@ HOT_INLINE void track_sample(tendonfmu_finger* f, double time, double step, doub
     quad_store(s->bias + j, quad_add(quad_load(s->bias + j), quad_load(f->scratch.bias_step + j)));
   }
   leave_residual(f, step);
+  if (settings->has_start_share) {
+    add_unlearned(f);
+  }
   if (settings->watches_rest) {
     watch_rest(f, mean_force, time, step);
   }
@@ -251,6 +259,9 @@ static sample_result take_sample(tendonfmu_finger* f, double time) {
   measured_torques(f);
   const double mean_force = mean_tendon_force(f);
   bound_friction(f);
+  if (f->derived.settings.has_start_share) {
+    turned_friction(f, first);
+  }
   if (transitions && !first) {
     bias_steps(f);
   } else {

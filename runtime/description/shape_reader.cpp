@@ -171,6 +171,7 @@ std::uint32_t read_bias_options(const json_node& bias, std::uint32_t joints) {
   const json_node entry_load = bias.member("entry_load");
   return given(bias, {"initial_variance"}, MODEL_HAS_INITIAL_VARIANCE) |
          given(bias, {"initial_torque"}, MODEL_HAS_INITIAL_TORQUE) | given(bias, {"noise_time"}, MODEL_HAS_NOISE_TIME) |
+         given(bias, {"start_share"}, MODEL_HAS_START_SHARE) |
          (word_of(bias.member("forgetting"), {"time", "absorption"}) ? unsigned{MODEL_FORGETS_BY_ABSORPTION} : 0u) |
          (!entry_load.absent() && entry_load.boolean() ? unsigned{MODEL_REMEMBERS_ENTRY_LOAD} : 0u);
 }
@@ -312,7 +313,7 @@ void check_top(const json_node& document) {
   check_settings(document, "velocity_threshold", {"tendon", "joint", "hysteresis"});
   check_settings(document, "bias",
                  {"drift_variance", "noise_std", "noise_std_per_force", "initial_variance", "forget_rate",
-                  "initial_torque", "noise_time", "forgetting", "entry_load"});
+                  "initial_torque", "noise_time", "start_share", "forgetting", "entry_load"});
 }
 
 }  // namespace

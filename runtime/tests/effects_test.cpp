@@ -442,7 +442,7 @@ TEST(Friction, BuildsUpOverADistance) {
 
 TEST(Friction, BuildsUpEverywhereByThresholds) {
   Effect presliding("presliding", 0, 0, {0.1});
-  ASSERT_EQ(presliding.memory.size(), 3 * joints * (tendons + 1));
+  ASSERT_EQ(presliding.memory.size(), 4 * joints * (tendons + 1));
   Sample sample;
   presliding.memory = presliding.advanced(sample);
   const auto grip_at = [&](std::size_t member) {

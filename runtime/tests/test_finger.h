@@ -43,7 +43,7 @@ inline std::string every_key() {
     text.insert(text.find(after) + after.size(), added);
   };
   put("\"velocity_threshold\": {", "\"hysteresis\": 0.3, ");
-  put("\"bias\": {", "\"forgetting\": \"absorption\", \"entry_load\": true, ");
+  put("\"bias\": {", R"("forgetting": "absorption", "entry_load": true, "start_share": 0.5, )");
   put("\"contact\": {", R"("method": "cusum",
     "innovation": {"time": 0.4, "threshold": [0.03, 0.03], "threshold_per_force": [1e-4, 1e-4], "evidence_time": 0.01},
     "friction_bound": {"stuck_share": 0.4, "stuck_time": 0.03, "jump_share": 0.5, "jump_time": 0.05},

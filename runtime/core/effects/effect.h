@@ -89,6 +89,7 @@ typedef struct effect_signals {
  * what fig. 5 gives. */
 typedef struct effect_grip {
   int slides;         /* 1: never sticks */
+  double kept;        /* of what slides: share of where it was before this sample that is left */
   double value;       /* share or factor */
   double by_velocity; /* s/m or s/rad */
   double by_motion;   /* the same, where it depends on the travel; with a position filter 1/m or 1/rad */

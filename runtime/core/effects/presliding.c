@@ -11,7 +11,7 @@
  * D is the displacement at a place; of a row without one displacement·v_min, v_min being the effect's threshold. */
 
 /* per velocity of the place */
-enum { SHARE, BY_DISPLACEMENT, BY_MOTION, MEMORY_ROWS }; /* motion: velocity, or travel by a position filter */
+enum { SHARE, BY_DISPLACEMENT, BY_MOTION, KEPT, MEMORY_ROWS }; /* motion: velocity, or travel by a position filter */
 
 static const effect_parameter parameters[] = {
     {.name = "displacement",
@@ -80,6 +80,7 @@ static void advance_member(double displacement, double distance, double travel, 
                            const double* before, double* after) {
   const double side = travel < 0.0 ? -1.0 : 1.0;
   const double ratio = fabs(travel) / distance, kept = law_exponential(ratio), left = side - before[SHARE];
+  after[KEPT] = travel == 0.0 ? 1.0 : kept;
   after[SHARE] = travel == 0.0 ? before[SHARE] : side - left * kept;
   /* nothing is left of where it was: slopes of 0, however short the displacement */
   const int lasts = ratio < 700.0;
@@ -113,7 +114,8 @@ static void advance_slope(effect_place place, const double* values, const effect
     advance_member(values[0], distance, travel, sample, before + row, after);
     slope_after[row + SHARE] =
         law_exponential(fabs(travel) / distance) * slope_before[row + SHARE] + after[BY_MOTION] * slope;
-    slope_after[row + BY_DISPLACEMENT] = slope_after[row + BY_MOTION] = 0.0; /* only the share is read */
+    slope_after[row + BY_DISPLACEMENT] = slope_after[row + BY_MOTION] = slope_after[row + KEPT] =
+        0.0; /* only the share */
   }
 }
 
@@ -121,8 +123,11 @@ static effect_grip grip(effect_place place, const double* values, const double* 
   (void)place;
   (void)values;
   memory += MEMORY_ROWS * member;
-  return (effect_grip){
-      .slides = 1, .value = memory[SHARE], .by_motion = memory[BY_MOTION], .by_parameter = {memory[BY_DISPLACEMENT]}};
+  return (effect_grip){.slides = 1,
+                       .kept = memory[KEPT],
+                       .value = memory[SHARE],
+                       .by_motion = memory[BY_MOTION],
+                       .by_parameter = {memory[BY_DISPLACEMENT]}};
 }
 
 const effect_type effect_presliding = {
