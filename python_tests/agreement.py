@@ -42,6 +42,7 @@ DETECTION_OUTPUTS = (
     "innovation",
     "stuck_friction",
     "friction_jump",
+    "drift",
     "friction_parts",
 )
 REST_OUTPUTS = ("contact_change",)  # with contact.rest, also of the FMU

@@ -7,6 +7,7 @@ Indices in this file start at 0; joint 0 is the first joint, so the edge before 
 
 from __future__ import annotations
 
+import functools
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -82,11 +83,8 @@ class FingerOracle:
         # state
         self.samples = 0
         self.time = math.nan
-        self.q = np.zeros(self.n)
-        self.v = np.zeros(self.n)
+        self.q, self.v, self.b_eff, self.P = (np.zeros(self.n) for _ in range(4))
         self.travel: Array | None = None  # of the joints within the sample, rad, by the position filter
-        self.b_eff = np.zeros(self.n)
-        self.P = np.zeros(self.n)
         self.absorbed = 0.0  # Λ
         self.last = Step()
 
@@ -169,15 +167,16 @@ class FingerOracle:
         if first:
             self.P = np.full(self.n, noise if self.initial_variance is None else float(self.initial_variance))
             self.b_eff = tau - T if self.initial_torque is None else np.array(self.initial_torque, dtype=float)
+            self.detector.begin(time)
             self.branches["initial_torque" if self.initial_torque is not None else "initial_bias"] += 1
         else:
             self.b_eff = self.b_eff + db
         T_eff = self.b_eff + T
-        self.start.turn(self.places, Places.zeros(self.m, self.n), f, lambda p: self._at_joints(p, np.abs(self.R)))
+        hold = functools.partial(self._at_joints, arms=np.abs(self.R))
+        self.start.turn(self.places, Places.zeros(self.m, self.n), f, hold, decide)
         # 4a. what friction may differ by
         change = np.zeros(self.n) if first else T_eff - self.last.values["friction_torque"]
-        bounds = self.detector.bounds(self._at_joints(hidden * f, np.abs(self.R)), self._parts(F * f, q), change, dt)
-        bounds.E = bounds.E + self.start.unlearned
+        bounds = self.detector.bounds(hold(hidden * f), self._parts(F * f, q), change, self.start.unlearned, dt)
         self.detector.watch(f0, x0, mean_force, time, dt, first, decide, out)
         joint_contact, r, y = np.zeros(self.n, dtype=bool), np.zeros(self.n), np.zeros(self.n)
         if not first:
@@ -185,10 +184,11 @@ class FingerOracle:
             r = tau - T_eff
             joint_contact, y = self.detector.contact(r, bounds, mean_force, time, dt, decide, out)
             if self.detector.updates(time):
-                correction = self._gain(dt, noise) * r
+                K, own = self._gain(dt, noise)
+                correction = K * r
                 self.b_eff = self.b_eff + correction
                 T_eff = T_eff + correction
-                self.detector.update(r, dt)
+                self.detector.update(r, K, own, time, dt)
             else:
                 self._inhibit(time)
             self._count_in_contact(out, bool(joint_contact.any()))
@@ -208,6 +208,7 @@ class FingerOracle:
             "innovation": y,
             "stuck_friction": bounds.H,
             "friction_jump": bounds.J,
+            "drift": self.detector.drift(),
             "friction_parts": bounds.parts,
         } | self.detector.at_rest()
         self.q, self.v, self.time, self.last = q, v, time, out
@@ -422,8 +423,8 @@ class FingerOracle:
         """T_jq and the torques of `extensions`."""
         return self._covers(q) + self.extensions.torques()
 
-    def _gain(self, dt: float, noise: float) -> Array:
-        """Kalman gain per joint; updates P."""
+    def _gain(self, dt: float, noise: float) -> tuple[Array, Array]:
+        """Kalman gain per joint, and that without V; updates P."""
         if self.noise_time is not None:
             noise = noise * float(self.noise_time) / dt
             self.branches["noise_time"] += 1
@@ -436,7 +437,7 @@ class FingerOracle:
         self.start.learn(K)
         # all joints have one K of P: one start, one drift, one noise
         self.absorbed += LARGEST_ABSORPTION if own[0] >= 1.0 else min(LARGEST_ABSORPTION, -math.log(1.0 - own[0]))
-        return K
+        return K, own
 
     def _inhibit(self, time: float) -> None:
         """Contact: b_eff and P stay, the rest counts as begun now (fig. 5, t1 = t)."""

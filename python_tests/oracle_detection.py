@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from oracle_drift import DriftWatch
 from oracle_finger import given
 from oracle_rest import RestWatch
 
@@ -35,13 +36,14 @@ def direction_above(v: float, limit: float, key: tuple[Any, ...], decide: Callab
 
 @dataclass
 class Bounds:
-    """Step 4a at one sample, N·m: H, J, E and u [n]; parts [n, m + 3]."""
+    """Step 4a at one sample, N·m: H, J, E, u and V [n]; parts [n, m + 3]."""
 
     H: Array
     J: Array
     E: Array
     u: Array
     parts: Array
+    V: Array
 
 
 class Detector:
@@ -80,6 +82,8 @@ class Detector:
         self.release_time = given(contact, "release_time", None)
         rests = given(contact, "rest", None) is not None
         self.rest = RestWatch(description, R, branches) if rests else None
+        drift = given(contact, "drift", None)
+        self.slow = None if drift is None else DriftWatch(drift, n, branches)
         # state
         self.H = np.zeros(n)
         self.J = np.zeros(n)
@@ -89,7 +93,7 @@ class Detector:
         self.last_exceeded = np.full(n, math.nan)
         self.contact_since: float | None = None  # time of the first sample of the present contact
 
-    def bounds(self, H: Array, parts: Array, change: Array, dt: float) -> Bounds:
+    def bounds(self, H: Array, parts: Array, change: Array, V: Array, dt: float) -> Bounds:
         """Step 4a. H [n]: S_j, what hides in stiction; parts [n, m + 3]: T by its sources; change [n]: T_eff − T'_eff.
 
         change and dt are 0 at the first sample, which leaves J there at 0.
@@ -108,7 +112,7 @@ class Detector:
                 e = sum(weight * part for weight, part in zip(direction, parts[j], strict=True))
                 u[j] += e * e
         u = np.sqrt(u)
-        return Bounds(H, self.J.copy(), self.stuck_share * H + self.jump_share * self.J, u, parts)
+        return Bounds(H, self.J.copy(), self.stuck_share * H + self.jump_share * self.J + V, u, parts, V)
 
     def _directions(self, j: int) -> list[list[float]]:
         if self.uncertainty is None:
@@ -124,6 +128,15 @@ class Detector:
         if self.rest is not None:
             self.rest.take(f0, np.array(x0, dtype=float), mean_force, time, dt, first, decide, out)
 
+    def begin(self, time: float) -> None:
+        """The first sample."""
+        if self.slow is not None:
+            self.slow.start = time
+
+    def drift(self) -> Array:
+        """d [n], N·m; 0 without contact.drift."""
+        return np.zeros(self.n) if self.slow is None else self.slow.drift
+
     def at_rest(self) -> dict[str, Array]:
         """The outputs of contact.rest; none without it."""
         if self.rest is None:
@@ -136,6 +149,8 @@ class Detector:
     ) -> tuple[Array, Array]:  # fmt: skip
         """Step 5: joint_contact [n] and y [n] (0 with the method `threshold`), after `watch`."""
         y = np.zeros(self.n) if self.method == "threshold" else r - self.filtered
+        if self.slow is not None:
+            self.slow.take(r, time, dt)
         found = np.zeros(self.n, dtype=bool)
         loaded = np.zeros(self.n, dtype=bool) if self.rest is None else self.rest.loaded(r, decide, out)
         for j in range(self.n):
@@ -183,6 +198,10 @@ class Detector:
             if by_residual != by_innovation:
                 self.branches["residual_alone" if by_residual else f"{self.method}_alone"] += 1
             exceeds = by_residual or by_innovation
+        if self.slow is not None:
+            by_drift = above("drift", abs(self.slow.drift[j]), self.slow.bound(j, mean_force) + bounds.V[j])
+            self.branches["drift_alone"] += by_drift and not exceeds
+            exceeds = exceeds or by_drift
         if exceeds and not without_ratio:
             self.branches["release_ratio_holds"] += 1
         return exceeds
@@ -213,8 +232,10 @@ class Detector:
         self.branches["update_in_contact"] += 1
         return True
 
-    def update(self, r: Array, dt: float) -> None:
-        """m_j follows r where the bias is updated."""
+    def update(self, r: Array, K: Array, own: Array, time: float, dt: float) -> None:
+        """m_j, s_j and c_j follow r where the bias is updated. K: the gain; own: that without V."""
+        if self.slow is not None:
+            self.slow.follow(r, K, own, bool(self.in_contact.any()), time, dt)
         if self.method != "threshold":
             self.filtered = self.filtered + (1.0 - math.exp(-dt / self.T)) * (r - self.filtered)
 

@@ -46,9 +46,10 @@ class StartFriction:
         effect.turned, effect.whole = (0.0 if effect.stuck else effect.start_left), 2.0 * abs(F)
 
     def turn(
-        self, places: Iterable[tuple[str, Any, Effect]], turned: Places, f: Places, at_joints: Callable[[Places], Array]
-    ) -> None:
-        """turned: zeros to fill. f: what multiplies an F."""
+        self, places: Iterable[tuple[str, Any, Effect]], turned: Places, f: Places,
+        at_joints: Callable[[Places], Array], decide: Callable[..., Any],
+    ) -> None:  # fmt: skip
+        """turned: zeros to fill. f: what multiplies an F. Derivatives hold V: a decision."""
         if self.share is None:
             return
         for kind, at, effect in places:
@@ -57,7 +58,7 @@ class StartFriction:
             if effect.start_left <= LEAST_LEFT:
                 effect.start_left = 0.0
             self.branches["start_turned" if effect.turned > 0.0 else "start_stands"] += 1
-        self.unlearned = self.unlearned + self.share * at_joints(turned * f)
+        self.unlearned = decide(("unlearned",), self.unlearned + self.share * at_joints(turned * f), [])
 
     def variance(self) -> Array:
         """[n] (N·m)², of an even distribution within ±V."""

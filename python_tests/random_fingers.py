@@ -286,6 +286,16 @@ def random_directions(rng: np.random.Generator, n: int, m: int) -> list[Any]:
     return directions
 
 
+def random_drift(rng: np.random.Generator, scale: Array, n: int) -> Description:
+    keys: Description = {"threshold": np.asarray(scale * rng.uniform(0.03, 0.4, n)).tolist()}
+    if rng.random() < 0.5:
+        keys["threshold_per_force"] = np.asarray(rng.uniform(0.0, 1e-3, n)).tolist()
+    for name, (low, high) in {"quick_time": (-2.0, -0.5), "slow_time": (-1.5, 0.5)}.items():
+        if rng.random() < 0.8:
+            keys[name] = float(10.0 ** rng.uniform(low, high))
+    return keys
+
+
 def random_release(rng: np.random.Generator) -> Description:
     """How a contact ends; a key left out, null or at its least for some."""
     keys: Description = {}
@@ -317,6 +327,8 @@ def random_detection(seed: int, finger: Description) -> Description:
         contact["method"] = method
     if method != "threshold":
         contact["innovation"] = random_innovation(rng, method, scale, "friction_bound" in contact)
+    if rng.random() < 0.5:
+        contact["drift"] = random_drift(rng, scale, n)
     if rng.random() < 0.5:
         contact["uncertainty"] = random_directions(rng, n, m)
         if rng.random() < 0.5:

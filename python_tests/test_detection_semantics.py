@@ -133,59 +133,6 @@ def test_entry_load_of_a_slack_tendon_is_none(runner: Runner) -> None:
     close(out["bias_torque"][:, 0] - out["bias_torque"][0, 0], [0.0, added, 0.0, 0.0, 0.0])
 
 
-# --- step 4a: how friction stood at the start
-
-
-DRY_JOINT = {"name": "j", "friction": {"static": 0.1, "coulomb": 0.1, "stribeck_velocity": 0.01}}  # 0.1 N·m
-SMOOTH = [{"effect": "presliding", "joint": 1, "displacement": 0.01}]
-
-
-def at_start(share: float | None, smooth: bool, **contact: Any) -> Any:
-    """A joint with 0.1 N·m of friction whose bias does not move by itself, and hears 1e-4 N·m of noise."""
-    bias = NO_UPDATE | {"noise_std": 1e-4} | ({} if share is None else {"start_share": share})
-    return finger([FREE], [DRY_JOINT], bias=bias, contact={"threshold": [0.02]} | contact,
-                  extensions=SMOOTH if smooth else [])  # fmt: skip
-
-
-@pytest.mark.parametrize("smooth", [True, False], ids=["presliding", "sticks"])
-def test_the_first_stroke_shows_how_friction_stood(runner: Runner, smooth: bool) -> None:
-    """Friction stood against the first motion: τ changes by 2F. The model, which took it as 0, or as standing with the
-    motion where it sticks, is wrong by F or 2F; that is not contact, and the bias has it at once."""
-    wrong = 0.1 if smooth else 0.2
-    force = [10.0, 10.0, 10.0 - 20.0, 10.0 - 20.0, 10.0 - 20.0]
-    speed = [0.0, 0.0, -4.0, -4.0, -4.0]  # 0.5 rad a sample: nothing is left of where it was
-    paper = run(runner, at_start(None, smooth), force, speed)
-    assert contact_of(paper) == [0, 0, 1, 1, 1]
-    close(paper["residual"][2:, 0], -wrong)
-    told = run(runner, at_start(1.0, smooth), force, speed)
-    assert contact_of(told) == [0, 0, 0, 0, 0]
-    close(told["residual"][2, 0], -wrong)
-    gain = wrong**2 / 3.0 / (wrong**2 / 3.0 + 1e-8)
-    close(told["bias_torque"][2, 0] - told["bias_torque"][1, 0], -gain * wrong + (0.0 if smooth else 0.1))
-    left = (1.0 - gain) * wrong  # of V after the update
-    close(told["compensated_torque_std"][2, 0], left / math.sqrt(3.0))
-
-
-def test_a_share_of_the_start_bounds_what_is_learned(runner: Runner) -> None:
-    """With a tenth of the friction open, 0.1 N·m beside the model is contact, and stays."""
-    force, speed = [10.0, 10.0, -10.0, -10.0], [0.0, 0.0, -4.0, -4.0]
-    assert contact_of(run(runner, at_start(0.1, True), force, speed)) == [0, 0, 1, 1]
-
-
-def test_the_start_is_turned_over_once(runner: Runner) -> None:
-    """A push in the second stroke is contact, and one in the first is not."""
-    speed = [0.0, 4.0, -4.0, 4.0]
-    model = np.array([0.0, 0.1, -0.1, 0.1]) / ARM  # N that friction takes, from 0 at the start
-    for at, contact in ((1, [0, 0, 0, 0]), (3, [0, 0, 0, 1])):
-        force = 50.0 + model + 5.0 * (np.arange(4) >= at)
-        assert contact_of(run(runner, at_start(1.0, True), force, speed)) == contact
-
-
-def test_what_moves_at_the_start_leaves_nothing_open(runner: Runner) -> None:
-    out = run(runner, at_start(1.0, False), [10.0, 10.0, 10.0], [4.0, 4.0, 4.0])
-    close(out["compensated_torque_std"], 0.0)
-
-
 def absorbed(bias: float, steps: list[tuple[float, float]]) -> Array:
     """b_eff after each (jump, τ − T): the jump is added, then K_n = 3/(1 + 3 n) of what is left absorbed."""
     found = []

@@ -79,6 +79,8 @@ DETECTION_BRANCHES = {
     "held",
     "update_in_contact",
     "start_turned",
+    "drift_alone",
+    "drift_begins_anew",
     "start_stands",
 }
 
@@ -213,12 +215,14 @@ def test_detection_fingers_have_every_key() -> None:
         seen["jerk_density"] += "jerk_density" in description.get("position_filter", {})
         seen["full hysteresis"] += places["velocity_threshold"].get("hysteresis") == 1.0
     expected = {
-        "velocity_threshold.hysteresis", "bias.forgetting", "bias.entry_load", "bias.start_share", "contact.method", "contact.innovation",
+        "velocity_threshold.hysteresis", "bias.forgetting", "bias.entry_load", "bias.start_share",
+        "contact.method", "contact.innovation",
         "innovation.time", "innovation.threshold", "innovation.threshold_per_force", "innovation.evidence_time",
         "contact.friction_bound", "friction_bound.stuck_share", "friction_bound.jump_share", "friction_bound.jump_time",
         "friction_bound.stuck_time",
         "contact.uncertainty", "contact.uncertainty_level", "contact.deviation", "contact.deviation_per_force",
-        "contact.release_ratio", "contact.hold_time", "contact.release_time", "release_time 0", "release_time null",
+        "contact.drift", "contact.release_ratio", "contact.hold_time", "contact.release_time", "release_time 0",
+        "release_time null",
         "uncertainty null", "extension", "no method", "full hysteresis", "position_filter",
         "jerk_density", *(f"{k} directions" for k in range(5)),
     }  # fmt: skip

@@ -106,7 +106,8 @@ def made_up(seed: int, hours: float = 0.5, forces: tuple[float, ...] = (10.0, 20
             "made up", {"time": time}, np.full(samples, force), np.ones(samples, dtype=bool), np.full(samples, 1 / rate)
         )
         quiet = np.zeros_like(signal, dtype=np.float32)
-        runs.append(FreeRun(part, signal.astype(np.float32), signal.astype(np.float32), quiet, quiet, quiet, quiet))
+        bumps = signal.astype(np.float32)
+        runs.append(FreeRun(part, bumps, bumps, bumps, quiet, quiet, quiet, quiet))
     return runs, cells_of([run.part for run in runs])
 
 

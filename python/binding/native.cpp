@@ -47,7 +47,7 @@ nb::object as_array(std::vector<Number> values, std::vector<std::size_t> shape) 
 }
 
 struct OutputRows {
-  std::vector<double> numbers[6], detection[5], parts;
+  std::vector<double> numbers[6], detection[6], parts;
   std::vector<unsigned char> flags[3], observable;
   std::vector<double> tip_force, tip_std, misfit; /* these and what follows: of fingers with links */
   std::vector<int> contact_link;
@@ -82,7 +82,7 @@ struct OutputRows {
             numbers[5].data(),   flags[0].data(),     flags[1].data(),     flags[2].data(),     detection[0].data(),
             detection[1].data(), detection[2].data(), detection[3].data(), detection[4].data(), wanted(parts),
             wanted(tip_force),   wanted(tip_std),     wanted(observable),  wanted(misfit),      wanted(contact_link),
-            wanted(change),      wanted(at_rest)};
+            wanted(change),      wanted(at_rest),     detection[5].data()};
   }
 };
 

@@ -82,10 +82,10 @@ class ContactTuning(ConstructorArguments):
     strict: too little free motion for the rate is refused; else the tuning is for the rate that it supports.
     innovation_time, jump_time, stuck_time, evidence_time: s, written as such. progress: called with (steps done, all).
 
-    After `tune`: description_ (tuned), bias_, lines_, levels_, bounds_ (by "innovation" and "residual"), deviation_,
-    cells_, runs_, pretensions_, rest_ (None: no rests), held_out_ (alarms, 1/h upper limit), loop_ (alarms of the
-    finger as it runs), rate_ (1/h that it is tuned for), more_minutes_ (missing for the wished rate), allowed_, hours_,
-    forces_ (N, the lowest and the highest recorded mean force), level_raised_, warnings_, seconds_.
+    After `tune`: description_ (tuned), bias_, lines_, levels_, bounds_ (by "residual", "drift" and "innovation"),
+    deviation_, cells_, runs_, pretensions_, rest_ (None: no rests), held_out_ (alarms, 1/h upper limit), loop_ (alarms
+    of the finger as it runs), rate_ (1/h that it is tuned for), more_minutes_ (missing for the wished rate), allowed_,
+    hours_, forces_ (N, the lowest and the highest recorded mean force), level_raised_, warnings_, seconds_.
     """
 
     def __init__(
@@ -224,11 +224,21 @@ class ContactTuning(ConstructorArguments):
         self.levels_["residual"] = above = level_of(behind, self.cells_, second)
         if self.method == "cusum":
             line = evidence_line(fast, line, [run.part for run in self.runs_], self.evidence_time)
+        self._choose_drift(second)
         order, factor = self.cells_.order, above.factor
-        others, held = order[behind.statistic > factor], order[behind.held > factor]
+        drift, drifted = self.lines_["drift"], self.levels_["drift"].factor
+        others = order[(behind.statistic > factor) | (drift.statistic > drifted)]
+        held = order[(behind.held > factor) | (drift.held > drifted)]
         self.lines_["innovation"] = line
         self.levels_["innovation"] = level_of(line, self.cells_, self.allowed_, others, held)
         self.searches_["innovation"] = fast
+
+    def _choose_drift(self, allowed: int) -> None:
+        """The line of `contact.drift`: slow loads, for which friction's jumps and stiction are no excuse."""
+        slow = search_for(self.runs_, self.cells_, "drift", self.rate_)
+        self.lines_["drift"] = line = given_line(slow, [(0.0, 0.0)] * 3, allowed)
+        self.levels_["drift"] = level_of(line, self.cells_, allowed)
+        self.searches_["drift"] = slow
 
     def _tick(self) -> None:
         self._ticks = getattr(self, "_ticks", 0) + 1
@@ -266,7 +276,7 @@ class ContactTuning(ConstructorArguments):
         """The description with everything that was learned."""
         data = own_copy(self._data)
         contact: dict[str, Any] = {**data["contact"], "method": self.method}
-        for key in ("innovation", "threshold", "threshold_per_force"):
+        for key in ("innovation", "threshold", "threshold_per_force", "drift"):
             contact.pop(key, None)
         slow = self.bounds_["residual"]
         contact |= {"threshold": _rounded(slow.base), "threshold_per_force": _rounded(slow.per_force)}
@@ -285,6 +295,8 @@ class ContactTuning(ConstructorArguments):
                 "jump_share": fast.jump_share,
                 "jump_time": self.jump_time,
             }
+            drift = self.bounds_["drift"]
+            contact["drift"] = {"threshold": _rounded(drift.base), "threshold_per_force": _rounded(drift.per_force)}
         contact |= {
             "deviation": _rounded(self.deviation_.base),
             "deviation_per_force": _rounded(self.deviation_.per_force),

@@ -54,13 +54,14 @@ class FreePart:
 class FreeRun:
     """What a finger that never sees contact leaves of a part, all [N, n] and in N·m.
 
-    residual, innovation: r and y. stuck, jump: H and J. known: standard deviation that is known before any tuning, of
-    the bias and of the model's uncertainty; uncertain: u, of the latter alone.
+    residual, innovation, drift: r, y and d. stuck, jump: H and J. known: standard deviation that is known before any
+    tuning, of the bias and of the model's uncertainty; uncertain: u, of the latter alone.
     """
 
     part: FreePart
     residual: Signal
     innovation: Signal
+    drift: Signal
     stuck: Signal
     jump: Signal
     known: Signal
@@ -160,7 +161,7 @@ def run_free(data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int
             plain.restore_state(plain_begin)
             of_bias = _run(plain, part)["compensated_torque_std"]
             uncertain = np.sqrt(np.maximum(known**2 - of_bias**2, 0.0))
-        names = ("residual", "innovation", "stuck_friction", "friction_jump")
+        names = ("residual", "innovation", "drift", "stuck_friction", "friction_jump")
         arrays = [*(found[name] for name in names), known, uncertain]
         runs.append(FreeRun(part, *(values.astype(np.float32) for values in arrays)))
     return runs
@@ -178,6 +179,7 @@ def _open_loop(data: Mapping[str, Any], clock: Clock) -> dict[str, Any]:
         "method": "innovation",
         "threshold": never,
         "innovation": {"time": clock.innovation, "threshold": never},
+        "drift": {"threshold": never},
         "friction_bound": {
             **given,
             "stuck_share": 0.0,

@@ -161,8 +161,8 @@ class Finger:
             [N, n]; those that the kinematics source does not use may be left out.
         parts: with `friction_parts` [N, n, m + 3], N·m, what makes each joint's friction (needs contact.uncertainty).
         Returns [N, n], `slack` [N, m], `contact` [N]; flags are bool. Beyond section 4, as docs/contract-additions.md
-        has them: `compensated_torque_std`, `residual`, `innovation`, `stuck_friction`, `friction_jump`, N·m. With
-        links also `fingertip_force` and `fingertip_force_std` [N, 3] (N, base frame), and [N]
+        has them: `compensated_torque_std`, `residual`, `innovation`, `stuck_friction`, `friction_jump`, `drift`,
+        N·m. With links also `fingertip_force` and `fingertip_force_std` [N, 3] (N, base frame), and [N]
         `fingertip_force_observable`, `fingertip_force_misfit`, `contact_link`. With contact.rest also `contact_change`
         [N, n] (N·m) and `contact_at_rest` [N].
         A later call goes on where this one ended.

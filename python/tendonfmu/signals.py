@@ -8,7 +8,7 @@ FLAGS = ("joint_contact", "contact", "slack")
 
 # beyond the contract (docs/contract-additions.md); the FMU has the first one only
 OPTIONAL_NUMBERS = ("compensated_torque_std",)  # older FMUs have none
-DETECTION = ("compensated_torque_std", "residual", "innovation", "stuck_friction", "friction_jump")
+DETECTION = ("compensated_torque_std", "residual", "innovation", "stuck_friction", "friction_jump", "drift")
 
 # of fingers with links, and of their FMUs
 PLACE = (

@@ -4,6 +4,7 @@
 #define TENDONFMU_CONTACT_DETECTOR_H
 
 #include "contact_at_rest.h"
+#include "contact_drift.h"
 
 /* base_j + per_force_j·mean|f0| */
 HOT_INLINE quad force_dependent(const double* base, const double* per_force, size_t j, double mean_force) {
@@ -64,6 +65,15 @@ HOT_INLINE quad_mask residual_exceeds(const tendonfmu_finger* f, size_t j, quad 
   return quad_greater(quad_abs(quad_load(f->remembered.residual + j)), quad_mul(ratio, bound));
 }
 
+/* lanes that have drifted too far */
+HOT_INLINE quad_mask drift_exceeds(const tendonfmu_finger* f, size_t j, quad ratio, double mean_force) {
+  quad bound = force_dependent(f->derived.drift_threshold, f->derived.drift_per_force, j, mean_force);
+  if (f->derived.settings.has_start_share) {
+    bound = quad_add(bound, quad_load(f->remembered.unlearned + j));
+  }
+  return quad_greater(quad_abs(quad_load(f->remembered.drift + j)), quad_mul(ratio, bound));
+}
+
 /* Into joint_contact, from the residuals; returns whether any joint is in contact. Lanes without a joint have residual
  * and bounds of 0 and are never. */
 HOT_INLINE int detect_contact(tendonfmu_finger* f, double mean_force, double time, double step) {
@@ -77,6 +87,9 @@ HOT_INLINE int detect_contact(tendonfmu_finger* f, double mean_force, double tim
     quad_mask exceeds = residual_exceeds(f, j, ratio, mean_force);
     if (settings->uses_innovation) {
       exceeds = quad_either(exceeds, innovation_exceeds(f, j, ratio, mean_force, step));
+    }
+    if (settings->watches_drift) {
+      exceeds = quad_either(exceeds, drift_exceeds(f, j, ratio, mean_force));
     }
     if (settings->watches_rest) {
       exceeds = quad_either(exceeds, loaded_since_rest(f, j));

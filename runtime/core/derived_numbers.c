@@ -162,6 +162,10 @@ static void derive_detection(derivation* d, const model_item* item) {
     case ITEM_DEVIATION_PER_FORCE: memcpy(to->deviation_per_force, values, bytes); break;
     case ITEM_RELEASE_RATIO: settings->release_ratio = values[0]; break;
     case ITEM_HOLD_TIME: settings->hold_time = values[0]; break;
+    case ITEM_DRIFT_QUICK_TIME: settings->drift_quick_time = values[0]; break;
+    case ITEM_DRIFT_SLOW_TIME: settings->drift_slow_time = values[0]; break;
+    case ITEM_DRIFT_THRESHOLD: memcpy(to->drift_threshold, values, bytes); break;
+    case ITEM_DRIFT_PER_FORCE: memcpy(to->drift_per_force, values, bytes); break;
     default: settings->release_time = values[0]; break;
   }
 }
@@ -279,6 +283,7 @@ void derive_numbers(tendonfmu_finger* finger, int routing_changed) {
                                                .bounds_friction = (options & MODEL_HAS_FRICTION_BOUND) != 0,
                                                .knows_uncertainty = (options & MODEL_HAS_UNCERTAINTY) != 0,
                                                .uses_innovation = (options & MODEL_DETECTS_BY_INNOVATION) != 0,
+                                               .watches_drift = (options & MODEL_HAS_DRIFT) != 0,
                                                .watches_rest = (options & MODEL_HAS_REST) != 0};
   clear_grids(finger);
   model_visit(&finger->shape, derive_item, &d);

@@ -67,6 +67,9 @@ static void lay_out_derived(tendonfmu_finger* f, cursor* c) {
   d->innovation_per_force = take_numbers(c, joints);
   d->deviation = take_numbers(c, joints);
   d->deviation_per_force = take_numbers(c, joints);
+  const size_t drifting = f->shape.options & MODEL_HAS_DRIFT ? joints : 0;
+  d->drift_threshold = take_numbers(c, drifting);
+  d->drift_per_force = take_numbers(c, drifting);
   const size_t resting = f->shape.options & MODEL_HAS_REST ? joints : 0;
   d->rest_threshold = take_numbers(c, resting);
   d->rest_per_force = take_numbers(c, resting);
@@ -104,7 +107,8 @@ static void lay_out_state(tendonfmu_finger* f, cursor* c) {
   const size_t rests = f->shape.options & MODEL_HAS_REST ? 1 : 0;
   const size_t starts = f->shape.options & MODEL_HAS_START_SHARE ? 1 : 0;
   f->state_count = STATE_SCALARS + 17 * joints + 2 * tendons + 6 * slots + 2 * entries + parts + filter +
-                   starts * (slots + joints) + rests * (5 * joints + 5 * tendons) + f->shape.extension_memory;
+                   starts * (slots + joints) + (f->shape.options & MODEL_HAS_DRIFT ? 5 * joints : 0) +
+                   rests * (5 * joints + 5 * tendons) + f->shape.extension_memory;
   f->state = take_numbers(c, f->state_count);
   double* run = f->state;
   s->scalar = part(&run, STATE_SCALARS);
@@ -127,6 +131,11 @@ static void lay_out_state(tendonfmu_finger* f, cursor* c) {
   s->unlearned = part(&run, starts * joints);
   s->part = part(&run, parts);
   s->filter = part(&run, filter);
+  const size_t drifts = f->shape.options & MODEL_HAS_DRIFT ? joints : 0;
+  double** const drift_rows[] = {&s->drift_of_late, &s->drift_quick, &s->drift_slow, &s->learned, &s->drift};
+  for (size_t i = 0; i < sizeof drift_rows / sizeof drift_rows[0]; ++i) {
+    *drift_rows[i] = part(&run, drifts);
+  }
   double** const rest_of_joints[] = {&s->contact_change, &s->rest_tracked, &s->rest_contact, &s->rest_extreme,
                                      &s->carried_load};
   for (size_t i = 0; i < sizeof rest_of_joints / sizeof rest_of_joints[0]; ++i) {

@@ -42,6 +42,8 @@ typedef struct finger_settings {
   double stuck_rate;                         /* 1/T_H, 1/s; < 0: H is that of the sample */
   double uncertainty_level, release_ratio, hold_time;
   double release_time; /* < 0: never */
+  int watches_drift;
+  double drift_quick_time, drift_slow_time; /* s */
   int watches_rest;
   double rest_travel, rest_settle_time, rest_fall_share; /* m, s, 1 */
   double rest_innovation_rate;                           /* 1/T, 1/s; < 0: none */
@@ -90,6 +92,7 @@ typedef struct derived_numbers {
   double* position_variance;                           /* [N] rad², with a position filter only; 1 in spare lanes */
   double *innovation_threshold, *innovation_per_force; /* [N] */
   double *deviation, *deviation_per_force;             /* [N] */
+  double *drift_threshold, *drift_per_force;           /* [N] with contact.drift only */
   double *rest_threshold, *rest_per_force, *rest_creep, *rest_innovation; /* [N] with contact.rest only */
   double* direction;   /* [n × (m + 3) × 4] relative errors, the directions of a joint side by side */
   link_geometry links; /* arrays NULL without links */
@@ -112,6 +115,7 @@ enum {
   STATE_MARKED_AT,       /* s, begin of the rest, or of the wait for one */
   STATE_CONTACT_AT_REST, /* 0 or 1 */
   STATE_RECENT_AT,       /* s, from which on motion counts as recent */
+  STATE_STARTED_AT,      /* s, first sample; with contact.drift, else 0 */
   STATE_SCALARS = 16     /* the rest is 0 and keeps the rows aligned */
 };
 
@@ -161,6 +165,8 @@ typedef struct finger_state {
                                      over, [N] V, N·m; with start_share only */
   double* part;   /* [n × M + 3N] torques of tendons; T_jv0, T_jvf·Σ f_B, T_jq; with uncertainty only */
   double* filter; /* [FILTER_ROWS × N] with a position filter only */
+  /* [N] N·m, with contact.drift only: u, p, s, what the bias has learned since the start, d */
+  double *drift_of_late, *drift_quick, *drift_slow, *learned, *drift;
   /* with contact.rest only */
   double* contact_change; /* [N] c, N·m; 0 outside a rest */
   double* rest_tracked;   /* [N] m, N·m, what y = c − m is taken from; 0 without innovation */

@@ -109,7 +109,7 @@ static void walk_detection(walk* w) {
   const uint32_t innovation = options & MODEL_DETECTS_BY_INNOVATION ? 1 : 0;
   const uint32_t bound = options & MODEL_HAS_FRICTION_BOUND ? 1 : 0, deviation = options & MODEL_HAS_DEVIATION ? n : 0;
   const uint32_t release = options & MODEL_HAS_RELEASE ? 1 : 0, rest = options & MODEL_HAS_REST ? 1 : 0;
-  const uint32_t of_late = options & MODEL_HAS_REST_INNOVATION ? 1 : 0;
+  const uint32_t of_late = options & MODEL_HAS_REST_INNOVATION ? 1 : 0, drift = options & MODEL_HAS_DRIFT ? 1 : 0;
   const item_size before[] = {
       {ITEM_INNOVATION_TIME, innovation},
       {ITEM_INNOVATION_THRESHOLD, n * innovation},
@@ -127,6 +127,10 @@ static void walk_detection(walk* w) {
       {ITEM_RELEASE_RATIO, release},
       {ITEM_HOLD_TIME, release},
       {ITEM_RELEASE_TIME, options & MODEL_HAS_RELEASE_TIME ? 1 : 0},
+      {ITEM_DRIFT_QUICK_TIME, drift},
+      {ITEM_DRIFT_SLOW_TIME, drift},
+      {ITEM_DRIFT_THRESHOLD, n * drift},
+      {ITEM_DRIFT_PER_FORCE, n * drift},
       {ITEM_REST_TRAVEL, rest},
       {ITEM_REST_SETTLE_TIME, rest},
       {ITEM_REST_AVERAGING_TIME, rest},

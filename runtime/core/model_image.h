@@ -60,7 +60,8 @@ enum {
   MODEL_HAS_REST = 1 << 18,
   MODEL_HAS_REST_INNOVATION = 1 << 19, /* beside the bit before */
   MODEL_HAS_START_SHARE = 1 << 20,
-  MODEL_OPTION_BITS = (1 << 21) - 1
+  MODEL_HAS_DRIFT = 1 << 21,
+  MODEL_OPTION_BITS = (1 << 22) - 1
 };
 
 #define MODEL_EDGE_HAS_ANGLES 0x80000000u
@@ -121,7 +122,11 @@ typedef enum model_item_kind {
   ITEM_RELEASE_RATIO,
   ITEM_HOLD_TIME,
   ITEM_RELEASE_TIME,
-  ITEM_REST_TRAVEL, /* contact.rest.… */
+  ITEM_DRIFT_QUICK_TIME, /* contact.drift.… */
+  ITEM_DRIFT_SLOW_TIME,
+  ITEM_DRIFT_THRESHOLD, /* n */
+  ITEM_DRIFT_PER_FORCE, /* n */
+  ITEM_REST_TRAVEL,     /* contact.rest.… */
   ITEM_REST_SETTLE_TIME,
   ITEM_REST_AVERAGING_TIME,
   ITEM_REST_THRESHOLD, /* n */

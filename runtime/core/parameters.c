@@ -89,6 +89,10 @@ static void path_of_finger(message_line path, const model_item* item, uint32_t o
       [ITEM_RELEASE_RATIO] = "contact.release_ratio",
       [ITEM_HOLD_TIME] = "contact.hold_time",
       [ITEM_RELEASE_TIME] = "contact.release_time",
+      [ITEM_DRIFT_QUICK_TIME] = "contact.drift.quick_time",
+      [ITEM_DRIFT_SLOW_TIME] = "contact.drift.slow_time",
+      [ITEM_DRIFT_THRESHOLD] = "contact.drift.threshold",
+      [ITEM_DRIFT_PER_FORCE] = "contact.drift.threshold_per_force",
       [ITEM_REST_TRAVEL] = "contact.rest.travel",
       [ITEM_REST_SETTLE_TIME] = "contact.rest.settle_time",
       [ITEM_REST_AVERAGING_TIME] = "contact.rest.averaging_time",
@@ -108,6 +112,8 @@ static void path_of_finger(message_line path, const model_item* item, uint32_t o
     case ITEM_INNOVATION_PER_FORCE:
     case ITEM_DEVIATION:
     case ITEM_DEVIATION_PER_FORCE:
+    case ITEM_DRIFT_THRESHOLD:
+    case ITEM_DRIFT_PER_FORCE:
     case ITEM_REST_THRESHOLD:
     case ITEM_REST_PER_FORCE:
     case ITEM_REST_CREEP:
@@ -250,6 +256,10 @@ parameter_range parameter_range_of(const model_item* item, uint32_t index) {
       [ITEM_RELEASE_RATIO] = {"1", 0.0, 1.0, 1, 1},
       [ITEM_HOLD_TIME] = {"s", 0.0, LARGE, 0, 1},
       [ITEM_RELEASE_TIME] = {"s", 0.0, LARGE, 0, 1},
+      [ITEM_DRIFT_QUICK_TIME] = {"s", 0.0, LARGE, 1, 1},
+      [ITEM_DRIFT_SLOW_TIME] = {"s", 0.0, LARGE, 1, 1},
+      [ITEM_DRIFT_THRESHOLD] = {"N.m", 0.0, LARGE, 0, 1},
+      [ITEM_DRIFT_PER_FORCE] = {"m", 0.0, LARGE, 0, 1},
       [ITEM_REST_TRAVEL] = {"m", 0.0, LARGE, 0, 1},
       [ITEM_REST_SETTLE_TIME] = {"s", 0.0, LARGE, 0, 1},
       [ITEM_REST_AVERAGING_TIME] = {"s", 0.0, LARGE, 0, 1},

@@ -126,6 +126,15 @@ static void give_parts(double* to, const tendonfmu_finger* f, size_t row) {
   }
 }
 
+/* 0 without contact.drift */
+static void give_drift(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs, size_t row) {
+  if (finger->derived.settings.watches_drift) {
+    give_numbers(outputs->drift, finger->remembered.drift, finger->joints, row);
+  } else if (outputs->drift) {
+    memset(outputs->drift + row * finger->joints, 0, finger->joints * sizeof(double));
+  }
+}
+
 /* contact at rest; 0 without contact.rest */
 static void give_rest(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs, size_t row) {
   const finger_state* s = &finger->remembered;
@@ -172,6 +181,7 @@ void samples_give_outputs(const tendonfmu_finger* finger, const tendonfmu_output
   give_numbers(outputs->innovation, s->innovation, n, row);
   give_numbers(outputs->stuck_friction, s->stuck_friction, n, row);
   give_numbers(outputs->friction_jump, s->friction_jump, n, row);
+  give_drift(finger, outputs, row);
   give_parts(outputs->friction_parts, finger, row);
   give_place(finger, outputs, row);
   give_rest(finger, outputs, row);

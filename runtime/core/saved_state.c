@@ -83,6 +83,7 @@ static int rows_are_sound(const tendonfmu_finger* f, const unsigned char* state,
 static int scalars_are_sound(const tendonfmu_finger* f, const unsigned char* state) {
   const double* s = f->remembered.scalar;
   const double rests = f->derived.settings.watches_rest ? 1.0 : 0.0;
+  const double drifts = f->derived.settings.watches_drift ? 1.0 : 0.0;
   const row_rule rules[] = {
       {s + STATE_INITIALISED, 1, ROW_WITHOUT_LANES, 0.0, 1.0, 1, 0},
       {s + STATE_SOURCE, 1, ROW_WITHOUT_LANES, 1.0, 3.0, 1, 0},
@@ -96,7 +97,8 @@ static int scalars_are_sound(const tendonfmu_finger* f, const unsigned char* sta
       {s + STATE_MARKED_AT, 1, ROW_WITHOUT_LANES, -LARGEST_TIME * rests, LARGEST_TIME * rests, 0, 0},
       {s + STATE_CONTACT_AT_REST, 1, ROW_WITHOUT_LANES, 0.0, rests, 1, 0},
       {s + STATE_RECENT_AT, 1, ROW_WITHOUT_LANES, -LARGEST_TIME * rests, LARGEST_TIME * rests, 0, 0},
-      {s + STATE_RECENT_AT + 1, STATE_SCALARS - STATE_RECENT_AT - 1, ROW_WITHOUT_LANES, 0.0, 0.0, 0, 0},
+      {s + STATE_STARTED_AT, 1, ROW_WITHOUT_LANES, -LARGEST_TIME * drifts, LARGEST_TIME * drifts, 0, 0},
+      {s + STATE_STARTED_AT + 1, STATE_SCALARS - STATE_STARTED_AT - 1, ROW_WITHOUT_LANES, 0.0, 0.0, 0, 0},
   };
   return rows_are_sound(f, state, rules, sizeof rules / sizeof rules[0]);
 }
@@ -142,6 +144,8 @@ static int slots_are_sound(const tendonfmu_finger* f, const unsigned char* state
       {s->last_stuck, slots, ROW_OF_SLOTS, -LARGEST_TIME, LARGEST_TIME, 0, 1},
       {s->entry_edge, rest, ROW_WITHOUT_LANES, -DBL_MAX, DBL_MAX, 0, 0}, /* entries, start, parts, filter, rest, … */
       {s->start_left, starts * slots, ROW_OF_SLOTS, 0.0, 1.0, 0, 1},
+      {s->drift_of_late, f->derived.settings.watches_drift ? 5 * f->joint_lanes : 0, ROW_WITHOUT_LANES,
+       -2.0 * LARGEST_SUM, 2.0 * LARGEST_SUM, 0, 0}, /* and the four rows after it */
       {s->unlearned, starts * f->joint_lanes, ROW_OF_JOINTS, 0.0, LARGEST_SUM, 0, 0},
   };
   return rows_are_sound(f, state, rules, sizeof rules / sizeof rules[0]);

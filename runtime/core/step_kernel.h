@@ -190,6 +190,7 @@ HOT_INLINE void begin_tracking(tendonfmu_finger* f, double time, double mean_for
   if (!settings->has_initial_torque) {
     copy_row(s->friction, s->torque, f->joint_lanes); /* to the last bit */
   }
+  s->scalar[STATE_STARTED_AT] = settings->watches_drift ? time : 0.0;
   s->scalar[STATE_INITIALISED] = 1.0;
   s->scalar[STATE_FIRST_SAMPLE] = 1.0;
   s->scalar[STATE_CONTACT] = 0.0;
@@ -211,10 +212,17 @@ HOT_INLINE void track_sample(tendonfmu_finger* f, double time, double step, doub
   if (settings->watches_rest) {
     watch_rest(f, mean_force, time, step);
   }
+  if (settings->watches_drift) {
+    watch_drift(f, time, step);
+  }
   const int contact = detect_contact(f, mean_force, time, step);
   s->scalar[STATE_ABSORBED_BEFORE] = s->scalar[STATE_ABSORBED];
   if (bias_is_updated(f, contact, time)) {
-    track_bias(f, step, noise_variance(settings, mean_force, scale));
+    const double noise = noise_variance(settings, mean_force, scale);
+    if (settings->watches_drift) {
+      follow_drift(f, contact, time, step, noise);
+    }
+    track_bias(f, step, noise);
     if (settings->uses_innovation) {
       follow_residual(f, step);
     }

@@ -26,8 +26,8 @@ HOT_INLINE void begin_start_left(tendonfmu_finger* f) {
   }
 }
 
-/* By how much a slot's effect may stand otherwise than the model took it: |F| of what slides, which begins at ζ = 0; else
- * twice that of the sample, in which it moves, since b of a first exit took it as standing that way already. */
+/* By how much a slot's effect may stand otherwise than the model took it: |F| of what slides, which begins at ζ = 0;
+ * else twice that of the sample, in which it moves, since b of a first exit took it as standing that way already. */
 HOT_INLINE quad whole_friction(const tendonfmu_finger* f, const double* friction, const double* whole, size_t slot,
                                size_t at) {
   const quad sample = quad_abs(quad_load(friction + at)), of_sample = quad_add(sample, sample);

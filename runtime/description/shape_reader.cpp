@@ -257,10 +257,20 @@ std::uint32_t read_rest(const json_node& contact, std::uint32_t joints) {
   return unsigned{MODEL_HAS_REST} | unsigned{MODEL_HAS_REST_INNOVATION};
 }
 
+std::uint32_t read_drift(const json_node& contact, std::uint32_t joints) {
+  const json_node drift = contact.member("drift");
+  if (drift.absent()) {
+    return 0u;
+  }
+  drift.expect_keys({"quick_time", "slow_time", "threshold", "threshold_per_force"});
+  check_thresholds(drift, joints);
+  return MODEL_HAS_DRIFT;
+}
+
 std::uint32_t read_contact_options(const json_node& contact, std::uint32_t joints, std::uint32_t tendons) {
   contact.expect_keys({"threshold", "threshold_per_force", "method", "innovation", "friction_bound", "uncertainty",
                        "uncertainty_level", "deviation", "deviation_per_force", "release_ratio", "hold_time",
-                       "release_time", "rest"});
+                       "release_time", "drift", "rest"});
   check_thresholds(contact, joints);
   const json_node bound = contact.member("friction_bound");
   if (!bound.absent()) {
@@ -272,7 +282,8 @@ std::uint32_t read_contact_options(const json_node& contact, std::uint32_t joint
          given(contact, {"friction_bound"}, MODEL_HAS_FRICTION_BOUND) |
          given(contact, {"deviation", "deviation_per_force"}, MODEL_HAS_DEVIATION) |
          given(contact, {"release_ratio", "hold_time"}, MODEL_HAS_RELEASE) |
-         given(contact, {"release_time"}, MODEL_HAS_RELEASE_TIME) | read_rest(contact, joints);
+         given(contact, {"release_time"}, MODEL_HAS_RELEASE_TIME) | read_drift(contact, joints) |
+         read_rest(contact, joints);
 }
 
 std::uint32_t read_position_filter(const json_node& filter, std::uint32_t joints) {

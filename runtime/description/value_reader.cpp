@@ -32,6 +32,7 @@ std::optional<double> default_value(const model_item& item, std::uint32_t offset
     case ITEM_DEVIATION_PER_FORCE:
     case ITEM_HOLD_TIME:
     case ITEM_LINK_OFFSET:
+    case ITEM_DRIFT_PER_FORCE:
     case ITEM_REST_PER_FORCE:
     case ITEM_REST_CREEP:
     case ITEM_UNCERTAINTY: return 0.0; /* joints with fewer directions than others */
@@ -40,6 +41,8 @@ std::optional<double> default_value(const model_item& item, std::uint32_t offset
       return 1.0; /* a hand: least friction error on two families of fingers, docs/contract-additions.md */
     case ITEM_UNCERTAINTY_LEVEL: return 3.0;
     case ITEM_RELEASE_RATIO: return 1.0;
+    case ITEM_DRIFT_QUICK_TIME: return 0.3;     /* longer than a stroke's edge, shorter than a slow load */
+    case ITEM_DRIFT_SLOW_TIME: return 10.0;     /* the slowest load that it is for */
     case ITEM_REST_SETTLE_TIME: return 0.3;     /* a servo's ringing and most of what relaxes after a stop */
     case ITEM_REST_AVERAGING_TIME: return 0.03; /* noise falls, and a push is late by no more than a touch takes */
     case ITEM_REST_FALL_SHARE:

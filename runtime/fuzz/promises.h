@@ -41,7 +41,7 @@ struct Outputs {
         joints(samples * tendonfmu_joint_count(finger)),
         tendons(samples * tendonfmu_tendon_count(finger)),
         last_link(static_cast<int>(tendonfmu_joint_count(finger))),
-        real(11 * joints + 7 * samples + joints * (tendonfmu_tendon_count(finger) + 3)),
+        real(12 * joints + 7 * samples + joints * (tendonfmu_tendon_count(finger) + 3)),
         flags(joints + 2 * samples + tendons),
         links(samples) {}
 
@@ -50,7 +50,7 @@ struct Outputs {
     double* r = real.data();
     for (double** row :
          {&v.compensated_torque, &v.joint_torque, &v.friction_torque, &v.bias_torque, &v.joint_angle, &v.joint_speed,
-          &v.compensated_torque_std, &v.residual, &v.innovation, &v.stuck_friction, &v.friction_jump}) {
+          &v.compensated_torque_std, &v.residual, &v.innovation, &v.stuck_friction, &v.friction_jump, &v.drift}) {
       *row = r;
       r += joints;
     }

@@ -134,6 +134,7 @@ typedef struct tendonfmu_outputs {
   /* of fingers with contact.rest, else 0 */
   double* contact_change;         /* [n] N·m   change of the joint torque since the motors came to rest; 0 in motion */
   unsigned char* contact_at_rest; /* [1]       a change of some joint exceeds its bound */
+  double* drift;                  /* [n] N·m   d, how far a slow load may have come; 0 without contact.drift */
 } tendonfmu_outputs;
 
 /* Chooses where joint angles and velocities come from. Default 1. Before tendonfmu_initialise() only. */

@@ -49,7 +49,8 @@ inline std::string every_key() {
     "friction_bound": {"stuck_share": 0.4, "stuck_time": 0.03, "jump_share": 0.5, "jump_time": 0.05},
     "uncertainty": [[[0.1, 0.05, -0.1, 0.2, 0.3, 0.1], [0, 0.1, 0, 0, 0, 0.2]], [[0.1, 0.1, 0.1, 0.1, 0, 0]]],
     "uncertainty_level": 2, "deviation": [0.002, 0.003], "deviation_per_force": [1e-5, 2e-5],
-    "release_ratio": 0.6, "hold_time": 0.02, "release_time": 0.15, )");
+    "release_ratio": 0.6, "hold_time": 0.02, "release_time": 0.15,
+    "drift": {"quick_time": 0.05, "slow_time": 0.4, "threshold": [0.05, 0.04], "threshold_per_force": [1e-4, 2e-4]}, )");
   put("\"name\": \"test\",", R"("links": [{"axis": [0, 0, 2]}, {"axis": [0, 1, 0.2], "offset": [0.05, 0, 0]}],
     "tip": [0.03, 0, 0.004],)");
   return text;
@@ -136,13 +137,13 @@ struct Motion {
 // Room for the outputs of a run.
 struct Outputs {
   std::vector<double> compensated, torque, friction, bias, angle, speed;
-  std::vector<double> deviation, residual, innovation, stuck, jump, parts, tip_force, tip_std, misfit;
+  std::vector<double> deviation, residual, innovation, stuck, jump, drift, parts, tip_force, tip_std, misfit;
   std::vector<unsigned char> joint_contact, contact, slack, observable;
   std::vector<int> link;
 
   explicit Outputs(std::size_t samples) {
-    for (auto* row :
-         {&compensated, &torque, &friction, &bias, &angle, &speed, &deviation, &residual, &innovation, &stuck, &jump}) {
+    for (auto* row : {&compensated, &torque, &friction, &bias, &angle, &speed, &deviation, &residual, &innovation,
+                      &stuck, &jump, &drift}) {
       row->assign(samples * joints, NAN);
     }
     parts.assign(samples * joints * (tendons + 3), NAN);
@@ -170,6 +171,7 @@ struct Outputs {
     outputs.innovation = innovation.data();
     outputs.stuck_friction = stuck.data();
     outputs.friction_jump = jump.data();
+    outputs.drift = drift.data();
     outputs.friction_parts = parts.data();
     outputs.fingertip_force = tip_force.data();
     outputs.fingertip_force_std = tip_std.data();
@@ -182,8 +184,8 @@ struct Outputs {
     return compensated == o.compensated && torque == o.torque && friction == o.friction && bias == o.bias &&
            angle == o.angle && speed == o.speed && joint_contact == o.joint_contact && contact == o.contact &&
            slack == o.slack && deviation == o.deviation && residual == o.residual && innovation == o.innovation &&
-           stuck == o.stuck && jump == o.jump && parts == o.parts && tip_force == o.tip_force && tip_std == o.tip_std &&
-           misfit == o.misfit && observable == o.observable && link == o.link;
+           stuck == o.stuck && jump == o.jump && drift == o.drift && parts == o.parts && tip_force == o.tip_force &&
+           tip_std == o.tip_std && misfit == o.misfit && observable == o.observable && link == o.link;
   }
 };
 

@@ -1,0 +1,81 @@
+/* Contact that rises slowly: what the modelled friction leaves drifts away from where it was
+ * (docs/contract-additions.md, contact.drift). */
+#ifndef TENDONFMU_CONTACT_DRIFT_H
+#define TENDONFMU_CONTACT_DRIFT_H
+
+#include "bias_tracker.h"
+
+#define DRIFT_OF_LATE 0.1 /* of T_q: the time of the mean u */
+
+/* 1 − exp(−Δt/min(T, time since the start)) */
+HOT_INLINE quad mean_share(double time_constant, double since_start, double step) {
+  return quad_set(law_one_minus_exponential(step / (since_start < time_constant ? since_start : time_constant)));
+}
+
+/* e = r + c, four joints: what friction leaves, what the bias has learned since the start put back */
+HOT_INLINE quad left_by_friction(const tendonfmu_finger* f, size_t j) {
+  return quad_add(quad_load(f->remembered.residual + j), quad_load(f->remembered.learned + j));
+}
+
+/* a mean that goes a share of the way to a value */
+HOT_INLINE quad approach(double* mean, quad value, quad share) {
+  const quad before = quad_load(mean), after = quad_add(before, quad_mul(share, quad_sub(value, before)));
+  quad_store(mean, after);
+  return after;
+}
+
+/* the smaller of two numbers of one sign, else 0 */
+HOT_INLINE quad common_part(quad a, quad b) {
+  const quad_mask same = quad_greater(quad_mul(a, b), quad_set(0.0));
+  return quad_keep(same, quad_with_sign(quad_min(quad_abs(a), quad_abs(b)), a));
+}
+
+/* u and p follow e; d is what p − s and u − s have in common: it ends as the load does, and single samples are no load.
+ * Before contact is decided. */
+HOT_INLINE void watch_drift(tendonfmu_finger* f, double time, double step) {
+  const finger_state* s = &f->remembered;
+  const double quick_time = f->derived.settings.drift_quick_time, since_start = time - s->scalar[STATE_STARTED_AT];
+  const quad share = mean_share(quick_time, since_start, step);
+  const quad share_of_late = mean_share(quick_time * DRIFT_OF_LATE, since_start, step);
+  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+    const quad left = left_by_friction(f, j), slow = quad_load(s->drift_slow + j);
+    const quad of_late = approach(s->drift_of_late + j, left, share_of_late);
+    const quad quick = approach(s->drift_quick + j, left, share);
+    quad_store(s->drift + j, common_part(quad_sub(quick, slow), quad_sub(of_late, slow)));
+  }
+}
+
+/* What the bias learns in this update of how friction stood at the start: no drift. Four joints. */
+HOT_INLINE quad learned_of_start(const tendonfmu_finger* f, size_t j, quad predicted, quad own_gain, quad noise) {
+  const quad whole = kalman_gain(with_unlearned(f, j, predicted), noise);
+  return quad_mul(quad_sub(whole, own_gain), quad_load(f->remembered.residual + j));
+}
+
+/* s and c follow, before the bias is updated; in a contact that has lasted too long s begins anew at p */
+HOT_INLINE void follow_drift(tendonfmu_finger* f, int contact, double time, double step, double noise) {
+  const finger_state* s = &f->remembered;
+  const finger_settings* settings = &f->derived.settings;
+  const double since_start = time - s->scalar[STATE_STARTED_AT];
+  const quad drift_variance = quad_set(settings->drift_variance * step), noise_now = quad_set(noise);
+  const quad quick_share = mean_share(settings->drift_quick_time, since_start, step);
+  const quad slow_share = mean_share(settings->drift_slow_time, since_start, step);
+  const quad share_of_late = mean_share(settings->drift_quick_time * DRIFT_OF_LATE, since_start, step);
+  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+    const quad predicted = quad_add(quad_load(s->variance + j), drift_variance);
+    const quad gain = kalman_gain(predicted, noise_now), learned = quad_mul(gain, quad_load(s->residual + j));
+    quad left = left_by_friction(f, j), quick = quad_load(s->drift_quick + j);
+    if (settings->has_start_share) {
+      const quad of_start = learned_of_start(f, j, predicted, gain, noise_now);
+      left = quad_sub(left, of_start);
+      quick = quad_sub(quick, quad_mul(quick_share, of_start));
+      quad_store(s->drift_quick + j, quick);
+      const quad of_late = quad_load(s->drift_of_late + j);
+      quad_store(s->drift_of_late + j, quad_sub(of_late, quad_mul(share_of_late, of_start)));
+    }
+    approach(s->drift_slow + j, contact ? quick : left, contact ? quad_set(1.0) : slow_share);
+    const quad sum = quad_add(quad_load(s->learned + j), learned);
+    quad_store(s->learned + j, quad_with_sign(quad_min(quad_abs(sum), quad_set(LARGEST_SUM)), sum));
+  }
+}
+
+#endif
