@@ -245,14 +245,15 @@ class FingerOracle:
         for (kind, at, effect), rows in zip(self.places, self.grips, strict=True):
             velocity, angle, key = self._seen_by(kind, at, q, v, x_dot)
             factor = self.extensions.factor(rows, abs(velocity), time)
-            displacement = self.extensions.slides(rows, effect.threshold)
-            if displacement is not None:
+            if (displacement := self.extensions.slides(rows, effect.threshold)) is not None:
                 travel = self._seen_by(kind, at, q, *self.travelled)[0]
                 taken = self._slide(effect, displacement, velocity, angle, travel, key), 0.0
                 whole = abs(effect.value(self.extensions.side_of(effect, key), abs(velocity), angle))
                 self.start.slides(effect, travel, displacement, factor * whole, first)
                 direction = direction_above(velocity, effect.limit(self.hysteresis), key, decide, out)
                 effect.side, effect.rests = direction or effect.side, direction == 0
+                if effect.rests and self.detector.bounds_presliding:
+                    getattr(hidden, kind)[at] = effect.whole
             else:
                 taken = self._take_effect(effect, velocity, angle, time, first, key, decide, out)
                 self.start.sticks(effect, factor * taken[0], first)

@@ -71,6 +71,7 @@ class Detector:
         self.friction_bound = given(contact, "friction_bound", None)
         self.stuck_share = float(given(self.friction_bound, "stuck_share", 0.0))
         self.jump_share = float(given(self.friction_bound, "jump_share", 0.0))
+        self.bounds_presliding = bool(given(self.friction_bound, "stuck_presliding", False))
         self.jump_time = float(given(self.friction_bound, "jump_time", 0.06))
         self.stuck_time = float(given(self.friction_bound, "stuck_time", 0.0))
         self.uncertainty = given(contact, "uncertainty", None)

@@ -322,6 +322,8 @@ def random_detection(seed: int, finger: Description) -> Description:
         for key, most in (("stuck_share", 1.0), ("stuck_time", 0.2), ("jump_share", 0.5), ("jump_time", 0.2)):
             if rng.random() < 0.8:
                 contact["friction_bound"][key] = rng.uniform(0.01, most)
+        if rng.random() < 0.5:
+            contact["friction_bound"]["stuck_presliding"] = bool(rng.random() < 0.8)
     method = str(rng.choice(["threshold", "innovation", "cusum"], p=[0.3, 0.35, 0.35]))
     if method != "threshold" or rng.random() < 0.5:
         contact["method"] = method

@@ -46,6 +46,7 @@ METHODS = ("innovation", "cusum", "threshold")
 INNOVATION_TIME = 0.05  # s, T
 JUMP_TIME = 0.06  # s, T_J
 STUCK_TIME = 0.25  # s, T_H
+STUCK_TIME_PRESLIDING = 0.06  # s, where presliding says how friction turns over after break-away
 EVIDENCE_TIME = 0.02  # s, τ_e
 RELEASE = {"release_ratio": 1.0, "hold_time": 0.05}  # 1, s
 RELEASE_TIME = 2.0  # s
@@ -80,7 +81,8 @@ class ContactTuning(ConstructorArguments):
     release_time: s in contact after which the bias learns again; math.inf: never.
     kinematics: 1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
     strict: too little free motion for the rate is refused; else the tuning is for the rate that it supports.
-    innovation_time, jump_time, stuck_time, evidence_time: s, written as such. progress: called with (steps done, all).
+    innovation_time, jump_time, stuck_time, evidence_time: s, written as such; stuck_time None: by whether it has
+        presliding. progress: called with (steps done, all).
 
     After `tune`: description_ (tuned), bias_, lines_, levels_, bounds_ (by "residual", "drift" and "innovation"),
     deviation_, cells_, runs_, pretensions_, rest_ (None: no rests), held_out_ (alarms, 1/h upper limit), loop_ (alarms
@@ -101,7 +103,7 @@ class ContactTuning(ConstructorArguments):
         strict: bool = False,
         innovation_time: float = INNOVATION_TIME,
         jump_time: float = JUMP_TIME,
-        stuck_time: float = STUCK_TIME,
+        stuck_time: float | None = None,
         evidence_time: float = EVIDENCE_TIME,
         progress: Callable[[int, int], None] | None = None,
     ) -> None:
@@ -153,7 +155,7 @@ class ContactTuning(ConstructorArguments):
             (self.kinematics in (1, 2, 3), "kinematics", "1, 2 or 3"),
             (0 < self.innovation_time <= 100, "innovation_time", "above 0 and at most 100 s"),
             (0 < self.jump_time <= 100, "jump_time", "above 0 and at most 100 s"),
-            (0 <= self.stuck_time <= 100, "stuck_time", "0 to 100 s"),
+            (self.stuck_time is None or 0 <= self.stuck_time <= 100, "stuck_time", "0 to 100 s"),
             (0 < self.evidence_time <= 100, "evidence_time", "above 0 and at most 100 s"),
         )
         for sound, name, expectation in checks:
@@ -187,7 +189,7 @@ class ContactTuning(ConstructorArguments):
     def _run(self, parts: Sequence[FreePart]) -> None:
         """The bias, and runs with it: residuals depend on the bias, its noise on the residuals."""
         given = self.start_.data["contact"].get("friction_bound") or {}
-        jump, stuck = self.jump_time, self.stuck_time
+        jump, stuck = self.jump_time, self._stuck_time()
         if self.method == "threshold":  # whose friction bound stays as it is
             jump, stuck = float(given.get("jump_time") or jump), float(given.get("stuck_time") or 0.0)
         clock = Clock(self.innovation_time, jump, stuck)
@@ -195,12 +197,23 @@ class ContactTuning(ConstructorArguments):
         bias = self.start_.data.get("bias") or {}
         start = START_SHARE if bias.get("start_share") is None else bias["start_share"]
         data = {**self.start_.data, "bias": {**bias, "start_share": start}}
+        if self.method != "threshold" and self._slides():
+            data["contact"] = {**data["contact"], "friction_bound": {**given, "stuck_presliding": True}}
         for _ in range(2):
             self.runs_: list[FreeRun] = run_free(data, parts, self.kinematics, clock)
             self.bias_: BiasNoise = bias_noise(data, self.runs_, self.cells_, time)
             data = {**data, "bias": {**(data.get("bias") or {}), **self.bias_.keys()}}
         self.runs_ = run_free(data, parts, self.kinematics, clock)
         self._data = data
+
+    def _slides(self) -> bool:
+        return any(row["effect"] == "presliding" for row in self.start_.data.get("extensions") or [])
+
+    def _stuck_time(self) -> float:
+        """s, T_H."""
+        if self.stuck_time is not None:
+            return self.stuck_time
+        return STUCK_TIME_PRESLIDING if self._slides() else STUCK_TIME
 
     def _choose(self) -> None:
         """Lines of `contact.innovation` and `contact.threshold`, and their levels."""
@@ -291,7 +304,7 @@ class ContactTuning(ConstructorArguments):
             contact["friction_bound"] = {
                 **(contact.get("friction_bound") or {}),
                 "stuck_share": fast.stuck_share,
-                "stuck_time": self.stuck_time,
+                "stuck_time": self._stuck_time(),
                 "jump_share": fast.jump_share,
                 "jump_time": self.jump_time,
             }

@@ -281,6 +281,7 @@ void derive_numbers(tendonfmu_finger* finger, int routing_changed) {
                                                .remembers_entry_load = (options & MODEL_REMEMBERS_ENTRY_LOAD) != 0,
                                                .filters_position = (options & MODEL_HAS_POSITION_FILTER) != 0,
                                                .bounds_friction = (options & MODEL_HAS_FRICTION_BOUND) != 0,
+                                               .bounds_presliding = (options & MODEL_BOUNDS_PRESLIDING) != 0,
                                                .knows_uncertainty = (options & MODEL_HAS_UNCERTAINTY) != 0,
                                                .uses_innovation = (options & MODEL_DETECTS_BY_INNOVATION) != 0,
                                                .watches_drift = (options & MODEL_HAS_DRIFT) != 0,

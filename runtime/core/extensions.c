@@ -295,6 +295,12 @@ static slot_values values_of(const tendonfmu_finger* f, size_t slot) {
   return (slot_values){{s->edge + slot, slot >= f->tendon_lanes ? s->pulley + slot : NULL}, {stuck, other_stuck}};
 }
 
+/* by step 2, hysteresis included */
+static int slot_moves(const tendonfmu_finger* f, size_t slot, int at_joint, double speed) {
+  const finger_scratch* s = &f->scratch;
+  return speed > (f->remembered.moving[slot] > 0.5 ? s->stop_below : s->start_above)[at_joint];
+}
+
 static void slide(tendonfmu_finger* f, size_t slot, const slot_values* at) {
   const derived_numbers* d = &f->derived;
   const size_t joint_row = f->joints * f->tendon_lanes;
@@ -312,7 +318,9 @@ static void slide(tendonfmu_finger* f, size_t slot, const slot_values* at) {
     *at->friction[1] = share * second;
     s->whole_pulley[slot] = others * second;
   }
-  *at->stuck[0] = *at->stuck[1] = 0.0;
+  const int stands = d->settings.bounds_presliding && !slot_moves(f, slot, own, speed);
+  *at->stuck[0] = stands ? s->whole_edge[slot] : 0.0;
+  *at->stuck[1] = stands && at->friction[1] ? s->whole_pulley[slot] : 0.0;
 }
 
 void grip_friction(tendonfmu_finger* f) {

@@ -35,7 +35,7 @@ typedef struct finger_settings {
   double jerk_density; /* rad²/s⁵ */
   int forgets_by_absorption, remembers_entry_load;
   /* the detector */
-  int bounds_friction, knows_uncertainty, uses_innovation;
+  int bounds_friction, bounds_presliding, knows_uncertainty, uses_innovation;
   double innovation_time;
   double evidence_time;                      /* < 0: not by CUSUM */
   double stuck_share, jump_share, jump_rate; /* jump_rate: 1/T_J, 1/s */

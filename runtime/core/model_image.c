@@ -252,7 +252,8 @@ static int check_options(const model_shape* shape) {
   const uint32_t options = shape->options, directions = model_direction_count(shape);
   const int cusum = (options & MODEL_DETECTS_BY_CUSUM) != 0, innovation = (options & MODEL_DETECTS_BY_INNOVATION) != 0;
   const int uncertain = (options & MODEL_HAS_UNCERTAINTY) != 0;
-  const int alone = (options & MODEL_HAS_REST_INNOVATION) && !(options & MODEL_HAS_REST);
+  const int alone = ((options & MODEL_HAS_REST_INNOVATION) && !(options & MODEL_HAS_REST)) ||
+                    ((options & MODEL_BOUNDS_PRESLIDING) && !(options & MODEL_HAS_FRICTION_BOUND));
   return directions > MODEL_MAX_DIRECTIONS || (directions && !uncertain) || (cusum && !innovation) || alone ? -1 : 0;
 }
 

@@ -61,7 +61,8 @@ enum {
   MODEL_HAS_REST_INNOVATION = 1 << 19, /* beside the bit before */
   MODEL_HAS_START_SHARE = 1 << 20,
   MODEL_HAS_DRIFT = 1 << 21,
-  MODEL_OPTION_BITS = (1 << 22) - 1
+  MODEL_BOUNDS_PRESLIDING = 1 << 22, /* beside MODEL_HAS_FRICTION_BOUND */
+  MODEL_OPTION_BITS = (1 << 23) - 1
 };
 
 #define MODEL_EDGE_HAS_ANGLES 0x80000000u

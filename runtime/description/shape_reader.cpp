@@ -267,19 +267,25 @@ std::uint32_t read_drift(const json_node& contact, std::uint32_t joints) {
   return MODEL_HAS_DRIFT;
 }
 
+std::uint32_t read_friction_bound(const json_node& contact) {
+  const json_node bound = contact.member("friction_bound");
+  if (bound.absent()) {
+    return 0u;
+  }
+  bound.expect_keys({"stuck_share", "stuck_time", "stuck_presliding", "jump_share", "jump_time"});
+  const json_node presliding = bound.member("stuck_presliding");
+  const bool counts = !presliding.absent() && presliding.boolean();
+  return unsigned{MODEL_HAS_FRICTION_BOUND} | (counts ? unsigned{MODEL_BOUNDS_PRESLIDING} : 0u);
+}
+
 std::uint32_t read_contact_options(const json_node& contact, std::uint32_t joints, std::uint32_t tendons) {
   contact.expect_keys({"threshold", "threshold_per_force", "method", "innovation", "friction_bound", "uncertainty",
                        "uncertainty_level", "deviation", "deviation_per_force", "release_ratio", "hold_time",
                        "release_time", "drift", "rest"});
   check_thresholds(contact, joints);
-  const json_node bound = contact.member("friction_bound");
-  if (!bound.absent()) {
-    bound.expect_keys({"stuck_share", "stuck_time", "jump_share", "jump_time"});
-  }
   check_optional_list(contact.member("deviation"), joints, "numbers in N.m, one per joint");
   check_optional_list(contact.member("deviation_per_force"), joints, "numbers in N.m per N, one per joint");
-  return read_method(contact, joints) | read_uncertainty(contact, joints, tendons) |
-         given(contact, {"friction_bound"}, MODEL_HAS_FRICTION_BOUND) |
+  return read_method(contact, joints) | read_uncertainty(contact, joints, tendons) | read_friction_bound(contact) |
          given(contact, {"deviation", "deviation_per_force"}, MODEL_HAS_DEVIATION) |
          given(contact, {"release_ratio", "hold_time"}, MODEL_HAS_RELEASE) |
          given(contact, {"release_time"}, MODEL_HAS_RELEASE_TIME) | read_drift(contact, joints) |
