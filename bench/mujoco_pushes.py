@@ -1,7 +1,8 @@
-"""Recordings of MuJoCo fingers for contact detection: training, free motion and labelled pushes, each with its truth.
+"""Recordings of MuJoCo fingers for contact detection: free motion and labelled pushes, each with its truth.
 
 The fingers are those of python_tests/foreign (their friction, springs, sensors and hidden effects), which share no code
-with the product. Their motion has rests here, and the pretension two mean values. A push is a force on a link, at right
+with the product. Their motion has rests here, the pretension two mean values, and the free motion of each is two
+motions of 6.5 min: 26 min in all. A push is a force on a link, at right
 angles to it, of 0.1 to 2 N, uniform in the logarithm, that begins anywhere in a slot of 6 s. A *slow* one rises over
 1 to 10 s.
 
@@ -33,13 +34,15 @@ from tendonfmu.whole_file import whole_file  # noqa: E402
 Numbers = NDArray[np.float64]
 
 PRETENSIONS = (15.0, 30.0)  # N, each breathing by 30 %
-SECONDS = {"train": 60.0, "free": 420.0, "push": 300.0, "slow": 240.0}  # s, of one recording
+RATE = 250.0  # Hz
+SECONDS = {"free": 390.0, "more": 390.0, "push": 300.0, "slow": 240.0}  # s, of one recording; "more" is free, too
+FREE, PUSHED = ("free", "more"), ("push",)
 SLOT = {"push": 6.0, "slow": 20.0}  # s, of one push
 EARLIEST, LATEST = 0.5, 4.4  # s into its slot that a push begins
 FORCE = (0.1, 2.0)  # N
 RISE, HOLD = {"push": (0.01, 0.05), "slow": (1.0, 10.0)}, (0.3, 1.0)  # s
 FALL = 0.05  # s, at most; it falls as it rises, but no slower
-KINDS = ("train", "test", "free", "push", "slow")
+SEEDS = {"more": 1, "free": 2, "push": 3, "slow": 4}  # of a kind of recording
 STRETCH, STILL, RAMP = (6.0, 13.0), (0.7, 2.0), 0.3  # s of motion, of rest, and from one to the other
 
 
@@ -119,19 +122,19 @@ def simulated(physics: Physics, plan: Plan, motion: Motion, seconds: float, push
     data.qpos[runner.hinges] = motion.angles(np.array([-SETTLE]))[0]
     data.qpos[runner.motors] = motors[0]
     mujoco.mj_forward(runner.model, data)
-    every, first = round(1 / (plan.rate * STEP)), round(SETTLE / STEP)
+    every, first = round(1 / (RATE * STEP)), round(SETTLE / STEP)
     rows: list[tuple[Numbers, ...]] = []
     peaks = [np.zeros(physics.joints) for _ in pushes]
     for k, row in enumerate(motors, start=-first):
         t = k * STEP
         if k >= 0 and k % every == 0:
-            kept = (data.qpos[runner.hinges].copy(), runner.tension(), data.qpos[runner.motors].copy())
+            kept = (data.qpos[runner.hinges].copy(), runner.tension(), data.qpos[runner.motors].copy(), runner.torque)
             rows.append((np.array([t]), *kept))
         runner.advance(t, row)
         n = next((n for n, push in enumerate(pushes) if push.begin <= t <= push.end), None)
         if n is not None and np.abs(runner.torque).max() > np.abs(peaks[n]).max():
             peaks[n] = runner.torque.copy()
-    time, angle, force, position = (np.array(column) for column in zip(*rows, strict=True))
+    time, angle, force, position, torque = (np.array(column) for column in zip(*rows, strict=True))
     force = noisy(force, 0.02, rng)
     table = frame(time[:, 0], force, quantised(position, 1e-6), quantised(angle, 1e-4))
     if pushes:
@@ -139,6 +142,8 @@ def simulated(physics: Physics, plan: Plan, motion: Motion, seconds: float, push
         for push in pushes:
             label[(table["time"] >= push.begin) & (table["time"] <= push.end)] = 1.0
         table["contact"] = label
+        for j, column in enumerate(torque.T):
+            table[f"external_torque[{j + 1}]"] = -column  # as the tendons bear it
     return table, [dataclasses.replace(p, torque=tuple(t.tolist())) for p, t in zip(pushes, peaks, strict=True)]
 
 
@@ -152,7 +157,7 @@ def description_file(folder: Path, number: int) -> Path:
     return folder / f"mujoco_{number:02d}.json"
 
 
-def make(folder: Path, number: int, kinds: tuple[str, ...] = KINDS[:4]) -> None:
+def make(folder: Path, number: int, kinds: tuple[str, ...] = FREE + PUSHED) -> None:
     """All recordings of a finger of PLANS (from 1) that are missing."""
     plan = PLANS[number - 1]
     rng = np.random.default_rng(7100 + number)  # as python_tests/foreign makes it
@@ -165,12 +170,11 @@ def make(folder: Path, number: int, kinds: tuple[str, ...] = KINDS[:4]) -> None:
             file = place(folder, number, kind, pretension)
             if file.exists():
                 continue
-            seed = [number, KINDS.index(kind), round(pretension)]
+            seed = [number, SEEDS[kind], round(pretension)]
             draws = np.random.default_rng([*seed, 1])
             motion = dataclasses.replace(random_motion(plan.joints, draws, plan.speed), pretension=pretension)
-            seconds = SECONDS["train" if kind == "test" else kind]
             pushes = planned(plan.joints, kind, draws) if kind in SLOT else []
-            table, found = simulated(physics, plan, motion, seconds, pushes, [*seed, 2])
+            table, found = simulated(physics, plan, motion, SECONDS[kind], pushes, [*seed, 2])
             if pushes:
                 _write(file.with_suffix(".json"), json.dumps([dataclasses.asdict(each) for each in found]))
             with whole_file(file) as temporary:

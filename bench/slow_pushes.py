@@ -20,12 +20,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from detection_mujoco import SETTINGS, tuned
-from mujoco_pushes import PRETENSIONS, make, place, pushes_of
+from detection_mujoco import calibrated
+from mujoco_pushes import FREE, PRETENSIONS, make, place, pushes_of
 from numpy.typing import NDArray
 
 from tendonfmu.alarm_level import allowed_alarms, cells_of, rate_limit
-from tendonfmu.description import FingerDescription
+from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.detection_bounds import Bound, search_for
 from tendonfmu.detection_run import Subject, run_track
 from tendonfmu.detection_score import score_detection
@@ -110,8 +110,8 @@ def scored(each: Seen, label: Flags, holds: Flags) -> Any:
 def finger_rows(folder: Path, number: int, pairs: tuple[tuple[float, float], ...]) -> list[str]:
     """A row of the table for each pair of times, and one without the rule."""
     make(folder, number, ("slow",))
-    finger, _ = tuned(folder, number, "present", SETTINGS["present"])
-    recordings = [read_recording(place(folder, number, "free", each)) for each in PRETENSIONS]
+    finger = read_finger(calibrated(folder, number) / "finger.json")
+    recordings = [read_recording(place(folder, number, kind, each)) for kind in FREE for each in PRETENSIONS]
     free = [seen(finger, each) for each in recordings]
     parts = [
         coarse(part, each)
