@@ -144,6 +144,34 @@ def test_bounds_keep_a_known_rate() -> None:
     assert np.median(true) > 0.3 * WISHED, "bounds far higher than the rate asks for"
 
 
+def free_part(source: str, force: float, minutes: float) -> FreePart:
+    samples = round(60 * 100 * minutes)
+    time = np.arange(samples) / 100.0
+    return FreePart(
+        source, {"time": time}, np.full(samples, force), np.ones(samples, dtype=bool), np.full(samples, 0.01)
+    )
+
+
+def test_whole_recordings_are_held_out_where_each_pretension_has_two() -> None:
+    cells = cells_of([free_part(name, force, 4.0) for name, force in (("a", 10), ("b", 40), ("c", 10.1), ("d", 40.1))])
+    fold = [set(cells.fold[cells.part == k].tolist()) for k in range(4)]
+    assert fold == [{0}, {0}, {1}, {1}]
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        [("a", 10.0, 4.0), ("b", 40.0, 4.0)],  # one of each pretension
+        [("a", 10.0, 4.0), ("a", 10.0, 4.0)],  # one with a gap
+        [("a", 10.0, 8.0), ("b", 10.0, 1.0)],  # one that is too short for a half
+    ],
+)
+def test_blocks_are_held_out_elsewhere(parts: list[tuple[str, float, float]]) -> None:
+    cells = cells_of([free_part(*each) for each in parts])
+    for k in range(len(parts)):
+        assert set(cells.fold[cells.part == k].tolist()) == {0, 1}
+
+
 def test_stiction_is_taken_where_it_explains_the_tail() -> None:
     """Bumps of the stuck share of H, and none otherwise: the rest of the bound is small."""
     draws = np.random.default_rng(0)

@@ -30,6 +30,7 @@ SAME = 1.2  # factor between mean forces of one group
 WIDEST = 1.6  # factor across a group; wider ones are cut
 BLOCK = 60.0  # s; cross-validation takes every other one. Of short parts a smaller one, so that there are some:
 BLOCKS = 6
+OF_BOTH = 0.25  # of each pretension's time, at least, is in either half when whole recordings are held out
 
 
 # --- rates ------------------------------------------------------------------------------------------------------------
@@ -62,7 +63,8 @@ class Cells:
 
     rows: for each part its counted samples. first: where among all of them, one part after the other, a cell begins.
     order: number of each cell in time, far apart between parts. part, time: index of the part, and s of its own clock.
-    force: N, mean over all tendons. group: index of its pretension. fold: 0 or 1, by turns. hours: h of each.
+    force: N, mean over all tendons. group: index of its pretension. fold: 0 or 1, the half of the time that it is in.
+    hours: h of each.
     """
 
     rows: Sequence[Index]
@@ -97,6 +99,10 @@ def cells_of(parts: Sequence[FreePart]) -> Cells:
     size = np.diff(np.append(first, len(order)))
     mean_force = np.add.reduceat(force, first) / size
     window = np.floor(time[first] / WINDOW).astype(np.int64) + _FAR * owner[first]
+    group, hours = _groups(mean_force, window), np.add.reduceat(seconds, first) / 3600.0
+    fold = _recordings_by_turns(parts, owner[first], mean_force, group, hours)
+    if fold is None:
+        fold = np.floor(time[first] / _blocks(parts)[owner[first]]).astype(np.int64) % 2
     return Cells(
         rows=rows,
         first=first,
@@ -104,10 +110,26 @@ def cells_of(parts: Sequence[FreePart]) -> Cells:
         part=owner[first],
         time=time[first],
         force=mean_force,
-        group=_groups(mean_force, window),
-        fold=np.floor(time[first] / _blocks(parts)[owner[first]]).astype(np.int64) % 2,
-        hours=np.add.reduceat(seconds, first) / 3600.0,
+        group=group,
+        fold=fold,
+        hours=hours,
     )
+
+
+def _recordings_by_turns(
+    parts: Sequence[FreePart], owner: Index, force: Numbers, group: Index, hours: Numbers
+) -> Index | None:
+    """[c] 0 or 1: whole recordings in the order of their mean force, so that other motion is held out; None where a
+    pretension has too little in one of the halves. owner: [c] part of each cell.
+
+    One motion repeats itself: its peaks are alike in all blocks, and say little of those of another motion.
+    """
+    _, recording = np.unique([part.source for part in parts], return_inverse=True)
+    of_cell = recording[owner]
+    mean = np.bincount(of_cell, force) / np.maximum(np.bincount(of_cell), 1)
+    fold = (np.argsort(np.argsort(mean)) % 2)[of_cell]
+    share = np.bincount(group, hours * fold) / np.bincount(group, hours)
+    return fold if share.min() >= OF_BOTH and share.max() <= 1.0 - OF_BOTH else None
 
 
 def _blocks(parts: Sequence[FreePart]) -> Numbers:

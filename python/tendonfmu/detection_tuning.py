@@ -361,7 +361,7 @@ class ContactTuning(ConstructorArguments):
             )
         if held > self.allowed_:
             self.warnings_.append(
-                f"{held} alarms on held-out blocks, where {self.allowed_} are allowed: the rate is not supported"
+                f"{held} alarms in the held-out halves, where {self.allowed_} are allowed: the rate is not supported"
             )
         self.warnings_ += self._sentences()
 

@@ -78,4 +78,4 @@ def lines(tuning: ContactTuning) -> Iterator[str]:
     )
     levels = np.array([level.held_out / level.in_sample for level in tuning.levels_.values()])
     if levels.max() > 1:
-        yield f"held-out blocks ask for bounds {levels.max():.2f} times those that the data themselves ask for"
+        yield f"held-out halves ask for bounds {levels.max():.2f} times those that the data themselves ask for"

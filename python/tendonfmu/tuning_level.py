@@ -48,7 +48,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Level:
-    """Factor on a line's bound. in_sample: for the allowed alarms; held_out: for as many of them on held-out blocks."""
+    """Factor on a line's bound. in_sample: for the allowed alarms; held_out: for as many of them in the other half."""
 
     in_sample: float
     held_out: float
