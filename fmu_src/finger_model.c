@@ -83,6 +83,10 @@ int model_watches_rest(const model* m) {
   return tendonfmu_watches_rest(m->finger);
 }
 
+int model_watches_sensors(const model* m) {
+  return tendonfmu_watches_sensors(m->finger);
+}
+
 const char* model_last_error(const model* m) {
   return tendonfmu_last_error(m->finger);
 }
@@ -166,7 +170,9 @@ tendonfmu_outputs variables_outputs(const variables* v) {
                              .fingertip_force_observable = v->flag[GROUP_FINGERTIP_FORCE_OBSERVABLE],
                              .fingertip_force_misfit = v->number[GROUP_FINGERTIP_FORCE_MISFIT],
                              .contact_change = v->number[GROUP_CONTACT_CHANGE],
-                             .contact_at_rest = v->flag[GROUP_CONTACT_AT_REST]};
+                             .contact_at_rest = v->flag[GROUP_CONTACT_AT_REST],
+                             .sensor_fault = v->flag[GROUP_SENSOR_FAULT],
+                             .contact_observable = v->flag[GROUP_CONTACT_OBSERVABLE]};
 }
 
 void model_fetch_outputs(const model* m, variables* values) {

@@ -4,7 +4,8 @@
 #include <string.h>
 
 size_t variables_group_count(const variables* v, const variable_group* group) {
-  if ((group->needs == NEEDS_LINKS && !v->has_links) || (group->needs == NEEDS_REST && !v->watches_rest)) {
+  if ((group->needs == NEEDS_LINKS && !v->has_links) || (group->needs == NEEDS_REST && !v->watches_rest) ||
+      (group->needs == NEEDS_SENSOR_FAULT && !v->watches_sensors)) {
     return 0;
   }
   switch (group->size) {
@@ -62,6 +63,7 @@ int variables_create(variables* v, const model* m) {
   v->parameter_count = model_parameter_count(m);
   v->has_links = model_has_links(m);
   v->watches_rest = model_watches_rest(m);
+  v->watches_sensors = model_watches_sensors(m);
   v->input_count = number_count(v, CAUSALITY_INPUT);
   v->output_count = number_count(v, CAUSALITY_OUTPUT);
   const size_t settings = number_count(v, CAUSALITY_PARAMETER);

@@ -11,7 +11,7 @@
 /* Arrays of n joints, m tendons, p parameters. All memory is taken by variables_create(). */
 typedef struct variables {
   size_t joints, tendons, parameter_count;
-  int has_links, watches_rest;
+  int has_links, watches_rest, watches_sensors;
   double* numbers;                  /* one block: what the pointers below point into */
   unsigned char* flags;             /* likewise */
   size_t input_count, output_count; /* inputs stand first in the block, then Real and Integer outputs, then settings */

@@ -16,7 +16,7 @@ from typing import Any
 
 FMI_TYPES = ("Real", "Integer", "Boolean", "String")
 SIZES = ("scalar", "joints", "tendons", "vector")
-NEEDS = ("nothing", "links", "rest")  # of the description: a group is there only where it has this
+NEEDS = ("nothing", "links", "rest", "sensor_fault")  # of the description: a group is there only where it has this
 MAX_GROUP = 100  # value references that a group may take up
 
 HEADER = """\
@@ -36,7 +36,7 @@ typedef enum variable_group_id {{
 typedef enum variable_type {{ VARIABLE_REAL, VARIABLE_INTEGER, VARIABLE_BOOLEAN, VARIABLE_STRING }} variable_type;
 typedef enum variable_size {{ SIZE_SCALAR, SIZE_JOINTS, SIZE_TENDONS, SIZE_VECTOR }} variable_size;
 /* What the model must have for the group to exist. */
-typedef enum variable_needs {{ NEEDS_NOTHING, NEEDS_LINKS, NEEDS_REST }} variable_needs;
+typedef enum variable_needs {{ NEEDS_NOTHING, NEEDS_LINKS, NEEDS_REST, NEEDS_SENSOR_FAULT }} variable_needs;
 typedef enum variable_causality {{ CAUSALITY_INPUT, CAUSALITY_OUTPUT, CAUSALITY_PARAMETER }} variable_causality;
 
 typedef struct variable_group {{

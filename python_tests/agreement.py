@@ -47,7 +47,7 @@ DETECTION_OUTPUTS = (
 )
 REST_OUTPUTS = ("contact_change",)  # with contact.rest, also of the FMU
 BOOLEAN_OUTPUTS = ("joint_contact", "contact", "slack")
-OPTIONAL_FLAGS = ("contact_at_rest",)  # with contact.rest
+OPTIONAL_FLAGS = ("contact_at_rest", "contact_observable", "sensor_fault")  # with contact.rest, sensor_fault
 FLIPS_TRIED_TOGETHER = 6  # more near decisions in one sample are tried one by one
 MOST_FOLLOWED = 10  # more near decisions in one recording than any rule allows: give up
 NEAR_SAMPLES_TRIED = 3  # how many near samples before a difference may explain it
@@ -92,7 +92,7 @@ def excess(reference: Mapping[str, Array], candidate: Mapping[str, Array]) -> di
     flags = BOOLEAN_OUTPUTS + tuple(name for name in OPTIONAL_FLAGS if name in candidate and name in reference)
     for name in REAL_OUTPUTS + optional + flags:
         expected, got = np.asarray(reference[name]), np.asarray(candidate[name])
-        if name in ("contact", *OPTIONAL_FLAGS):
+        if expected.ndim < 2:
             expected, got = expected.reshape(-1, 1), got.reshape(-1, 1)
         if expected.shape != got.shape:
             raise AssertionError(f"{name}: expected shape {expected.shape}, got {got.shape}")

@@ -11,7 +11,6 @@ import functools
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -21,49 +20,13 @@ from oracle_detection import NEAR, Detector, direction_above
 from oracle_extensions import Extensions
 from oracle_finger import Effect, Places, given, read_joints, read_tendons, tendon_velocity
 from oracle_position_filter import read_position_filter
+from oracle_result import Key, Result, Step
+from oracle_sensors import SensorWatch, Watch
 from oracle_start import StartFriction, gain_of
 
 Array = NDArray[Any]
-Key = tuple[Any, ...]
 
 LARGEST_ABSORPTION = 700.0  # of one sample, -ln(1 - K): K = 1 leaves nothing, and exp(-700) is not yet 0
-
-
-@dataclass
-class Result:
-    """Outputs of a run and what the agreement rule and the branch counts need.
-
-    outputs: name -> [N, n], [N, m], [N] (`contact`) or [N, n, m + 3] (`friction_parts`).
-    velocity_margin, residual_margin, force_margin: [N], smallest distance of the sample to a
-        threshold (m/s or rad/s, N.m, N); evidence, in s, counts with the residual.
-    alternatives: sample -> {decision key: values the decision may also take within NEAR}.
-    branches: how often each branch was taken.
-    """
-
-    outputs: dict[str, Array]
-    velocity_margin: Array
-    residual_margin: Array
-    force_margin: Array
-    alternatives: dict[int, dict[Key, list[Any]]]
-    branches: Counter[str]
-
-    @property
-    def near(self) -> Array:
-        """[N] bool: samples within NEAR of some threshold."""
-        smallest = np.minimum(np.minimum(self.velocity_margin, self.residual_margin), self.force_margin)
-        return np.asarray(smallest < NEAR)
-
-
-@dataclass
-class Step:
-    """What one sample yields besides the change of the state."""
-
-    values: dict[str, Array] = field(default_factory=dict)
-    velocity_margin: float = math.inf
-    residual_margin: float = math.inf
-    force_margin: float = math.inf
-    decisions: dict[Key, Any] = field(default_factory=dict)
-    alternatives: dict[Key, list[Any]] = field(default_factory=dict)
 
 
 class FingerOracle:
@@ -79,6 +42,10 @@ class FingerOracle:
         self._read_settings(description)
         self.detector = Detector(description, self.R, self.branches)
         self.extensions = Extensions(description, self.n, self.m, self.R, self.joints, kinematics_source, self.branches)
+        watches = given(description, "sensor_fault", None) is not None
+        self.sensors = SensorWatch(description, self.R, kinematics_source, self.branches) if watches else None
+        self.watch = Watch(self.R_plus, self.R_plus, [False] * self.n, [False] * self.n)
+        self.spring_end = np.zeros(self.m)  # x0 − f0/k
         self.grips = [self.extensions.rows_at(kind, at) for kind, at, _ in self.places]
         # state
         self.samples = 0
@@ -147,6 +114,8 @@ class FingerOracle:
                 out.alternatives[key] = others
             return chosen
 
+        # 0. sensors
+        self._watch(inputs, f0, time, decide, out)
         # 1. kinematics
         q, v = self._kinematics(inputs, f0, dt, first, decide, out)
         x_dot = tendon_velocity(self.R, v)
@@ -162,7 +131,7 @@ class FingerOracle:
         T = self._total(F * f) + self._springs(q)
         db = self._total(self._increments(b * f))
         tau = self.R.T @ f0
-        mean_force = float(np.mean(np.abs(f0)))
+        mean_force = float(np.mean(np.abs(f0))) if self.sensors is None else self.sensors.mean_force(f0)
         noise = (self.noise_std + self.noise_std_per_force * mean_force) ** 2
         if first:
             self.P = np.full(self.n, noise if self.initial_variance is None else float(self.initial_variance))
@@ -170,18 +139,22 @@ class FingerOracle:
             self.detector.begin(time)
             self.branches["initial_torque" if self.initial_torque is not None else "initial_bias"] += 1
         else:
-            self.b_eff = self.b_eff + db
+            self.b_eff = np.where(self.watch.anew, tau - T, self.b_eff + db)
         T_eff = self.b_eff + T
         hold = functools.partial(self._at_joints, arms=np.abs(self.R))
         self.start.turn(self.places, Places.zeros(self.m, self.n), f, hold, decide)
         # 4a. what friction may differ by
         change = np.zeros(self.n) if first else T_eff - self.last.values["friction_torque"]
+        unwatched = np.asarray(self.watch.blind) | np.asarray(self.watch.anew)
+        self.start.forget(unwatched)
         bounds = self.detector.bounds(hold(hidden * f), self._parts(F * f, q), change, self.start.unlearned, dt)
-        self.detector.watch(f0, x0, mean_force, time, dt, first, decide, out)
+        unwell = bool(unwatched.any()) or (self.sensors is not None and bool(self.sensors.faults.any()))
+        self.detector.watch(f0, x0, mean_force, time, dt, first or unwell, decide, out)
         joint_contact, r, y = np.zeros(self.n, dtype=bool), np.zeros(self.n), np.zeros(self.n)
         if not first:
             # 5. contact, 6. bias update or its inhibition
-            r = tau - T_eff
+            r = np.where(unwatched, 0.0, tau - T_eff)
+            self.detector.forget(unwatched)
             joint_contact, y = self.detector.contact(r, bounds, mean_force, time, dt, decide, out)
             if self.detector.updates(time):
                 K, own = self._gain(dt, noise)
@@ -211,27 +184,45 @@ class FingerOracle:
             "drift": self.detector.drift(),
             "friction_parts": bounds.parts,
         } | self.detector.at_rest()
+        if self.sensors is not None:
+            observable = np.asarray(not any(self.watch.blind))
+            out.values |= {"sensor_fault": self.sensors.faults, "contact_observable": observable}
         self.q, self.v, self.time, self.last = q, v, time, out
         self.samples += 1
         return out
+
+    def _watch(
+        self, inputs: Mapping[str, Array], f0: Array, time: float, decide: Callable[..., Any], out: Step
+    ) -> None:  # fmt: skip
+        """Step 0: the rows in use, x0 − f0/k, and by how much the angles of the sample before change with the rows."""
+        k = np.array([tendon.stiffness for tendon in self.tendons])
+        before = self.spring_end
+        x = inputs.get("tendon_position")
+        if self.source == 1:
+            self.spring_end = np.asarray(x, dtype=float) - self.extensions.stretch(f0, k)
+            x = self.spring_end + f0 / k
+        if self.sensors is not None:
+            q = None if self.source == 1 else np.asarray(inputs["joint_position"], dtype=float)
+            self.watch = self.sensors.take(f0, np.asarray(x, dtype=float), q, time, decide, out)
+        self.shift = (self.watch.inverse - self.watch.before) @ before
 
     def _kinematics(
         self, inputs: Mapping[str, Array], f0: Array, dt: float, first: bool, decide: Callable[..., Any], out: Step
     ) -> tuple[Array, Array]:
         if self.source == 1:
-            k = np.array([tendon.stiffness for tendon in self.tendons])
-            q = self.R_plus @ (np.asarray(inputs["tendon_position"], dtype=float) - self.extensions.stretch(f0, k))
+            q = self.watch.inverse @ self.spring_end
         else:
             q = np.array(inputs["joint_position"], dtype=float)
         q = self.extensions.play(q, first)
         if self.source == 3:
             return q, np.array(inputs["joint_velocity"], dtype=float)
         if self.position_filter is not None:
+            self.position_filter.shift(self.shift)
             v, self.travel = self.position_filter.take(q, dt, first, decide, out)
             return q, v
         if first:
             return q, np.zeros(self.n)
-        raw = (q - self.q) / dt
+        raw = (q - (self.q + self.shift)) / dt
         if self.cutoff == 0.0:
             return q, raw
         return q, self.v + (1.0 - math.exp(-2.0 * math.pi * self.cutoff * dt)) * (raw - self.v)

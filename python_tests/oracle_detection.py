@@ -138,6 +138,16 @@ class Detector:
         """d [n], N·m; 0 without contact.drift."""
         return np.zeros(self.n) if self.slow is None else self.slow.drift
 
+    def forget(self, unwatched: Array) -> None:
+        """Joints [n] whose sensors fail: nothing is known of them, before `contact`."""
+        self.filtered = np.where(unwatched, 0.0, self.filtered)
+        self.evidence = np.where(unwatched, 0.0, self.evidence)
+        self.in_contact = self.in_contact & ~unwatched
+        if self.rest is not None:
+            self.rest.carried = np.where(unwatched, 0.0, self.rest.carried)
+        if self.slow is not None:
+            self.slow.forget(unwatched)
+
     def at_rest(self) -> dict[str, Array]:
         """The outputs of contact.rest; none without it."""
         if self.rest is None:

@@ -58,5 +58,11 @@ class DriftWatch:
             self.slow = self.slow + self._share(self.slow_time, time, dt) * (r - of_start + self.learned - self.slow)
         self.learned = self.learned + own * r
 
+    def forget(self, unwatched: Array) -> None:
+        """Joints whose sensors fail."""
+        self.late, self.quick, self.slow, self.learned = (
+            np.where(unwatched, 0.0, row) for row in (self.late, self.quick, self.slow, self.learned)
+        )
+
     def bound(self, j: int, mean_force: float) -> float:
         return float(self.threshold[j] + self.per_force[j] * mean_force)

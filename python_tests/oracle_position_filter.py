@@ -35,6 +35,10 @@ class JointFilter:
         self.z = q
         return travel
 
+    def shift(self, angle: float) -> None:
+        self.estimate[0] += angle
+        self.z += angle
+
     def take(self, q: float, h: float, key: tuple[Any, ...], decide: Callable[..., Any], out: Any) -> float:
         """One later sample: how far z moves."""
         if h > LONGEST_STEP:
@@ -66,6 +70,11 @@ class JointFilter:
 class PositionFilter:
     def __init__(self, filters: list[JointFilter]) -> None:
         self.filters = filters
+
+    def shift(self, angles: Array) -> None:
+        """Moves what is remembered by [n] rad, where other tendons tell the angles from now on."""
+        for joint, angle in zip(self.filters, angles, strict=True):
+            joint.shift(float(angle))
 
     def take(
         self, q: Array, dt: float, first: bool, decide: Callable[..., Any], out: Any

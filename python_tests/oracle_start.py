@@ -60,6 +60,10 @@ class StartFriction:
             self.branches["start_turned" if effect.turned > 0.0 else "start_stands"] += 1
         self.unlearned = decide(("unlearned",), self.unlearned + self.share * at_joints(turned * f), [])
 
+    def forget(self, unwatched: Array) -> None:
+        """Joints whose sensors fail."""
+        self.unlearned = np.where(unwatched, 0.0, self.unlearned)
+
     def variance(self) -> Array:
         """[n] (N·m)², of an even distribution within ±V."""
         return np.asarray(self.unlearned**2 / 3.0)

@@ -95,6 +95,11 @@ int model_watches_rest(const model* m) {
   return 0;
 }
 
+int model_watches_sensors(const model* m) {
+  (void)m; /* nor this */
+  return 0;
+}
+
 const char* model_last_error(const model* m) {
   return m->error;
 }

@@ -53,8 +53,10 @@ struct OutputRows {
   std::vector<int> contact_link;
   std::vector<double> change; /* these two: of fingers with contact.rest */
   std::vector<unsigned char> at_rest;
+  std::vector<unsigned char> sensor_fault, contact_observable; /* of fingers with sensor_fault */
 
-  OutputRows(std::size_t samples, std::size_t n, std::size_t m, bool with_parts, bool with_place, bool with_rest) {
+  OutputRows(std::size_t samples, std::size_t n, std::size_t m, bool with_parts, bool with_place, bool with_rest,
+             bool with_sensors) {
     for (auto& row : numbers) row.resize(samples * n);
     for (auto& row : detection) row.resize(samples * n);
     if (with_parts) parts.resize(samples * n * (m + 3));
@@ -72,17 +74,41 @@ struct OutputRows {
       change.resize(samples * n);
       at_rest.resize(samples);
     }
+    if (with_sensors) {
+      sensor_fault.resize(samples * m);
+      contact_observable.resize(samples);
+    }
   }
   template <typename Number>
   static Number* wanted(std::vector<Number>& rows) {
     return rows.empty() ? nullptr : rows.data();
   }
   tendonfmu_outputs view() {
-    return {numbers[0].data(),   numbers[1].data(),   numbers[2].data(),   numbers[3].data(),   numbers[4].data(),
-            numbers[5].data(),   flags[0].data(),     flags[1].data(),     flags[2].data(),     detection[0].data(),
-            detection[1].data(), detection[2].data(), detection[3].data(), detection[4].data(), wanted(parts),
-            wanted(tip_force),   wanted(tip_std),     wanted(observable),  wanted(misfit),      wanted(contact_link),
-            wanted(change),      wanted(at_rest),     detection[5].data()};
+    return {numbers[0].data(),
+            numbers[1].data(),
+            numbers[2].data(),
+            numbers[3].data(),
+            numbers[4].data(),
+            numbers[5].data(),
+            flags[0].data(),
+            flags[1].data(),
+            flags[2].data(),
+            detection[0].data(),
+            detection[1].data(),
+            detection[2].data(),
+            detection[3].data(),
+            detection[4].data(),
+            wanted(parts),
+            wanted(tip_force),
+            wanted(tip_std),
+            wanted(observable),
+            wanted(misfit),
+            wanted(contact_link),
+            wanted(change),
+            wanted(at_rest),
+            detection[5].data(),
+            wanted(sensor_fault),
+            wanted(contact_observable)};
   }
 };
 
@@ -101,6 +127,7 @@ class Finger {
   std::size_t tendons() const { return tendonfmu_tendon_count(handle_); }
   bool has_links() const { return tendonfmu_has_links(handle_) != 0; }
   bool watches_rest() const { return tendonfmu_watches_rest(handle_) != 0; }
+  bool watches_sensors() const { return tendonfmu_watches_sensors(handle_) != 0; }
   std::size_t parameter_count() const { return tendonfmu_parameter_count(handle_); }
   std::string kernel() const { return tendonfmu_get_kernel(handle_); }
   void set_kernel(const std::string& name) { check(tendonfmu_set_kernel(handle_, name.c_str())); }
@@ -142,7 +169,7 @@ class Finger {
     const tendonfmu_inputs inputs = {
         rows(force, samples, m, "tendon_force"), rows(position, samples, m, "tendon_position"),
         rows(angle, samples, n, "joint_position"), rows(velocity, samples, n, "joint_velocity")};
-    OutputRows outputs(samples, n, m, with_parts, has_links(), watches_rest());
+    OutputRows outputs(samples, n, m, with_parts, has_links(), watches_rest(), watches_sensors());
     const tendonfmu_outputs view = outputs.view();
     std::size_t done = 0;
     tendonfmu_status status;
@@ -169,6 +196,10 @@ class Finger {
     if (watches_rest()) {
       arrays.append(as_array(std::move(outputs.change), {samples, n}));
       arrays.append(as_array(std::move(outputs.at_rest), {samples}));
+    }
+    if (watches_sensors()) {
+      arrays.append(as_array(std::move(outputs.sensor_fault), {samples, m}));
+      arrays.append(as_array(std::move(outputs.contact_observable), {samples}));
     }
     return nb::tuple(arrays);
   }
@@ -224,6 +255,7 @@ NB_MODULE(_native, m) {
       .def_prop_ro("tendons", &Finger::tendons)
       .def_prop_ro("has_links", &Finger::has_links)
       .def_prop_ro("watches_rest", &Finger::watches_rest)
+      .def_prop_ro("watches_sensors", &Finger::watches_sensors)
       .def_prop_ro("parameter_count", &Finger::parameter_count)
       .def_prop_rw("kernel", &Finger::kernel, &Finger::set_kernel)
       .def_prop_rw("kinematics_source", &Finger::source, &Finger::set_source)

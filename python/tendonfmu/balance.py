@@ -64,7 +64,7 @@ def friction_probe(data: Mapping[str, Any]) -> native.Finger:
         if (data.get("bias") or {}).get(key) is not None:
             bias[key] = data["bias"][key]
     contact = {"threshold": [_NEVER] * len(data["joints"])}
-    probe = {**data, "bias": bias, "contact": contact}
+    probe = {**data, "bias": bias, "contact": contact, "sensor_fault": None}
     return native.Finger(native.image_from_json(json.dumps(probe)), kinematics_source=3)
 
 

@@ -55,7 +55,7 @@ def _learning_nothing(data: Mapping[str, Any]) -> dict[str, Any]:
     kept = {key: value for key, value in (data.get("bias") or {}).items() if key in ("forget_rate", "entry_load")}
     joints = len(data["joints"])
     still = {**kept, "drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": [0.0] * joints}
-    return {**data, "bias": still, "contact": {"threshold": [_NEVER] * joints}}
+    return {**data, "bias": still, "contact": {"threshold": [_NEVER] * joints}, "sensor_fault": None}
 
 
 def block_late_forces(

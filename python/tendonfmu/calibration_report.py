@@ -33,6 +33,7 @@ OF_TUNING = (
     "closed_loop",
     "pretensions",
     "rest",
+    "sensor_fault",
 )
 
 

@@ -123,6 +123,17 @@ def recording_rows(report: Report) -> list[Row]:
     ]
 
 
+def sensor_sentence(report: Report) -> str:
+    """Whether failing sensors are told from contact."""
+    found = report["detection"]["sensor_fault"]
+    if found["keys"] is None:
+        return f"Sensor faults are not watched: {found['left_out']}."
+    return (
+        f"A tendon sensor that contradicts its spring by more than {found['keys']['jump_margin']:.2g} N is reported as "
+        f"a sensor fault, not as contact; free motion shows differences of up to {found['largest_difference']:.2g} N."
+    )
+
+
 def push_sentence(report: Report) -> str:
     pushes = report["pushes"]
     alarms = pushes["false_alarms"]

@@ -184,9 +184,10 @@ def _refuse_too_many(size: float, columns: int) -> None:
 
 
 def without_uncertainty(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Without directions of uncertainty, which tell of the description's own numbers and grow with their count."""
+    """Without directions of uncertainty, which tell of the description's own numbers and grow with their count, and
+    without a watch over the sensors, which is no part of the model."""
     contact = {key: value for key, value in data["contact"].items() if not key.startswith("uncertainty")}
-    return {**data, "contact": contact}
+    return {**data, "contact": contact, "sensor_fault": None}
 
 
 def _proposed(

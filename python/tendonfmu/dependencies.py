@@ -18,7 +18,7 @@ import numpy as np
 from tendonfmu import native
 from tendonfmu.description import FingerDescription
 from tendonfmu.extensions import extension_rows
-from tendonfmu.signals import PLACE, REST
+from tendonfmu.signals import PLACE, REST, SENSORS
 
 # Extensions whose torque at their joint follows from its angle, or from its velocity.
 BY_OWN_ANGLE = frozenset({"cover_hardening", "moment_arm_variation", "pulley_eccentricity"})
@@ -63,7 +63,10 @@ class Structure:
 
 def structure_of(description: FingerDescription) -> Structure:
     passes = np.array(description.moment_arms) != 0.0
-    return Structure(description.data, passes, _inverse_routing(description.image, *passes.shape) != 0.0)
+    inverse = _inverse_routing(description.image, *passes.shape) != 0.0
+    if description.data.get("sensor_fault") is not None:  # with a row that leaves, any may matter to any
+        inverse = np.ones_like(inverse)
+    return Structure(description.data, passes, inverse)
 
 
 def _inverse_routing(image: bytes, tendons: int, joints: int) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -95,7 +98,8 @@ def dependencies(structure: Structure) -> Dependencies:
         result |= {name: [place] * (3 if name in VECTORS else 1) for name in PLACE}
     for name in ("compensated_torque", "compensated_torque_std", "friction_torque", "bias_torque", "joint_contact"):
         result[name] = by_joint
-    return result | _at_rest(structure, result)
+    result |= _at_rest(structure, result)
+    return result | _with_sensors(structure, result)
 
 
 def _at_rest(structure: Structure, others: Dependencies) -> Dependencies:
@@ -108,6 +112,20 @@ def _at_rest(structure: Structure, others: Dependencies) -> Dependencies:
         name: [element | watched for element in others[name]] for name in ("joint_contact", "contact")
     }
     return found | {name: [watched] * (structure.joints if name == REST[0] else 1) for name in REST}
+
+
+def _with_sensors(structure: Structure, others: Dependencies) -> Dependencies:
+    """With sensor_fault: what fails, and with it contact, depends on all sensors."""
+    if structure.data.get("sensor_fault") is None:
+        return {}
+    tendons, joints = list(range(structure.tendons)), list(range(structure.joints))
+    watched = {"tendon_force": tendons, "tendon_position": tendons, "joint_position": joints}
+    found: Dependencies = {
+        name: [element | watched for element in elements]
+        for name, elements in others.items()
+        if name in ("joint_contact", "contact", *PLACE, *REST)
+    }
+    return found | {SENSORS[0]: [watched] * structure.tendons, SENSORS[1]: [watched]}
 
 
 def _inputs(structure: Structure, motion: Motion, forces: set[int]) -> dict[str, list[int]]:

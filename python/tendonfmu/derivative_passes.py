@@ -97,7 +97,7 @@ def plan_passes(base: Mapping[str, Any], variants: Sequence[tuple[Variant, int]]
 
 def nominal_directions(data: Mapping[str, Any]) -> tuple[list[str], list[Direction]]:
     """What a fit of a description estimates, the initial bias left out: names, and the numbers that each moves."""
-    image = native.image_from_json(json.dumps(data))
+    image = native.image_from_json(json.dumps({**data, "sensor_fault": None}))
     paths = [parameter.path for parameter in native.Finger(image).parameters()]
     estimator = Estimator(image)
     names: list[str] = []
@@ -163,7 +163,7 @@ def _stretches(estimator: Estimator, recording: FitRecording, part: slice, watch
 
 def _estimator_of(data: Mapping[str, Any], wanted: set[str]) -> tuple[Estimator, dict[str, int]]:
     """An estimator in which each of the wanted numbers is an unknown of its own, and path -> its column."""
-    image = native.image_from_json(json.dumps(data))
+    image = native.image_from_json(json.dumps({**data, "sensor_fault": None}))
     paths = [parameter.path for parameter in native.Finger(image).parameters()]
     index = {path: k for k, path in enumerate(paths)}
     group = np.full(len(paths), -1, dtype=np.int32)

@@ -19,7 +19,7 @@ from tendonfmu.errors import InputError
 from tendonfmu.fit_residuals import model_alone
 from tendonfmu.recording import Recording
 from tendonfmu.running import check_model, run_model
-from tendonfmu.signals import inputs_used
+from tendonfmu.signals import inputs_used, watches_motors
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -103,7 +103,7 @@ def run_track(subject: Subject, recording: Recording, kinematics: int, force: st
     """force: column with the sensed force, or None. Raises InputError where the recording does not fit the finger."""
     data = subject.finger.data
     joints, tendons = len(data["joints"]), len(data["tendons"])
-    recording.require(joints, tendons, inputs_used(kinematics, data["contact"].get("rest") is not None))
+    recording.require(joints, tendons, inputs_used(kinematics, watches_motors(data)))
     if subject.packed:
         outputs = _grouped(run_model(subject.path, recording, kinematics_source=kinematics))
     else:

@@ -33,6 +33,7 @@ from tendonfmu.fit_structure import own_copy
 from tendonfmu.free_motion import Clock, FreePart, FreeRun, free_parts, run_free
 from tendonfmu.recording import Recording, read_recording
 from tendonfmu.rest_tuning import RestRule, learn_rest
+from tendonfmu.sensor_tuning import SensorRule, learn_sensors
 from tendonfmu.tuned_loop import LoopAlarms, count_loop
 from tendonfmu.tuning_level import SECOND_SHARE, Level, Line, evidence_line, given_line, level_of, searched_line
 from tendonfmu.tuning_noise import BiasNoise, Deviation, bias_noise, deviation, wanted_time
@@ -85,9 +86,10 @@ class ContactTuning(ConstructorArguments):
         presliding. progress: called with (steps done, all).
 
     After `tune`: description_ (tuned), bias_, lines_, levels_, bounds_ (by "residual", "drift" and "innovation"),
-    deviation_, cells_, runs_, pretensions_, rest_ (None: no rests), held_out_ (alarms, 1/h upper limit), loop_ (alarms
-    of the finger as it runs), rate_ (1/h that it is tuned for), more_minutes_ (missing for the wished rate), allowed_,
-    hours_, forces_ (N, the lowest and the highest recorded mean force), level_raised_, warnings_, seconds_.
+    deviation_, cells_, runs_, pretensions_, rest_ (None: no rests), sensors_ (of sensor_fault), held_out_ (alarms, 1/h
+    upper limit), loop_ (alarms of the finger as it runs), rate_ (1/h that it is tuned for), more_minutes_ (missing for
+    the wished rate), allowed_, hours_, forces_ (N, the lowest and the highest recorded mean force), level_raised_,
+    warnings_, seconds_.
     """
 
     def __init__(
@@ -137,6 +139,7 @@ class ContactTuning(ConstructorArguments):
         self._run(parts)
         self._choose()
         self._learn_rest(parts)
+        self.sensors_: SensorRule = learn_sensors(self.start_.data, parts, self.kinematics)
         self._close_the_loop(parts)
         self.pretensions_ = self._by_pretension()
         self.seconds_ = perf_counter() - begin
@@ -320,6 +323,9 @@ class ContactTuning(ConstructorArguments):
             contact["release_time"] = self.release_time
         if self.rest_ is not None:
             contact["rest"] = dict(self.rest_.keys)
+        data = {key: value for key, value in data.items() if key != "sensor_fault"}
+        if self.sensors_.keys is not None:
+            data["sensor_fault"] = dict(self.sensors_.keys)
         return {**data, "contact": contact}
 
     # --- what it is worth ---------------------------------------------------------------------------------------------

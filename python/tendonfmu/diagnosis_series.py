@@ -154,7 +154,7 @@ def exact_model(data: Mapping[str, Any], recording: FitRecording, *, entry_load:
     still = {**kept, "drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": [0.0] * joints}
     if entry_load is not None:
         still["entry_load"] = entry_load
-    alone = {**data, "bias": still, "contact": {"threshold": [_NEVER] * joints}}
+    alone = {**data, "bias": still, "contact": {"threshold": [_NEVER] * joints}, "sensor_fault": None}
     image, found = native.image_from_json(json.dumps(alone)), np.full(recording.target.shape, np.nan)
     for part in recording.parts:
         arrays = recording.arrays(part)

@@ -103,6 +103,8 @@ def with_values(structure: Structure, values: Numbers) -> FingerDescription:
         for path in (number.path, number.with_path):
             if path is not None:
                 set_number(data, path, float(f"{values[structure.index[path]]:.{DIGITS}g}"))
+    if structure.sensor_fault is not None:
+        data["sensor_fault"] = dict(structure.sensor_fault)
     text = description_text(data).encode()
     try:
         return FingerDescription(structure.start.path, text, data, native.image_from_json(text))

@@ -27,7 +27,7 @@ from tendonfmu.recording_faults import (
     silent_tendons,
     stuck_sensors,
 )
-from tendonfmu.signals import INPUTS_OF_SOURCE, inputs_used
+from tendonfmu.signals import INPUTS_OF_SOURCE, inputs_used, watches_motors
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -123,8 +123,7 @@ class FitRecording:
 def prepare(finger: FingerDescription, recording: Recording, kinematics: int, held: Held) -> FitRecording:
     """Checks a recording against a finger. Raises InputError where nothing sound can come of it."""
     joints, tendons = len(finger.joint_names), len(finger.tendon_names)
-    rests = (finger.data.get("contact") or {}).get("rest") is not None
-    recording.require(joints, tendons, inputs_used(kinematics, rests))
+    recording.require(joints, tendons, inputs_used(kinematics, watches_motors(finger.data)))
     _check_numbers(recording)
     target = recording.groups["tendon_force"] @ moment_arms(finger.data)
     external = recording.groups.get("external_torque")

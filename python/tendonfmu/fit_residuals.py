@@ -79,7 +79,8 @@ def _without_filter(data: Mapping[str, Any]) -> dict[str, Any]:
     """The description whose bias moves by the jumps alone, and that never sees contact."""
     bias = {key: value for key, value in (data.get("bias") or {}).items() if key in ("forget_rate", "entry_load")}
     still = {**bias, "drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": [0.0] * len(data["joints"])}
-    return {**data, "bias": still, "contact": {"threshold": [_NEVER] * len(data["joints"])}}
+    never = {"threshold": [_NEVER] * len(data["joints"])}
+    return {**data, "bias": still, "contact": never, "sensor_fault": None}
 
 
 # --- the bias filter --------------------------------------------------------------------------------------------------

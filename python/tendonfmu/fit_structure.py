@@ -39,7 +39,8 @@ class Structure:
 
     numbers: those estimated, in the order of identifiability.unknowns, `bias.initial_torque` last. group: [p] of all
     parameters of the description in canonical order, −1 fixed, equal numbers share one value. scale: [p] expected
-    magnitudes, NaN where the start's own. index: path -> place among the p.
+    magnitudes, NaN where the start's own. index: path -> place among the p. sensor_fault: of the description, which the
+    start lacks.
     """
 
     start: FingerDescription
@@ -47,6 +48,7 @@ class Structure:
     group: NDArray[np.int32]
     scale: NDArray[np.float64]
     index: Mapping[str, int]
+    sensor_fault: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ class Choice:
 
 def build_structure(finger: FingerDescription, choice: Choice) -> Structure:
     """Raises InputError where a pattern matches nothing, nothing is left to estimate, or shared laws differ in kind."""
-    data = _without_uncertainty(with_sides(finger.data, choice.sides))
+    data = _model_alone(with_sides(finger.data, choice.sides))
     numbers = estimable_numbers(data)
     if not numbers:
         raise InputError(f"{finger.path}: nothing to estimate: no friction, cover or extension; expected at least one")
@@ -81,6 +83,7 @@ def build_structure(finger: FingerDescription, choice: Choice) -> Structure:
             group[index[number.with_path]] = owner
     return Structure(
         start=start,
+        sensor_fault=finger.data.get("sensor_fault"),
         numbers=_numbered(start, chosen),
         group=group,
         scale=_scales(paths, chosen, choice.scale),
@@ -88,8 +91,10 @@ def build_structure(finger: FingerDescription, choice: Choice) -> Structure:
     )
 
 
-def _without_uncertainty(data: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Directions of uncertainty tell of numbers that are about to change."""
+def _model_alone(data: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Directions of uncertainty tell of numbers that are about to change; a watch over sensors is no part of them."""
+    if data.get("sensor_fault") is not None:
+        data = {key: value for key, value in data.items() if key != "sensor_fault"}
     contact = data.get("contact") or {}
     if contact.get("uncertainty") is None:
         return data

@@ -212,5 +212,5 @@ def friction_parts(data: Mapping[str, Any], arrays: Mapping[str, Numbers]) -> Nu
     """
     joints, tendons = len(data["joints"]), len(data["tendons"])
     none = [[[0.0] * (tendons + 3)]] * joints
-    asked = {**data, "contact": {"threshold": [_NEVER] * joints, "uncertainty": none}}
+    asked = {**data, "contact": {"threshold": [_NEVER] * joints, "uncertainty": none}, "sensor_fault": None}
     return np.asarray(native.Finger.from_description(asked, 3).run(arrays, parts=True)["friction_parts"])

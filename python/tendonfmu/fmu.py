@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
 from tendonfmu.recording import Recording
-from tendonfmu.signals import FLAGS, INPUTS, NUMBERS, OPTIONAL_NUMBERS, PLACE, REST, inputs_used
+from tendonfmu.signals import FLAGS, INPUTS, NUMBERS, OPTIONAL_NUMBERS, PLACE, REST, SENSORS, inputs_used
 
 Progress = Callable[[int], None]
 
@@ -111,8 +111,10 @@ class _Run:
         if description.fmiVersion != "2.0" or description.coSimulation is None:
             raise InputError(f"{path}: FMI {description.fmiVersion}; expected an FMI 2.0 co-simulation FMU")
         self._all = {variable.name: variable for variable in description.modelVariables}
-        missing = {group for group in (*OPTIONAL_NUMBERS, *PLACE, *REST) if not self._has(group)}
-        present = [group for group in (*NUMBERS, *OPTIONAL_NUMBERS, *FLAGS, *PLACE, *REST) if group not in missing]
+        missing = {group for group in (*OPTIONAL_NUMBERS, *PLACE, *REST, *SENSORS) if not self._has(group)}
+        present = [
+            group for group in (*NUMBERS, *OPTIONAL_NUMBERS, *FLAGS, *PLACE, *REST, *SENSORS) if group not in missing
+        ]
         outputs = {group: self._group(group) for group in present}
         types = {group: str(self._all[next(iter(names))].type) for group, names in outputs.items()}
         self.variables = Variables(outputs, types)
@@ -126,7 +128,7 @@ class _Run:
 
     def inputs(self, source: int) -> tuple[str, ...]:
         """Groups of inputs that the FMU uses."""
-        return inputs_used(source, self._has(REST[-1]))
+        return inputs_used(source, self._has(REST[-1]) or self._has(SENSORS[-1]))
 
     def _has(self, group: str) -> bool:
         return group in self._all or f"{group}[1]" in self._all

@@ -190,7 +190,7 @@ def _open_loop(data: Mapping[str, Any], clock: Clock) -> dict[str, Any]:
     }
     if _is_uncertain(data):
         contact["uncertainty"] = data["contact"]["uncertainty"]
-    return {**data, "contact": contact}
+    return {**data, "contact": contact, "sensor_fault": None}
 
 
 def _without_uncertainty(data: Mapping[str, Any]) -> dict[str, Any]:

@@ -169,7 +169,7 @@ def _fmu_outputs(data: Data, recording: FitRecording) -> dict[str, Numbers]:
 
 def _core_outputs(data: Data, recording: FitRecording) -> dict[str, Any]:
     """Of `native.Finger.run`, without contact detection."""
-    free = {**data, "contact": {"threshold": [_NEVER] * len(data["joints"])}}
+    free = {**data, "contact": {"threshold": [_NEVER] * len(data["joints"])}, "sensor_fault": None}
     return native.Finger.from_description(free, recording.kinematics).run(recording.recording.arrays())
 
 

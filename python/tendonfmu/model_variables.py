@@ -38,7 +38,7 @@ def describe_model(description: FingerDescription, table: VariableTable) -> dict
     """
     finger = native.Finger(description.image)
     sizes = group_sizes(finger.joints, finger.tendons)
-    has = {"links": finger.has_links, "rest": finger.watches_rest}
+    has = {"links": finger.has_links, "rest": finger.watches_rest, "sensor_fault": finger.watches_sensors}
     groups = present_groups(table, {need for need, given in has.items() if given})
     variables = [variable for group in groups for variable in elements(group, sizes)]
     variables += _parameters(finger.parameters(), table, description.data)

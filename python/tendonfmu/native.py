@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu import _native
-from tendonfmu.signals import DETECTION, FLAGS, INPUTS, NUMBERS, PLACE, REST
+from tendonfmu.signals import DETECTION, FLAGS, INPUTS, NUMBERS, PLACE, REST, SENSORS
 
 Array = NDArray[Any]
 
@@ -99,6 +99,11 @@ class Finger:
         return self._finger.watches_rest
 
     @property
+    def watches_sensors(self) -> bool:
+        """Whether the description has sensor_fault; then tendon positions are needed with every source."""
+        return self._finger.watches_sensors
+
+    @property
     def kernel(self) -> str:
         """Instruction set of the step: "plain", "sse2" or "avx2"; all give the same bits."""
         return self._finger.kernel
@@ -164,7 +169,8 @@ class Finger:
         has them: `compensated_torque_std`, `residual`, `innovation`, `stuck_friction`, `friction_jump`, `drift`,
         N·m. With links also `fingertip_force` and `fingertip_force_std` [N, 3] (N, base frame), and [N]
         `fingertip_force_observable`, `fingertip_force_misfit`, `contact_link`. With contact.rest also `contact_change`
-        [N, n] (N·m) and `contact_at_rest` [N].
+        [N, n] (N·m) and `contact_at_rest` [N]. With sensor_fault also `sensor_fault` [N, m] and `contact_observable`
+        [N].
         A later call goes on where this one ended.
         """
         inputs = [
@@ -175,7 +181,8 @@ class Finger:
             time = np.ascontiguousarray(recording["time"], dtype=np.float64)
             arrays = self._finger.run(time, inputs[0], inputs[1], inputs[2], inputs[3], parts)
         place, rest = PLACE if self.has_links else (), REST if self.watches_rest else ()
-        optional = (*(("friction_parts",) if parts else ()), *place, *rest)
+        sensors = SENSORS if self.watches_sensors else ()
+        optional = (*(("friction_parts",) if parts else ()), *place, *rest, *sensors)
         names = (*NUMBERS, *FLAGS, *DETECTION, *optional)
         outputs: dict[str, Array] = dict(zip(names, arrays, strict=True))
         flags = (name for name in outputs if outputs[name].dtype == np.uint8)

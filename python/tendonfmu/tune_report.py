@@ -43,6 +43,7 @@ def build_report(tuning: ContactTuning) -> dict[str, Any]:
         "held_out": _counted(tuning, tuning.held_out_[0]),
         "closed_loop": _loop(tuning),
         "rest": _rest(tuning),
+        "sensor_fault": _sensors(tuning),
         "pretensions": [_pretension(tuning, g) for g in range(len(tuning.pretensions_))],
         "tail": [_point(tuning, *each) for each in tuning.tail(FACTORS)],
         "tried": _tried(tuning),
@@ -93,6 +94,13 @@ def _rest(tuning: ContactTuning) -> dict[str, Any] | None:
         return None
     counted = {"alarms": rule.alarms, "held_out": rule.held_out, "limit": rule.limit}
     return {"rests": rule.rests, "minutes": 60.0 * rule.hours, **counted}
+
+
+def _sensors(tuning: ContactTuning) -> dict[str, Any]:
+    """The keys of sensor_fault (None: why) and the largest difference between a force and its spring, N."""
+    rule = tuning.sensors_
+    keys = None if rule.keys is None else dict(rule.keys)
+    return {"keys": keys, "largest_difference": rule.largest, "left_out": rule.why}
 
 
 def _level(tuning: ContactTuning, name: str) -> dict[str, Any]:

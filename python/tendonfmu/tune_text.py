@@ -76,6 +76,14 @@ def lines(tuning: ContactTuning) -> Iterator[str]:
         f"bias: noise {1e3 * bias.noise_std:.3g} mN·m + {1e3 * bias.noise_std_per_force:.3g} mN·m per N, "
         f"time constant {bias.time_constant:.3g} s at {bias.force:.3g} N"
     )
+    sensors = tuning.sensors_
+    if sensors.keys is None:
+        yield f"sensor faults are not watched: {sensors.why}"
+    else:
+        yield (
+            f"sensor faults: forces differ from their springs by up to {sensors.largest:.2g} N in free motion, "
+            f"{sensors.keys['jump_margin']:.3g} N are allowed"
+        )
     levels = np.array([level.held_out / level.in_sample for level in tuning.levels_.values()])
     if levels.max() > 1:
         yield f"held-out halves ask for bounds {levels.max():.2f} times those that the data themselves ask for"

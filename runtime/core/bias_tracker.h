@@ -280,7 +280,7 @@ HOT_INLINE void track_bias(tendonfmu_finger* f, double step, double noise) {
       double* unlearned = s->unlearned + j;
       quad_store(unlearned, quad_mul(quad_sub(one, gain), quad_load(unlearned)));
     }
-    const quad correction = quad_mul(gain, quad_sub(quad_load(s->torque + j), quad_load(s->friction + j)));
+    const quad correction = quad_mul(gain, quad_load(s->residual + j));
     quad_store(s->bias + j, quad_add(quad_load(s->bias + j), correction));
     quad_store(s->friction + j, quad_add(quad_load(s->friction + j), correction));
     quad_store(s->variance + j, quad_mul(quad_sub(one, own), predicted));

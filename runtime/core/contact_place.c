@@ -4,6 +4,8 @@
 
 #include <math.h>
 
+#include "rows_in_use.h"
+
 static const double told_share = 0.01;     /* of the largest eigenvalue: a tenth of the standard deviation's inverse */
 static const double least_square = 1e-200; /* of levers: below it a quotient by it may overflow */
 static const double turning_share = 1e-8;  /* above it a force along the direction turns joints at all */
@@ -166,6 +168,10 @@ contact_place find_contact_place(const tendonfmu_finger* finger) {
     found.tip = find_tip_force(n, lever, torque, deviation);
     if (s->scalar[STATE_CONTACT] != 0.0) {
       found.link = find_contact_link(n, finger->derived.least_link, torque, deviation);
+    }
+    if (any_joint_is_blind(finger)) { /* its torque is not that of the finger */
+      found.tip.observable = 0;
+      found.link = found.link ? -1 : 0;
     }
   }
   return found;

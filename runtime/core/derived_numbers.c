@@ -7,6 +7,7 @@
 
 #include "extensions.h"
 #include "pseudo_inverse.h"
+#include "rows_in_use.h"
 
 static const double two_pi = 6.28318530717958647692;
 
@@ -70,7 +71,10 @@ static void derive_tendon(derivation* d, const model_item* item) {
   const size_t lanes = d->finger->tendon_lanes;
   const double* values = d->values + item->first;
   switch (item->kind) {
-    case ITEM_STIFFNESS: to->inverse_stiffness[item->tendon] = bounded_inverse(values[0]); break;
+    case ITEM_STIFFNESS:
+      to->stiffness[item->tendon] = values[0];
+      to->inverse_stiffness[item->tendon] = bounded_inverse(values[0]);
+      break;
     case ITEM_MOMENT_ARMS:
       for (uint32_t j = 0; j < item->count; ++j) {
         to->moment_arm[j * lanes + item->tendon] = values[j];
@@ -206,6 +210,18 @@ static void derive_link(derivation* d, const model_item* item) {
   }
 }
 
+static void derive_sensors(derivation* d, const model_item* item) {
+  finger_settings* settings = &d->finger->derived.settings;
+  const double value = d->values[item->first];
+  switch (item->kind) {
+    case ITEM_FAULT_HOLD_TIME: settings->fault_hold_time = value; break;
+    case ITEM_FAULT_FORCE_RESOLUTION: settings->force_resolution = value; break;
+    case ITEM_FAULT_POSITION_RESOLUTION: settings->position_resolution = value; break;
+    case ITEM_FAULT_JUMP_MARGIN: settings->jump_margin = value; break;
+    default: settings->recovery_time = value; break;
+  }
+}
+
 static int derive_item(void* context, const model_item* item) {
   derivation* d = context;
   if (item->kind <= ITEM_LOAD_FRICTION) {
@@ -214,6 +230,8 @@ static int derive_item(void* context, const model_item* item) {
     derive_tendon(d, item);
   } else if (item->kind <= ITEM_JERK_DENSITY || item->kind >= ITEM_EXTENSION) {
     derive_finger(d, item);
+  } else if (item->kind >= ITEM_FAULT_HOLD_TIME) {
+    derive_sensors(d, item);
   } else if (item->kind >= ITEM_LINK_AXIS) {
     derive_link(d, item);
   } else if (item->kind >= ITEM_REST_TRAVEL) {
@@ -285,7 +303,8 @@ void derive_numbers(tendonfmu_finger* finger, int routing_changed) {
                                                .knows_uncertainty = (options & MODEL_HAS_UNCERTAINTY) != 0,
                                                .uses_innovation = (options & MODEL_DETECTS_BY_INNOVATION) != 0,
                                                .watches_drift = (options & MODEL_HAS_DRIFT) != 0,
-                                               .watches_rest = (options & MODEL_HAS_REST) != 0};
+                                               .watches_rest = (options & MODEL_HAS_REST) != 0,
+                                               .watches_sensors = (options & MODEL_HAS_SENSOR_FAULT) != 0};
   clear_grids(finger);
   model_visit(&finger->shape, derive_item, &d);
   derive_flags(finger);
@@ -293,5 +312,6 @@ void derive_numbers(tendonfmu_finger* finger, int routing_changed) {
     derive_routing(finger);
   }
   find_extensions(finger);
+  recall_rows(finger);
   forget_views(finger);
 }

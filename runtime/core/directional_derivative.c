@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "extension_signals.h"
+#include "rows_in_use.h"
 #include "slot_view.h"
 
 /* A number and its derivative along the direction. */
@@ -279,12 +280,26 @@ static void linearise_extensions(linearisation* l, const double* force) {
   }
 }
 
+/* mean |f0| and its slope */
+static void linearise_mean(linearisation* l, const double* direction) {
+  const tendonfmu_finger* f = l->finger;
+  double sound[MODEL_MAX_TENDONS];
+  const int watches = f->derived.settings.watches_sensors;
+  if (watches) {
+    weigh_forces(f, sensor_row(f, f->remembered.sensor, SENSOR_FAULT), sound);
+  }
+  for (size_t i = 0; i < f->tendons; ++i) {
+    const double force = f->remembered.force[i], slope = force < 0.0 ? -direction[i] : direction[i];
+    l->mean_force += watches ? sound[i] * fabs(force) : fabs(force) / (double)f->tendons;
+    l->mean_force_slope += watches ? sound[i] * slope : slope / (double)f->tendons;
+  }
+}
+
 static void linearise_forces(linearisation* l, const double* direction) {
   const tendonfmu_finger* f = l->finger;
+  linearise_mean(l, direction);
   for (size_t i = 0; i < f->tendons; ++i) {
-    const double force = f->remembered.force[i], slope = direction[i];
-    l->mean_force += fabs(force) / (double)f->tendons;
-    l->mean_force_slope += (force < 0.0 ? -slope : slope) / (double)f->tendons;
+    const double slope = direction[i];
     for (size_t j = 0; j < f->joints; ++j) {
       l->torque_slope[j] += f->derived.moment_arm[j * f->tendon_lanes + i] * slope;
     }
@@ -313,7 +328,11 @@ static void write_joint(const linearisation* l, size_t j, const tendonfmu_output
   const double torque = l->torque_slope[j], friction = l->friction[j].slope;
   double bias = l->bias_step[j].slope;
   double total = friction + bias;
-  if (f->remembered.scalar[STATE_FIRST_SAMPLE] != 0.0) {
+  const int begins_anew = f->derived.settings.watches_sensors && f->remembered.watch[j] == JOINT_BEGINS_ANEW;
+  if (begins_anew) {
+    bias = torque - friction;
+    total = torque;
+  } else if (f->remembered.scalar[STATE_FIRST_SAMPLE] != 0.0) {
     bias = f->derived.settings.has_initial_torque ? 0.0 : torque - friction;
     total = f->derived.settings.has_initial_torque ? friction : torque;
   } else {

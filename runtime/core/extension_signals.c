@@ -23,7 +23,7 @@ void angles_along(const tendonfmu_finger* f, signal_derivative* d) {
   for (size_t j = 0; j < f->joints; ++j) {
     for (size_t i = 0; i < f->tendons; ++i) {
       const double stretch = d->force[i] * f->derived.inverse_stiffness[i];
-      d->angle[j] += f->derived.inverse_routing[j * f->tendon_lanes + i] * (d->position[i] - stretch);
+      d->angle[j] += inverse_in_use(f)[j * f->tendon_lanes + i] * (d->position[i] - stretch);
     }
   }
 }

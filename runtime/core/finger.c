@@ -12,6 +12,7 @@
 #include "kernel_choice.h"
 #include "message.h"
 #include "parameters.h"
+#include "rows_in_use.h"
 #include "samples.h"
 #include "saved_state.h"
 
@@ -23,8 +24,7 @@ const char* tendonfmu_version(void) {
   return TENDONFMU_VERSION;
 }
 
-/* --- errors ---------------------------------------------------------------------------------------------------------
- */
+/* --- errors ------------------------------------------------------------------------------------------------------- */
 
 /* the text of the last error may be written on a finger that is otherwise only read */
 static message_line error_line(const tendonfmu_finger* finger) {
@@ -46,8 +46,7 @@ const char* tendonfmu_last_error(const tendonfmu_finger* finger) {
   return finger ? finger->error : "no finger: NULL";
 }
 
-/* --- creation -------------------------------------------------------------------------------------------------------
- */
+/* --- creation ----------------------------------------------------------------------------------------------------- */
 
 tendonfmu_status tendonfmu_check_image(const void* image, size_t image_size, char* message, size_t message_size) {
   model_shape shape;
@@ -167,8 +166,11 @@ int tendonfmu_watches_rest(const tendonfmu_finger* finger) {
   return finger && (finger->shape.options & MODEL_HAS_REST) != 0;
 }
 
-/* --- samples --------------------------------------------------------------------------------------------------------
- */
+int tendonfmu_watches_sensors(const tendonfmu_finger* finger) {
+  return finger && (finger->shape.options & MODEL_HAS_SENSOR_FAULT) != 0;
+}
+
+/* --- samples ------------------------------------------------------------------------------------------------------ */
 
 int tendonfmu_is_initialised(const tendonfmu_finger* finger) {
   return finger && finger->remembered.scalar[STATE_INITIALISED] != 0.0;
@@ -195,6 +197,7 @@ tendonfmu_status tendonfmu_set_kinematics_source(tendonfmu_finger* finger, int s
     return fail(finger, TENDONFMU_WRONG_ORDER, "kinematics_source is fixed once the first sample is taken");
   }
   finger->remembered.scalar[STATE_SOURCE] = source;
+  recall_rows(finger); /* measured angles need none */
   return TENDONFMU_OK;
 }
 
@@ -211,6 +214,7 @@ static tendonfmu_status take(tendonfmu_finger* finger, double time, const tendon
       message_start(error_line(finger), "the sample at time ");
       message_number(error_line(finger), time);
       message_text(error_line(finger), " s overflows: expected forces and velocities whose torques are finite");
+      recall_rows(finger);
       forget_views(finger); /* they follow its velocities, which nothing else remembers */
       break;
     default: return TENDONFMU_OK;
@@ -284,8 +288,7 @@ tendonfmu_status tendonfmu_get_directional_derivative(tendonfmu_finger* finger, 
   return TENDONFMU_OK;
 }
 
-/* --- parameters -----------------------------------------------------------------------------------------------------
- */
+/* --- parameters --------------------------------------------------------------------------------------------------- */
 
 size_t tendonfmu_parameter_count(const tendonfmu_finger* finger) {
   return finger ? finger->shape.parameter_count : 0;
@@ -437,8 +440,7 @@ tendonfmu_status tendonfmu_set_parameter(tendonfmu_finger* finger, const char* p
   return tendonfmu_set_parameters(finger, 1, &index, &value);
 }
 
-/* --- state ----------------------------------------------------------------------------------------------------------
- */
+/* --- state -------------------------------------------------------------------------------------------------------- */
 
 size_t tendonfmu_state_size(const tendonfmu_finger* finger) {
   return finger ? saved_state_size(finger) : 0;
@@ -475,8 +477,7 @@ tendonfmu_status tendonfmu_reset(tendonfmu_finger* finger) {
   return TENDONFMU_OK;
 }
 
-/* --- kernels --------------------------------------------------------------------------------------------------------
- */
+/* --- kernels ------------------------------------------------------------------------------------------------------ */
 
 const char* tendonfmu_get_kernel(const tendonfmu_finger* finger) {
   return finger ? finger->kernel->name : "";

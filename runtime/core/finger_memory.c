@@ -45,6 +45,7 @@ static void lay_out_derived(tendonfmu_finger* f, cursor* c) {
   for (size_t j = 0; j < n; ++j) {
     angles += f->shape.most_points[j] * lanes;
   }
+  d->stiffness = take_numbers(c, lanes);
   d->inverse_stiffness = take_numbers(c, lanes);
   d->bidirectional = take_numbers(c, lanes);
   d->moment_arm = take_numbers(c, n * lanes);
@@ -106,9 +107,11 @@ static void lay_out_state(tendonfmu_finger* f, cursor* c) {
   const size_t filter = f->shape.options & MODEL_HAS_POSITION_FILTER ? FILTER_ROWS * joints : 0;
   const size_t rests = f->shape.options & MODEL_HAS_REST ? 1 : 0;
   const size_t starts = f->shape.options & MODEL_HAS_START_SHARE ? 1 : 0;
+  const size_t drifts = f->shape.options & MODEL_HAS_DRIFT ? 1 : 0;
+  const size_t sensors = f->shape.options & MODEL_HAS_SENSOR_FAULT ? 1 : 0;
   f->state_count = STATE_SCALARS + 17 * joints + 2 * tendons + 6 * slots + 2 * entries + parts + filter +
-                   starts * (slots + joints) + (f->shape.options & MODEL_HAS_DRIFT ? 5 * joints : 0) +
-                   rests * (5 * joints + 5 * tendons) + f->shape.extension_memory;
+                   starts * (slots + joints) + drifts * 5 * joints + rests * (5 * joints + 5 * tendons) +
+                   sensors * (SENSOR_ROWS * tendons + joints) + f->shape.extension_memory;
   f->state = take_numbers(c, f->state_count);
   double* run = f->state;
   s->scalar = part(&run, STATE_SCALARS);
@@ -131,10 +134,9 @@ static void lay_out_state(tendonfmu_finger* f, cursor* c) {
   s->unlearned = part(&run, starts * joints);
   s->part = part(&run, parts);
   s->filter = part(&run, filter);
-  const size_t drifts = f->shape.options & MODEL_HAS_DRIFT ? joints : 0;
   double** const drift_rows[] = {&s->drift_of_late, &s->drift_quick, &s->drift_slow, &s->learned, &s->drift};
   for (size_t i = 0; i < sizeof drift_rows / sizeof drift_rows[0]; ++i) {
-    *drift_rows[i] = part(&run, drifts);
+    *drift_rows[i] = part(&run, drifts * joints);
   }
   double** const rest_of_joints[] = {&s->contact_change, &s->rest_tracked, &s->rest_contact, &s->rest_extreme,
                                      &s->carried_load};
@@ -146,6 +148,8 @@ static void lay_out_state(tendonfmu_finger* f, cursor* c) {
   for (size_t i = 0; i < sizeof rest_of_tendons / sizeof rest_of_tendons[0]; ++i) {
     *rest_of_tendons[i] = part(&run, rests * tendons);
   }
+  s->sensor = part(&run, sensors * SENSOR_ROWS * tendons);
+  s->watch = part(&run, sensors * joints);
   s->extension = run;
 }
 
@@ -185,6 +189,14 @@ static void lay_out_scratch(tendonfmu_finger* f, cursor* c) {
   s->rest_noise = take_numbers(c, resting ? f->joint_lanes : 0);
   s->rest_bound = take_numbers(c, resting ? f->joint_lanes : 0);
   s->rest_sudden_bound = take_numbers(c, resting ? f->joint_lanes : 0);
+  const size_t sensors = f->shape.options & MODEL_HAS_SENSOR_FAULT ? 1 : 0;
+  s->sensor = take_numbers(c, sensors * SENSOR_ROWS * f->tendon_lanes);
+  s->watch = take_numbers(c, sensors * f->joint_lanes);
+  s->inverse_routing = take_numbers(c, sensors * f->joints * f->tendon_lanes);
+  s->leverage = take_numbers(c, sensors * f->tendon_lanes);
+  s->determined = take_numbers(c, sensors * f->tendon_lanes);
+  s->row_in_use = take_numbers(c, sensors * f->tendon_lanes);
+  s->angle_shift = take_numbers(c, sensors * f->joint_lanes);
   s->velocity = take_numbers(c, f->slots);
   s->view = take(c, f->slots / 4 * sizeof *s->view);
 }

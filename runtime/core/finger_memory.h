@@ -48,6 +48,9 @@ typedef struct finger_settings {
   double rest_travel, rest_settle_time, rest_fall_share; /* m, s, 1 */
   double rest_innovation_rate;                           /* 1/T, 1/s; < 0: none */
   double rest_averaging_rate;                            /* 1/s; < 0: none */
+  int watches_sensors;
+  double fault_hold_time, recovery_time;                     /* s */
+  double force_resolution, jump_margin, position_resolution; /* N, N, m */
 } finger_settings;
 
 /* One row of the description's extensions. */
@@ -74,6 +77,7 @@ typedef struct extension_rows {
  */
 typedef struct derived_numbers {
   finger_settings settings;
+  double* stiffness;         /* [M] k; 0 in spare lanes */
   double* inverse_stiffness; /* [M] 1/k */
   double* bidirectional;     /* [M] 1 or 0 */
   double* moment_arm;        /* [n × M] r_ij */
@@ -116,6 +120,7 @@ enum {
   STATE_CONTACT_AT_REST, /* 0 or 1 */
   STATE_RECENT_AT,       /* s, from which on motion counts as recent */
   STATE_STARTED_AT,      /* s, first sample; with contact.drift, else 0 */
+  STATE_UNWELL,          /* 1 where a sensor fails or a joint is not watched; with sensor_fault, else 0 */
   STATE_SCALARS = 16     /* the rest is 0 and keeps the rows aligned */
 };
 
@@ -138,6 +143,32 @@ typedef enum filter_row_kind {
   FILTER_CARRIES, /* ∂z/∂x of the last sample: 1 or 0 */
   FILTER_ROWS
 } filter_row_kind;
+
+/* Rows of tendons that sensor_fault remembers. */
+typedef enum sensor_row_kind {
+  SENSOR_FAULT,       /* sensor_fault_kind */
+  SENSOR_FAULT_SINCE, /* s; 0 without a fault */
+  SENSOR_UNSOUND_AT,  /* s, last sample of a fault that the springs contradict; 0 without a fault */
+  SENSOR_KNOWN,       /* 1 where w of the last sample follows from the others, with the rows still in use */
+  SENSOR_FORCE,       /* f0, x0 and w of the last sample: N, m, m */
+  SENSOR_POSITION,
+  SENSOR_JOINT_SIDE,
+  SENSOR_HELD_FORCE, /* N, from which f0 has not gone by more than its resolution, and since when: s */
+  SENSOR_FORCE_HELD_SINCE,
+  SENSOR_HAS_TAUT,   /* 1 where the next two are known */
+  SENSOR_TAUT_FORCE, /* N, f0 and y = k·(x0 − w) of a sample with a taut tendon */
+  SENSOR_TAUT_SPRING,
+  SENSOR_HELD_POSITION, /* m, the same of x0, and since when: s */
+  SENSOR_POSITION_HELD_SINCE,
+  SENSOR_FORCE_THEN, /* N, m: f0 and w when x0 was there first */
+  SENSOR_JOINT_SIDE_THEN,
+  SENSOR_ROWS
+} sensor_row_kind;
+
+typedef enum sensor_fault_kind { SENSOR_IS_WELL, FORCE_FAILS, POSITION_FAILS } sensor_fault_kind;
+
+/* What a joint whose torque a failing sensor falsifies remembers. */
+typedef enum joint_watch { JOINT_WATCHED, JOINT_BLIND, JOINT_BEGINS_ANEW } joint_watch;
 
 typedef struct finger_state {
   double* scalar; /* [STATE_SCALARS] */
@@ -175,6 +206,8 @@ typedef struct finger_state {
   double* carried_load;   /* [N] ± N·m, bound of a load from the rest before; 0: none */
   double *smooth_force, *mark_force, *mark_position; /* [M] f̄, f̄ and x0 at the mark */
   double *recent_force, *recent_position;            /* [M] f̄ and x0 at the recent mark */
+  double* sensor;                                    /* [SENSOR_ROWS × M]; this and the next with sensor_fault only */
+  double* watch;                                     /* [N] joint_watch of the last sample */
   double* extension;                                 /* as the extensions ask for */
 } finger_state;
 
@@ -215,10 +248,19 @@ typedef struct finger_scratch {
   double* travel;                        /* [n × M + N] of what slides, by the position filter: m, rad; with it only */
   double *motor_position, *force_change; /* [M] x0 as it was given, f̄ less that of the mark; with contact.rest only */
   double *rest_noise, *rest_bound, *rest_sudden_bound; /* [N] N, D, B; with contact.rest only */
-  double* extension;                                   /* the memory of the extensions after this sample */
-  double *kept, *others, *whole_edge, *whole_pulley;   /* [n × M + N] of what slides: share left of where it was before
-                                                          this   sample, what the other rows make of F, that times |F| of
-                                                          the   law; with such rows only */
+  double* sensor; /* [SENSOR_ROWS × M] as in the state, after this sample; this and the next with sensor_fault only */
+  double* watch;  /* [N] likewise */
+  double* inverse_routing; /* [n × M] R⁺ of the rows in use */
+  double* leverage;        /* [M] h/(1 − h) of the rows in use; 0 of the others */
+  double* determined;      /* [M] 1: the others determine the angles */
+  double* row_in_use;      /* [M] 1 or 0 */
+  double* angle_shift;     /* [N] rad, by which the angles of the sample before change with the rows in use */
+  int angles_determined;   /* no row in use belongs to a failing sensor */
+  int unwell;              /* as in the state, after this sample */
+  double* extension;       /* the memory of the extensions after this sample */
+  double *kept, *others, *whole_edge, *whole_pulley; /* [n × M + N] of what slides: share left of where it was before
+                                                        this sample, what the other rows make of F, that times |F| of
+                                                        the law; with such rows only */
   double *grip, *bias_grip, *slides;    /* [n × M + N] what friction rows make of F and b, 1 where a slot never sticks;
                                            with    such rows only */
   effect_sample sample;                 /* as the extensions see it */
@@ -252,6 +294,16 @@ static inline int filters_position(const tendonfmu_finger* finger) {
 }
 static inline const double* filter_memory(const tendonfmu_finger* finger, const double* filter, filter_row_kind row) {
   return filter + (size_t)row * finger->joint_lanes;
+}
+
+/* Row of the sensors in memory. */
+static inline double* sensor_row(const tendonfmu_finger* finger, double* sensor, sensor_row_kind row) {
+  return sensor + (size_t)row * finger->tendon_lanes;
+}
+
+/* R⁺ as the kinematics use it */
+static inline const double* inverse_in_use(const tendonfmu_finger* finger) {
+  return finger->derived.settings.watches_sensors ? finger->scratch.inverse_routing : finger->derived.inverse_routing;
 }
 
 /* Exponent of forgetting of a slot at the last sample: exp(−this) of what it brought along when it came to rest counted

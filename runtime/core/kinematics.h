@@ -20,8 +20,14 @@ HOT_INLINE void angles_from_tendons(const tendonfmu_finger* f, const double* for
     quad_store(position + i, quad_sub(quad_load(position + i), stretch));
   }
   for (size_t j = 0; j < f->joints; ++j) {
-    angle[j] = tendon_sum(f->derived.inverse_routing + j * f->tendon_lanes, position, f->tendon_lanes);
+    angle[j] = tendon_sum(inverse_in_use(f) + j * f->tendon_lanes, position, f->tendon_lanes);
   }
+}
+
+/* four joint angles of the sample before, by the rows that are in use now */
+HOT_INLINE quad angle_before_step(const tendonfmu_finger* f, const double* angle, size_t j) {
+  const quad before = quad_load(angle + j);
+  return f->derived.settings.watches_sensors ? quad_add(before, quad_load(f->scratch.angle_shift + j)) : before;
 }
 
 /* share of the raw velocity that the filter takes in a step: 1 − exp(−2π·cutoff·Δt), 1 without a filter */
@@ -34,7 +40,7 @@ HOT_INLINE void filter_velocities(const tendonfmu_finger* f, const double* angle
                                   double* velocity) {
   const finger_state* s = &f->remembered;
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
-    const quad raw = quad_div(quad_sub(quad_load(angle + j), quad_load(s->angle + j)), quad_set(step));
+    const quad raw = quad_div(quad_sub(quad_load(angle + j), angle_before_step(f, s->angle, j)), quad_set(step));
     const quad before = quad_load(s->speed + j);
     const quad filtered = quad_add(before, quad_mul(quad_set(share), quad_sub(raw, before)));
     quad_store(velocity + j, share < 1.0 ? filtered : raw);

@@ -160,6 +160,15 @@ static void walk_links(walk* w) {
   emit(w, (model_item){.kind = ITEM_TIP}, space);
 }
 
+static void walk_sensors(walk* w) {
+  const uint32_t one = w->shape->options & MODEL_HAS_SENSOR_FAULT ? 1 : 0;
+  const item_size items[] = {
+      {ITEM_FAULT_HOLD_TIME, one},   {ITEM_FAULT_FORCE_RESOLUTION, one}, {ITEM_FAULT_POSITION_RESOLUTION, one},
+      {ITEM_FAULT_JUMP_MARGIN, one}, {ITEM_FAULT_RECOVERY_TIME, one},
+  };
+  emit_all(w, items, sizeof items / sizeof items[0]);
+}
+
 static effect_place place_of(uint32_t joint, uint32_t tendon) {
   return (effect_place){joint ? joint - 1 : EFFECT_NOWHERE, tendon ? tendon - 1 : EFFECT_NOWHERE};
 }
@@ -200,6 +209,7 @@ static uint32_t run_walk(walk* w) {
   walk_finger(w);
   walk_detection(w);
   walk_links(w);
+  walk_sensors(w);
   walk_extensions(w);
   return w->next;
 }

@@ -62,7 +62,8 @@ enum {
   MODEL_HAS_START_SHARE = 1 << 20,
   MODEL_HAS_DRIFT = 1 << 21,
   MODEL_BOUNDS_PRESLIDING = 1 << 22, /* beside MODEL_HAS_FRICTION_BOUND */
-  MODEL_OPTION_BITS = (1 << 23) - 1
+  MODEL_HAS_SENSOR_FAULT = 1 << 23,
+  MODEL_OPTION_BITS = (1 << 24) - 1
 };
 
 #define MODEL_EDGE_HAS_ANGLES 0x80000000u
@@ -139,7 +140,12 @@ typedef enum model_item_kind {
   ITEM_LINK_AXIS,                 /* 3, of one joint */
   ITEM_LINK_OFFSET,               /* 3, of one joint */
   ITEM_TIP,                       /* 3 */
-  ITEM_EXTENSION                  /* as many as the effect has */
+  ITEM_FAULT_HOLD_TIME,           /* sensor_fault.… */
+  ITEM_FAULT_FORCE_RESOLUTION,
+  ITEM_FAULT_POSITION_RESOLUTION,
+  ITEM_FAULT_JUMP_MARGIN,
+  ITEM_FAULT_RECOVERY_TIME,
+  ITEM_EXTENSION /* as many as the effect has */
 } model_item_kind;
 
 typedef struct model_item {

@@ -102,6 +102,11 @@ static void path_of_finger(message_line path, const model_item* item, uint32_t o
       [ITEM_REST_FALL_SHARE] = "contact.rest.fall_share",
       [ITEM_REST_INNOVATION_TIME] = "contact.rest.innovation.time",
       [ITEM_REST_INNOVATION_THRESHOLD] = "contact.rest.innovation.threshold",
+      [ITEM_FAULT_HOLD_TIME] = "sensor_fault.hold_time",
+      [ITEM_FAULT_FORCE_RESOLUTION] = "sensor_fault.force_resolution",
+      [ITEM_FAULT_POSITION_RESOLUTION] = "sensor_fault.position_resolution",
+      [ITEM_FAULT_JUMP_MARGIN] = "sensor_fault.jump_margin",
+      [ITEM_FAULT_RECOVERY_TIME] = "sensor_fault.recovery_time",
   };
   switch (item->kind) {
     case ITEM_INITIAL_TORQUE:
@@ -272,6 +277,11 @@ parameter_range parameter_range_of(const model_item* item, uint32_t index) {
       [ITEM_LINK_AXIS] = {"1", -1e6, 1e6, 0, 0},
       [ITEM_LINK_OFFSET] = {"m", -10.0, 10.0, 0, 0},
       [ITEM_TIP] = {"m", -10.0, 10.0, 0, 0},
+      [ITEM_FAULT_HOLD_TIME] = {"s", 0.0, LARGE, 0, 1},
+      [ITEM_FAULT_FORCE_RESOLUTION] = {"N", 0.0, LARGE, 0, 1},
+      [ITEM_FAULT_POSITION_RESOLUTION] = {"m", 0.0, LARGE, 0, 1},
+      [ITEM_FAULT_JUMP_MARGIN] = {"N", 0.0, LARGE, 1, 1}, /* without one rounding would be a fault */
+      [ITEM_FAULT_RECOVERY_TIME] = {"s", 0.0, LARGE, 0, 1},
   };
   const uint32_t offset = index - item->first;
   switch (item->kind) {

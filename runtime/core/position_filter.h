@@ -3,7 +3,7 @@
 #ifndef TENDONFMU_POSITION_FILTER_H
 #define TENDONFMU_POSITION_FILTER_H
 
-#include "finger_memory.h"
+#include "kinematics.h"
 
 /* what is taken to be known at the first sample: 1 rad/s and 10 rad/s², one standard deviation */
 #define FIRST_VELOCITY_VARIANCE     1.0
@@ -29,7 +29,8 @@ HOT_INLINE void begin_position_filter(const tendonfmu_finger* f, const double* a
   double* to = f->scratch.filter;
   const quad zero = quad_set(0.0), follows = quad_set(first ? 0.0 : 1.0);
   for (size_t j = 0; j < lanes; j += 4) {
-    const quad q = quad_load(angle + j), held = filter_row(f->remembered.filter, FILTER_HELD_ANGLE, lanes, j);
+    const quad q = quad_load(angle + j),
+               held = angle_before_step(f, filter_memory(f, f->remembered.filter, FILTER_HELD_ANGLE), j);
     for (int row = 0; row < FILTER_ROWS; ++row) {
       set_filter_row(to, (filter_row_kind)row, lanes, j, zero);
     }
@@ -62,7 +63,7 @@ HOT_INLINE void filter_four_joints(const tendonfmu_finger* f, size_t j, const do
   const quad acceleration = filter_row(from, FILTER_ACCELERATION, lanes, j);
   const quad speed = quad_add(quad_load(f->remembered.speed + j), quad_mul(h, acceleration));
   const quad moved = quad_sub(quad_mul(h, speed), quad_mul(half, acceleration));
-  const quad ahead = quad_add(filter_row(from, FILTER_ANGLE, lanes, j), moved);
+  const quad ahead = quad_add(angle_before_step(f, filter_memory(f, from, FILTER_ANGLE), j), moved);
   const quad m01 = quad_add(p01, quad_add(quad_mul(h, p11), quad_mul(half, p12)));
   const quad m02 = quad_add(p02, quad_add(quad_mul(h, p12), quad_mul(half, p22)));
   const quad m12 = quad_add(p12, quad_mul(h, p22));
@@ -97,7 +98,8 @@ HOT_INLINE void filter_four_joints(const tendonfmu_finger* f, size_t j, const do
   quad_store(velocity, v);
 
   /* the gate: two standard deviations of velocity and angle */
-  const quad held = filter_row(from, FILTER_HELD_ANGLE, lanes, j), width = quad_mul(quad_set(2.0), quad_sqrt(q00));
+  const quad held = angle_before_step(f, filter_memory(f, from, FILTER_HELD_ANGLE), j),
+             width = quad_mul(quad_set(2.0), quad_sqrt(q00));
   const quad low = quad_sub(x, width), high = quad_add(x, width);
   const quad_mask moves = quad_greater(quad_mul(v, v), quad_mul(quad_set(4.0), q11));
   const quad_mask above = quad_greater(held, high), below = quad_greater(low, held);

@@ -7,6 +7,7 @@
 
 #include "contact_place.h"
 #include "kernel_choice.h"
+#include "rows_in_use.h"
 
 enum { MOST_ROWS = 4 };
 
@@ -18,14 +19,14 @@ typedef struct input_row {
   double* to;
 } input_row;
 
-/* the rows that the kinematics source and contact.rest use; returns how many */
+/* the rows that the kinematics source, contact.rest and sensor_fault use; returns how many */
 static size_t used_rows(const tendonfmu_finger* f, const tendonfmu_inputs* inputs, input_row rows[MOST_ROWS]) {
   const finger_scratch* s = &f->scratch;
   const int source = (int)f->remembered.scalar[STATE_SOURCE];
   const size_t m = f->tendons, n = f->joints;
   size_t count = 0;
   rows[count++] = (input_row){"tendon_force", "N", inputs->tendon_force, m, s->force};
-  if (source == TENDONFMU_TENDON_POSITIONS || f->derived.settings.watches_rest) {
+  if (source == TENDONFMU_TENDON_POSITIONS || f->derived.settings.watches_rest || f->derived.settings.watches_sensors) {
     rows[count++] = (input_row){"tendon_position", "m", inputs->tendon_position, m, s->position};
   }
   if (source != TENDONFMU_TENDON_POSITIONS) {
@@ -64,7 +65,7 @@ int samples_take_inputs(tendonfmu_finger* finger, double time, const tendonfmu_i
   for (size_t k = 0; k < count; ++k) {
     if (!rows[k].values) {
       message_start(message, rows[k].name);
-      message_text(message, " is missing: this kinematics source, or contact.rest, needs it");
+      message_text(message, " is missing: this kinematics source, or contact.rest or sensor_fault, needs it");
       return -1;
     }
     memcpy(rows[k].to, rows[k].values, rows[k].count * sizeof(double));
@@ -147,6 +148,20 @@ static void give_rest(const tendonfmu_finger* finger, const tendonfmu_outputs* o
   }
 }
 
+/* failing sensors and what they hide; 0 without sensor_fault */
+static void give_sensors(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs, size_t row) {
+  const int watches = finger->derived.settings.watches_sensors;
+  if (outputs->sensor_fault && watches) {
+    give_flags(outputs->sensor_fault, sensor_row(finger, finger->remembered.sensor, SENSOR_FAULT), finger->tendons,
+               row);
+  } else if (outputs->sensor_fault) {
+    memset(outputs->sensor_fault + row * finger->tendons, 0, finger->tendons);
+  }
+  if (outputs->contact_observable) {
+    outputs->contact_observable[row] = watches && !any_joint_is_blind(finger);
+  }
+}
+
 static void give_place(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs, size_t row) {
   if (!outputs->fingertip_force && !outputs->fingertip_force_std && !outputs->fingertip_force_observable &&
       !outputs->fingertip_force_misfit && !outputs->contact_link) {
@@ -185,6 +200,7 @@ void samples_give_outputs(const tendonfmu_finger* finger, const tendonfmu_output
   give_parts(outputs->friction_parts, finger, row);
   give_place(finger, outputs, row);
   give_rest(finger, outputs, row);
+  give_sensors(finger, outputs, row);
 }
 
 static const double* row_of(const double* values, size_t row, size_t count) {

@@ -9,6 +9,7 @@
 #include "derived_numbers.h"
 #include "kernel_choice.h"
 #include "parameters.h"
+#include "rows_in_use.h"
 
 enum { HEADER_BYTES = 40, HASHED_FROM = 32, STATE_VERSION = 1 };
 
@@ -98,7 +99,8 @@ static int scalars_are_sound(const tendonfmu_finger* f, const unsigned char* sta
       {s + STATE_CONTACT_AT_REST, 1, ROW_WITHOUT_LANES, 0.0, rests, 1, 0},
       {s + STATE_RECENT_AT, 1, ROW_WITHOUT_LANES, -LARGEST_TIME * rests, LARGEST_TIME * rests, 0, 0},
       {s + STATE_STARTED_AT, 1, ROW_WITHOUT_LANES, -LARGEST_TIME * drifts, LARGEST_TIME * drifts, 0, 0},
-      {s + STATE_STARTED_AT + 1, STATE_SCALARS - STATE_STARTED_AT - 1, ROW_WITHOUT_LANES, 0.0, 0.0, 0, 0},
+      {s + STATE_UNWELL, 1, ROW_WITHOUT_LANES, 0.0, f->derived.settings.watches_sensors ? 1.0 : 0.0, 1, 0},
+      {s + STATE_UNWELL + 1, STATE_SCALARS - STATE_UNWELL - 1, ROW_WITHOUT_LANES, 0.0, 0.0, 0, 0},
   };
   return rows_are_sound(f, state, rules, sizeof rules / sizeof rules[0]);
 }
@@ -142,7 +144,8 @@ static int slots_are_sound(const tendonfmu_finger* f, const unsigned char* state
       {s->stuck_since, slots, ROW_OF_SLOTS, absorbs ? 0.0 : -LARGEST_TIME, absorbs ? LARGEST_SQUARE : LARGEST_TIME, 0,
        1},
       {s->last_stuck, slots, ROW_OF_SLOTS, -LARGEST_TIME, LARGEST_TIME, 0, 1},
-      {s->entry_edge, rest, ROW_WITHOUT_LANES, -DBL_MAX, DBL_MAX, 0, 0}, /* entries, start, parts, filter, rest, … */
+      {s->entry_edge, rest, ROW_WITHOUT_LANES, -DBL_MAX, DBL_MAX, 0,
+       0}, /* entries, start, parts, filter, rest, sensors, … */
       {s->start_left, starts * slots, ROW_OF_SLOTS, 0.0, 1.0, 0, 1},
       {s->drift_of_late, f->derived.settings.watches_drift ? 5 * f->joint_lanes : 0, ROW_WITHOUT_LANES,
        -2.0 * LARGEST_SUM, 2.0 * LARGEST_SUM, 0, 0}, /* and the four rows after it */
@@ -185,6 +188,23 @@ static int motors_rest_is_sound(const tendonfmu_finger* f, const unsigned char* 
          (marked_at <= time && rows_are_sound(f, state, rules, sizeof rules / sizeof rules[0]));
 }
 
+static int sensors_are_sound(const tendonfmu_finger* f, const unsigned char* state) {
+  const size_t m = f->tendon_lanes, n = f->joint_lanes;
+  for (size_t row = 0; f->derived.settings.watches_sensors && row < SENSOR_ROWS; ++row) {
+    const int time = row == SENSOR_FAULT_SINCE || row == SENSOR_UNSOUND_AT || row == SENSOR_FORCE_HELD_SINCE ||
+                     row == SENSOR_POSITION_HELD_SINCE;
+    const int flag = row == SENSOR_FAULT || row == SENSOR_KNOWN || row == SENSOR_HAS_TAUT;
+    const double most = flag ? (row == SENSOR_FAULT ? POSITION_FAILS : 1.0) : time ? LARGEST_TIME : DBL_MAX;
+    const double* at = f->remembered.sensor + row * m;
+    const row_rule rule = {at, m, ROW_OF_TENDONS, flag ? 0.0 : -most, most, flag, time};
+    if (!row_is_sound(f, state, &rule)) {
+      return 0;
+    }
+  }
+  const row_rule watch = {f->remembered.watch, n, ROW_OF_JOINTS, 0.0, JOINT_BEGINS_ANEW, 1, 0};
+  return !f->derived.settings.watches_sensors || row_is_sound(f, state, &watch);
+}
+
 /* nothing has rested for less than no time: exponents of forgetting are not negative */
 static int rests_are_sound(const tendonfmu_finger* f, const unsigned char* state) {
   const finger_state* s = &f->remembered;
@@ -215,7 +235,8 @@ static int check_bytes(tendonfmu_finger* f, const unsigned char* from, message_l
   }
   const unsigned char* state = from + HEADER_BYTES + 8 * p;
   if (!scalars_are_sound(f, state) || !joints_are_sound(f, state) || !slots_are_sound(f, state) ||
-      !filter_is_sound(f, state) || !motors_rest_is_sound(f, state) || !rests_are_sound(f, state)) {
+      !filter_is_sound(f, state) || !motors_rest_is_sound(f, state) || !sensors_are_sound(f, state) ||
+      !rests_are_sound(f, state)) {
     return refuse(message, "damaged saved state: a number in it cannot be");
   }
   load_doubles(f->candidate, from + HEADER_BYTES, p);
@@ -234,6 +255,7 @@ int restore_state(tendonfmu_finger* finger, const void* bytes, message_line mess
     memcpy(finger->parameters, finger->candidate, p * sizeof(double));
     derive_numbers(finger, 1);
   }
+  recall_rows(finger);
   forget_views(finger); /* they follow the side of the last moving sample, which is another one now */
   return 0;
 }

@@ -10,6 +10,7 @@
 #include "kernel_choice.h"
 #include "kinematics.h"
 #include "position_filter.h"
+#include "sensor_fault.h"
 #include "unlearned_friction.h"
 
 HOT_INLINE int is_first(const tendonfmu_finger* f) {
@@ -29,7 +30,8 @@ HOT_INLINE int inputs_in_range(const tendonfmu_finger* f) {
   const finger_scratch* s = &f->scratch;
   const int source = (int)f->remembered.scalar[STATE_SOURCE];
   if (!row_in_range(s->force, f->tendon_lanes) ||
-      (f->derived.settings.watches_rest && !row_in_range(s->position, f->tendon_lanes))) {
+      ((f->derived.settings.watches_rest || f->derived.settings.watches_sensors) &&
+       !row_in_range(s->position, f->tendon_lanes))) {
     return 0;
   }
   if (source == TENDONFMU_TENDON_POSITIONS) {
@@ -81,6 +83,9 @@ HOT_INLINE void measured_torques(tendonfmu_finger* f) {
 
 /* mean |f0| over the tendons */
 HOT_INLINE double mean_tendon_force(const tendonfmu_finger* f) {
+  if (f->derived.settings.watches_sensors && f->scratch.unwell) {
+    return mean_sound_force(f);
+  }
   quad sum = quad_set(0.0);
   for (size_t i = 0; i < f->tendon_lanes; i += 4) {
     sum = quad_add(sum, quad_abs(quad_load(f->scratch.force + i)));
@@ -103,7 +108,8 @@ HOT_INLINE int all_finite(const tendonfmu_finger* f) {
   for (size_t k = 0; k < f->shape.extension_memory; ++k) {
     probe += 0.0 * s->extension[k];
   }
-  return probe == 0.0 && (!filters_position(f) || filter_is_finite(f));
+  return probe == 0.0 && (!filters_position(f) || filter_is_finite(f)) &&
+         (!f->derived.settings.watches_sensors || sensors_are_finite(f));
 }
 
 HOT_INLINE void copy_row(double* to, const double* from, size_t lanes) {
@@ -160,6 +166,9 @@ HOT_INLINE void remember_sample(tendonfmu_finger* f, double time, double velocit
   if (filters_position(f)) {
     copy_row(s->filter, f->scratch.filter, FILTER_ROWS * f->joint_lanes);
   }
+  if (f->derived.settings.watches_sensors) {
+    remember_sensors(f);
+  }
   if (f->shape.extension_count) {
     remember_extensions(f);
   }
@@ -200,17 +209,26 @@ HOT_INLINE void begin_tracking(tendonfmu_finger* f, double time, double mean_for
 HOT_INLINE void track_sample(tendonfmu_finger* f, double time, double step, double mean_force) {
   const finger_state* s = &f->remembered;
   const finger_settings* settings = &f->derived.settings;
+  const int unwell = settings->watches_sensors && f->scratch.unwell;
   const double wanted = settings->noise_time >= 0.0 ? settings->noise_time / step : 1.0;
   const double scale = wanted < 1e300 ? wanted : 1e300; /* finite, however short the step */
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     quad_store(s->bias + j, quad_add(quad_load(s->bias + j), quad_load(f->scratch.bias_step + j)));
   }
+  if (unwell) {
+    begin_bias_anew(f);
+  }
   leave_residual(f, step);
   if (settings->has_start_share) {
     add_unlearned(f);
   }
-  if (settings->watches_rest) {
+  if (unwell) {
+    forget_unwatched(f);
+  }
+  if (settings->watches_rest && !unwell) {
     watch_rest(f, mean_force, time, step);
+  } else if (settings->watches_rest) {
+    begin_rest(f, time); /* no rest while a sensor fails */
   }
   if (settings->watches_drift) {
     watch_drift(f, time, step);
@@ -225,6 +243,9 @@ HOT_INLINE void track_sample(tendonfmu_finger* f, double time, double step, doub
     track_bias(f, step, noise);
     if (settings->uses_innovation) {
       follow_residual(f, step);
+    }
+    if (unwell) {
+      leave_unwatched(f);
     }
   } else {
     restart_rest(f, time);
@@ -250,6 +271,9 @@ static sample_result take_sample(tendonfmu_finger* f, double time) {
   }
   if (f->extensions.signals) {
     shape_signals(f, time, 0);
+  }
+  if (f->derived.settings.watches_sensors) {
+    watch_sensors(f, time);
   }
   const double velocity_gain = find_kinematics(f, time, step);
   if (f->shape.extension_count) {

@@ -319,9 +319,17 @@ std::uint32_t read_links(const json_node& document, std::uint32_t joints) {
   return MODEL_HAS_LINKS;
 }
 
+std::uint32_t read_sensor_fault(const json_node& fault) {
+  if (fault.absent()) {
+    return 0u;
+  }
+  fault.expect_keys({"hold_time", "force_resolution", "position_resolution", "jump_margin", "recovery_time"});
+  return MODEL_HAS_SENSOR_FAULT;
+}
+
 void check_top(const json_node& document) {
   document.expect_keys({"format", "name", "joints", "tendons", "velocity_threshold", "velocity_filter_cutoff",
-                        "position_filter", "bias", "contact", "extensions", "links", "tip"});
+                        "position_filter", "bias", "contact", "extensions", "links", "tip", "sensor_fault"});
   const json_node format = document.member("format");
   if (format.absent() || format.value() != format_name) {
     format.refuse("\"" + std::string(format_name) + "\"");
@@ -353,7 +361,7 @@ finger_shape read_shape(const json_node& document) {
                          read_contact_options(document.member("contact"), finger.shape.joints, finger.shape.tendons) |
                          given(document.member("velocity_threshold"), {"hysteresis"}, MODEL_HAS_HYSTERESIS) |
                          read_position_filter(document.member("position_filter"), finger.shape.joints) |
-                         read_links(document, finger.shape.joints);
+                         read_links(document, finger.shape.joints) | read_sensor_fault(document.member("sensor_fault"));
   read_extensions(document.member("extensions"), finger.shape.joints, finger.shape.tendons, finger.extensions);
   finger.shape.extension_count = static_cast<std::uint32_t>(finger.extensions.size() / MODEL_EXTENSION_WORDS);
   finger.shape.word_count = static_cast<std::uint32_t>(finger.words.size());

@@ -47,6 +47,12 @@ std::optional<double> default_value(const model_item& item, std::uint32_t offset
     case ITEM_REST_AVERAGING_TIME: return 0.03; /* noise falls, and a push is late by no more than a touch takes */
     case ITEM_REST_FALL_SHARE:
       return 0.05; /* of the virtual hand's pushes at rest, few holds break and most ends show */
+    case ITEM_FAULT_HOLD_TIME: return 0.05;           /* channels are read up to some 20 ms apart */
+    case ITEM_FAULT_FORCE_RESOLUTION: return 0.01;    /* of a load cell of 100 N: a part in 10,000 */
+    case ITEM_FAULT_POSITION_RESOLUTION: return 2e-6; /* an encoder of 12 bits on a spool of 1 cm */
+    case ITEM_FAULT_JUMP_MARGIN:
+      return 1.0; /* several times what noise and sampling make of it on five families of fingers */
+    case ITEM_FAULT_RECOVERY_TIME: return 0.5; /* a loose contact that comes back for less is not well */
     case ITEM_EXTENSION:
       return item.effect->parameters[offset].required
                  ? std::nullopt

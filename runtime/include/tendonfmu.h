@@ -91,6 +91,10 @@ int tendonfmu_has_links(const tendonfmu_finger* finger);
  * is then needed with every kinematics source. */
 int tendonfmu_watches_rest(const tendonfmu_finger* finger);
 
+/* 1 when the description has sensor_fault, so that sensor_fault and contact_observable mean something; tendon_position
+ * is then needed with every kinematics source. */
+int tendonfmu_watches_sensors(const tendonfmu_finger* finger);
+
 /* One line about the last call that failed on this finger, "" when none has. Valid until the next call. */
 const char* tendonfmu_last_error(const tendonfmu_finger* finger);
 
@@ -98,7 +102,7 @@ const char* tendonfmu_last_error(const tendonfmu_finger* finger);
 
 /* Inputs of one sample, or of many (tendonfmu_run): row-major [samples × m] or [samples × n].
  * joint_position may be NULL for source 1, joint_velocity for sources 1 and 2, tendon_position for 2 and 3 without
- * contact.rest. */
+ * contact.rest and sensor_fault. */
 typedef struct tendonfmu_inputs {
   const double* tendon_force;    /* [m] N    f0, tension at the spring; negative only on bidirectional tendons */
   const double* tendon_position; /* [m] m    x0, motor side */
@@ -135,6 +139,9 @@ typedef struct tendonfmu_outputs {
   double* contact_change;         /* [n] N·m   change of the joint torque since the motors came to rest; 0 in motion */
   unsigned char* contact_at_rest; /* [1]       a change of some joint exceeds its bound */
   double* drift;                  /* [n] N·m   d, how far a slow load may have come; 0 without contact.drift */
+  /* of fingers with sensor_fault, else 0 */
+  unsigned char* sensor_fault;       /* [m]    the force or the position of the tendon contradicts its spring */
+  unsigned char* contact_observable; /* [1]    no failing sensor keeps contact at any joint from being seen */
 } tendonfmu_outputs;
 
 /* Chooses where joint angles and velocities come from. Default 1. Before tendonfmu_initialise() only. */

@@ -69,14 +69,21 @@ void free(void* block) {
 
 namespace {
 
-/* every call with the paper's finger, with every key beyond it, and with every extension too */
-enum { FINGERS = 3 };
+/* every call with the paper's finger, with every key beyond it, with watched sensors, and with every extension */
+enum { FINGERS = 4 };
 
 const std::vector<unsigned char>& image_of(int which) {
-  static const std::vector<unsigned char> images[FINGERS] = {test_finger::image(),
-                                                             test_finger::image(test_finger::every_key()),
-                                                             test_finger::image(test_finger::every_effect())};
+  static const std::vector<unsigned char> images[FINGERS] = {
+      test_finger::image(), test_finger::image(test_finger::every_key()),
+      test_finger::image(test_finger::watched_sensors()), test_finger::image(test_finger::every_effect())};
   return images[which];
+}
+
+/* with a force that fails now and then */
+Motion failing_motion(std::size_t samples) {
+  Motion motion(samples);
+  motion.let_force_fail(1);
+  return motion;
 }
 
 /* everything that the header promises to be fit for real time; returns how many calls did not answer as they should */
@@ -108,7 +115,7 @@ TEST(QuietStep, AllocatesNothing) {
 #if !defined(COUNTS_ALLOCATIONS)
   GTEST_SKIP() << "SKIPPED: malloc can only be counted with glibc and without sanitizers";
 #else
-  const Motion motion(20000);
+  const Motion motion = failing_motion(20000);
   const char* const kernels[] = {"plain", "sse2", "avx2"};
   for (int k = 0; k < 3 * FINGERS; ++k) {
     const char* const kernel = kernels[k / FINGERS];
@@ -146,7 +153,7 @@ int exit_status_without_system_calls(Action action) {
 }
 
 TEST(QuietStep, MakesNoSystemCall) {
-  const Motion motion(20000);
+  const Motion motion = failing_motion(20000);
   const int caught = exit_status_without_system_calls([] { return getppid() > 0 ? 0 : 1; });
   if (caught == 77) GTEST_SKIP() << "SKIPPED: this kernel has no seccomp";
   ASSERT_EQ(caught, -SIGKILL) << "a system call went unnoticed";
@@ -161,7 +168,7 @@ TEST(QuietStep, MakesNoSystemCall) {
 #endif
 
 TEST(QuietStep, LeavesTheHostAsItWas) {
-  const Motion motion(2000);
+  const Motion motion = failing_motion(2000);
   Finger finger(image_of(FINGERS - 1));
   Outputs outputs(motion.time.size());
   std::vector<unsigned char> state(tendonfmu_state_size(finger));

@@ -56,6 +56,14 @@ inline std::string every_key() {
   return text;
 }
 
+// The same, with sensors that are watched.
+inline std::string watched_sensors() {
+  std::string text = every_key();
+  const std::string name = "\"name\": \"test\",";
+  text.insert(text.find(name) + name.size(), R"("sensor_fault": {"jump_margin": 0.5, "recovery_time": 0.05},)");
+  return text;
+}
+
 // And with a position filter and every effect of docs/extensions.md, at every kind of place.
 inline std::string every_effect() {
   std::string text = every_key();
@@ -125,6 +133,13 @@ struct Motion {
       }
       angle.insert(angle.end(), q, q + joints);
       velocity.insert(velocity.end(), v, v + joints);
+    }
+  }
+
+  // The force of a tendon reads 0 for 0.3 s of every 2 s.
+  void let_force_fail(std::size_t tendon) {
+    for (std::size_t k = 0; k < time.size(); ++k) {
+      if (std::fmod(time[k], 2.0) > 1.0 && std::fmod(time[k], 2.0) < 1.3) force[k * tendons + tendon] = 0.0;
     }
   }
 
