@@ -1,0 +1,108 @@
+"""Calibrate the index finger on 27 min of its simulated motion: `index_finger_calibrated.json`, see README.md.
+
+Plays 800 s at 10 N and 800 s at tensions of 6 to 20 N on the rig, calibrates the description on both, and prints what
+each description makes of the demo's recordings, as README.md has it.
+
+    python make_calibrated.py [-o FOLDER] [--jobs CORES] [--table]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+HERE = Path(__file__).resolve().parent
+RIGS = HERE.parent / "rigs"
+GIVEN = HERE.parent / "fingers" / "index_finger.json"
+CALIBRATED = HERE / "index_finger_calibrated.json"
+DURATION = 800.0  # s, of each recording
+FREE = {"free_10": ["--pretension", "10"], "free_vary": ["--vary-tension", "6:20", "--seed", "5"]}
+RECORDINGS = {
+    "index_finger_free": "free motion, 10 N",
+    "index_finger_free_x4": "the same at 40 N",
+    "index_finger_pushes": "with pushes, while nobody pushes",
+}
+
+Array = NDArray[Any]
+
+
+def free_motion(folder: Path) -> list[Path]:
+    """Recordings of free motion in a folder; those that are there already stay."""
+    sys.path.insert(0, str(RIGS))
+    from virtual_hand import record
+
+    found = []
+    for name, options in FREE.items():
+        recording = folder / f"{name}.parquet"
+        found.append(recording if recording.is_file() else record(folder, name, DURATION, options))
+    return found
+
+
+def calibrate(folder: Path, jobs: int) -> Path:
+    """The calibrated description in a folder, of `tendonfmu calibrate`: a call that is repeated goes on."""
+    command = [sys.executable, "-m", "tendonfmu.cli", "calibrate", str(GIVEN), *map(str, free_motion(folder))]
+    pushes = ["--pushes", str(HERE / "index_finger_pushes.parquet")]
+    output = folder / "calibrated"
+    subprocess.run([*command, *pushes, "-o", str(output), "--jobs", str(jobs), "--progress"], check=True)
+    return output / "finger.json"
+
+
+# --- what the descriptions make of the demo's recordings --------------------------------------------------------------
+
+
+def rows(finger: Path) -> Iterator[tuple[str, list[str]]]:
+    """(what, before → after of each joint in mN·m) of free motion, and of the time in contact."""
+    from tendonfmu.native import Finger
+    from tendonfmu.recording import read_recording
+
+    description = json.loads(finger.read_text(encoding="utf-8"))
+    for name, what in RECORDINGS.items():
+        recording = read_recording(HERE / f"{name}.parquet")
+        given = Finger.from_description(description).run(recording.arrays())
+        label = np.zeros(len(recording), bool) if recording.contact is None else recording.contact
+        torque, left = given["joint_torque"], given["compensated_torque"]
+        yield f"{what}: τ → compensated", cells(torque[~label], left[~label])
+    load = recording.groups["external_torque"]
+    words = "with pushes, in contact: `external_torque` → compensated minus that"
+    yield words, cells(load[label], (left - load)[label])
+
+
+def cells(before: Array, after: Array) -> list[str]:
+    """Of each joint, rms in mN·m."""
+    rms = (1e3 * np.sqrt(np.mean(np.square(values), axis=0)) for values in (before, after))
+    return [f"{one:.1f} → {other:.1f}" for one, other in zip(*rms, strict=True)]
+
+
+def print_table() -> None:
+    print("| | | abduction | mcp flexion | pip flexion | dip flexion |")
+    print("| --- | --- | ---: | ---: | ---: | ---: |")
+    for words, finger in (("as given", GIVEN), ("calibrated", CALIBRATED)):
+        for what, found in rows(finger):
+            print(f"| {words} | {what} | {' | '.join(found)} |")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("-o", "--output", type=Path, help="folder for motions (70 MB), recordings and calibration")
+    parser.add_argument("--jobs", type=int, default=1, help="processor cores")
+    parser.add_argument("--table", action="store_true", help="print the table of the file that is there, no more")
+    arguments = parser.parse_args()
+    if not arguments.table:
+        folder = arguments.output or Path(tempfile.mkdtemp())
+        folder.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(calibrate(folder.resolve(), arguments.jobs), CALIBRATED)
+    print_table()
+
+
+if __name__ == "__main__":
+    main()
