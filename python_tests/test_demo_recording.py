@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
 from plant_rigs import needs_plant
+from tendonfmu.description import read_finger
 from tendonfmu.detection_score import score_detection
 from tendonfmu.native import Finger
 from tendonfmu.recording import Recording, read_recording
@@ -49,12 +50,30 @@ def description() -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module")
+def calibrated() -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((FOLDER / "index_finger_calibrated.json").read_text(encoding="utf-8"))
+    return found
+
+
+@pytest.fixture(scope="module")
 def recordings() -> dict[str, Recording]:
     return {name: read_recording(FOLDER / f"{name}.parquet") for name in RIGS}
 
 
+Outputs = dict[str, dict[str, Array]]
+
+
 @pytest.fixture(scope="module")
-def outputs(description: dict[str, Any], recordings: dict[str, Recording]) -> dict[str, dict[str, Array]]:
+def outputs(description: dict[str, Any], recordings: dict[str, Recording]) -> Outputs:
+    return outputs_of(description, recordings)
+
+
+@pytest.fixture(scope="module")
+def calibrated_outputs(calibrated: dict[str, Any], recordings: dict[str, Recording]) -> Outputs:
+    return outputs_of(calibrated, recordings)
+
+
+def outputs_of(description: dict[str, Any], recordings: dict[str, Recording]) -> Outputs:
     return {name: Finger.from_description(description).run(each.arrays()) for name, each in recordings.items()}
 
 
@@ -252,7 +271,7 @@ def is_alike(one: Any, other: Any, share: float) -> bool:
 
 
 def test_what_is_left_of_free_motion(
-    recordings: dict[str, Recording], outputs: dict[str, dict[str, Array]], description: dict[str, Any]
+    recordings: dict[str, Recording], outputs: Outputs, description: dict[str, Any]
 ) -> None:
     """A third at the pretension of the training, half at four times that; no false alarm in the first."""
     for name, most in (("index_finger_free", 1 / 3), ("index_finger_free_x4", 1 / 2)):
@@ -264,9 +283,7 @@ def test_what_is_left_of_free_motion(
     assert score.free_alarm_share < 0.03
 
 
-def test_most_pushes_are_found_and_felt_in_size(
-    recordings: dict[str, Recording], outputs: dict[str, dict[str, Array]]
-) -> None:
+def test_most_pushes_are_found_and_felt_in_size(recordings: dict[str, Recording], outputs: Outputs) -> None:
     recording, given = recordings["index_finger_pushes"], outputs["index_finger_pushes"]
     label = label_of(recording)
     score = score_detection(recording.time, label, given["contact"])
@@ -280,19 +297,88 @@ def test_most_pushes_are_found_and_felt_in_size(
     assert np.all(rms(given["compensated_torque"][label] - load) < 0.4 * rms(load))
 
 
-def test_the_readme_says_what_comes_out(recordings: dict[str, Recording], outputs: dict[str, dict[str, Array]]) -> None:
+# --- the calibrated finger --------------------------------------------------------------------------------------------
+
+
+def test_the_calibrated_finger_is_one_that_calibrate_takes_and_writes(
+    description: dict[str, Any], calibrated: dict[str, Any]
+) -> None:
+    """The format of today, the finger that it was made from, and the keys that a calibration leaves."""
+    from tendonfmu.calibrated_fit import earlier_finger
+
+    given = read_finger(EXAMPLES / "fingers" / "index_finger.json")
+    earlier = earlier_finger(given, FOLDER / "index_finger_calibrated.json")
+    assert earlier.joint_names == given.joint_names and earlier.tendon_names == given.tendon_names
+    for key in ("moment_arms", "stiffness"):
+        assert [each[key] for each in calibrated["tendons"]] == [each[key] for each in description["tendons"]]
+    assert calibrated["contact"]["method"] == "innovation" and calibrated["contact"]["uncertainty"]
+    assert {row["effect"] for row in calibrated["extensions"]} == {"presliding"}
+
+
+def test_the_calibrated_finger_finds_the_pushes(
+    recordings: dict[str, Recording], outputs: Outputs, calibrated_outputs: Outputs
+) -> None:
+    """10 of 11 and more, soon, and three times as exact as before."""
+    recording = recordings["index_finger_pushes"]
+    label, load = label_of(recording), recording.groups["external_torque"]
+    score = score_detection(recording.time, label, calibrated_outputs["index_finger_pushes"]["contact"])
+    assert len(score.events) == 11 and score.found >= 10
+    assert np.median(score.delays) < 0.03
+    before, after = (
+        rms((each["index_finger_pushes"]["compensated_torque"] - load)[label & (recording.time > 8.0)])
+        for each in (outputs, calibrated_outputs)
+    )
+    assert np.linalg.norm(after) < np.linalg.norm(before) / 2
+
+
+@pytest.mark.xfail(reason="bias.start_uncertainty is not in the file yet: 2.3 s at the first stroke", strict=True)
+@pytest.mark.parametrize("name", ["index_finger_free", "index_finger_pushes"])
+def test_no_false_alarm_of_the_calibrated_finger_lasts(
+    recordings: dict[str, Recording], calibrated_outputs: Outputs, name: str
+) -> None:
+    score = score_detection(recordings[name].time, label_of(recordings[name]), calibrated_outputs[name]["contact"])
+    assert all(end - begin <= 0.3 for begin, end in score.false_alarms), score.false_alarms
+
+
+# --- what the page says -----------------------------------------------------------------------------------------------
+
+
+def test_the_readme_says_what_comes_out(
+    recordings: dict[str, Recording], outputs: Outputs, calibrated_outputs: Outputs
+) -> None:
     page = (FOLDER / "README.md").read_text(encoding="utf-8")
     rows = [[cell.strip() for cell in line.strip("| ").split("|")] for line in page.splitlines() if "→" in line]
-    assert len(rows) == 4
-    for (name, where), (_, *cells) in zip(
-        (*((name, False) for name in RIGS), ("index_finger_pushes", True)), rows, strict=True
-    ):
+    wanted = [
+        (given, name, where)
+        for given in (outputs, calibrated_outputs)
+        for name, where in (*((name, False) for name in RIGS), ("index_finger_pushes", True))
+    ]
+    for (given, name, where), (_, _, *cells) in zip(wanted, rows, strict=True):
         part = label_of(recordings[name]) == where
-        left = outputs[name]["compensated_torque"][part]
-        before = outputs[name]["joint_torque"][part]
+        left = given[name]["compensated_torque"][part]
+        before = given[name]["joint_torque"][part]
         if where:
             before = recordings[name].groups["external_torque"][part]
             left = left - before
         said = np.array([[float(number) for number in re.findall(r"[\d.]+", cell)] for cell in cells])
         # another machine may simulate a slip otherwise
         np.testing.assert_allclose(said, 1e3 * np.column_stack([rms(before), rms(left)]), rtol=0.02, atol=0.1)
+
+
+def test_the_readme_says_what_is_found(
+    recordings: dict[str, Recording], outputs: Outputs, calibrated_outputs: Outputs
+) -> None:
+    """Pushes and the longest false alarm, of both descriptions, here and in the first README."""
+    recording = recordings["index_finger_pushes"]
+    own, first = ((folder / "README.md").read_text(encoding="utf-8") for folder in (FOLDER, EXAMPLES.parent))
+    scores = [
+        score_detection(recording.time, label_of(recording), each["index_finger_pushes"]["contact"])
+        for each in (outputs, calibrated_outputs)
+    ]
+    found = re.findall(r"(\d+) of the 11 pushes", own)
+    assert [int(each) for each in found] == [score.found for score in scores]
+    longest = max((end - begin for begin, end in scores[1].false_alarms), default=0.0)
+    for page in (own, first):
+        said = re.findall(r"no false alarm longer than ([\d.]+)\s+s", page)
+        assert len(said) == 1 and longest <= float(said[0]) <= longest + 0.3
+    assert f"**{scores[1].found} of 11 pushes**" in first

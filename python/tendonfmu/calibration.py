@@ -30,6 +30,7 @@ from tendonfmu.detection_tuning import ContactTuning, TuneWarning
 from tendonfmu.diagnosis import diagnose
 from tendonfmu.diagnosis_files import write_diagnosis
 from tendonfmu.diagnosis_page import PAGE
+from tendonfmu.diagnosis_result import Diagnosis
 from tendonfmu.errors import InputError
 from tendonfmu.estimation_signals import Signals
 from tendonfmu.extension_fit import FitSettings
@@ -71,10 +72,13 @@ PHASES = {
 
 @dataclass(frozen=True)
 class Calibration:
-    """data: the calibrated description. report: `calibration.json`, but for the files."""
+    """data: the calibrated description. report: `calibration.json`, but for the files. diagnosis: None where it was
+    not made in this call, but repeated or not asked for.
+    """
 
     data: Data
     report: dict[str, Any]
+    diagnosis: Diagnosis | None
 
 
 @dataclass(frozen=True)
@@ -124,7 +128,9 @@ def calibrate(
     run = _Run(case, Path(folder), options, phases)
     report, data = run.report()
     return Calibration(
-        data, {key: finite(value) for key, value in {**report, "seconds": perf_counter() - begun}.items()}
+        data,
+        {key: finite(value) for key, value in {**report, "seconds": perf_counter() - begun}.items()},
+        run.diagnosed,
     )
 
 
@@ -214,6 +220,7 @@ class _Run:
         self._case, self._folder, self._options, self._phases = case, folder, options, phases
         self._steps = Steps(folder, {**case.made_from, **options.of_all})
         self._seconds: dict[str, float] = {}
+        self.diagnosed: Diagnosis | None = None
 
     def report(self) -> tuple[dict[str, Any], Data]:
         """And the calibrated description."""
@@ -291,6 +298,7 @@ class _Run:
             jobs=options.jobs,
             progress=show,
         )
+        self.diagnosed = found
         write_diagnosis(found, self._folder / DIAGNOSIS)
         return structure_of(found)
 

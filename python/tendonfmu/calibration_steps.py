@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -47,6 +48,11 @@ class Steps:
         write_text(file, json.dumps({"format": FORMAT, "key": key, "result": result}) + "\n")
         # as a later call reads it: tuples become lists at once
         return dict(json.loads(json.dumps(result)))
+
+
+def forget_steps(folder: Path) -> None:
+    """The next calibration in this folder does everything anew."""
+    shutil.rmtree(folder / FOLDER, ignore_errors=True)
 
 
 def _read(file: Path, key: str) -> dict[str, Any] | None:

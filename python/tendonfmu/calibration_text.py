@@ -159,7 +159,11 @@ def tables(report: Report) -> Iterator[tuple[str, Row, list[Row]]]:
     """(title, headings, rows)."""
     yield "error, rms in mN·m", ("model", *report["joints"], "all"), error_rows(report)
     if report["structure"]["causes"]:
-        yield "built into the model", ("cause", "place", "how much", "less error"), cause_rows(report)
+        yield (
+            "built into the model",
+            ("cause", "place", "how much", "less error, the bias taken off"),
+            cause_rows(report),
+        )
     yield (
         "smallest sudden change that is reported, mN·m",
         ("joint", "half of the time", "9 of 10 times"),

@@ -455,7 +455,7 @@ def demo(
         "tendonfmu-demo"
     ),
 ) -> None:
-    """The whole story on built-in data, in two minutes: run, fit, detect, and diagnose an effect hidden in the data.
+    """The whole story on built-in data, in a minute: calibrate, detect, diagnose what is hidden in the data, fit, run.
 
     DIR gets story.html, which tells all of it, and all that it is made from.
     """
@@ -466,7 +466,7 @@ def demo(
     if story.missing:
         say(f"tendonfmu: warning: {story.missing}")
     for number, chapter in enumerate(story.chapters, start=1):
-        say(f"{number} {chapter.name}: {chapter.title.lower()}")
+        say(f"{number} {chapter.name}: {chapter.title[:1].lower()}{chapter.title[1:]}")
         with progress_bar() as bar:
             chapter.run(phase_bar(bar))
         print_tables(chapter_tables(story, chapter.name), chapter_lines(story, chapter.name), left="")

@@ -1,9 +1,9 @@
-"""The demo: the whole story on built-in data, from tendon forces to a named cause. Computes, prints nothing.
+"""The demo: the whole story on built-in data, from free motion to a tuned FMU. Computes, prints nothing.
 
-Four chapters, in this order: an FMU run over recordings of the index finger; the numbers of a two-joint finger fitted;
-pushes on the index finger detected; and what the two-joint finger's model lacks, which the demo is not told, found,
-named, built into the model and measured on a recording that nobody has seen. One page tells all of it. Where the
-installation cannot estimate, the second and the last chapter are left out.
+Five chapters: a two-joint finger is calibrated on a minute of motion; pushes on an index finger are detected that was
+calibrated on 27 min; what the two-joint finger's model lacked, which the demo is not told, is looked at, with the gain
+on a recording that nobody has seen; its numbers are fitted alone; and the index finger's FMU runs over free motion. One
+page tells all of it. Where the installation cannot estimate, the chapters of the two-joint finger are left out.
 """
 
 from __future__ import annotations
@@ -21,14 +21,15 @@ from tendonfmu.estimation import ESTIMATION_MISSING, HAS_ESTIMATION
 from tendonfmu.phases import PhaseState
 
 if TYPE_CHECKING:
+    from tendonfmu.calibration import Calibration
     from tendonfmu.diagnosis_result import Diagnosis
     from tendonfmu.fit_methods import Progress
     from tendonfmu.fitting import FrictionFit
 
 TWO_JOINTS, TRAINING, UNSEEN = "two_joints.json", "two_joints_training.parquet", "two_joints_unseen.parquet"
-FIT, DIAGNOSIS = "fit", "diagnosis"  # folders of the full pages
+CALIBRATION, FIT = "calibration", "fit"  # folders of the full pages
 FITTED = "fitted.json"
-ESTIMATING = ("fit", "diagnose")  # chapters that need what not every installation has
+ESTIMATING = ("calibrate", "diagnose", "fit")  # chapters that need what not every installation has
 
 Phase = Callable[[str, int, int | None], None]
 
@@ -47,12 +48,13 @@ class Chapter:
 class Story:
     """The demo in a folder: the chapters are run one by one, in order; `write` then makes the page of all of them.
 
-    finger: of run and detect. fit, diagnosis: of theirs. files: path -> what is in it. missing: why chapters are left
-    out, empty if none is.
+    finger: of detect and run. calibration, fit: of theirs. diagnosis: of the calibration. files: path -> what is in it.
+    missing: why chapters are left out, empty if none is.
     """
 
-    fit: FrictionFit
+    calibration: Calibration
     diagnosis: Diagnosis
+    fit: FrictionFit
 
     def __init__(self, folder: Path) -> None:
         """Raises InputError where the folder cannot be made."""
@@ -64,13 +66,14 @@ class Story:
         self.finger = IndexFinger(folder)
         self._files: dict[Path, str] = {}
         told = (
-            Chapter("run", "What the joints feel, friction subtracted", self._run),
-            Chapter("fit", "Friction learned from motion", self._fit),
+            Chapter("calibrate", "From free motion to a tuned FMU", self._calibrate),
             Chapter("detect", "Contact without a touch sensor", self._detect),
-            Chapter("diagnose", "What the model gets wrong, and why", self._diagnose),
+            Chapter("diagnose", "What the model got wrong, and why", self._diagnose),
+            Chapter("fit", "Its numbers alone, and how well they are known", self._fit),
+            Chapter("run", "What the joints feel, friction subtracted", self._run),
         )
         self.chapters = [each for each in told if HAS_ESTIMATION or each.name not in ESTIMATING]
-        self.missing = "" if HAS_ESTIMATION else f"{' and '.join(ESTIMATING)} are left out: {ESTIMATION_MISSING}"
+        self.missing = "" if HAS_ESTIMATION else f"{', '.join(ESTIMATING)} are left out: {ESTIMATION_MISSING}"
 
     @property
     def files(self) -> dict[Path, str]:
@@ -86,8 +89,28 @@ class Story:
         self._files = {page: "the whole story, to be read in a browser", **self._files}
         return page
 
-    def _run(self, phase: Phase) -> None:
-        self.finger.free_motion(lambda done, total: phase("running the FMU", done, total))
+    def _calibrate(self, phase: Phase) -> None:
+        from tendonfmu.calibration import calibrate
+        from tendonfmu.calibration_files import write_calibration
+        from tendonfmu.calibration_steps import forget_steps
+
+        def show(state: PhaseState) -> None:
+            phase(state.words, state.done, state.total)
+
+        folder = self.folder / CALIBRATION
+        forget_steps(folder)  # of an earlier demo: this one shows the work
+        with as_file(DATA) as data:
+            found = calibrate(data / TWO_JOINTS, [data / TRAINING], folder, tests=[data / UNSEEN], progress=show)
+        assert found.diagnosis is not None, "no step was there to be repeated"
+        self.calibration, self.diagnosis = found, found.diagnosis
+        phase("writing", 0, None)
+        self._files |= write_calibration(found, folder)
+
+    def _detect(self, phase: Phase) -> None:
+        self.finger.pushes(lambda done, total: phase("running the FMU", done, total))
+
+    def _diagnose(self, phase: Phase) -> None:
+        """A closer look at what the calibration has found."""
 
     def _fit(self, phase: Phase) -> None:
         from tendonfmu.fit_files import write_text
@@ -106,20 +129,5 @@ class Story:
         write_text(folder / FITTED, self.fit.description_text())
         self._files |= {page: "all of the fit", folder / FITTED: "the fitted description"}
 
-    def _detect(self, phase: Phase) -> None:
-        self.finger.pushes(lambda done, total: phase("running the FMU", done, total))
-
-    def _diagnose(self, phase: Phase) -> None:
-        from tendonfmu.diagnosis import diagnose
-        from tendonfmu.diagnosis_files import write_diagnosis
-
-        def show(state: PhaseState) -> None:
-            phase(state.words, state.done, state.total)
-
-        with as_file(DATA) as data:
-            self.diagnosis = diagnose(data / TWO_JOINTS, [data / TRAINING], [data / UNSEEN], progress=show)
-        phase("writing", 0, None)
-        written = write_diagnosis(self.diagnosis, self.folder / DIAGNOSIS)
-        named = ("diagnosis.html", "diagnosis.json", "extended.json", "extended.fmu")
-        self._files |= {file: what for file, what in written.items() if file.name in named}
-        self._files[self.folder / DIAGNOSIS / "diagnosis.html"] = "all of the diagnosis"
+    def _run(self, phase: Phase) -> None:
+        self.finger.free_motion(lambda done, total: phase("running the FMU", done, total))

@@ -1,4 +1,4 @@
-"""The figures of the demo's page, computed for `fit_plots.py`: torques of the index finger, error of the fit."""
+"""The figures of the demo's page, computed for `fit_plots.py`: torques of the index finger, errors of the other."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.calibration_report import rms_of
 from tendonfmu.demo import Story
 from tendonfmu.demo_run import ABDUCTION, FLEXION, FREE, FREE_X4, PUSHES
 from tendonfmu.figure_data import CompensationFigure, JointCurves
@@ -22,16 +23,17 @@ _HEIGHT = 270  # CSS pixels
 
 
 def story_sheets(story: Story) -> Iterator[Sheet]:
-    """All figures of the first three chapters, each in the section of its chapter."""
-    yield _free_sheet(story)
+    """All figures but those of the diagnosis, each in the section of its chapter."""
     yield _push_sheet(story)
+    yield _free_sheet(story)
     if story.missing:
         return
+    yield _calibration_sheet(story)
     yield _error_sheet(story)
     yield from _fit_sheets(story)
 
 
-# --- chapters 1 and 3 -------------------------------------------------------------------------------------------------
+# --- the index finger: detect and run ---------------------------------------------------------------------------------
 
 
 def _free_sheet(story: Story) -> Sheet:
@@ -103,7 +105,7 @@ def _panel(
     room = 0.06 * float(high - low)
     limits = (float(low) - (3 if pushes else 1) * room, float(high) + room)
     if pushes:
-        curves += _alarm([*figure.found, *figure.unlabelled], limits[0] + room)
+        curves += _alarm([*figure.found, *figure.false], limits[0] + room)
     return Panel(
         title=title,
         alt=alt,
@@ -135,7 +137,20 @@ def _alarm(spans: Sequence[Interval], height: float) -> list[Curve]:
     return [Curve("negative", each, np.full(2, height)) for each in ends]
 
 
-# --- chapter 2 --------------------------------------------------------------------------------------------------------
+# --- the two-joint finger: calibrate and fit --------------------------------------------------------------------------
+
+
+def _calibration_sheet(story: Story) -> Sheet:
+    """Error before and after the calibration, by joint."""
+    report = story.calibration.report
+    names = [*report["joints"], "all joints"]
+    none, before, after = (
+        1e3 * np.array([*report["error"][model], rms_of(report["error"][model])])
+        for model in ("bias_only", "as_given", "calibrated")
+    )
+    panel = _error_panel("On a recording that it has not seen", "mN·m", names, none, before, after)
+    keys = (("floor", "no friction model"), ("before_dots", "the description as given"), ("after_dots", "calibrated"))
+    return Sheet("calibrate", "calibrate_error", "", "", keys, (panel,))
 
 
 def _error_sheet(story: Story) -> Sheet:
@@ -144,34 +159,37 @@ def _error_sheet(story: Story) -> Sheet:
     panels = []
     for table, title in zip(tables, ("On the training recording", "On a recording that it has not seen"), strict=True):
         rows = table.rows[:-1]
-        places = np.arange(len(rows), dtype=float)
-        before, after, none = (
+        none, before, after = (
             np.array([np.nan if value is None else value for value in values])
             for values in (
+                [row.bias_only for row in rows],
                 [row.start for row in rows],
                 [row.fitted for row in rows],
-                [row.bias_only for row in rows],
             )
         )
-        panels.append(
-            Panel(
-                title=title,
-                alt=f"{title}: error by joint without a friction model, before the fit, and after it",
-                x_label=f"rms ({table.unit})",
-                y_label="",
-                bars=(Bars("data", places, np.minimum(before, after), np.maximum(before, after), lying=True),),
-                dots=(
-                    Dots("floor", none, places),
-                    Dots("before_dots", before, places),
-                    Dots("after_dots", after, places),
-                ),
-                rows=tuple(row.name.replace("_", " ") for row in rows),
-                x_limits=(0.0, 1.08 * float(np.nanmax([*before, *after, *none]))),
-                height=110 + 30 * len(rows),
-            )
-        )
+        panels.append(_error_panel(title, table.unit, [row.name for row in rows], none, before, after))
     keys = (("floor", "no friction model"), ("before_dots", "before the fit"), ("after_dots", "fitted"))
     return Sheet("fit", "fit_error", "", "", keys, tuple(panels))
+
+
+def _error_panel(title: str, unit: str, names: Sequence[str], none: Numbers, before: Numbers, after: Numbers) -> Panel:
+    """rms of each joint [k]: without a friction model, before, and after."""
+    places = np.arange(len(names), dtype=float)
+    return Panel(
+        title=title,
+        alt=f"{title}: error by joint without a friction model, before, and after",
+        x_label=f"rms ({unit})",
+        y_label="",
+        bars=(Bars("data", places, np.minimum(before, after), np.maximum(before, after), lying=True),),
+        dots=(
+            Dots("floor", none, places),
+            Dots("before_dots", before, places),
+            Dots("after_dots", after, places),
+        ),
+        rows=tuple(name.replace("_", " ") for name in names),
+        x_limits=(0.0, 1.08 * float(np.nanmax([*before, *after, *none]))),
+        height=110 + 30 * len(names),
+    )
 
 
 def _fit_sheets(story: Story) -> Iterator[Sheet]:

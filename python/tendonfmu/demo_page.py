@@ -1,14 +1,17 @@
-"""The page of the demo: its four chapters with their figures in one HTML file that needs nothing else."""
+"""The page of the demo: its chapters with their figures in one HTML file that needs nothing else."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
-from tendonfmu.demo import DIAGNOSIS, FIT, Story
+from tendonfmu import calibration_text
+from tendonfmu.calibration import DIAGNOSIS
+from tendonfmu.calibration_files import PAGE as CALIBRATION_PAGE
+from tendonfmu.demo import CALIBRATION, FIT, TRAINING, TWO_JOINTS, UNSEEN, Story
 from tendonfmu.demo_figures import story_sheets
-from tendonfmu.demo_run import FLEXION, FREE, FREE_X4, PUSHES
-from tendonfmu.demo_text import alarms, chapter_tables, fit_sentence, push_sentence
+from tendonfmu.demo_run import FLEXION, FREE, FREE_X4, MINUTES, PUSHES
+from tendonfmu.demo_text import alarms, chapter_tables, detection_sentence, fit_sentence
 from tendonfmu.diagnosis_page import PAGE as DIAGNOSIS_PAGE
 from tendonfmu.diagnosis_page import Tile, cards_of, drawn_sheets
 from tendonfmu.diagnosis_result import Diagnosis
@@ -49,10 +52,11 @@ def story_page(story: Story, figures: list[PageFigure]) -> str:
         tiles=[(each.name, _tile(story, each.name)) for each in story.chapters],
         tables={each.name: list(chapter_tables(story, each.name)) for each in story.chapters},
         figures=by_section,
-        run=_run(story),
-        fit=None if story.missing else {"sentence": fit_sentence(story), "page": f"{FIT}/{FIT_PAGE}"},
+        calibrate=None if story.missing else _calibrate(story),
         detect=_detect(story),
         diagnosis=None if story.missing else _diagnosis(story),
+        fit=None if story.missing else {"sentence": fit_sentence(story), "page": f"{FIT}/{FIT_PAGE}"},
+        run=_run(story),
         missing=story.missing,
         files=[(path.relative_to(story.folder).as_posix(), what) for path, what in story.files.items()],
     )
@@ -61,6 +65,8 @@ def story_page(story: Story, figures: list[PageFigure]) -> str:
 def _tile(story: Story, chapter: str) -> Tile:
     """The figure that matters in a chapter."""
     results = story.finger.results
+    if chapter == "calibrate":
+        return Tile(*next(calibration_text.tiles(story.calibration.report)))
     if chapter == "run":
         joint = next(each for each in results[FREE].joints if each.name == FLEXION)
         left = f"{1e3 * joint.measured:.0f} → {1e3 * joint.left:.1f}"
@@ -71,7 +77,10 @@ def _tile(story: Story, chapter: str) -> Tile:
         return Tile(fitted, unseen.unit, "error on an unseen recording, before and after friction is learned")
     if chapter == "detect":
         score = results[PUSHES].score
-        return Tile(f"{score.found} of {len(score.events)}", "", "pushes found, without a touch sensor")
+        found = f"{score.found} of {len(score.events)}"
+        return Tile(
+            found, "", f"pushes found, without a touch sensor, by a finger calibrated on {MINUTES} min of motion"
+        )
     return _tile_of_cause(story.diagnosis)
 
 
@@ -84,6 +93,20 @@ def _tile_of_cause(found: Diagnosis) -> Tile:
     cause = f"{at_place(first.title, first.where, names_of(found))}, found and built in"
     meaning = f"error on an unseen recording: {percent(found.gain.value)} less with {cause}"
     return Tile(f"{before} → {after}", unit, meaning)
+
+
+def _calibrate(story: Story) -> dict[str, Any]:
+    report = story.calibration.report
+    tone, sentence = calibration_text.verdict(report)
+    return {
+        "command": f"tendonfmu calibrate {TWO_JOINTS} {TRAINING} --test {UNSEEN} -o {CALIBRATION}",
+        "seconds": f"{report['seconds']:.0f}",
+        "tone": tone,
+        "verdict": sentence,
+        "warnings": report["warnings"],
+        "next": report["next"],
+        "page": f"{CALIBRATION}/{CALIBRATION_PAGE}",
+    }
 
 
 def _run(story: Story) -> dict[str, Any]:
@@ -100,7 +123,12 @@ def _run(story: Story) -> dict[str, Any]:
 
 def _detect(story: Story) -> dict[str, Any]:
     result = story.finger.results[PUSHES]
-    return {"sentence": push_sentence(result.score), "alarms": alarms(result.score), "seconds": f"{result.seconds:.0f}"}
+    return {
+        "sentence": detection_sentence(result.score),
+        "as_given": detection_sentence(story.finger.as_given),
+        "minutes": MINUTES,
+        "seconds": f"{result.seconds:.0f}",
+    }
 
 
 def _diagnosis(story: Story) -> dict[str, Any]:
@@ -114,6 +142,5 @@ def _diagnosis(story: Story) -> dict[str, Any]:
         "cards": cards_of(found, names),
         "figures": drawn_sheets(found),
         "tested": found.tested,
-        "page": f"{DIAGNOSIS}/{DIAGNOSIS_PAGE}",
-        "seconds": f"{found.seconds:.0f}",
+        "page": f"{CALIBRATION}/{DIAGNOSIS}/{DIAGNOSIS_PAGE}",
     }

@@ -1,8 +1,8 @@
-"""The demo's first and third chapter: the built-in index finger's FMU over its built-in recordings.
+"""The demo's chapters `detect` and `run`: the calibrated index finger's FMU over its built-in recordings.
 
-The paper's story on a simulated finger whose truth is known: free motion at a low pretension, the same motion at four
-times the pretension, and pushes on the fingertip. The description holds the simulated finger's own static friction;
-nothing is fitted to these recordings.
+The paper's story on a simulated finger whose truth is known: pushes on the fingertip, free motion at a low pretension,
+and the same motion at four times the pretension. The description was calibrated on 27 min of other motion of that
+finger (examples/demo_recording/make_calibrated.py); nothing is fitted to these recordings.
 """
 
 from __future__ import annotations
@@ -21,12 +21,14 @@ from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.detection_score import DetectionScore, score_detection
 from tendonfmu.figure_data import CompensationFigure, StoryFigure, compensation_figure
 from tendonfmu.fmu import run_fmu
+from tendonfmu.native import Finger
 from tendonfmu.packaging import build_fmu
 from tendonfmu.recording import Recording, read_recording
 from tendonfmu.signals import NUMBERS
 from tendonfmu.tables import write_table
 
-FINGER = "index_finger.json"
+FINGER, GIVEN = "index_finger_calibrated.json", "index_finger.json"  # and what it was calibrated from
+MINUTES = 27  # of free motion that it was calibrated on
 FREE, FREE_X4, PUSHES = "index_finger_free", "index_finger_free_x4", "index_finger_pushes"
 ABDUCTION, FLEXION = "mcp_abduction", "mcp_flexion"  # the joints that are drawn
 FMU, FIGURE = "index_finger.fmu", "compensated.png"
@@ -61,7 +63,13 @@ class RecordingResult:
 
 
 class IndexFinger:
-    """The built-in index finger in a folder: `free_motion` first, then `pushes`; files: path -> what is in it."""
+    """The calibrated index finger in a folder: `pushes` first, then `free_motion`.
+
+    files: path -> what is in it. results: by recording. as_given: pushes, with the description as it was before it was
+    calibrated.
+    """
+
+    as_given: DetectionScore
 
     def __init__(self, folder: Path) -> None:
         """folder: exists."""
@@ -71,17 +79,20 @@ class IndexFinger:
         self._recordings: dict[str, Recording] = {}
         self._outputs: dict[str, Outputs] = {}
 
-    def free_motion(self, progress: Callable[[int, int], None]) -> None:
-        """Builds the FMU and runs it over both recordings of free motion. progress: samples done, of how many."""
-        with as_file(DATA / FINGER) as finger:
-            self.description = read_finger(finger)
-            build_fmu(finger, self.folder / FMU)
-        self.files[self.folder / FMU] = "the index finger's FMU"
-        self._run((FREE, FREE_X4), progress)
-
     def pushes(self, progress: Callable[[int, int], None]) -> None:
-        """Runs the FMU over the recording with pushes, and draws all three."""
+        """Builds the FMU and runs it over the recording with pushes. progress: samples done, of how many."""
+        with as_file(DATA / FINGER) as finger, as_file(DATA / GIVEN) as given:
+            self.description, before = read_finger(finger), read_finger(given)
+            build_fmu(finger, self.folder / FMU)
+        self.files[self.folder / FMU] = "the calibrated index finger's FMU"
         self._run((PUSHES,), progress)
+        recording = self._recordings[PUSHES]
+        contact = Finger(before.image).run(recording.arrays())["contact"]
+        self.as_given = score_detection(recording.time, _label(recording), contact)
+
+    def free_motion(self, progress: Callable[[int, int], None]) -> None:
+        """Runs the FMU over both recordings of free motion, and draws all three."""
+        self._run((FREE, FREE_X4), progress)
         figure = self.folder / FIGURE
         _draw(self.description, self.results, self._recordings, self._outputs, figure)
         self.files[figure] = "torques, what is left of them, contacts"
@@ -150,9 +161,14 @@ def _rms(values: NDArray[np.float64]) -> float:
     return float(np.sqrt(np.mean(np.square(values)))) if values.size else float("nan")
 
 
+def _label(recording: Recording) -> NDArray[np.bool_]:
+    """[N] while somebody pushes."""
+    return np.zeros(len(recording), bool) if recording.contact is None else recording.contact
+
+
 def _result(description: FingerDescription, name: str, recording: Recording, outputs: Outputs) -> RecordingResult:
     torque, left = _rows(outputs, "joint_torque"), _rows(outputs, "compensated_torque")
-    label = np.zeros(len(recording), bool) if recording.contact is None else recording.contact
+    label = _label(recording)
     external = recording.groups.get("external_torque", np.zeros_like(torque))
     joints = [
         JointResult(

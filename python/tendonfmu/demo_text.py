@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from tendonfmu import calibration_text
 from tendonfmu.demo import Story
 from tendonfmu.demo_run import FREE, FREE_X4, PUSHES, RecordingResult
 from tendonfmu.detection_score import DetectionScore
@@ -19,6 +20,8 @@ Table = tuple[str, Row, list[Row]]
 def chapter_tables(story: Story, chapter: str) -> Iterator[Table]:
     """(title, headings, rows) of a chapter that was run."""
     results = story.finger.results
+    if chapter == "calibrate":
+        yield from calibration_text.tables(story.calibration.report)
     if chapter == "run":
         yield _left(story.finger.description.name, [results[FREE], results[FREE_X4]])
     if chapter == "detect":
@@ -30,14 +33,18 @@ def chapter_tables(story: Story, chapter: str) -> Iterator[Table]:
 def chapter_lines(story: Story, chapter: str) -> Iterator[str]:
     """Its lines, after the tables."""
     results = story.finger.results
+    if chapter == "calibrate":
+        report = story.calibration.report
+        yield from (f"warning: {sentence}" for sentence in report["warnings"])
+        yield from calibration_text.lines(report)
     if chapter == "run":
         for name in (FREE, FREE_X4):
             yield f"{_motion(results[name])}: alarms without a push: {alarms(results[name].score)}"
     if chapter == "fit":
         yield fit_sentence(story)
     if chapter == "detect":
-        yield push_sentence(results[PUSHES].score)
-        yield f"alarms without a push: {alarms(results[PUSHES].score)}"
+        yield f"calibrated: {detection_sentence(results[PUSHES].score)}"
+        yield f"as given:   {detection_sentence(story.finger.as_given)}"
     if chapter == "diagnose":
         yield from cause_lines(story)
 
@@ -98,6 +105,11 @@ def fit_sentence(story: Story) -> str:
         f"recording that it has not seen the error falls from {rounded(unseen.all.start)} to "
         f"{rounded(unseen.all.fitted)} {unseen.unit} rms"
     )
+
+
+def detection_sentence(score: DetectionScore) -> str:
+    """Pushes found, and alarms without one."""
+    return f"{push_sentence(score)}; alarms without a push: {alarms(score)}"
 
 
 def push_sentence(score: DetectionScore) -> str:

@@ -1,4 +1,4 @@
-"""What the figures of compensated recordings show, computed for `plots.py`: joint torques, thresholds, contacts."""
+"""What the figures of compensated recordings show, computed for `plots.py`: joint torques and contacts."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.description import FingerDescription
+from tendonfmu.detection_score import score_detection
 
 Array = NDArray[Any]
 Interval = tuple[float, float]
@@ -23,21 +24,20 @@ class JointCurves:
     measured: Array
     predicted: Array
     compensated: Array
-    threshold: Array
     external: Array | None
 
 
 @dataclass(frozen=True)
 class CompensationFigure:
-    """One recording. time: [N] s. Intervals (begin, end) in s: contact found where a label says so, contact found
-    where none does, and contact as labelled, which is None without labels.
+    """One recording. time: [N] s. Intervals (begin, end) in s: contact found, but for false alarms; false alarms, as
+    `score_detection` counts them; and contact as labelled, which is None without labels.
     """
 
     title: str
     time: Array
     joints: list[JointCurves]
     found: list[Interval]
-    unlabelled: list[Interval]
+    false: list[Interval]
     labelled: list[Interval] | None
 
 
@@ -83,14 +83,14 @@ def compensation_figure(
 ) -> CompensationFigure:
     """Curves of some joints (indices from 0) of one recording.
 
-    recording: `time` [N], `tendon_force` [N, m], maybe `external_torque` [N, n] and `contact` [N].
+    recording: `time` [N], maybe `external_torque` [N, n] and `contact` [N].
     outputs: those of `native.Finger.run`, [N, n] and [N].
     """
-    thresholds = contact_thresholds(description, recording["tendon_force"])
     time = recording["time"]
     labels, external = recording.get("contact"), recording.get("external_torque")
     found = outputs["contact"].ravel().astype(bool)
-    pushed = np.zeros_like(found) if labels is None else labels.astype(bool)
+    alarms = score_detection(time, np.zeros_like(found) if labels is None else labels.astype(bool), found).false_alarms
+    is_false = np.any([(time >= begin) & (time <= end) for begin, end in alarms] or [np.zeros_like(found)], axis=0)
     return CompensationFigure(
         title=title,
         time=time,
@@ -100,24 +100,14 @@ def compensation_figure(
                 measured=outputs["joint_torque"][:, j],
                 predicted=outputs["friction_torque"][:, j],
                 compensated=outputs["compensated_torque"][:, j],
-                threshold=thresholds[:, j],
                 external=None if external is None else external[:, j],
             )
             for j in joints
         ],
-        found=intervals(time, found & pushed),
-        unlabelled=intervals(time, found & ~pushed),
+        found=intervals(time, found & ~is_false),
+        false=intervals(time, is_false),
         labelled=None if labels is None else intervals(time, labels),
     )
-
-
-def contact_thresholds(description: FingerDescription, tendon_force: Array) -> Array:
-    """[N, n] N·m: threshold + threshold_per_force·mean|f0| (contract section 5, step 5) of every sample."""
-    contact = description.data["contact"]
-    n = len(contact["threshold"])
-    per_force = [value or 0.0 for value in contact.get("threshold_per_force") or [0.0] * n]
-    mean_force = np.abs(tendon_force).mean(axis=1)
-    return np.asarray(np.array(contact["threshold"]) + mean_force[:, None] * np.array(per_force))
 
 
 def intervals(time: Array, flags: Array) -> list[Interval]:

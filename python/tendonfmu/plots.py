@@ -157,7 +157,6 @@ def _draw_story_legend(figure: Figure, title: str) -> None:
         Line2D([], [], color=SKY, linewidth=1.8, label="predicted friction and bias"),
         Line2D([], [], color=BLUE, linewidth=1.4, label="compensated torque"),
         Line2D([], [], color=GREEN, linewidth=3.4, alpha=0.55, label="external torque (sensor)"),
-        Line2D([], [], color=VERMILION, linewidth=1.4, linestyle="--", label="contact threshold"),
         Patch(color=ORANGE, label="contact found"),
         Patch(color=PURPLE, label="found without a push"),
         Patch(color=GREY, label="contact labelled"),
@@ -169,7 +168,7 @@ def _draw_story_legend(figure: Figure, title: str) -> None:
 
 
 def _shade(axes: Axes, data: CompensationFigure) -> None:
-    for found, colour in ((data.found, ORANGE), (data.unlabelled, PURPLE)):
+    for found, colour in ((data.found, ORANGE), (data.false, PURPLE)):
         for begin, end in found:
             axes.axvspan(begin, end, color=colour, alpha=0.2, linewidth=0)
 
@@ -190,13 +189,11 @@ def _draw_compensated(axes: Axes, data: CompensationFigure, joint: JointCurves) 
     if joint.external is not None:
         axes.plot(data.time, joint.external, color=GREEN, linewidth=3.4, alpha=0.55)
     axes.plot(data.time, joint.compensated, color=BLUE, linewidth=1.1)
-    axes.plot(data.time, joint.threshold, color=VERMILION, linewidth=1.1, linestyle="--")
-    axes.plot(data.time, -joint.threshold, color=VERMILION, linewidth=1.1, linestyle="--")
     axes.set_ylabel("N·m", fontsize=12)
 
 
 def _draw_contacts(axes: Axes, data: CompensationFigure) -> None:
-    rows = [("found", [(data.found, ORANGE), (data.unlabelled, PURPLE)])]
+    rows = [("found", [(data.found, ORANGE), (data.false, PURPLE)])]
     if data.labelled is not None:
         rows.append(("labelled", [(data.labelled, GREY)]))
     for row, (_, bars) in enumerate(rows):
