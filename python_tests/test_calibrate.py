@@ -122,6 +122,17 @@ def test_little_motion_supports_a_higher_rate_and_says_what_is_missing(calibrate
     assert any("min more of free motion" in sentence for sentence in report["next"])
 
 
+@pytest.mark.slow
+def test_what_is_wrong_with_a_recording_is_said_once(folder: Path, tmp_path: Path) -> None:
+    """A gap, which the readers of each step see, too."""
+    whole = read_recording(folder / FREE)
+    rows = (whole.time < 10.0) | ((whole.time > 12.0) & (whole.time < 25.0))
+    columns = {f"{name}[{k + 1}]": each[rows] for name, group in whole.groups.items() for k, each in enumerate(group.T)}
+    write_table(tmp_path / "gap.parquet", {"time": whole.time[rows], **columns})
+    found = calibrate(folder / FINGER, [tmp_path / "gap.parquet"], tmp_path / "out")
+    assert sum("gap" in sentence for sentence in found.report["warnings"]) == 1, found.report["warnings"]
+
+
 def test_the_folder_holds_finger_fmu_page_and_report(calibrated: tuple[Calibration, Path]) -> None:
     from tendonfmu.fmu import run_fmu
 

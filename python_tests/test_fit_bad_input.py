@@ -103,20 +103,31 @@ def test_slack_tendons_are_named() -> None:
 # --- units and signs --------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("kinematics", "group"), [(1, "tendon_position"), (2, "joint_position")])
-def test_positions_in_mm_and_angles_in_milliradians_are_told(kinematics: int, group: str) -> None:
+@pytest.mark.parametrize(
+    ("kinematics", "group", "factor", "words"),
+    [
+        (1, "tendon_position", 1e3, "tendon_position[1..4]: scale 0.001"),
+        (2, "joint_position", 180 / np.pi, "joint_position[1..2]: scale 0.0174533"),
+        (3, "joint_velocity", -1.0, "joint_velocity[1]: sign -1"),
+        (1, "tendon_position", -1.0, "tendon_position[1..4]: sign -1"),
+    ],
+)
+def test_what_does_not_belong_is_refused(kinematics: int, group: str, factor: float, words: str) -> None:
+    """Units and signs, with what to write into the map of columns."""
     recording = made_recording()
-    recording.groups[group][:] *= 1000.0
-    fit = fitted(recording, kinematics=kinematics, max_passes=1)
-    assert said(fit, "joint base turns from -", "positions in mm, or angles in degrees? expected m and rad")
+    assert not said(fitted(recording, kinematics=kinematics, max_passes=1), "map of columns")
+    recording.groups[group][:] *= factor
+    assert words in refusal(recording, kinematics=kinematics)
 
 
-@pytest.mark.parametrize(("kinematics", "group"), [(1, "tendon_position"), (3, "joint_velocity")])
-def test_a_wrong_sign_is_told(kinematics: int, group: str) -> None:
+def test_what_was_checked_is_neither_checked_nor_told_again() -> None:
     recording = made_recording()
-    assert not said(fitted(recording, kinematics=kinematics, max_passes=1), "wrong sign")
-    recording.groups[group][:] *= -1.0
-    assert said(fitted(recording, kinematics=kinematics, max_passes=1), "wrong sign", "against the pull")
+    recording.time[2200:] += 5.0
+    recording.groups["joint_position"][:] *= 180 / np.pi
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FitWarning)
+        fit = FrictionFit(small_finger(), share=["tendons"], kinematics=1, max_passes=1).fit(recording, checked=True)
+    assert not said(fit, "gap") and not said(fit, "map of columns")
 
 
 # --- samples ----------------------------------------------------------------------------------------------------------

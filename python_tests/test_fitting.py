@@ -231,7 +231,8 @@ def test_what_only_shows_together_names_its_partners() -> None:
     finger = small_finger()
     finger["tendons"][1]["moment_arms"] = finger["tendons"][0]["moment_arms"]
     recording = made_recording(duration=40.0)
-    recording.groups["tendon_force"][:, 1] = recording.groups["tendon_force"][:, 0]
+    for name in ("tendon_force", "tendon_position"):
+        recording.groups[name][:, 1] = recording.groups[name][:, 0]
     only = ["tendons[1].edge_friction[1].coulomb", "tendons[2].edge_friction[1].coulomb"]
     fit = shared(finger, share=[], only=only).fit(recording)
     one, other = fit.report_["parameters"]

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from command import Call
 from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.errors import InputError
+from tendonfmu.fit_recordings import Held, prepare
 from tendonfmu.recording import Recording, read_recording
-from tendonfmu.recording_match import belongs, refuse_errors
+from tendonfmu.recording_match import admit, belongs, refuse_errors
 from tendonfmu.tables import write_table
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
@@ -290,3 +291,50 @@ def test_check_refuses_bad_recordings(call: Call, tmp_path: Path) -> None:
     assert answer.status == 2 and "absent.csv" in answer.err
     answer = call("check", EXAMPLES / "rigs" / "index_finger.json", FREE)
     assert answer.status == 2 and "a rig" in answer.err
+
+
+# --- the commands that fit --------------------------------------------------------------------------------------------
+
+STRANGERS: dict[str, tuple[Spoil, str]] = {
+    "exchanged": (exchanged("tendon_position", [0, 2, 1, 3, 4, 5, 6, 7]), "tendon_position[2] exchanged with"),
+    "degrees": (SPOILT["angles in degrees"][0], "joint_position[1..4]: scale 0.0174533"),
+    "milliseconds": (SPOILT["time in ms"][0], "time: scale 0.001"),
+}
+
+
+@pytest.mark.parametrize("stranger", STRANGERS)
+@pytest.mark.parametrize(
+    ("command", "output"), [("fit", "f.json"), ("diagnose", "out"), ("tune", "t.json"), ("calibrate", "out")]
+)
+def test_a_stranger_is_refused_by_name_before_any_fit(
+    call: Call, tmp_path: Path, sound: Recording, stranger: str, command: str, output: str
+) -> None:
+    """Also beside a recording that belongs."""
+    spoil, words = STRANGERS[stranger]
+    file = written(spoil(sound), tmp_path / "stranger.parquet")
+    answer = call(command, INDEX, FREE, file, "-o", output)
+    assert answer.status == 2 and len(answer.err.splitlines()) == 1, answer
+    assert f"{file}: " in answer.err and words in answer.err
+    assert not (tmp_path / output).exists()
+
+
+@pytest.mark.parametrize("command", ["fit", "diagnose"])
+def test_a_stranger_is_refused_where_it_only_judges(call: Call, tmp_path: Path, sound: Recording, command: str) -> None:
+    file = written(scaled(sound, "tendon_force", at(8, 2)), tmp_path / "stranger.parquet")
+    output = "f.json" if command == "fit" else "out"
+    answer = call(command, INDEX, FREE, "--compare" if command == "fit" else "--test", file, "-o", output)
+    assert answer.status == 2 and f"{file}: tendon_force[2]: " in answer.err, answer
+    assert not (tmp_path / output).exists()
+
+
+def test_a_fit_says_itself_what_becomes_of_gaps_and_stuck_sensors(finger: FingerDescription, sound: Recording) -> None:
+    """Each of them once: `belongs` sees them, `admit` leaves them to `prepare`."""
+    gap = part_of(sound, (sound.time < 8.0) | (sound.time > 9.5))
+    position = sound.groups["joint_position"].copy()
+    position[2000:4000, 1] = position[2000, 1]
+    stuck = with_group(sound, "joint_position", position)
+    assert [finding.kind for finding in belongs(finger, [gap, stuck])] == ["gaps", "held"]
+    assert admit(finger, [gap, stuck]) == []
+    sentences = [sentence for each in (gap, stuck) for sentence in prepare(finger, each, 1, Held()).warnings]
+    assert len(sentences) == 2 and "a gap or a jump of the clock" in sentences[0]
+    assert "joint_position[2] stands still" in sentences[1]

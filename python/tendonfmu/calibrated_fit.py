@@ -102,5 +102,5 @@ def fit_again(
     fitting = FrictionFit(finger, previous=previous, kinematics=kinematics, holdout=share, threads=threads)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FitWarning)  # they are in the report
-        fitting.fit([each.recording for each in recordings])
+        fitting.fit([each.recording for each in recordings], checked=True)
     return CalibratedFit(fitting.description_.data, (), tuple(fitting.warnings_))

@@ -42,7 +42,7 @@ from tendonfmu.free_motion import require_no_contact
 from tendonfmu.phases import Phases, PhaseState
 from tendonfmu.push_sizes import by_size
 from tendonfmu.recording import read_recording
-from tendonfmu.recording_match import belongs, refuse_errors
+from tendonfmu.recording_match import admit
 from tendonfmu.score_report import build_report as score_report
 from tendonfmu.scoring import score_recordings
 
@@ -202,7 +202,7 @@ def _read(
     read, others, touched = ([read_recording(each) for each in group] for group in (free, tests, pushes))
     for each in (*read, *others):
         require_no_contact(each)
-    sentences = refuse_errors(belongs(given, [*read, *others, *touched]))
+    sentences = admit(given, [*read, *others, *touched])
     own = [prepare(given, each, options.kinematics, Held() if tests else HELD) for each in read]
     unseen = [prepare(given, each, options.kinematics, Held()) for each in others]
     require_noise(given, own)
@@ -296,6 +296,7 @@ class _Run:
             kinematics=options.kinematics,
             seed=options.seed,
             jobs=options.jobs,
+            checked=True,
             progress=show,
         )
         self.diagnosed = found
@@ -374,7 +375,7 @@ class _Run:
         )
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", TuneWarning)  # they are in the report
-            tuning.tune([each.recording for each in (*case.free, *case.tests)])
+            tuning.tune([each.recording for each in (*case.free, *case.tests)], checked=True)
         return tuning_of(tuning)
 
     def _score(self, tuned: dict[str, Any], left: Sequence[float], step: Callable[[float], None]) -> dict[str, Any]:

@@ -126,7 +126,7 @@ def _tuned(data: Data, free: Sequence[Recording], kinematics: int, rate: float) 
     )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", TuneWarning)
-        return tuning.tune(list(free)).description_.data
+        return tuning.tune(list(free), checked=True).description_.data
 
 
 def _score(data: Data, recordings: Sequence[Recording], kinematics: int) -> DetectionScore:

@@ -32,6 +32,7 @@ from tendonfmu.fit_files import check_given_once, description_text
 from tendonfmu.fit_structure import own_copy
 from tendonfmu.free_motion import Clock, FreePart, FreeRun, free_parts, run_free
 from tendonfmu.recording import Recording, read_recording
+from tendonfmu.recording_match import admit
 from tendonfmu.rest_tuning import RestRule, learn_rest
 from tendonfmu.sensor_tuning import SensorRule, learn_sensors
 from tendonfmu.tuned_loop import LoopAlarms, count_loop
@@ -123,15 +124,16 @@ class ContactTuning(ConstructorArguments):
         self.evidence_time = evidence_time
         self.progress = progress
 
-    def tune(self, recordings: Source | Sequence[Source]) -> ContactTuning:
-        """Learns from recordings of free motion.
+    def tune(self, recordings: Source | Sequence[Source], *, checked: bool = False) -> ContactTuning:
+        """Learns from recordings of free motion. checked: they were held against the finger, and what is to be said of
+        them was said.
 
         Raises InputError: contact in them, or not sound; NotEnough: no free motion, or with `strict` too little.
         """
         begin = perf_counter()
         self._check_options()
         self.start_ = _read(self.finger)
-        parts = self._parts(_listed(recordings))
+        parts = self._parts(_listed(recordings), checked)
         self.hours_ = sum(part.hours for part in parts)
         self.cells_ = cells_of(parts)
         self.forces_ = (float(self.cells_.force.min()), float(self.cells_.force.max()))
@@ -167,17 +169,17 @@ class ContactTuning(ConstructorArguments):
 
     # --- recordings ---------------------------------------------------------------------------------------------------
 
-    def _parts(self, sources: Sequence[Source]) -> list[FreePart]:
+    def _parts(self, sources: Sequence[Source], checked: bool) -> list[FreePart]:
         check_given_once(sources, [])
         if not sources:
             raise InputError("no recording; expected at least one of free motion")
+        recordings = [each if isinstance(each, Recording) else read_recording(each) for each in sources]
         parts: list[FreePart] = []
-        self.warnings_: list[str] = []
-        for source in sources:
-            recording = source if isinstance(source, Recording) else read_recording(source)
+        self.warnings_: list[str] = [] if checked else admit(self.start_, recordings)
+        for recording in recordings:
             found, sentences = free_parts(self.start_, recording, self.kinematics)
             parts += found
-            self.warnings_ += [f"{recording.path}: {sentence}" for sentence in sentences]
+            self.warnings_ += [] if checked else [f"{recording.path}: {sentence}" for sentence in sentences]
         if not any(part.counted.any() for part in parts):
             raise NotEnough("no free motion beyond the first 2 s of a recording; expected minutes of it", 0.0)
         return parts

@@ -51,6 +51,7 @@ from tendonfmu.hypotheses import HERE, Hypothesis
 from tendonfmu.next_experiment import Experiments, Question, plan_experiments
 from tendonfmu.phases import Phases, PhaseState
 from tendonfmu.recording import Recording, read_recording
+from tendonfmu.recording_match import admit
 from tendonfmu.remainder import Remainder, measure_remainder
 from tendonfmu.residual_views import residual_views, whiteness
 from tendonfmu.signal_choice import choose
@@ -83,6 +84,7 @@ def diagnose(
     least_gain: float = LEAST_GAIN,
     seed: int = 0,
     jobs: int = 1,
+    checked: bool = False,
     progress: Callable[[PhaseState], None] | None = None,
 ) -> Diagnosis:
     """Finds what a description lacks.
@@ -91,12 +93,13 @@ def diagnose(
     recordings that the gain is measured on. Without them that is every fifth stretch of 10 s of `recordings`, that the
     numbers are not fitted to, and causes are judged on up to eight parts of all of it, held out in turn. kinematics:
     source, 1 to 3. least_gain: share of what is left of the rms that a cause has to take away, 0 to 0.5. jobs: threads
-    of the fits. progress: called with what is being done. Raises InputError where a file or an option is at fault.
+    of the fits. checked: the recordings were held against the finger, and what is to be said of them was said.
+    progress: called with what is being done. Raises InputError where a file or an option is at fault.
     """
     begun = perf_counter()
     phases = Phases(PHASES, progress or (lambda state: None))
     with threadpool_limits(limits=max(jobs, 1)):
-        case = _case(finger, recordings, tests, kinematics, least_gain)
+        case = _case(finger, recordings, tests, kinematics, least_gain, checked)
         with phases.start(SIGNALS):
             chosen = choose(case.finger, case.whole, FitSettings(threads=jobs, path=case.finger.path))
         with own_fault("diagnosis"):  # all that was given has been checked and fitted once
@@ -110,11 +113,12 @@ def diagnose(
 
 @dataclass(frozen=True)
 class _Case:
-    """training: with held-out stretches where there are no tests. tests: recordings to judge on."""
+    """training: with held-out stretches where there are no tests. tests: to judge on. warnings: about the recordings."""
 
     finger: FingerDescription
     training: list[FitRecording]
     tests: list[FitRecording]
+    warnings: tuple[str, ...]
 
     @property
     def whole(self) -> list[FitRecording]:
@@ -125,13 +129,14 @@ class _Case:
             for each, none in zip(self.training, nothing, strict=True)
         ]
 
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        return tuple(f"{each.path.name}: {text}" for each in [*self.training, *self.tests] for text in each.warnings)
-
 
 def _case(
-    finger: Finger, recordings: Sequence[Source], tests: Sequence[Source], kinematics: int, least_gain: float
+    finger: Finger,
+    recordings: Sequence[Source],
+    tests: Sequence[Source],
+    kinematics: int,
+    least_gain: float,
+    checked: bool,
 ) -> _Case:
     if not recordings:
         raise InputError("no recording; expected at least one")
@@ -141,12 +146,16 @@ def _case(
         raise InputError(f"least_gain = {least_gain!r}: expected 0 to 0.5")
     given = finger if isinstance(finger, FingerDescription) else read_finger(Path(finger))
     held = Held() if tests else HELD
-    training = [prepare(given, _read(each), kinematics, held) for each in recordings]
-    unseen = [prepare(given, _read(each), kinematics, Held()) for each in tests]
+    read, others = ([_read(each) for each in group] for group in (recordings, tests))
+    warnings = [] if checked else admit(given, [*read, *others])
+    training = [prepare(given, each, kinematics, held) for each in read]
+    unseen = [prepare(given, each, kinematics, Held()) for each in others]
     require_noise(given, training)
     require_unseen(training, unseen)
     check_unseen([each.recording for each in training], [each.recording for each in unseen])
-    return _Case(given, training, unseen)
+    if not checked:
+        warnings += [f"{each.path.name}: {text}" for each in (*training, *unseen) for text in each.warnings]
+    return _Case(given, training, unseen, tuple(warnings))
 
 
 def _read(source: Source) -> Recording:

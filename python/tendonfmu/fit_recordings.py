@@ -16,14 +16,13 @@ from tendonfmu.description import FingerDescription
 from tendonfmu.errors import InputError
 from tendonfmu.fit_residuals import Model, model_alone
 from tendonfmu.friction_places import DEFAULT_THRESHOLD
-from tendonfmu.recording import Recording, check_times
+from tendonfmu.recording import Recording, check_numbers
 from tendonfmu.recording_faults import (
     SETTLING,
     StuckSensor,
     gap_sentences,
     gaps,
     rate_sentences,
-    sense_sentences,
     silent_tendons,
     stuck_sensors,
 )
@@ -35,7 +34,6 @@ Flags = NDArray[np.bool_]
 FEWEST = 20  # samples of a part; fewer say nothing of a bias, let alone of friction
 _LOOKED_AT = 50_000  # samples, about, of which is said where the motion has been
 SHORTEST_BLOCK = 1.0  # s; of a held-out block
-LARGEST, LATEST = 1e12, 1e15  # of a signal in its unit, and s: what the model takes
 
 
 @dataclass(frozen=True)
@@ -121,10 +119,13 @@ class FitRecording:
 
 
 def prepare(finger: FingerDescription, recording: Recording, kinematics: int, held: Held) -> FitRecording:
-    """Checks a recording against a finger. Raises InputError where nothing sound can come of it."""
+    """Makes a recording ready, and says what of it is left out. Raises InputError where nothing sound can come of it.
+
+    Whether it belongs to the finger, `recording_match.admit` has to say before.
+    """
     joints, tendons = len(finger.joint_names), len(finger.tendon_names)
     recording.require(joints, tendons, inputs_used(kinematics, watches_motors(finger.data)))
-    _check_numbers(recording)
+    check_numbers(recording)
     target = recording.groups["tendon_force"] @ moment_arms(finger.data)
     external = recording.groups.get("external_torque")
     contact = np.zeros(len(recording), dtype=bool)
@@ -142,9 +143,6 @@ def prepare(finger: FingerDescription, recording: Recording, kinematics: int, he
     _refuse_too_little(recording, parts, usable, contact)
     held_out = _held_out(recording, parts, held) & usable
     model = model_alone(finger.data, [_arrays(recording, part) for part in parts], parts, len(recording), kinematics)
-    warnings += sense_sentences(
-        target[usable], model.joint_angle[usable], model.joint_speed[usable], finger.joint_names
-    )
     if contact.any():
         warnings.append(f"{int(contact.sum())} samples labelled contact are left out: no column external_torque")
     return FitRecording(
@@ -159,22 +157,6 @@ def prepare(finger: FingerDescription, recording: Recording, kinematics: int, he
         model=model,
         warnings=[*warnings, *sentences],
     )
-
-
-def _check_numbers(recording: Recording) -> None:
-    """What the reader of files has seen to, for a recording that was made in memory."""
-    check_times(recording.path, recording.time)
-    for name, values in recording.groups.items():
-        wrong = np.argwhere(~(np.abs(values) <= LARGEST))
-        if len(wrong):
-            row, column = wrong[0]
-            what = f"at most {LARGEST:g}" if np.isfinite(values[row, column]) else "a finite number"
-            raise InputError(
-                f"{recording.path}: column {name}[{column + 1}], row {row + 1}: {values[row, column]:g}; "
-                f"expected {what}"
-            )
-    if np.abs(recording.time).max(initial=0.0) > LATEST:
-        raise InputError(f"{recording.path}: column time: {recording.time[-1]:g} s; expected at most {LATEST:g} s")
 
 
 def _arrays(recording: Recording, part: slice) -> dict[str, Numbers]:

@@ -54,6 +54,7 @@ from tendonfmu.fit_uncertainty import parameter_uncertainty
 from tendonfmu.fit_verdicts import Fitted, Knowledge, judge_numbers
 from tendonfmu.previous_fit import CHANGE, PreviousFit, read_previous_fit, with_previous_values
 from tendonfmu.recording import Recording, read_recording
+from tendonfmu.recording_match import admit
 
 Numbers = NDArray[np.float64]
 Finger = FingerDescription | Mapping[str, Any] | str | os.PathLike[str]
@@ -150,8 +151,11 @@ class FrictionFit(ConstructorArguments):
 
     # --- fit ----------------------------------------------------------------------------------------------------------
 
-    def fit(self, recordings: Source | Sequence[Source], compare: Source | Sequence[Source] = ()) -> FrictionFit:
-        """Learns from recordings, each with a bias path of its own. compare: recordings to judge only.
+    def fit(
+        self, recordings: Source | Sequence[Source], compare: Source | Sequence[Source] = (), *, checked: bool = False
+    ) -> FrictionFit:
+        """Learns from recordings, each with a bias path of its own. compare: recordings to judge only. checked: they
+        were held against the finger, and what is to be said of them was said.
 
         Raises InputError where nothing sound can come of it. Ctrl-C, or progress returning False, leaves `finished_`
         False and the best so far in `unfinished_`; Ctrl-C goes on as KeyboardInterrupt.
@@ -167,14 +171,15 @@ class FrictionFit(ConstructorArguments):
         structure = build_structure(finger, Choice(self.sides, *map(_listed_text, chosen)))
         self.structure_, self.start_ = structure, structure.start
         held = Held(self.holdout, self.holdout_block, strict=True)
-        training, others = _listed(recordings), _listed(compare)
-        check_given_once(training, others)
-        self.recordings_ = [self._prepared(each, held) for each in training]
-        if not self.recordings_:
+        check_given_once(_listed(recordings), _listed(compare))
+        training, others = ([_read_recording(each) for each in _listed(group)] for group in (recordings, compare))
+        if not training:
             raise InputError("no recording; expected at least one")
+        found = [] if checked else admit(self.start_, [*training, *others])
+        self.recordings_ = [self._prepared(each, held) for each in training]
         compared = [self._prepared(each, Held()) for each in others]
         require_noise(self.start_, self.recordings_)
-        found = self._motion_warnings()
+        found += self._motion_warnings(not checked)
         learned = self._learn(previous, Watch(self.progress))
         if learned is None:
             return self
@@ -213,16 +218,15 @@ class FrictionFit(ConstructorArguments):
                 raise InputError(f"{name} = {value!r}: expected {expectation}")
 
     def _prepared(self, source: Source, held: Held) -> FitRecording:
-        recording = source if isinstance(source, Recording) else read_recording(source)
-        return prepare(self.start_, recording, self.kinematics, held)
+        return prepare(self.start_, _read_recording(source), self.kinematics, held)
 
-    def _motion_warnings(self) -> list[str]:
+    def _motion_warnings(self, of_recordings: bool) -> list[str]:
         self.coverage_: list[EffectCoverage] = coverage_of(self.start_.data, *motion_of(self.recordings_))
         moves = {cover.effect.path: cover.times.positive + cover.times.negative > 0 for cover in self.coverage_}
         several = len(self.recordings_) > 1
         found = [
             f"{each.path}: {sentence}" if several else sentence
-            for each in self.recordings_
+            for each in (self.recordings_ if of_recordings else [])
             for sentence in each.warnings
         ]
         return [*found, *refuse_stillness(self.start_, self.recordings_, moves)]
@@ -394,6 +398,10 @@ def _read_finger(finger: Finger) -> FingerDescription:
         except native.NativeError as refused:
             raise InputError(f"finger: {refused}") from None
     return read_finger(Path(finger))
+
+
+def _read_recording(source: Source) -> Recording:
+    return source if isinstance(source, Recording) else read_recording(source)
 
 
 def _listed(sources: Source | Sequence[Source]) -> list[Source]:

@@ -28,6 +28,7 @@ GROUPS: dict[str, tuple[str, bool]] = {
 }
 GROUP_PER = {name: "tendon" if name.startswith("tendon") else "joint" for name in GROUPS}
 LABEL = "contact"
+LARGEST, LATEST = 1e12, 1e15  # of a signal in its unit, and s: what the model takes
 
 _ELEMENT = re.compile(r"([a-z_]+)\[([1-9][0-9]*)\]")
 
@@ -84,6 +85,22 @@ def read_recording(path: str | os.PathLike[str], *, label: str = LABEL, others: 
     groups = {name: np.column_stack(columns) for name, columns in _grouped(table).items()}
     kept = {name: table[name] for name in others if name in table}
     return Recording(file, time, groups, None if found is None else found.astype(bool), kept)
+
+
+def check_numbers(recording: Recording) -> None:
+    """What the reader of files has seen to, for a recording that was made in memory. Raises InputError."""
+    check_times(recording.path, recording.time)
+    for name, values in recording.groups.items():
+        wrong = np.argwhere(~(np.abs(values) <= LARGEST))
+        if len(wrong):
+            row, column = wrong[0]
+            what = f"at most {LARGEST:g}" if np.isfinite(values[row, column]) else "a finite number"
+            raise InputError(
+                f"{recording.path}: column {name}[{column + 1}], row {row + 1}: {values[row, column]:g}; "
+                f"expected {what}"
+            )
+    if np.abs(recording.time).max(initial=0.0) > LATEST:
+        raise InputError(f"{recording.path}: column time: {recording.time[-1]:g} s; expected at most {LATEST:g} s")
 
 
 def check_times(file: Path, time: NDArray[np.float64]) -> None:

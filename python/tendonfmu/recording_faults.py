@@ -1,11 +1,11 @@
-"""What is wrong with a recording beyond its format: gaps, rates, units, signs, sensors that stand still.
+"""What is wrong with a recording beyond its format: gaps, rates, sensors that stand still.
 
 Every finding is a sentence; which samples it costs is said too.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +21,6 @@ GAP = 10.0  # sample times; a longer step is a gap
 SHORTEST_GAP = 0.1  # s; single lost samples do no harm
 STUCK = 1.0  # s; a sensor that repeats one value longer, while others say that it should not, is stuck
 TURNS = 20.0  # rad; further than a joint of a finger turns
-BRAKED = 0.3  # of all power; friction alone would be −1, covers and gravity come to about 0
 SETTLING = 1.0  # s after a stuck sensor, until the velocity filter has forgotten it
 SLOW_RATE, FAST_RATE = 50.0, 5000.0  # samples per second; the model's events need the first, nothing needs the second
 _MOVES = {"tendon_position": 2e-4, "joint_position": 0.02, "joint_velocity": 0.05}  # m, rad, rad: should have moved by
@@ -96,23 +95,6 @@ def silent_tendons(recording: Recording, finger: FingerDescription) -> Iterator[
         yield (
             f"tendon_force[{i + 1}] ({finger.tendon_names[i]}) is 0 throughout: a tendon without tension or a sensor "
             "without signal; what its friction is cannot be told, its numbers stay as they were"
-        )
-
-
-def sense_sentences(target: Numbers, angle: Numbers, speed: Numbers, names: Sequence[str]) -> Iterator[str]:
-    """About units and signs that cannot be meant. target: [N, n] N·m; angle, speed: [N, n] rad, rad/s, NaN: unused."""
-    low, high = np.nanmin(angle, axis=0), np.nanmax(angle, axis=0)
-    for name, least, most in zip(names, low, high, strict=True):
-        if max(abs(least), abs(most)) > TURNS:
-            yield (
-                f"joint {name} turns from {least:.0f} to {most:.0f} rad by this recording: positions in mm, or angles "
-                "in degrees? expected m and rad"
-            )
-    power = np.nansum(target * speed, axis=1)
-    if power.sum() < -BRAKED * np.abs(power).sum():
-        yield (
-            "the joints move against the pull of the tendons, where friction lets them only follow it: positions, "
-            "forces or moment_arms have a wrong sign; expected an angle that grows with moment_arms times force"
         )
 
 

@@ -1,7 +1,8 @@
 """Do recordings belong to a finger description? Said before any fit, with what to write into the map of columns.
 
-`belongs` answers for all recordings. Errors are what makes every number of a fit wrong: signs, order and units of
-columns, sensors that are dead. Warnings are what makes it worse: a poor clock, sensors that clip now and then.
+`belongs` answers for all recordings, `admit` for a command that goes on with them. Errors are what makes every number
+of a fit wrong: signs, order and units of columns, sensors that are dead. Warnings are what makes it worse: a poor
+clock, sensors that clip now and then.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from tendonfmu import recording_match_text as text
 from tendonfmu.description import FingerDescription
 from tendonfmu.errors import InputError
-from tendonfmu.recording import GROUP_PER, Recording
+from tendonfmu.recording import GROUP_PER, Recording, check_numbers
 from tendonfmu.recording_channels import (
     clipped_channels,
     coarse_channels,
@@ -44,6 +45,7 @@ STILL = 0.02  # rad; less motion says nothing
 SLACK = 0.01  # of the largest force of a tendon; a slack one does not follow its joints
 OPPOSED = 0.5  # of what forces and reference leave of each other, when their sum leaves less
 LEAST_KEPT = 0.2  # of the samples, for the equations
+LEFT_TO_THE_FIT = ("gaps", "held")  # kinds of findings
 
 
 def belongs(finger: FingerDescription, recordings: Sequence[Recording]) -> list[Finding]:
@@ -65,8 +67,19 @@ def belongs(finger: FingerDescription, recordings: Sequence[Recording]) -> list[
     return found
 
 
+def admit(finger: FingerDescription, recordings: Sequence[Recording]) -> list[str]:
+    """Before a fit: raises InputError for a recording that does not belong to the finger, returns the warnings' lines.
+
+    Gaps and stuck sensors are left to `fit_recordings.prepare`, which knows which columns are used, and says what
+    becomes of the samples.
+    """
+    for recording in recordings:
+        check_numbers(recording)
+    return refuse_errors([each for each in belongs(finger, recordings) if each.kind not in LEFT_TO_THE_FIT])
+
+
 def refuse_errors(findings: Sequence[Finding]) -> list[str]:
-    """For commands that go on with a recording: raises InputError for the first error, returns the warnings' lines."""
+    """Raises InputError for the first error, returns the warnings' lines."""
     for finding in findings:
         if finding.severity == "error":
             raise InputError(finding.line())
