@@ -53,6 +53,7 @@ COMMANDS = {
     "cli_check.py",
     "cli_detect.py",
     "cli_diagnose.py",
+    "cli_options.py",
     "several_values.py",
 }  # what a user may call
 # those that draw, and what they share

@@ -21,7 +21,6 @@ pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not insta
 from command import Answer, Call
 from tendonfmu.cli import main
 from tendonfmu.detection_run import read_subject, residual_of, run_track, scaled_detection
-from tendonfmu.figure_data import contact_thresholds
 from tendonfmu.native import Finger
 from tendonfmu.recording import read_recording
 from tendonfmu.score_figures import contact_figure, delay_figure, event_figure, roc_figure
@@ -131,7 +130,8 @@ def test_the_residual_is_what_the_decision_was_made_of(path: Path) -> None:
     """joint_contact is |r| > threshold (contract section 5, step 5), so r is right to within what decides."""
     subject = read_subject(INDEX)
     track = run_track(subject, read_recording(path), 1, None)
-    threshold = contact_thresholds(subject.finger, track.recording.groups["tendon_force"])
+    contact, force = subject.finger.data["contact"], np.abs(track.recording.groups["tendon_force"]).mean(axis=1)
+    threshold = np.array(contact["threshold"]) + force[:, None] * np.array(contact["threshold_per_force"])
     from_outputs = residual_of(subject.finger.data, track.recording, track.outputs, 1)  # as of an FMU
     for residual in (track.residual, from_outputs):
         known = ~np.isnan(residual)

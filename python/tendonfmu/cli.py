@@ -15,6 +15,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from tendonfmu import cli_calibrate, cli_campaign, cli_check, cli_detect, cli_diagnose
+from tendonfmu.cli_options import FingerFile, FreeRecordings, Kinematics, Model, Progress, Report, Subject
 from tendonfmu.console import fit_bar, leave, phase_bar, print_tables, progress_bar, say
 from tendonfmu.errors import InputError, line_of
 from tendonfmu.fault_report import is_own_file, write_fault_report
@@ -31,8 +32,6 @@ FAULT = 3
 INTERRUPTED = 130
 
 cli_check.register(app)
-
-FingerFile = Annotated[Path, typer.Argument(metavar="FINGER.json", help="finger description")]
 
 
 def main() -> None:
@@ -104,7 +103,7 @@ def options(
 
 @app.command()
 def build(
-    file: Annotated[Path, typer.Argument(metavar="FINGER.json|RIG.json", help="finger description, or rig")],
+    file: Subject,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FINGER.fmu", help="FMU to write")],
     binaries: Annotated[
         Path | None,
@@ -127,15 +126,10 @@ def build(
 
 @app.command()
 def run(
-    model: Annotated[Path, typer.Argument(metavar="FINGER.json|FINGER.fmu", help="description, or FMU of one")],
+    model: Model,
     recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="recording, .csv or .parquet")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT.csv", help="outputs, .csv or .parquet")],
-    kinematics: Annotated[
-        int,
-        typer.Option(
-            min=1, max=3, help="1: tendon positions, 2: measured joint positions, 3: joint positions and velocities"
-        ),
-    ] = 1,
+    kinematics: Kinematics = 1,
 ) -> None:
     """Run the FMU over a recording: time and all outputs, one row per sample, each at its own sample's time."""
     from tendonfmu.recording import read_recording
@@ -164,9 +158,7 @@ def simulate(
         Path | None, typer.Option(metavar="TRUTH.parquet", help="true signals at the same times, .csv or .parquet")
     ] = None,
     integrator: Annotated[str | None, typer.Option(metavar="cvode|fixed_step", help="instead of the rig's own")] = None,
-    progress: Annotated[
-        bool | None, typer.Option("--progress/--no-progress", help="progress bar; by default on a terminal")
-    ] = None,
+    progress: Progress = None,
 ) -> None:
     """A recording of the simulated finger. The same rig gives the same numbers."""
     from tendonfmu.plant import INTEGRATORS
@@ -269,9 +261,7 @@ def excite(
     max_acceleration: Annotated[float, typer.Option(min=0.1, max=1e4, help="rad/s²; of every joint")] = 10.0,
     rate: Annotated[float, typer.Option(min=20.0, max=10000.0, help="rows per second")] = 100.0,
     seed: Annotated[int, typer.Option(min=0, max=2**53, help="of the strokes")] = 0,
-    report: Annotated[
-        Path | None, typer.Option(metavar="R.json", help="everything that is known of the motion")
-    ] = None,
+    report: Report = None,
     discriminate: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="the next experiment of a diagnosis instead; with --rate alone"),
@@ -319,10 +309,10 @@ def excite(
 @app.command()
 def fit(
     finger: FingerFile,
-    recordings: Annotated[list[Path], typer.Argument(metavar="RECORDING", help="free motion, .csv or .parquet")],
+    recordings: FreeRecordings,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FITTED.json", help="description to write")],
     method: Annotated[str, typer.Option(metavar="batch|ekf", help="maximum likelihood, or Kalman filter")] = "batch",
-    report: Annotated[Path | None, typer.Option(metavar="R.json", help="everything that is known of the fit")] = None,
+    report: Report = None,
     figures: Annotated[Path | None, typer.Option(metavar="DIR", help="folder for figures and report.html")] = None,
     compare: Annotated[
         list[Path] | None, typer.Option(metavar="RECORDING", help="judged, not trained on; may be repeated")
@@ -331,12 +321,7 @@ def fit(
         float, typer.Option(min=0.0, max=0.9, metavar="SHARE", help="of the time, not trained on")
     ] = 0.0,
     holdout_block: Annotated[float, typer.Option(min=1.0, metavar="SECONDS", help="longest block held out")] = 10.0,
-    kinematics: Annotated[
-        int,
-        typer.Option(
-            min=1, max=3, help="1: tendon positions, 2: measured joint positions, 3: joint positions and velocities"
-        ),
-    ] = 1,
+    kinematics: Kinematics = 1,
     only: Annotated[
         list[str] | None, typer.Option(metavar="PATTERN", help="estimate these numbers alone; may be repeated")
     ] = None,
@@ -379,9 +364,7 @@ def fit(
     resume: Annotated[
         Path | None, typer.Option(metavar="FITTED.unfinished.json", help="go on from an interrupted fit")
     ] = None,
-    progress: Annotated[
-        bool | None, typer.Option("--progress/--no-progress", help="progress bar; by default on a terminal")
-    ] = None,
+    progress: Progress = None,
 ) -> None:
     """Estimate the numbers of a finger from recordings of free motion, and say how well each is known.
 

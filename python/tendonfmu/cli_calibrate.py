@@ -7,6 +7,16 @@ from typing import Annotated
 
 import typer
 
+from tendonfmu.cli_options import (
+    Confidence,
+    FalseAlarms,
+    FingerFile,
+    FreeAtPretensions,
+    Jobs,
+    Kinematics,
+    Progress,
+    Seed,
+)
 from tendonfmu.console import PhaseDisplay, print_tables, say
 from tendonfmu.several_values import SeveralValues
 
@@ -17,10 +27,8 @@ def register(app: typer.Typer) -> None:
 
 
 def calibrate(
-    finger: Annotated[Path, typer.Argument(metavar="FINGER.json", help="finger description, its structure as given")],
-    recordings: Annotated[
-        list[Path], typer.Argument(metavar="FREE", help="free motion at several pretensions, .csv or .parquet")
-    ],
+    finger: FingerFile,
+    recordings: FreeAtPretensions,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder for page, finger and FMU")],
     test: Annotated[
         list[Path] | None,
@@ -43,21 +51,12 @@ def calibrate(
             "the prior; for little data",
         ),
     ] = None,
-    false_alarms_per_hour: Annotated[
-        float, typer.Option(min=1e-3, max=3600.0, metavar="RATE", help="at most, in free motion like the recorded one")
-    ] = 6.0,
-    confidence: Annotated[float, typer.Option(min=0.5, max=0.9999, help="that the rate is at most that")] = 0.9,
-    kinematics: Annotated[
-        int,
-        typer.Option(
-            min=1, max=3, help="1: tendon positions, 2: measured joint positions, 3: joint positions and velocities"
-        ),
-    ] = 1,
-    seed: Annotated[int, typer.Option(min=0, max=2**53, help="of all that is drawn at random")] = 0,
-    jobs: Annotated[int, typer.Option(min=1, max=64, help="processor cores to use; the result is the same")] = 1,
-    progress: Annotated[
-        bool | None, typer.Option("--progress/--no-progress", help="progress bar; by default on a terminal")
-    ] = None,
+    false_alarms_per_hour: FalseAlarms = 6.0,
+    confidence: Confidence = 0.9,
+    kinematics: Kinematics = 1,
+    seed: Seed = 0,
+    jobs: Jobs = 1,
+    progress: Progress = None,
 ) -> None:
     """From free motion to a tuned FMU: what the model lacks, all its numbers, and what decides on contact.
 

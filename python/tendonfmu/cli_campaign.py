@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from tendonfmu.cli_options import LeastGain, Progress
 from tendonfmu.console import print_tables, progress_bar, say
 
 
@@ -29,17 +30,13 @@ def campaign(
     stop_after: Annotated[
         float, typer.Option(min=0.0, metavar="SECONDS", help="begin no case after that time; go on another day")
     ] = math.inf,
-    least_gain: Annotated[
-        float, typer.Option(min=0.0, max=0.5, metavar="SHARE", help="as of diagnose: least gain of a cause")
-    ] = 0.03,
+    least_gain: LeastGain = 0.03,
     beside: Annotated[
         str | None, typer.Option(metavar="FILE.py:FUNCTION", help="rivals, asked to name a cause for each case, too")
     ] = None,
     again: Annotated[bool, typer.Option("--again", help="run cases that ended in an error once more")] = False,
     report: Annotated[Path | None, typer.Option(metavar="R.md", help="the tables as Markdown")] = None,
-    progress: Annotated[
-        bool | None, typer.Option("--progress/--no-progress", help="progress bar; by default on a terminal")
-    ] = None,
+    progress: Progress = None,
 ) -> None:
     """Diagnose many recordings whose cause is known, and count how often the answer is right.
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tendonfmu.cli_options import Subject
 from tendonfmu.console import say, show
 from tendonfmu.errors import InputError
 
@@ -20,7 +21,7 @@ def register(app: typer.Typer) -> None:
 
 
 def check(
-    file: Annotated[Path, typer.Argument(metavar="FINGER.json|RIG.json", help="finger description, or rig")],
+    file: Subject,
     recordings: Annotated[
         list[Path] | None, typer.Argument(metavar="[RECORDING]...", help="of this finger, .csv or .parquet")
     ] = None,

@@ -7,14 +7,17 @@ from typing import Annotated
 
 import typer
 
+from tendonfmu.cli_options import (
+    Confidence,
+    FalseAlarms,
+    Figures,
+    FreeAtPretensions,
+    Kinematics,
+    Model,
+    Progress,
+    Report,
+)
 from tendonfmu.console import print_tables, progress_bar, say
-
-Kinematics = Annotated[
-    int,
-    typer.Option(
-        min=1, max=3, help="1: tendon positions, 2: measured joint positions, 3: joint positions and velocities"
-    ),
-]
 
 
 def register(app: typer.Typer) -> None:
@@ -25,14 +28,10 @@ def register(app: typer.Typer) -> None:
 
 def tune(
     finger: Annotated[Path, typer.Argument(metavar="FINGER.json", help="finger description, fitted")],
-    recordings: Annotated[
-        list[Path], typer.Argument(metavar="RECORDING", help="free motion at several pretensions, .csv or .parquet")
-    ],
+    recordings: FreeAtPretensions,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="TUNED.json", help="description to write")],
-    false_alarms_per_hour: Annotated[
-        float, typer.Option(min=1e-3, max=3600.0, metavar="RATE", help="at most, in free motion like the recorded one")
-    ] = 6.0,
-    confidence: Annotated[float, typer.Option(min=0.5, max=0.9999, help="that the rate is at most that")] = 0.9,
+    false_alarms_per_hour: FalseAlarms = 6.0,
+    confidence: Confidence = 0.9,
     method: Annotated[
         str, typer.Option(metavar="innovation|cusum|threshold", help="contact.method; threshold is the paper's")
     ] = "innovation",
@@ -44,15 +43,13 @@ def tune(
         float,
         typer.Option(min=0.0, metavar="SECONDS", help="in contact until the bias learns again; inf: never"),
     ] = 2.0,
-    report: Annotated[Path | None, typer.Option(metavar="R.json", help="everything that is known of it")] = None,
-    figures: Annotated[Path | None, typer.Option(metavar="DIR", help="folder for figures")] = None,
+    report: Report = None,
+    figures: Figures = None,
     kinematics: Kinematics = 1,
     strict: Annotated[
         bool, typer.Option("--strict", help="exit 1 and no file if there is too little free motion for RATE")
     ] = False,
-    progress: Annotated[
-        bool | None, typer.Option("--progress/--no-progress", help="progress bar; by default on a terminal")
-    ] = None,
+    progress: Progress = None,
 ) -> None:
     """Choose what decides on contact, from free motion, for a stated rate of false alarms.
 
@@ -104,7 +101,7 @@ def tune(
 
 
 def score(
-    model: Annotated[Path, typer.Argument(metavar="FINGER.json|FINGER.fmu", help="description, or FMU of one")],
+    model: Model,
     recordings: Annotated[list[Path], typer.Argument(metavar="RECORDING", help="labelled or free, .csv or .parquet")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="SCORE.json", help="report to write")],
     labels: Annotated[
@@ -113,12 +110,10 @@ def score(
     force: Annotated[
         str | None, typer.Option(metavar="COLUMN", help="sensed force in N: told at each alarm, and drawn")
     ] = None,
-    figures: Annotated[Path | None, typer.Option(metavar="DIR", help="folder for figures")] = None,
+    figures: Figures = None,
     kinematics: Kinematics = 1,
     seed: Annotated[int, typer.Option(min=0, max=2**53, help="of the intervals' resampling")] = 0,
-    progress: Annotated[
-        bool | None, typer.Option("--progress/--no-progress", help="progress bar; by default on a terminal")
-    ] = None,
+    progress: Progress = None,
 ) -> None:
     """Measure contact detection against labels: events found and missed, false alarms, delay, torque; a ROC.
 

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from tendonfmu.cli_options import FingerFile, FreeRecordings, Jobs, Kinematics, LeastGain, Progress, Seed
 from tendonfmu.console import PhaseDisplay, print_tables, say
 from tendonfmu.errors import InputError
 from tendonfmu.several_values import SeveralValues
@@ -18,8 +19,8 @@ def register(app: typer.Typer) -> None:
 
 
 def diagnose(
-    finger: Annotated[Path, typer.Argument(metavar="FINGER.json", help="finger description, its structure as given")],
-    recordings: Annotated[list[Path], typer.Argument(metavar="RECORDING", help="free motion, .csv or .parquet")],
+    finger: FingerFile,
+    recordings: FreeRecordings,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder for page, report and model")],
     test: Annotated[
         list[Path] | None,
@@ -29,21 +30,11 @@ def diagnose(
             "\\[default: parts of the recordings]",
         ),
     ] = None,
-    kinematics: Annotated[
-        int,
-        typer.Option(
-            min=1, max=3, help="1: tendon positions, 2: measured joint positions, 3: joint positions and velocities"
-        ),
-    ] = 1,
-    least_gain: Annotated[
-        float,
-        typer.Option(min=0.0, max=0.5, metavar="SHARE", help="by which a cause has to lower the rms on unseen data"),
-    ] = 0.03,
-    seed: Annotated[int, typer.Option(min=0, max=2**53, help="of all that is drawn at random")] = 0,
-    jobs: Annotated[int, typer.Option(min=1, max=64, help="processor cores to use; the result is the same")] = 1,
-    progress: Annotated[
-        bool | None, typer.Option("--progress/--no-progress", help="progress bar; by default on a terminal")
-    ] = None,
+    kinematics: Kinematics = 1,
+    least_gain: LeastGain = 0.03,
+    seed: Seed = 0,
+    jobs: Jobs = 1,
+    progress: Progress = None,
 ) -> None:
     """Show what the model gets wrong, name the cause, extend the model by it and measure the gain.
 

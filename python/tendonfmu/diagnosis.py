@@ -113,7 +113,7 @@ def diagnose(
 
 @dataclass(frozen=True)
 class _Case:
-    """training: with held-out stretches where there are no tests. tests: to judge on. warnings: about the recordings."""
+    """training: with held-out stretches where there are no tests. tests: to judge on. warnings: about recordings."""
 
     finger: FingerDescription
     training: list[FitRecording]
