@@ -1,4 +1,4 @@
-"""The finger description (contract section 2): read from a file, and counted.
+"""The finger description (docs/finger_description.md): read from a file, and counted.
 
 What a description may hold is decided by the native reader alone; `schema/finger.schema.json` says the same to editors.
 """
@@ -149,7 +149,7 @@ def laws(data: Mapping[str, Any]) -> Iterator[tuple[str, Law]]:
 def estimated_numbers(data: Mapping[str, Any]) -> dict[str, int]:
     """How many numbers a fit estimates, by kind.
 
-    What is absent stays absent (contract section 7): viscous 0 is no viscous friction, static equal to coulomb no
+    What is absent stays absent: viscous 0 is no viscous friction, static equal to coulomb no
     Stribeck effect. So a side has up to four numbers; a cover has its stiffness, an extension all it has, and every
     joint a bias.
     """

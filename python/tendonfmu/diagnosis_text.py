@@ -56,7 +56,7 @@ _KINDS = ("joints", "tendons")
 
 
 def title_of(effect: str) -> str:
-    """A few plain words for an effect of contract section 7."""
+    """A few plain words for an effect of docs/diagnose.md."""
     from tendonfmu.effects import CANDIDATES
 
     titles = {candidate.name: candidate.title for candidate in CANDIDATES} | TITLES

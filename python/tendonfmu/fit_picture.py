@@ -44,9 +44,9 @@ class FitSeries:
 
     label: for people, such as "free motion" or the file's name. mean_force: N, of all tendons over all samples.
     time: [N] s. torque: [N, n] N·m, what the model has to explain: τ, or τ − external_torque where that was used.
-    residual: [N, n] N·m before the bias update, r of contract section 5, step 5 (`Estimator.innovations(...)[0]`); NaN
-        for the first sample. model_torque: [N, n] N·m, T of eq. (10) without the bias (`friction_torque` −
-        `bias_torque` of `native.Finger.run`). joint_angle, joint_speed: [N, n] rad, rad/s, the kinematics in use.
+    residual: [N, n] N·m before the bias update, τ − T_eff (`Estimator.innovations(...)[0]`); NaN for the first sample.
+    model_torque: [N, n] N·m, T of eq. (10) without the bias (`friction_torque` − `bias_torque` of `native.Finger.run`).
+    joint_angle, joint_speed: [N, n] rad, rad/s, the kinematics in use.
     used: [N] bool: trained on. Contact left out, or held out: False. All False in a comparison.
     held_out: [N] bool: held out of training and judged, None where nothing was.
     """

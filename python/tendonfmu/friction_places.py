@@ -14,7 +14,7 @@ from tendonfmu.description import Law
 
 Numbers = NDArray[np.float64]
 
-DEFAULT_THRESHOLD = {"tendon": 0.0005, "joint": 0.01}  # m/s, rad/s; contract section 2
+DEFAULT_THRESHOLD = {"tendon": 0.0005, "joint": 0.01}  # m/s, rad/s; where a description has none
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ class NativeError(ValueError):
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of a finger: path as in contract section 4, value in the image, allowed range, FMI unit."""
+    """One number of a finger: path as of the FMU's parameter, value in the image, allowed range, FMI unit."""
 
     path: str
     start: float
@@ -65,7 +65,7 @@ def image_guid(image: bytes, salt: int) -> str:
 class Finger:
     """One finger of the C runtime: parameters, state, and runs over whole recordings in one call.
 
-    image: as `image_from_json` makes it. kinematics_source: 1, 2 or 3 (contract section 4).
+    image: as `image_from_json` makes it. kinematics_source: 1, 2 or 3, as of the FMU.
     Not for use by two threads at a time.
     """
 
@@ -160,12 +160,12 @@ class Finger:
             self._finger.restore_state(state)
 
     def run(self, recording: Mapping[str, Array], parts: bool = False) -> dict[str, Array]:
-        """Takes all samples of a recording in one call and returns all outputs of contract section 4.
+        """Takes all samples of a recording in one call and returns all outputs of the FMU.
 
         recording: `time` [N] (s), `tendon_force` and `tendon_position` [N, m], `joint_position` and `joint_velocity`
             [N, n]; those that the kinematics source does not use may be left out.
         parts: with `friction_parts` [N, n, m + 3], N·m, what makes each joint's friction (needs contact.uncertainty).
-        Returns [N, n], `slack` [N, m], `contact` [N]; flags are bool. Beyond section 4, as docs/contract-additions.md
+        Returns [N, n], `slack` [N, m], `contact` [N]; flags are bool. Beyond these, as docs/contract-additions.md
         has them: `compensated_torque_std`, `residual`, `innovation`, `stuck_friction`, `friction_jump`, `drift`,
         N·m. With links also `fingertip_force` and `fingertip_force_std` [N, 3] (N, base frame), and [N]
         `fingertip_force_observable`, `fingertip_force_misfit`, `contact_link`. With contact.rest also `contact_change`

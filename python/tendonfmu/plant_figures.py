@@ -23,7 +23,7 @@ WAYS = tuple[tuple[float, float], ...]
 
 STEP = 1e-3  # s, between the rows of a run
 DRAWN_APART = 1e-4  # rad, between points of a model's line
-KINEMATICS_MEASURED = 3  # joint positions and velocities, contract section 4
+KINEMATICS_MEASURED = 3  # joint positions and velocities
 PRETENSIONS = (10.0, 40.0)  # N
 TO_AND_FRO: WAYS = ((0.0, 0.35), (1.0, 0.35), (3.0, 0.1), (9.0, 1.0), (15.0, 0.1), (21.0, 1.0))  # s, rad
 # after a stroke small moves to and fro, each commanded larger than the one before, then one that breaks away

@@ -91,7 +91,7 @@ bool left_out(const Structure& s, std::uint32_t parameter) {
   return missing != 0.0 && s.finger->start[parameter] == missing;
 }
 
-/* what is present is estimated, what is absent stays absent (contract section 7) */
+/* what is present is estimated, what is absent stays absent */
 std::vector<std::int32_t> present_groups(const Structure& s) {
   const double* value = s.finger->start;
   std::vector<std::int32_t> group(s.finger->shape.parameter_count, -1);

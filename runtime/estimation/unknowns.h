@@ -43,9 +43,9 @@ struct SideColumns {
 
 class Unknowns {
  public:
-  /* group [parameter_count]: −1 fixed, equal numbers share one value; nullptr: all that the structure has
-   * (contract section 7). scale [parameter_count]: expected magnitudes in the description's numbers, NaN or nullptr:
-   * from the start. Throws refused with one line. */
+  /* group [parameter_count]: −1 fixed, equal numbers share one value; nullptr: all that the structure has.
+   * scale [parameter_count]: expected magnitudes in the description's numbers, NaN or nullptr: from the start. Throws
+   * refused with one line. */
   Unknowns(const tendonfmu_finger* finger, const std::int32_t* group, const double* scale);
 
   std::size_t count() const { return list_.size(); }

@@ -112,7 +112,7 @@ tendonfmu_status tendonfmu_estimator_jacobian(tendonfmu_estimator* estimator, si
                                               size_t first, size_t count, double* torque, double* jump,
                                               double* torque_derivative, double* jump_derivative);
 
-/* Residuals before the bias update, e [samples × n] (r of contract section 5, step 5), and their variances S [samples].
+/* Residuals before the bias update, e [samples × n] (τ − T_eff), and their variances S [samples].
  * NaN: e where the bias has not started, S where nothing is learned either (samples not used, which have an e, and the
  * first). bias [samples × n] after the update. NULL: not wanted. */
 tendonfmu_status tendonfmu_estimator_innovations(tendonfmu_estimator* estimator, size_t recording, const double* z,

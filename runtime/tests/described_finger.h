@@ -7,7 +7,7 @@
 
 #include "tendonfmu_description.h"
 
-// Two joints, two tendons, one of everything that section 2 of the contract allows to be left out.
+// Two joints, two tendons, one of everything that a description may leave out.
 inline nlohmann::json small_finger() {
   return nlohmann::json::parse(R"({
     "format": "tendonfmu-finger-1",

@@ -3,7 +3,7 @@
 
 It becomes a finger of one joint and one bidirectional tendon with a moment arm of 1 m: a metre of travel is a radian,
 a newton is a newton metre, m/s is rad/s, kg is kg·m². Its equation of motion M·a = F − F_friction − F_offset reads, as
-contract section 3 (eq. 9) has it, T_eff = τ − external_torque with τ = F and external_torque = +M·a: the torque that
+eq. 9 has it, T_eff = τ − external_torque with τ = F and external_torque = +M·a: the torque that
 accelerates the carriage is known load, the rest is friction and its offset.
 
 | recording | from | unit |

@@ -109,7 +109,7 @@ class Variant:
         """The description with the term at these magnitudes, one per column, none of its numbers at zero.
 
         A magnitude of the wrong sign, or next to nothing, becomes a small one of the right sign: what a fit starts
-        from has to be present (contract section 7).
+        from has to be present.
         """
         if len(magnitudes) != self.count:
             raise InputError(f"magnitudes: {len(magnitudes)} numbers; expected {self.count}, one per column")
@@ -137,7 +137,7 @@ def _present(column: Column, magnitude: float) -> float:
 
 @dataclass(frozen=True)
 class Candidate:
-    """One effect of contract section 7.
+    """One effect of docs/diagnose.md.
 
     name: of the contract. title: a few plain words. explanation: what it is physically, and what to look at on the
     hand. sign: expected one of its magnitudes, +1, −1 or 0 for either. excited_by: the motion or load that shows it.
@@ -161,7 +161,7 @@ class Candidate:
     make: Callable[[Data, Place, Mapping[str, float]], Variant]
 
     def places(self, data: Data, kinematics: int = 1) -> list[Place]:
-        """Where it can be proposed: absent there now (contract section 7, structure). kinematics: source, 1 to 3."""
+        """Where it can be proposed: absent there now. kinematics: source, 1 to 3."""
         return self.find_places(data, kinematics)
 
     def variants(self, data: Data, place: Place, span: Span) -> list[Variant]:

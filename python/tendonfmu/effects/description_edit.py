@@ -1,7 +1,8 @@
 """Changes of a finger description that add a term at a strength of zero: they leave its torque as it is.
 
 Laws that are absent get next to no friction (the estimator takes a law without any as a mistake); a law with two sides
-or with working points in place of a single one starts with equal sides and equal laws. Paths: contract section 4.
+or with working points in place of a single one starts with equal sides and equal laws. Paths
+are those of the FMU's parameters.
 """
 
 from __future__ import annotations

@@ -99,7 +99,7 @@ typedef struct effect_grip {
 typedef enum effect_kind { EFFECT_TORQUE, EFFECT_FRICTION, EFFECT_SIGNAL } effect_kind;
 
 typedef struct effect_type {
-  const char* name; /* as in contract section 7 */
+  const char* name; /* as in docs/extensions.md */
   uint32_t id;      /* in the model image; never reused */
   effect_kind kind;
   int order; /* of signals: rows act in the order of these, whatever theirs */
