@@ -130,7 +130,7 @@ def test_what_is_wrong_with_a_recording_is_said_once(folder: Path, tmp_path: Pat
     columns = {f"{name}[{k + 1}]": each[rows] for name, group in whole.groups.items() for k, each in enumerate(group.T)}
     write_table(tmp_path / "gap.parquet", {"time": whole.time[rows], **columns})
     found = calibrate(folder / FINGER, [tmp_path / "gap.parquet"], tmp_path / "out")
-    assert sum("gap" in sentence for sentence in found.report["warnings"]) == 1, found.report["warnings"]
+    assert sum(" gap" in sentence for sentence in found.report["warnings"]) == 1, found.report["warnings"]
 
 
 def test_the_folder_holds_finger_fmu_page_and_report(calibrated: tuple[Calibration, Path]) -> None:
