@@ -84,6 +84,14 @@ std::string detection_keys(int joints, int tendons, bool by_cusum) {
          R"(, "deviation": )" + per_joint("0.002") + R"(, "release_ratio": 0.7, "hold_time": 0.05, "release_time": 2)";
 }
 
+// what it writes beside them: slow loads, contact at rest
+std::string calibrated_keys(int joints) {
+  const auto per_joint = [joints](const char* value) { return list(joints, [=](int) { return std::string(value); }); };
+  return R"(, "drift": {"threshold": )" + per_joint("5") + R"(, "threshold_per_force": )" + per_joint("0.001") +
+         R"(}, "rest": {"travel": 1e-5, "threshold": )" + per_joint("0.01") + R"(, "creep": )" + per_joint("0.001") +
+         R"(, "innovation": {"time": 0.5, "threshold": )" + per_joint("0.01") + "}}";
+}
+
 std::string row(const char* effect, const char* key, int place, const char* numbers) {
   return std::string(R"({"effect": ")") + effect + "\", \"" + key + "\": " + std::to_string(place + 1) + ", " +
          numbers + "}";
@@ -116,7 +124,8 @@ std::string extension_rows(int joints, int tendons, Keys keys) {
 }  // namespace
 
 std::string description(int joints, int tendons, int points, Keys keys) {
-  const bool everything = keys == Keys::everything, detects = everything || keys == Keys::innovation;
+  const bool everything = keys == Keys::everything, calibrated = keys == Keys::calibrated;
+  const bool detects = everything || calibrated || keys == Keys::innovation;
   const bool filtered = keys == Keys::filtered || keys == Keys::presliding_filtered;
   return R"({"format": "tendonfmu-finger-1", "name": "bench", "joints": )" +
          list(joints,
@@ -126,11 +135,12 @@ std::string description(int joints, int tendons, int points, Keys keys) {
               }) +
          R"(, "tendons": )" + list(tendons, [&](int i) { return tendon(i, joints, points); }) +
          R"(, "contact": {"threshold": )" + list(joints, [](int) { return std::string("5"); }) +
-         (detects ? detection_keys(joints, tendons, everything) : "") + R"(}, "extensions": )" +
-         extension_rows(joints, tendons, keys) +
+         (detects ? detection_keys(joints, tendons, everything) : "") + (calibrated ? calibrated_keys(joints) : "") +
+         R"(}, "extensions": )" + extension_rows(joints, tendons, keys) +
          (everything ? R"(, "velocity_threshold": {"hysteresis": 0.3}, "bias": {"forgetting": "absorption", )"
                        R"("entry_load": true})"
                      : "") +
+         (calibrated ? R"(, "bias": {"start_share": 1, "noise_time": 0.001}, "sensor_fault": {})" : "") +
          (filtered ? R"(, "position_filter": {"noise": )" + list(joints, [](int) { return std::string("4e-4"); }) + "}"
                    : "") +
          "}";

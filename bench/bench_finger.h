@@ -8,9 +8,20 @@
 
 namespace bench_finger {
 
-// Which keys of docs/contract-additions.md, or rows of docs/extensions.md, a description has: torques: three a joint
+// Which keys of docs/contract-additions.md, or rows of docs/extensions.md, a description has: calibrated: all that
+// `tendonfmu calibrate` writes, presliding apart; torques: three a joint
 // and one a tendon; presliding: one at every place; presliding_filtered: the same with a position filter.
-enum class Keys { paper, innovation, everything, torques, presliding, delay, filtered, presliding_filtered };
+enum class Keys {
+  paper,
+  innovation,
+  calibrated,
+  everything,
+  torques,
+  presliding,
+  delay,
+  filtered,
+  presliding_filtered
+};
 
 // A description with n joints, m tendons and `points` working points at every edge, all laws different.
 std::string description(int joints, int tendons, int points, Keys keys = Keys::paper);

@@ -78,6 +78,7 @@ const auto* const registered = [] {
   };
   add("step/avx2/4x8x5", "avx2", 4, 8, 5, false);
   add("step/avx2/4x8x5/innovation", "avx2", 4, 8, 5, false, Keys::innovation);
+  add("step/avx2/4x8x5/calibrated", "avx2", 4, 8, 5, false, Keys::calibrated);
   add("step/avx2/4x8x5/everything", "avx2", 4, 8, 5, false, Keys::everything);
   add("step/plain/4x8x5/innovation", "plain", 4, 8, 5, false, Keys::innovation);
   add("step/avx2/4x8x5/shaking/everything", "avx2", 4, 8, 5, true, Keys::everything);

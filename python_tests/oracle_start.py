@@ -17,6 +17,7 @@ from oracle_finger import Effect, Places
 
 Array = NDArray[Any]
 
+LEAST_UNLEARNED = 1e-12  # N·m of V: less counts as none
 LEAST_LEFT = 1e-12  # of how an effect stood at the start: less counts as none
 
 
@@ -70,3 +71,4 @@ class StartFriction:
 
     def learn(self, K: Array) -> None:
         self.unlearned = (1.0 - K) * self.unlearned
+        self.unlearned[self.unlearned <= LEAST_UNLEARNED] = 0.0

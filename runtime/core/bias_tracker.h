@@ -243,9 +243,11 @@ HOT_INLINE double noise_variance(const finger_settings* settings, double mean_fo
   return noise * noise * scale;
 }
 
+#define LEAST_UNLEARNED 1e-12 /* N·m: less of V counts as none */
+
 /* P⁻ + V²/3, four joints: what of the start is not learned counts as evenly distributed */
 HOT_INLINE quad with_unlearned(const tendonfmu_finger* f, size_t j, quad variance) {
-  if (!f->derived.settings.has_start_share) {
+  if (!start_is_open(f)) {
     return variance;
   }
   const quad unlearned = quad_load(f->remembered.unlearned + j);
@@ -275,10 +277,11 @@ HOT_INLINE void track_bias(tendonfmu_finger* f, double step, double noise) {
     const quad predicted = quad_add(quad_load(s->variance + j), drift);
     const quad own = kalman_gain(predicted, noise_variance);
     quad gain = own;
-    if (f->derived.settings.has_start_share) {
+    if (start_is_open(f)) {
       gain = kalman_gain(with_unlearned(f, j, predicted), noise_variance);
       double* unlearned = s->unlearned + j;
-      quad_store(unlearned, quad_mul(quad_sub(one, gain), quad_load(unlearned)));
+      const quad left = quad_mul(quad_sub(one, gain), quad_load(unlearned));
+      quad_store(unlearned, quad_keep(quad_greater(left, quad_set(LEAST_UNLEARNED)), left));
     }
     const quad correction = quad_mul(gain, quad_load(s->residual + j));
     quad_store(s->bias + j, quad_add(quad_load(s->bias + j), correction));

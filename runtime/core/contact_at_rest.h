@@ -44,7 +44,7 @@ COLD_STATIC void begin_rest(tendonfmu_finger* f, double time) {
 HOT_INLINE void change_since_mark(tendonfmu_finger* f, double step) {
   const finger_state* s = &f->remembered;
   const double rate = f->derived.settings.rest_averaging_rate;
-  const quad share = quad_set(rate < 0.0 ? 1.0 : law_one_minus_exponential(rate * step));
+  const quad share = rate < 0.0 ? quad_set(1.0) : approach_share(quad_set(rate * step));
   for (size_t i = 0; i < f->tendon_lanes; i += 4) {
     const quad before = quad_load(s->smooth_force + i);
     const quad distance = quad_sub(quad_load(f->scratch.force + i), before);
@@ -163,7 +163,7 @@ HOT_INLINE void follow_change(tendonfmu_finger* f, double step) {
   if (rate < 0.0) {
     return; /* m stays 0 */
   }
-  const quad share = quad_set(law_one_minus_exponential(rate * step)), half = quad_set(0.5);
+  const quad share = approach_share(quad_set(rate * step)), half = quad_set(0.5);
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     const quad tracked = quad_load(s->rest_tracked + j);
     const quad followed = quad_add(tracked, quad_mul(share, change_of_late(f, j)));

@@ -17,7 +17,7 @@ HOT_INLINE quad hidden_torque(const tendonfmu_finger* f, size_t j) {
   const quad stuck = quad_mul(quad_set(settings->stuck_share), quad_load(f->remembered.stuck_friction + j));
   const quad jump = quad_mul(quad_set(settings->jump_share), quad_load(f->remembered.friction_jump + j));
   const quad hidden = quad_add(stuck, jump);
-  return settings->has_start_share ? quad_add(hidden, quad_load(f->remembered.unlearned + j)) : hidden;
+  return start_is_open(f) ? quad_add(hidden, quad_load(f->remembered.unlearned + j)) : hidden;
 }
 
 /* g of the CUSUM: time, weighted by how far the innovation is beyond its bound */
@@ -55,7 +55,7 @@ HOT_INLINE quad_mask innovation_exceeds(tendonfmu_finger* f, size_t j, quad rati
 HOT_INLINE quad_mask residual_exceeds(const tendonfmu_finger* f, size_t j, quad ratio, double mean_force) {
   const finger_settings* settings = &f->derived.settings;
   quad bound = force_dependent(f->derived.contact_threshold, f->derived.contact_per_force, j, mean_force);
-  if (settings->bounds_friction || settings->has_start_share) {
+  if (settings->bounds_friction || start_is_open(f)) {
     bound = quad_add(bound, hidden_torque(f, j));
   }
   if (settings->knows_uncertainty) {
@@ -68,7 +68,7 @@ HOT_INLINE quad_mask residual_exceeds(const tendonfmu_finger* f, size_t j, quad 
 /* lanes that have drifted too far */
 HOT_INLINE quad_mask drift_exceeds(const tendonfmu_finger* f, size_t j, quad ratio, double mean_force) {
   quad bound = force_dependent(f->derived.drift_threshold, f->derived.drift_per_force, j, mean_force);
-  if (f->derived.settings.has_start_share) {
+  if (start_is_open(f)) {
     bound = quad_add(bound, quad_load(f->remembered.unlearned + j));
   }
   return quad_greater(quad_abs(quad_load(f->remembered.drift + j)), quad_mul(ratio, bound));

@@ -7,9 +7,17 @@
 
 #define DRIFT_OF_LATE 0.1 /* of T_q: the time of the mean u */
 
-/* 1 − exp(−Δt/min(T, time since the start)) */
-HOT_INLINE quad mean_share(double time_constant, double since_start, double step) {
-  return quad_set(law_one_minus_exponential(step / (since_start < time_constant ? since_start : time_constant)));
+/* what u, p and s go of the way to e: 1 − exp(−Δt/min(T, time since the start)), into scratch */
+HOT_INLINE void find_drift_shares(tendonfmu_finger* f, double time, double step) {
+  const finger_settings* settings = &f->derived.settings;
+  const double quick = settings->drift_quick_time;
+  const double constant[4] = {DRIFT_OF_LATE * quick, quick, settings->drift_slow_time, 1.0};
+  const double since_start = time - f->remembered.scalar[STATE_STARTED_AT];
+  _Alignas(32) double age[4];
+  for (int k = 0; k < 4; ++k) {
+    age[k] = since_start < constant[k] ? since_start : constant[k];
+  }
+  quad_store(f->scratch.drift_share, approach_share(quad_div(quad_set(step), quad_load(age))));
 }
 
 /* e = r + c, four joints: what friction leaves, what the bias has learned since the start put back */
@@ -34,9 +42,8 @@ HOT_INLINE quad common_part(quad a, quad b) {
  * Before contact is decided. */
 HOT_INLINE void watch_drift(tendonfmu_finger* f, double time, double step) {
   const finger_state* s = &f->remembered;
-  const double quick_time = f->derived.settings.drift_quick_time, since_start = time - s->scalar[STATE_STARTED_AT];
-  const quad share = mean_share(quick_time, since_start, step);
-  const quad share_of_late = mean_share(quick_time * DRIFT_OF_LATE, since_start, step);
+  find_drift_shares(f, time, step);
+  const quad share_of_late = quad_set(f->scratch.drift_share[0]), share = quad_set(f->scratch.drift_share[1]);
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     const quad left = left_by_friction(f, j), slow = quad_load(s->drift_slow + j);
     const quad of_late = approach(s->drift_of_late + j, left, share_of_late);
@@ -52,19 +59,17 @@ HOT_INLINE quad learned_of_start(const tendonfmu_finger* f, size_t j, quad predi
 }
 
 /* s and c follow, before the bias is updated; in a contact that has lasted too long s begins anew at p */
-HOT_INLINE void follow_drift(tendonfmu_finger* f, int contact, double time, double step, double noise) {
+HOT_INLINE void follow_drift(tendonfmu_finger* f, int contact, double step, double noise) {
   const finger_state* s = &f->remembered;
   const finger_settings* settings = &f->derived.settings;
-  const double since_start = time - s->scalar[STATE_STARTED_AT];
   const quad drift_variance = quad_set(settings->drift_variance * step), noise_now = quad_set(noise);
-  const quad quick_share = mean_share(settings->drift_quick_time, since_start, step);
-  const quad slow_share = mean_share(settings->drift_slow_time, since_start, step);
-  const quad share_of_late = mean_share(settings->drift_quick_time * DRIFT_OF_LATE, since_start, step);
+  const double* share = f->scratch.drift_share;
+  const quad share_of_late = quad_set(share[0]), quick_share = quad_set(share[1]), slow_share = quad_set(share[2]);
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     const quad predicted = quad_add(quad_load(s->variance + j), drift_variance);
     const quad gain = kalman_gain(predicted, noise_now), learned = quad_mul(gain, quad_load(s->residual + j));
     quad left = left_by_friction(f, j), quick = quad_load(s->drift_quick + j);
-    if (settings->has_start_share) {
+    if (start_is_open(f)) {
       const quad of_start = learned_of_start(f, j, predicted, gain, noise_now);
       left = quad_sub(left, of_start);
       quick = quad_sub(quick, quad_mul(quick_share, of_start));

@@ -183,6 +183,7 @@ static void lay_out_scratch(tendonfmu_finger* f, cursor* c) {
   s->pulley_turned = take_numbers(c, starts ? f->slots : 0);
   s->start_left = take_numbers(c, starts ? f->slots : 0);
   s->turned = take_numbers(c, starts ? f->joint_lanes : 0);
+  s->drift_share = take_numbers(c, f->shape.options & MODEL_HAS_DRIFT ? 4 : 0);
   const int resting = (f->shape.options & MODEL_HAS_REST) != 0;
   s->motor_position = take_numbers(c, resting ? f->tendon_lanes : 0);
   s->force_change = take_numbers(c, resting ? f->tendon_lanes : 0);

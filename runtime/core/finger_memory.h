@@ -121,7 +121,8 @@ enum {
   STATE_RECENT_AT,       /* s, from which on motion counts as recent */
   STATE_STARTED_AT,      /* s, first sample; with contact.drift, else 0 */
   STATE_UNWELL,          /* 1 where a sensor fails or a joint is not watched; with sensor_fault, else 0 */
-  STATE_SCALARS = 16     /* the rest is 0 and keeps the rows aligned */
+  STATE_START_OPEN,      /* 1 while there is anything to learn of the start; with bias.start_share, else 0 */
+  STATE_SCALARS = 16     /* a multiple of 4: the rows stay aligned */
 };
 
 #define LONGEST_FILTER_STEP 1.0 /* s; after a longer one the position filter begins anew */
@@ -242,9 +243,11 @@ typedef struct finger_scratch {
   double *edge_turned, *pulley_turned, *start_left; /* [n × M + N] |F| whose start this sample turns over, what is left
                                                        of the start after it; with start_share only */
   double* turned;                                   /* [N] G, N·m; with start_share only */
-  double *stuck_friction, *uncertainty;             /* [N] H of what sticks now, u */
-  double* part;                                     /* as in the state */
-  double* filter;                                   /* as in the state, after this sample */
+  int start_remains;                                /* motion has not turned over all of the start */
+  double* drift_share;                   /* [4] of u, p, s: what they go of the way to e; with contact.drift only */
+  double *stuck_friction, *uncertainty;  /* [N] H of what sticks now, u */
+  double* part;                          /* as in the state */
+  double* filter;                        /* as in the state, after this sample */
   double* travel;                        /* [n × M + N] of what slides, by the position filter: m, rad; with it only */
   double *motor_position, *force_change; /* [M] x0 as it was given, f̄ less that of the mark; with contact.rest only */
   double *rest_noise, *rest_bound, *rest_sudden_bound; /* [N] N, D, B; with contact.rest only */
@@ -286,6 +289,11 @@ struct tendonfmu_finger {
   void* allocation; /* of tendonfmu_create(), NULL in the caller's memory */
   char error[ERROR_BYTES];
 };
+
+/* 1 while there is anything to learn of how friction stood at the start */
+static inline int start_is_open(const tendonfmu_finger* finger) {
+  return finger->remembered.scalar[STATE_START_OPEN] != 0.0;
+}
 
 /* 1 where the velocity comes from the position filter; then its row of the filter in memory */
 static inline int filters_position(const tendonfmu_finger* finger) {

@@ -100,7 +100,7 @@ static int scalars_are_sound(const tendonfmu_finger* f, const unsigned char* sta
       {s + STATE_RECENT_AT, 1, ROW_WITHOUT_LANES, -LARGEST_TIME * rests, LARGEST_TIME * rests, 0, 0},
       {s + STATE_STARTED_AT, 1, ROW_WITHOUT_LANES, -LARGEST_TIME * drifts, LARGEST_TIME * drifts, 0, 0},
       {s + STATE_UNWELL, 1, ROW_WITHOUT_LANES, 0.0, f->derived.settings.watches_sensors ? 1.0 : 0.0, 1, 0},
-      {s + STATE_UNWELL + 1, STATE_SCALARS - STATE_UNWELL - 1, ROW_WITHOUT_LANES, 0.0, 0.0, 0, 0},
+      {s + STATE_START_OPEN, 1, ROW_WITHOUT_LANES, 0.0, f->derived.settings.has_start_share ? 1.0 : 0.0, 1, 0},
   };
   return rows_are_sound(f, state, rules, sizeof rules / sizeof rules[0]);
 }
@@ -146,7 +146,7 @@ static int slots_are_sound(const tendonfmu_finger* f, const unsigned char* state
       {s->last_stuck, slots, ROW_OF_SLOTS, -LARGEST_TIME, LARGEST_TIME, 0, 1},
       {s->entry_edge, rest, ROW_WITHOUT_LANES, -DBL_MAX, DBL_MAX, 0,
        0}, /* entries, start, parts, filter, rest, sensors, … */
-      {s->start_left, starts * slots, ROW_OF_SLOTS, 0.0, 1.0, 0, 1},
+      {s->start_left, starts * slots, ROW_OF_SLOTS, 0.0, 1.0, 0, 0},
       {s->drift_of_late, f->derived.settings.watches_drift ? 5 * f->joint_lanes : 0, ROW_WITHOUT_LANES,
        -2.0 * LARGEST_SUM, 2.0 * LARGEST_SUM, 0, 0}, /* and the four rows after it */
       {s->unlearned, starts * f->joint_lanes, ROW_OF_JOINTS, 0.0, LARGEST_SUM, 0, 0},

@@ -100,8 +100,7 @@ HOT_INLINE int all_finite(const tendonfmu_finger* f) {
   double probe = 0.0; /* stays 0 unless something is infinite or NaN */
   for (size_t j = 0; j < f->joints; ++j) {
     const double sum = fabs(s->torque[j]) + fabs(s->friction[j]) + fabs(s->bias_step[j]) + fabs(f->remembered.bias[j]) +
-                       s->stuck_friction[j] + s->uncertainty[j] +
-                       (f->derived.settings.has_start_share ? s->turned[j] : 0.0);
+                       s->stuck_friction[j] + s->uncertainty[j] + (start_is_open(f) ? s->turned[j] : 0.0);
     probe += 0.0 * (1e160 * sum); /* infinite above 1.8e148 */
     probe += 0.0 * s->angle[j] + 0.0 * joint_velocity[j];
   }
@@ -157,7 +156,7 @@ HOT_INLINE void remember_sample(tendonfmu_finger* f, double time, double velocit
   if (f->derived.settings.bounds_friction) {
     remember_stuck(f, is_first(f) ? 0.0 : time - s->scalar[STATE_TIME]);
   }
-  if (f->derived.settings.has_start_share) {
+  if (start_is_open(f) || (f->derived.settings.has_start_share && is_first(f))) {
     copy_row(s->start_left, f->scratch.start_left, f->slots);
   }
   if (f->derived.settings.knows_uncertainty) {
@@ -200,6 +199,7 @@ HOT_INLINE void begin_tracking(tendonfmu_finger* f, double time, double mean_for
     copy_row(s->friction, s->torque, f->joint_lanes); /* to the last bit */
   }
   s->scalar[STATE_STARTED_AT] = settings->watches_drift ? time : 0.0;
+  s->scalar[STATE_START_OPEN] = settings->has_start_share ? 1.0 : 0.0;
   s->scalar[STATE_INITIALISED] = 1.0;
   s->scalar[STATE_FIRST_SAMPLE] = 1.0;
   s->scalar[STATE_CONTACT] = 0.0;
@@ -219,7 +219,7 @@ HOT_INLINE void track_sample(tendonfmu_finger* f, double time, double step, doub
     begin_bias_anew(f);
   }
   leave_residual(f, step);
-  if (settings->has_start_share) {
+  if (start_is_open(f)) {
     add_unlearned(f);
   }
   if (unwell) {
@@ -238,7 +238,7 @@ HOT_INLINE void track_sample(tendonfmu_finger* f, double time, double step, doub
   if (bias_is_updated(f, contact, time)) {
     const double noise = noise_variance(settings, mean_force, scale);
     if (settings->watches_drift) {
-      follow_drift(f, contact, time, step, noise);
+      follow_drift(f, contact, step, noise);
     }
     track_bias(f, step, noise);
     if (settings->uses_innovation) {
@@ -252,6 +252,9 @@ HOT_INLINE void track_sample(tendonfmu_finger* f, double time, double step, doub
     for (size_t j = 0; j < f->joint_lanes; ++j) {
       s->gain[j] = 0.0;
     }
+  }
+  if (start_is_open(f)) {
+    close_start(f);
   }
   s->scalar[STATE_FIRST_SAMPLE] = 0.0;
   s->scalar[STATE_CONTACT] = contact ? 1.0 : 0.0;
@@ -291,7 +294,7 @@ static sample_result take_sample(tendonfmu_finger* f, double time) {
   measured_torques(f);
   const double mean_force = mean_tendon_force(f);
   bound_friction(f);
-  if (f->derived.settings.has_start_share) {
+  if (f->derived.settings.has_start_share && (first || start_is_open(f))) {
     turned_friction(f, first);
   }
   if (transitions && !first) {

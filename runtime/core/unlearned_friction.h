@@ -18,11 +18,24 @@ HOT_INLINE quad turned_share(const tendonfmu_finger* f, size_t slot) {
   return quad_select(slides, quad_sub(one, quad_load(f->scratch.kept + slot)), by_moving);
 }
 
+/* whether the joints turn the velocity of a slot: a tendon that ends before a joint is still there */
+static inline int can_move(const tendonfmu_finger* f, size_t slot) {
+  const size_t lanes = f->tendon_lanes, joint_row = f->joints * lanes;
+  int moves = slot >= joint_row && slot - joint_row < f->joints;
+  for (size_t at = slot; at < joint_row; at += lanes) {
+    moves |= f->derived.moment_arm[at] != 0.0;
+  }
+  return moves;
+}
+
 /* the first sample: what sticks, or slides in presliding, stands as nobody knows */
-HOT_INLINE void begin_start_left(tendonfmu_finger* f) {
-  const quad one = quad_set(1.0);
+COLD_STATIC void begin_start_left(tendonfmu_finger* f) {
+  double* left = f->scratch.start_left;
   for (size_t slot = 0; slot < f->slots; slot += 4) {
-    quad_store(f->scratch.start_left + slot, quad_sub(one, turned_share(f, slot)));
+    quad_store(left + slot, quad_sub(quad_set(1.0), turned_share(f, slot)));
+  }
+  for (size_t slot = 0; slot < f->slots; ++slot) {
+    left[slot] = can_move(f, slot) ? left[slot] : 0.0;
   }
 }
 
@@ -42,7 +55,7 @@ HOT_INLINE quad whole_friction(const tendonfmu_finger* f, const double* friction
 HOT_INLINE int turn_start(tendonfmu_finger* f) {
   const finger_scratch* s = &f->scratch;
   const size_t lanes = f->tendon_lanes, joint_row = f->joints * lanes;
-  int any = 0;
+  int any = 0, remains_any = 0;
   for (size_t slot = 0; slot < f->slots; slot += 4) {
     const quad left = quad_load(f->remembered.start_left + slot), turned = quad_mul(left, turned_share(f, slot));
     const int own = slot >= joint_row;
@@ -50,11 +63,14 @@ HOT_INLINE int turn_start(tendonfmu_finger* f) {
     const quad first = whole_friction(f, own ? s->joint_friction : s->edge, s->whole_edge, slot, at);
     const quad second = whole_friction(f, own ? s->load_friction : s->pulley, s->whole_pulley, slot, at);
     const quad remains = quad_sub(left, turned);
-    quad_store(s->start_left + slot, quad_keep(quad_greater(remains, quad_set(LEAST_LEFT)), remains));
+    const quad_mask lasts = quad_greater(remains, quad_set(LEAST_LEFT));
+    quad_store(s->start_left + slot, quad_keep(lasts, remains));
+    remains_any |= quad_mask_bits(lasts);
     quad_store(s->edge_turned + slot, quad_mul(turned, first));
     quad_store(s->pulley_turned + slot, quad_mul(turned, second));
     any |= quad_mask_bits(quad_greater(turned, quad_set(0.0)));
   }
+  f->scratch.start_remains = remains_any;
   return any;
 }
 
@@ -71,6 +87,15 @@ HOT_INLINE void turned_friction(tendonfmu_finger* f, int first) {
     return;
   }
   held_torque(f, f->scratch.edge_turned, f->scratch.pulley_turned, f->scratch.turned);
+}
+
+/* the start is over where nothing of it is left, neither to be turned over nor to be learned */
+HOT_INLINE void close_start(tendonfmu_finger* f) {
+  int open = f->scratch.start_remains;
+  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+    open |= quad_mask_bits(quad_greater(quad_load(f->remembered.unlearned + j), quad_set(0.0)));
+  }
+  f->remembered.scalar[STATE_START_OPEN] = open ? 1.0 : 0.0;
 }
 
 /* V grows by what the sample turns over */

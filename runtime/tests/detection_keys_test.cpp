@@ -269,7 +269,10 @@ TEST(DetectionKeys, StateWithANumberThatCannotBeIsRefused) {
       {"rest that begins after it ends", s.stuck_since, s.scalar[STATE_ABSORBED] + 1.0},
       {"third side", s.side, 2.0},
       {"side without a tendon", s.side + tendons, 1.0},
-      {"spare number", s.scalar + STATE_SCALARS - 1, 1.0},
+      {"half an open start", s.scalar + STATE_START_OPEN, 0.5},
+      {"negative V", s.unlearned, -1e-3},
+      {"more of the start than all", s.start_left, 1.5},
+      {"drift that overflows", s.drift, 1e200},
       {"not a number", s.entry_pulley, std::numeric_limits<double>::quiet_NaN()},
       {"infinite part", s.part, std::numeric_limits<double>::infinity()},
   };
