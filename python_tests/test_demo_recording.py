@@ -331,7 +331,6 @@ def test_the_calibrated_finger_finds_the_pushes(
     assert np.linalg.norm(after) < np.linalg.norm(before) / 2
 
 
-@pytest.mark.xfail(reason="bias.start_uncertainty is not in the file yet: 2.3 s at the first stroke", strict=True)
 @pytest.mark.parametrize("name", ["index_finger_free", "index_finger_pushes"])
 def test_no_false_alarm_of_the_calibrated_finger_lasts(
     recordings: dict[str, Recording], calibrated_outputs: Outputs, name: str
