@@ -9,6 +9,7 @@ from typing import Any
 
 from tendonfmu.calibration import DIAGNOSIS, Calibration
 from tendonfmu.calibration_text import (
+    TORQUE_HEADINGS,
     cause_rows,
     error_rows,
     push_sentence,
@@ -72,6 +73,7 @@ def calibration_page(report: Mapping[str, Any]) -> str:
         errors=error_rows(report),
         causes=cause_rows(report),
         torques=torque_rows(report),
+        torque_headings=list(TORQUE_HEADINGS),
         sensors=sensor_sentence(report),
         push=push_sentence(report) if report["pushes"] is not None else "",
         sizes=size_rows(report),

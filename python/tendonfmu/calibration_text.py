@@ -78,13 +78,14 @@ def error_rows(report: Report) -> list[Row]:
     ]
 
 
+TORQUE_HEADINGS = ("sudden, half of the time", "sudden, 9 of 10 times", "over seconds")
+
+
 def torque_rows(report: Report) -> list[Row]:
-    """A row per joint: the smallest change that is reported."""
+    """A row per joint: the smallest change that is reported (`TORQUE_HEADINGS`)."""
     smallest = report["detection"]["smallest_torque"]
-    return [
-        (name, mnm(half), mnm(most))
-        for name, half, most in zip(report["joints"], smallest["median"], smallest["nine_tenths"], strict=True)
-    ]
+    columns = (smallest[key] for key in ("median", "nine_tenths", "slow"))
+    return [(name, *(mnm(value) for value in each)) for name, *each in zip(report["joints"], *columns, strict=True)]
 
 
 def size_rows(report: Report) -> list[Row]:
@@ -165,8 +166,8 @@ def tables(report: Report) -> Iterator[tuple[str, Row, list[Row]]]:
             cause_rows(report),
         )
     yield (
-        "smallest sudden change that is reported, mN·m",
-        ("joint", "half of the time", "9 of 10 times"),
+        "smallest change that is reported, mN·m",
+        ("joint", *TORQUE_HEADINGS),
         torque_rows(report),
     )
     if sizes := size_rows(report):
