@@ -236,13 +236,20 @@ def _asked(hand: Hand, reference: Detector, take: Take, pushes: Sequence[Push]) 
 # --- the campaign -----------------------------------------------------------------------------------------------------
 
 
-def campaign(folder: Path, fingers: Sequence[Detector], parts: int = PARTS) -> Campaign:
-    """fingers: run beside the example's description and the fitted one, with the thresholds that they have."""
+def campaign(folder: Path, fingers: Sequence[Detector], parts: int = PARTS, alone: bool = False) -> Campaign:
+    """fingers: run beside the example's description and the fitted one, with the thresholds that they have.
+
+    alone: without rivals and matched detectors.
+    """
     hand = Hand(folder, parts)
     hand.make()
     fitted = Detector("fitted", json.loads(fitted_file(folder).read_text(encoding="utf-8")))
     described = Detector("description", json.loads(FINGER.read_text(encoding="utf-8")))
     pushes = hand.pushes()
+    if alone:
+        products = run(hand, [described, fitted, *fingers])
+        names = [each.name for each in products]
+        return Campaign(pushes, free_rms(hand, fitted), products, fitted.name, names)
     others = run(hand, rivals(hand, fitted.description), folder / "rival_outcomes.json")
     best = run_matched(hand, fitted, pushes)
     products = run(hand, [described, fitted, *fingers])
@@ -273,6 +280,7 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, help="folder of everything; default: a temporary one")
     parser.add_argument("--finger", action="append", default=[], metavar="NAME=FILE", help="run beside the others")
     parser.add_argument("--parts", type=int, default=PARTS, help="of 10 min and 100 pushes, by pretension")
+    parser.add_argument("--alone", action="store_true", help="fingers alone, without rivals: a quarter of an hour")
     given = parser.parse_args()
     folder = given.output or Path(tempfile.mkdtemp())
     folder.mkdir(parents=True, exist_ok=True)
@@ -282,7 +290,7 @@ def main() -> None:
         if not separator or not Path(file).is_file():
             parser.error(f"--finger {each}: expected NAME=FILE with a finger description that exists")
         fingers.append(Detector(name, json.loads(Path(file).read_text(encoding="utf-8"))))
-    found = campaign(folder, fingers, given.parts)
+    found = campaign(folder, fingers, given.parts, given.alone)
     write_pushes(folder / "detection.csv", found)
     text = report(found)
     _kept(folder / "detection.md", text)

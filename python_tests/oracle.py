@@ -1,4 +1,4 @@
-"""Naive numpy implementation of the sample semantics (contract section 5), used by tests alone.
+"""Naive numpy implementation of the sample semantics (docs/model.md), used by tests alone.
 
 Written from the texts (the contract, docs/contract-additions.md, docs/extensions.md, the paper), sharing no code with
 the runtime. It favours reading over speed: one plain loop over samples, and one small object per friction effect.

@@ -1,4 +1,4 @@
-"""Seeded random fingers and recordings that take every branch of contract section 5 and of its additions for detection.
+"""Seeded random fingers and recordings that take every branch of docs/model.md and of its additions for detection.
 
 The recordings are not a simulation: motions and forces are chosen so that the rules are exercised
 (jumps, slow reversals, rests held to the last bit, pushes, slack), and they share no code with any law.
@@ -126,7 +126,7 @@ def random_bias(rng: np.random.Generator) -> Description:
 
 
 def random_finger(seed: int) -> Description:
-    """A valid description (contract section 2) with 1-4 joints and up to 8 tendons."""
+    """A valid description (docs/finger_description.md) with 1-4 joints and up to 8 tendons."""
     rng = np.random.default_rng([seed, 1])
     n = int(rng.integers(1, 5))
     m = int(rng.integers(n, 9))

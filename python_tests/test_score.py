@@ -127,7 +127,7 @@ def delays_by_hand(time: NDArray[Any], label: NDArray[Any], contact: NDArray[Any
 
 @pytest.mark.parametrize("path", [PUSHES, FREE_X4])
 def test_the_residual_is_what_the_decision_was_made_of(path: Path) -> None:
-    """joint_contact is |r| > threshold (contract section 5, step 5), so r is right to within what decides."""
+    """joint_contact is |r| > threshold (docs/model.md, contact), so r is right to within what decides."""
     subject = read_subject(INDEX)
     track = run_track(subject, read_recording(path), 1, None)
     contact, force = subject.finger.data["contact"], np.abs(track.recording.groups["tendon_force"]).mean(axis=1)

@@ -32,7 +32,7 @@ from tendonfmu.alarm_level import (
 )
 from tendonfmu.cli import main
 from tendonfmu.detection_bounds import SHARES, Bound, search_for
-from tendonfmu.detection_tuning import RELEASE, RELEASE_TIME, ContactTuning
+from tendonfmu.detection_tuning import RELEASE, RELEASE_TIME, ContactTuning, TuneWarning
 from tendonfmu.errors import InputError
 from tendonfmu.fit_residuals import BiasSettings, track
 from tendonfmu.free_motion import FreePart, FreeRun
@@ -250,6 +250,17 @@ def tuned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, str]:
     return folder, out.getvalue(), err.getvalue()
 
 
+def test_presliding_counts_as_held_while_it_stands() -> None:
+    """Where the description has it, and with the short time that presliding leaves to be held."""
+    data = json.loads(INDEX.read_text())
+    data["extensions"] = [{"effect": "presliding", "displacement": 0.07}]
+    with pytest.warns(TuneWarning):
+        bound = (
+            ContactTuning(data, false_alarms_per_hour=WISHED).tune(FREE).description_.data["contact"]["friction_bound"]
+        )
+    assert bound["stuck_presliding"] is True and bound["stuck_time"] == 0.06
+
+
 def test_the_demo_tuned_and_drawn(tuned: tuple[Path, str, str]) -> None:
     folder, out, _ = tuned
     report = json.loads((folder / "r.json").read_text())
@@ -260,6 +271,11 @@ def test_the_demo_tuned_and_drawn(tuned: tuple[Path, str, str]) -> None:
         assert after[key] == before[key], key
     changed = {"noise_std", "noise_std_per_force", "drift_variance", "start_share"}
     assert after["bias"]["start_share"] == 1
+    assert all(value >= 0 for value in after["contact"]["drift"]["threshold"]) and any(
+        after["contact"]["drift"]["threshold"]
+    )
+    assert "stuck_presliding" not in after["contact"]["friction_bound"], "it has no presliding"
+    assert {"jump_margin", "force_resolution"} <= set(after["sensor_fault"])
     assert {key: value for key, value in after["bias"].items() if key not in changed} == {
         key: value for key, value in before["bias"].items() if key not in changed
     }

@@ -125,7 +125,7 @@ def recording_rows(report: Report) -> list[Row]:
 
 
 def sensor_sentence(report: Report) -> str:
-    """Whether failing sensors are told from contact."""
+    """How far sensors and springs may differ before a fault is reported."""
     found = report["detection"]["sensor_fault"]
     if found["keys"] is None:
         return f"Sensor faults are not watched: {found['left_out']}."

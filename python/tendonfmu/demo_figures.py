@@ -70,7 +70,7 @@ def _push_sheet(story: Story) -> Sheet:
             samples,
             joint.name.replace("_", " "),
             f"Joint {joint.name.replace('_', ' ')} while the fingertip is pushed: what is left of the torque, the "
-            "external torque as a sensor measures it, and when contact is told",
+            "external torque as a sensor measures it, and when contact is reported",
             ("external", "compensated"),
             pushes=True,
         )
@@ -132,7 +132,7 @@ def _within(spans: Sequence[Interval], shown: Interval) -> Iterator[Interval]:
 
 
 def _alarm(spans: Sequence[Interval], height: float) -> list[Curve]:
-    """A line at this height wherever contact is told."""
+    """A line at this height wherever contact is reported."""
     ends = [np.array([begin, end]) for begin, end in _within(spans, SHOWN)]
     return [Curve("negative", each, np.full(2, height)) for each in ends]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -45,13 +46,13 @@ class BoundPanel:
     """Of one joint, N·m over force [k]. own: base + per_force·f; friction: what stiction and jumps add on average.
 
     points [g]: what its innovation alone exceeds at the rate, with the friction taken off. rms: of the residual.
-    second: of the residual's bound, without friction.
+    others: of the bounds of the residual and of slow loads, by name, without friction.
     """
 
     joint: str
     force: Numbers
     own: Numbers
-    second: Numbers | None
+    others: Mapping[str, Numbers]
     at: Numbers
     friction: Numbers
     points: Numbers
@@ -131,7 +132,7 @@ def bound_figure(tuning: ContactTuning) -> BoundFigure:
     friction = np.array([added[cells.group == g].mean(axis=0) for g in range(cells.groups)])
     force = np.linspace(0.0, 1.1 * float(at.max()), 60)
     own = bound.own(force)
-    second = tuning.bounds_["residual"].own(force) if name == "innovation" else None
+    others = {each: found.own(force) for each, found in tuning.bounds_.items() if each != name}
     rms = np.array([each.rms for each in tuning.pretensions_])
     names = tuning.description_.joint_names
     chosen = np.sort(np.argsort(-own.mean(axis=0), kind="stable")[:JOINTS])
@@ -143,7 +144,7 @@ def bound_figure(tuning: ContactTuning) -> BoundFigure:
                 joint=names[j],
                 force=force,
                 own=own[:, j],
-                second=None if second is None else second[:, j],
+                others={each: values[:, j] for each, values in others.items()},
                 at=at,
                 friction=own_at(bound.base[j], bound.per_force[j], at) + friction[:, j],
                 points=levels[:, j],

@@ -9,6 +9,7 @@ from tendonfmu.plot_style import BLUE, DARK, GREEN, GREY, LIGHT, ORANGE, VERMILI
 from tendonfmu.tune_figures import BoundFigure, TailFigure, WorstFigure
 
 _TITLE, _LABEL, _LEGEND = 14.0, 12.5, 11.5  # pt
+_OTHERS = {"residual": ("threshold of the residual", (4, 2)), "drift": ("threshold of slow loads", (1, 1.5))}
 
 
 def draw_tail(data: TailFigure, target: Target) -> None:
@@ -81,15 +82,9 @@ def draw_bounds(data: BoundFigure, target: Target) -> None:
             label="the joint alone, at the wished rate",
         )
         axes.plot(panel.at, 1e3 * panel.rms, "x", color=DARK, markersize=8, label="rms of the residual")
-        if panel.second is not None:
-            axes.plot(
-                panel.force,
-                1e3 * panel.second,
-                color=GREY,
-                linewidth=1.5,
-                linestyle=(0, (4, 2)),
-                label="threshold of the residual",
-            )
+        for name, values in panel.others.items():
+            label, dashes = _OTHERS[name]
+            axes.plot(panel.force, 1e3 * values, color=GREY, linewidth=1.5, linestyle=(0, dashes), label=label)
         axes.set_title(panel.joint, loc="left", fontsize=_LABEL, color=DARK)
         axes.set_xlim(left=0.0)
         axes.set_ylim(bottom=0.0)

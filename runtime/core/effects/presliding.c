@@ -114,8 +114,9 @@ static void advance_slope(effect_place place, const double* values, const effect
     advance_member(values[0], distance, travel, sample, before + row, after);
     slope_after[row + SHARE] =
         law_exponential(fabs(travel) / distance) * slope_before[row + SHARE] + after[BY_MOTION] * slope;
-    slope_after[row + BY_DISPLACEMENT] = slope_after[row + BY_MOTION] = slope_after[row + KEPT] =
-        0.0; /* only the share */
+    for (size_t k = BY_DISPLACEMENT; k < MEMORY_ROWS; ++k) {
+      slope_after[row + k] = 0.0; /* only the share is read */
+    }
   }
 }
 
