@@ -90,8 +90,9 @@ def smallest_torque(tuning: ContactTuning) -> dict[str, list[float]]:
     bound, search = tuning.bounds_[name], tuning.searches_[name]
     whole = bound.own(tuning.cells_.force)
     whole = whole + bound.stuck_share * search.mean_stuck + bound.jump_share * search.mean_jump
-    slow = tuning.bounds_["drift"].own(tuning.cells_.force)
-    parts = {"median": (whole, 0.5), "nine_tenths": (whole, 0.9), "slow": (slow, 0.5)}
+    parts = {"median": (whole, 0.5), "nine_tenths": (whole, 0.9)}
+    if "drift" in tuning.bounds_:
+        parts["slow"] = tuning.bounds_["drift"].own(tuning.cells_.force), 0.5
     return {key: [float(value) for value in np.quantile(each, q, axis=0)] for key, (each, q) in parts.items()}
 
 

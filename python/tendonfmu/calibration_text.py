@@ -84,8 +84,10 @@ TORQUE_HEADINGS = ("sudden, half of the time", "sudden, 9 of 10 times", "over se
 def torque_rows(report: Report) -> list[Row]:
     """A row per joint: the smallest change that is reported (`TORQUE_HEADINGS`)."""
     smallest = report["detection"]["smallest_torque"]
-    columns = (smallest[key] for key in ("median", "nine_tenths", "slow"))
-    return [(name, *(mnm(value) for value in each)) for name, *each in zip(report["joints"], *columns, strict=True)]
+    joints = report["joints"]
+    columns = [[mnm(value) for value in smallest[key]] for key in ("median", "nine_tenths")]
+    slow = [mnm(value) for value in smallest["slow"]] if "slow" in smallest else ["not found"] * len(joints)
+    return list(zip(joints, *columns, slow, strict=True))
 
 
 def size_rows(report: Report) -> list[Row]:

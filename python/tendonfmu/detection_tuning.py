@@ -52,6 +52,9 @@ STUCK_TIME_PRESLIDING = 0.06  # s, where presliding says how friction turns over
 EVIDENCE_TIME = 0.02  # s, τ_e
 RELEASE = {"release_ratio": 1.0, "hold_time": 0.05}  # 1, s
 RELEASE_TIME = 2.0  # s
+LEAST_DRIFT = (
+    10.0  # min of free motion: 60 of the slow means that contact.drift compares with, not a few that a fit knows
+)
 START_SHARE = 1.0  # bias.start_share: all friction may stand either way before the start
 _STEP, _STEPS = 1.05, 12  # by which the level is raised, and how often, until the running finger keeps the rate
 _DIGITS = 6
@@ -86,7 +89,7 @@ class ContactTuning(ConstructorArguments):
     innovation_time, jump_time, stuck_time, evidence_time: s, written as such; stuck_time None: by whether it has
         presliding. progress: called with (steps done, all).
 
-    After `tune`: description_ (tuned), bias_, lines_, levels_, bounds_ (by "residual", "drift" and "innovation"),
+    After `tune`: description_ (tuned), bias_, lines_, levels_, bounds_ (by "residual", "innovation", "drift"),
     deviation_, cells_, runs_, pretensions_, rest_ (None: no rests), sensors_ (of sensor_fault), held_out_ (alarms, 1/h
     upper limit), loop_ (alarms of the finger as it runs), rate_ (1/h that it is tuned for), more_minutes_ (missing for
     the wished rate), allowed_, hours_, forces_ (N, the lowest and the highest recorded mean force), level_raised_,
@@ -244,15 +247,23 @@ class ContactTuning(ConstructorArguments):
             line = evidence_line(fast, line, [run.part for run in self.runs_], self.evidence_time)
         self._choose_drift(second)
         order, factor = self.cells_.order, above.factor
-        drift, drifted = self.lines_["drift"], self.levels_["drift"].factor
-        others = order[(behind.statistic > factor) | (drift.statistic > drifted)]
-        held = order[(behind.held > factor) | (drift.held > drifted)]
+        above_others, held_above = behind.statistic > factor, behind.held > factor
+        if "drift" in self.lines_:
+            drift, drifted = self.lines_["drift"], self.levels_["drift"].factor
+            above_others, held_above = above_others | (drift.statistic > drifted), held_above | (drift.held > drifted)
+        others, held = order[above_others], order[held_above]
         self.lines_["innovation"] = line
         self.levels_["innovation"] = level_of(line, self.cells_, self.allowed_, others, held)
         self.searches_["innovation"] = fast
 
     def _choose_drift(self, allowed: int) -> None:
         """The line of `contact.drift`: slow loads, for which friction's jumps and stiction are no excuse."""
+        if 60.0 * self.hours_ < LEAST_DRIFT:
+            self.warnings_.append(
+                f"contact.drift is left out, so slow loads are not found: {60 * self.hours_:.1f} min of free motion; "
+                f"expected {LEAST_DRIFT:g} or more"
+            )
+            return
         slow = search_for(self.runs_, self.cells_, "drift", self.rate_)
         self.lines_["drift"] = line = given_line(slow, [(0.0, 0.0)] * 3, allowed)
         self.levels_["drift"] = level_of(line, self.cells_, allowed)
@@ -313,6 +324,7 @@ class ContactTuning(ConstructorArguments):
                 "jump_share": fast.jump_share,
                 "jump_time": self.jump_time,
             }
+        if "drift" in self.bounds_:
             drift = self.bounds_["drift"]
             contact["drift"] = {"threshold": _rounded(drift.base), "threshold_per_force": _rounded(drift.per_force)}
         contact |= {
