@@ -170,7 +170,8 @@ def test_a_portable_library_keeps_its_promises(binaries: Path, platform: str) ->
     for contents in found:
         assert portable.findings(contents) == []
         assert len(contents.exports - portable.LINKER_MARKS) == 44  # all functions of FMI 2.0 for co-simulation
-    assert library.stat().st_size < 350_000 * len(found)
+    # Our own code is 250 to 390 kB of it; a C library or an exception runtime linked in by mistake would double it.
+    assert library.stat().st_size < 500_000 * len(found)
 
 
 @pytest.mark.long
