@@ -45,11 +45,21 @@ class Grams:
     """Products of a target, of the nominal model's columns and of candidates', by fold."""
 
     def __init__(
-        self, folds: Folds, target: Numbers, nominal: Array, values: Array, splines: Splines, scale: Numbers
+        self,
+        folds: Folds,
+        target: Numbers,
+        nominal: Array,
+        values: Array,
+        splines: Splines,
+        scale: Numbers,
+        judged: NDArray[np.bool_] | None = None,
     ) -> None:
         """target: [B, n] N·m. nominal: [B, n, u], values: [B, n, c]: derivatives. splines: [B, s] of the slow bias.
         scale: [u] how far each nominal number may be expected to move: a ridge that decides where the data do not.
+        judged: [f] folds whose errors count, all by default; the others are only learned from.
         """
+        self._judged = np.ones(folds.folds, dtype=bool) if judged is None else judged
+        self._counted = np.unique(folds.stretch[self._judged[folds.fold]])  # stretches
         self.folds, self.nominal_count, self.count = folds, nominal.shape[2], values.shape[2]
         rows, joints = folds.rows, target.shape[1]
         span = self._span = Span(splines[rows])
@@ -106,7 +116,7 @@ class Grams:
     @property
     def without(self) -> float:
         """Σ e² on held-out folds, (N·m)², of the nominal model refitted, without any candidate."""
-        return float(sum(each.own_square for each in self._by_fold))
+        return float(sum(each.own_square for each, counts in zip(self._by_fold, self._judged, strict=True) if counts))
 
     def surviving(self, mix: Numbers) -> float:
         """Share of the variance of a combination of candidates [c, d] that the refit leaves: of its best direction."""
@@ -141,29 +151,66 @@ class Grams:
         left, found = 0.0, []
         used = np.flatnonzero(mix.any(axis=1))
         part = mix[used]
-        for each in self._by_fold:
+        for each, counts in zip(self._by_fold, self._judged, strict=True):
             energy, own = (part.T @ matrix[np.ix_(used, used)] @ part for matrix in (each.energy, each.own_energy))
             theta = bounded(energy, part.T @ each.score[used], low, high)
-            left += each.own_square - 2.0 * float(theta @ (part.T @ each.own_score[used])) + float(theta @ own @ theta)
+            gain = 2.0 * float(theta @ (part.T @ each.own_score[used])) - float(theta @ own @ theta)
+            left += (each.own_square - gain) if counts else 0.0
             found.append(theta)
         return left, np.array(found)
 
     def by_stretch(self, mix: Numbers | None, magnitudes: Numbers | None) -> Numbers:
-        """[stretches] Σ e² on unseen samples. mix: [c, d], magnitudes: [f, d], as `error` gives them; None: without."""
-        u = self.nominal_count
+        """[stretches that count] Σ e² on unseen samples. mix: [c, d], magnitudes: [f, d], as `error` gives them; None:
+        without."""
         found = np.zeros(self.folds.stretches)
-        for number, each in enumerate(self._by_fold):
-            rows = self.folds.fold == number
-            change = np.zeros(u + self.count)
-            change[:u] = each.refit[:, -1]
-            if mix is not None and magnitudes is not None:
-                added = mix @ magnitudes[number]
-                change[u:] = added
-                change[:u] -= each.refit[:, :-1] @ added
-            used = np.flatnonzero(change)
-            left = self._target[rows] - self._table[rows][:, :, used] @ change[used]
-            found += np.bincount(self.folds.stretch[rows], np.sum(left**2, axis=1), minlength=self.folds.stretches)
-        return found
+        for number, counts in enumerate(self._judged):
+            if counts:
+                rows, left = self._unseen(number, mix, magnitudes)
+                found += np.bincount(self.folds.stretch[rows], np.sum(left**2, axis=1), minlength=self.folds.stretches)
+        return np.asarray(found[self._counted])
+
+    def _unseen(
+        self, number: int, mix: Numbers | None, magnitudes: Numbers | None
+    ) -> tuple[NDArray[np.bool_], Numbers]:
+        """Rows of a fold, and [r, n] N·m that the model learned without it leaves there."""
+        u, each = self.nominal_count, self._by_fold[number]
+        rows = self.folds.fold == number
+        change = np.zeros(u + self.count)
+        change[:u] = each.refit[:, -1]
+        if mix is not None and magnitudes is not None:
+            added = mix @ magnitudes[number]
+            change[u:] = added
+            change[:u] -= each.refit[:, :-1] @ added
+        used = np.flatnonzero(change)
+        return rows, np.asarray(self._target[rows] - self._table[rows][:, :, used] @ change[used])
+
+    def scores(self, mix: Numbers, magnitudes: Numbers) -> tuple[Numbers, Numbers]:
+        """Energy [d, d] of a combination of candidates [c, d], what refitting can mend taken off, and its product
+        with the unseen residual of each stretch [stretches, d]: the parts of a sandwich (cluster-robust) covariance."""
+        u, used = self.nominal_count, np.flatnonzero(mix.any(axis=1))
+        part = mix[used]
+        nominal = self._whole.refit[:, used] @ part
+        found = np.zeros((self.folds.stretches, mix.shape[1]))
+        for number in range(self.folds.folds):
+            rows, left = self._unseen(number, mix, magnitudes)
+            table = self._table[rows]
+            own = table[:, :, u + used] @ part - table[:, :, :u] @ nominal
+            np.add.at(found, self.folds.stretch[rows], np.einsum("rnd,rn->rd", own, left))
+        return part.T @ self._whole.energy[np.ix_(used, used)] @ part, found
+
+    def left(self) -> tuple[Numbers, Numbers]:
+        """[stretches, n] Σ e² of each joint on unseen samples, (N·m)², without any candidate, and [stretches] rows: of
+        all stretches, whether they count or not."""
+        found = np.zeros((self.folds.stretches, self._target.shape[1]))
+        for number in range(self.folds.folds):
+            rows, left = self._unseen(number, None, None)
+            np.add.at(found, self.folds.stretch[rows], left**2)
+        return found, np.bincount(self.folds.stretch, minlength=self.folds.stretches).astype(np.float64)
+
+    @property
+    def refitted(self) -> Numbers:
+        """[u] what refitting on everything adds to the nominal numbers, without any candidate."""
+        return np.asarray(self._whole.refit[:, -1])
 
     def errors_of(self, targets: Numbers) -> Numbers:
         """[K] Σ e² on held-out folds, (N·m)², of other targets [B, n, K], the nominal numbers refitted to each."""

@@ -30,6 +30,14 @@ def diagnose(
             "\\[default: parts of the recordings]",
         ),
     ] = None,
+    reference: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="RECORDING",
+            help="of the same finger when it was well: says what has changed since, instead of what the model lacks; "
+            "another motion, pretension or length will do, the same motion tells most",
+        ),
+    ] = None,
     kinematics: Kinematics = 1,
     least_gain: LeastGain = 0.03,
     seed: Seed = 0,
@@ -38,7 +46,8 @@ def diagnose(
 ) -> None:
     """Show what the model gets wrong, name the cause, extend the model by it and measure the gain.
 
-    The given structure is fitted first: a cause is what that cannot mend. DIR gets the page diagnosis.html,
+    The given structure is fitted first: a cause is what that cannot mend. With --reference a cause is what has changed
+    since; several recordings of now, in order of time, show how it grows. DIR gets the page diagnosis.html,
     diagnosis.json, figures, and the model with its causes, extended.json and extended.fmu.
     """
     from tendonfmu.diagnosis import diagnose as find
@@ -48,9 +57,10 @@ def diagnose(
 
     if not 0.0 <= least_gain <= 0.5:  # NaN passes the range
         raise InputError(f"--least-gain {least_gain:g}: expected 0 to 0.5")
-    tests = test or []
-    check_folder(output, [finger, *recordings, *tests])
+    tests, before = test or [], reference or []
+    check_folder(output, [finger, *recordings, *tests, *before])
     check_given_once(recordings, tests, "a test")
+    check_given_once([*recordings, *tests], before, "the reference")
     with PhaseDisplay(progress) as display:
         found = find(
             finger,
@@ -60,6 +70,7 @@ def diagnose(
             least_gain=least_gain,
             seed=seed,
             jobs=jobs,
+            reference=before or None,
             progress=display,
         )
         display.note("writing the files")

@@ -23,6 +23,9 @@ from tendonfmu.block_grams import standard_error
 from tendonfmu.cause_gains import Verified, verify
 from tendonfmu.cause_search import residual_alone, series_of
 from tendonfmu.cause_selection import CERTAIN, LEAST_SHARE
+from tendonfmu.change_check import check_sides
+from tendonfmu.change_diagnosis import PHASES as CHANGE_PHASES
+from tendonfmu.change_diagnosis import ChangeCase, find_changes
 from tendonfmu.contact_gain import detection_gain
 from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.diagnosis_evidence import evidence
@@ -85,18 +88,28 @@ def diagnose(
     seed: int = 0,
     jobs: int = 1,
     checked: bool = False,
+    reference: Sequence[Source] | None = None,
     progress: Callable[[PhaseState], None] | None = None,
 ) -> Diagnosis:
-    """Finds what a description lacks.
+    """Finds what a description lacks; with reference recordings, what has changed since them.
 
     finger: description, or its file. recordings: of contact-free motion; samples labelled contact are left out. tests:
     recordings that the gain is measured on. Without them that is every fifth stretch of 10 s of `recordings`, that the
     numbers are not fitted to, and causes are judged on up to eight parts of all of it, held out in turn. kinematics:
     source, 1 to 3. least_gain: share of what is left of the rms that a cause has to take away, 0 to 0.5. jobs: threads
     of the fits. checked: the recordings were held against the finger, and what is to be said of them was said.
+    reference: recordings of the same finger when it was well, another motion or the same; `recordings` and `tests` are
+    then those of now, several in order of time.
     progress: called with what is being done. Raises InputError where a file or an option is at fault.
     """
     begun = perf_counter()
+    if reference is not None:
+        phases = Phases(CHANGE_PHASES, progress or (lambda state: None))
+        with threadpool_limits(limits=max(jobs, 1)):
+            changed = change_case(finger, recordings, reference, tests, kinematics, least_gain, checked)
+            with own_fault("diagnosis"):
+                different = find_changes(changed, least_gain=least_gain, seed=seed, jobs=jobs, phases=phases)
+                return replace(different, seconds=perf_counter() - begun)
     phases = Phases(PHASES, progress or (lambda state: None))
     with threadpool_limits(limits=max(jobs, 1)):
         case = _case(finger, recordings, tests, kinematics, least_gain, checked)
@@ -160,6 +173,24 @@ def _case(
 
 def _read(source: Source) -> Recording:
     return source if isinstance(source, Recording) else read_recording(source)
+
+
+def change_case(
+    finger: Finger,
+    now: Sequence[Source],
+    reference: Sequence[Source],
+    tests: Sequence[Source],
+    kinematics: int,
+    least_gain: float,
+    checked: bool,
+) -> ChangeCase:
+    """The recordings of now and of the reference, checked: by themselves, and against each other."""
+    own = _case(finger, now, tests, kinematics, least_gain, checked)
+    before = _case(own.finger, reference, [], kinematics, least_gain, checked)
+    then = before.whole
+    warnings = [*own.warnings, *(each for each in before.warnings if each not in own.warnings)]
+    warnings += check_sides(own.finger, then, [*own.training, *own.tests])
+    return ChangeCase(own.finger, then, own.training, own.tests, tuple(warnings))
 
 
 # --- what is reported -------------------------------------------------------------------------------------------------

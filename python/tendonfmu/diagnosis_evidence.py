@@ -16,7 +16,7 @@ Flags = NDArray[np.bool_]
 
 BINS = 24
 SHOWN = 4.0  # squared means of the bins, without the cause over with it
-_FEWEST = 10  # blocks of a bin
+FEWEST = 10  # blocks of a bin
 
 
 def evidence(
@@ -30,7 +30,7 @@ def evidence(
     change = np.sum((before - after)[series.used] ** 2, axis=0)
     joint = int(np.argmax(change))
     pair = (before[:, joint], after[:, joint])
-    own = _binned(*_coordinate(_nearest(places, joint), candidate.coordinate, series, joint), series, pair, joint)
+    own = _binned(*coordinate_of(_nearest(places, joint), candidate.coordinate, series, joint), series, pair, joint)
     if own and _shown(own[0]):
         return own
     added = (f"torque of this cause at joint {joint + 1}", "N·m", (before - after)[:, joint])
@@ -52,18 +52,18 @@ def _binned(
 ) -> tuple[Evidence, ...]:
     """Over bins of equal count; nothing where there are too few blocks. values: [B]. pair: [B] without and with."""
     kept = series.used & np.isfinite(values)
-    bins = min(BINS, int(kept.sum()) // _FEWEST)
+    bins = min(BINS, int(kept.sum()) // FEWEST)
     if bins < 2:
         return ()
     order = np.flatnonzero(kept)[np.argsort(values[kept], kind="stable")]
     parts = np.array_split(order, bins)
     before, after = (np.array([each[rows].mean() for rows in parts]) for each in pair)
-    before_std, after_std = (_standard_errors(each, parts, series) for each in pair)
+    before_std, after_std = (standard_errors(each, parts, series) for each in pair)
     coordinate = np.array([values[rows].mean() for rows in parts])
     return (Evidence(joint + 1, label, unit, coordinate, before, after, before_std, after_std),)
 
 
-def _standard_errors(values: Numbers, parts: list[NDArray[np.int64]], series: Series) -> Numbers:
+def standard_errors(values: Numbers, parts: list[NDArray[np.int64]], series: Series) -> Numbers:
     """Of the means; neighbouring blocks of time are not independent, so whole seconds count as one."""
     second = np.floor(series.time).astype(np.int64) + 1_000_000 * series.recording
     found = []
@@ -74,7 +74,7 @@ def _standard_errors(values: Numbers, parts: list[NDArray[np.int64]], series: Se
     return np.array(found)
 
 
-def _coordinate(place: Place, kind: str, series: Series, joint: int) -> tuple[str, str, Numbers]:
+def coordinate_of(place: Place, kind: str, series: Series, joint: int) -> tuple[str, str, Numbers]:
     """Label, unit, [B] values."""
     own = joint if place.joint is None else place.joint - 1
     tendon = None if place.tendon is None else place.tendon - 1

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.diagnosis_result import Cause, Diagnosis, Evidence, ResidualView
 from tendonfmu.diagnosis_text import Names, at_place, names_of, unit_of
+from tendonfmu.diagnosis_words import words_of
 from tendonfmu.fit_sheet import Band, Bars, Curve, Dots, Panel, Sheet
 
 Numbers = NDArray[np.float64]
@@ -26,7 +27,14 @@ _TITLES = {
     "autocorrelation": "Autocorrelation",
 }
 _BINNED = ("angle", "velocity", "tendon_force", "load", "travel")
-_BEFORE_AFTER = (("before", "nominal model, refitted"), ("after", "extended model"))
+_STYLES = ("before", "after")
+_CAUSE_KEYS = (("before_dots", "without it"), ("after_dots", "with it"), ("after", "95 % interval of the mean"))
+_CHANGE_KEYS = (
+    ("reference_dots", "then, in the reference"),
+    ("before_dots", "now"),
+    ("after_dots", "now, with the change in the model"),
+    ("after", "95 % interval of the mean"),
+)
 _ROOM = 3.0  # times the largest mean: more of the scatter within bins would hide the means
 
 
@@ -50,17 +58,19 @@ def _cause_sheet(found: Diagnosis, names: Names, number: int, cause: Cause) -> S
         name=f"cause_{number}",
         title=f"{number}. {at_place(cause.title[:1].upper() + cause.title[1:], cause.where, names)}",
         caption="",
-        keys=(("before_dots", "without it"), ("after_dots", "with it"), ("after", "95 % interval of the mean")),
+        keys=_CHANGE_KEYS if cause.changed else _CAUSE_KEYS,
         panels=_same_scale(panels),
     )
 
 
 def _evidence_panel(found: Evidence, names: Names, factor: float, unit: str) -> Panel:
-    shown = (("before", found.before, found.before_std), ("after", found.after, found.after_std))
+    shown = [("before", found.before, found.before_std), ("after", found.after, found.after_std)]
+    if found.reference is not None and found.reference_std is not None:
+        shown.append(("reference", found.reference, found.reference_std))
     x, x_unit = (factor * found.coordinate, unit) if found.unit == "N·m" else (found.coordinate, found.unit)
     return Panel(
         title=f"Residual at {names.joint(found.joint)}",
-        alt=f"Mean residual at {names.joint(found.joint)} over {found.label}, without and with this cause in the model",
+        alt=f"Mean residual at {names.joint(found.joint)} over {found.label}, without and with this in the model",
         x_label=f"{found.label} ({x_unit})",
         y_label=f"residual ({unit})",
         curves=tuple(Curve(f"{style}_line", x, factor * mean) for style, mean, _ in shown),
@@ -118,11 +128,16 @@ def _joint_sheet(found: Diagnosis, names: Names, joint: int, views: Sequence[Res
         title=f"Residual at {names.joint(joint)}",
         caption="",
         keys=(
-            *(_BEFORE_AFTER if found.causes else _BEFORE_AFTER[:1]),
-            ("before_scatter", "scatter within a bin, nominal"),
+            *(_before_after(found) if found.causes else _before_after(found)[:1]),
+            ("before_scatter", f"scatter within a bin, {words_of(found.kind).nominal}"),
         ),
         panels=tuple(_view_panel(view, names, factor, unit, limits) for view in views),
     )
+
+
+def _before_after(found: Diagnosis) -> tuple[tuple[str, str], ...]:
+    words = words_of(found.kind)
+    return ("before", words.refitted), ("after", words.extended)
 
 
 def _shared_limits(views: Sequence[ResidualView], factor: float) -> tuple[float, float] | None:
@@ -172,7 +187,7 @@ def _spectrum(panel: Panel, view: ResidualView, factor: float, unit: str) -> Pan
 
 
 def _curves(view: ResidualView, factor: float) -> tuple[Curve, ...]:
-    return tuple(Curve(style, view.x, factor * getattr(view, style)) for style, _ in _BEFORE_AFTER)
+    return tuple(Curve(style, view.x, factor * getattr(view, style)) for style in _STYLES)
 
 
 def _least(view: ResidualView) -> float:

@@ -18,6 +18,7 @@ from tendonfmu.diagnosis_size import count_of, size_at
 from tendonfmu.diagnosis_text import (
     Names,
     at_place,
+    change_rows,
     confusion_sentence,
     error_rows,
     error_sentence,
@@ -40,6 +41,7 @@ from tendonfmu.diagnosis_text import (
     unseen,
 )
 from tendonfmu.diagnosis_waterfall import waterfall_of
+from tendonfmu.diagnosis_words import words_of
 from tendonfmu.effects.friction_law_places import thresholds
 from tendonfmu.fit_page import keys_of, render
 from tendonfmu.fit_sheet import Panel, Sheet
@@ -91,6 +93,7 @@ def diagnosis_page(found: Diagnosis) -> str:
     return render(
         "diagnosis.html.jinja",
         found=found,
+        words=words_of(found.kind),
         unit=unit,
         first=_first_screen(found, names),
         fall=waterfall_of(found, names),
@@ -140,11 +143,15 @@ def _first_screen(found: Diagnosis, names: Names) -> dict[str, Any]:
 
 
 def _tiles(found: Diagnosis) -> Iterator[Tile]:
-    factor, unit = unit_of(found)
+    words, (factor, unit) = words_of(found.kind), unit_of(found)
     before, after = (rounded(factor * together(each.test_rms)) for each in (found.nominal, found.extended))
     data = "held-out parts" if found.held_out else "unseen data"
     if found.causes:
-        yield Tile(f"{before} → {after}", unit, f"error on {data}, all joints, with the nominal and the extended model")
+        yield Tile(
+            f"{before} → {after}",
+            unit,
+            f"error on {data}, all joints, with the {words.nominal} and the {words.extended}",
+        )
         low, high = percent(found.gain.low).split("\u00a0")[0], percent(found.gain.high)
         yield Tile(percent(found.gain.value), "", f"less error, 95 % interval {low} to {high}")
     else:
@@ -152,7 +159,7 @@ def _tiles(found: Diagnosis) -> Iterator[Tile]:
     if left := left_of(found):
         yield Tile(left.told(left.noise), unit, "of what is left is noise: nothing that was recorded predicts it")
         if left.nameless > 0.0:
-            yield Tile(left.told(left.nameless), unit, "of what is left can be predicted, but has no name")
+            yield Tile(left.told(left.nameless), unit, f"of what is left {words.no_name}")
 
 
 def _untold(found: Diagnosis, names: Names) -> Iterator[str]:
@@ -193,7 +200,11 @@ def _card(found: Diagnosis, cause: Cause, names: Names) -> dict[str, Any]:
         UNKNOWN: "less error if what can be predicted were known",
     }
     others = "" if len(found.causes) < 2 else "; the other causes kept"
-    own = f"less error in means of 10 ms, the slow bias taken off{others}"  # the tiles and the waterfall show r itself
+    own = f"less error in means of 10 ms, the slow bias taken off{others}"
+    if found.kind == "change":
+        others = others.replace("causes", "changes")
+        own = f"less of what is left of the new recordings beside what is wrong in both{others}"
+    # the tiles and the waterfall show r itself
     numbers = thresholds(found.extended_data)
     sizes = [size_at(where, each.parameters, numbers) for each in cause.places]
     return {
@@ -208,6 +219,7 @@ def _card(found: Diagnosis, cause: Cause, names: Names) -> dict[str, Any]:
         "confusion": confusion_sentence(cause, names),
         "places": place_rows(cause, names, sizes) if cause.parameters else [],
         "parameters": parameter_rows(cause.parameters),
+        "sizes": change_rows(cause, found.recordings),
     }
 
 
@@ -266,14 +278,12 @@ def _detection(found: DetectionGain, factor: float, unit: str) -> dict[str, Any]
 
 def _method(found: Diagnosis) -> Iterator[str]:
     """In sentences, with the numbers that count."""
-    yield (
-        "The given model was fitted first; a cause is what that cannot mend. Every effect, at every place where the "
-        f"model lacks it, was then tried. A cause has to take away at least {percent(found.least_gain)} of the error "
-        "that is left without it, on data that it was not fitted to, and its 95 % interval has to lie above 0."
-    )
+    yield words_of(found.kind).method.format(least=percent(found.least_gain))
     yield f"The numbers were estimated from {found.signals}; errors and gains are those of the raw signals."
     if text := tested_sentence(found):
         yield text
+    if found.repeated:
+        yield f"{count_of(found.repeated, 'motion')} of the reference, made again, were compared sample by sample."
     yield f"The gain was measured on {unseen(found)}, by running both models. Seed {found.seed}."
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.diagnosis_result import (
     Cause,
+    ChangedSize,
     DetectionGain,
     Diagnosis,
     Event,
@@ -23,6 +24,7 @@ from tendonfmu.diagnosis_result import (
     Where,
 )
 from tendonfmu.diagnosis_text import at_place, names_of
+from tendonfmu.diagnosis_words import words_of
 from tendonfmu.finite_numbers import finite
 from tendonfmu.reported_causes import reported_causes
 
@@ -35,7 +37,7 @@ def build_report(found: Diagnosis, files: Sequence[str] = ()) -> dict[str, Any]:
     """The whole report: the contract's keys first. files: names of what stands beside it."""
     report = {
         "format": FORMAT,
-        "kind": "model",
+        "kind": found.kind,
         "verdict": found.verdict,
         "nominal": {
             "train_rms": found.nominal.train_rms,
@@ -51,8 +53,8 @@ def build_report(found: Diagnosis, files: Sequence[str] = ()) -> dict[str, Any]:
         },
         "noise_floor": found.noise_floor,
         "gain": _gain(found.gain),
-        "causes": [_cause(cause) for cause in reported_causes(found)],
-        "too_small": [_cause(cause) for cause in found.too_small],
+        "causes": [_cause(cause, found.kind) for cause in reported_causes(found)],
+        "too_small": [_cause(cause, found.kind) for cause in found.too_small],
         "unexplained": {
             "share": found.unexplained.share,
             "description": found.unexplained.description,
@@ -66,6 +68,8 @@ def build_report(found: Diagnosis, files: Sequence[str] = ()) -> dict[str, Any]:
         "finger": found.finger,
         "joints": [joint.get("name") for joint in found.nominal_data["joints"]],
         "tendons": [tendon.get("name") for tendon in found.nominal_data["tendons"]],
+        "references": found.references,
+        "repeated": found.repeated,
         "recordings": found.recordings,
         "tests": found.tests,
         "held_out": found.held_out,
@@ -116,18 +120,34 @@ def _where(where: Where) -> dict[str, Any]:
     return {"effect": where.effect, "joint": where.joint, "tendon": where.tendon}
 
 
-def _cause(cause: Cause) -> dict[str, Any]:
+def _cause(cause: Cause, kind: str) -> dict[str, Any]:
     return {
         **_where(cause.where),
         "p_value": cause.p_value,
         "gain": _gain(cause.gain),
         "confusable_with": [_where(other) for other in cause.confusable_with],
         **_numbers_of(cause.parameters),
+        **(_changed(cause.changed) if kind == "change" else {}),
         "places": [_place(each) for each in cause.places],
         "size": cause.size,
         "title": cause.title,
         "explanation": cause.explanation,
         "evidence": [_evidence(each) for each in cause.evidence],
+    }
+
+
+def _changed(found: ChangedSize | None) -> dict[str, Any]:
+    """reference, now: the main number then and now; null of what has none, such as contact."""
+    if found is None:
+        return {"reference": None, "now": None}
+    return {
+        "number": found.number,
+        "unit": found.unit,
+        "reference": found.reference.value,
+        "now": found.now.value,
+        "now_interval": [found.now.low, found.now.high],
+        "change": {"value": found.change.value, "interval": [found.change.low, found.change.high]},
+        "by_recording": [_gain(each) for each in found.by],
     }
 
 
@@ -145,7 +165,7 @@ def _numbers_of(parameters: Mapping[str, tuple[float, str]]) -> dict[str, Any]:
 def _waterfall(found: Diagnosis) -> list[dict[str, Any]]:
     """rms over all joints on unseen data: of the nominal model, then after each cause."""
     names = names_of(found)
-    steps = [("nominal model", Where("", None, None))]
+    steps = [(words_of(found.kind).nominal, Where("", None, None))]
     steps += [(at_place(cause.title, cause.where, names), cause.where) for cause in found.causes]
     return [
         {"label": label, "effect": where.effect or None, "joint": where.joint, "tendon": where.tendon, "rms": rms}
@@ -154,7 +174,8 @@ def _waterfall(found: Diagnosis) -> list[dict[str, Any]]:
 
 
 def _evidence(found: Evidence) -> dict[str, Any]:
-    names = ("coordinate", "before", "after", "before_std", "after_std")
+    names = ["coordinate", "before", "after", "before_std", "after_std"]
+    names += ["reference", "reference_std"] if found.reference is not None else []
     curves = {name: _numbers(getattr(found, name)) for name in names}
     return {"joint": found.joint, "label": found.label, "unit": found.unit, **curves}
 

@@ -38,6 +38,7 @@ class Evidence:
 
     joint: from 1, whose residual it is. label, unit: of the coordinate. coordinate: [K] centres of bins of equal
     count. before, after: [K] mean residual, N·m; before_std, after_std: [K] standard error of that mean, N·m.
+    reference, reference_std: [K] of the reference, where it is a change that is shown; NaN where it has not been.
     """
 
     joint: int
@@ -48,6 +49,8 @@ class Evidence:
     after: Numbers
     before_std: Numbers
     after_std: Numbers
+    reference: Numbers | None = None
+    reference_std: Numbers | None = None
 
 
 @dataclass(frozen=True)
@@ -60,13 +63,29 @@ class FoundPlace:
 
 
 @dataclass(frozen=True)
+class ChangedSize:
+    """How large a cause was in the reference, and is now. number: what is told, such as "coulomb"; unit: of both.
+
+    A term that the description lacks is 0 in the reference: what is the same in both recordings is no change. by: its
+    size in each of the new recordings, in their order, where there are several.
+    """
+
+    number: str
+    unit: str
+    reference: Interval
+    now: Interval
+    change: Interval
+    by: tuple[Interval, ...] = ()
+
+
+@dataclass(frozen=True)
 class Cause:
     """An effect that was found, at one place or several.
 
     p_value: family-wise, over all effects and places that were tested. gain: of this cause alone on unseen data,
     1 − rms with / rms without, the other causes kept. confusable_with: what the data cannot tell from it.
     parameters: its numbers in the extended description by path, with units as (value, unit); of all places.
-    size: in plain words with physical units.
+    size: in plain words with physical units. changed: then and now, of a change.
     """
 
     where: Where
@@ -79,6 +98,7 @@ class Cause:
     size: str
     places: tuple[FoundPlace, ...] = ()
     evidence: tuple[Evidence, ...] = ()
+    changed: ChangedSize | None = None
 
 
 @dataclass(frozen=True)
@@ -192,6 +212,9 @@ class Diagnosis:
     order of `causes`. gain: over all joints on the test data; held_out: whether those are parts of the training
     recordings. too_small: seen for certain, but not material, or not on unseen data. event_gain: what leaving `events`
     out takes away from the rms on the training recordings; None without events. smoothing: what `signals` says.
+    kind: "model", what the model lacks, or "change", what is different from the reference recordings
+    `references`; nominal is then the model of the reference, one set of numbers for both. repeated: motions of the
+    reference that were made again exactly.
     """
 
     finger: str
@@ -225,3 +248,6 @@ class Diagnosis:
     tested: int = 0  # effects at places
     event_gain: Interval | None = None
     smoothing: Signals = field(default_factory=Signals)
+    kind: str = "model"
+    references: tuple[str, ...] = ()
+    repeated: int = 0

@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from tendonfmu.diagnosis_result import Cause, Diagnosis, FoundPlace, Interval, Invisible, Where
+from tendonfmu.diagnosis_size import quantity
+from tendonfmu.diagnosis_words import words_of
 from tendonfmu.fit_summary import rounded
 from tendonfmu.reported_causes import CONTACT, TITLES, reported_causes
 
@@ -121,37 +124,16 @@ def magnitude(value: float, unit: str) -> str:
 # --- sentences --------------------------------------------------------------------------------------------------------
 
 
-_HEADLINES = {  # with no cause, one, several
-    "adequate": (
-        "The model is adequate: these data show nothing that it lacks.",
-        "The model is adequate: one cause was found, but what it explains hardly matters.",
-        "The model is adequate: {many} were found, but what they explain hardly matters.",
-    ),
-    "explained": (
-        "The model is adequate: these data show nothing that it lacks.",
-        "One cause explains what the model gets wrong.",
-        "{Many} together explain what the model gets wrong.",
-    ),
-    "partly explained": (
-        "The model gets something wrong, and no effect that is known explains it.",
-        "One cause explains part of what the model gets wrong.",
-        "{Many} together explain part of what the model gets wrong.",
-    ),
-    "unexplained": (
-        "The model gets something wrong, and no effect that is known explains it.",
-        "One cause was found, but it explains little of what the model gets wrong.",
-        "{Many} were found, but they explain little of what the model gets wrong.",
-    ),
-}
-
-
 def headline(found: Diagnosis) -> str:
     """The verdict, in one sentence; a second one where something touches the finger."""
     count = len(found.causes)
-    many = f"{_NUMBERS[count] if count < len(_NUMBERS) else count} causes"
-    text = _HEADLINES[found.verdict][min(count, 2)].format(Many=many, many=many.lower())
+    what = "changes" if found.kind == "change" else "causes"
+    many = f"{_NUMBERS[count] if count < len(_NUMBERS) else count} {what}"
+    text = words_of(found.kind).headlines[found.verdict][min(count, 2)].format(Many=many, many=many.lower())
     if count == 1:
-        text = f"{text[:-1]}: {at_place(found.causes[0].title, found.causes[0].where, names_of(found))}."
+        cause = found.causes[0]
+        size = f", {cause.size}" if cause.changed else ""
+        text = f"{text[:-1]}: {at_place(cause.title, cause.where, names_of(found))}{size}."
     for cause in reported_causes(found):
         if cause.where.effect == CONTACT:
             text += f" In some stretches {cause.title}: they were left out ({cause.size})."
@@ -165,11 +147,12 @@ def error_sentence(found: Diagnosis) -> str:
     where = unseen(found)
     if found.causes:
         text = (
-            f"On {where} the error falls from {rounded(factor * nominal)} to {rounded(factor * extended)} {unit} rms, "
+            f"On {where} the error{words_of(found.kind).error} falls from {rounded(factor * nominal)} to "
+            f"{rounded(factor * extended)} {unit} rms, "
             f"by {percent_interval(found.gain)}"
         )
     else:
-        text = f"On {where} the error is {rounded(factor * nominal)} {unit} rms"
+        text = f"On {where} the error{words_of(found.kind).error} is {rounded(factor * nominal)} {unit} rms"
     bias = together(found.bias_only_rms)
     if math.isfinite(bias):
         text += f"; without any friction model it would be {rounded(factor * bias)}"
@@ -211,9 +194,9 @@ def left_sentence(found: Diagnosis) -> str:
     whole = f"{left.told(left.whole)} {unit} are left"
     if left.nameless <= 0.0:
         return f"{whole}. Nothing that was recorded predicts any of it: to these sensors it is noise."
-    little = "" if found.unexplained.unknown else ", and is too little to matter"
+    little = "" if found.unexplained.unknown or found.kind == "change" else ", and is too little to matter"
     return (
-        f"{whole}. {left.told(left.nameless)} of it can be predicted from what was recorded, but has no name{little}; "
+        f"{whole}. {left.told(left.nameless)} of it {words_of(found.kind).no_name}{little}; "
         f"the rest, {left.told(left.noise)}, is noise to these sensors."
     )
 
@@ -226,10 +209,7 @@ def unknown_sentence(found: Diagnosis) -> str:
 
 def too_small_sentence(found: Diagnosis) -> str:
     """What stands in the list of what is too small."""
-    return (
-        f"Seen in these recordings, but on unseen data each of them takes away less than {percent(found.least_gain)} "
-        "of the error, or not for certain. They are not in the extended model."
-    )
+    return words_of(found.kind).small.format(least=percent(found.least_gain))
 
 
 def unseen(found: Diagnosis) -> str:
@@ -288,7 +268,8 @@ def hidden_sentences(found: Diagnosis, names: Names) -> Iterator[str]:
     effects = hidden(found, names)
     if len(effects) > _TOLD:
         listed = "; ".join(f"{each.title} ({each.places})" if each.places else each.title for each in effects)
-        yield f"{len(effects)} effects are not visible in these data, since refitting absorbs them: {listed}."
+        absorbs = "what is shared with the reference" if found.kind == "change" else "refitting"
+        yield f"{len(effects)} effects are not visible in these data, since {absorbs} absorbs them: {listed}."
         return
     for each in effects:
         place = f", at {each.places}" if each.places else ""
@@ -305,6 +286,8 @@ def hidden_sentences(found: Diagnosis, names: Names) -> Iterator[str]:
 def next_sentence(found: Diagnosis) -> str:
     """What to record next."""
     sentence = found.experiment.sentence.rstrip(".")
+    if found.kind == "change" and not sentence:
+        return "No further recording is needed: nothing is left to be told apart."
     return f"{sentence}." if sentence else "No further experiment is needed: nothing is left to be told apart."
 
 
@@ -315,7 +298,8 @@ def tables(found: Diagnosis) -> Iterator[tuple[str, Row, list[Row]]]:
     """(title, headings, rows) of the causes and of the errors by joint."""
     names, causes = names_of(found), reported_causes(found)
     if causes:
-        headings: Row = ("cause", "place", "size", "gain", "may also be")
+        first = "change" if found.kind == "change" else "cause"
+        headings: Row = (first, "place", "size", "gain", "may also be")
         rows: list[Row] = [
             (
                 f"{k}. {cause.where.effect}",
@@ -328,7 +312,9 @@ def tables(found: Diagnosis) -> Iterator[tuple[str, Row, list[Row]]]:
         ]
         yield f"{found.finger}: {found.verdict}", headings, rows
     factor, unit = unit_of(found)
-    headings = ("joint", "bias only", "nominal", "extended", "nominal, test", "extended, test", "noise floor")
+    words = words_of(found.kind)
+    before, after = words.nominal_column, words.extended_column
+    headings = ("joint", "bias only", before, after, f"{before}, test", f"{after}, test", "noise floor")
     yield f"residual before the bias learns from it, rms in {unit}", headings, error_rows(found, names, factor)
 
 
@@ -394,3 +380,20 @@ def _at(kind: str, place: FoundPlace, names: Names) -> str:
 def parameter_rows(parameters: Mapping[str, tuple[float, str]]) -> list[tuple[str, str]]:
     """(path, value with unit)."""
     return [(path, magnitude(value, unit)) for path, (value, unit) in parameters.items()]
+
+
+def change_rows(cause: Cause, recordings: Sequence[str]) -> list[tuple[str, str]]:
+    """(when, main number with its 95 % interval): in the reference, and now or in each of several new recordings."""
+    changed = cause.changed
+    if changed is None:
+        return []
+    now = zip(recordings, changed.by, strict=False) if changed.by else [("now", changed.now)]
+    return [
+        ("reference", quantity(changed.reference.value, changed.unit)),
+        *((Path(name).name, _quantity_interval(each, changed.unit)) for name, each in now),
+    ]
+
+
+def _quantity_interval(found: Interval, unit: str) -> str:
+    low, high = (quantity(each, unit) for each in (found.low, found.high))
+    return f"{quantity(found.value, unit)} ({low} to {high})"

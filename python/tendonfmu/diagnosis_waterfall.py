@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from tendonfmu.diagnosis_result import Diagnosis
 from tendonfmu.diagnosis_text import Names, at_place, left_of, unit_of
+from tendonfmu.diagnosis_words import words_of
 from tendonfmu.fit_summary import rounded
 
 
@@ -31,11 +32,14 @@ class Row:
 
 @dataclass(frozen=True)
 class Waterfall:
-    """unit: of the values. floor: per cent at which the noise floor is; None where it is not known."""
+    """unit: of the values. floor: per cent at which the noise floor is; None where it is not known. nameless: what the
+    part of that name is; taken: that of a cause."""
 
     unit: str
     rows: tuple[Row, ...]
     floor: float | None
+    nameless: str
+    taken: str
 
 
 def waterfall_of(found: Diagnosis, names: Names) -> Waterfall:
@@ -45,7 +49,8 @@ def waterfall_of(found: Diagnosis, names: Names) -> Waterfall:
     widest = max([each for each in steps if math.isfinite(each)], default=0.0) or 1.0
     noise = _noise(found, steps[-1])
     floor = None if noise is None else 100.0 * noise / widest
-    return Waterfall(unit, tuple(_rows(found, names, steps, widest)), floor)
+    words = words_of(found.kind)
+    return Waterfall(unit, tuple(_rows(found, names, steps, widest)), floor, words.left, words.taken)
 
 
 def _rows(found: Diagnosis, names: Names, steps: list[float], widest: float) -> Iterator[Row]:
@@ -57,7 +62,9 @@ def _rows(found: Diagnosis, names: Names, steps: list[float], widest: float) -> 
         return Part(tone, round(low, 2), round(high - low, 2))
 
     if found.causes:
-        yield Row("error of the nominal model", f"{shown[0]:.{digits}f}", (part("nominal", 0.0, steps[0]),))
+        yield Row(
+            f"error of the {words_of(found.kind).nominal}", f"{shown[0]:.{digits}f}", (part("nominal", 0.0, steps[0]),)
+        )
     for k, cause in enumerate(found.causes):
         change = shown[k + 1] - shown[k]
         tone, sign = ("cause", "−") if change <= 0 else ("more", "+")

@@ -63,6 +63,8 @@ class LeastSizes:
 
 def _size(hypothesis: Hypothesis, magnitudes: Sequence[float] | Numbers) -> float:
     """Of its first number, at its first place."""
+    if not hypothesis.members:  # a number that the description has
+        return abs(float(magnitudes[0]))
     member = hypothesis.members[0]
     shape: Mapping[str, float] = member.shape.shape
     step = abs(float(next(iter(shape.values())))) if member.shape.secant and shape else 1.0

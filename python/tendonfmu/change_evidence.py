@@ -1,0 +1,73 @@
+"""The picture of a change: what the model of the reference leaves, in the reference and now, over the effect's own
+coordinate; and now with the change in the model."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.change_search import ChangeSearch
+from tendonfmu.diagnosis_evidence import BINS, FEWEST, coordinate_of, standard_errors
+from tendonfmu.diagnosis_result import Evidence
+from tendonfmu.effects import Place
+
+Numbers = NDArray[np.float64]
+
+
+def change_evidence(search: ChangeSearch, number: int, coordinate: str) -> tuple[Evidence, ...]:
+    """Of the joint where the change shows most. Bins of equal count of the new recordings; in the reference NaN where
+    it has hardly been."""
+    change = search.changes[number]
+    left = search.left()  # with all changes, the background taken off
+    added = search.column(number) @ change.magnitudes
+    added = added - added[search.series.used].mean(axis=0)
+    now = search.series.used & search.sides.now
+    then = search.series.used & ~search.sides.now
+    joint = int(np.argmax(np.sum(added[now] ** 2, axis=0)))
+    place = _place(search, number, joint)
+    label, unit, values = coordinate_of(place, coordinate, search.series, joint)
+    kept = now & np.isfinite(values)
+    bins = min(BINS, int(kept.sum()) // FEWEST)
+    if bins < 2:
+        return ()
+    edges = np.quantile(values[kept], np.linspace(0.0, 1.0, bins + 1))
+    edges[0], edges[-1] = -np.inf, np.inf
+    member = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, bins - 1)
+    parts = [np.flatnonzero(kept & (member == k)) for k in range(bins)]
+    parts = [each for each in parts if len(each)]
+    low, high = float(values[kept].min()), float(values[kept].max())
+    inside = then & (values >= low) & (values <= high)
+    theirs = [np.flatnonzero(inside & (member == member[each[0]])) for each in parts]
+    before, after = (left + added)[:, joint], left[:, joint]
+    own = [_means(each, parts, search) for each in (before, after)]
+    reference = _means(after, theirs, search)
+    return (
+        Evidence(
+            joint + 1,
+            label,
+            unit,
+            np.array([values[rows].mean() for rows in parts]),
+            own[0][0],
+            own[1][0],
+            own[0][1],
+            own[1][1],
+            *reference,
+        ),
+    )
+
+
+def _place(search: ChangeSearch, number: int, joint: int) -> Place:
+    own = search.changes[number].hypothesis
+    return Place(own.joint or joint + 1, own.tendon)
+
+
+def _means(values: Numbers, parts: list[NDArray[np.int64]], search: ChangeSearch) -> tuple[Numbers, Numbers]:
+    """[K] means and their standard errors; NaN of fewer than FEWEST."""
+    enough = [rows if len(rows) >= FEWEST else rows[:0] for rows in parts]
+    means = np.array([values[rows].mean() if len(rows) else np.nan for rows in enough])
+    errors = standard_errors(values, [rows for rows in enough if len(rows)], replace(search.series))
+    spread = np.full(len(parts), np.nan)
+    spread[[k for k, rows in enumerate(enough) if len(rows)]] = errors
+    return means, spread

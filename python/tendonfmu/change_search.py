@@ -1,0 +1,298 @@
+"""What is different now: the changes that, put on the model of the reference, lower the error on new recordings.
+
+All recordings together; shared by them: the model's numbers, what it lacks in both, and a background of the motion
+(`change_background`). A hypothesis is free in the new recordings alone: a number that the description has, or a term
+that it lacks. The error is that of held-out parts of the new recordings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from tendonfmu.balance import moment_arms
+from tendonfmu.block_grams import Grams
+from tendonfmu.candidate_columns import candidate_columns
+from tendonfmu.cause_search import bias_of, blocks_of, nominal_scale, predicted_of, residual_alone, series_of
+from tendonfmu.cause_selection import Judged, Selection, names_with
+from tendonfmu.change_background import background_columns
+from tendonfmu.change_numbers import changed, number_hypotheses, numbers_of
+from tendonfmu.diagnosis_search import SIGNIFICANCE, accepted_of
+from tendonfmu.diagnosis_series import Grid, Series, block_prediction
+from tendonfmu.extension_fit import Accepted, extended_description
+from tendonfmu.fit_recordings import FitRecording
+from tendonfmu.held_out_folds import Folds, make_folds
+from tendonfmu.hypotheses import Hypothesis, hypotheses
+from tendonfmu.least_sizes import LeastSizes
+from tendonfmu.phases import Step
+
+Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Array = NDArray[Any]
+Data = Mapping[str, Any]
+
+MOST_CHANGES = 4
+MOST_REFUSED = 4
+STEPS = 3  # of Newton's method, with the derivatives of the reference
+
+
+@dataclass(frozen=True)
+class Change:
+    """hypothesis: what and where. magnitudes: [d] of it; covariance: [d, d]. gain, error: 1 − rms with / rms without on
+    held-out parts of the new recordings, and its standard error. p_value: family-wise. alike: what the data cannot tell
+    from it, best first.
+    """
+
+    hypothesis: Hypothesis
+    magnitudes: Numbers
+    covariance: Numbers
+    gain: float
+    error: float
+    p_value: float
+    alike: tuple[Hypothesis, ...] = ()
+
+
+@dataclass(frozen=True)
+class Sides:
+    """Which blocks are of which recordings. now: [B] of the new ones; test: [B] of those of them that are not learned
+    from."""
+
+    now: Flags
+    test: Flags
+
+
+class ChangeSearch:
+    """Changes, one after the other."""
+
+    def __init__(
+        self,
+        data: Data,
+        recordings: Sequence[FitRecording],
+        grid: Grid,
+        least: LeastSizes,
+        now: Sequence[int],
+        tests: Sequence[int] = (),
+        left_out: Flags | None = None,
+        seed: int = 0,
+    ) -> None:
+        """data: the model fitted to the reference. recordings: as estimated from. now: numbers of the new ones, tests:
+        of those that are not learned from. left_out: [B] blocks that are not looked at."""
+        self.data, self._recordings, self._grid, self._least = data, recordings, grid, least
+        self.series = series_of(data, recordings, grid, left_out)
+        self.sides = Sides(np.isin(self.series.recording, [*now, *tests]), np.isin(self.series.recording, tests))
+        self._new = {*now, *tests}
+        self._splines = bias_of(data, self.series)
+        residual = residual_alone(data, self.series)
+        predicted = predicted_of(data, recordings, grid, self.series)
+        self._columns = candidate_columns(data, predicted, blocks_of(grid, recordings), worth=least.worth)
+        force = np.concatenate(
+            [
+                segment.mean(predicted[segment.recording].recording.groups["tendon_force"][segment.part])
+                for segment in grid.segments
+            ]
+        )
+        background, scale = background_columns(data, self.series, force, self._columns, residual, seed)
+        self._shared = np.concatenate([self._columns.nominal, background], axis=2)
+        self._scale = np.concatenate([nominal_scale(data), scale])
+        self.numbers = numbers_of(data)
+        both = np.concatenate([self._columns.values, self._columns.nominal], axis=2)
+        self._values = both * self.sides.now[:, None, None]
+        learned = replace(self.series, used=self.series.used & ~self.sides.test)
+        self.folds, self.judged = folds_of_sides(learned, self.sides.now)
+        self.hypotheses = self._hypotheses()
+        self.tried = len({each.key for each in self.hypotheses})
+        self.repeated = 0
+        self.changes: list[Change] = []
+        self.refused: list[Change] = []
+        self.selection = self._look()
+
+    def _hypotheses(self) -> list[Hypothesis]:
+        count, own = self._columns.values.shape[2], len(self.numbers)
+        reach = np.abs(self.series.angle[self.series.used]).max(axis=0, initial=0.0)
+        missing = [
+            replace(each, mix=np.concatenate([each.mix, np.zeros((own, each.mix.shape[1]))]))
+            for each in hypotheses(self._columns, moment_arms(self.data), reach)
+        ]
+        present = number_hypotheses(self.numbers, count + own, count)
+        return sorted([*missing, *present], key=lambda each: each.level)
+
+    # --- rounds ---
+
+    def run(self, least_gain: float, step: Step = lambda done: None) -> None:
+        """Takes one change after the other, until none is material, certain and no chance."""
+        while len(self.changes) < MOST_CHANGES and len(self.refused) < MOST_REFUSED:
+            step(len(self.changes))
+            named = [each.hypothesis.effect for each in self.changes]
+            picked = self.selection.best(least_gain, {each.hypothesis.effect for each in self.refused})
+            if picked is None:
+                break
+            own = picked.hypothesis
+            p_value, covariance = self.certainty(self.selection.grams, picked.judged)
+            found = Change(own, picked.judged.magnitudes, covariance, picked.gain, picked.error, p_value, picked.alike)
+            if p_value >= SIGNIFICANCE or picked.gain < least_gain * names_with(own.effect, named):
+                self.refused.append(found)
+            else:
+                self._take(found)
+
+    def _take(self, change: Change) -> None:
+        self.changes.append(change)
+        for _ in range(STEPS):
+            self.selection = self._look()
+            self.changes = self.moved_on(self.selection.grams)
+        self.selection = self._look()
+
+    def moved_on(self, grams: Grams) -> list[Change]:
+        """The changes, each with what is added to its magnitudes by a solution in which their columns are shared."""
+        sizes = [len(each.magnitudes) for each in self.changes]
+        steps = np.split(grams.refitted[-sum(sizes) :], np.cumsum(sizes)[:-1]) if sizes else []
+        return [
+            replace(each, magnitudes=np.clip(each.magnitudes + own, each.hypothesis.low, each.hypothesis.high))
+            for each, own in zip(self.changes, steps, strict=True)
+        ]
+
+    def keep(self, changes: Sequence[Change]) -> None:
+        """Goes on with these alone."""
+        self.changes = list(changes)
+        self.selection = self._look()
+        self.changes = self.moved_on(self.selection.grams)
+        self.selection = self._look()
+
+    # --- looking ---
+
+    def _look(self) -> Selection:
+        """With all changes so far in the model of the new recordings."""
+        known = {each.hypothesis.effect for each in self.changes}
+        left = [each for each in self.hypotheses if each.effect not in known]
+        return Selection(self.grams(), left, self._least)
+
+    @property
+    def new_recordings(self) -> list[int]:
+        """Numbers of those that are learned from."""
+        learned = self.sides.now & ~self.sides.test
+        return [int(each) for each in np.unique(self.series.recording[learned])]
+
+    def left(self) -> Numbers:
+        """[B, n] N·m that is left with all changes, what is shared by both taken off; 0 where nothing is used."""
+        grams = self.selection.grams
+        found = np.zeros_like(self.series.target)
+        found[grams.folds.rows] = grams.residual()
+        return found
+
+    def grams(self, without: int | None = None, unseen: Flags | None = None, only: int | None = None) -> Grams:
+        """Of all columns, the changes' own among the shared ones; `without` one of them. unseen: [B] blocks that alone
+        are judged, and not learned from. only: the new recording that columns are of; the change that is left out is
+        then free in each of the others."""
+        kept = [each for k, each in enumerate(self.changes) if k != without]
+        own = [self._values @ each.hypothesis.mix for each in kept]
+        values = self._values
+        if only is not None and without is not None:
+            column = self._values @ self._mixed(self.changes[without])
+            others = [each for each in self.new_recordings if each != only]
+            own += [(column * (self.series.recording == each)[:, None])[:, :, None] for each in others]
+            values = values * (self.series.recording == only)[:, None, None]
+        shared = np.concatenate([self._shared, *own], axis=2).astype(np.float32)
+        scale = np.concatenate([self._scale, np.full(sum(each.shape[2] for each in own), np.nan)])
+        target = self.series.target - self.moved() if self.changes else self.series.target
+        if without is not None:
+            alone = self.changes[without]
+            target = target + self._values @ (alone.hypothesis.mix @ alone.magnitudes)
+        folds, judged = (self.folds, self.judged) if unseen is None else folds_of_unseen(self.series, unseen)
+        return Grams(folds, target, shared, values, self._splines, scale, judged)
+
+    def accepted(self, changes: Sequence[Change]) -> list[Accepted]:
+        """Terms that changes add to the description of now."""
+        return [part for each in changes for part in accepted_of(each.hypothesis, each.magnitudes)]
+
+    def added(self, changes: Sequence[Change]) -> Numbers:
+        """[u] what changes add to the numbers that the description has."""
+        first = self._columns.values.shape[2]
+        parts = [np.zeros(len(self.numbers)), *(self._mixed(each)[first:] for each in changes)]
+        return np.asarray(np.sum(parts, axis=0))
+
+    @staticmethod
+    def _mixed(change: Change) -> Numbers:
+        return np.asarray(change.hypothesis.mix @ change.magnitudes)
+
+    def now_data(self, changes: Sequence[Change] | None = None) -> dict[str, Any]:
+        """The description of now, from that of the reference."""
+        taken = self.changes if changes is None else changes
+        return dict(extended_description(changed(self.data, self.added(taken)), self.accepted(taken)))
+
+    def moved(self) -> Numbers:
+        """[B, n] N·m that the changes add to the model's torque; 0 in the reference."""
+        found = np.zeros_like(self.series.target)
+        segments = tuple(each for each in self._grid.segments if each.recording in self._new)
+        rows = np.concatenate([np.arange(each.blocks.start, each.blocks.stop) for each in segments])
+        part = replace(self._grid, segments=segments)
+        after, before = (block_prediction(each, self._recordings, part) for each in (self.now_data(), self.data))
+        found[rows] = after - before
+        return found
+
+    @property
+    def stretches_now(self) -> Flags:
+        """[stretches] whether they are of the new recordings."""
+        found = np.zeros(self.folds.stretches, dtype=bool)
+        found[self.folds.stretch[self.judged[self.folds.fold]]] = True
+        return found
+
+    def column(self, number: int) -> Numbers:
+        """[B, n, d] of a change, also in the reference."""
+        both = np.concatenate([self._columns.values, self._columns.nominal], axis=2)
+        return np.asarray(both @ self.changes[number].hypothesis.mix)
+
+    # --- certainty ---
+
+    def certainty(self, grams: Grams, judged: Judged) -> tuple[float, Numbers]:
+        """p-value of there being no change, corrected for all that was tried; [d, d] covariance of the magnitudes."""
+        mix = judged.hypothesis.mix
+        _, by_fold = grams.error(mix, judged.hypothesis.low, judged.hypothesis.high)
+        return self.certainty_of(grams, mix, judged.magnitudes, by_fold)
+
+    def certainty_of(self, grams: Grams, mix: Numbers, magnitudes: Numbers, by_fold: Numbers) -> tuple[float, Numbers]:
+        """Hotelling's test on the scores of stretches of all recordings, taken together in twos where they vary
+        together: what wanders from stretch to stretch in the reference is no change."""
+        energy, scores = grams.scores(mix, by_fold)
+        inverse = np.linalg.pinv(energy, hermitian=True)
+        score = energy @ magnitudes
+        spreads = [each.T @ each for each in (scores, _in_twos(scores))]
+        squares = [float(score @ np.linalg.pinv(each, hermitian=True) @ score) for each in spreads]
+        least = int(np.argmin(squares))
+        stretches, size = scores.shape
+        dof = stretches - 1 - size
+        p = float(stats.f.sf(squares[least] * dof / (size * (stretches - 1)), size, dof)) if dof > 0 else 1.0
+        return min(1.0, p * self.tried), np.asarray(inverse @ spreads[least] @ inverse)
+
+
+def _in_twos(values: Numbers) -> Numbers:
+    """[K / 2, d] sums of neighbours."""
+    even = len(values) // 2 * 2
+    return np.concatenate([values[:even].reshape(-1, 2, values.shape[1]).sum(axis=1), values[even:]])
+
+
+def folds_of_sides(series: Series, is_now: Flags) -> tuple[Folds, Flags]:
+    """Parts of the new recordings, then of the reference, and [f] which are of the new ones."""
+    now, then = (make_folds(replace(series, used=series.used & side)) for side in (is_now, ~is_now))
+    return _joined(now, then), np.arange(now.folds + then.folds) < now.folds
+
+
+def folds_of_unseen(series: Series, unseen: Flags) -> tuple[Folds, Flags]:
+    """What is unseen as one part, all else as the other, and [2] that the first is judged."""
+    both = [make_folds(replace(series, used=series.used & side)) for side in (unseen, ~unseen)]
+    one, other = (replace(each, fold=np.zeros_like(each.fold), folds=1) for each in both)
+    return _joined(one, other), np.array([True, False])
+
+
+def _joined(one: Folds, other: Folds) -> Folds:
+    return Folds(
+        rows=np.concatenate([one.rows, other.rows]),
+        run=np.concatenate([one.run, other.run + 1 + one.run.max(initial=-1)]),
+        stretch=np.concatenate([one.stretch, other.stretch + one.stretches]),
+        fold=np.concatenate([one.fold, other.fold + one.folds]),
+        stretches=one.stretches + other.stretches,
+        folds=one.folds + other.folds,
+    )
