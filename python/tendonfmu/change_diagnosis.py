@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from tendonfmu.cause_search import residual_alone
-from tendonfmu.cause_selection import LEAST_SHARE, Judged, names_with
+from tendonfmu.cause_selection import LEAST_SHARE, Judged
 from tendonfmu.change_evidence import change_evidence
 from tendonfmu.change_search import Change, ChangeSearch
 from tendonfmu.change_sizes import sized
@@ -135,17 +135,20 @@ class _Changes:
         search, dropped = self._search, list[Change]()
         while True:
             after = search.grams(unseen=self._unseen).by_stretch(None, None)
-            gains = [
-                gain_interval(search.grams(k, self._unseen).by_stretch(None, None), after, self._seed)
-                for k in range(len(search.changes))
-            ]
+            without = [search.grams(k, self._unseen).by_stretch(None, None) for k in range(len(search.changes))]
+            gains = [gain_interval(each, after, self._seed) for each in without]
             order = sorted(range(len(gains)), key=lambda k: -gains[k].value)
             named = [search.changes[k].hypothesis.effect for k in order]
             weak = [
                 k
                 for place, k in enumerate(order)
-                if not (
-                    gains[k].low > 0.0 and gains[k].value >= self._least_gain * names_with(named[place], named[:place])
+                if not gains[k].low > 0.0
+                or not search.matters(
+                    gains[k].value,
+                    search.error * float(np.sqrt(without[k].sum() / after.sum())),
+                    named[place],
+                    named[:place],
+                    self._least_gain,
                 )
             ]
             if not weak:

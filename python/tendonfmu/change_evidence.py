@@ -23,8 +23,8 @@ def change_evidence(search: ChangeSearch, number: int, coordinate: str) -> tuple
     left = search.left()  # with all changes, the background taken off
     added = search.column(number) @ change.magnitudes
     added = added - added[search.series.used].mean(axis=0)
-    now = search.series.used & search.sides.now
-    then = search.series.used & ~search.sides.now
+    now = search.told & search.sides.now
+    then = search.told & ~search.sides.now
     joint = int(np.argmax(np.sum(added[now] ** 2, axis=0)))
     place = _place(search, number, joint)
     label, unit, values = coordinate_of(place, coordinate, search.series, joint)

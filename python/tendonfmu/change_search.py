@@ -30,6 +30,7 @@ from tendonfmu.held_out_folds import Folds, make_folds
 from tendonfmu.hypotheses import Hypothesis, hypotheses
 from tendonfmu.least_sizes import LeastSizes
 from tendonfmu.phases import Step
+from tendonfmu.repeated_motion import find_repeats, less_reference, outside
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -96,20 +97,25 @@ class ChangeSearch:
                 for segment in grid.segments
             ]
         )
+        then = sorted(set(np.unique(self.series.recording).tolist()) - self._new)
+        self._repeats = find_repeats(self.series, force, then, sorted(self._new))
         background, scale = background_columns(data, self.series, force, self._columns, residual, seed)
-        self._shared = np.concatenate([self._columns.nominal, background], axis=2)
+        shared = np.concatenate([self._columns.nominal, background], axis=2)
+        self._shared = less_reference(shared, self.series, self._repeats)
+        self._target = less_reference(self.series.target, self.series, self._repeats)
         self._scale = np.concatenate([nominal_scale(data), scale])
         self.numbers = numbers_of(data)
         both = np.concatenate([self._columns.values, self._columns.nominal], axis=2)
         self._values = both * self.sides.now[:, None, None]
-        learned = replace(self.series, used=self.series.used & ~self.sides.test)
+        self._told = replace(self.series, used=self.series.used & ~outside(self.series, self._repeats))
+        learned = replace(self._told, used=self._told.used & ~self.sides.test)
         self.folds, self.judged = folds_of_sides(learned, self.sides.now)
         self.hypotheses = self._hypotheses()
         self.tried = len({each.key for each in self.hypotheses})
-        self.repeated = 0
         self.changes: list[Change] = []
         self.refused: list[Change] = []
         self.selection = self._look()
+        self._whole = self.error
 
     def _hypotheses(self) -> list[Hypothesis]:
         count, own = self._columns.values.shape[2], len(self.numbers)
@@ -134,10 +140,20 @@ class ChangeSearch:
             own = picked.hypothesis
             p_value, covariance = self.certainty(self.selection.grams, picked.judged)
             found = Change(own, picked.judged.magnitudes, covariance, picked.gain, picked.error, p_value, picked.alike)
-            if p_value >= SIGNIFICANCE or picked.gain < least_gain * names_with(own.effect, named):
+            if p_value >= SIGNIFICANCE or not self.matters(picked.gain, self.error, own.effect, named, least_gain):
                 self.refused.append(found)
             else:
                 self._take(found)
+
+    @property
+    def error(self) -> float:
+        """Root of Σ e² on held-out parts of the new recordings, N·m, with the changes so far."""
+        return float(np.sqrt(self.selection.base.sum()))
+
+    def matters(self, gain: float, before: float, effect: str, named: Sequence[str], least_gain: float) -> bool:
+        """Whether a change takes enough of what is left without it (`before`), each further name more than the one
+        before; and of the whole difference, so that no crumbs of a large change are named."""
+        return gain >= least_gain * names_with(effect, named) and gain * before >= least_gain * self._whole
 
     def _take(self, change: Change) -> None:
         self.changes.append(change)
@@ -197,11 +213,11 @@ class ChangeSearch:
             values = values * (self.series.recording == only)[:, None, None]
         shared = np.concatenate([self._shared, *own], axis=2).astype(np.float32)
         scale = np.concatenate([self._scale, np.full(sum(each.shape[2] for each in own), np.nan)])
-        target = self.series.target - self.moved() if self.changes else self.series.target
+        target = self._target - self.moved() if self.changes else self._target
         if without is not None:
             alone = self.changes[without]
             target = target + self._values @ (alone.hypothesis.mix @ alone.magnitudes)
-        folds, judged = (self.folds, self.judged) if unseen is None else folds_of_unseen(self.series, unseen)
+        folds, judged = (self.folds, self.judged) if unseen is None else folds_of_unseen(self._told, unseen)
         return Grams(folds, target, shared, values, self._splines, scale, judged)
 
     def accepted(self, changes: Sequence[Change]) -> list[Accepted]:
@@ -232,6 +248,16 @@ class ChangeSearch:
         after, before = (block_prediction(each, self._recordings, part) for each in (self.now_data(), self.data))
         found[rows] = after - before
         return found
+
+    @property
+    def told(self) -> Flags:
+        """[B] blocks that something is learned from."""
+        return self._told.used
+
+    @property
+    def repeated(self) -> int:
+        """How many of the new recordings repeat a motion of the reference exactly."""
+        return len(self._repeats)
 
     @property
     def stretches_now(self) -> Flags:
