@@ -17,6 +17,7 @@ from scipy import stats
 from tendonfmu.cause_search import residual_alone
 from tendonfmu.cause_selection import LEAST_SHARE, Judged
 from tendonfmu.change_evidence import change_evidence
+from tendonfmu.change_load import steady_load
 from tendonfmu.change_search import Change, ChangeSearch
 from tendonfmu.change_sizes import sized
 from tendonfmu.change_trend import sizes_by_recording
@@ -28,6 +29,7 @@ from tendonfmu.diagnosis_result import (
     FoundPlace,
     Interval,
     Invisible,
+    SteadyLoad,
     Unexplained,
     Where,
 )
@@ -209,11 +211,11 @@ class _Changes:
             search.keep(search.changes[:-1])
             return self._result(dropped, gains[:-1])
         before, after = self._views()
-        unexplained = self._unexplained()
+        unexplained, load = self._unexplained(), self._load()
         causes = tuple(self._cause(k, learned, each) for k, each in enumerate(gains))
         return Diagnosis(
             finger=case.finger.name,
-            verdict=_verdict(bool(causes), unexplained.unknown),
+            verdict=_verdict(bool(causes) or load is not None, unexplained.unknown),
             recordings=tuple(str(each.path) for each in case.now),
             tests=tuple(str(each.path) for each in case.tests),
             held_out=gain.held_out,
@@ -244,6 +246,7 @@ class _Changes:
             event_gain=event_gain(extended, case.whole, self._events),
             smoothing=self._chosen.signals,
             kind="change",
+            load=load,
             references=tuple(str(each.path) for each in case.then),
             repeated=search.repeated,
         )
@@ -296,6 +299,11 @@ class _Changes:
         )
         whole = float(np.array(share) @ now**2 / max(float((now**2).sum()), 1e-300))
         return Unexplained(whole, words if unknown else "", share, p_value, unknown, gain)
+
+    def _load(self) -> SteadyLoad | None:
+        search = self._search
+        moved = search.moved() if search.changes else 0.0
+        return steady_load(search.series, search.series.target - moved, search.sides.now, self._seed)
 
     def _floor(self) -> Numbers:
         """[n] N·m rms of the new recordings."""

@@ -196,7 +196,9 @@ def _card(found: Diagnosis, cause: Cause, names: Names) -> dict[str, Any]:
     certainty = f"p = {probability(cause.p_value)}".replace("= <", "<")
     where = cause.where.effect
     meaning = {
-        CONTACT: "less error on the training recordings without these stretches",
+        CONTACT: "less error about the level of now than about that of the reference"
+        if cause.changed
+        else "less error on the training recordings without these stretches",
         UNKNOWN: "less error if what can be predicted were known",
     }
     others = "" if len(found.causes) < 2 else "; the other causes kept"

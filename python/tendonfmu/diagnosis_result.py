@@ -128,6 +128,19 @@ class Event:
 
 
 @dataclass(frozen=True)
+class SteadyLoad:
+    """A torque that is there all the time now and was not in the reference.
+
+    joint: from 1. size: N·m, of the mean torque that the model leaves, then and now. gain: 1 − rms about its own level
+    / rms about that of the reference, of the new recordings.
+    """
+
+    joint: int
+    size: ChangedSize
+    gain: Interval
+
+
+@dataclass(frozen=True)
 class Unexplained:
     """What no effect explains.
 
@@ -214,7 +227,7 @@ class Diagnosis:
     out takes away from the rms on the training recordings; None without events. smoothing: what `signals` says.
     kind: "model", what the model lacks, or "change", what is different from the reference recordings
     `references`; nominal is then the model of the reference, one set of numbers for both. repeated: motions of the
-    reference that were made again exactly.
+    reference that were made again exactly. load: that is there now and was not.
     """
 
     finger: str
@@ -251,3 +264,4 @@ class Diagnosis:
     kind: str = "model"
     references: tuple[str, ...] = ()
     repeated: int = 0
+    load: SteadyLoad | None = None

@@ -135,8 +135,11 @@ def headline(found: Diagnosis) -> str:
         size = f", {cause.size}" if cause.changed else ""
         text = f"{text[:-1]}: {at_place(cause.title, cause.where, names_of(found))}{size}."
     for cause in reported_causes(found):
-        if cause.where.effect == CONTACT:
+        if cause.where.effect == CONTACT and cause.changed is None:
             text += f" In some stretches {cause.title}: they were left out ({cause.size})."
+        elif cause.where.effect == CONTACT:
+            told = f"{at_place(cause.title, cause.where, names_of(found))}, {cause.size}."
+            text = f"{text} And {told}" if count else f"{told[0].upper()}{told[1:]}"
     return text
 
 

@@ -8,13 +8,19 @@ import numpy as np
 
 from tendonfmu.contact_scan import LEVEL as SCAN_LEVEL
 from tendonfmu.diagnosis_result import Cause, Diagnosis, Where
+from tendonfmu.diagnosis_size import quantity
 
 CONTACT, UNKNOWN = "contact", "unknown"
+LOAD = "load"  # a contact that lasts: of a change
 TITLES = {
+    LOAD: "a load on the finger that was not there, or a sensor's zero that has moved",
     CONTACT: "something touches the finger, or stops it",
     UNKNOWN: "something that no effect on the list explains",
 }
 _EXPLANATIONS = {
+    LOAD: "The mean torque that the model leaves has moved, far beyond what it does in the reference. No friction does "
+    "that. Look whether something touches or pulls the finger, and what the sensors show without a tendon; the bias "
+    "takes it up at run time.",
     CONTACT: "In some stretches a torque comes and goes that no friction explains. They are left out of the fit; the "
     "gain is what leaving them out takes away from the error on the training recordings.",
     UNKNOWN: "What is left can be predicted in part from what was recorded, but it has the shape of no effect on the "
@@ -26,7 +32,25 @@ LEAST_PEAK = 6.0  # rms of what the extended model leaves, that the peak of a co
 
 def reported_causes(found: Diagnosis) -> list[Cause]:
     """In order of gain; contact and unknown at the end, each only where its gain is above 0 for certain."""
-    return [*found.causes, *_contact(found), *_unknown(found)]
+    return [*found.causes, *_load(found), *_contact(found), *_unknown(found)]
+
+
+def _load(found: Diagnosis) -> Iterator[Cause]:
+    load = found.load
+    if load is None or not load.gain.low > 0.0:
+        return
+    size = load.size
+    yield Cause(
+        where=Where(CONTACT, load.joint),
+        title=TITLES[LOAD],
+        explanation=_EXPLANATIONS[LOAD],
+        p_value=SCAN_LEVEL,
+        gain=load.gain,
+        confusable_with=(Where("force_offset"), Where("gravity", load.joint)),
+        parameters={},
+        size=f"{quantity(size.change.value, size.unit, sign=True)} all the time",
+        changed=size,
+    )
 
 
 def _contact(found: Diagnosis) -> Iterator[Cause]:
