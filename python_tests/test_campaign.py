@@ -26,6 +26,7 @@ from tendonfmu.diagnosis_result import (
     Where,
 )
 from tendonfmu.errors import InputError
+from tendonfmu.jobs import workers_of
 
 ERRORS = ModelErrors((0.002,), (0.002,))
 GAIN = Interval(0.1, 0.05, 0.15)
@@ -104,6 +105,8 @@ GOOD = {"name": "a", "group": "null", "finger": "f.json", "recordings": ["r.csv"
         ({"group": "double", "truth": [{"effect": "gravity"}]}, "expected 2 effects"),
         ({"group": "single", "truth": [{"effect": "gravity", "joint": 0}]}, "cases[1].truth[1].joint = 0"),
         ({"facts": {"strength": [1]}}, "cases[1].facts.strength"),
+        ({"also": "inertia"}, "cases[1].also"),
+        ({"reference": ["r.csv"]}, "cases[1].reference"),
         ({"wrong": 1}, "cases[1].wrong"),
         ({"maker": "cases:make"}, "cases[1].maker"),
         ({"arguments": {"seed": 1}}, "cases[1].arguments"),
@@ -145,9 +148,9 @@ def test_a_campaign_is_resumed_and_survives_a_case_that_fails(tmp_path: Path, mo
 
     def run(case: Case, how: campaigns.How) -> dict[str, Any]:
         ran.append(case.name)
-        error = "ValueError: bad" if case.name == "b" else ""
-        row = judge(case, diagnosis()) | {"name": case.name, "group": "null", "rig": "", "seed": 0, "error": error}
-        return row | {"gain": math.nan}
+        if case.name == "b":
+            raise ValueError("bad")
+        return campaigns.known_of(case) | judge(case, diagnosis()) | {"gain": math.nan}
 
     monkeypatch.setattr(campaigns, "run_case", run)
     cases = read_cases(written(tmp_path, *({**GOOD, "name": name} for name in "abc")))
@@ -169,7 +172,7 @@ def test_workers_of_dask_write_the_rows(tmp_path: Path) -> None:
     """Real worker processes; their case fails at once, for its recording is not there, and says so."""
     pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")
     cases = read_cases(written(tmp_path, {**GOOD, "name": "a"}, {**GOOD, "name": "b"}))
-    with campaigns.cluster(None, 1) as client:
+    with workers_of(count=1) as client:
         assert run_campaign(cases, tmp_path / "out", client) == 2
     rows = collect(cases, tmp_path / "out")
     assert [row["name"] for row in rows] == ["a", "b"]
@@ -208,6 +211,24 @@ def test_one_effect_at_many_places_is_right_where_the_true_one_is_among_them() -
     assert json.loads(row["causes"])[0]["places"] == [{"joint": 1, "tendon": 1}, {"joint": 1, "tendon": 2}]
     row = judge(case("single", truth), diagnosis(cause("load_friction", joint=1, places=places[:1])))
     assert row["in_set"] and not row["place"]
+
+
+def test_what_the_rig_has_anyway_is_neither_right_nor_false() -> None:
+    anyway = ("presliding", "inertia")
+    null = Case("a", "null", Path(), also=anyway)
+    row = judge(null, diagnosis(cause("presliding"), cause("inertia")))
+    assert (row["cause_count"], row["named_count"]) == (0, 2)
+    assert judge(null, diagnosis(cause("presliding"), cause("gravity")))["cause_count"] == 1
+    single = Case("a", "single", Path(), truth=(Truth("gravity", 1),), also=anyway)
+    row = judge(single, diagnosis(cause("presliding"), cause("gravity")))
+    assert (row["in_set"], row["first"], row["cause_count"]) == (True, True, 1)
+    hidden = Case("a", "single", Path(), truth=(Truth("inertia", 1),), also=anyway)
+    assert judge(hidden, diagnosis(cause("inertia")))["in_set"]
+
+
+def test_an_effect_of_the_whole_finger_has_no_place_to_be_right_about() -> None:
+    row = judge(case("single", Truth("time_delay")), diagnosis(cause("time_delay", joint=None)))
+    assert row["in_set"] and row["place"] is None
 
 
 def test_rivals_are_asked_the_same(tmp_path: Path) -> None:

@@ -1,49 +1,28 @@
 """Many diagnoses of recordings whose cause is known: run anywhere, resumed at any time, one table at the end.
 
-Each case writes its row as soon as it ends, DIR/rows/NAME.json, whole or not at all; a case with a row is not run
-again. The rows together are DIR/campaign.parquet.
+Each case is a job (jobs.py), its row DIR/rows/NAME.json. The rows together are DIR/campaign.parquet.
 """
 
 from __future__ import annotations
 
 import json
 import math
-import os
 import tempfile
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tendonfmu.campaign_cases import Case, made, names_of, python_function
+from tendonfmu.campaign_cases import Case, made, python_function
 from tendonfmu.campaign_judgement import judge, judge_names
 from tendonfmu.diagnosis_result import Diagnosis
 from tendonfmu.errors import InputError
-from tendonfmu.whole_file import check_output_folder, whole_file
+from tendonfmu.jobs import ROWS, Job, Row, rows_of, run_jobs, waiting_jobs
+from tendonfmu.whole_file import whole_file
 
-ROWS = "rows"
 TABLE = "campaign.parquet"
-
-Row = dict[str, Any]
-
-
-def row_file(folder: Path, name: str) -> Path:
-    return folder / ROWS / f"{name}.json"
-
-
-def still_to_do(cases: Sequence[Case], folder: Path, failed_again: bool = False) -> list[Case]:
-    """Cases without a row; failed_again: also those whose row is an error."""
-    return [case for case in cases if _wanted(row_file(folder, case.name), failed_again)]
-
-
-def _wanted(file: Path, failed_again: bool) -> bool:
-    if not file.is_file():
-        return True
-    return failed_again and bool(json.loads(file.read_text(encoding="utf-8")).get("error"))
 
 
 # --- one case, on a worker --------------------------------------------------------------------------------------------
@@ -62,15 +41,14 @@ ALL_OF_IT = How()
 
 
 def run_case(case: Case, how: How = ALL_OF_IT) -> Row:
-    """Makes the recordings, diagnoses them untold, and judges the answer. What goes wrong becomes the row's `error`."""
-    begin = time.perf_counter()
-    row: Row = {"name": case.name, "group": case.group, "rig": case.rig, "seed": case.seed, "error": ""}
-    try:
-        with tempfile.TemporaryDirectory(prefix="tendonfmu-campaign-") as folder:
-            row |= _answered(made(case, Path(folder)), how)
-    except Exception as failed:  # a campaign of days goes on: the row says what happened
-        row["error"] = f"{type(failed).__name__}: {' '.join(str(failed).split())}"
-    return row | {"run_seconds": time.perf_counter() - begin}
+    """Makes the recordings, diagnoses them untold, and judges the answer."""
+    with tempfile.TemporaryDirectory(prefix="tendonfmu-campaign-") as folder:
+        return known_of(case) | _answered(made(case, Path(folder)), how)
+
+
+def known_of(case: Case) -> Row:
+    """What a row says of its case, however it ends."""
+    return {"name": case.name, "group": case.group, "rig": case.rig, "seed": case.seed}
 
 
 def _answered(case: Case, how: How) -> Row:
@@ -87,7 +65,7 @@ def _answered(case: Case, how: How) -> Row:
 def _diagnosed(case: Case, how: How) -> Row:
     found = _diagnosis(case, case.recordings, how)
     row = judge(case, found)
-    if case.reference:
+    if case.gain_recordings:
         row["true_gain"] = true_gain(found.nominal_data, found.extended_data, case)
     if case.experiment is not None:
         row["named_after_experiment"] = named_after_experiment(case, found, how)
@@ -123,7 +101,7 @@ def _diagnosis(case: Case, recordings: Sequence[Path], how: How) -> Diagnosis:
 
 
 def true_gain(nominal: Mapping[str, Any], extended: Mapping[str, Any], case: Case) -> float:
-    """1 − rms of the extended over that of the nominal model, over all joints of the case's reference recordings."""
+    """1 − rms of the extended over that of the nominal model, over all joints of the case's gain recordings."""
     from tendonfmu.description import read_finger
     from tendonfmu.fit_recordings import Held, prepare
     from tendonfmu.gain import residual_of
@@ -132,7 +110,7 @@ def true_gain(nominal: Mapping[str, Any], extended: Mapping[str, Any], case: Cas
     assert case.finger is not None
     finger = read_finger(case.finger)
     sums = np.zeros(2)
-    for path in case.reference:
+    for path in case.gain_recordings:
         recording = prepare(finger, read_recording(path), case.kinematics, Held())
         for k, data in enumerate((nominal, extended)):
             sums[k] += float(np.nansum(residual_of(data, recording)[1:] ** 2))
@@ -142,34 +120,14 @@ def true_gain(nominal: Mapping[str, Any], extended: Mapping[str, Any], case: Cas
 # --- all of them ------------------------------------------------------------------------------------------------------
 
 
-@contextmanager
-def cluster(address: str | None, workers: int) -> Iterator[Any]:
-    """A dask client: of the scheduler at an address, or of worker processes here. Raises InputError without dask."""
-    try:
-        import dask
-        import distributed
-    except ImportError as missing:
-        wanted = "expected dask and distributed: pip install 'tendonfmu[campaign]'"
-        raise InputError(f"campaign: no module {missing.name}; {wanted}") from None
-    library: Any = distributed  # it has no types
-    if address is not None:
-        try:
-            client = library.Client(address, timeout=20)
-        except (OSError, ValueError) as failed:
-            raise InputError(f"--scheduler {address}: {failed}; expected the address of a dask scheduler") from None
-        with client:
-            yield client
-        return
-    # one thread of linear algebra per worker; a port of its own, so that two campaigns do not meet
-    limits = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-    with (
-        dask.config.set({"distributed.nanny.pre-spawn-environ": limits}),
-        library.LocalCluster(
-            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0"
-        ) as here,
-        library.Client(here) as client,
-    ):
-        yield client
+def jobs_of(cases: Sequence[Case], how: How) -> list[Job]:
+    return [Job(case.name, (case, how)) for case in cases]
+
+
+def still_to_do(cases: Sequence[Case], folder: Path, failed_again: bool = False) -> list[Case]:
+    """Cases without a row; failed_again: also those whose row is an error."""
+    waiting = {job.name for job in waiting_jobs(jobs_of(cases, ALL_OF_IT), folder, failed_again)}
+    return [case for case in cases if case.name in waiting]
 
 
 def run_campaign(
@@ -182,59 +140,16 @@ def run_campaign(
     failed_again: bool = False,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> int:
-    """Runs what has no row yet, a row's file as each case ends. Returns how many ran.
-
-    client: of dask, or None: here, one after another. stop_after: s, after which no further case begins.
-    """
-    check_output_folder(folder)
-    (folder / ROWS).mkdir(parents=True, exist_ok=True)
-    waiting = still_to_do(cases, folder, failed_again)
-    done = len(cases) - len(waiting)
-    progress(done, len(cases))
-    count = 0
-    for row in _rows(waiting, client, how, time.monotonic() + stop_after):
-        write_row(folder, row)
-        count += 1
-        progress(done + count, len(cases))
-    return count
-
-
-def _rows(cases: Sequence[Case], client: Any, how: How, deadline: float) -> Iterator[Row]:
-    """Each row as it ends. Only as many cases are under way as there are workers to take them at once, and one more."""
-    waiting = iter(cases)
-
-    def next_case() -> Case | None:
-        return next(waiting, None) if time.monotonic() < deadline else None
-
-    if client is None:
-        while (case := next_case()) is not None:
-            yield run_case(case, how)
-        return
-    import distributed
-
-    library: Any = distributed
-    threads = max(1, sum(client.nthreads().values()))
-    begun = [case for case in (next_case() for _ in range(threads + 1)) if case is not None]
-    pending = library.as_completed([client.submit(run_case, case, how, pure=False) for case in begun])
-    for future in pending:
-        yield future.result()
-        case = next_case()
-        if case is not None:
-            pending.add(client.submit(run_case, case, how, pure=False))
-
-
-def write_row(folder: Path, row: Row) -> None:
-    with whole_file(row_file(folder, row["name"])) as file:
-        file.write_text(json.dumps(_plain(row), indent=1, allow_nan=True) + "\n", encoding="utf-8")
-
-
-def _plain(row: Row) -> Row:
-    """Numbers of numpy as those of JSON; what is not finite as null."""
-    found: Row = {}
-    for key, value in row.items():
-        value = value.item() if isinstance(value, np.generic) else value
-        found[key] = None if isinstance(value, float) and not math.isfinite(value) else value
-    return found
+    """Runs what has no row yet; as `jobs.run_jobs`. Returns how many ran."""
+    return run_jobs(
+        run_case,
+        jobs_of(cases, how),
+        folder,
+        client,
+        stop_after=stop_after,
+        failed_again=failed_again,
+        progress=progress,
+    )
 
 
 def collect(cases: Sequence[Case], folder: Path) -> list[Row]:
@@ -245,8 +160,8 @@ def collect(cases: Sequence[Case], folder: Path) -> list[Row]:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    files = [row_file(folder, name) for name in names_of(cases)]
-    rows: list[Row] = [json.loads(file.read_text(encoding="utf-8")) for file in files if file.is_file()]
+    known = {case.name: known_of(case) for case in cases}
+    rows = [known[row["name"]] | row for row in rows_of(jobs_of(cases, ALL_OF_IT), folder)]
     if not rows:
         raise InputError(f"{folder / ROWS}: no rows of these cases; expected at least one case to have ended")
     keys = list(dict.fromkeys(key for row in rows for key in row))
@@ -254,8 +169,3 @@ def collect(cases: Sequence[Case], folder: Path) -> list[Row]:
     with whole_file(folder / TABLE) as file:
         pq.write_table(pa.table(columns), file)
     return rows
-
-
-def worker_count() -> int:
-    """As many as there are processors to use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

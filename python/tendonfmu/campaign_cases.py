@@ -18,7 +18,7 @@ import hashlib
 import importlib.util
 import re
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import ModuleType
@@ -38,10 +38,11 @@ _KEYS = (
     "finger",
     "recordings",
     "test",
-    "reference",
+    "gain_recordings",
     "kinematics",
     "seed",
     "truth",
+    "also",
     "facts",
     "maker",
     "arguments",
@@ -65,8 +66,9 @@ class Case:
     """One diagnosis to make and to judge.
 
     name: of its row's file. group: of `GROUPS`. rig: what made it, for the table. finger, recordings, test: as for
-    `tendonfmu diagnose`. reference: long recordings of the same finger, for the true gain of the extended model.
-    truth: empty for null. facts: numbers and words that go into the row. maker, arguments: instead of files.
+    `tendonfmu diagnose`. gain_recordings: long recordings of the same finger, for the true gain of the extended model.
+    truth: empty for null. also: effects that the rig has although the description lacks them: naming them is neither
+    right nor false. facts: numbers and words that go into the row. maker, arguments: instead of files.
     experiment: FILE.py:FUNCTION that carries out what a diagnosis asks for, FUNCTION(folder, motion, **arguments) ->
     name of the recording; motion: as in `diagnosis.json`.
     """
@@ -78,10 +80,11 @@ class Case:
     finger: Path | None = None
     recordings: tuple[Path, ...] = ()
     test: tuple[Path, ...] = ()
-    reference: tuple[Path, ...] = ()
+    gain_recordings: tuple[Path, ...] = ()
     kinematics: int = 1
     seed: int = 0
     truth: tuple[Truth, ...] = ()
+    also: tuple[str, ...] = ()
     facts: Mapping[str, float | str] = field(default_factory=dict)
     maker: str | None = None
     arguments: Mapping[str, Any] = field(default_factory=dict)
@@ -133,7 +136,7 @@ def case_of(node: Node, folder: Path) -> Case:
         return Case(**common, maker=maker.value, arguments=arguments.value or {})
     if not arguments.absent:
         arguments.refuse("no arguments without a maker")
-    return Case(**common, **_files(node, folder), truth=_truth(node, group.value), facts=_facts(node))
+    return Case(**common, **_files(node, folder), **_hidden(node, group.value), facts=_facts(node))
 
 
 def _files(node: Node, folder: Path) -> dict[str, Any]:
@@ -151,9 +154,17 @@ def _files(node: Node, folder: Path) -> dict[str, Any]:
         "recordings": recordings,
         "test": several("test"),
         "experiment": node.member("experiment").value,
-        "reference": several("reference"),
+        "gain_recordings": several("gain_recordings"),
         "kinematics": node.member("kinematics").integer(1, 3, default=1),
     }
+
+
+def _hidden(node: Node, group: str) -> dict[str, Any]:
+    also = node.member("also")
+    if not also.absent and not isinstance(also.value, list):
+        also.refuse("a list of names of effects")
+    found = tuple(each.text("the name of an effect") for each in also.elements())
+    return {"truth": _truth(node, group), "also": found}
 
 
 def _truth(node: Node, group: str) -> tuple[Truth, ...]:
@@ -230,7 +241,3 @@ def _module(file: Path) -> ModuleType:
         del sys.modules[name]
         raise
     return module
-
-
-def names_of(cases: Sequence[Case]) -> list[str]:
-    return [case.name for case in cases]

@@ -45,12 +45,13 @@ def judge_causes(case: Case, causes: Sequence[Cause]) -> dict[str, Any]:
 
     detected: a cause is reported. in_set: the true effect is a cause or in the confusion set of one. first: it is the
     first cause. set_size: effects of the set that has it, or of the first cause. place: the true joint and tendon are
-    among the places of the named effect. both, exactly: all that is hidden, and nothing else.
+    among the places of the named effect; None for the whole finger. both, exactly: all that is hidden, and no more.
     """
-    own = [cause for cause in causes if cause.where.effect not in NOT_IN_MODEL]
+    own = [cause for cause in causes if cause.where.effect not in NOT_IN_MODEL and not _is_there_anyway(cause, case)]
     row: dict[str, Any] = {
         "causes": json.dumps([_listed(cause) for cause in causes]),
         "cause_count": len(own),
+        "named_count": len(causes),
         "p_value": own[0].p_value if own else None,
         "detected": bool(own),
     }
@@ -77,6 +78,12 @@ def judge_names(case: Case, names: Sequence[Where]) -> dict[str, Any]:
         both = all(truth.effect in effects for truth in _hidden(case))
         row |= {"both": both, "exactly": both and len(names) == len(case.truth)}
     return row
+
+
+def _is_there_anyway(cause: Cause, case: Case) -> bool:
+    """The rig has the effect beside what is hidden."""
+    effect = cause.where.effect
+    return effect in case.also and effect not in (truth.effect for truth in case.truth)
 
 
 def _hidden(case: Case) -> list[Truth]:
@@ -117,7 +124,7 @@ def _single(truth: Truth, causes: Sequence[Cause]) -> dict[str, Any]:
     shown = holder or causes[0]
     size = len({shown.where.effect, *(each.effect for each in shown.confusable_with)})
     row = {"in_set": holder is not None, "first": causes[0].where.effect == truth.effect, "set_size": size}
-    if holder is not None:
+    if holder is not None and (truth.joint, truth.tendon) != (None, None):
         # what a cause says first is what counts
         own = holder.places if holder.where.effect == truth.effect else _of(holder.confusable_with, truth.effect)
         row["place"] = any(_is_at(each, truth) for each in own)

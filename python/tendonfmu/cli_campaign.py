@@ -43,10 +43,11 @@ def campaign(
     Each case writes its row as it ends; interrupted, the same command goes on where it was.
     The rows together are DIR/campaign.parquet; every rate has its number of cases and its 95 % interval.
     """
-    from tendonfmu.campaign import How, cluster, collect, run_campaign, still_to_do, worker_count
+    from tendonfmu.campaign import How, collect, run_campaign, still_to_do
     from tendonfmu.campaign_cases import python_function, read_cases
     from tendonfmu.campaign_rates import EFFECT_HEADINGS, HEADINGS, by_effect, markdown, rates
     from tendonfmu.fit_files import write_text
+    from tendonfmu.jobs import worker_count, workers_of
     from tendonfmu.whole_file import check_output, check_output_folder
 
     listed = read_cases(cases)
@@ -58,7 +59,7 @@ def campaign(
     waiting = len(still_to_do(listed, output, again))
     if waiting and stop_after > 0:
         with (
-            cluster(scheduler, min(workers or worker_count(), waiting)) as client,
+            workers_of(scheduler, min(workers or worker_count(), waiting)) as client,
             progress_bar(progress) as bar,
         ):
             task = bar.add_task("cases", total=len(listed))

@@ -93,12 +93,17 @@ PLANS = (
     Plan("preload_friction", 2, tendon=3, add=lambda p: {"preload": (3, 2.0)}),
 )
 NUMBERS = range(1, len(PLANS) + 1)
+SEED = 7100
 
 
 def make(number: int, train_seconds: float = TRAIN_SECONDS, test_seconds: float = TEST_SECONDS) -> Case:
     """The case of a number (from 1); shorter recordings are beginnings of the full ones."""
-    plan = PLANS[number - 1]
-    rng = np.random.default_rng(7100 + number)
+    return of_plan(PLANS[number - 1], number, SEED + number, train_seconds, test_seconds)
+
+
+def of_plan(plan: Plan, number: int, seed: int, train_seconds: float, test_seconds: float) -> Case:
+    """The case of a plan. seed: of finger, description, motion and noise."""
+    rng = np.random.default_rng(seed)
     plain = finger(plan, rng)
     physics = dataclasses.replace(plain, **plan.add(plain))
     truth = Truth(plan.hidden, plan.joints, plan.joint, plan.tendon, also=ALSO)
@@ -108,7 +113,7 @@ def make(number: int, train_seconds: float = TRAIN_SECONDS, test_seconds: float 
     train = run(physics, truth, motions[0], train_seconds + DELAY, plan.rate)
     test = run(still, truth, motions[1], test_seconds + DELAY, plan.rate)
     inside, truth = seen_from_inside(physics, plan, train, truth)
-    frames = [record(trace, plan, np.random.default_rng((7100 + number, k))) for k, trace in enumerate((train, test))]
+    frames = [record(trace, plan, np.random.default_rng((seed, k))) for k, trace in enumerate((train, test))]
     return Case(FAMILY, number, nominal, frames[0], frames[1], truth, inside)
 
 

@@ -66,12 +66,17 @@ PLANS = (
 NUMBERS = range(1, len(PLANS) + 1)
 
 
-def make(number: int, train_seconds: float = TRAIN_SECONDS, test_seconds: float = TEST_SECONDS) -> Case:
-    """The case of a number (from 1)."""
+SEED = 4200
+
+
+def make(
+    number: int, train_seconds: float = TRAIN_SECONDS, test_seconds: float = TEST_SECONDS, seed: int = SEED
+) -> Case:
+    """The case of a number (from 1). seed: of motion and noise; the finger is that of its simulator."""
     plan = PLANS[number - 1]
     simulator = plan.simulator
-    train = simulator.simulate(plan.hidden, train_seconds, np.random.default_rng((4200, number, 1)))
-    test = simulator.simulate(plan.hidden, test_seconds, np.random.default_rng((4200, number, 2)))
+    train = simulator.simulate(plan.hidden, train_seconds, np.random.default_rng((seed, number, 1)))
+    test = simulator.simulate(plan.hidden, test_seconds, np.random.default_rng((seed, number, 2)))
     inside = Inside(train["true_angle"], train["measured"], train["described"], train["hidden"])
     truth = Truth(
         plan.hidden,

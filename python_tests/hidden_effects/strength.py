@@ -98,21 +98,31 @@ def splines(time: Array) -> Array:
 
 def look(hand: Hand, made: Made) -> Seen:
     """What the nominal model at its true numbers leaves of a quiet recording, and all that refitting can bend."""
+    columns = np.hstack([number_columns(hand, made), bias_columns(hand, made)])
+    return Seen(residual(hand, made), orthonormal(columns), len(columns) // len(hand.truth["joints"]))
+
+
+def number_columns(hand: Hand, made: Made) -> Array:
+    """[n·B, p] block means of the torque's derivatives by the nominal's numbers, one joint after the other."""
     finger = read_finger(hand.truth)
     motion, force = kinematics(hand, finger, made.columns)
     size = max(1, round(BLOCK * hand.rate))
     columns = [averaged(column, size).T.ravel() for column in derivatives(finger, motion, force)]
-    time = averaged(motion.time, size)
-    slow = splines(time)
-    for j in range(finger.joints):
-        for k in range(slow.shape[1]):
-            column = np.zeros((finger.joints, len(time)))
-            column[j] = slow[:, k]
-            columns.append(column.ravel())
-    matrix = np.column_stack(columns)
-    matrix = matrix[:, np.linalg.norm(matrix, axis=0) > 0.0]
-    left, size_of, _ = np.linalg.svd(matrix / np.linalg.norm(matrix, axis=0), full_matrices=False)
-    return Seen(residual(hand, made), left[:, size_of > 1e-9 * size_of[0]], len(time))
+    blocks = len(made.columns["time"]) // size
+    return np.column_stack(columns) if columns else np.zeros((finger.joints * blocks, 0))
+
+
+def bias_columns(hand: Hand, made: Made) -> Array:
+    """[n·B, n·s] the slow bias of every joint."""
+    slow = splines(averaged(made.columns["time"], max(1, round(BLOCK * hand.rate))))
+    return np.kron(np.eye(len(hand.truth["joints"])), slow)
+
+
+def orthonormal(columns: Array) -> Array:
+    """[N, r] a basis of what the columns can do."""
+    columns = columns[:, np.linalg.norm(columns, axis=0) > 0.0]
+    left, size, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
+    return np.asarray(left[:, size > 1e-9 * size[0]])
 
 
 def residual(hand: Hand, made: Made) -> Array:
