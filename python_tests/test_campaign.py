@@ -9,11 +9,12 @@ from typing import Any
 
 import pytest
 
+from dask_on_loopback import dask_processes
 from tendonfmu import campaign as campaigns
 from tendonfmu.campaign import collect, run_campaign, still_to_do
 from tendonfmu.campaign_cases import Case, Truth, made, read_cases
 from tendonfmu.campaign_judgement import judge, judge_names
-from tendonfmu.campaign_rates import markdown, mean, rate, rates, rivals_of, seen_by
+from tendonfmu.campaign_rates import markdown, mean, rate, rates, rates_by_part, rivals_of, seen_by
 from tendonfmu.diagnosis_result import (
     Cause,
     Diagnosis,
@@ -179,6 +180,35 @@ def test_workers_of_dask_write_the_rows(tmp_path: Path) -> None:
     assert all("f.json" in row["error"] and row["run_seconds"] >= 0 for row in rows)
 
 
+@pytest.mark.slow
+def test_a_worker_of_a_cluster_dies_and_every_case_is_counted_once(tmp_path: Path) -> None:
+    """Diagnoses on two workers that are processes of their own on the loopback; one is killed after the first row."""
+    pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")
+    maker = Path(__file__).resolve().parent / "hidden_effects" / "cases.py"
+    options = {"joints": 1, "seconds": 12.0, "rate": 250.0}
+    cases = read_cases(
+        written(
+            tmp_path,
+            *(
+                {"name": f"null_{k}", "group": "null", "maker": f"{maker}:null", "arguments": {"seed": k, **options}}
+                for k in range(6)
+            ),
+        )
+    )
+    with dask_processes(2) as processes, workers_of(processes.address) as client:
+        client.wait_for_workers(2, timeout=30)
+
+        def kill_after_one(done: int, total: int) -> None:
+            if done == 1:
+                processes.workers[0].kill()
+
+        assert run_campaign(cases, tmp_path / "out", client, progress=kill_after_one) == 6
+        assert processes.workers[0].poll() is not None
+    rows = collect(cases, tmp_path / "out")
+    assert [row["name"] for row in rows] == [each.name for each in cases]
+    assert not any(row["error"] for row in rows) and rates(rows)[0].cases == 6
+
+
 # --- judging ----------------------------------------------------------------------------------------------------------
 
 
@@ -293,3 +323,31 @@ def test_the_gain_is_covered_where_the_interval_has_the_true_one() -> None:
     assert (line.hits, line.cases) == (2, 3)
     first = next(each for each in rates(rows) if each.what == "one effect at 0.1: true cause first")
     assert (first.hits, first.cases) == (3, 3)
+
+
+def test_rates_by_rig_and_joints_where_there_are_several() -> None:
+    def null(rig: str, joints: float, *causes: Cause) -> dict[str, Any]:
+        row = judge(case("null"), diagnosis(*causes)) | {"true_gain": 0.2}
+        return row | {"group": "null", "error": "", "rig": rig, "joints": joints}
+
+    rows = [null("matched", 1.0), null("matched", 2.0), null("numpy", 2.0, cause("gravity"))]
+    lines = {each.what: (each.hits, each.cases) for each in rates_by_part(rows)}
+    assert lines["nothing hidden: a false cause; matched"] == (0, 2)
+    assert lines["nothing hidden: a false cause; numpy"] == (1, 1)
+    assert lines["nothing hidden: a false cause; 1 joint"] == (0, 1)
+    assert lines["nothing hidden: a false cause; 2 joints"] == (1, 2)
+    # the gain of a case without a cause is 0 by construction: it is no question
+    assert lines["the gain's interval covers the true gain; numpy"] == (0, 1)
+    assert "the gain's interval covers the true gain; matched" not in lines
+    assert not rates_by_part(rows[:1]) and "; 2 joints |" in markdown(rows)
+
+
+def test_an_absorbed_effect_that_no_motion_shows_is_not_asked_for() -> None:
+    truth = Truth("force_offset", None, 2)
+    listed = (Invisible(Where("force_offset", None, 2), "", 0.001, "change the pretension"),)
+    row = judge(case("absorbed", truth), diagnosis(verdict="adequate", invisible=listed))
+    row |= {"group": "absorbed", "error": "", "named_after_experiment": False}
+    rows = [row | {"shown_strength": strength} for strength in (1e-6, 0.29, 0.31)] + [row]
+    by_name = {each.what: (each.hits, each.cases) for each in rates(rows)}
+    assert by_name["absorbed by refitting: “not visible”, with an experiment"] == (4, 4)
+    assert by_name["the same where a motion shows it: named after the experiment"] == (0, 2)

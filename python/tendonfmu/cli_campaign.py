@@ -45,7 +45,7 @@ def campaign(
     """
     from tendonfmu.campaign import How, collect, run_campaign, still_to_do
     from tendonfmu.campaign_cases import python_function, read_cases
-    from tendonfmu.campaign_rates import EFFECT_HEADINGS, HEADINGS, by_effect, markdown, rates
+    from tendonfmu.campaign_rates import EFFECT_HEADINGS, HEADINGS, by_effect, markdown, rates, rates_by_part
     from tendonfmu.fit_files import write_text
     from tendonfmu.jobs import worker_count, workers_of
     from tendonfmu.whole_file import check_output, check_output_folder
@@ -76,6 +76,8 @@ def campaign(
     if report is not None:
         write_text(report, markdown(rows))
     tables = [("rates", HEADINGS, [each.cells() for each in rates(rows)])]
+    by_part = [each.cells() for each in rates_by_part(rows)]
+    tables += [("by rig and joints", HEADINGS, by_part)] if by_part else []
     effects = by_effect(rows)
     print_tables([*tables, *([("single effects", EFFECT_HEADINGS, effects)] if effects else [])], [], left="goal")
     failed = sum(1 for row in rows if row["error"])

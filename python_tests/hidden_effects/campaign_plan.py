@@ -4,7 +4,8 @@
     tendonfmu campaign cases.json -o campaign --report rates.md
 
 Every case is a maker (cases.py, ../foreign/seeded_cases.py) with a seed; the worker that runs it makes its finger and
-recordings. Groups are spread evenly over the list, so that a campaign that is cut has some of each.
+recordings. Groups are spread evenly over the list, each in random order, so that a campaign that is cut has some of
+each.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ Options = Mapping[str, Any]
 
 
 def planned(counts: argparse.Namespace) -> Iterator[Listed]:
-    """All cases, lists of a kind spread evenly over the whole."""
+    """All cases, each kind in random order and spread evenly over the whole."""
     options = {"seconds": counts.seconds, "rate": counts.rate}
     seed, foreign = counts.seed, counts.foreign
     kinds = [
@@ -73,10 +74,15 @@ def planned(counts: argparse.Namespace) -> Iterator[Listed]:
         _foreign("unknown", NUMPY_UNKNOWN, MUJOCO_UNKNOWN, 2 * foreign, 2 * foreign, seed),
         _foreign("contact", (), MUJOCO_CONTACT, 0, 2 * foreign, seed),
     ]
-    lists = [list(kind) for kind in kinds]
+    random = np.random.default_rng([seed, 68])
+    lists = [_shuffled(list(kind), random) for kind in kinds]
     order = [(rank / len(cases), number, rank) for number, cases in enumerate(lists) for rank in range(len(cases))]
     for _, number, rank in sorted(order):
         yield lists[number][rank]
+
+
+def _shuffled(cases: list[Listed], random: np.random.Generator) -> list[Listed]:
+    return [cases[k] for k in random.permutation(len(cases))]
 
 
 def _case(name: str, group: str, maker: Path, function: str, **arguments: Any) -> Listed:
