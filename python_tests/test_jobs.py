@@ -46,6 +46,20 @@ def test_a_name_that_stands_twice_is_refused(tmp_path: Path) -> None:
     assert not any(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("name", ["", "../a", "a/b", ".a", "a\\b"])
+def test_a_name_that_no_file_can_have_is_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(InputError, match="expected one that a file can have"):
+        run_jobs(some_jobs.fail, [Job(name, (1,))], tmp_path)
+
+
+def test_what_no_row_can_hold_is_an_error_of_the_job(tmp_path: Path) -> None:
+    some = [Job("a", ({"list": [float("nan")]},)), Job("b", ({"object": Path()},)), Job("c", ({"name": "a", "x": 1},))]
+    assert run_jobs(dict, some, tmp_path) == 3
+    rows = rows_of(some, tmp_path)
+    assert rows[0]["error"].startswith("ValueError") and rows[1]["error"].startswith("TypeError")
+    assert (rows[2]["name"], rows[2]["x"], rows[2]["error"]) == ("c", 1, "")
+
+
 def test_no_job_begins_after_the_time(tmp_path: Path) -> None:
     log = tmp_path / "log"
     assert run_jobs(some_jobs.note, noting(5, 0.2, log), tmp_path / "out", stop_after=0.5) == 3

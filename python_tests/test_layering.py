@@ -43,8 +43,8 @@ ONLY = {
     "tendonfmu._plant": "plant.py",
     "tendonfmu._estimation": "estimation.py",
     "rich": "console.py",
-    "dask": "campaign.py",
-    "distributed": "campaign.py",
+    "dask": "jobs.py",
+    "distributed": "jobs.py",
 }
 COMMANDS = {
     "cli.py",

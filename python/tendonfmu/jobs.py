@@ -95,12 +95,10 @@ def run_jobs(
 
     Raises
     ------
-    InputError : a folder that cannot be written, names that are not unique, a scheduler that was lost.
+    InputError : a folder that cannot be written, names that no file can have or that are not unique, a scheduler that
+        was lost.
     """
-    names = [job.name for job in jobs]
-    if len(set(names)) < len(names):
-        twice = next(name for k, name in enumerate(names) if name in names[:k])
-        raise InputError(f"jobs: the name {twice} stands twice; expected names that differ")
+    _check_names([job.name for job in jobs])
     check_output_folder(folder)
     (folder / ROWS).mkdir(parents=True, exist_ok=True)
     waiting = waiting_jobs(jobs, folder, failed_again)
@@ -114,9 +112,23 @@ def run_jobs(
     return count
 
 
+def _check_names(names: Sequence[str]) -> None:
+    taken = set[str]()
+    for name in names:
+        if not name or name.startswith(".") or Path(name).name != name or "\\" in name:
+            raise InputError(f"jobs: name {name!r}; expected one that a file can have")
+        if name in taken:
+            raise InputError(f"jobs: the name {name} stands twice; expected names that differ")
+        taken.add(name)
+
+
 def write_row(folder: Path, row: Row) -> None:
     with whole_file(row_file(folder, row["name"])) as file:
-        file.write_text(json.dumps(_plain(row), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        file.write_text(_json(row) + "\n", encoding="utf-8")
+
+
+def _json(row: Row) -> str:
+    return json.dumps(_plain(row), indent=1, allow_nan=False)
 
 
 def _plain(row: Row) -> Row:
@@ -136,7 +148,8 @@ def call(function: Function, job: Job) -> Row:
     """The job's row, made where it runs."""
     begin, begin_cpu = time.perf_counter(), time.process_time()
     try:
-        row = {"name": job.name, "error": "", **function(*job.arguments)}
+        row = {"error": "", **function(*job.arguments), "name": job.name}
+        _json(row)  # what no row can hold is an error of the job
     except Exception as failed:  # days of work go on: the row says what happened
         row = failed_row(job.name, failed)
     return row | {"run_seconds": time.perf_counter() - begin, "cpu_seconds": time.process_time() - begin_cpu}
