@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import signal
 import sys
 import time
@@ -136,6 +137,19 @@ def test_a_job_that_kills_every_worker_is_an_error_of_its_own(tmp_path: Path) ->
         assert run_jobs(some_jobs.end_its_worker, some, tmp_path, client) == 3
     rows = {row["name"]: row["error"] for row in rows_of(some, tmp_path)}
     assert rows["1"].startswith("KilledWorker") and rows["0"] == "" and rows["2"] == ""
+
+
+def test_a_function_that_workers_cannot_import_is_an_error_of_each_job(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")
+    (tmp_path / "only_here.py").write_text("def nothing():\n    return {}\n", encoding="utf-8")
+    with dask_processes(1) as processes, workers_of(processes.address) as client:
+        monkeypatch.syspath_prepend(tmp_path)
+        function = importlib.import_module("only_here").nothing
+        some = [Job("a"), Job("b")]
+        assert run_jobs(function, some, tmp_path, client) == 2
+    assert ["only_here" in row["error"] for row in rows_of(some, tmp_path)] == [True, True], rows_of(some, tmp_path)
 
 
 def test_a_scheduler_that_dies_is_an_error_and_the_rest_is_resumed(tmp_path: Path) -> None:

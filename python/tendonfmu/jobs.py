@@ -194,7 +194,7 @@ def _rows_of_workers(function: Function, next_job: Callable[[], Job | None], cli
     try:
         top_up()
         for future in pending:
-            yield _row_of(future, under_way.pop(future), library)
+            yield _row_of(future, under_way.pop(future))
             top_up()
     except (OSError, library.CancelledError) as lost:  # what a job raises is in its row
         words = " ".join(str(lost).split())
@@ -204,14 +204,20 @@ def _rows_of_workers(function: Function, next_job: Callable[[], Job | None], cli
         ) from None
 
 
-def _row_of(future: Any, job: Job, library: Any) -> Row:
-    """A job that ends one worker after another (memory, a crash) is given up by dask: an error of its own."""
+def _row_of(future: Any, job: Job) -> Row:
+    """Errors of the job that `call` could not catch: a function that the worker cannot import, a job that ends one
+    worker after another (memory, a crash) until dask gives it up."""
     try:
-        return dict(future.result())
-    except library.KilledWorker as killed:
-        return failed_row(job.name, killed)
+        return failed_row(job.name, _first_of(future.exception())) if future.status == "error" else future.result()
     finally:
         future.release()  # else dask makes it again when the worker that has it dies
+
+
+def _first_of(failed: BaseException) -> BaseException:
+    """What dask wraps in an error of its own."""
+    while failed.__cause__ is not None:
+        failed = failed.__cause__
+    return failed
 
 
 # --- workers ----------------------------------------------------------------------------------------------------------
@@ -268,24 +274,23 @@ def version_here() -> str:
 
 
 def check_versions(client: Any, address: str) -> None:
-    """Raises InputError where there is no worker, or one that has another tendonfmu, or none."""
+    """Raises InputError where there is no worker, or a scheduler or worker without tendonfmu of this version."""
     try:
         client.wait_for_workers(1, timeout=SECONDS_TO_CONNECT)
     except TimeoutError:
         raise InputError(f"--scheduler {address}: no workers; expected at least one, `dask worker {address}`") from None
     try:
-        found = client.run(version_here)
-    except Exception as failed:  # of any worker: no such module, most often
-        words = " ".join(str(failed).split())
+        # the scheduler reads jobs, too
+        found = {"the scheduler": client.run_on_scheduler(version_here), **client.run(version_here)}
+    except Exception as failed:  # of any of them: no such module, most often
+        words = " ".join(str(_first_of(failed)).split())
         raise InputError(
-            f"--scheduler {address}: a worker cannot import tendonfmu ({words}); expected version {version_here()} "
-            "there"
+            f"--scheduler {address}: it or a worker cannot import tendonfmu ({words}); expected version "
+            f"{version_here()} there"
         ) from None
-    for worker, version in found.items():
+    for place, version in found.items():
         if version != version_here():
-            raise InputError(
-                f"--scheduler {address}: worker {worker} has tendonfmu {version}; expected {version_here()}"
-            )
+            raise InputError(f"--scheduler {address}: {place} has tendonfmu {version}; expected {version_here()}")
 
 
 def worker_count() -> int:
