@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 Columns = Mapping[str, Array]
 
 NOTHING = "nothing"
+# what a change of speed alone may show of a model that is not exact: not false where `now` is faster or slower
+BY_SPEED = ("viscous_friction", "stribeck", "time_delay", "inertia")
 HALVES = {1: "odd", 0: "even"}  # of the case's number: odd to develop on, even to report
 FINGER, TRUTH = "finger.json", "truth.json"
 

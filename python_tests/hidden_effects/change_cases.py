@@ -19,7 +19,7 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
-from change_case import HALVES, NOTHING, Case, Columns, Truth, write_case  # noqa: E402
+from change_case import BY_SPEED, HALVES, NOTHING, Case, Columns, Truth, write_case  # noqa: E402
 from change_effects import CHANGES, hide  # noqa: E402
 from change_machines import (  # noqa: E402
     KINEMATICS,
@@ -182,6 +182,7 @@ def made_of(plan: Plan, pair: Pair) -> Case:
         machine=pair.machine,
         model=plan.model,
         hidden=plan.hidden,
+        also=BY_SPEED if pair.conditions == "speed" else (),
         joint=1,
         tendon=1,
         conditions=pair.conditions,
@@ -200,7 +201,7 @@ def with_change(truth: Truth, plan: Plan, then: Machine, now: Machine) -> tuple[
     truth = replace(
         truth,
         effects=change.names,
-        also=change.also,
+        also=(*truth.also, *change.also),
         signs={name: change.sign * sign for name, sign in change.signs.items() if name in change.names},
         strength=plan.strength,
         size=hidden.magnitude,

@@ -142,7 +142,13 @@ class Change:
 
 
 FRICTION = ("joint_friction", "preload_friction")
-UP = {"joint_friction": 1, "preload_friction": 1, "viscous_friction": 1, "stribeck": 1} | dict.fromkeys(GROWING, 1)
+UP = {
+    "joint_friction": 1,
+    "preload_friction": 1,
+    "viscous_friction": 1,
+    "stribeck": 1,
+    "friction_drift": 1,
+} | dict.fromkeys(GROWING, 1)
 
 CHANGES = {
     "coulomb": Change(coulomb, FRICTION, "N.m", UP),
@@ -160,7 +166,8 @@ CHANGES = {
     ),
     "near_standstill": Change(near_standstill, ("stribeck",), "N.m", UP),
     "along_the_stroke": Change(along_the_stroke, GROWING, "m", UP, 0.02, "arm"),
-    "with_time": Change(with_time, ("friction_drift",), "N.m", {"friction_drift": 1}, also=FRICTION),
+    # there is more friction now, and it grows: either is right
+    "with_time": Change(with_time, ("friction_drift", *FRICTION), "N.m", UP),
     "longer_presliding": Change(longer_presliding, ("presliding",), "rad", {"presliding": 1}, 0.01, "stroke"),
     "heavier": Change(heavier, ("inertia",), "kg.m2", {"inertia": 1}, 1.0, "one", machines=("emps",)),
     "weight": Change(weight, ("gravity",), "N.m", {}, also=("cover_stiffness",), machines=("davinci",)),

@@ -86,9 +86,13 @@ def thinned(columns: Columns, to_one: int = THINNED) -> Columns:
     return {name: values[:rows].reshape(-1, to_one).mean(axis=1) for name, values in columns.items()}
 
 
-def cut(machine: str, stretches: Sequence[Stretch]) -> dict[str, Columns]:
-    """Recordings at 1 kHz, by the words of their stretches."""
-    return {str(each): part_of(recording(machine, each.run), each.begin, each.end) for each in stretches}
+def cut(machine: str, stretches: Sequence[Stretch], known_load: bool = True) -> dict[str, Columns]:
+    """Recordings at 1 kHz, by the words of their stretches. known_load: with the column `external_torque`."""
+    found = {str(each): part_of(recording(machine, each.run), each.begin, each.end) for each in stretches}
+    return {
+        words: {name: values for name, values in columns.items() if known_load or name != LOAD}
+        for words, columns in found.items()
+    }
 
 
 def diagnosed_model(machine: str) -> Description:
@@ -98,14 +102,14 @@ def diagnosed_model(machine: str) -> Description:
 
 
 @cache
-def plain_model(machine: str, stretches: tuple[Stretch, ...]) -> Mapping[str, Any]:
+def plain_model(machine: str, stretches: tuple[Stretch, ...], known_load: bool) -> Mapping[str, Any]:
     """Coulomb and viscous friction as in examples, fitted to the stretches: what most users have."""
     folder, name = PLAIN[machine]
     start = json.loads((ROOT / "examples" / folder / name).read_text(encoding="utf-8"))
     with tempfile.TemporaryDirectory() as scratch, warnings.catch_warnings():
         warnings.simplefilter("ignore", FitWarning)
         files = []
-        for k, columns in enumerate(cut(machine, stretches).values()):
+        for k, columns in enumerate(cut(machine, stretches, known_load).values()):
             files.append(Path(scratch) / f"{k}.parquet")
             write_table(files[-1], dict(thinned(columns)))
         fit = FrictionFit(start, kinematics=KINEMATICS[machine], threads=1, uncertainty=False).fit(files)
@@ -113,9 +117,9 @@ def plain_model(machine: str, stretches: tuple[Stretch, ...]) -> Mapping[str, An
     return fitted
 
 
-def model_of(machine: str, model: str, stretches: tuple[Stretch, ...]) -> Description:
+def model_of(machine: str, model: str, stretches: tuple[Stretch, ...], known_load: bool = True) -> Description:
     """stretches: of the machine as it was, which a plain model is fitted to."""
-    return diagnosed_model(machine) if model == "diagnosed" else dict(plain_model(machine, stretches))
+    return diagnosed_model(machine) if model == "diagnosed" else dict(plain_model(machine, stretches, known_load))
 
 
 def seen(machine: str, model: Description, recordings: Mapping[str, Columns]) -> Machine:
