@@ -1,29 +1,22 @@
-"""Real changes of the da Vinci instrument, as folders: another load that no sensor shows, and another speed.
-
-    python python_tests/hidden_effects/change_real.py -o DIR [--half odd]
+"""The bed `real`: what really changed at the da Vinci instrument, another load that no sensor shows, or another speed.
 
 Load: every pair of runs at one speed, `external_torque` taken out of both. What changed is a nearly constant torque on
 the jaw: right answers are those of change_judgement.LOAD. Friction did not change: it grows with the load by one law.
 To say nothing is no error where the bias of each recording may take a constant; the table counts it apart.
 Speed: 0.1 Hz and 0.5 Hz under one load, with the column: nothing but what speed explains (change_case.BY_SPEED).
-Both directions and both models alternate. Develop on odd cases, report even ones.
+Directions, models and halves alternate.
 """
 
 from __future__ import annotations
 
-import argparse
-import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from itertools import combinations
-from pathlib import Path
 from typing import Any
 
-HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE))
-
-from change_case import BY_SPEED, HALVES, NOTHING, Case, Truth, write_case  # noqa: E402
-from change_judgement import LOAD  # noqa: E402
-from change_machines import KINEMATICS, MODELS, Stretch, cut, model_of, thinned  # noqa: E402
+from change_case import BY_SPEED, NOTHING, Case, Truth
+from change_judgement import LOAD
+from change_machines import KINEMATICS, MODELS, Stretch, cut, model_of, thinned
 
 BED, MACHINE = "real", "davinci"
 OTHER_LOAD = "other_load"
@@ -77,16 +70,6 @@ def make(told: Truth, then: str, now: str) -> Case:
     return Case(told, model, *(tuple(map(thinned, each.values())) for each in recordings))
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the cases")
-    parser.add_argument("--half", choices=(*HALVES.values(), "all"), default="all", help="cases of odd or even number")
-    given = parser.parse_args()
-    for told, then, now in truths():
-        wanted = given.half in ("all", told.half) and not list(given.output.glob(f"{BED}_{told.number:04d}_*"))
-        if wanted:
-            print(write_case(make(told, then, now), given.output), flush=True)
-
-
-if __name__ == "__main__":
-    main()
+def makers() -> dict[int, Callable[[], Case]]:
+    """By number, what makes the case."""
+    return {told.number: partial(make, told, then, now) for told, then, now in truths()}

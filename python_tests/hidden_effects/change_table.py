@@ -3,7 +3,7 @@
     python python_tests/hidden_effects/change_table.py CASES -o rows.csv [--half even] [--without-reference]
     python python_tests/hidden_effects/change_table.py -o rows.csv --print-only
 
-CASES is a folder that change_cases.py, change_real.py or change_simulated.py made. A row is written as its case ends;
+CASES is a folder that change_cases.py made. A row is written as its case ends;
 cases that the file has already, by the same way of asking, are not run again. Reports are kept with --keep.
 """
 
