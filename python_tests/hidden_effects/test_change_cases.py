@@ -46,10 +46,13 @@ def recording(seed: int, noise: float = NOISE) -> Columns:
     }
 
 
+def law_of(coulomb: float, viscous: float) -> Description:
+    return {"static": coulomb, "coulomb": coulomb, "stribeck_velocity": 0.1, "viscous": viscous}
+
+
 def model() -> Description:
     """EMPS's, with the friction of `recording` and without what that has not."""
-    law = {"static": COULOMB, "coulomb": COULOMB, "stribeck_velocity": 0.1, "viscous": VISCOUS}
-    joint = {"name": "carriage", "friction": law}
+    joint = {"name": "carriage", "friction": law_of(COULOMB, VISCOUS)}
     presliding = {"effect": "presliding", "joint": 1, "displacement": PRESLIDING}
     bias = {**diagnosed_model("emps")["bias"], "initial_torque": [0.0]}
     return diagnosed_model("emps") | {"joints": [joint], "extensions": [presliding], "bias": bias}
@@ -82,6 +85,47 @@ def test_more_friction_takes_power_out_in_both_directions(name: str) -> None:
     for way in (-1, 1):
         rows = np.sign(columns[SPEED]) == way
         assert np.mean(torque[rows] * columns[SPEED][rows]) > 0.0
+
+
+JOINT, PLACE = {"joint": 1}, {"joint": 1, "tendon": 1}
+# what a description has more of when the effect has grown: a row of extensions, or a number of its joint
+GROWN: dict[str, Description] = {
+    "cover_stiffness": {"cover": {"stiffness": 1.0, "rest_angle": 0.0}},
+    "joint_friction": {"friction": law_of(COULOMB + 0.1, VISCOUS)},
+    "viscous_friction": {"friction": law_of(COULOMB, VISCOUS + 1.0)},
+    "force_gain": {"tendon": 1, "correction": 0.01},
+    "moment_arm": PLACE | {"correction": 0.01},
+    "moment_arm_variation": PLACE | {"slope": 0.1},
+    "preload_friction": PLACE | {"coulomb": 0.1},
+    "load_friction": PLACE | {"coulomb": 0.01},
+    "inertia": JOINT | {"inertia": 0.1},
+    "friction_drift": JOINT | {"amplitude": 0.1, "time_constant": 3.0},
+    "stribeck": JOINT | {"amplitude": 0.1, "stribeck_velocity": 0.05},
+    "time_delay": {"delay": 0.002},
+    "presliding": JOINT | {"displacement": PRESLIDING + 0.002},  # as much as the change: it is not linear
+}
+SIGNED = [
+    (name, effect)
+    for name, change in CHANGES.items()
+    for effect in change.names
+    if effect in change.signs and effect in GROWN
+]
+
+
+@pytest.mark.parametrize(("name", "effect"), SIGNED)
+def test_the_sign_of_the_truth_is_that_of_the_models_own_number(name: str, effect: str) -> None:
+    """What the change adds to the residual is what the model with more, or less, of the effect takes off it."""
+    change, columns = CHANGES[name], NOW.recordings["run 2"]
+    grown = model()
+    if effect in ("cover_stiffness", "joint_friction", "viscous_friction"):
+        grown["joints"][0] |= GROWN[effect]
+    else:
+        kept = [row for row in grown["extensions"] if row["effect"] != effect]
+        grown["extensions"] = [*kept, {"effect": effect} | GROWN[effect]]
+    before = residual(NOW, columns)
+    put_in = residual(NOW, change.put(NOW, columns, change.sign * first_magnitude(change, NOW))) - before
+    taken_off = before - residual(replace(NOW, model=grown), columns)
+    assert np.corrcoef(put_in, taken_off)[0, 1] * change.sign * change.signs[effect] > 0.3
 
 
 def test_a_change_of_a_number_counts_as_a_whole_and_one_of_no_number_by_what_refitting_leaves() -> None:
