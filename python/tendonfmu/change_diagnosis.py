@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from tendonfmu.cause_search import residual_alone
-from tendonfmu.cause_selection import LEAST_SHARE, Judged
+from tendonfmu.cause_selection import LEAST_SHARE
 from tendonfmu.change_evidence import change_evidence
 from tendonfmu.change_load import steady_load
 from tendonfmu.change_search import Change, ChangeSearch
@@ -24,6 +24,7 @@ from tendonfmu.change_trend import sizes_by_recording
 from tendonfmu.description import FingerDescription
 from tendonfmu.diagnosis_result import (
     Cause,
+    ChangedSize,
     Diagnosis,
     Experiment,
     FoundPlace,
@@ -42,7 +43,7 @@ from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.fit_structure import Choice
 from tendonfmu.gain import measure_gain
 from tendonfmu.gain_interval import gain_interval
-from tendonfmu.hypotheses import HERE, Hypothesis
+from tendonfmu.hypotheses import HERE, Hypothesis, Key
 from tendonfmu.phases import Phases
 from tendonfmu.residual_views import residual_views, whiteness
 from tendonfmu.signal_choice import Estimation, choose, estimation_recordings
@@ -82,6 +83,13 @@ def find_changes(case: ChangeCase, *, least_gain: float, seed: int, jobs: int, p
     return _Changes(case, chosen, settings, least_gain, seed, phases).diagnosis()
 
 
+def sizes_now(case: ChangeCase, keys: Sequence[Key], *, seed: int, jobs: int) -> list[tuple[Key, ChangedSize]]:
+    """How large these effects are in the new recordings, named or not; of those that the description can have."""
+    settings = FitSettings(threads=jobs, path=case.finger.path)
+    own = _Changes(case, choose(case.finger, case.then, settings), settings, 0.0, seed, Phases(PHASES))
+    return own.sizes(keys)
+
+
 class _Changes:
     """Everything that is reported."""
 
@@ -105,25 +113,34 @@ class _Changes:
         self._grid = make_grid(self._all)
 
     def diagnosis(self) -> Diagnosis:
-        first = len(self._then)
         with self._phases.start("contact"):
-            events, out = events_of(self._chosen.model.data, self._all, self._grid, self._seed)
-            self._events = tuple(each for each in events if each.recording in {str(r.path) for r in self._all[first:]})
+            out = self._without_events()
         with self._phases.start("changes") as step:
-            self._search = ChangeSearch(
-                self._chosen.model.data,
-                self._all,
-                self._grid,
-                self._chosen.least,
-                range(first, first + len(self._now)),
-                range(first + len(self._now), len(self._all)),
-                out,
-                self._seed,
-            )
+            self._search = self._made(out)
             self._search.run(self._least_gain, step)
         with self._phases.start("gain on unseen data"):
             dropped, gains = self._verified()
             return self._result(dropped, gains)
+
+    def _without_events(self) -> Flags:
+        """[B] blocks that lie in contact or a stall."""
+        names = {str(each.path) for each in self._all[len(self._then) :]}
+        events, out = events_of(self._chosen.model.data, self._all, self._grid, self._seed)
+        self._events = tuple(each for each in events if each.recording in names)
+        return out
+
+    def _made(self, out: Flags) -> ChangeSearch:
+        first, last = len(self._then), len(self._then) + len(self._now)
+        now, tests = range(first, last), range(last, len(self._all))
+        model, least = self._chosen.model.data, self._chosen.least
+        return ChangeSearch(model, self._all, self._grid, least, now, tests, out, self._seed)
+
+    def sizes(self, keys: Sequence[Key]) -> list[tuple[Key, ChangedSize]]:
+        """Of effects at places in the new recordings, all of them free."""
+        search = self._search = self._made(self._without_events())
+        search.free(keys)
+        found = [search.certain(k) for k in range(len(search.changes))]
+        return [(each.hypothesis.key, sized(search, found, k).size) for k, each in enumerate(found)]
 
     # --- verified on unseen data ---
 
@@ -161,14 +178,9 @@ class _Changes:
             search.keep([each for k, each in enumerate(search.changes) if k != worst])
 
     def _sharpened(self, number: int) -> Change:
-        """With the covariance and p-value beside all other changes."""
-        search = self._search
-        change, grams = search.changes[number], search.grams(number)
-        own = change.hypothesis
-        error, _ = grams.error(own.mix, own.low, own.high)
-        magnitudes = grams.magnitudes(own.mix, own.low, own.high)
-        p_value, covariance = search.certainty(grams, Judged(own, error, np.zeros(0), magnitudes))
-        return replace(change, covariance=covariance, p_value=min(max(p_value, change.p_value), 1.0))
+        """With the covariance and p-value beside all other changes; the p-value is that of the search, if larger."""
+        found = self._search.certain(number)
+        return replace(found, p_value=min(max(found.p_value, self._search.changes[number].p_value), 1.0))
 
     # --- the models ---
 

@@ -27,7 +27,7 @@ from tendonfmu.diagnosis_series import Grid, Series, block_prediction
 from tendonfmu.extension_fit import Accepted, extended_description
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.held_out_folds import Folds, make_folds
-from tendonfmu.hypotheses import Hypothesis, hypotheses
+from tendonfmu.hypotheses import Hypothesis, Key, hypotheses
 from tendonfmu.least_sizes import LeastSizes
 from tendonfmu.phases import Step
 from tendonfmu.repeated_motion import find_repeats, less_reference, outside
@@ -157,10 +157,34 @@ class ChangeSearch:
 
     def _take(self, change: Change) -> None:
         self.changes.append(change)
+        self._settle()
+
+    def _settle(self) -> None:
         for _ in range(STEPS):
             self.selection = self._look()
             self.changes = self.moved_on(self.selection.grams)
         self.selection = self._look()
+
+    def free(self, keys: Sequence[Key]) -> None:
+        """Frees these effects at these places in the new recordings, whether they are certain or not: each with the
+        form that fits best. Those that the description cannot have are left out."""
+        for key in keys:
+            grams = self.selection.grams
+            own = [each for each in self.hypotheses if each.key == key]
+            if own:
+                best = min(own, key=lambda each: grams.error(each.mix, each.low, each.high)[0])
+                nothing = np.zeros(best.mix.shape[1])
+                self.changes.append(Change(best, nothing, np.diag(nothing), 0.0, np.inf, 1.0))
+                self._settle()
+
+    def certain(self, number: int) -> Change:
+        """A change with the covariance and p-value that it has beside all others."""
+        change, grams = self.changes[number], self.grams(number)
+        own = change.hypothesis
+        _, by_fold = grams.error(own.mix, own.low, own.high)
+        magnitudes = grams.magnitudes(own.mix, own.low, own.high)
+        p_value, covariance = self.certainty_of(grams, own.mix, magnitudes, by_fold)
+        return replace(change, covariance=covariance, p_value=p_value)
 
     def moved_on(self, grams: Grams) -> list[Change]:
         """The changes, each with what is added to its magnitudes by a solution in which their columns are shared."""

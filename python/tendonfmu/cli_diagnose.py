@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from tendonfmu.cli_options import FingerFile, FreeRecordings, Jobs, Kinematics, LeastGain, Progress, Seed
-from tendonfmu.console import PhaseDisplay, print_tables, say
+from tendonfmu.console import PhaseDisplay, print_tables, progress_bar, say
 from tendonfmu.errors import InputError
 from tendonfmu.several_values import SeveralValues
 
@@ -38,6 +38,18 @@ def diagnose(
             "another motion, pretension or length will do, the same motion tells most",
         ),
     ] = None,
+    history: Annotated[
+        bool,
+        typer.Option(
+            "--history",
+            help="each recording, in order of time, held against the reference, by default the first: a line per "
+            "recording and cause, and how fast it grows",
+        ),
+    ] = False,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="of a dask cluster, for --history \\[default: --jobs processes]"),
+    ] = None,
     kinematics: Kinematics = 1,
     least_gain: LeastGain = 0.03,
     seed: Seed = 0,
@@ -48,7 +60,8 @@ def diagnose(
 
     The given structure is fitted first: a cause is what that cannot mend. With --reference a cause is what has changed
     since; several recordings of now, in order of time, show how it grows. DIR gets the page diagnosis.html,
-    diagnosis.json, figures, and the model with its causes, extended.json and extended.fmu.
+    diagnosis.json, figures, and the model with its causes, extended.json and extended.fmu; with --history the page
+    history.html, history.csv and history.png.
     """
     from tendonfmu.diagnosis import diagnose as find
     from tendonfmu.diagnosis_files import check_folder, write_diagnosis
@@ -58,6 +71,13 @@ def diagnose(
     if not 0.0 <= least_gain <= 0.5:  # NaN passes the range
         raise InputError(f"--least-gain {least_gain:g}: expected 0 to 0.5")
     tests, before = test or [], reference or []
+    if history:
+        if tests:
+            raise InputError("--test: with --history; expected recordings in order of time alone")
+        _history(finger, recordings, before, output, scheduler, kinematics, least_gain, seed, jobs, progress)
+        return
+    if scheduler is not None:
+        raise InputError("--scheduler: without --history; expected both or none")
     check_folder(output, [finger, *recordings, *tests, *before])
     check_given_once(recordings, tests, "a test")
     check_given_once([*recordings, *tests], before, "the reference")
@@ -78,6 +98,58 @@ def diagnose(
     for sentence in found.warnings:
         say(f"tendonfmu: warning: {sentence}")
     print_tables(tables(found), lines(found), left="may also be")
+    for path, what in written.items():
+        say(f"{path}: {what}")
+
+
+def _history(
+    finger: Path,
+    recordings: list[Path],
+    reference: list[Path],
+    output: Path,
+    scheduler: str | None,
+    kinematics: int,
+    least_gain: float,
+    seed: int,
+    jobs: int,
+    progress: bool | None,
+) -> None:
+    """`diagnose --history`."""
+    from contextlib import nullcontext
+
+    from tendonfmu.change_history import diagnose_history
+    from tendonfmu.description import read_finger
+    from tendonfmu.diagnosis_text import Names
+    from tendonfmu.fit_files import check_given_once
+    from tendonfmu.history_files import write_history
+    from tendonfmu.history_text import headline, rows_of_lines
+    from tendonfmu.jobs import workers_of
+    from tendonfmu.whole_file import check_output_folder
+
+    check_given_once(recordings, reference, "the reference")
+    check_output_folder(output)
+    given = read_finger(finger)
+    several = scheduler is not None or jobs > 1
+    with workers_of(scheduler, jobs) if several else nullcontext() as client, progress_bar(progress) as bar:
+        task = bar.add_task("recordings", total=2 * len(recordings))
+        found = diagnose_history(
+            given,
+            recordings,
+            reference,
+            rows=output,
+            client=client,
+            kinematics=kinematics,
+            least_gain=least_gain,
+            seed=seed,
+            progress=lambda done, total: bar.update(task, completed=done, total=total),
+        )
+    names = Names(tuple(given.joint_names), tuple(given.tendon_names))
+    written = write_history(found, names, output)
+    headings = ("cause", "place", "reference", "last", "named in", "trend")
+    rows = list(rows_of_lines(found, names))
+    print_tables([(found.finger, headings, rows)] if rows else (), [headline(found)], left="trend")
+    for name, why in found.failed:
+        say(f"tendonfmu: warning: {name} is left out: {why}")
     for path, what in written.items():
         say(f"{path}: {what}")
 
