@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from tendonfmu.campaign_cases import NOT_IN_MODEL, Case, Truth
@@ -11,6 +12,21 @@ from tendonfmu.diagnosis_result import Cause, Diagnosis, FoundPlace, Where
 
 ALARMS = ("unexplained", "partly explained")
 QUESTIONS = ("in_set", "first", "set_size", "place", "both", "exactly", "not_visible", "experiment")
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a rival says of a case.
+
+    names: causes, the first one first. one_of: it says only that one of them is there, so none of several is first.
+    alarm: something is missing, with or without a name; None: it does not say. gain: 1 − rms ratio of its model and the
+    nominal one on the tests; None: it has no model.
+    """
+
+    names: Sequence[Where] = ()
+    one_of: bool = False
+    alarm: bool | None = None
+    gain: float | None = None
 
 
 def judge(case: Case, found: Diagnosis) -> dict[str, Any]:
@@ -64,16 +80,26 @@ def judge_causes(case: Case, causes: Sequence[Cause]) -> dict[str, Any]:
     return row
 
 
-def judge_names(case: Case, names: Sequence[Where]) -> dict[str, Any]:
-    """The same questions for a rival that only names causes, the first one first."""
-    row: dict[str, Any] = {"cause_count": len(names), "detected": bool(names), "wrong_name": bool(names)}
-    row |= dict.fromkeys(("in_set", "first", "place", "both", "exactly"))
-    effects = [where.effect for where in names]
+def judge_names(case: Case, said: Sequence[Where] | Answer) -> dict[str, Any]:
+    """The same questions for a rival. said: its answer, or the causes that it names alone."""
+    answer = said if isinstance(said, Answer) else Answer(said)
+    names, effects = answer.names, list(dict.fromkeys(where.effect for where in answer.names))
+    row: dict[str, Any] = {
+        "causes": json.dumps([_place(where) for where in names]),
+        "cause_count": 1 if answer.one_of and names else len(names),
+        "detected": bool(names) or bool(answer.alarm),
+        "wrong_name": bool(names),
+        "unknown": None if answer.alarm is None else answer.alarm and not names,
+        "gain": answer.gain,
+    }
+    row |= dict.fromkeys(("in_set", "first", "place", "set_size", "both", "exactly"))
     if case.group == "single":
         truth = _hidden(case)[0]
         row |= {"in_set": truth.effect in effects, "first": effects[:1] == [truth.effect]}
-        named = [where for where in names if where.effect == truth.effect][:1]
-        row |= {"place": _is_at(named[0], truth)} if named else {}
+        if answer.one_of:
+            row |= {"first": effects == [truth.effect], "set_size": len(effects) if effects else None}
+        own = _of(names, truth.effect)[: None if answer.one_of else 1]
+        row |= {"place": any(_is_at(each, truth) for each in own)} if own else {}
     if case.group == "double":
         both = all(truth.effect in effects for truth in _hidden(case))
         row |= {"both": both, "exactly": both and len(names) == len(case.truth)}
