@@ -148,3 +148,25 @@ def campaign(
                     pair = judged(finger, runs, name), judged(after, runs, name)
                     found.append(Outcome(way.name, factor, name, *pair))
     return found
+
+
+@dataclass(frozen=True)
+class SampleCount:
+    """Samples of the joint that a fit was trained on, and how many independent ones they are worth."""
+
+    runs: str
+    samples: float
+    worth: float
+
+
+def sample_counts() -> list[SampleCount]:
+    """Of the even loads together, and of the first, a middle and the last run at 0.1 Hz alone."""
+    with tempfile.TemporaryDirectory() as scratch:
+        runs = read_runs(Path(scratch))
+        chosen = {"even loads together": EVEN} | {f"run {name} alone": (name,) for name in ("00", "05", "09")}
+        found = []
+        for name, own in chosen.items():
+            fit = fitted(STRUCTURE, [runs[each] for each in own], {"effective_samples": True})
+            counts = json.loads(report_text(fit.report_))["innovations"]["effective"]
+            found.append(SampleCount(name, sum(counts["samples"]), sum(counts["worth"])))
+        return found

@@ -11,7 +11,7 @@ import argparse
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
-from recalibration import EVEN, PLANTED, Outcome, campaign, ways
+from recalibration import EVEN, PLANTED, Outcome, SampleCount, campaign, sample_counts, ways
 
 from tendonfmu.previous_fit import CHANGE
 
@@ -58,12 +58,19 @@ def by_run(found: Sequence[Outcome]) -> Iterator[str]:
         yield f"| {way} | {' | '.join(f'{ratio[run]:.2f}' for run in runs)} |"
 
 
+def by_samples(found: Sequence[SampleCount]) -> Iterator[str]:
+    yield "| | samples | worth |"
+    yield "| --- | ---: | ---: |"
+    yield from (f"| {each.runs} | {each.samples:.0f} | {each.worth:.0f} |" for each in found)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--change", type=float, nargs="*", default=[CHANGE])
     found = campaign(ways(parser.parse_args().change))
     print("\n".join(rows(found)), end="\n\n")
-    print("\n".join(by_run(found)))
+    print("\n".join(by_run(found)), end="\n\n")
+    print("\n".join(by_samples(sample_counts())))
 
 
 if __name__ == "__main__":

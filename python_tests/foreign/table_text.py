@@ -20,6 +20,9 @@ def markdown(rows: Sequence[Row], title: str) -> str:
         lines += [f"## {family}", "", *summary_lines([row for row in rows if row["family"] == family]), ""]
     if len({row["family"] for row in rows}) > 1:
         lines += ["## all", "", *summary_lines(rows), ""]
+    nothing = [row for row in rows if row["truth"]["hidden"] == "none" and row["report"] is not None]
+    if nothing:
+        lines += ["## nothing hidden: rms of r on the test, mN·m by joint", "", *error_lines(nothing), ""]
     return "\n".join(lines)
 
 
@@ -38,6 +41,15 @@ def line(row: Row) -> str:
             f"{judged['error_ratio']:.2f}",
         ]
     return "| " + " | ".join([*cells, f"{run['cpu_seconds']:.0f}", f"{run['peak_megabytes']:.0f}"]) + " |"
+
+
+def error_lines(rows: Sequence[Row]) -> list[str]:
+    lines = ["| case | joints | nominal | extended |", "| --- | --- | ---: | ---: |"]
+    for row in rows:
+        errors = [row["report"][model]["test_rms"] for model in ("nominal", "extended")]
+        spoken = (", ".join(f"{1e3 * value:.2f}" for value in each) for each in errors)
+        lines.append(f"| {row['case']} | {len(errors[0])} | " + " | ".join(spoken) + " |")
+    return lines
 
 
 def hidden(truth: Row) -> str:

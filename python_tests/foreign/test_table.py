@@ -68,3 +68,11 @@ def test_halves_and_numbers() -> None:
     odd, even = (table.numbers(fingers_in_numpy, half, None) for half in ("odd", "even"))
     assert sorted(odd + even) == list(fingers_in_numpy.NUMBERS) and all(number % 2 for number in odd)
     assert table.numbers(fingers_in_numpy, "all", [3, 99]) == [3]
+
+
+def test_errors_where_nothing_is_hidden_are_by_joint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    row = run_row(WRITES, tmp_path, monkeypatch)
+    assert "nothing hidden" not in markdown([row], "made").splitlines()[-2]
+    report = {**row["report"], "nominal": {"test_rms": [0.002, 0.003]}, "extended": {"test_rms": [0.00117, 0.0013]}}
+    nothing = {**row, "case": "x_01", "truth": {**row["truth"], "hidden": "none"}, "report": report}
+    assert "| x_01 | 2 | 2.00, 3.00 | 1.17, 1.30 |" in markdown([nothing], "made").splitlines()
