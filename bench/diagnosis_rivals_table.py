@@ -124,6 +124,17 @@ def _mean(group: str, number: Callable[[Verdict], int | None]) -> Callable[[Sequ
     return cell
 
 
+def _unnamed(group: str) -> Callable[[Sequence[Row], str], str]:
+    """Says that something is there that it cannot name; who never says so has a dash."""
+
+    def cell(rows: Sequence[Row], who: str) -> str:
+        key = "unknown" if who == OWN else f"{who}.unknown"
+        said = [row[key] for row in rows if row["group"] == group and row.get(key) is not None]
+        return f"{sum(said)} of {len(said)}" if said else "–"
+
+    return cell
+
+
 def _gain(group: str) -> Callable[[Sequence[Row], str], str]:
     def cell(rows: Sequence[Row], who: str) -> str:
         key = "gain" if who == OWN else f"{who}.gain"
@@ -143,6 +154,7 @@ CELLS: dict[str, Callable[[Sequence[Row], str], str]] = {
     "one effect: false causes per case": _mean("single", lambda it: it.false),
     "one effect: effects in the set": _mean("single", lambda it: it.set_size),
     "not on the list: names something": _share("unknown", lambda it: it.false > 0),
+    "not on the list: says there is something, unnamed": _unnamed("unknown"),
     "nothing hidden: gain, median and range": _gain("null"),
     "one effect: gain": _gain("single"),
     "not on the list: gain": _gain("unknown"),
