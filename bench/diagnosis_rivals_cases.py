@@ -19,9 +19,10 @@ from typing import Any
 TESTS = Path(__file__).resolve().parent.parent / "python_tests"
 sys.path += [str(TESTS / "foreign"), str(TESTS / "hidden_effects")]
 
-import cases as matched  # noqa: E402
 import fingers_in_mujoco  # noqa: E402
 import fingers_in_numpy  # noqa: E402
+from effects_hidden import BUILDERS  # noqa: E402
+from hidden_unknown import UNKNOWN  # noqa: E402
 from judgement import is_absorbed  # noqa: E402
 
 TRAIN, TEST = 30.0, 15.0  # s
@@ -38,7 +39,7 @@ def foreign(folder: Path, family: str, number: int) -> dict[str, Any]:
     made.test.to_parquet(folder / "test.parquet", index=False)
     truth = {"effect": made.truth.hidden, "joint": made.truth.joint, "tendon": made.truth.tendon}
     listed = {"single": [{key: value for key, value in truth.items() if value is not None}]}
-    facts = {"hidden": made.truth.hidden, "joints": made.truth.joints, "also": ",".join(made.truth.also)}
+    facts = {"hidden": made.truth.hidden, "joints": made.truth.joints, "simulated_too": ",".join(made.truth.also)}
     return {
         "rig": family,
         "finger": "finger.json",
@@ -70,10 +71,38 @@ def foreign_cases() -> Iterator[dict[str, Any]]:
 
 
 def matched_cases(seed: int) -> Iterator[dict[str, Any]]:
-    options = {"joints": 2, "seconds": TRAIN, "rate": 500.0, "test": TEST}
-    for case in matched.planned(NULLS, 1, [STRENGTH], 0, seed, **options):
-        if case["group"] in ("null", "single", "unknown"):
-            yield case | {"maker": str(TESTS / "hidden_effects" / case["maker"])}
+    """Of the makers in python_tests/hidden_effects/cases.py, nothing hidden, one effect and unlisted ones in turn."""
+    groups = [list(_nulls(seed)), list(_singles(seed)), list(_unlisted(seed))]
+    order = [(rank / len(group), number, rank) for number, group in enumerate(groups) for rank in range(len(group))]
+    for _, number, rank in sorted(order):
+        yield groups[number][rank]
+
+
+def _nulls(seed: int) -> Iterator[dict[str, Any]]:
+    """Half with presliding, half with a bias that wanders three times as much, two thirds of one joint."""
+    for k in range(NULLS):
+        options = {"wander": 3.0 if k % 4 >= 2 else 1.0, "joints": 2 if k % 3 == 0 else 1, "presliding": k % 2 == 1}
+        yield _case(f"null_{k}", "null", "null", seed=seed + k, **options)
+
+
+def _singles(seed: int) -> Iterator[dict[str, Any]]:
+    for number, effect in enumerate(BUILDERS):
+        if effect != "force_offset":  # refitting always absorbs it
+            options = {"effect": effect, "strength": STRENGTH, "presliding": number % 2 == 1}
+            yield _case(f"{effect}_{STRENGTH:g}_0", "single", "single", seed=seed + 1000 + number, **options)
+
+
+def _unlisted(seed: int) -> Iterator[dict[str, Any]]:
+    for effect in UNKNOWN:
+        for strength in (STRENGTH, 1.0):
+            options = {"effect": effect, "strength": strength, "presliding": False}
+            yield _case(f"{effect}_{strength:g}_0", "unknown", "single", seed=seed + 400_000, **options)
+
+
+def _case(name: str, group: str, function: str, **given: Any) -> dict[str, Any]:
+    arguments = {"joints": 2, "seconds": TRAIN, "rate": 500.0, "test": TEST, **given}
+    maker = f"{TESTS / 'hidden_effects' / 'cases.py'}:{function}"
+    return {"name": name, "group": group, "maker": maker, "seed": given["seed"], "arguments": arguments}
 
 
 def all_cases(seed: int) -> list[dict[str, Any]]:

@@ -78,7 +78,7 @@ def _is_foreign(row: Row) -> bool:
 
 def _truth(row: Row) -> Truth:
     place = {key: None if row[f"true_{key}"] is None else int(row[f"true_{key}"]) for key in ("joint", "tendon")}
-    also = tuple(name for name in str(row.get("also") or "").split(",") if name)
+    also = tuple(name for name in str(row.get("simulated_too") or "").split(",") if name)
     return Truth(row["true_effect"], joints=int(row["joints"]), **place, also=also)
 
 

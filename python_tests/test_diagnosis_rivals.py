@@ -161,7 +161,7 @@ def test_a_set_without_an_order_is_first_only_alone() -> None:
 
 
 def test_what_a_simulator_has_anyway_is_not_false() -> None:
-    true = {"true_effect": "gravity", "true_joint": 1.0, "true_tendon": None, "also": "inertia,stribeck"}
+    true = {"true_effect": "gravity", "true_joint": 1.0, "true_tendon": None, "simulated_too": "inertia,stribeck"}
     assert judged(row("single", **true, causes=listed(("inertia", 1, None))), "diagnose").false == 0
 
 
