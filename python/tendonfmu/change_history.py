@@ -249,9 +249,9 @@ def _date(name: str) -> float | None:
     matched = _DATE.search(name)
     if matched is None:
         return None
-    parts = [int(each) for each in matched.groups() if each is not None]
+    year, month, day, hour, minute, second = (int(each or 0) for each in matched.groups())
     try:
-        return datetime(*parts[:6], tzinfo=timezone.utc)  # noqa: UP017.timestamp()  # type: ignore[misc,arg-type]
+        return datetime(year, month, day, hour, minute, second, tzinfo=timezone.utc).timestamp()
     except ValueError:
         return None
 
