@@ -169,6 +169,17 @@ class Grams:
                 found += np.bincount(self.folds.stretch[rows], np.sum(left**2, axis=1), minlength=self.folds.stretches)
         return np.asarray(found[self._counted])
 
+    def unseen_residual(self, mix: Numbers | None = None, magnitudes: Numbers | None = None) -> Numbers:
+        """[r, n] N·m left on the unseen rows that count, in the order of `counted_stretch`. mix, magnitudes: as for
+        `by_stretch`."""
+        return np.concatenate([self._unseen(int(k), mix, magnitudes)[1] for k in np.flatnonzero(self._judged)])
+
+    @property
+    def counted_stretch(self) -> NDArray[np.int64]:
+        """[r] stretch of each unseen row that counts."""
+        own = [self.folds.stretch[self.folds.fold == k] for k in np.flatnonzero(self._judged)]
+        return np.asarray(np.concatenate(own), dtype=np.int64)
+
     def _unseen(
         self, number: int, mix: Numbers | None, magnitudes: Numbers | None
     ) -> tuple[NDArray[np.bool_], Numbers]:

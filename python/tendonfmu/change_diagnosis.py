@@ -17,6 +17,7 @@ from scipy import stats
 from tendonfmu.cause_search import residual_alone
 from tendonfmu.cause_selection import LEAST_SHARE
 from tendonfmu.change_evidence import change_evidence
+from tendonfmu.change_gain import interval_of
 from tendonfmu.change_load import steady_load
 from tendonfmu.change_search import Change, ChangeSearch
 from tendonfmu.change_sizes import sized
@@ -42,7 +43,6 @@ from tendonfmu.extension_fit import FitSettings, fit_numbers
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.fit_structure import Choice
 from tendonfmu.gain import measure_gain
-from tendonfmu.gain_interval import gain_interval
 from tendonfmu.hypotheses import HERE, Hypothesis, Key
 from tendonfmu.phases import Phases
 from tendonfmu.residual_views import residual_views, whiteness
@@ -153,9 +153,11 @@ class _Changes:
         """What unseen data do not bear out, and the gains of what they do."""
         search, dropped = self._search, list[Change]()
         while True:
-            after = search.grams(unseen=self._unseen).by_stretch(None, None)
-            without = [search.grams(k, self._unseen).by_stretch(None, None) for k in range(len(search.changes))]
-            gains = [gain_interval(each, after, self._seed) for each in without]
+            unseen = self._unseen
+            grams = search.grams(unseen=unseen)
+            after, stretch = grams.unseen_residual(), grams.counted_stretch
+            without = [search.grams(k, unseen).unseen_residual() for k in range(len(search.changes))]
+            gains = [interval_of(each, after, stretch) for each in without]
             order = sorted(range(len(gains)), key=lambda k: -gains[k].value)
             named = [search.changes[k].hypothesis.effect for k in order]
             weak = [
@@ -164,7 +166,7 @@ class _Changes:
                 if not gains[k].low > 0.0
                 or not search.matters(
                     gains[k].value,
-                    search.error * float(np.sqrt(without[k].sum() / after.sum())),
+                    search.error * float(np.linalg.norm(without[k]) / np.linalg.norm(after)),
                     named[place],
                     named[:place],
                     self._least_gain,
@@ -314,8 +316,7 @@ class _Changes:
 
     def _load(self) -> SteadyLoad | None:
         search = self._search
-        moved = search.moved() if search.changes else 0.0
-        return steady_load(search.series, search.series.target - moved, search.sides.now, self._seed)
+        return steady_load(search.series, search.torque_left(), search.sides.now, self._seed)
 
     def _floor(self) -> Numbers:
         """[n] N·m rms of the new recordings."""

@@ -7,7 +7,7 @@ that it lacks. The error is that of held-out parts of the new recordings.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,11 +19,12 @@ from tendonfmu.balance import moment_arms
 from tendonfmu.block_grams import Grams
 from tendonfmu.candidate_columns import candidate_columns
 from tendonfmu.cause_search import bias_of, blocks_of, nominal_scale, predicted_of, residual_alone, series_of
-from tendonfmu.cause_selection import Judged, Selection, names_with
+from tendonfmu.cause_selection import CERTAIN, Judged, Selection, is_alike, names_with
 from tendonfmu.change_background import background_columns
+from tendonfmu.change_gain import gain_of
 from tendonfmu.change_numbers import changed, number_hypotheses, numbers_of
 from tendonfmu.diagnosis_search import SIGNIFICANCE, accepted_of
-from tendonfmu.diagnosis_series import Grid, Series, block_prediction
+from tendonfmu.diagnosis_series import Grid, Series, block_prediction, exact_model
 from tendonfmu.extension_fit import Accepted, extended_description
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.held_out_folds import Folds, make_folds
@@ -99,7 +100,8 @@ class ChangeSearch:
         )
         then = sorted(set(np.unique(self.series.recording).tolist()) - self._new)
         self._repeats = find_repeats(self.series, force, then, sorted(self._new))
-        background, scale = background_columns(data, self.series, force, self._columns, residual, seed)
+        shift = self._level_shift() @ np.linalg.pinv(moment_arms(data))
+        background, scale = background_columns(data, self.series, force - shift, self._columns, residual, seed)
         shared = np.concatenate([self._columns.nominal, background], axis=2)
         self._shared = less_reference(shared, self.series, self._repeats)
         self._target = less_reference(self.series.target, self.series, self._repeats)
@@ -127,6 +129,18 @@ class ChangeSearch:
         present = number_hypotheses(self.numbers, count + own, count)
         return sorted([*missing, *present], key=lambda each: each.level)
 
+    def _level_shift(self) -> Numbers:
+        """[B, n] N·m by which the mean of what is left of each recording is off that of the reference: a load or a
+        zero that is no state of the motion."""
+        left, series = self._torque_left(self.data), self.series
+        then = left[series.used & ~self.sides.now].mean(axis=0)
+        found = np.zeros_like(left)
+        for number in np.unique(series.recording):
+            rows = series.recording == number
+            own = left[rows & series.used]
+            found[rows] = own.mean(axis=0) - then if len(own) else 0.0
+        return found
+
     # --- rounds ---
 
     def run(self, least_gain: float, step: Step = lambda done: None) -> None:
@@ -134,16 +148,31 @@ class ChangeSearch:
         while len(self.changes) < MOST_CHANGES and len(self.refused) < MOST_REFUSED:
             step(len(self.changes))
             named = [each.hypothesis.effect for each in self.changes]
-            picked = self.selection.best(least_gain, {each.hypothesis.effect for each in self.refused})
-            if picked is None:
+            judged = self._best({each.hypothesis.effect for each in self.refused})
+            if judged is None or self.selection.gain(judged)[0] < least_gain:
                 break
-            own = picked.hypothesis
-            p_value, covariance = self.certainty(self.selection.grams, picked.judged)
-            found = Change(own, picked.judged.magnitudes, covariance, picked.gain, picked.error, p_value, picked.alike)
-            if p_value >= SIGNIFICANCE or not self.matters(picked.gain, self.error, own.effect, named, least_gain):
-                self.refused.append(found)
-            else:
+            found, certain = self._judged(judged)
+            enough = self.matters(found.gain, self.error, judged.hypothesis.effect, named, least_gain)
+            if certain and enough:
                 self._take(found)
+            else:
+                self.refused.append(found)
+
+    def _best(self, tried: Collection[str]) -> Judged | None:
+        """What lowers the error most, at the coarsest place that is as good. tried: effects that are left out."""
+        ranked = [each for each in self.selection.ranked() if each.hypothesis.effect not in tried]
+        return self.selection.refined(ranked[0].hypothesis.effect) if ranked else None
+
+    def _judged(self, judged: Judged) -> tuple[Change, bool]:
+        """The change, and whether it is certain: its gain by two standard errors, and no chance."""
+        grams, own = self.selection.grams, judged.hypothesis
+        _, by_fold = grams.error(own.mix, own.low, own.high)
+        gain, error = gain_of(grams.unseen_residual(), grams.unseen_residual(own.mix, by_fold), grams.counted_stretch)
+        p_value, covariance = self.certainty_of(grams, own.mix, judged.magnitudes, by_fold)
+        others = [each for each in self.selection.ranked() if each.hypothesis.effect != own.effect]
+        alike = tuple(each.hypothesis for each in others if is_alike(each.by_stretch, judged.by_stretch))
+        found = Change(own, judged.magnitudes, covariance, gain, error, p_value, alike)
+        return found, gain > CERTAIN * error and p_value < SIGNIFICANCE
 
     @property
     def error(self) -> float:
@@ -283,6 +312,17 @@ class ChangeSearch:
         """How many of the new recordings repeat a motion of the reference exactly."""
         return len(self._repeats)
 
+    def torque_left(self) -> Numbers:
+        """[B, n] N·m measured less modelled torque with all changes, bias and all, without the bias's own jumps."""
+        return self._torque_left(self.now_data())
+
+    def _torque_left(self, now: Data) -> Numbers:
+        whole = [
+            recording.target - exact_model(now if number in self._new else self.data, recording, jumps=False)
+            for number, recording in enumerate(self._recordings)
+        ]
+        return np.concatenate([segment.mean(whole[segment.recording][segment.part]) for segment in self._grid.segments])
+
     @property
     def stretches_now(self) -> Flags:
         """[stretches] whether they are of the new recordings."""
@@ -297,14 +337,10 @@ class ChangeSearch:
 
     # --- certainty ---
 
-    def certainty(self, grams: Grams, judged: Judged) -> tuple[float, Numbers]:
-        """p-value of there being no change, corrected for all that was tried; [d, d] covariance of the magnitudes."""
-        mix = judged.hypothesis.mix
-        _, by_fold = grams.error(mix, judged.hypothesis.low, judged.hypothesis.high)
-        return self.certainty_of(grams, mix, judged.magnitudes, by_fold)
-
     def certainty_of(self, grams: Grams, mix: Numbers, magnitudes: Numbers, by_fold: Numbers) -> tuple[float, Numbers]:
-        """Hotelling's test on the scores of stretches of all recordings, taken together in twos where they vary
+        """p-value of there being no change, corrected for all that was tried; [d, d] covariance of the magnitudes.
+
+        Hotelling's test on the scores of stretches of all recordings, taken together in twos where they vary
         together: what wanders from stretch to stretch in the reference is no change."""
         energy, scores = grams.scores(mix, by_fold)
         inverse = np.linalg.pinv(energy, hermitian=True)

@@ -142,8 +142,11 @@ def make_grid(recordings: Sequence[FitRecording]) -> Grid:
     return Grid(tuple(segments), step)
 
 
-def exact_model(data: Mapping[str, Any], recording: FitRecording, *, entry_load: bool | None = None) -> Numbers:
-    """[N, n] N·m: G of a description by a run of the core, NaN outside the parts.
+def exact_model(
+    data: Mapping[str, Any], recording: FitRecording, *, entry_load: bool | None = None, jumps: bool = True
+) -> Numbers:
+    """[N, n] N·m: G of a description by a run of the core, NaN outside the parts; T alone without the jumps, which
+    depend on how a recording begins.
 
     entry_load: in place of what the description says. Less the delay of the measured torque, where the description
     delays the forces: measured τ less this is what bias and noise are.
@@ -160,6 +163,8 @@ def exact_model(data: Mapping[str, Any], recording: FitRecording, *, entry_load:
         arrays = recording.arrays(part)
         outputs = native.Finger(image, kinematics_source=recording.kinematics).run(arrays)
         found[part] = outputs["friction_torque"] - delayed_torque(data, arrays, outputs["joint_torque"])
+        if not jumps:
+            found[part] -= outputs["bias_torque"]
     return found
 
 
