@@ -8,6 +8,7 @@ fold each time (Frisch and Waugh, 1933): candidates and target are replaced by w
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,9 +21,11 @@ from tendonfmu.nuisance import Span, Splines
 
 Numbers = NDArray[np.float64]
 Array = NDArray[Any]
+Indices = NDArray[np.intp]
 
 MEMORY = 20.0  # blocks that noise remembers, about: so many rows count as one against what is known beforehand
 _PIECE = 4096  # rows at a time
+_SMALLEST = 1e-100  # of a scale: its square is a number
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,59 @@ class _Fold:
     own_square: float
 
 
+class Products:
+    """Columns free of a slow bias, and their products by fold: what does not depend on a target."""
+
+    def __init__(self, folds: Folds, nominal: Array, values: Array, splines: Splines) -> None:
+        """nominal: [B, n, u], values: [B, n, c]: derivatives. splines: [B, s] of the slow bias."""
+        self.folds, self.nominal_count, self.count = folds, nominal.shape[2], values.shape[2]
+        rows, joints = folds.rows, nominal.shape[1]
+        self.span = Span(splines[rows])
+        self.table = np.empty((len(rows), joints, self.nominal_count + self.count), dtype=np.float32)
+        for j in range(joints):
+            self.table[:, j, : self.nominal_count] = self.span.without(nominal[rows, j])
+            self.table[:, j, self.nominal_count :] = self.span.without(values[rows, j])
+        self.by_fold = [self._of(np.flatnonzero(folds.fold == number)) for number in range(folds.folds)]
+
+    def _of(self, rows: Indices) -> Numbers:
+        """[u + c]² of some rows."""
+        size, joints = self.table.shape[2], self.table.shape[1]
+        total = np.zeros((size, size))
+        for begin in range(0, len(rows), _PIECE):
+            part = rows[begin : begin + _PIECE]
+            columns = self.table[part].reshape(len(part) * joints, size).astype(np.float64)
+            total += columns.T @ columns
+        return total
+
+    def chosen(self, shared: Numbers | None, candidates: Indices | None) -> Products:
+        """With combinations [c, k] of the values among the nominal columns as well, and of the values some alone."""
+        u = self.nominal_count
+        mixed = np.zeros((self.count, 0)) if shared is None else shared
+        kept = np.arange(self.count) if candidates is None else candidates
+        if not mixed.shape[1] and len(kept) == self.count:
+            return self
+        found = copy(self)
+        found.nominal_count, found.count = u + mixed.shape[1], len(kept)
+        added = self.table[:, :, u:] @ mixed.astype(np.float32)
+        found.table = np.concatenate([self.table[:, :, :u], added, self.table[:, :, u + kept]], axis=2)
+        found.by_fold = [self._turned(each, mixed, u + kept) for each in self.by_fold]
+        return found
+
+    def _turned(self, products: Numbers, mixed: Numbers, kept: Indices) -> Numbers:
+        """[u + k + kept]² of [u + c]²; kept: indices among all columns."""
+        u = self.nominal_count
+        cross = products[:, u:] @ mixed
+        own = np.concatenate([np.arange(u), kept])
+        count = mixed.shape[1]
+        found = np.empty((len(own) + count, len(own) + count))
+        place = np.concatenate([np.arange(u), u + count + np.arange(len(kept))])
+        found[np.ix_(place, place)] = products[np.ix_(own, own)]
+        found[place, u : u + count] = cross[own]
+        found[u : u + count, place] = cross[own].T
+        found[u : u + count, u : u + count] = mixed.T @ cross[u:]
+        return found
+
+
 class Grams:
     """Products of a target, of the nominal model's columns and of candidates', by fold."""
 
@@ -52,29 +108,34 @@ class Grams:
         values: Array,
         splines: Splines,
         scale: Numbers,
-        judged: NDArray[np.bool_] | None = None,
     ) -> None:
         """target: [B, n] N·m. nominal: [B, n, u], values: [B, n, c]: derivatives. splines: [B, s] of the slow bias.
         scale: [u] how far each nominal number may be expected to move: a ridge that decides where the data do not.
-        judged: [f] folds whose errors count, all by default; the others are only learned from.
         """
+        self._begin(Products(folds, nominal, values, splines), target, scale, None)
+
+    @classmethod
+    def of(cls, products: Products, target: Numbers, scale: Numbers, judged: NDArray[np.bool_] | None = None) -> Grams:
+        """judged: [f] folds whose errors count, all by default; the others are only learned from."""
+        found = cls.__new__(cls)
+        found._begin(products, target, scale, judged)
+        return found
+
+    def _begin(self, products: Products, target: Numbers, scale: Numbers, judged: NDArray[np.bool_] | None) -> None:
+        folds = self.folds = products.folds
+        self.nominal_count, self.count, self._table = products.nominal_count, products.count, products.table
         self._judged = np.ones(folds.folds, dtype=bool) if judged is None else judged
         self._counted = np.unique(folds.stretch[self._judged[folds.fold]])  # stretches
-        self.folds, self.nominal_count, self.count = folds, nominal.shape[2], values.shape[2]
+        self._span = products.span
         rows, joints = folds.rows, target.shape[1]
-        span = self._span = Span(splines[rows])
-        columns = self.nominal_count + self.count
-        self._table = np.empty((len(rows), joints, columns), dtype=np.float32)
-        for j in range(joints):
-            self._table[:, j, : self.nominal_count] = span.without(nominal[rows, j])
-            self._table[:, j, self.nominal_count :] = span.without(values[rows, j])
-        self._target = np.stack([span.without(target[rows, j][:, None])[:, 0] for j in range(joints)], axis=1)
+        self._target = np.stack([self._span.without(target[rows, j][:, None])[:, 0] for j in range(joints)], axis=1)
         self.square = float(np.sum(self._target**2))
-        whole, by_fold = self._products()
+        by_fold = self._with_target(products.by_fold)
+        whole = np.sum(by_fold, axis=0)
         spread = self.square / max(self._target.size, 1) * MEMORY
         ridge = np.zeros(self.nominal_count)
         known = np.isfinite(scale) & (scale > 0)
-        ridge[known] = spread / scale[known] ** 2
+        ridge[known] = spread / np.maximum(scale[known], _SMALLEST) ** 2
         diagonal = np.diagonal(whole)[: self.nominal_count]
         self._ridge = np.maximum(ridge, 1e-9 * diagonal) + 1e-300
         self._by_fold = [self._left_out(whole - own, own) for own in by_fold]
@@ -82,18 +143,19 @@ class Grams:
 
     # --- making -------------------------------------------------------------------------------------------------------
 
-    def _products(self) -> tuple[Numbers, list[Numbers]]:
-        """[u + c + 1]² of all columns and the target, of everything and of each fold."""
-        size, joints = self._table.shape[2] + 1, self._table.shape[1]
-        found = [np.zeros((size, size)) for _ in range(self.folds.folds)]
-        for number, total in enumerate(found):
-            rows = np.flatnonzero(self.folds.fold == number)
-            for begin in range(0, len(rows), _PIECE):
-                part = rows[begin : begin + _PIECE]
-                columns = self._table[part].reshape(len(part) * joints, size - 1).astype(np.float64)
-                both = np.concatenate([columns, self._target[part].reshape(-1, 1)], axis=1)
-                total += both.T @ both
-        return np.sum(found, axis=0), found
+    def _with_target(self, by_fold: Sequence[Numbers]) -> list[Numbers]:
+        """[u + c + 1]² of all columns and the target, of each fold."""
+        size = self._table.shape[2]
+        found = []
+        for number, columns in enumerate(by_fold):
+            rows = self.folds.fold == number
+            own, target = self._table[rows].reshape(-1, size), self._target[rows].reshape(-1)
+            both = np.empty((size + 1, size + 1))
+            both[:size, :size] = columns
+            both[:size, size] = both[size, :size] = own.T.astype(np.float64) @ target
+            both[size, size] = target @ target
+            found.append(both)
+        return found
 
     def _left_out(self, learned: Numbers, own: Numbers) -> _Fold:
         u = self.nominal_count

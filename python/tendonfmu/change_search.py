@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from tendonfmu.balance import moment_arms
-from tendonfmu.block_grams import Grams
+from tendonfmu.block_grams import Grams, Products
 from tendonfmu.candidate_columns import candidate_columns
 from tendonfmu.cause_search import bias_of, blocks_of, nominal_scale, predicted_of, residual_alone, series_of
 from tendonfmu.cause_selection import CERTAIN, Judged, Selection, is_alike, names_with
@@ -113,10 +113,11 @@ class ChangeSearch:
         learned = replace(self._told, used=self._told.used & ~self.sides.test)
         self.folds, self.judged = folds_of_sides(learned, self.sides.now)
         self.hypotheses = self._hypotheses()
+        self._known: dict[bytes, tuple[Products, Flags]] = {}
         self.tried = len({each.key for each in self.hypotheses})
         self.changes: list[Change] = []
         self.refused: list[Change] = []
-        self.selection = self._look()
+        self._selection: Selection | None = None
         self._whole = self.error
 
     def _hypotheses(self) -> list[Hypothesis]:
@@ -190,9 +191,8 @@ class ChangeSearch:
 
     def _settle(self) -> None:
         for _ in range(STEPS):
-            self.selection = self._look()
-            self.changes = self.moved_on(self.selection.grams)
-        self.selection = self._look()
+            self.changes = self.moved_on(self.grams())
+        self._selection = None
 
     def free(self, keys: Sequence[Key]) -> None:
         """Frees these effects at these places in the new recordings, whether they are certain or not: each with the
@@ -210,9 +210,10 @@ class ChangeSearch:
         """A change with the covariance and p-value that it has beside all others."""
         change, grams = self.changes[number], self.grams(number)
         own = change.hypothesis
-        _, by_fold = grams.error(own.mix, own.low, own.high)
-        magnitudes = grams.magnitudes(own.mix, own.low, own.high)
-        p_value, covariance = self.certainty_of(grams, own.mix, magnitudes, by_fold)
+        mix = own.mix[own.mix.any(axis=1)]  # its columns are the only candidates
+        _, by_fold = grams.error(mix, own.low, own.high)
+        magnitudes = grams.magnitudes(mix, own.low, own.high)
+        p_value, covariance = self.certainty_of(grams, mix, magnitudes, by_fold)
         return replace(change, covariance=covariance, p_value=p_value)
 
     def moved_on(self, grams: Grams) -> list[Change]:
@@ -227,17 +228,24 @@ class ChangeSearch:
     def keep(self, changes: Sequence[Change]) -> None:
         """Goes on with these alone."""
         self.changes = list(changes)
-        self.selection = self._look()
-        self.changes = self.moved_on(self.selection.grams)
-        self.selection = self._look()
+        self.changes = self.moved_on(self.grams())
+        self._selection = None
 
     # --- looking ---
 
+    @property
+    def selection(self) -> Selection:
+        """Of all that may have changed beside the changes so far."""
+        if self._selection is None:
+            self._selection = self._look()
+        return self._selection
+
     def _look(self) -> Selection:
-        """With all changes so far in the model of the new recordings."""
         known = {each.hypothesis.effect for each in self.changes}
         left = [each for each in self.hypotheses if each.effect not in known]
-        return Selection(self.grams(), left, self._least)
+        products, judged = self._products(None)
+        chosen = products.chosen(self._together(self.changes), None)
+        return Selection(Grams.of(chosen, self._target_now(), self._scales(self.changes), judged), left, self._least)
 
     @property
     def new_recordings(self) -> list[int]:
@@ -252,26 +260,51 @@ class ChangeSearch:
         found[grams.folds.rows] = grams.residual()
         return found
 
-    def grams(self, without: int | None = None, unseen: Flags | None = None, only: int | None = None) -> Grams:
-        """Of all columns, the changes' own among the shared ones; `without` one of them. unseen: [B] blocks that alone
-        are judged, and not learned from. only: the new recording that columns are of; the change that is left out is
-        then free in each of the others."""
+    def grams(self, without: int | None = None, unseen: Flags | None = None) -> Grams:
+        """Of the changes' own columns among the shared ones; `without` one of them, which alone is then a candidate.
+        unseen: [B] blocks that alone are judged, and not learned from."""
         kept = [each for k, each in enumerate(self.changes) if k != without]
-        own = [self._values @ each.hypothesis.mix for each in kept]
-        values = self._values
-        if only is not None and without is not None:
-            column = self._values @ self._mixed(self.changes[without])
-            others = [each for each in self.new_recordings if each != only]
-            own += [(column * (self.series.recording == each)[:, None])[:, :, None] for each in others]
-            values = values * (self.series.recording == only)[:, None, None]
-        shared = np.concatenate([self._shared, *own], axis=2).astype(np.float32)
-        scale = np.concatenate([self._scale, np.full(sum(each.shape[2] for each in own), np.nan)])
-        target = self._target - self.moved() if self.changes else self._target
+        used = np.zeros(0, dtype=np.intp)
+        target = self._target_now()
         if without is not None:
             alone = self.changes[without]
-            target = target + self._values @ (alone.hypothesis.mix @ alone.magnitudes)
-        folds, judged = (self.folds, self.judged) if unseen is None else folds_of_unseen(self._told, unseen)
-        return Grams(folds, target, shared, values, self._splines, scale, judged)
+            used = np.flatnonzero(alone.hypothesis.mix.any(axis=1))
+            target = target + self._values @ self._mixed(alone)
+        products, judged = self._products(unseen)
+        return Grams.of(products.chosen(self._together(kept), used), target, self._scales(kept), judged)
+
+    def grams_of_recording(self, number: int, only: int) -> Grams:
+        """Of one change in one new recording alone, its only candidate; it is free in each of the others, too."""
+        change = self.changes[number]
+        column = (self._values @ self._mixed(change))[:, :, None]
+        of = {each: column * (self.series.recording == each)[:, None, None] for each in self.new_recordings}
+        kept = [each for k, each in enumerate(self.changes) if k != number]
+        shared = [self._values @ self._together(kept), *(of[each] for each in of if each != only)]
+        nominal = np.concatenate([self._shared, *shared], axis=2)
+        products = Products(self.folds, nominal, of[only], self._splines)
+        scale = np.concatenate([self._scales(kept), np.full(len(of) - 1, np.nan)])
+        return Grams.of(products, self._target_now() + column[:, :, 0], scale, self.judged)
+
+    def _target_now(self) -> Numbers:
+        return self._target - self.moved() if self.changes else self._target
+
+    def _together(self, changes: Sequence[Change]) -> Numbers:
+        """[c, k] of all their columns."""
+        empty = np.zeros((self._values.shape[2], 0))
+        return np.concatenate([empty, *(each.hypothesis.mix for each in changes)], axis=1)
+
+    def _scales(self, changes: Sequence[Change]) -> Numbers:
+        """Of the shared columns; those of changes are free."""
+        free = sum(each.hypothesis.mix.shape[1] for each in changes)
+        return np.concatenate([self._scale, np.full(free, np.nan)])
+
+    def _products(self, unseen: Flags | None) -> tuple[Products, Flags]:
+        """Made once for every way of judging."""
+        key = b"" if unseen is None else unseen.tobytes()
+        if key not in self._known:
+            folds, judged = (self.folds, self.judged) if unseen is None else folds_of_unseen(self._told, unseen)
+            self._known[key] = (Products(folds, self._shared, self._values, self._splines), judged)
+        return self._known[key]
 
     def accepted(self, changes: Sequence[Change]) -> list[Accepted]:
         """Terms that changes add to the description of now."""

@@ -26,12 +26,10 @@ def sizes_by_recording(
 
 def shares_by_recording(search: ChangeSearch, number: int) -> list[tuple[float, float]]:
     """(value, standard error) of each new recording: how much of the change is in it, 1 for all."""
-    change = search.changes[number]
     found = []
     for recording in search.new_recordings:
-        grams = search.grams(number, only=recording)
-        mix = (change.hypothesis.mix @ change.magnitudes)[:, None]
-        unbounded = np.array([np.inf])
+        grams = search.grams_of_recording(number, recording)
+        mix, unbounded = np.eye(1), np.array([np.inf])
         _, by_fold = grams.error(mix, -unbounded, unbounded)
         share = grams.magnitudes(mix, -unbounded, unbounded)
         _, covariance = search.certainty_of(grams, mix, share, by_fold)
