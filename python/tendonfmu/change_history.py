@@ -61,7 +61,7 @@ class Line:
 
 @dataclass(frozen=True)
 class History:
-    """times: [K] of the recordings, weeks since the first where their names have dates, else their number from 1.
+    """times: [K] of the recordings, weeks since the reference where all names have dates, else their number from 1.
     failed: (recording, why) of what could not be diagnosed."""
 
     finger: str
@@ -182,7 +182,8 @@ def _history(
     ]
     bad = {recording for recording, _ in failed}
     kept = [k for k, recording in enumerate(recordings) if recording not in bad]
-    times, dated = times_of([recordings[k] for k in kept])
+    times, dated = times_of([*references, *(recordings[k] for k in kept)])
+    times = times[len(references) :] if dated else tuple(float(k) for k in range(1, len(kept) + 1))
     titles: dict[str, str] = {}
     for row in causes:
         titles |= json.loads(row.get("titles") or "{}")
