@@ -96,6 +96,24 @@ class Products:
         found[u : u + count, u : u + count] = mixed.T @ cross[u:]
         return found
 
+    def with_own(self, values: Array) -> Products:
+        """With other candidates [r, n, k], free of the slow bias already; r: the folds' rows."""
+        u = self.nominal_count
+        found = copy(self)
+        found.count = values.shape[2]
+        found.table = np.concatenate([self.table[:, :, :u], values.astype(np.float32)], axis=2)
+        found.by_fold = []
+        for number, products in enumerate(self.by_fold):
+            rows = self.folds.fold == number
+            own = found.table[rows].reshape(-1, u + found.count).astype(np.float64)
+            cross = own.T @ own[:, u:]
+            both = np.empty((u + found.count, u + found.count))
+            both[:u, :u] = products[:u, :u]
+            both[:, u:] = cross
+            both[u:, :u] = cross[:u].T
+            found.by_fold.append(both)
+        return found
+
 
 class Grams:
     """Products of a target, of the nominal model's columns and of candidates', by fold."""

@@ -162,7 +162,37 @@ class ChangeSearch:
     def _best(self, tried: Collection[str]) -> Judged | None:
         """What lowers the error most, at the coarsest place that is as good. tried: effects that are left out."""
         ranked = [each for each in self.selection.ranked() if each.hypothesis.effect not in tried]
-        return self.selection.refined(ranked[0].hypothesis.effect) if ranked else None
+        if not ranked:
+            return None
+        judged = self.selection.refined(ranked[0].hypothesis.effect)
+        return self._at_best_place(judged) if len(self.new_recordings) > 1 else judged
+
+    def _at_best_place(self, judged: Judged) -> Judged:
+        """Of places that are nearly as good the one that leaves least where its size is free in each new recording: a
+        change that grows from one to the next is not everywhere as large as on average."""
+        options = [judged, *self.selection.near(judged)]
+        if len(options) == 1:
+            return judged
+        products, counted = self._products(None)
+        chosen = products.chosen(self._together(self.changes), None)
+        u = chosen.nominal_count
+        recording = self.series.recording[chosen.folds.rows]
+        masks = [(recording == number)[:, None, None] for number in self.new_recordings]
+        parts, places, at = [], [], 0
+        for each in options:
+            column = chosen.table[:, :, u:] @ each.hypothesis.mix.astype(np.float32)
+            own = np.concatenate([column * mask for mask in masks], axis=2)
+            parts.append(own)
+            places.append(slice(at, at + own.shape[2]))
+            at += own.shape[2]
+        every = chosen.with_own(np.concatenate(parts, axis=2))
+        grams = Grams.of(every, self._target_now(), self._scales(self.changes), counted)
+        errors = []
+        for each, place in zip(options, places, strict=True):
+            mix = np.eye(at)[:, place]
+            low, high = (np.tile(end, len(masks)) for end in (each.hypothesis.low, each.hypothesis.high))
+            errors.append(grams.error(mix, low, high)[0])
+        return options[int(np.argmin(errors))]
 
     def _judged(self, judged: Judged) -> tuple[Change, bool]:
         """The change, and whether it is certain: its gain by two standard errors, and no chance."""

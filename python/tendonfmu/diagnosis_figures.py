@@ -59,7 +59,30 @@ def _cause_sheet(found: Diagnosis, names: Names, number: int, cause: Cause) -> S
         title=f"{number}. {at_place(cause.title[:1].upper() + cause.title[1:], cause.where, names)}",
         caption="",
         keys=_CHANGE_KEYS if cause.changed else _CAUSE_KEYS,
-        panels=_same_scale(panels),
+        panels=(*_same_scale(panels), *_by_recording(found, cause)),
+    )
+
+
+def _by_recording(found: Diagnosis, cause: Cause) -> Iterator[Panel]:
+    """How large a change is in each of several new recordings."""
+    changed = cause.changed
+    if changed is None or not changed.by:
+        return
+    factor, told = (100.0, "%") if changed.unit in ("", "1") else (1.0, changed.unit.replace(".", "·"))
+    x = np.arange(1.0, len(changed.by) + 1.0)
+    value, low, high = (
+        factor * np.array([getattr(each, end) for each in changed.by]) for end in ("value", "low", "high")
+    )
+    then = np.full(2, factor * changed.reference.value)
+    yield Panel(
+        title="In each of the new recordings",
+        alt=f"Size of this change in each of {len(changed.by)} new recordings, in their order",
+        x_label="new recording, in the order given",
+        y_label=f"{changed.number.replace('_', ' ')} ({told})",
+        curves=(Curve("after_line", x, value), Curve("start", np.array([1.0, x[-1]]), then)),
+        bars=(Bars("after", x, low, high),),
+        dots=(Dots("after_dots", x, value),),
+        ticks=tuple((float(k), str(int(k))) for k in x) if len(x) <= 12 else (),
     )
 
 
