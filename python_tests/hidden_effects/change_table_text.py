@@ -115,13 +115,14 @@ def tables(rows: Sequence[Row]) -> Iterator[str]:
     nothing = [row for row in others if row["hidden"] == NOTHING]
     something = [row for row in others if row["hidden"] != NOTHING]
     parts = (
-        ("Nothing changed", quiet, nothing, (("bed", "asked"), ("bed", "asked", "machine", "model", "conditions"))),
+        ("Nothing changed", quiet, nothing, (("bed", "asked"), ("bed", "asked", "machine", "conditions"))),
         (
             "Something changed",
             changed,
             something,
             (
                 ("bed", "asked", "strength"),
+                ("bed", "asked", "conditions", "strength"),
                 ("bed", "asked", "machine", "model", "strength"),
                 ("bed", "asked", "hidden"),
             ),
