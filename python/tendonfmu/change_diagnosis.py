@@ -316,7 +316,8 @@ class _Changes:
 
     def _load(self) -> SteadyLoad | None:
         search = self._search
-        return steady_load(search.series, search.torque_left(), search.sides.now, self._seed)
+        found = steady_load(search.series, search.torque_left(), search.sides.now, self._seed)
+        return found if found is not None and found.gain.low > 0.0 else None
 
     def _floor(self) -> Numbers:
         """[n] N·m rms of the new recordings."""
@@ -379,8 +380,9 @@ def _told(hypothesis: Hypothesis) -> tuple[str, str, str]:
     if candidate is None:
         return hypothesis.effect.replace("_", " "), "", "velocity"
     explanation = candidate.explanation
-    if not hypothesis.members:  # the description has it
-        explanation = explanation.replace(", where the model has none", "")
+    if not hypothesis.members:
+        _, look, where = explanation.partition("Look ")
+        explanation = f"The description has this; its number is another one now. {look}{where}".strip()
     return candidate.title, explanation, candidate.coordinate
 
 

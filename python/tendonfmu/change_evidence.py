@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.change_search import ChangeSearch
-from tendonfmu.diagnosis_evidence import BINS, FEWEST, coordinate_of, standard_errors
+from tendonfmu.diagnosis_evidence import BINS, FEWEST, coordinate_of, shown, standard_errors
 from tendonfmu.diagnosis_result import Evidence
 from tendonfmu.effects import Place
 
@@ -24,36 +24,46 @@ def change_evidence(search: ChangeSearch, number: int, coordinate: str) -> tuple
     added = search.column(number) @ change.magnitudes
     added = added - added[search.series.used].mean(axis=0)
     now = search.told & search.sides.now
-    then = search.told & ~search.sides.now
     joint = int(np.argmax(np.sum(added[now] ** 2, axis=0)))
     place = _place(search, number, joint)
-    label, unit, values = coordinate_of(place, coordinate, search.series, joint)
+    own = _binned(search, coordinate_of(place, coordinate, search.series, joint), left, added, joint)
+    if own and shown(own[0]):
+        return own
+    torque = (f"torque of this change at joint {joint + 1}", "N·m", added[:, joint])
+    return _binned(search, torque, left, added, joint) or own
+
+
+def _binned(
+    search: ChangeSearch, over: tuple[str, str, Numbers], left: Numbers, added: Numbers, joint: int
+) -> tuple[Evidence, ...]:
+    label, unit, values = over
+    now = search.told & search.sides.now
+    then = search.told & ~search.sides.now
     kept = now & np.isfinite(values)
     bins = min(BINS, int(kept.sum()) // FEWEST)
     if bins < 2:
         return ()
     edges = np.quantile(values[kept], np.linspace(0.0, 1.0, bins + 1))
+    low, high = edges[0], edges[-1]
     edges[0], edges[-1] = -np.inf, np.inf
     member = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, bins - 1)
     parts = [np.flatnonzero(kept & (member == k)) for k in range(bins)]
     parts = [each for each in parts if len(each)]
-    low, high = float(values[kept].min()), float(values[kept].max())
     inside = then & (values >= low) & (values <= high)
     theirs = [np.flatnonzero(inside & (member == member[each[0]])) for each in parts]
     before, after = (left + added)[:, joint], left[:, joint]
-    own = [_means(each, parts, search) for each in (before, after)]
-    reference = _means(after, theirs, search)
+    means = [_means(each, parts, search) for each in (before, after)]
     return (
         Evidence(
             joint + 1,
             label,
             unit,
             np.array([values[rows].mean() for rows in parts]),
-            own[0][0],
-            own[1][0],
-            own[0][1],
-            own[1][1],
-            *reference,
+            means[0][0],
+            means[1][0],
+            means[0][1],
+            means[1][1],
+            *_means(after, theirs, search),
         ),
     )
 

@@ -31,7 +31,7 @@ def evidence(
     joint = int(np.argmax(change))
     pair = (before[:, joint], after[:, joint])
     own = _binned(*coordinate_of(_nearest(places, joint), candidate.coordinate, series, joint), series, pair, joint)
-    if own and _shown(own[0]):
+    if own and shown(own[0]):
         return own
     added = (f"torque of this cause at joint {joint + 1}", "N·m", (before - after)[:, joint])
     return _binned(*added, series, pair, joint) or own
@@ -42,7 +42,7 @@ def _nearest(places: Sequence[Place], joint: int) -> Place:
     return next((each for each in places if each.joint == joint + 1), places[0])
 
 
-def _shown(found: Evidence) -> bool:
+def shown(found: Evidence) -> bool:
     """Whether the cause takes away most of what the means of the bins were."""
     return float(np.sum(found.before**2)) >= SHOWN * float(np.sum(found.after**2))
 
