@@ -23,6 +23,9 @@ Array = NDArray[Any]
 SAME = 0.02  # of the angles' spread: a controller follows the same reference as closely
 ALIKE = 0.1  # of the forces: friction that grows with them then differs by as little
 LEAST = 5.0  # s that both motions share
+NEAR = (
+    0.3  # s: the later one motion is, the fewer samples their correlation sums, which moves its peak by less than this
+)
 
 
 @dataclass(frozen=True)
@@ -91,8 +94,8 @@ def _repeat(series: Series, force: Numbers, then: int, now: int) -> Repeat | Non
     step = series.step
     if min(len(each) for each in time) * step < LEAST or any(np.diff(each).max() > 1.5 * step for each in time):
         return None
-    for lag in _lags(angle[0], angle[1]):
-        begin, end = max(0, -lag), min(len(angle[0]), len(angle[1]) - lag)
+    for lag in _lags(angle[0], angle[1], round(NEAR / step)):
+        begin, end = _shared(len(angle[0]), len(angle[1]), lag)
         if (end - begin) * step < LEAST:
             continue
         one, other = angle[0][begin:end], angle[1][begin + lag : end + lag]
@@ -111,11 +114,26 @@ def _same_load(force: Numbers, rows: Sequence[Flags], begin: int, end: int, lag:
     return bool((apart <= ALIKE * np.sqrt(np.mean(one**2, axis=0))).all())
 
 
-def _lags(one: Numbers, other: Numbers) -> Iterator[int]:
-    """Blocks by which the second may be later: recorded alike, and where the angles go together best."""
+def _shared(one: int, other: int, lag: int) -> tuple[int, int]:
+    """Of the first motion: the first block that the second has, too, and the one after the last."""
+    return max(0, -lag), min(one, other - lag)
+
+
+def _lags(one: Numbers, other: Numbers, near: int) -> Iterator[int]:
+    """Blocks by which the second may be later: recorded alike, and where the angles differ least, within `near` blocks
+    of where they go together best."""
     yield 0
     whole = np.zeros(len(one) + len(other) - 1)
     for a, b in zip((one - one.mean(axis=0)).T, (other - other.mean(axis=0)).T, strict=True):
         scale = max(float(np.linalg.norm(a) * np.linalg.norm(b)), 1e-300)
         whole += correlate(b, a, method="fft") / scale
-    yield int(np.argmax(whole)) - (len(one) - 1)
+    best = int(np.argmax(whole)) - (len(one) - 1)
+    yield min(range(best - near, best + near + 1), key=lambda lag: _apart(one, other, lag))
+
+
+def _apart(one: Numbers, other: Numbers, lag: int) -> float:
+    """Mean square of the difference of the angles, over what both share."""
+    begin, end = _shared(len(one), len(other), lag)
+    if end <= begin:
+        return np.inf
+    return float(np.mean((one[begin:end] - other[begin + lag : end + lag]) ** 2))
