@@ -153,7 +153,8 @@ class Grams:
         spread = self.square / max(self._target.size, 1) * MEMORY
         ridge = np.zeros(self.nominal_count)
         known = np.isfinite(scale) & (scale > 0)
-        ridge[known] = spread / np.maximum(scale[known], _SMALLEST) ** 2
+        # a column that is 0 has a scale without bound: the quotient is squared, which cannot overflow
+        ridge[known] = (np.sqrt(spread) / np.maximum(scale[known], _SMALLEST)) ** 2
         diagonal = np.diagonal(whole)[: self.nominal_count]
         self._ridge = np.maximum(ridge, 1e-9 * diagonal) + 1e-300
         self._by_fold = [self._left_out(whole - own, own) for own in by_fold]
