@@ -109,11 +109,13 @@ def diagnose_history(
     keys = sorted({tuple(key) for row in causes for key in json.loads(row.get("keys") or "[]")}, key=str)
     mark = _mark(keys)
     second = [
-        Job(f"{name}.sizes.{mark}", (*options, file, json.dumps(keys))) for name, file in zip(names, later, strict=True)
+        Job(f"{name}.sizes.{mark}", (*options, file, json.dumps(keys)))
+        for name, file, row in zip(names, later, causes, strict=True)
+        if keys and not row.get("error")
     ]
-    if keys:
-        run_jobs(sizes_in, second, rows, client, progress=lambda done, _: progress(len(later) + done, total))
-    sizes = rows_of(second, rows) if keys else [{} for _ in later]
+    run_jobs(sizes_in, second, rows, client, progress=lambda done, _: progress(total - len(second) + done, total))
+    of = dict(zip((job.arguments[-2] for job in second), rows_of(second, rows), strict=True))
+    sizes = [of.get(file, {}) for file in later]
     return _history(given.name, before, later, causes, sizes)
 
 
