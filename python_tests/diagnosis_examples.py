@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.diagnosis_result import (
     Cause,
+    ChangedSize,
     DetectionGain,
     Diagnosis,
     Event,
@@ -26,6 +27,7 @@ from tendonfmu.diagnosis_result import (
     Invisible,
     ModelErrors,
     ResidualView,
+    SteadyLoad,
     Unexplained,
     Where,
 )
@@ -411,10 +413,71 @@ def many_joints() -> Diagnosis:
     )
 
 
+def changed() -> Diagnosis:
+    """What is different since a reference: a number that grows over three recordings, a term, and a load."""
+    found = one_cause()
+    finger = copy.deepcopy(dict(found.nominal_data))
+    path = "tendons[1].pulley_friction[1].coulomb"
+    grown = [Interval(value, value - 4e-4, value + 4e-4) for value in (0.033, 0.036, 0.039)]
+    pulley = replace(
+        GRAVITY,
+        where=Where("pulley_friction", 1, 1),
+        title="friction of a tendon on its pulley",
+        explanation="The tendon rubs on the pulley of this joint.",
+        gain=Interval(0.42, 0.38, 0.46),
+        parameters={path: (0.036, "1")},
+        places=(FoundPlace(1, 1, {path: (0.036, "1")}),),
+        size="+20 %: 3 % then, 3.6 % now",
+        evidence=tuple(_with_reference(each) for each in GRAVITY.evidence),
+        changed=ChangedSize("coulomb", "1", Interval(0.03, 0.03, 0.03), grown[1], _less(grown[1], 0.03), tuple(grown)),
+    )
+    own = Interval(0.0126, 0.0115, 0.0137)
+    term = replace(
+        GRAVITY,
+        gain=Interval(0.2, 0.15, 0.25),
+        size="12.6 mN·m more than in the reference",
+        changed=ChangedSize("amplitude", "N.m", Interval(0.0, 0.0, 0.0), own, own),
+    )
+    level, moved = Interval(0.0004, 0.0002, 0.0006), Interval(0.0494, 0.0489, 0.0499)
+    extended = _extended(finger, [term])
+    extended["tendons"][0]["pulley_friction"][0] = {**_LAW, "static": 0.036, "coulomb": 0.036}
+    return replace(
+        found,
+        kind="change",
+        recordings=("march_8.parquet", "march_15.parquet", "march_22.parquet"),
+        references=("march_1.parquet",),
+        causes=(pulley, term),
+        too_small=(SMALL,),
+        invisible=INVISIBLE[:1],
+        steps=(3.547e-3, 1.9e-3, 1.161e-3),
+        load=SteadyLoad(
+            2, ChangedSize("torque", "N.m", level, _less(moved, -0.0004), moved), Interval(0.9, 0.87, 0.93)
+        ),
+        unexplained=Unexplained(0.0, "", (0.0, 0.0)),
+        floor_source="what is left of unseen stretches with what is wrong in both recordings taken off",
+        experiment=Experiment("Make the motions of the reference again, exactly, at the same load and pretension."),
+        detection=None,
+        extended_data=extended,
+        repeated=1,
+    )
+
+
+def _less(of: Interval, what: float) -> Interval:
+    return Interval(of.value - what, of.low - what, of.high - what)
+
+
+def _with_reference(of: Evidence) -> Evidence:
+    """The reference has not been in the last bins."""
+    mean, spread = of.after.copy(), of.after_std.copy()
+    mean[-3:] = spread[-3:] = np.nan
+    return replace(of, reference=mean, reference_std=spread)
+
+
 ALL: dict[str, Callable[[], Diagnosis]] = {
     "adequate": adequate,
     "one_cause": one_cause,
     "three_causes": three_causes,
     "unexplained": unexplained,
     "many_joints": many_joints,
+    "changed": changed,
 }

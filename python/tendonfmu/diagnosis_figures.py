@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.diagnosis_result import Cause, Diagnosis, Evidence, ResidualView
 from tendonfmu.diagnosis_text import Names, at_place, names_of, unit_of
-from tendonfmu.diagnosis_words import words_of
+from tendonfmu.diagnosis_words import Words, words_of
 from tendonfmu.fit_sheet import Band, Bars, Curve, Dots, Panel, Sheet
 
 Numbers = NDArray[np.float64]
@@ -154,7 +154,7 @@ def _joint_sheet(found: Diagnosis, names: Names, joint: int, views: Sequence[Res
             *(_before_after(found) if found.causes else _before_after(found)[:1]),
             ("before_scatter", f"scatter within a bin, {words_of(found.kind).nominal}"),
         ),
-        panels=tuple(_view_panel(view, names, factor, unit, limits) for view in views),
+        panels=tuple(_view_panel(view, names, factor, unit, limits, words_of(found.kind)) for view in views),
     )
 
 
@@ -176,12 +176,13 @@ def _shared_limits(views: Sequence[ResidualView], factor: float) -> tuple[float,
 
 
 def _view_panel(
-    view: ResidualView, names: Names, factor: float, unit: str, limits: tuple[float, float] | None
+    view: ResidualView, names: Names, factor: float, unit: str, limits: tuple[float, float] | None, words: Words
 ) -> Panel:
     title = _TITLES.get(view.kind, f"Over {view.label}")
+    models = f"of the {words.nominal} and of the {words.extended}"
     panel = Panel(
         title=title,
-        alt=f"Residual at {names.joint(view.joint)}, {title.lower()}, of the nominal and of the extended model",
+        alt=f"Residual at {names.joint(view.joint)}, {title.lower()}, {models}",
         x_label=f"{view.label} ({view.unit})" if view.unit not in ("", "1") else view.label,
         y_label=f"residual ({unit})",
     )
