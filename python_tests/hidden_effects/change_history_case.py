@@ -1,0 +1,41 @@
+"""Six recordings of a finger in numpy, the friction of one edge 6 % higher from each to the next: dated, for --history.
+
+python python_tests/hidden_effects/change_history_case.py -o history
+cd history && tendonfmu diagnose finger.json 2026-*.parquet --history -o out
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from change_fingers import NO_CHANGE, How, record_numpy
+from change_simulated import Plan, described, fitted, numpy_maxwell, scaled
+
+from tendonfmu.tables import write_table
+
+DAYS = ("2026-03-01", "2026-03-08", "2026-03-15", "2026-03-22", "2026-04-05", "2026-04-12")
+GROWTH = 0.06  # of the friction of tendon 5's edge at joint 1, from one recording to the next
+SECONDS = 30.0
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("-o", "--output", type=Path, required=True, help="folder, made if it is not there")
+    folder: Path = parser.parse_args().output
+    folder.mkdir(parents=True, exist_ok=True)
+    for k, day in enumerate(DAYS):
+        change = scaled("SHARE", 1.0 + GROWTH * k, 4, 0) if k else NO_CHANGE
+        columns = record_numpy(numpy_maxwell, change, How(motion=100 + k, noise=200 + k, seconds=SECONDS)).columns
+        write_table(folder / f"{day}.parquet", columns)
+        if not k:
+            model = fitted(described(Plan("maxwell", "motion")), columns)
+            (folder / "finger.json").write_text(json.dumps(model), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
