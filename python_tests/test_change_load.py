@@ -75,9 +75,9 @@ def test_a_level_within_what_the_reference_leaves_is_no_load() -> None:
     turns = np.sign(np.sin(2 * np.pi * OFTEN / 60.0 * series.time))[:, None]
     assert found_in(wandering + 0.6 * LOAD * turns, series, 1) is None
     assert found_in(wandering + 0.3 * LOAD * turns, series, 1) is not None
-    three = series_of(3)
-    assert found_in(at_joint(three, [0.0, 1.2 * LOAD, LOAD + 0.6 * LOAD]), three, 2) is None
-    assert found_in(at_joint(three, [0.0, 0.2 * LOAD, LOAD + 0.1 * LOAD]), three, 2) is not None
+    five = series_of(5)  # one of four references lies 0.75 of its distance off their mean, their rms is 0.43 of it
+    assert found_in(at_joint(five, [0.0, 0.0, 0.0, LOAD, 1.5 * LOAD]), five, 4) is None
+    assert found_in(at_joint(five, [0.0, 0.0, 0.0, LOAD, 2.0 * LOAD]), five, 4) is not None
 
 
 def test_a_level_that_is_there_at_times_is_no_load() -> None:
