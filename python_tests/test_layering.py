@@ -51,6 +51,7 @@ COMMANDS = {
     "cli_calibrate.py",
     "cli_campaign.py",
     "cli_check.py",
+    "cli_convert.py",
     "cli_detect.py",
     "cli_diagnose.py",
     "cli_options.py",

@@ -14,7 +14,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from tendonfmu import cli_calibrate, cli_campaign, cli_check, cli_detect, cli_diagnose
+from tendonfmu import cli_calibrate, cli_campaign, cli_check, cli_convert, cli_detect, cli_diagnose
 from tendonfmu.cli_options import FingerFile, FreeRecordings, Kinematics, Model, Progress, Report, Subject
 from tendonfmu.console import fit_bar, leave, phase_bar, print_tables, progress_bar, say
 from tendonfmu.errors import InputError, line_of
@@ -191,46 +191,7 @@ def simulate(
         say(f"{output}: {line}")
 
 
-@app.command()
-def convert(
-    source: Annotated[str, typer.Argument(metavar="FORMAT", help="davinci or emps")],
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="third-party recording")],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="REC.csv", help="recording, .csv or .parquet")],
-    radius: Annotated[
-        float | None,
-        typer.Option(
-            min=1e-6, max=1.0, help="m; davinci: of the pulley on which the recorded torque acts \\[default: 0.005]"
-        ),
-    ] = None,
-    pretension: Annotated[
-        float | None,
-        typer.Option(
-            min=0.0,
-            max=1e6,
-            help="N; davinci: of the cable loop, to record its closing cable alone \\[default: 0, the net force]",
-        ),
-    ] = None,
-    mass: Annotated[
-        float | None,
-        typer.Option(
-            min=0.0, max=1e6, help="kg; emps: moved mass, its inertial force is known load \\[default: 95.1089]"
-        ),
-    ] = None,
-    decimation: Annotated[
-        int | None, typer.Option(min=1, max=1000, help="emps: keep one sample in so many, smoothed \\[default: 10]")
-    ] = None,
-) -> None:
-    """Turn a third-party recording into one of ours."""
-    from tendonfmu.converters import convert_file
-    from tendonfmu.tables import check_format, write_table
-    from tendonfmu.whole_file import check_output
-
-    check_format(output)
-    check_output(output, file)
-    given = {"radius": radius, "pretension": pretension, "mass": mass, "decimation": decimation}
-    table = convert_file(source, file, {name: value for name, value in given.items() if value is not None})
-    write_table(output, table)
-    say(f"{output}: {len(table['time'])} samples, {table['time'][-1] - table['time'][0]:.3f} s")
+cli_convert.register(app)
 
 
 @app.command()

@@ -1,7 +1,8 @@
 """Third-party recordings to ours: one foreign format a file.
 
 A converter is a function (file, its own options) -> columns of a recording (docs/recording.md). To add one, write a
-module beside this and name it in `CONVERTERS`.
+module beside this and name it in `CONVERTERS`. Logs without a format of their own are read by a map of columns
+(`table`).
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ CONVERTERS = {
 def converter(name: str) -> Converter:
     """The converter of that name; raises InputError listing the known ones."""
     if name not in CONVERTERS:
-        raise InputError(f"convert: unknown format {name!r}; expected one of {', '.join(CONVERTERS)}")
+        raise InputError(f"convert: unknown format {name!r}; expected one of {', '.join(CONVERTERS)}, table")
     convert: Converter = importlib.import_module(CONVERTERS[name].module).convert
     return convert
 
