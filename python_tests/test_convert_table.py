@@ -1,0 +1,440 @@
+"""`convert table`: logs in random units, signs, zeros and separators read back; what is refused; one-joint machines."""
+
+from __future__ import annotations
+
+import copy
+import gzip
+import json
+import subprocess
+import sys
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pandas as pd
+import pytest
+
+from command import Call
+
+pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
+
+from tendonfmu.converters import units
+from tendonfmu.converters.column_map import read_map
+from tendonfmu.converters.one_joint import central_velocity
+from tendonfmu.converters.one_joint_description import starting_numbers
+from tendonfmu.converters.table import convert_table
+from tendonfmu.description import read_finger
+from tendonfmu.errors import InputError
+from tendonfmu.recording import read_recording
+from tendonfmu.tables import read_table, write_table
+
+EXAMPLE = Path(__file__).resolve().parent.parent / "examples" / "one_joint"
+SCHEMA = json.loads((files("tendonfmu") / "schema" / "map.schema.json").read_text(encoding="utf-8"))
+VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)
+
+ROWS = 200
+SMALL = {
+    "format": "tendonfmu-map-1",
+    "columns": {
+        "time": {"column": "t", "unit": "ms"},
+        "tendon_force[1]": {"column": "force", "unit": "kN"},
+        "tendon_position[1]": {"column": "spool", "unit": "mm", "sign": -1, "offset": 5},
+    },
+}
+LOG = "t,force,spool,note\n0,0.001,5,a\n2,0.002,4,b\n4,0.003,3,c\n"
+TURNING = {
+    "format": "tendonfmu-map-1",
+    "joint": {
+        "time": {"column": "t", "unit": "s"},
+        "torque": {"column": "torque", "unit": "N.m"},
+        "angle": {"column": "angle", "unit": "rad"},
+    },
+}
+
+
+def edited(document: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
+    """A copy with one value changed; path: keys with / between; value ...: the key is taken away."""
+    found = copy.deepcopy(document)
+    *parents, last = path.split("/")
+    inner = found
+    for key in parents:
+        inner = inner.setdefault(key, {})
+    if value is ...:
+        del inner[last]
+    else:
+        inner[last] = value
+    return found
+
+
+def written(folder: Path, log: str | bytes = LOG, wanted: Any = SMALL, name: str = "log.csv") -> tuple[Path, Path]:
+    """Log and map."""
+    (folder / name).write_bytes(log if isinstance(log, bytes) else log.encode())
+    (folder / "map.json").write_text(wanted if isinstance(wanted, str) else json.dumps(wanted))
+    return folder / name, folder / "map.json"
+
+
+# --- what is read -----------------------------------------------------------------------------------------------------
+
+
+def test_units_are_exact(tmp_path: Path) -> None:
+    """By definition: an inch is 25.4 mm, a turn 2 pi, a kilopond 9.80665 N; 60 turns a minute are one a second."""
+    found = convert_table(*written(tmp_path)).columns
+    assert found["time"].tolist() == [0.0, 0.002, 0.004]
+    assert found["tendon_force[1]"].tolist() == [1.0, 2.0, 3.0]
+    assert found["tendon_position[1]"].tolist() == pytest.approx([0.0, 0.001, 0.002], abs=1e-18)
+    assert units.LENGTH["inch"] * 1000 == pytest.approx(25.4, rel=1e-15)
+    assert units.FORCE["lbf"] * units.LENGTH["inch"] == units.TORQUE["lbf.in"]
+    assert units.ANGULAR_SPEED["rpm"] * 60 == pytest.approx(units.ANGULAR_SPEED["turn/s"], rel=1e-15)
+    assert units.ANGLE["deg"] * 360 == pytest.approx(units.ANGLE["turn"], rel=1e-15)
+    assert units.TORQUE["kgf.cm"] == pytest.approx(units.FORCE["kgf"] * units.LENGTH["cm"], rel=1e-15)
+
+
+def random_recording(random: np.random.Generator) -> dict[str, Any]:
+    """Columns in SI."""
+    columns: dict[str, Any] = {"time": np.cumsum(random.uniform(1e-3, 3e-3, ROWS))}
+    for group, count in (("tendon", random.integers(1, 5)), ("joint", random.integers(1, 3))):
+        names = {"tendon": ["tendon_force", "tendon_position"], "joint": ["joint_position", "external_torque"]}[group]
+        columns |= {f"{name}[{i}]": random.normal(0.0, 3.0, ROWS) for name in names for i in range(1, count + 1)}
+    if random.random() < 0.5:
+        columns["contact"] = (random.random(ROWS) < 0.3).astype(float)
+    return columns
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_random_logs_read_back(tmp_path: Path, seed: int) -> None:
+    """Any units, signs, scales, zeros, separators, order and text beside; to rounding of the numbers themselves."""
+    random = np.random.default_rng(seed)
+    recording = random_recording(random)
+    separator = str(random.choice([",", ";", "\t", "|", " "]))
+    decimal = "," if separator in ";\t|" and random.random() < 0.5 else "."
+    by_number, skip = random.random() < 0.3, int(random.integers(0, 3))
+    names = {column: f"signal_{k}" for k, column in enumerate(random.permutation(list(recording)))}
+    readings: dict[str, Any] = {}
+    wanted: dict[str, Any] = {}
+    errors = {}
+    for column, name in names.items():
+        known = units.OF_COLUMN[column.split("[")[0]]
+        unit = str(random.choice(list(known)))
+        plain = column in ("time", "contact")
+        sign = 1 if plain else int(random.choice([1, -1]))
+        scale = 1.0 if plain else float(random.uniform(0.1, 10.0))
+        offset = 0.0 if plain else float(random.normal(0.0, 2.0))
+        factor = known[unit] * scale
+        readings[name] = sign * recording[column] / factor + offset
+        errors[column] = 1e-15 * (np.abs(recording[column]).max() + abs(offset) * factor) * 4
+        wanted[column] = {"column": name, "unit": unit, "sign": sign, "scale": scale, "offset": offset}
+    readings["remark"] = np.array(["go"] * ROWS)
+    if by_number:
+        for column in wanted.values():
+            column["column"] = list(readings).index(column["column"]) + 1
+    log = {"header": not by_number, "skip": skip, "decimal": decimal} | ({"separator": separator} if seed % 2 else {})
+    document = {"format": "tendonfmu-map-1", "log": log, "columns": wanted}
+    VALIDATOR.validate(document)
+    rows = zip(*(values.tolist() for values in readings.values()), strict=True)
+    lines = [separator.join(str(each).replace(".", decimal) for each in row) for row in rows]
+    text = "\n".join(["made by a machine"] * skip + ([] if by_number else [separator.join(readings)]) + lines) + "\n"
+    name = str(random.choice(["log.csv", "log.txt", "log.csv.gz"]))
+    content = gzip.compress(text.encode()) if name.endswith("gz") else text.encode()
+    found = convert_table(*written(tmp_path, content, document, name)).columns
+    assert found.keys() == recording.keys()
+    for column, values in recording.items():
+        assert np.abs(found[column] - values).max() <= errors[column], column
+    write_table(tmp_path / "rec.parquet", found)
+    assert len(read_recording(tmp_path / "rec.parquet")) == ROWS
+
+
+def test_parquet_reads_as_csv_does(tmp_path: Path) -> None:
+    frame = pd.DataFrame({"t": [0, 2, 4], "force": np.float32([0.25, 0.5, 0.75]), "spool": [5, 4, 3], "note": "abc"})
+    frame.to_parquet(tmp_path / "log.parquet")
+    frame.to_csv(tmp_path / "same.csv", index=False)
+    (tmp_path / "map.json").write_text(json.dumps(SMALL))
+    one, other = (convert_table(tmp_path / name, tmp_path / "map.json") for name in ("log.parquet", "same.csv"))
+    for name, values in one.columns.items():
+        assert values.tolist() == other.columns[name].tolist()
+
+
+def test_the_first_reading_may_be_the_zero(tmp_path: Path) -> None:
+    """A clock of nanoseconds since 1970, which starts at 0 then."""
+    log = LOG.replace("\n0,", "\n1700000000000000000,").replace("\n2,", "\n1700000000002000128,")
+    log = log.replace("\n4,", "\n1700000000004000000,")
+    wanted = edited(SMALL, "columns/time", {"column": "t", "unit": "ns", "offset": "first"})
+    assert convert_table(*written(tmp_path, log, wanted)).columns["time"] == pytest.approx([0, 0.002, 0.004], abs=1e-6)
+
+
+def test_a_last_line_without_its_end_is_left_out_and_said(tmp_path: Path) -> None:
+    found = convert_table(*written(tmp_path, LOG + "6,0.00"))
+    assert len(found.columns["time"]) == 3
+    assert "'6,0.00'" in found.notes[0] and "left out" in found.notes[0]
+
+
+# --- what is refused --------------------------------------------------------------------------------------------------
+
+BAD_MAPS = [
+    ("format", "tendonfmu-map-2", ["format", "tendonfmu-map-1"]),
+    ("columns", ..., ["joint: missing", "columns"]),
+    ("unknown", 1, ["unknown", "expected one of format"]),
+    ("joint", TURNING["joint"], ["joint", "one of the two"]),
+    ("columns/time", ..., ["columns.time: missing"]),
+    ("columns/tendon_position[1]", ..., ["columns.tendon_position[1]: missing"]),
+    ("columns/tendon_force[3]", {"column": "x", "unit": "N"}, ["columns.tendon_force[2]: missing"]),
+    ("columns/tendon_forces[1]", {"column": "x", "unit": "N"}, ["tendon_forces[1]", "tendon_force[1]"]),
+    ("columns/tendon_force", {"column": "x", "unit": "N"}, ["columns.tendon_force", "tendon_force[1]"]),
+    ("columns/time/unit", "hours", ["columns.time.unit", '"hours"', "s, ms, us, ns"]),
+    ("columns/tendon_force[1]/unit", "mm", ["tendon_force[1].unit", "N, mN, kN"]),
+    ("columns/tendon_force[1]/unit", ..., ["tendon_force[1].unit: missing", "N, mN"]),
+    ("columns/tendon_force[1]/sign", 0, ["sign", "1 or -1"]),
+    ("columns/tendon_force[1]/scale", 0, ["scale", "above 0"]),
+    ("columns/tendon_force[1]/offset", "last", ["offset", "number"]),
+    ("columns/tendon_force[1]/colour", "red", ["colour", "column, unit, sign, scale, offset"]),
+    ("columns/tendon_force[1]/column", 0, ["column = 0", "number from 1"]),
+    ("columns/tendon_force[1]/column", ..., ["column: missing"]),
+    ("log", {"separator": ":"}, ["log.separator", '";"']),
+    ("log", {"separator": ",", "decimal": ","}, ["log.decimal", "separator"]),
+    ("log", {"header": 1}, ["log.header", "true or false"]),
+    ("log", {"skip": -1}, ["log.skip"]),
+]
+
+
+@pytest.mark.parametrize(("path", "value", "words"), BAD_MAPS, ids=[f"{path}={value}" for path, value, _ in BAD_MAPS])
+def test_wrong_maps_are_refused_by_key(tmp_path: Path, path: str, value: Any, words: list[str]) -> None:
+    document = edited(SMALL, path, value)
+    file, wanted = written(tmp_path, wanted=document)
+    with pytest.raises(InputError) as refused:
+        convert_table(file, wanted)
+    line = str(refused.value)
+    assert line.startswith(f"{wanted}: ") and "\n" not in line
+    assert all(word in line for word in words), line
+    relation = value == {"separator": ",", "decimal": ","} or path == "columns/tendon_force[3]"
+    assert relation or not VALIDATOR.is_valid(document)  # a schema cannot say that two values differ
+
+
+@pytest.mark.parametrize(
+    ("log", "words"),
+    [
+        ("", ["no line"]),
+        ("t,force,spool,note\n", ["no samples"]),
+        (LOG.replace("force", "Forces"), ["'force'", "columns.tendon_force[1]", "it has Forces"]),
+        (LOG.replace("note", "t"), ["'t'", "2 times"]),
+        (LOG.replace("0.002", "much"), ["column force", "row 2", "'much'", "number"]),
+        (LOG.replace("0.002", "nan"), ["column force", "row 2", "number"]),
+        (LOG.replace("0.002", ""), ["column force", "row 2", "''"]),
+        (LOG.replace("0.002", "1_0"), ["column force", "row 2", "'1_0'"]),
+        (LOG.replace("4,b", "4"), ["row 2", "3 fields", "expected 4"]),
+        (LOG.replace("\n4,", "\n2,"), ["column t", "row 3", "2.0 after 2.0", "increasing"]),
+        (LOG.replace("\n2,", "\n9,"), ["column t", "row 3", "4.0 after 9.0"]),
+        (b"\xff\xfe\x00", ["UTF-8"]),
+        (b"t,\0", ["not a text file"]),
+    ],
+)
+def test_wrong_logs_are_refused_by_column_and_row(tmp_path: Path, log: str | bytes, words: list[str]) -> None:
+    file, wanted = written(tmp_path, log)
+    with pytest.raises(InputError) as refused:
+        convert_table(file, wanted)
+    line = str(refused.value)
+    assert line.startswith(f"{file}: ") and "\n" not in line
+    assert all(word in line for word in words), line
+
+
+def test_other_refusals(tmp_path: Path) -> None:
+    file, wanted = written(tmp_path)
+    with pytest.raises(InputError, match=r"absent\.csv: no such file"):
+        convert_table(tmp_path / "absent.csv", wanted)
+    with pytest.raises(InputError, match=r"log\.xlsx: unknown format"):
+        convert_table(written(tmp_path, name="log.xlsx")[0], wanted)
+    with pytest.raises(InputError, match=r"gz: not a whole gzip file"):
+        convert_table(written(tmp_path, gzip.compress(LOG.encode() * 50)[:60], name="log.csv.gz")[0], wanted)
+    with pytest.raises(InputError, match="not a whole Parquet file"):
+        convert_table(written(tmp_path, name="log.parquet")[0], wanted)
+    with pytest.raises(InputError, match=r"columns\.time\.column = 9: .* has 4 columns"):
+        convert_table(file, written(tmp_path, wanted=edited(SMALL, "columns/time/column", 9))[1])
+    labelled = edited(SMALL, "columns/contact", {"column": "force"})
+    with pytest.raises(InputError, match=r"column force, row 1: 0\.001; expected 0 or 1"):
+        convert_table(*written(tmp_path, wanted=labelled))
+    pd.DataFrame({"t": ["a"], "force": [1.0], "spool": [2.0]}).to_parquet(tmp_path / "log.parquet")
+    with pytest.raises(InputError, match=r"column t, row 1: .*; expected numbers"):
+        convert_table(tmp_path / "log.parquet", wanted)
+
+
+def test_the_command_writes_whole_files_or_none(call: Call, tmp_path: Path) -> None:
+    written(tmp_path, LOG.replace("0.002", "much"))
+    for arguments, words in (
+        (["log.csv", "--map", "map.json"], ["row 2"]),
+        (["log.csv"], ["--map", "missing"]),
+        (["log.csv", "--map", "map.json", "--mass", "3"], ["--mass", "--map or --finger"]),
+        (["log.csv", "--map", "map.json", "--finger", "rec.csv"], ["two names"]),
+        (["log.csv", "--map", "absent.json"], ["absent.json"]),
+    ):
+        answer = call("convert", "table", *arguments, "-o", "rec.csv")
+        assert answer.status == 2 and len(answer.err.splitlines()) == 1
+        assert all(word in answer.err for word in words), answer.err
+    answer = call("convert", "davinci", "log.csv", "--map", "map.json", "-o", "rec.csv")
+    assert answer.status == 2 and "--map" in answer.err
+    written(tmp_path)
+    answer = call("convert", "table", "log.csv", "--map", "map.json", "-o", "rec.csv", "--finger", "finger.json")
+    assert answer.status == 2 and '"joint" instead of "columns"' in answer.err
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["log.csv", "map.json"]
+    answer = call("convert", "table", "log.csv", "--map", "map.json", "-o", "map.json")
+    assert answer.status == 2
+    answer = call("convert", "table", "log.csv", "--map", "map.json", "-o", "rec.csv")
+    assert answer.status == 0 and "3 samples" in answer.err
+
+
+# --- machines with one joint ------------------------------------------------------------------------------------------
+
+COULOMB, VISCOUS, INERTIA, OFFSET = 0.8, 0.3, 0.05, 0.1
+
+
+def machine(rate: float = 500.0, rest: float = 0.4, noise: float = 0.0) -> dict[str, Any]:
+    """time, angle, velocity, acceleration and torque of a joint that rests and then swings; all exact but for noise."""
+    time = np.arange(0.0, 12.0, 1 / rate)
+    t = np.maximum(time - rest, 0.0)
+    parts = [(1.0, 2.1), (0.4, 5.3)]
+    angle = sum(a * (1 - np.cos(w * t)) for a, w in parts)
+    velocity = sum(a * w * np.sin(w * t) for a, w in parts)
+    acceleration = sum(a * w * w * np.cos(w * t) for a, w in parts) * (time >= rest)
+    torque = COULOMB * np.sign(velocity) + VISCOUS * velocity + INERTIA * acceleration + OFFSET
+    torque = torque + np.random.default_rng(1).normal(0.0, noise, len(time)) if noise else torque
+    return {"t": time, "angle": angle, "speed": velocity, "accelerating": INERTIA * acceleration, "torque": torque}
+
+
+def machine_log(folder: Path, signals: dict[str, Any], wanted: dict[str, Any] = TURNING) -> tuple[Path, Path]:
+    write_table(folder / "log.csv", signals)
+    VALIDATOR.validate(wanted)
+    return written(folder, (folder / "log.csv").read_bytes(), wanted)
+
+
+def test_torque_is_the_force_of_one_tendon(tmp_path: Path) -> None:
+    """The start at rest is left out; the velocity is within 1 % of the largest one, without delay."""
+    signals = machine()
+    log = convert_table(*machine_log(tmp_path, signals))
+    found = log.columns
+    begin = len(signals["t"]) - len(found["time"])
+    assert 0.4 * 500 <= begin < 0.45 * 500 and f"{begin} samples at rest" in log.notes[1]
+    assert found["tendon_force[1]"].tolist() == signals["torque"][begin:].tolist()
+    assert found["tendon_position[1]"].tolist() == found["joint_position[1]"].tolist()
+    assert found["joint_position[1]"].tolist() == signals["angle"][begin:].tolist()
+    error = np.abs(found["joint_velocity[1]"] - signals["speed"][begin:])[20:-20]
+    assert error.max() < 0.01 * np.abs(signals["speed"]).max()
+    assert "20 Hz" in log.notes[0]
+
+
+def test_a_given_velocity_and_known_load_are_taken_as_they_are(tmp_path: Path) -> None:
+    wanted = edited(TURNING, "joint/velocity", {"column": "speed", "unit": "rad/s"})
+    wanted = edited(wanted, "joint/known_load", {"column": "accelerating", "unit": "N.m"})
+    signals = machine(rest=0.0)
+    found = convert_table(*machine_log(tmp_path, signals, wanted)).columns
+    kept = len(found["time"])
+    assert found["joint_velocity[1]"].tolist() == signals["speed"][-kept:].tolist()
+    assert found["external_torque[1]"].tolist() == signals["accelerating"][-kept:].tolist()
+    numbers = starting_numbers(found, 1e-3)
+    truth = {"coulomb": COULOMB, "viscous": VISCOUS, "offset": OFFSET}
+    assert {name: numbers[name] for name in truth} == pytest.approx(truth, rel=1e-5)
+
+
+def test_a_sliding_axis_is_the_same_in_metres(tmp_path: Path) -> None:
+    parts = {"force": "torque", "position": "angle"}
+    sliding = {"kind": "sliding", "time": {"column": "t", "unit": "s"}}
+    sliding |= {"force": {"column": "torque", "unit": "mN"}, "position": {"column": "angle", "unit": "mm"}}
+    turning = convert_table(*machine_log(tmp_path, machine())).columns
+    signals = machine() | {name: 1e3 * machine()[name] for name in parts.values()}
+    found = convert_table(*machine_log(tmp_path, signals, {"format": "tendonfmu-map-1", "joint": sliding})).columns
+    for name, values in turning.items():
+        assert found[name] == pytest.approx(values, rel=1e-9, abs=1e-9), name
+    for wrong, words in (("torque", "unknown key"), ("angle", "unknown key")):
+        bad = {"format": "tendonfmu-map-1", "joint": {**sliding, wrong: {"column": "t", "unit": "rad"}}}
+        with pytest.raises(InputError, match=words):
+            convert_table(*written(tmp_path, wanted=bad))
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "words"),
+    [
+        ("joint/angle", ..., ["joint.angle: missing", "rad", "deg"]),
+        ("joint/kind", "flying", ["joint.kind", "turning", "sliding"]),
+        ("joint/velocity_cutoff", 200, ["500 samples per second", "joint.velocity_cutoff = 200", "at most 100 Hz"]),
+        ("joint/velocity_cutoff", -1, ["joint.velocity_cutoff", "at least 0"]),
+        ("joint/angle/unit", "mm", ["joint.angle.unit", "rad, mrad, deg, turn"]),
+        ("joint/angle/column", "angel", ["'angel'", "joint.angle", "it has angle"]),
+    ],
+)
+def test_wrong_joints_are_refused(tmp_path: Path, path: str, value: Any, words: list[str]) -> None:
+    write_table(tmp_path / "log.csv", machine())
+    with pytest.raises(InputError) as refused:
+        convert_table(*written(tmp_path, (tmp_path / "log.csv").read_bytes(), edited(TURNING, path, value)))
+    assert all(word in str(refused.value) for word in words), refused.value
+
+
+def test_what_does_not_move_is_refused(tmp_path: Path) -> None:
+    still = {name: values[:100] for name, values in machine(rest=5.0).items()}
+    with pytest.raises(InputError, match=r"log\.csv: the joint does not move"):
+        convert_table(*machine_log(tmp_path, still))
+    with pytest.raises(InputError, match=r"19 samples; expected at least 20"):
+        convert_table(*machine_log(tmp_path, {name: values[:19] for name, values in machine(rest=0.0).items()}))
+
+
+def test_no_filter_passes_over_a_gap() -> None:
+    """A joint that is elsewhere after the log was interrupted: no velocity comes of the jump."""
+    time = np.r_[np.arange(0.0, 1.0, 0.002), np.arange(5.0, 6.0, 0.002)]
+    angle = 0.5 * time + 3.0 * (time > 3.0)
+    assert central_velocity(time, angle, 20.0) == pytest.approx(0.5, rel=1e-6)
+
+
+def test_the_description_is_sound_and_its_numbers_are_those_of_the_log(call: Call, tmp_path: Path) -> None:
+    machine_log(tmp_path, machine(noise=0.02))
+    answer = call("convert", "table", "log.csv", "--map", "map.json", "-o", "rec.parquet", "--finger", "finger.json")
+    assert answer.status == 0, answer.err
+    data = read_finger(tmp_path / "finger.json").data
+    law = data["joints"][0]["friction"]
+    assert law["static"] == law["coulomb"] == pytest.approx(COULOMB, rel=0.02)
+    assert law["viscous"] == pytest.approx(VISCOUS, rel=0.02)
+    assert data["extensions"][0]["inertia"] == pytest.approx(INERTIA, rel=0.05)
+    assert data["bias"]["initial_torque"][0] == pytest.approx(OFFSET, abs=0.01)
+    answer = call("check", "finger.json", "rec.parquet")
+    assert answer.status == 0 and "belongs to this finger" in answer.out and answer.err == ""
+    assert call("fit", "finger.json", "rec.parquet", "--kinematics", "3", "-o", "fitted.json").status == 0
+    fitted = read_finger(tmp_path / "fitted.json").data["joints"][0]["friction"]
+    assert (fitted["coulomb"], fitted["viscous"]) == pytest.approx((COULOMB, VISCOUS), rel=0.02)
+
+
+# --- the example and the schema ---------------------------------------------------------------------------------------
+
+
+def test_the_schema_says_what_every_key_is() -> None:
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+    for wanted in (SMALL, TURNING, json.loads((EXAMPLE / "map.json").read_text(encoding="utf-8"))):
+        VALIDATOR.validate(wanted)
+    for name, table in (("time", units.TIME), ("torque", units.TORQUE), ("angular_speed", units.ANGULAR_SPEED)):
+        assert SCHEMA["$defs"][name]["properties"]["unit"]["enum"] == list(table)
+    for name, table in (("force", units.FORCE), ("length", units.LENGTH), ("angle", units.ANGLE)):
+        assert SCHEMA["$defs"][name]["properties"]["unit"]["enum"] == list(table)
+    assert SCHEMA["$defs"]["speed"]["properties"]["unit"]["enum"] == list(units.SPEED)
+
+
+@pytest.mark.slow
+def test_the_example_finds_what_was_changed(call: Call, tmp_path: Path) -> None:
+    """Week 5 has 20 % more Coulomb friction than week 1, week 3 has what week 1 had; every week moves differently.
+
+    The first 30 s of each, for speed.
+    """
+    script = EXAMPLE / "make_logs.py"
+    subprocess.run([sys.executable, str(script), "-o", "logs"], cwd=tmp_path, check=True, capture_output=True)
+    assert read_map(EXAMPLE / "map.json").joint is not None
+    for week in (1, 3, 5):
+        made = f"week_{week}.parquet"
+        extra = ["--finger", "servo.json"] if week == 1 else []
+        log = f"logs/week_{week}.csv"
+        assert call("convert", "table", log, "--map", EXAMPLE / "map.json", "-o", made, *extra).status == 0
+        table = read_table(tmp_path / made, lambda *_: None)
+        write_table(tmp_path / made, {name: values[table["time"] < 30.0] for name, values in table.items()})
+    assert call("fit", "servo.json", "week_1.parquet", "--kinematics", "3", "-o", "fitted.json").status == 0
+    causes = {}
+    for week in (3, 5):
+        now = ["diagnose", "fitted.json", f"week_{week}.parquet", "--reference", "week_1.parquet", "--kinematics", "3"]
+        assert call(*now, "-o", f"diagnosis_{week}").status == 0
+        report = json.loads((tmp_path / f"diagnosis_{week}" / "diagnosis.json").read_text(encoding="utf-8"))
+        causes[week] = report["causes"]
+    assert causes[3] == []
+    # in a machine with one rigid tendon these two are one friction
+    assert len(causes[5]) == 1 and causes[5][0]["effect"] in ("joint_friction", "preload_friction")
