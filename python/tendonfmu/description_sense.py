@@ -48,6 +48,11 @@ def description_findings(finger: FingerDescription) -> list[Finding]:
     ]
 
 
+def is_direct_drive(arms: Numbers) -> bool:
+    """Whether R [m, n] has arms of 1 m alone: a machine without tendons, whose radians, or metres, may be large."""
+    return bool(np.all(np.abs(arms[arms != 0.0]) == 1.0))
+
+
 Row = tuple[str, str, str, str, str]  # kind, key, seen, probably, write
 
 
@@ -55,10 +60,9 @@ Row = tuple[str, str, str, str, str]  # kind, key, seen, probably, write
 
 
 def _moment_arms(arms: Numbers, data: Mapping[str, Any]) -> Iterator[Row]:
-    """Arms of 1 m exactly are a linear axis, whose metres are radians."""
-    sizes = np.abs(arms[arms != 0.0])
-    if np.all(sizes == 1.0):
+    if is_direct_drive(arms):
         return
+    sizes = np.abs(arms[arms != 0.0])
     i, j = np.unravel_index(int(np.abs(arms).argmax()), arms.shape)
     key = f"tendons[{i + 1}].moment_arms[{j + 1}]"
     if sizes.max() > LONGEST_ARM:
@@ -148,6 +152,8 @@ def _angles(data: Mapping[str, Any]) -> Iterator[Row]:
 
 
 def _thresholds(data: Mapping[str, Any], arms: Numbers) -> Iterator[Row]:
+    if is_direct_drive(arms):
+        return
     given = data.get("velocity_threshold") or {}
     for name, most, unit, wrong in (
         ("tendon", TENDON_THRESHOLD, "m/s", "mm/s"),

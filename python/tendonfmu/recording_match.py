@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from tendonfmu import recording_match_text as text
 from tendonfmu.description import FingerDescription
+from tendonfmu.description_sense import is_direct_drive
 from tendonfmu.errors import InputError
 from tendonfmu.recording import GROUP_PER, Recording, check_numbers
 from tendonfmu.recording_channels import (
@@ -163,7 +164,7 @@ def _of_kinematics(finger: FingerDescription, recording: Recording) -> tuple[lis
         if left > POOR:
             found.append(text.unfit(recording.path, left, "warning", balance))
     turn = np.ptp(tendon_angles(recording, finger), axis=0)
-    if turn.max() > TURNS:
+    if turn.max() > TURNS and not is_direct_drive(np.array(finger.moment_arms)):
         correction = balance.plausible_scale() if not found else None
         found.append(text.turns(recording.path, turn, finger.joint_names, correction))
         if correction is not None:
