@@ -150,7 +150,7 @@ def history(tmp_path: Path, answering: Calls) -> Callable[[], History]:
 
 def test_what_was_named_in_one_recording_is_sized_in_all(history: Callable[[], History]) -> None:
     found = history()
-    assert found.dated and found.times == (0.0, 1.0, 2.0, 3.0) and found.failed == ()
+    assert found.dated and found.times == (1.0, 2.0, 3.0, 4.0) and found.failed == ()
     assert found.verdicts == ("adequate", "adequate", "adequate", "explained")
     (line,) = found.lines
     assert line.where == Where("joint_friction", 1) and [each.named for each in line.sizes] == [False] * 3 + [True]
@@ -212,7 +212,7 @@ def test_what_fails_is_left_out_and_named(tmp_path: Path, history: Callable[[], 
     ((name, why),) = found.failed
     assert Path(name).stem == WEEKS[1] and "no column; expected some" in why
     assert ("sizes", f"{WEEKS[1]}.csv") not in answering
-    assert found.times == (0.0, 2.0, 3.0) and len(found.lines[0].sizes) == len(found.verdicts) == 3
+    assert found.times == (1.0, 3.0, 4.0) and len(found.lines[0].sizes) == len(found.verdicts) == 3
     page = next(iter(write_history(found, NAMES, tmp_path / "out"))).read_text("utf-8")
     assert "no column; expected some" in page
 
@@ -236,7 +236,7 @@ def test_the_table_has_a_row_per_recording_and_cause(tmp_path: Path, history: Ca
     assert {(row["effect"], row["joint"], row["tendon"], row["unit"]) for row in rows} == {
         ("joint_friction", "1", "0", "N.m")
     }
-    assert [float(row["time_weeks"]) for row in rows] == [0.0, 1.0, 2.0, 3.0]
+    assert [float(row["time_weeks"]) for row in rows] == [1.0, 2.0, 3.0, 4.0]
 
 
 def plain(text: str) -> str:

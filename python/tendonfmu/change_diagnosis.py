@@ -226,7 +226,7 @@ class _Changes:
             return self._result(dropped, gains[:-1])
         before, after = self._views()
         unexplained, load = self._unexplained(), self._load()
-        causes = tuple(self._cause(k, learned, each) for k, each in enumerate(gains))
+        causes = tuple(self._cause(k, search.changes, each) for k, each in enumerate(gains))
         return Diagnosis(
             finger=case.finger.name,
             verdict=_verdict(bool(causes) or load is not None, unexplained.unknown),
@@ -254,7 +254,7 @@ class _Changes:
             whiteness=whiteness(self._now_series(), before, after),
             detection=None,
             nominal_data=nominal,
-            extended_data=extended,
+            extended_data=self._online(search.changes) if causes else nominal,
             warnings=(*case.warnings, *self._warnings()),
             tested=search.tried,
             event_gain=event_gain(extended, case.whole, self._events),
@@ -361,7 +361,8 @@ class _Changes:
 
     def _next(self, causes: Sequence[Cause]) -> str:
         search = self._search
-        if any(cause.confusable_with for cause in causes):
+        pulls = any(not each.get("bidirectional") for each in self._case.finger.data["tendons"])
+        if any(cause.confusable_with for cause in causes) and pulls:
             return (
                 f"{REPEAT}, once as it was and once at half and at twice the pretension: what grows with the force is "
                 "then told from what does not"

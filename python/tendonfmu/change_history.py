@@ -61,8 +61,8 @@ class Line:
 
 @dataclass(frozen=True)
 class History:
-    """times: [K] of the recordings, weeks since the reference where all names have dates, else their number from 1.
-    failed: (recording, why) of what could not be diagnosed."""
+    """times: [K] of the recordings: weeks since the reference, or since the first where that has no date, if the names
+    have dates, else their number from 1. failed: (recording, why) of what could not be diagnosed."""
 
     finger: str
     references: tuple[str, ...]
@@ -185,7 +185,9 @@ def _history(
     bad = {recording for recording, _ in failed}
     kept = [k for k, recording in enumerate(recordings) if recording not in bad]
     times, dated = times_of([*references, *(recordings[k] for k in kept)])
-    times = times[len(references) :] if dated else tuple(float(k) for k in range(1, len(kept) + 1))
+    times = times[len(references) :]
+    if not dated:
+        times, dated = times_of([recordings[k] for k in kept])
     titles: dict[str, str] = {}
     for row in causes:
         titles |= json.loads(row.get("titles") or "{}")

@@ -20,7 +20,6 @@ from tendonfmu.hypotheses import EVERYWHERE, HERE, SHARED, SOMEWHERE, Hypothesis
 Numbers = NDArray[np.float64]
 Data = Mapping[str, Any]
 
-LARGEST = 3.0  # times what the number is: derivatives say nothing of more
 _LAW = re.compile(
     r"(?:joints\[(?P<joint>\d+)\]\.(?P<own>friction|load_friction)"
     r"|tendons\[(?P<tendon>\d+)\]\.(?P<along>edge_friction|pulley_friction)\[(?P<at>\d+)\])"

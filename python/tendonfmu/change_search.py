@@ -165,6 +165,10 @@ class ChangeSearch:
         if not ranked:
             return None
         judged = self.selection.refined(ranked[0].hypothesis.effect)
+        if judged.hypothesis.members:  # a number that the description has goes before a term that it lacks
+            present = (each for each in ranked if not each.hypothesis.members)
+            same = next((each for each in present if is_alike(each.by_stretch, judged.by_stretch)), None)
+            judged = judged if same is None else self.selection.refined(same.hypothesis.effect)
         return self._at_best_place(judged) if len(self.new_recordings) > 1 else judged
 
     def _at_best_place(self, judged: Judged) -> Judged:

@@ -14,13 +14,15 @@ from tendonfmu import native
 from tendonfmu.change_numbers import changed
 from tendonfmu.change_search import Change, ChangeSearch
 from tendonfmu.diagnosis_result import ChangedSize, FoundPlace, Interval
-from tendonfmu.diagnosis_size import NBSP, quantity
+from tendonfmu.diagnosis_size import NBSP, quantity, size_of
 from tendonfmu.effects.description_edit import data_number
+from tendonfmu.effects.friction_law_places import thresholds
 from tendonfmu.extension_fit import added_paths
 
 Numbers = NDArray[np.float64]
 Data = Mapping[str, Any]
 TWO_SIDED = 1.96
+LEAST_OF_NOW = 0.05  # that a number was, for its change to be told as a share of it
 _OTHER_SIDE = {"positive": "negative", "negative": "positive"}
 
 
@@ -78,9 +80,7 @@ def _new_term(
     nothing = Interval(0.0, 0.0, 0.0)
     size = _interval(value, abs(value) * _relative_error(change))
     name = "amplitude" if len(main) > 1 else main[0].rsplit(".", 1)[-1]
-    words = f"{quantity(value, unit)} more than in the reference"
-    if value < 0:
-        words = f"{quantity(-value, unit)} less than in the reference"
+    words = f"{size_of(change.hypothesis.effect, places, thresholds(now))}, beyond what the reference has"
     return Sized(tuple(places), ChangedSize(name, unit, nothing, size, size), words)
 
 
@@ -117,7 +117,8 @@ def _other_number(search: ChangeSearch, change: Change, then: Data, now: Data, u
         before, after = _difference(then, main), _difference(now, main)
         name = f"{name}, positive less negative"
     error = abs(after - before) * _relative_error(change)
-    share = (after - before) / before if before and change.hypothesis.effect != "asymmetric_friction" else math.nan
+    told = abs(before) >= LEAST_OF_NOW * abs(after) and change.hypothesis.effect != "asymmetric_friction"
+    share = (after - before) / before if told and before else math.nan
     size = ChangedSize(name, unit, _interval(before, 0.0), _interval(after, error), _interval(after - before, error))
     more = f"{100 * share:+.0f}{NBSP}%: ".replace("-", "−") if math.isfinite(share) else ""
     where = f", at the largest of {len(places)} places" if len(places) > 1 else ""

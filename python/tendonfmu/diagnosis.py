@@ -64,6 +64,7 @@ Finger = FingerDescription | str | os.PathLike[str]
 Source = Recording | str | os.PathLike[str]
 
 HELD = Held(0.2, 10.0)  # of the recordings, for the gain, where no others are given
+HALF = Held(0.5, 10.0)  # of a change: its few numbers need less, and single samples of r are mostly noise
 LEAST_GAIN = 0.03
 MOST_RIVALS = 3  # of a cause, that an experiment is looked for
 MOST_UNSEEN = 6  # effects that are not visible, that an experiment is looked for
@@ -150,6 +151,7 @@ def _case(
     kinematics: int,
     least_gain: float,
     checked: bool,
+    apart: Held = HELD,
 ) -> _Case:
     if not recordings:
         raise InputError("no recording; expected at least one")
@@ -158,7 +160,7 @@ def _case(
     if not 0.0 <= least_gain <= 0.5:
         raise InputError(f"least_gain = {least_gain!r}: expected 0 to 0.5")
     given = finger if isinstance(finger, FingerDescription) else read_finger(Path(finger))
-    held = Held() if tests else HELD
+    held = Held() if tests else apart
     read, others = ([_read(each) for each in group] for group in (recordings, tests))
     warnings = [] if checked else admit(given, [*read, *others])
     training = [prepare(given, each, kinematics, held) for each in read]
@@ -185,7 +187,7 @@ def change_case(
     checked: bool,
 ) -> ChangeCase:
     """The recordings of now and of the reference, checked: by themselves, and against each other."""
-    own = _case(finger, now, tests, kinematics, least_gain, checked)
+    own = _case(finger, now, tests, kinematics, least_gain, checked, HALF)
     before = _case(own.finger, reference, [], kinematics, least_gain, checked)
     then = before.whole
     warnings = [*own.warnings, *(each for each in before.warnings if each not in own.warnings)]

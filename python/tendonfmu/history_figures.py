@@ -37,7 +37,7 @@ def _panel(line: Line, found: History, names: Names) -> Panel:
     named = np.array([each.named for each in line.sizes])
     then = factor * line.sizes[0].size.reference.value
     title = at_place(line.title[:1].upper() + line.title[1:], line.where, names)
-    axis = "weeks since the reference" if found.dated else "recording"
+    axis = "weeks" if found.dated else "recording"
     return Panel(
         title=title,
         alt=trend_sentence(line, found, names).replace(NBSP, " "),
