@@ -435,7 +435,7 @@ def changed() -> Diagnosis:
     term = replace(
         GRAVITY,
         gain=Interval(0.2, 0.15, 0.25),
-        size="12.6 mN·m more than in the reference",
+        size="12.6 mN·m at most, beyond what the reference has",
         changed=ChangedSize("amplitude", "N.m", Interval(0.0, 0.0, 0.0), own, own),
     )
     level, moved = Interval(0.0004, 0.0002, 0.0006), Interval(0.0494, 0.0489, 0.0499)
