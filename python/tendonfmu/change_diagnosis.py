@@ -56,6 +56,7 @@ SIGNALS = "signals, delay and presliding"
 PHASES = {SIGNALS: 20.0, "contact": 8.0, "changes": 20.0, "gain on unseen data": 20.0}
 LEAST_UNKNOWN = 0.25  # of the rms: as much do recordings of a finger differ in which nothing has changed
 LEVEL = 0.001  # of that
+SPREAD = 2.0  # standard deviations of the stretches of the reference: other motions have another error
 FEWEST = 4  # stretches on either side
 
 
@@ -301,7 +302,9 @@ class _Changes:
         worse = np.clip(1.0 - then / np.maximum(now, 1e-300), 0.0, 1.0)
         p_value = min(1.0, float(np.nanmin(p_values)) * len(worse))
         worst = int(np.argmax(worse * now))
-        unknown = bool(worse[worst] >= LEAST_UNKNOWN and p_values[worst] * len(worse) < LEVEL)
+        apart = float(level[is_now, worst].mean() - level[~is_now, worst].mean())
+        beyond = apart > SPREAD * float(level[~is_now, worst].std())
+        unknown = bool(worse[worst] >= LEAST_UNKNOWN and p_values[worst] * len(worse) < LEVEL and beyond)
         share = tuple(float(1.0 - (1.0 - each) ** 2) if unknown else 0.0 for each in worse)
         gain = Interval(0.0, 0.0, 0.0)
         if unknown:
