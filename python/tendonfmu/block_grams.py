@@ -105,7 +105,8 @@ class Products:
         found.by_fold = []
         for number, products in enumerate(self.by_fold):
             rows = self.folds.fold == number
-            own = found.table[rows].reshape(-1, u + found.count).astype(np.float64)
+            part = found.table[rows]
+            own = part.reshape(part.shape[0] * part.shape[1], u + found.count).astype(np.float64)
             cross = own.T @ own[:, u:]
             both = np.empty((u + found.count, u + found.count))
             both[:u, :u] = products[:u, :u]
@@ -168,7 +169,8 @@ class Grams:
         found = []
         for number, columns in enumerate(by_fold):
             rows = self.folds.fold == number
-            own, target = self._table[rows].reshape(-1, size), self._target[rows].reshape(-1)
+            target = self._target[rows].reshape(-1)
+            own = self._table[rows].reshape(len(target), size)
             both = np.empty((size + 1, size + 1))
             both[:size, :size] = columns
             both[:size, size] = both[size, :size] = own.T.astype(np.float64) @ target
