@@ -138,7 +138,7 @@ def moved_paths(before: Description, after: Description) -> set[str]:
 
 @pytest.mark.parametrize("seed", range(6))
 def test_adding_to_a_number_moves_it_alone(seed: int) -> None:
-    """Coulomb friction takes the static one with it, by the same share or sum: they are told as one law."""
+    """Coulomb friction takes the static one with it, by the same share or sum: both are one law."""
     data = description(seed)
     before, numbers = copy.deepcopy(data), numbers_of(data)
     for k in np.random.default_rng(seed).permutation(len(numbers))[:12]:

@@ -1,8 +1,8 @@
 """What a model gets wrong in both recordings alike: functions of the motion that no change may be credited with.
 
 Ridge regression on simple functions of angle, velocity, force, acceleration and travel, of each joint its own, and on
-the columns of all that may be missing. Where a motion is repeated exactly, a function of the time in that motion takes
-their place (`repeated_motion`).
+the columns of all that may be missing. Where a motion is repeated exactly, samples are subtracted instead
+(`repeated_motion`), and next to nothing of these columns is left.
 """
 
 from __future__ import annotations

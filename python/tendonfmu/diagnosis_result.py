@@ -64,7 +64,7 @@ class FoundPlace:
 
 @dataclass(frozen=True)
 class ChangedSize:
-    """How large a cause was in the reference, and is now. number: what is told, such as "coulomb"; unit: of both.
+    """How large a cause was in the reference, and is now. number: its name, such as "coulomb"; unit: of both.
 
     A term that the description lacks is 0 in the reference: what is the same in both recordings is no change. by: its
     size in each of the new recordings, in their order, where there are several.

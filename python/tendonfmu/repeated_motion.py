@@ -62,7 +62,7 @@ def less_reference(values: Array, series: Series, repeats: Sequence[Repeat]) -> 
 
 
 def outside(series: Series, repeats: Sequence[Repeat]) -> Flags:
-    """[B] blocks of which nothing new is told beside the differences: of the reference's repeated motions all, of the
+    """[B] blocks that add nothing to the differences: of the reference's repeated motions all, of the
     new recordings what lies before and after the motion."""
     found = np.isin(series.recording, [each.then for each in repeats])
     for each in repeats:

@@ -80,7 +80,7 @@ class Truth:
 
 @dataclass(frozen=True)
 class Case:
-    """finger: description. then, now: recordings by the columns of contract section 3."""
+    """finger: description. then, now: recordings by column, as docs/recording.md has them."""
 
     truth: Truth
     finger: Mapping[str, Any]
