@@ -451,7 +451,7 @@ def changed() -> Diagnosis:
         invisible=INVISIBLE[:1],
         steps=(3.547e-3, 1.9e-3, 1.161e-3),
         load=SteadyLoad(
-            2, ChangedSize("torque", "N.m", level, _less(moved, -0.0004), moved), Interval(0.9, 0.87, 0.93)
+            2, ChangedSize("torque", "N.m", level, _less(moved, -0.0004), moved), Interval(0.9, 0.87, 0.93), 1e-9
         ),
         unexplained=Unexplained(0.0, "", (0.0, 0.0)),
         floor_source="what is left of unseen stretches with what is wrong in both recordings taken off",

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,7 @@ from tendonfmu.diagnosis_result import (
     Unexplained,
     Where,
 )
-from tendonfmu.diagnosis_search import events_of, without_events
+from tendonfmu.diagnosis_search import SIGNIFICANCE, events_of, without_events
 from tendonfmu.diagnosis_series import Series, make_grid
 from tendonfmu.effects import CANDIDATES
 from tendonfmu.event_gain import event_gain
@@ -159,12 +160,14 @@ class _Changes:
             after, stretch = grams.unseen_residual(), grams.counted_stretch
             without = [search.grams(k, unseen).unseen_residual() for k in range(len(search.changes))]
             gains = [interval_of(each, after, stretch) for each in without]
+            beside = [search.certain(k) for k in range(len(search.changes))]
             order = sorted(range(len(gains)), key=lambda k: -gains[k].value)
             named = [search.changes[k].hypothesis.effect for k in order]
             weak = [
                 k
                 for place, k in enumerate(order)
                 if not gains[k].low > 0.0
+                or beside[k].p_value >= SIGNIFICANCE
                 or not search.matters(
                     gains[k].value,
                     search.error * float(np.linalg.norm(without[k]) / np.linalg.norm(after)),
@@ -174,16 +177,11 @@ class _Changes:
                 )
             ]
             if not weak:
-                search.keep([self._sharpened(k) for k in order])
+                search.keep([beside[k] for k in order])
                 return dropped, [gains[k] for k in order]
             worst = min(weak, key=lambda k: gains[k].value)
             dropped.append(replace(search.changes[worst], gain=gains[worst].value, error=_error(gains[worst])))
             search.keep([each for k, each in enumerate(search.changes) if k != worst])
-
-    def _sharpened(self, number: int) -> Change:
-        """With the covariance and p-value beside all other changes; the p-value is that of the search, if larger."""
-        found = self._search.certain(number)
-        return replace(found, p_value=min(max(found.p_value, self._search.changes[number].p_value), 1.0))
 
     # --- the models ---
 
@@ -221,10 +219,12 @@ class _Changes:
         clean = [without_events(each, self._events) for each in case.now]
         tests = [without_events(each, self._events) for each in case.tests]
         gain = measure_gain(nominal, extended, clean, tests, between=models[1:-1], seed=self._seed)
-        if gain.value.value < 0.0:  # what helps beside what is wrong in both, but not alone
-            dropped = [*dropped, search.changes[-1]]
-            search.keep(search.changes[:-1])
-            return self._result(dropped, gains[:-1])
+        harmful = [k for k, (one, other) in enumerate(pairwise(gain.steps)) if other > one]
+        if harmful:  # what helps beside what is wrong in both, but not alone
+            k = harmful[-1]
+            dropped = [*dropped, search.changes[k]]
+            search.keep([*search.changes[:k], *search.changes[k + 1 :]])
+            return self._result(dropped, [*gains[:k], *gains[k + 1 :]])
         before, after = self._views()
         unexplained, load = self._unexplained(), self._load()
         causes = tuple(self._cause(k, search.changes, each) for k, each in enumerate(gains))

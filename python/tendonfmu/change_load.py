@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from tendonfmu.diagnosis_result import ChangedSize, Interval, SteadyLoad
 from tendonfmu.diagnosis_series import Series
@@ -32,7 +33,8 @@ def steady_load(series: Series, left: Numbers, is_now: Flags, seed: int = 0) -> 
         load = _at(joint, then, now, seed)
         if load is not None:
             found.append(load)
-    return max(found, key=lambda each: abs(each.size.change.value), default=None)
+    best = max(found, key=lambda each: abs(each.size.change.value), default=None)
+    return best and replace(best, p_value=min(1.0, best.p_value * left.shape[1]))
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,8 @@ def _at(joint: int, then: _Side, now: _Side, seed: int) -> SteadyLoad | None:
     error = float(np.hypot(then.error, now.error))
     levels = (_interval(then.level, then.error), _interval(now.level, now.error), _interval(moved, error))
     size = ChangedSize("torque", "N.m", *levels)
-    return SteadyLoad(joint + 1, size, gain)
+    p_value = float(stats.ttest_ind(then.means, now.means, equal_var=False).pvalue)
+    return SteadyLoad(joint + 1, size, gain, p_value)
 
 
 def _interval(value: float, error: float) -> Interval:

@@ -27,14 +27,23 @@ def sizes_by_recording(
 def shares_by_recording(search: ChangeSearch, number: int) -> list[tuple[float, float]]:
     """(value, standard error) of each new recording: how much of the change is in it, 1 for all."""
     found = []
+    low, high = _bounds(search.changes[number])
     for recording in search.new_recordings:
         grams = search.grams_of_recording(number, recording)
-        mix, unbounded = np.eye(1), np.array([np.inf])
-        _, by_fold = grams.error(mix, -unbounded, unbounded)
-        share = grams.magnitudes(mix, -unbounded, unbounded)
+        mix = np.eye(1)
+        _, by_fold = grams.error(mix, low, high)
+        share = grams.magnitudes(mix, low, high)
         _, covariance = search.certainty_of(grams, mix, share, by_fold)
         found.append((float(share[0]), float(np.sqrt(max(covariance[0, 0], 0.0)))))
     return found
+
+
+def _bounds(change: Change) -> tuple[Numbers, Numbers]:
+    """[1] of the share, within which all magnitudes are within theirs."""
+    moved = change.magnitudes != 0.0
+    size, own = change.magnitudes[moved], change.hypothesis
+    ends = np.sort(np.stack([own.low[moved] / size, own.high[moved] / size]), axis=0)
+    return np.array([ends[0].max(initial=-np.inf)]), np.array([ends[1].min(initial=np.inf)])
 
 
 def _in_unit(share: tuple[float, float], change: Change, size: ChangedSize) -> Interval:

@@ -132,12 +132,13 @@ class SteadyLoad:
     """A torque that is there all the time now and was not in the reference.
 
     joint: from 1. size: N·m, of the mean torque that the model leaves, then and now. gain: 1 − rms about its own level
-    / rms about that of the reference, of the new recordings.
+    / rms about that of the reference, of the new recordings. p_value: of both levels being the same, for all joints.
     """
 
     joint: int
     size: ChangedSize
     gain: Interval
+    p_value: float
 
 
 @dataclass(frozen=True)

@@ -307,7 +307,7 @@ def tables(found: Diagnosis) -> Iterator[tuple[str, Row, list[Row]]]:
             (
                 f"{k}. {cause.where.effect}",
                 names.places(cause),
-                "see below" if cause.where.effect in TITLES else cause.size,
+                "see below" if cause.where.effect in TITLES and not cause.changed else cause.size,
                 percent_interval(cause.gain),
                 ", ".join(dict.fromkeys(other.effect for other in cause.confusable_with)) or "-",
             )

@@ -15,7 +15,7 @@ def history_sheet(found: History, names: Names) -> Sheet:
     return Sheet(
         section="history",
         name="history",
-        title=f"{found.finger}: {headline(found)}",
+        title=f"{found.finger}: {headline(found).rstrip('.')}",
         caption="",
         keys=(
             ("after_dots", "named by the diagnosis of that recording"),
@@ -36,7 +36,7 @@ def _panel(line: Line, found: History, names: Names) -> Panel:
     value, low, high = (factor * np.array(each) for each in values)
     named = np.array([each.named for each in line.sizes])
     then = factor * line.sizes[0].size.reference.value
-    title = at_place(line.title[:1].upper() + line.title[1:], line.where, names)
+    title = at_place(line.where.effect.replace("_", " ").capitalize(), line.where, names)
     axis = "weeks" if found.dated else "recording"
     return Panel(
         title=title,

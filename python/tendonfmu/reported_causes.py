@@ -44,7 +44,7 @@ def _load(found: Diagnosis) -> Iterator[Cause]:
         where=Where(CONTACT, load.joint),
         title=TITLES[LOAD],
         explanation=_EXPLANATIONS[LOAD],
-        p_value=SCAN_LEVEL,
+        p_value=load.p_value,
         gain=load.gain,
         confusable_with=(Where("force_offset"), Where("gravity", load.joint)),
         parameters={},
