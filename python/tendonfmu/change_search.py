@@ -88,6 +88,7 @@ class ChangeSearch:
         self.series = series_of(data, recordings, grid, left_out)
         self.sides = Sides(np.isin(self.series.recording, [*now, *tests]), np.isin(self.series.recording, tests))
         self._new = {*now, *tests}
+        self.changes: list[Change] = []
         self._splines = bias_of(data, self.series)
         residual = residual_alone(data, self.series)
         predicted = predicted_of(data, recordings, grid, self.series)
@@ -115,7 +116,6 @@ class ChangeSearch:
         self.hypotheses = self._hypotheses()
         self._known: dict[bytes, tuple[Products, Flags]] = {}
         self.tried = len({each.key for each in self.hypotheses})
-        self.changes: list[Change] = []
         self.refused: list[Change] = []
         self._selection: Selection | None = None
         self._whole = self.error
@@ -133,7 +133,7 @@ class ChangeSearch:
     def _level_shift(self) -> Numbers:
         """[B, n] N·m by which the mean of what is left of each recording is off that of the reference: a load or a
         zero that is no state of the motion."""
-        left, series = self._torque_left(self.data), self.series
+        left, series = self.torque_left(), self.series
         then = left[series.used & ~self.sides.now].mean(axis=0)
         found = np.zeros_like(left)
         for number in np.unique(series.recording):
@@ -380,15 +380,16 @@ class ChangeSearch:
         return len(self._repeats)
 
     def torque_left(self) -> Numbers:
-        """[B, n] N·m measured less modelled torque with all changes, bias and all, without the bias's own jumps."""
-        return self._torque_left(self.now_data())
-
-    def _torque_left(self, now: Data) -> Numbers:
-        whole = [
-            recording.target - exact_model(now if number in self._new else self.data, recording, jumps=False)
-            for number, recording in enumerate(self._recordings)
-        ]
-        return np.concatenate([segment.mean(whole[segment.recording][segment.part]) for segment in self._grid.segments])
+        """[B, n] N·m measured less modelled torque, bias and all, without the bias's own jumps; with all changes but
+        for their means, which no motion tells from a load or a zero."""
+        whole = [recording.target - exact_model(self.data, recording, jumps=False) for recording in self._recordings]
+        left = np.concatenate([segment.mean(whole[segment.recording][segment.part]) for segment in self._grid.segments])
+        if self.changes:
+            moved = self.moved()
+            left -= np.where(
+                self.sides.now[:, None], moved - moved[self.series.used & self.sides.now].mean(axis=0), 0.0
+            )
+        return np.asarray(left)
 
     @property
     def stretches_now(self) -> Flags:
