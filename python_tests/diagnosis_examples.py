@@ -23,7 +23,6 @@ from tendonfmu.diagnosis_result import (
     Evidence,
     Experiment,
     FoundPlace,
-    Interval,
     Invisible,
     ModelErrors,
     ResidualView,
@@ -31,6 +30,7 @@ from tendonfmu.diagnosis_result import (
     Unexplained,
     Where,
 )
+from tendonfmu.interval import Interval
 
 Numbers = NDArray[np.float64]
 Shape = Callable[[Numbers], Numbers]

@@ -20,13 +20,13 @@ from tendonfmu.diagnosis_result import (
     Diagnosis,
     Experiment,
     FoundPlace,
-    Interval,
     Invisible,
     ModelErrors,
     Unexplained,
     Where,
 )
 from tendonfmu.errors import InputError
+from tendonfmu.interval import Interval
 from tendonfmu.jobs import workers_of
 
 ERRORS = ModelErrors((0.002,), (0.002,))

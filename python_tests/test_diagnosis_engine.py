@@ -21,7 +21,6 @@ from tendonfmu.cause_gains import merged
 from tendonfmu.cause_search import bias_of, blocks_of, predicted_of, series_of
 from tendonfmu.description import FingerDescription
 from tendonfmu.diagnosis import PHASES
-from tendonfmu.diagnosis_result import Interval
 from tendonfmu.diagnosis_search import NamedCause, _Rounds, _Trial, search
 from tendonfmu.diagnosis_series import block_prediction, exact_model, make_grid
 from tendonfmu.diagnosis_span import span_of
@@ -31,6 +30,7 @@ from tendonfmu.extension_fit import Accepted, FitSettings, FittedModel
 from tendonfmu.fit_recordings import FitRecording, Held, prepare
 from tendonfmu.gain import residual_of as online_residual
 from tendonfmu.hypotheses import HERE, Hypothesis
+from tendonfmu.interval import Interval
 from tendonfmu.native import Finger, image_from_json
 from tendonfmu.nominal_fit import fitted
 from tendonfmu.nuisance import residual_of

@@ -24,7 +24,7 @@ import diagnosis_examples as examples
 from real_browser import Elements, framed, measure, visit
 from tendonfmu.diagnosis_page import PAGE, diagnosis_page, write_diagnosis_page
 from tendonfmu.diagnosis_report import build_report, report_text
-from tendonfmu.diagnosis_result import Diagnosis, FoundPlace, Interval, ModelErrors, Where
+from tendonfmu.diagnosis_result import Diagnosis, FoundPlace, ModelErrors, Where
 from tendonfmu.diagnosis_size import size_of
 from tendonfmu.diagnosis_text import (
     headline,
@@ -39,6 +39,7 @@ from tendonfmu.diagnosis_text import (
     unit_of,
 )
 from tendonfmu.diagnosis_waterfall import waterfall_of
+from tendonfmu.interval import Interval
 from tendonfmu.reported_causes import reported_causes
 
 THRESHOLDS = (5e-4, 0.01)  # m/s, rad/s

@@ -16,13 +16,14 @@ from scipy.interpolate import BPoly
 from excite_fingers import INDEX, INDEX_DATA, INDEX_RANGES, SMALL, SMALL_RANGES
 from tendonfmu import native
 from tendonfmu.balance import balanced_forces, moment_arms, pretension_vector
-from tendonfmu.coverage import effect_coverage, joint_coverage
+from tendonfmu.coverage import EffectCoverage, coverage_of, durations
 from tendonfmu.description import estimated_numbers
 from tendonfmu.errors import InputError
 from tendonfmu.excitation import ACCELERATION, Excitation, Plan, plan_excitation
 from tendonfmu.excite import as_array, find_pretensions, find_ranges, read_subject
 from tendonfmu.friction_places import effects, working_point_weights
 from tendonfmu.identifiability import unknowns
+from tendonfmu.joint_coverage import joint_coverage
 from tendonfmu.quintic import evaluate
 from tendonfmu.tables import read_table
 from tendonfmu.tension_plan import Variation
@@ -32,6 +33,11 @@ from tendonfmu.tension_plan import Variation
 def motion() -> Excitation:
     """400 s of the index finger."""
     return plan_excitation(INDEX_DATA, Plan(INDEX_RANGES, seed=3))
+
+
+def covered(motion: Excitation) -> list[EffectCoverage]:
+    """Of the index finger."""
+    return coverage_of(INDEX_DATA, motion.joint_position, motion.joint_velocity, durations(motion.time))
 
 
 @pytest.fixture
@@ -96,7 +102,7 @@ def test_covers_angles_speeds_and_directions(motion: Excitation) -> None:
     np.testing.assert_allclose(motion.joint_position.min(axis=0), INDEX_RANGES[:, 0], atol=1e-12)
     np.testing.assert_allclose(motion.joint_position.max(axis=0), INDEX_RANGES[:, 1], atol=1e-12)
     assert (np.abs(motion.joint_velocity).max(axis=0) > 0.9).all()
-    for cover in effect_coverage(INDEX_DATA, motion):
+    for cover in covered(motion):
         assert min(cover.times.positive, cover.times.negative) > 100
         for point in cover.points:
             assert min(point.positive, point.negative) > 2
@@ -301,7 +307,7 @@ def test_faster_joints_need_more_acceleration() -> None:
 
 
 def test_times_add_up_to_the_duration(motion: Excitation) -> None:
-    for cover in effect_coverage(INDEX_DATA, motion):
+    for cover in covered(motion):
         assert cover.times.total == pytest.approx(400, abs=1e-9)
         for side in ("positive", "negative", "stuck"):
             assert sum(getattr(point, side) for point in cover.points) == pytest.approx(getattr(cover.times, side))

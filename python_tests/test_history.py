@@ -21,11 +21,12 @@ from real_browser import Elements
 from tendonfmu import change_history
 from tendonfmu.change_history import History, Line, Size, diagnose_history, share_of, times_of
 from tendonfmu.change_trend import slope
-from tendonfmu.diagnosis_result import ChangedSize, Interval, Where
+from tendonfmu.diagnosis_result import ChangedSize, Where
 from tendonfmu.diagnosis_text import Names
 from tendonfmu.errors import InputError
 from tendonfmu.history_files import write_history
 from tendonfmu.history_text import headline, trend_sentence
+from tendonfmu.interval import Interval
 from tendonfmu.jobs import workers_of
 from worn_finger import WELL, Worn, record, write_files
 

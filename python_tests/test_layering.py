@@ -58,7 +58,7 @@ COMMANDS = {
     "several_values.py",
 }  # what a user may call
 # those that draw, and what they share
-DRAWING = {"fit_plots.py", "plot_style.py", "plots.py", "score_plots.py", "tune_plots.py"}
+DRAWING = {"finger_picture.py", "fit_plots.py", "plot_style.py", "plots.py", "score_plots.py", "tune_plots.py"}
 
 
 def imports_of(tree: ast.AST) -> Iterator[str]:

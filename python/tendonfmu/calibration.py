@@ -35,7 +35,7 @@ from tendonfmu.errors import InputError
 from tendonfmu.estimation_signals import Signals
 from tendonfmu.extension_fit import FitSettings
 from tendonfmu.finite_numbers import finite
-from tendonfmu.fit_files import check_given_once, check_unseen, description_text, write_text
+from tendonfmu.fit_files import check_given_once, check_unseen, description_text
 from tendonfmu.fit_recordings import FitRecording, Held, prepare, require_noise
 from tendonfmu.fit_structure import described
 from tendonfmu.free_motion import require_no_contact
@@ -45,6 +45,7 @@ from tendonfmu.recording import read_recording
 from tendonfmu.recording_match import admit
 from tendonfmu.score_report import build_report as score_report
 from tendonfmu.scoring import score_recordings
+from tendonfmu.whole_file import write_text
 
 Numbers = NDArray[np.float64]
 Data = Mapping[str, Any]

@@ -20,10 +20,10 @@ from tendonfmu.calibration_text import (
     torque_rows,
     verdict,
 )
-from tendonfmu.fit_files import description_text, write_text
+from tendonfmu.fit_files import description_text
 from tendonfmu.fit_page import render
 from tendonfmu.packaging import build_fmu
-from tendonfmu.whole_file import check_output, check_output_folder
+from tendonfmu.whole_file import check_output, check_output_folder, write_text
 
 FINGER, FMU, PAGE, REPORT = "finger.json", "finger.fmu", "calibration.html", "calibration.json"
 _WHAT = {

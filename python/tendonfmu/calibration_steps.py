@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from tendonfmu.fit_files import write_text
+from tendonfmu.whole_file import write_text
 
 FOLDER = ".steps"
 FORMAT = "tendonfmu-calibration-step-1"

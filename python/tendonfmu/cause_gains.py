@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from tendonfmu.cause_search import look, predicted_of, series_of
 from tendonfmu.cause_selection import names_with
 from tendonfmu.description import FingerDescription
-from tendonfmu.diagnosis_result import Interval
 from tendonfmu.diagnosis_search import NamedCause, Search
 from tendonfmu.extension_fit import FitSettings, FittedModel, cause_parameters, fit_extended
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.gain import Gain, measure_gain
 from tendonfmu.gain_interval import gain_interval
 from tendonfmu.hypotheses import Hypothesis
+from tendonfmu.interval import Interval
 from tendonfmu.nominal_fit import fitted
 from tendonfmu.online_error import OnlineError
 from tendonfmu.signal_choice import estimation_recordings

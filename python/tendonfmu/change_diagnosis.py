@@ -30,7 +30,6 @@ from tendonfmu.diagnosis_result import (
     Diagnosis,
     Experiment,
     FoundPlace,
-    Interval,
     Invisible,
     SteadyLoad,
     Unexplained,
@@ -45,6 +44,7 @@ from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.fit_structure import Choice
 from tendonfmu.gain import measure_gain
 from tendonfmu.hypotheses import HERE, Hypothesis, Key
+from tendonfmu.interval import Interval
 from tendonfmu.phases import Phases
 from tendonfmu.residual_views import residual_views, whiteness
 from tendonfmu.signal_choice import Estimation, choose, estimation_recordings

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from tendonfmu.diagnosis_result import Interval
+from tendonfmu.interval import Interval
 
 Numbers = NDArray[np.float64]
 

@@ -25,8 +25,9 @@ from numpy.typing import NDArray
 from tendonfmu.change_trend import slope
 from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.diagnosis import LEAST_GAIN, change_case, diagnose
-from tendonfmu.diagnosis_result import ChangedSize, Interval, Where
+from tendonfmu.diagnosis_result import ChangedSize, Where
 from tendonfmu.errors import InputError
+from tendonfmu.interval import Interval
 from tendonfmu.jobs import Job, rows_of, run_jobs
 
 Numbers = NDArray[np.float64]

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from tendonfmu.diagnosis_result import ChangedSize, Interval, SteadyLoad
+from tendonfmu.diagnosis_result import ChangedSize, SteadyLoad
 from tendonfmu.diagnosis_series import Series
 from tendonfmu.gain_interval import gain_interval
 from tendonfmu.held_out_folds import make_folds
+from tendonfmu.interval import Interval
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]

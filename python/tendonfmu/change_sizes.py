@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from tendonfmu import native
 from tendonfmu.change_numbers import changed
 from tendonfmu.change_search import Change, ChangeSearch
-from tendonfmu.diagnosis_result import ChangedSize, FoundPlace, Interval
+from tendonfmu.diagnosis_result import ChangedSize, FoundPlace
 from tendonfmu.diagnosis_size import NBSP, quantity, size_of
 from tendonfmu.effects.description_edit import data_number
 from tendonfmu.effects.friction_law_places import thresholds
 from tendonfmu.extension_fit import added_paths
+from tendonfmu.interval import Interval
 
 Numbers = NDArray[np.float64]
 Data = Mapping[str, Any]

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.change_search import Change, ChangeSearch
-from tendonfmu.diagnosis_result import ChangedSize, Interval
+from tendonfmu.diagnosis_result import ChangedSize
 from tendonfmu.fit_recordings import FitRecording
+from tendonfmu.interval import Interval
 
 Numbers = NDArray[np.float64]
 

@@ -332,10 +332,11 @@ def fit(
     PATTERN is a path of the description, such as tendons[*].edge_friction[2]*.viscous; * stands for anything. Ctrl-C
     leaves the best so far in FITTED.unfinished.json.
     """
-    from tendonfmu.fit_files import check_outputs, write_text, write_unfinished
+    from tendonfmu.fit_files import check_outputs, write_unfinished
     from tendonfmu.fit_report import report_text
     from tendonfmu.fit_text import lines, tables
     from tendonfmu.fitting import FitWarning, FrictionFit
+    from tendonfmu.whole_file import write_text
 
     inputs = [finger, *recordings, *(compare or []), *(each for each in (previous, resume) if each is not None)]
     check_outputs(output, report, figures, inputs)

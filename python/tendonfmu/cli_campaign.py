@@ -46,9 +46,8 @@ def campaign(
     from tendonfmu.campaign import How, collect, run_campaign, still_to_do
     from tendonfmu.campaign_cases import python_function, read_cases
     from tendonfmu.campaign_rates import EFFECT_HEADINGS, HEADINGS, by_effect, markdown, rates, rates_by_part
-    from tendonfmu.fit_files import write_text
     from tendonfmu.jobs import worker_count, workers_of
-    from tendonfmu.whole_file import check_output, check_output_folder
+    from tendonfmu.whole_file import check_output, check_output_folder, write_text
 
     listed = read_cases(cases)
     check_output_folder(output)

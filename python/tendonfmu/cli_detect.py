@@ -60,10 +60,11 @@ def tune(
     import warnings
 
     from tendonfmu.detection_tuning import ContactTuning, TuneWarning
-    from tendonfmu.fit_files import check_outputs, write_text
+    from tendonfmu.fit_files import check_outputs
     from tendonfmu.tune_report import build_report, report_text
     from tendonfmu.tune_text import lines, tables
     from tendonfmu.tuning_support import NotEnough
+    from tendonfmu.whole_file import write_text
 
     check_outputs(output, report, figures, [finger, *recordings])
     with progress_bar(progress) as bar:
@@ -122,10 +123,10 @@ def score(
     An alarm that begins in no event, nor in the 100 ms after one, is false.
     Everything has its 95 % interval; several recordings are pooled.
     """
-    from tendonfmu.fit_files import write_text
     from tendonfmu.score_report import build_report, report_text
     from tendonfmu.score_text import lines, tables
     from tendonfmu.scoring import check_outputs, score_recordings
+    from tendonfmu.whole_file import write_text
 
     check_outputs(output, figures, [model, *recordings])
     with progress_bar(progress) as bar:

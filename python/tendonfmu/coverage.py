@@ -1,16 +1,14 @@
-"""What a motion visits: how long each friction effect slides to either side or sticks, how each joint moves."""
+"""What a motion visits: how long each friction effect slides to either side or sticks."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.excitation import SLOW, Excitation, Stroke
 from tendonfmu.friction_places import Effect, effects, sliding_velocity, velocity_threshold, working_point_weights
 
 Numbers = NDArray[np.float64]
@@ -45,22 +43,6 @@ class EffectCoverage:
     fastest: tuple[float | None, float | None]
 
 
-@dataclass(frozen=True)
-class JointCoverage:
-    """Of one joint. lowest, highest: rad. fastest: rad/s. slow_reversals: between two strokes of at most `SLOW` of the
-    greatest speed. rests: between strokes, s in resting. moving: s.
-    """
-
-    lowest: float
-    highest: float
-    fastest: float
-    strokes: int
-    reversals: int
-    slow_reversals: int
-    rests: int
-    resting: float
-
-
 def durations(time: Numbers) -> Numbers:
     """[N] s for which each sample stands, by the trapezoidal rule: together the whole motion."""
     step = np.diff(time)
@@ -70,15 +52,13 @@ def durations(time: Numbers) -> Numbers:
     return result
 
 
-def effect_coverage(data: Mapping[str, Any], motion: Excitation) -> list[EffectCoverage]:
-    """Of every effect of a finger description."""
-    return coverage_of(data, motion.joint_position, motion.joint_velocity, durations(motion.time))
-
-
 def coverage_of(
     data: Mapping[str, Any], joint_position: Numbers, joint_velocity: Numbers, share: Numbers
 ) -> list[EffectCoverage]:
-    """The same of samples in any order. joint_position, joint_velocity: [N, n]. share: [N] s each stands for."""
+    """Of every effect of a finger description, from samples in any order.
+
+    joint_position, joint_velocity: [N, n]. share: [N] s each stands for.
+    """
     return [_cover(data, effect, joint_position, joint_velocity, share) for effect in effects(data)]
 
 
@@ -110,30 +90,3 @@ def _cover(
 def _ends(speed: Numbers, sides: tuple[Any, Any], end: Any) -> tuple[float | None, float | None]:
     positive, negative = (float(end(speed[side])) if side.any() else None for side in sides)
     return positive, negative
-
-
-def joint_coverage(motion: Excitation, max_speed: float) -> list[JointCoverage]:
-    """Of every joint. max_speed: rad/s, of the plan."""
-    return [
-        _joint(strokes, motion.joint_position[:, j], motion.joint_velocity[:, j], max_speed)
-        for j, strokes in enumerate(motion.strokes)
-    ]
-
-
-def _joint(strokes: list[Stroke], position: Numbers, velocity: Numbers, max_speed: float) -> JointCoverage:
-    turns = [
-        (before, after)
-        for before, after in pairwise(strokes)
-        if (before.target - before.start) * (after.target - after.start) < 0
-    ]
-    rests = [after.begin - before.end for before, after in pairwise(strokes) if after.begin > before.end]
-    return JointCoverage(
-        lowest=float(position.min()),
-        highest=float(position.max()),
-        fastest=float(np.abs(velocity).max()),
-        strokes=len(strokes),
-        reversals=len(turns),
-        slow_reversals=sum(max(before.speed, after.speed) <= SLOW * max_speed for before, after in turns),
-        rests=len(rests),
-        resting=float(sum(rests)),
-    )

@@ -113,9 +113,9 @@ class Story:
         """A closer look at what the calibration has found."""
 
     def _fit(self, phase: Phase) -> None:
-        from tendonfmu.fit_files import write_text
         from tendonfmu.fit_page import write_fit_page
         from tendonfmu.fitting import FitWarning, FrictionFit
+        from tendonfmu.whole_file import write_text
 
         def show(now: Progress) -> None:
             phase(f"fitting: {now.phase}", now.done, now.total)

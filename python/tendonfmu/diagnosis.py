@@ -29,16 +29,7 @@ from tendonfmu.change_diagnosis import ChangeCase, find_changes
 from tendonfmu.contact_gain import detection_gain
 from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.diagnosis_evidence import evidence
-from tendonfmu.diagnosis_result import (
-    Cause,
-    Diagnosis,
-    Event,
-    FoundPlace,
-    Interval,
-    Invisible,
-    Unexplained,
-    Where,
-)
+from tendonfmu.diagnosis_result import Cause, Diagnosis, Event, FoundPlace, Invisible, Unexplained, Where
 from tendonfmu.diagnosis_search import NamedCause, Search, events_of, search, without_events
 from tendonfmu.diagnosis_series import make_grid
 from tendonfmu.diagnosis_size import size_of
@@ -51,6 +42,7 @@ from tendonfmu.fit_files import check_unseen
 from tendonfmu.fit_recordings import FitRecording, Held, prepare, require_noise
 from tendonfmu.gain import require_unseen
 from tendonfmu.hypotheses import HERE, Hypothesis
+from tendonfmu.interval import Interval
 from tendonfmu.next_experiment import Experiments, Question, plan_experiments
 from tendonfmu.phases import Phases, PhaseState
 from tendonfmu.recording import Recording, read_recording

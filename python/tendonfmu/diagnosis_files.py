@@ -14,10 +14,10 @@ from tendonfmu.diagnosis_page import PAGE, write_diagnosis_page
 from tendonfmu.diagnosis_report import EXTENDED, EXTENDED_FMU, NOMINAL, REPORT, build_report, report_text
 from tendonfmu.diagnosis_result import Diagnosis
 from tendonfmu.errors import InputError, own_fault
-from tendonfmu.fit_files import description_text, write_text
+from tendonfmu.fit_files import description_text
 from tendonfmu.interruption import uninterrupted
 from tendonfmu.packaging import build_fmu
-from tendonfmu.whole_file import check_output, check_output_folder, is_about
+from tendonfmu.whole_file import check_output, check_output_folder, is_about, write_text
 
 _SUFFIXES = (".html", ".json", ".fmu", ".png")  # figures of the versions that wrote them beside the page
 _NAMED = (REPORT, EXTENDED, EXTENDED_FMU, PAGE, NOMINAL)

@@ -18,7 +18,6 @@ from tendonfmu.diagnosis_result import (
     Evidence,
     Experiment,
     FoundPlace,
-    Interval,
     Invisible,
     ResidualView,
     Where,
@@ -26,6 +25,7 @@ from tendonfmu.diagnosis_result import (
 from tendonfmu.diagnosis_text import at_place, names_of
 from tendonfmu.diagnosis_words import words_of
 from tendonfmu.finite_numbers import finite
+from tendonfmu.interval import Interval
 from tendonfmu.reported_causes import reported_causes
 
 FORMAT = "tendonfmu-diagnosis-1"

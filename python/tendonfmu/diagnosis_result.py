@@ -10,17 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.estimation_signals import Signals
+from tendonfmu.interval import Interval
 
 Numbers = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Interval:
-    """A value with its 95 % interval."""
-
-    value: float
-    low: float
-    high: float
+NO_GAIN = Interval(0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -155,7 +150,7 @@ class Unexplained:
     by_joint: tuple[float, ...] = ()
     p_value: float = 1.0
     unknown: bool = False
-    gain: Interval = Interval(0.0, 0.0, 0.0)
+    gain: Interval = NO_GAIN
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tendonfmu.cause_search import View, bias_of, look, predicted_of, residual_alone, series_of
 from tendonfmu.cause_selection import CERTAIN, Judged, Pick, Selection, is_alike, rms_gain
 from tendonfmu.contact_scan import left_out, scan_events
-from tendonfmu.diagnosis_result import Event, Interval
+from tendonfmu.diagnosis_result import Event
 from tendonfmu.diagnosis_series import Grid
 from tendonfmu.diagnosis_span import span_of
 from tendonfmu.effects import CANDIDATES, Candidate, Place
@@ -26,6 +26,7 @@ from tendonfmu.extension_fit import Accepted, FitSettings, FittedModel, extended
 from tendonfmu.extensions import extended_row
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.hypotheses import SCALING, Hypothesis, Key
+from tendonfmu.interval import Interval
 from tendonfmu.nominal_fit import fitted
 from tendonfmu.online_error import OnlineError
 from tendonfmu.phases import Phases, Step

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from tendonfmu import native
 from tendonfmu.balance import moment_arms
+from tendonfmu.blocks import Blocks
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.fit_residuals import delayed_torque
 from tendonfmu.friction_places import DEFAULT_THRESHOLD
@@ -66,21 +67,14 @@ class Grid:
 
 
 @dataclass(frozen=True)
-class Series:
-    """All recordings one after another, block means; B blocks, n joints, m tendons.
+class Series(Blocks):
+    """All recordings one after another, block means; n joints, m tendons.
 
-    time: [B] s, centre. recording: [B] from 0; segment: [B] stretch without a gap, from 0. target: [B, n] y − G, N·m.
-    used: [B] whether all its samples may be learned from. step: s. angle [B, n] rad, velocity [B, n] rad/s,
+    target: [B, n] y − G, N·m. angle [B, n] rad, velocity [B, n] rad/s,
     acceleration [B, n] rad/s², force [B, m] N, tendon_velocity [B, m, n] m/s (ẋ_ij), travel [B, n] rad since the joint
     last turned round.
     """
 
-    time: Numbers
-    recording: NDArray[np.int64]
-    segment: NDArray[np.int64]
-    target: Numbers
-    used: Flags
-    step: float
     angle: Numbers
     velocity: Numbers
     acceleration: Numbers

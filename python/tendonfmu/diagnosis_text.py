@@ -7,10 +7,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from tendonfmu.diagnosis_result import Cause, Diagnosis, FoundPlace, Interval, Invisible, Where
+from tendonfmu.diagnosis_result import Cause, Diagnosis, FoundPlace, Invisible, Where
 from tendonfmu.diagnosis_size import quantity
 from tendonfmu.diagnosis_words import words_of
 from tendonfmu.fit_summary import rounded
+from tendonfmu.interval import Interval
 from tendonfmu.reported_causes import CONTACT, TITLES, reported_causes
 
 NBSP = "\u00a0"

@@ -3,25 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tendonfmu.description import FingerDescription, count
-
-if TYPE_CHECKING:
-    from tendonfmu.rig import Rig
 
 
 def documentation_page(description: FingerDescription, model: Mapping[str, Any]) -> str:
     """HTML text of a friction FMU. model: the context of the FMU's XML (modelDescription/README.md)."""
-    return _render("documentation.html.jinja", model, summary=count(description))
+    return render_documentation("documentation.html.jinja", model, summary=count(description))
 
 
-def plant_documentation_page(rig: Rig, model: Mapping[str, Any]) -> str:
-    """HTML text of a simulated finger."""
-    return _render("plant_documentation.html.jinja", model, summary=count(rig.finger), rig=rig)
-
-
-def _render(template: str, model: Mapping[str, Any], **context: Any) -> str:
+def render_documentation(template: str, model: Mapping[str, Any], **context: Any) -> str:
+    """HTML text of a template of such a page, with the variables of the model by causality."""
     import jinja2
 
     environment = jinja2.Environment(

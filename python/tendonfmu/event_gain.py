@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.diagnosis_result import Event, Interval
+from tendonfmu.diagnosis_result import Event
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.gain import residual_of
 from tendonfmu.gain_interval import FEWEST, blocks_of
+from tendonfmu.interval import Interval
 
 Numbers = NDArray[np.float64]
 

@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 
 from tendonfmu import native
 from tendonfmu.balance import balanced_forces, pretension_vector
-from tendonfmu.coverage import EffectCoverage, JointCoverage, durations, effect_coverage, joint_coverage
+from tendonfmu.coverage import EffectCoverage, coverage_of, durations
 from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.errors import InputError
 from tendonfmu.excitation import Excitation, Plan, plan_excitation
 from tendonfmu.identifiability import Noise, Progress, information, noise_of, sensitivities, unknowns
+from tendonfmu.joint_coverage import JointCoverage, joint_coverage
 from tendonfmu.judgement import Judgement, as_json, judge
 from tendonfmu.tension_plan import Variation
 
@@ -210,7 +211,7 @@ def excite(subject: Subject, ranges: list[Range], plan: Plan, progress: Progress
     numbers, noise = unknowns(data), noise_of(data, 1 / plan.rate)
     parts = sensitivities(data, numbers, {**samples, "tendon_force": force}, progress)
     known = information(parts, samples["time"], np.abs(force).mean(axis=1), noise)
-    coverage = effect_coverage(data, motion)
+    coverage = coverage_of(data, motion.joint_position, motion.joint_velocity, durations(motion.time))
     pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
     slack = ((force < 0) & pulls).T @ durations(samples["time"])
     return ExciteResult(

@@ -19,7 +19,7 @@ from tendonfmu.errors import InputError, InternalError
 from tendonfmu.fit_structure import Structure, own_copy, set_number
 from tendonfmu.json_node import read_json
 from tendonfmu.recording import Recording
-from tendonfmu.whole_file import check_output, check_output_folder, whole_file
+from tendonfmu.whole_file import check_output, check_output_folder, write_text
 
 Numbers = NDArray[np.float64]
 
@@ -142,12 +142,6 @@ def _laid_out(value: Any, indent: str) -> str:
         return "{\n" + ",\n".join(deeper + part for part in parts) + f"\n{indent}}}"
     parts = [_laid_out(each, deeper) for each in value]
     return "[\n" + ",\n".join(deeper + part for part in parts) + f"\n{indent}]"
-
-
-def write_text(path: Path, text: str) -> None:
-    """Whole or not at all."""
-    with whole_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
 
 
 # --- an interrupted fit -----------------------------------------------------------------------------------------------

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu import native
-from tendonfmu.diagnosis_result import Interval, ModelErrors
+from tendonfmu.diagnosis_result import ModelErrors
 from tendonfmu.errors import InputError, InternalError
 from tendonfmu.fit_evaluation import residuals
 from tendonfmu.fit_files import description_text
@@ -28,6 +28,7 @@ from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.fit_residuals import BiasSettings, Model, bias_settings, delayed_torque, rms
 from tendonfmu.fmu import run_fmu
 from tendonfmu.gain_interval import Blocks, blocks_of, gain_interval
+from tendonfmu.interval import Interval
 from tendonfmu.packaging import build_fmu
 from tendonfmu.signals import NUMBERS
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.diagnosis_result import Interval
+from tendonfmu.interval import Interval
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -136,7 +136,7 @@ def members(
 def _for_readers(description: FingerDescription, context: Mapping[str, Any]) -> dict[str, bytes]:
     from tendonfmu.documentation import documentation_page
     from tendonfmu.drawing import finger_drawing
-    from tendonfmu.plots import draw_finger
+    from tendonfmu.finger_picture import draw_finger
 
     picture = io.BytesIO()
     draw_finger(finger_drawing(description), picture)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from tendonfmu import native
+from tendonfmu.description import count
 from tendonfmu.errors import InputError
 from tendonfmu.model_variables import read_table
 from tendonfmu.packaging import find_binaries, guid, model_description, model_identifier, pack, package_file
@@ -37,9 +38,9 @@ def build_plant_fmu(rig_path: Path, output_path: Path, *, binaries: Path | None 
 
 def plant_members(rig: Rig, *, binaries: Path | None = None) -> dict[str, bytes]:
     """Path in the archive to content, for all files of the FMU. Raises InputError where the plant refuses the rig."""
-    from tendonfmu.documentation import plant_documentation_page
+    from tendonfmu.documentation import render_documentation
     from tendonfmu.drawing import finger_drawing
-    from tendonfmu.plots import draw_finger
+    from tendonfmu.finger_picture import draw_finger
 
     text = rig.json().encode()
     table = read_table(package_file("model_description/plant_variables.json").read_text(encoding="utf-8"))
@@ -51,6 +52,7 @@ def plant_members(rig: Rig, *, binaries: Path | None = None) -> dict[str, bytes]
         "version": native.version(),
         "source_files": [],
     }
+    page = render_documentation("plant_documentation.html.jinja", context, summary=count(rig.finger), rig=rig)
     picture = io.BytesIO()
     draw_finger(finger_drawing(rig.finger), picture)
     found = find_binaries(binaries, BINARIES, BINARY_STEM, identifier)
@@ -58,7 +60,7 @@ def plant_members(rig: Rig, *, binaries: Path | None = None) -> dict[str, bytes]
         "modelDescription.xml": model_description(context),
         "model.png": picture.getvalue(),
         "documentation/finger.png": picture.getvalue(),
-        "documentation/index.html": plant_documentation_page(rig, context).encode(),
+        "documentation/index.html": page.encode(),
         "resources/rig.json": text,
         **{f"binaries/{path}": data for path, data in found.items()},
     }

@@ -82,3 +82,9 @@ def is_about(error: OSError, folder: Path) -> bool:
     if not isinstance(error.filename, str | bytes):
         return True
     return folder.absolute() in Path(os.fsdecode(error.filename)).absolute().parents
+
+
+def write_text(path: Path, text: str) -> None:
+    """Whole or not at all."""
+    with whole_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
