@@ -23,8 +23,8 @@ from rich.console import Console
 from rich.table import Table
 from scipy.integrate import solve_ivp
 
-from tendonfmu.plant import Plant, SolverError
-from tendonfmu.rig import read_rig
+from tendonfmu.simulate.plant import Plant, SolverError
+from tendonfmu.simulate.rig import read_rig
 
 Array = NDArray[Any]
 ROOT = Path(__file__).resolve().parent.parent

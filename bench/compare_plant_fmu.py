@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "python_tests"))
 
 from fmu_binary import Instance, UnpackedFmu, unpack  # noqa: E402
-from tendonfmu.plant_packaging import build_plant_fmu  # noqa: E402
+from tendonfmu.simulate.fmu_packaging import build_plant_fmu  # noqa: E402
 
 RIG = ROOT / "examples" / "rigs" / "index_finger.json"
 SETTINGS = [(1, 1e-6), (1, 1e-5), (1, 1e-4), (2, 1e-3), (2, 5e-4)]

@@ -24,10 +24,10 @@ from typing import Any
 
 import numpy as np
 
-from tendonfmu import native
-from tendonfmu.fmu import run_fmu
-from tendonfmu.packaging import build_fmu
-from tendonfmu.recording import Recording, read_recording
+from tendonfmu.fmu.fmpy_client import run_fmu
+from tendonfmu.fmu.packaging import build_fmu
+from tendonfmu.model import native
+from tendonfmu.recordings.recording import Recording, read_recording
 
 ROOT = Path(__file__).resolve().parent.parent
 TESTS = ROOT / "python_tests"

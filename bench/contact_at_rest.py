@@ -23,11 +23,11 @@ import numpy as np
 from detection_limit_cases import ROOT, Case, cut, made, slots
 from numpy.typing import NDArray
 
-from tendonfmu.description import FingerDescription
-from tendonfmu.free_motion import free_parts
-from tendonfmu.native import Finger, image_from_json
-from tendonfmu.recording import Recording
-from tendonfmu.rest_tuning import count_alarms, find_rests, learn_rest
+from tendonfmu.detect.contact_at_rest import count_alarms, find_rests, learn_rest
+from tendonfmu.detect.free_motion import free_parts
+from tendonfmu.model.description import FingerDescription
+from tendonfmu.model.native import Finger, image_from_json
+from tendonfmu.recordings.recording import Recording
 
 sys.path.insert(0, str(ROOT / "python_tests" / "foreign"))
 import mujoco_rests

@@ -19,10 +19,11 @@ from typing import Any
 import numpy as np
 from detection_cases import PRETENSIONS, RIG, Numbers, Take, read_truth, recording_file, takes, write_rig
 
-from tendonfmu import native, score_intervals
-from tendonfmu.recording import read_recording
-from tendonfmu.rig import read_rig
-from tendonfmu.whole_file import whole_file
+from tendonfmu.files.whole_file import whole_file
+from tendonfmu.model import native
+from tendonfmu.recordings.recording import read_recording
+from tendonfmu.simulate.rig import read_rig
+from tendonfmu.statistics import intervals as score_intervals
 
 CLASSES = ((0.1, 0.5), (0.5, 1.0), (1.0, 2.0))  # N
 NEAR_TIP = 0.8  # share of the last link's length from which a push is near the tip

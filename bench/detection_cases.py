@@ -23,17 +23,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.balance import moment_arms
-from tendonfmu.draws import Draws
-from tendonfmu.fitting import FrictionFit
-from tendonfmu.json_node import Node
-from tendonfmu.motion_plan import Joints, expand_motion
-from tendonfmu.quintic import evaluate
-from tendonfmu.recording import read_recording
-from tendonfmu.rig import read_rig
-from tendonfmu.simulation import Table, simulate
-from tendonfmu.tables import read_table, write_table
-from tendonfmu.whole_file import whole_file
+from tendonfmu.estimate.fitting import FrictionFit
+from tendonfmu.files.json_node import Node
+from tendonfmu.files.tables import read_table, write_table
+from tendonfmu.files.whole_file import whole_file
+from tendonfmu.model.balance import moment_arms
+from tendonfmu.recordings.recording import read_recording
+from tendonfmu.simulate.motion_plan import Joints, expand_motion
+from tendonfmu.simulate.rig import read_rig
+from tendonfmu.simulate.simulation import Table, simulate
+from tendonfmu.statistics.quintic import evaluate
+from tendonfmu.statistics.random_numbers import Draws
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "examples" / "rigs"))

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.quintic import evaluate
-from tendonfmu.rig import read_rig
-from tendonfmu.simulation import Table, simulate
-from tendonfmu.tables import read_table, write_table
+from tendonfmu.files.tables import read_table, write_table
+from tendonfmu.simulate.rig import read_rig
+from tendonfmu.simulate.simulation import Table, simulate
+from tendonfmu.statistics.quintic import evaluate
 
 ROOT = Path(__file__).resolve().parent.parent
 RIG = ROOT / "examples" / "rigs" / "index_finger.json"

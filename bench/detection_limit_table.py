@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from detection_limit_cases import AFTER, FORCES, LEAD, MOVE, RISES, STUCK_RISES
 
-from tendonfmu.score_intervals import Estimate, quantile, rate, share
+from tendonfmu.statistics.intervals import Estimate, quantile, rate, share
 
 Row = dict[str, Any]
 

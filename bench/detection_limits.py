@@ -41,10 +41,10 @@ from detection_limit_cases import (
 )
 from detection_limit_table import ramp_tables, recovery_table, stuck_tables
 
-from tendonfmu.balance import moment_arms
-from tendonfmu.detection_score import Event, score_detection, stretches
-from tendonfmu.native import Finger, image_from_json
-from tendonfmu.whole_file import whole_file
+from tendonfmu.detect.counting import Event, score_detection, stretches
+from tendonfmu.files.whole_file import whole_file
+from tendonfmu.model.balance import moment_arms
+from tendonfmu.model.native import Finger, image_from_json
 
 Row = dict[str, Any]
 

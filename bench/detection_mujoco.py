@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 from mujoco_pushes import FREE, PRETENSIONS, PUSHED, description_file, make, place
 
-from tendonfmu.whole_file import whole_file
+from tendonfmu.files.whole_file import whole_file
 
 FINGERS = (1, 3, 19, 4, 6)
 SIZES = (6.0, 3.0, 1.5)  # times the residual's rms: least sizes of classes
@@ -48,7 +48,14 @@ def calibrated(folder: Path, number: int) -> Path:
             [str(place(folder, number, kind, each)) for kind in kinds for each in PRETENSIONS]
             for kinds in (FREE, PUSHED)
         )
-        command = [sys.executable, "-m", "tendonfmu.cli", "calibrate", str(description_file(folder, number)), *free]
+        command = [
+            sys.executable,
+            "-m",
+            "tendonfmu.cli",
+            "calibrate",
+            str(description_file(folder, number)),
+            *free,
+        ]
         before = _processor_seconds()
         subprocess.run([*command, "--pushes", *pushed, "-o", str(into), "--no-progress"], check=True)
         _write(into / "cpu.json", json.dumps(_processor_seconds() - before))

@@ -28,11 +28,11 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 from scipy.signal import lfilter
 
-from tendonfmu import native
-from tendonfmu.balance import moment_arms
-from tendonfmu.detection_score import DetectionScore, score_detection, stretches
-from tendonfmu.fit_residuals import bias_settings, model_alone, track
-from tendonfmu.recording import Recording
+from tendonfmu.detect.counting import DetectionScore, score_detection, stretches
+from tendonfmu.model import native
+from tendonfmu.model.balance import moment_arms
+from tendonfmu.recordings.recording import Recording
+from tendonfmu.recordings.residuals import bias_settings, model_alone, track
 
 Numbers = NDArray[np.float64]
 Description = dict[str, Any]

@@ -10,7 +10,7 @@ import numpy as np
 from detection_cases import TWINS, Push
 from numpy.typing import NDArray
 
-from tendonfmu.score_intervals import Estimate, quantile, rate, share
+from tendonfmu.statistics.intervals import Estimate, quantile, rate, share
 
 Numbers = NDArray[np.float64]
 

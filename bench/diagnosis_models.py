@@ -27,13 +27,13 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from sklearn.ensemble import HistGradientBoostingRegressor
 
-from tendonfmu.balance import moment_arms
-from tendonfmu.description import read_finger
-from tendonfmu.diagnosis import diagnose
-from tendonfmu.fit_recordings import FitRecording, Held, prepare
-from tendonfmu.gain import residual_of
-from tendonfmu.native import Finger
-from tendonfmu.recording import read_recording
+from tendonfmu.diagnose.diagnosis import diagnose
+from tendonfmu.diagnose.gain import residual_of
+from tendonfmu.model.balance import moment_arms
+from tendonfmu.model.description import read_finger
+from tendonfmu.model.native import Finger
+from tendonfmu.recordings.prepared import FitRecording, Held, prepare
+from tendonfmu.recordings.recording import read_recording
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "python_tests" / "hidden_effects"))

@@ -20,15 +20,15 @@ from rival_knockoffs import by_knockoffs
 from rival_parity import by_parity
 from rival_selection import by_bic, by_correlation, by_random_cv, by_sindy, stepwise
 
-from tendonfmu.balance import moment_arms
-from tendonfmu.campaign_cases import Case
-from tendonfmu.campaign_judgement import Answer
-from tendonfmu.cause_search import View, look
-from tendonfmu.description import read_finger
-from tendonfmu.extension_fit import FitSettings
-from tendonfmu.fit_recordings import FitRecording, Held, prepare
-from tendonfmu.recording import read_recording
-from tendonfmu.signal_choice import choose
+from tendonfmu.diagnose.campaign.cases import Case
+from tendonfmu.diagnose.campaign.judging import Answer
+from tendonfmu.diagnose.cause_search import View, look
+from tendonfmu.diagnose.extension_fit import FitSettings
+from tendonfmu.diagnose.signal_choice import choose
+from tendonfmu.model.balance import moment_arms
+from tendonfmu.model.description import read_finger
+from tendonfmu.recordings.prepared import FitRecording, Held, prepare
+from tendonfmu.recordings.recording import read_recording
 
 
 def answers(view: View) -> dict[str, Answer]:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from tendonfmu.estimation import Estimator
+from tendonfmu.estimate.estimation import Estimator
 
 Array = NDArray[Any]
 CHUNK = 2000  # samples of Jacobian at a time: the compiled call's own arrays stay small

@@ -19,14 +19,14 @@ from fit_peers import Task, Watch, least_squares_fit, outer_products, run_filter
 from numpy.typing import NDArray
 
 from fit_data import model_torques, noise_scale
-from tendonfmu.balance import balanced_forces
-from tendonfmu.description import read_finger
-from tendonfmu.estimation import Estimator, Learner
-from tendonfmu.excitation import START, Plan, plan_excitation
-from tendonfmu.excite import as_array, find_ranges, read_subject
-from tendonfmu.fit_structure import Choice, Structure, build_structure
-from tendonfmu.fitting import FrictionFit
-from tendonfmu.tables import write_table
+from tendonfmu.estimate.estimation import Estimator, Learner
+from tendonfmu.estimate.fitting import FrictionFit
+from tendonfmu.estimate.structure import Choice, Structure, build_structure
+from tendonfmu.excite.excitation import START, Plan, plan_excitation
+from tendonfmu.excite.training_motion import as_array, find_ranges, read_subject
+from tendonfmu.files.tables import write_table
+from tendonfmu.model.balance import balanced_forces
+from tendonfmu.model.description import read_finger
 
 Array = NDArray[Any]
 ROOT = Path(__file__).resolve().parent.parent

@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "python_tests"))
 
 import some_jobs
 from dask_on_loopback import dask_processes
-from tendonfmu.jobs import Function, Job, rows_of, run_jobs, workers_of
+from tendonfmu.tasks.jobs import Function, Job, rows_of, run_jobs, workers_of
 
 
 @dataclass(frozen=True)

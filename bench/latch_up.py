@@ -19,7 +19,7 @@ import latch_up_contact as contact
 import numpy as np
 from latch_up_finger import Numbers, longest
 
-from tendonfmu.score_intervals import of_sums
+from tendonfmu.statistics.intervals import of_sums
 
 Keys = Mapping[str, Any]
 Measures = Mapping[str, float]

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu import native
+from tendonfmu.model import native
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -19,12 +19,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.converters import convert_file
-from tendonfmu.fit_report import report_text
-from tendonfmu.fitting import FitWarning, FrictionFit
-from tendonfmu.native import run_recording
-from tendonfmu.recording import Recording, read_recording
-from tendonfmu.tables import write_table
+from tendonfmu.estimate.fitting import FitWarning, FrictionFit
+from tendonfmu.estimate.report import report_text
+from tendonfmu.files.tables import write_table
+from tendonfmu.model.native import run_recording
+from tendonfmu.recordings.converters import convert_file
+from tendonfmu.recordings.recording import Recording, read_recording
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples" / "davinci"))
 from jaw_recordings import FAST, FAULT, SLOW, data_folder, rms, torque_error

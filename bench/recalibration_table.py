@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from recalibration import EVEN, PLANTED, Outcome, SampleCount, campaign, sample_counts, ways
 
-from tendonfmu.previous_fit import CHANGE
+from tendonfmu.estimate.previous_fit import CHANGE
 
 LIMIT = 1.05  # of the error before
 

@@ -21,10 +21,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from tendonfmu.description import FingerDescription, read_finger
-from tendonfmu.recording import GROUPS, Recording
-from tendonfmu.recording_findings import Finding
-from tendonfmu.recording_match import belongs
+from tendonfmu.model.description import FingerDescription, read_finger
+from tendonfmu.model.findings import Finding
+from tendonfmu.recordings.match import belongs
+from tendonfmu.recordings.recording import GROUPS, Recording
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "python_tests" / "foreign"))
 

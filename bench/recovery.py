@@ -24,8 +24,8 @@ from recovery_case import DURATION, RATE, Case, Scale, identifiable, image, make
 from rich.console import Console
 from rich.table import Table
 
-from tendonfmu.estimation import Estimator, Learner
-from tendonfmu.whole_file import whole_file
+from tendonfmu.estimate.estimation import Estimator, Learner
+from tendonfmu.files.whole_file import whole_file
 
 Numbers = NDArray[np.float64]
 Row = dict[str, float]

@@ -28,13 +28,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu import native
-from tendonfmu.balance import balanced_forces, moment_arms
-from tendonfmu.description import read_finger
-from tendonfmu.estimation import Estimator
-from tendonfmu.excitation import Excitation, Plan, plan_excitation
-from tendonfmu.excite import as_array, find_ranges, read_subject
-from tendonfmu.tension_plan import Variation
+from tendonfmu.estimate.estimation import Estimator
+from tendonfmu.excite.excitation import Excitation, Plan, plan_excitation
+from tendonfmu.excite.tension_plan import Variation
+from tendonfmu.excite.training_motion import as_array, find_ranges, read_subject
+from tendonfmu.model import native
+from tendonfmu.model.balance import balanced_forces, moment_arms
+from tendonfmu.model.description import read_finger
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "python_tests"))

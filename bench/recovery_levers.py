@@ -16,9 +16,9 @@ import recovery_case as case
 from rich.console import Console
 from rich.table import Table
 
-from tendonfmu.balance import balanced_forces, moment_arms
-from tendonfmu.excitation import Plan, plan_excitation
-from tendonfmu.excite import as_array, find_ranges, read_subject
+from tendonfmu.excite.excitation import Plan, plan_excitation
+from tendonfmu.excite.training_motion import as_array, find_ranges, read_subject
+from tendonfmu.model.balance import balanced_forces, moment_arms
 
 RATE = 100.0
 OWN = {"noise_std": 0.004, "noise_std_per_force": 0.0006, "noise_time": 0.002, "drift_variance": 1e-6}

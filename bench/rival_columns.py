@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.cause_search import View
-from tendonfmu.diagnosis_result import Where
-from tendonfmu.nuisance import Span, basis, without
+from tendonfmu.diagnose.cause_search import View
+from tendonfmu.diagnose.result import Where
+from tendonfmu.statistics.splines import Span, basis, without
 
 Numbers = NDArray[np.float64]
 

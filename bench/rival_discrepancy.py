@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
-from tendonfmu.cause_search import residual_alone, series_of
-from tendonfmu.diagnosis_series import make_grid
-from tendonfmu.fit_evaluation import model_over, residuals
-from tendonfmu.fit_recordings import FitRecording
-from tendonfmu.fit_residuals import Model
+from tendonfmu.diagnose.cause_search import residual_alone, series_of
+from tendonfmu.diagnose.series import make_grid
+from tendonfmu.estimate.evaluation import model_over, residuals
+from tendonfmu.recordings.prepared import FitRecording
+from tendonfmu.recordings.residuals import Model
 
 Numbers = NDArray[np.float64]
 Processes = list[GaussianProcessRegressor]

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from rival_columns import Numbers, Plain, least_power
 from scipy.stats import chi2
 
-from tendonfmu.diagnosis_result import Where
+from tendonfmu.diagnose.result import Where
 
 Flags = NDArray[np.bool_]
 

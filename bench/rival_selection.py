@@ -15,7 +15,7 @@ import numpy as np
 from rival_columns import MOST_CAUSES, Numbers, Plain, Trial, least_power
 from scipy.stats import t as student
 
-from tendonfmu.nuisance import basis, without
+from tendonfmu.statistics.splines import basis, without
 
 SIGNIFICANCE = 0.01
 FOLDS = 10

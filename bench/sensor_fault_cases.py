@@ -18,10 +18,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from tendonfmu.recording import Recording, read_recording
-from tendonfmu.rig import read_rig
-from tendonfmu.simulation import simulate
-from tendonfmu.tables import write_table
+from tendonfmu.files.tables import write_table
+from tendonfmu.recordings.recording import Recording, read_recording
+from tendonfmu.simulate.rig import read_rig
+from tendonfmu.simulate.simulation import simulate
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "python_tests" / "foreign"))

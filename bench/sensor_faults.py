@@ -40,12 +40,12 @@ from sensor_fault_cases import (
     with_faults,
 )
 
-from tendonfmu.description import read_finger
-from tendonfmu.detection_tuning import ContactTuning, TuneWarning
-from tendonfmu.free_motion import FreePart
-from tendonfmu.native import Finger
-from tendonfmu.recording import read_recording
-from tendonfmu.sensor_tuning import learn_sensors
+from tendonfmu.detect.free_motion import FreePart
+from tendonfmu.detect.sensor_faults import learn_sensors
+from tendonfmu.detect.tuning import ContactTuning, TuneWarning
+from tendonfmu.model.description import read_finger
+from tendonfmu.model.native import Finger
+from tendonfmu.recordings.recording import read_recording
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -16,10 +16,10 @@ import numpy as np
 from detection_mujoco import calibrated
 from mujoco_pushes import PRETENSIONS, Push, make, place, pushes_of
 
-from tendonfmu.description import read_finger
-from tendonfmu.detection_score import score_detection
-from tendonfmu.native import run_recording
-from tendonfmu.recording import Recording, read_recording
+from tendonfmu.detect.counting import score_detection
+from tendonfmu.model.description import read_finger
+from tendonfmu.model.native import run_recording
+from tendonfmu.recordings.recording import Recording, read_recording
 
 STRONG = 0.5  # N
 

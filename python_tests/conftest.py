@@ -22,7 +22,7 @@ from real_browser import BROWSERS, find_browser
 @pytest.fixture(scope="session")
 def small_fmu_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The packed FMU of fmu_binary.FINGER."""
-    from tendonfmu.packaging import build_fmu
+    from tendonfmu.fmu.packaging import build_fmu
 
     folder = tmp_path_factory.mktemp("small_fmu")
     (folder / "finger.json").write_text(json.dumps(FINGER))
@@ -39,7 +39,7 @@ def small_fmu(small_fmu_path: Path) -> UnpackedFmu:
 @pytest.fixture(scope="session")
 def plant_fmu_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The simulated finger of plant_fmu_rig.fmu_rig(), its rig.json beside it."""
-    from tendonfmu.plant_packaging import build_plant_fmu
+    from tendonfmu.simulate.fmu_packaging import build_plant_fmu
 
     folder = tmp_path_factory.mktemp("plant_fmu")
     (folder / "rig.json").write_text(json.dumps(fmu_rig()))

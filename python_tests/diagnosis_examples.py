@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.diagnosis_result import (
+from tendonfmu.diagnose.result import (
     Cause,
     ChangedSize,
     DetectionGain,
@@ -30,7 +30,7 @@ from tendonfmu.diagnosis_result import (
     Unexplained,
     Where,
 )
-from tendonfmu.interval import Interval
+from tendonfmu.statistics.interval import Interval
 
 Numbers = NDArray[np.float64]
 Shape = Callable[[Numbers], Numbers]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import oracle_fit
 from random_fingers import Description, Recording, random_case
-from tendonfmu import native
+from tendonfmu.model import native
 
 Array = NDArray[Any]
 

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu import native
+from tendonfmu.model import native
 
 Array = NDArray[Any]
 Description = dict[str, Any]

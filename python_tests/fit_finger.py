@@ -11,8 +11,8 @@ import numpy as np
 
 from fit_cases import small_finger
 from fit_data import make_recording, wavy_forces, wavy_motion
-from tendonfmu.recording import Recording
-from tendonfmu.tables import write_table
+from tendonfmu.files.tables import write_table
+from tendonfmu.recordings.recording import Recording
 
 Description = dict[str, Any]
 

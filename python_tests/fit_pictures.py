@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu import native
-from tendonfmu.fit_picture import FitPicture, FitSeries, Role
-from tendonfmu.identifiability import unknowns
-from tendonfmu.recording import read_recording
+from tendonfmu.estimate.information import unknowns
+from tendonfmu.estimate.picture import FitPicture, FitSeries, Role
+from tendonfmu.model import native
+from tendonfmu.recordings.recording import read_recording
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 FREE, FREE_X4 = (EXAMPLES / "demo_recording" / f"index_finger_{name}.parquet" for name in ("free", "free_x4"))

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from tendonfmu.block_grams import Grams
-from tendonfmu.candidate_columns import CandidateColumns, Proposal, Shape
-from tendonfmu.diagnosis_series import Series
-from tendonfmu.effects import Place, by_name
-from tendonfmu.held_out_folds import make_folds
-from tendonfmu.least_sizes import LeastSizes
-from tendonfmu.nuisance import bias_splines
+from tendonfmu.diagnose.candidate_columns import CandidateColumns, Proposal, Shape
+from tendonfmu.diagnose.effects import Place, by_name
+from tendonfmu.diagnose.least_sizes import LeastSizes
+from tendonfmu.diagnose.series import Series
+from tendonfmu.statistics.block_grams import Grams
+from tendonfmu.statistics.folds import make_folds
+from tendonfmu.statistics.splines import bias_splines
 
 Numbers = NDArray[np.float64]
 Array = NDArray[Any]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tendonfmu import plant as binding
+from tendonfmu.simulate import plant as binding
 
 Array = NDArray[Any]
 Table = dict[str, Any]

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from random_fingers import Array, Description, random_detection, random_finger
-from tendonfmu.recording import Recording
+from tendonfmu.recordings.recording import Recording
 
 
 def random_free_case(seed: int, longest: float = 300.0) -> tuple[Description, list[Recording]]:

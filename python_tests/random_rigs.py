@@ -1,7 +1,8 @@
 """Seeded random rigs of the simulated finger: other routing, masses, laws and physics than the index finger's.
 
 What is found on the index finger must hold on these too. Unexpanded, with the finger inline: write one to a file and
-read it with `tendonfmu.rig.read_rig`. The draws are those of `tendonfmu.draws`, the same on every machine.
+read it with `tendonfmu.simulate.rig.read_rig`. The draws are those of
+`tendonfmu.statistics.random_numbers`, the same on every machine.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.draws import Draws
+from tendonfmu.statistics.random_numbers import Draws
 
 Rig = dict[str, Any]
 Array = NDArray[np.float64]

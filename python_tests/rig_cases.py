@@ -9,8 +9,8 @@ from typing import Any
 
 from random_rigs import random_rig
 from tendonfmu.errors import InputError
-from tendonfmu.rig import read_rig
-from tendonfmu.simulation import plant_of
+from tendonfmu.simulate.rig import read_rig
+from tendonfmu.simulate.simulation import plant_of
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 RIGS = EXAMPLES / "rigs"

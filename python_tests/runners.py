@@ -61,7 +61,7 @@ def run_native(
     description: Mapping[str, Any], recording: Mapping[str, NDArray[Any]], kinematics_source: int
 ) -> Outputs:
     """The batch run of the C interface, through the one module that binds it."""
-    finger = product("native").Finger.from_description(description, kinematics_source)
+    finger = product("model.native").Finger.from_description(description, kinematics_source)
     outputs: Outputs = finger.run(recording, parts=True)
     return outputs
 
@@ -70,7 +70,7 @@ def run_plain_kernel(
     description: Mapping[str, Any], recording: Mapping[str, NDArray[Any]], kinematics_source: int
 ) -> Outputs:
     """The same on the kernel in plain C, which any machine can run."""
-    finger = product("native").Finger.from_description(description, kinematics_source)
+    finger = product("model.native").Finger.from_description(description, kinematics_source)
     finger.kernel = "plain"
     outputs: Outputs = finger.run(recording, parts=True)
     return outputs
@@ -80,7 +80,7 @@ def run_single_steps(
     description: Mapping[str, Any], recording: Mapping[str, NDArray[Any]], kinematics_source: int
 ) -> Outputs:
     """One call of the C interface a sample, the state saved and restored into a fresh finger half way."""
-    native = product("native")
+    native = product("model.native")
     finger = native.Finger.from_description(description, kinematics_source)
     samples = len(recording["time"])
     rows = []
@@ -99,19 +99,19 @@ def packed(text: str) -> Path:
     folder = Path(tempfile.mkdtemp(prefix="tendonfmu-tests-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     (folder / "finger.json").write_text(text, encoding="utf-8")
-    fmu: Path = product("packaging").build_fmu(folder / "finger.json", folder / "finger.fmu")
+    fmu: Path = product("fmu.packaging").build_fmu(folder / "finger.json", folder / "finger.fmu")
     return fmu
 
 
 def run_fmu(description: Mapping[str, Any], recording: Mapping[str, NDArray[Any]], kinematics_source: int) -> Outputs:
     """The FMU through fmpy, stepped by hand."""
-    samples = product("recording").Recording(
+    samples = product("recordings.recording").Recording(
         Path("recording"),
         np.asarray(recording["time"], dtype=float),
         {name: np.asarray(array, dtype=float) for name, array in recording.items() if name != "time"},
     )
     fmu = packed(json.dumps(description))
-    columns = product("fmu").run_fmu(fmu, samples, kinematics_source=kinematics_source)
+    columns = product("fmu.fmpy_client").run_fmu(fmu, samples, kinematics_source=kinematics_source)
     groups: dict[str, list[NDArray[Any]]] = {}
     for name, column in columns.items():
         groups.setdefault(name.split("[")[0], []).append(column)

@@ -1,4 +1,4 @@
-"""Functions that the tests of jobs.py and bench/job_scaling.py have workers call."""
+"""Functions that the tests of tasks/jobs.py and bench/job_scaling.py have workers call."""
 
 from __future__ import annotations
 

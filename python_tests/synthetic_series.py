@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from tendonfmu.diagnosis_series import Series
-from tendonfmu.nuisance import basis, bias_splines, without
+from tendonfmu.diagnose.series import Series
+from tendonfmu.statistics.splines import basis, bias_splines, without
 
 Numbers = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from made_columns import BLOCKS, JOINTS, STEP, coloured, grams_of, series_with, waves
-from tendonfmu.block_grams import MEMORY, Grams, bounded, standard_error
-from tendonfmu.held_out_folds import make_folds
-from tendonfmu.nuisance import basis, bias_splines, without
+from tendonfmu.statistics.block_grams import MEMORY, Grams, bounded, standard_error
+from tendonfmu.statistics.folds import make_folds
+from tendonfmu.statistics.splines import basis, bias_splines, without
 
 Numbers = NDArray[np.float64]
 

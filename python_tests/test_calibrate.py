@@ -16,23 +16,23 @@ from numpy.typing import NDArray
 
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
 
-from tendonfmu import calibration
-from tendonfmu.calibrated_fit import fit_all
-from tendonfmu.calibration import Calibration, Options, calibrate
-from tendonfmu.calibration_files import write_calibration
-from tendonfmu.calibration_parts import DIAGNOSED, JUDGED, stretches_for_diagnosis
-from tendonfmu.calibration_report import errors_of, rms_of
-from tendonfmu.calibration_steps import Steps
-from tendonfmu.calibration_text import size_rows, verdict
-from tendonfmu.description import read_finger
+from tendonfmu.calibrate import calibration
+from tendonfmu.calibrate.calibration import Calibration, Options, calibrate
+from tendonfmu.calibrate.files import write_calibration
+from tendonfmu.calibrate.fit import fit_all
+from tendonfmu.calibrate.parts import DIAGNOSED, JUDGED, stretches_for_diagnosis
+from tendonfmu.calibrate.report import errors_of, rms_of
+from tendonfmu.calibrate.text import size_rows, verdict
+from tendonfmu.cli.several_values import several_values
+from tendonfmu.diagnose.extension_fit import FitSettings
 from tendonfmu.errors import InputError
-from tendonfmu.estimation_signals import Signals
-from tendonfmu.extension_fit import FitSettings
-from tendonfmu.fit_recordings import Held, prepare
-from tendonfmu.fit_structure import described
-from tendonfmu.recording import Recording, read_recording
-from tendonfmu.several_values import several_values
-from tendonfmu.tables import write_table
+from tendonfmu.estimate.structure import described
+from tendonfmu.files.tables import write_table
+from tendonfmu.model.description import read_finger
+from tendonfmu.recordings.prepared import Held, prepare
+from tendonfmu.recordings.recording import Recording, read_recording
+from tendonfmu.recordings.smoothing import Signals
+from tendonfmu.tasks.steps import Steps
 
 Numbers = NDArray[np.float64]
 
@@ -134,7 +134,7 @@ def test_what_is_wrong_with_a_recording_is_said_once(folder: Path, tmp_path: Pat
 
 
 def test_the_folder_holds_finger_fmu_page_and_report(calibrated: tuple[Calibration, Path]) -> None:
-    from tendonfmu.fmu import run_fmu
+    from tendonfmu.fmu.fmpy_client import run_fmu
 
     found, out = calibrated
     finger = read_finger(out / "finger.json")

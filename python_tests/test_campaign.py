@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 
 from dask_on_loopback import dask_processes
-from tendonfmu import campaign as campaigns
-from tendonfmu.campaign import collect, run_campaign, still_to_do
-from tendonfmu.campaign_cases import Case, Truth, made, read_cases
-from tendonfmu.campaign_judgement import judge, judge_names
-from tendonfmu.campaign_rates import markdown, mean, rate, rates, rates_by_part, rivals_of, seen_by
-from tendonfmu.diagnosis_result import (
+from tendonfmu.diagnose.campaign import campaign as campaigns
+from tendonfmu.diagnose.campaign.campaign import collect, run_campaign, still_to_do
+from tendonfmu.diagnose.campaign.cases import Case, Truth, made, read_cases
+from tendonfmu.diagnose.campaign.judging import judge, judge_names
+from tendonfmu.diagnose.campaign.rates import markdown, mean, rate, rates, rates_by_part, rivals_of, seen_by
+from tendonfmu.diagnose.result import (
     Cause,
     Diagnosis,
     Experiment,
@@ -26,8 +26,8 @@ from tendonfmu.diagnosis_result import (
     Where,
 )
 from tendonfmu.errors import InputError
-from tendonfmu.interval import Interval
-from tendonfmu.jobs import workers_of
+from tendonfmu.statistics.interval import Interval
+from tendonfmu.tasks.jobs import workers_of
 
 ERRORS = ModelErrors((0.002,), (0.002,))
 GAIN = Interval(0.1, 0.05, 0.15)

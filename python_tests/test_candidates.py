@@ -14,20 +14,20 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tendonfmu import native
-from tendonfmu.balance import balanced_forces, moment_arms
-from tendonfmu.block_averages import Blocks, BlockSums, regular_blocks
-from tendonfmu.block_runs import block_prediction
-from tendonfmu.candidate_columns import CandidateColumns, Proposal, Shape, candidate_columns
-from tendonfmu.derivative_passes import nominal_directions, plan_passes
-from tendonfmu.description import FingerDescription
-from tendonfmu.diagnosis_span import Span, span_of
-from tendonfmu.effects import CANDIDATES, Candidate, Place, Variant, by_name
-from tendonfmu.effects.description_edit import add_to_number
+from tendonfmu.diagnose.block_runs import block_prediction
+from tendonfmu.diagnose.candidate_columns import CandidateColumns, Proposal, Shape, candidate_columns
+from tendonfmu.diagnose.derivative_passes import nominal_directions, plan_passes
+from tendonfmu.diagnose.effects import CANDIDATES, Candidate, Place, Variant, by_name
+from tendonfmu.diagnose.effects.description_edit import add_to_number
+from tendonfmu.diagnose.span import Span, span_of
 from tendonfmu.errors import InputError
-from tendonfmu.fit_recordings import FitRecording, Held, prepare
-from tendonfmu.fit_structure import own_copy
-from tendonfmu.recording import Recording
+from tendonfmu.estimate.structure import own_copy
+from tendonfmu.model import native
+from tendonfmu.model.balance import balanced_forces, moment_arms
+from tendonfmu.model.description import FingerDescription
+from tendonfmu.recordings.prepared import FitRecording, Held, prepare
+from tendonfmu.recordings.recording import Recording
+from tendonfmu.statistics.block_averages import Blocks, BlockSums, regular_blocks
 
 Numbers = NDArray[np.float64]
 Data = dict[str, Any]

@@ -10,11 +10,10 @@ import pytest
 from numpy.typing import NDArray
 
 from made_columns import BLOCKS, JOINTS, UNSEEN, Made, candidate_columns, coloured, grams_of, waves
-from tendonfmu.block_grams import standard_error
-from tendonfmu.candidate_columns import CandidateColumns
-from tendonfmu.cause_selection import CERTAIN, Selection, names_with, rms_gain
-from tendonfmu.effects import Place, by_name
-from tendonfmu.hypotheses import (
+from tendonfmu.diagnose.candidate_columns import CandidateColumns
+from tendonfmu.diagnose.cause_selection import CERTAIN, Selection, names_with, rms_gain
+from tendonfmu.diagnose.effects import Place, by_name
+from tendonfmu.diagnose.hypotheses import (
     EVERYWHERE,
     HERE,
     LARGEST_SCALING,
@@ -23,7 +22,8 @@ from tendonfmu.hypotheses import (
     Hypothesis,
     hypotheses,
 )
-from tendonfmu.least_sizes import BEFORE_FIT, OF_NOISE, OF_SAMPLE, LeastSizes, noise_of
+from tendonfmu.diagnose.least_sizes import BEFORE_FIT, OF_NOISE, OF_SAMPLE, LeastSizes, noise_of
+from tendonfmu.statistics.block_grams import standard_error
 
 Numbers = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
 
 from command import Call
-from tendonfmu.diagnosis import change_case
+from tendonfmu.diagnose.diagnosis import change_case
 from tendonfmu.errors import InputError
 from worn_finger import RATE, Columns, described, finger, record, recording, write_files
 

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
 
 from synthetic_series import make_series
-from tendonfmu.change_load import steady_load
-from tendonfmu.diagnosis import diagnose
-from tendonfmu.diagnosis_result import Diagnosis, SteadyLoad
-from tendonfmu.diagnosis_series import Series
-from tendonfmu.reported_causes import reported_causes
+from tendonfmu.diagnose.changes.load import steady_load
+from tendonfmu.diagnose.diagnosis import diagnose
+from tendonfmu.diagnose.reported_causes import reported_causes
+from tendonfmu.diagnose.result import Diagnosis, SteadyLoad
+from tendonfmu.diagnose.series import Series
 from worn_finger import WELL, How, finger, record, recording
 
 LOAD = 0.05  # N·m

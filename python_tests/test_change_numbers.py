@@ -15,11 +15,11 @@ pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eige
 
 from fit_cases import small_finger
 from random_fingers import random_extended, random_finger
-from tendonfmu.change_numbers import Number, changed, estimator_of, number_hypotheses, numbers_of
-from tendonfmu.effects import Place
-from tendonfmu.effects.description_edit import data_number
-from tendonfmu.fit_structure import set_number
-from tendonfmu.hypotheses import EVERYWHERE, HERE, SOMEWHERE, Hypothesis
+from tendonfmu.diagnose.changes.numbers import Number, changed, estimator_of, number_hypotheses, numbers_of
+from tendonfmu.diagnose.effects import Place
+from tendonfmu.diagnose.effects.description_edit import data_number
+from tendonfmu.diagnose.hypotheses import EVERYWHERE, HERE, SOMEWHERE, Hypothesis
+from tendonfmu.estimate.structure import set_number
 from worn_finger import described
 
 Description = dict[str, Any]

@@ -11,8 +11,8 @@ pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not insta
 
 import diagnosis_examples as examples
 from real_browser import Elements
-from tendonfmu.diagnosis_page import diagnosis_page
-from tendonfmu.diagnosis_text import headline, lines, tables
+from tendonfmu.report.diagnosis_page import diagnosis_page
+from tendonfmu.report.diagnosis_text import headline, lines, tables
 from test_diagnosis_page import parsed, plain
 
 

@@ -15,9 +15,9 @@ import pytest
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
 
 from command import Call
-from tendonfmu import native
-from tendonfmu.diagnosis import diagnose
-from tendonfmu.diagnosis_result import Cause, Diagnosis
+from tendonfmu.diagnose.diagnosis import diagnose
+from tendonfmu.diagnose.result import Cause, Diagnosis
+from tendonfmu.model import native
 from worn_finger import WELL, How, Worn, finger, record, recording, write_files
 
 SCHEMA = json.loads((files_of("tendonfmu") / "schema" / "diagnosis.schema.json").read_text("utf-8"))

@@ -46,7 +46,7 @@ def number_at(description: dict[str, Any], path: str) -> float:
 @pytest.fixture(scope="module")
 def fmus(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the FMU of each trace."""
-    from tendonfmu.packaging import build_fmu
+    from tendonfmu.fmu.packaging import build_fmu
 
     folder = tmp_path_factory.mktemp("fmus")
     for name in NAMES:
@@ -84,7 +84,7 @@ def test_a_changed_start_value_fails(fmus: Path, name: str) -> None:
 
 
 def test_a_rebuilt_fmu_of_another_finger_fails(tmp_path: Path) -> None:
-    from tendonfmu.packaging import build_fmu
+    from tendonfmu.fmu.packaging import build_fmu
 
     description = traces.read_description("asymmetric_pair")
     description["tendons"][0]["stiffness"] *= 1.001

@@ -19,7 +19,7 @@ import oracle
 import random_fingers
 from agreement import agree_with_oracle, few_left_out
 from command import Answer, Call
-from tendonfmu.tables import read_table, write_table
+from tendonfmu.files.tables import read_table, write_table
 
 ROOT = Path(__file__).resolve().parent.parent
 INDEX_FINGER = ROOT / "examples" / "fingers" / "index_finger.json"

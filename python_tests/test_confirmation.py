@@ -9,11 +9,11 @@ from scipy.stats import binom
 
 from made_columns import BLOCKS, JOINTS, STEP, coloured, series_with, waves
 from synthetic_series import make_series, nuisance_of, with_effect
-from tendonfmu.confirmation import Confirmation
-from tendonfmu.diagnosis_series import Series
-from tendonfmu.held_out_folds import make_folds
-from tendonfmu.nuisance import TRENDS, basis, bias_splines, constant_bias, without
-from tendonfmu.whitening import valid_rows, whitener
+from tendonfmu.diagnose.confirmation import Confirmation
+from tendonfmu.diagnose.series import Series
+from tendonfmu.statistics.folds import make_folds
+from tendonfmu.statistics.splines import TRENDS, basis, bias_splines, constant_bias, without
+from tendonfmu.statistics.whitening import valid_rows, whitener
 
 Numbers = NDArray[np.float64]
 

@@ -169,7 +169,7 @@ def test_no_rest_no_outputs_and_nothing_else_changes() -> None:
 
 
 def test_positions_are_needed_with_every_source() -> None:
-    native = product("native")
+    native = product("model.native")
     description, recording = random_case(301, 60)
     n = len(description["joints"])
     without = {name: values for name, values in recording.items() if name != "tendon_position"}
@@ -197,7 +197,7 @@ def test_positions_are_needed_with_every_source() -> None:
     ],
 )
 def test_refusals(rest: Any, message: str) -> None:
-    native = product("native")
+    native = product("model.native")
     with pytest.raises(native.NativeError, match=message):
         native.image_from_json(json.dumps(finger([{"moment_arms": [ARM]}], contact={"threshold": [1.0], "rest": rest})))
 
@@ -283,7 +283,7 @@ def test_the_fmu_has_the_outputs_only_with_the_key(tmp_path: Path) -> None:
     names = {}
     for name, data in (("rest", description), ("plain", plain)):
         (tmp_path / f"{name}.json").write_text(json.dumps(data), encoding="utf-8")
-        fmu = product("packaging").build_fmu(tmp_path / f"{name}.json", tmp_path / f"{name}.fmu")
+        fmu = product("fmu.packaging").build_fmu(tmp_path / f"{name}.json", tmp_path / f"{name}.fmu")
         variables = fmpy.read_model_description(str(fmu)).modelVariables
         names[name] = {variable.name: variable for variable in variables}
     added = set(names["rest"]) - set(names["plain"])
@@ -296,7 +296,7 @@ def test_the_fmu_has_the_outputs_only_with_the_key(tmp_path: Path) -> None:
 
 def test_a_saved_rest_goes_on(tmp_path: Path) -> None:
     """Saved in contact at rest, in the middle of a load that has been carried, and anywhere else."""
-    native = product("native")
+    native = product("model.native")
     description, recording = resting_case(303)
     whole = NATIVE(description, recording, 1)
     for k in (30, 60, 61, 75, 100, 140, 200, 300):

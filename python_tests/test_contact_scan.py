@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from synthetic_series import make_series, nuisance_of, residual_of, with_effect
-from tendonfmu.contact_scan import left_out, scan_events
-from tendonfmu.diagnosis_result import Event
-from tendonfmu.diagnosis_series import Series
-from tendonfmu.nuisance import bias_splines
+from tendonfmu.diagnose.contact_scan import left_out, scan_events
+from tendonfmu.diagnose.result import Event
+from tendonfmu.diagnose.series import Series
+from tendonfmu.statistics.splines import bias_splines
 
 PUSHES = ((8.0, 8.4, 0, 1.0), (21.0, 22.4, 1, -1.0), (37.0, 37.8, 1, 1.0), (50.0, 51.1, 0, -1.0))  # s, s, joint, sign
 

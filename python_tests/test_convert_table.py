@@ -18,11 +18,11 @@ from map_cases import LOG, SCHEMA, SMALL, TURNING, VALIDATOR, edited, written
 
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
-from tendonfmu.converters import units
-from tendonfmu.converters.table import convert_table
 from tendonfmu.errors import InputError
-from tendonfmu.recording import read_recording
-from tendonfmu.tables import write_table
+from tendonfmu.files.tables import write_table
+from tendonfmu.recordings.converters import units
+from tendonfmu.recordings.converters.table import convert_table
+from tendonfmu.recordings.recording import read_recording
 
 ROWS = 200
 

@@ -11,11 +11,11 @@ import pytest
 
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
-from tendonfmu.converters import CONVERTERS, converter
-from tendonfmu.converters.davinci import convert
 from tendonfmu.errors import InputError
-from tendonfmu.recording import read_recording
-from tendonfmu.tables import write_table
+from tendonfmu.files.tables import write_table
+from tendonfmu.recordings.converters import CONVERTERS, converter
+from tendonfmu.recordings.converters.davinci import convert
+from tendonfmu.recordings.recording import read_recording
 
 ROOT = Path(__file__).resolve().parent.parent
 DATA = Path(os.environ.get("TENDONFMU_DATA", ROOT.parent / "shared" / "data")) / "davinci_tool"

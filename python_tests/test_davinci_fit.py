@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not installed with its estimation")
 
-from tendonfmu.native import run_recording
-from tendonfmu.recording import read_recording
+from tendonfmu.model.native import run_recording
+from tendonfmu.recordings.recording import read_recording
 
 ROOT = Path(__file__).resolve().parents[1]
 EXAMPLE = ROOT / "examples" / "davinci"

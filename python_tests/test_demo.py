@@ -15,8 +15,8 @@ pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not i
 
 from command import Call
 from real_browser import Elements, find_browser, measure
-from tendonfmu import demo
-from tendonfmu.tables import read_table
+from tendonfmu.demo.demo import demo
+from tendonfmu.files.tables import read_table
 
 ROOT = Path(__file__).resolve().parents[1]
 HIDDEN = ROOT / "examples" / "demo_recording" / "two_joints_hidden.json"

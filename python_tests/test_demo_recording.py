@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
 from plant_rigs import needs_plant
-from tendonfmu.description import read_finger
-from tendonfmu.detection_score import score_detection
-from tendonfmu.native import Finger
-from tendonfmu.recording import Recording, read_recording
-from tendonfmu.rig import read_rig
-from tendonfmu.simulation import Table, simulate
-from tendonfmu.tables import read_table
+from tendonfmu.detect.counting import score_detection
+from tendonfmu.files.tables import read_table
+from tendonfmu.model.description import read_finger
+from tendonfmu.model.native import Finger
+from tendonfmu.recordings.recording import Recording, read_recording
+from tendonfmu.simulate.rig import read_rig
+from tendonfmu.simulate.simulation import Table, simulate
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 FOLDER = EXAMPLES / "demo_recording"
@@ -304,7 +304,7 @@ def test_the_calibrated_finger_is_one_that_calibrate_takes_and_writes(
     description: dict[str, Any], calibrated: dict[str, Any]
 ) -> None:
     """The format of today, the finger that it was made from, and the keys that a calibration leaves."""
-    from tendonfmu.calibrated_fit import earlier_finger
+    from tendonfmu.calibrate.fit import earlier_finger
 
     given = read_finger(EXAMPLES / "fingers" / "index_finger.json")
     earlier = earlier_finger(given, FOLDER / "index_finger_calibrated.json")

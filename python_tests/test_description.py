@@ -17,11 +17,11 @@ import pytest
 import extension_cases
 from fmu_binary import FINGER
 from random_fingers import random_finger
-from tendonfmu.description import count, read_finger
 from tendonfmu.errors import InputError
-from tendonfmu.extensions import MAGNITUDES, extension_numbers
-from tendonfmu.identifiability import unknowns
-from tendonfmu.native import Finger, NativeError, image_from_json
+from tendonfmu.estimate.information import unknowns
+from tendonfmu.model.description import count, read_finger
+from tendonfmu.model.extensions import MAGNITUDES, extension_numbers
+from tendonfmu.model.native import Finger, NativeError, image_from_json
 
 INDEX_FINGER = Path(__file__).parents[1] / "examples" / "fingers" / "index_finger.json"
 SCHEMA = json.loads((files("tendonfmu") / "schema" / "finger.schema.json").read_text(encoding="utf-8"))

@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from command import Call
-from tendonfmu.description import read_finger
-from tendonfmu.description_sense import description_findings
 from tendonfmu.errors import InputError
+from tendonfmu.model.description import read_finger
+from tendonfmu.model.plausibility import description_findings
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 LAW = {"static": 0.03, "coulomb": 0.02, "stribeck_velocity": 0.005, "viscous": 0.3}

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tendonfmu.balance import moment_arms
-from tendonfmu.recording import Recording
+from tendonfmu.model.balance import moment_arms
+from tendonfmu.recordings.recording import Recording
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "bench"))

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tendonfmu.balance import moment_arms
-from tendonfmu.native import run_recording
+from tendonfmu.model.balance import moment_arms
+from tendonfmu.model.native import run_recording
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "bench"))

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tendonfmu.detection_score import Signals, pooled, score_detection, stretches
-from tendonfmu.detection_summary import roc, summarise
-from tendonfmu.score_intervals import RESAMPLES, of_sums, quantile, rate, share
+from tendonfmu.detect.counting import Signals, pooled, score_detection, stretches
+from tendonfmu.detect.summary import roc, summarise
+from tendonfmu.statistics.intervals import RESAMPLES, of_sums, quantile, rate, share
 
 TIME = np.arange(1000) / 100.0  # 10 s
 

@@ -20,16 +20,16 @@ pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eige
 
 import diagnosis_examples as examples
 from command import Call
-from tendonfmu import diagnosis
-from tendonfmu.diagnosis_files import write_diagnosis
-from tendonfmu.diagnosis_result import Diagnosis
-from tendonfmu.effects import CANDIDATES
+from tendonfmu.cli.several_values import several_values
+from tendonfmu.diagnose import diagnosis
+from tendonfmu.diagnose.effects import CANDIDATES
+from tendonfmu.diagnose.result import Diagnosis
 from tendonfmu.errors import InputError, InternalError
-from tendonfmu.fit_files import check_unseen
-from tendonfmu.phases import PhaseState
-from tendonfmu.recording import Recording
-from tendonfmu.several_values import several_values
-from tendonfmu.tables import read_table
+from tendonfmu.estimate.files import check_unseen
+from tendonfmu.files.tables import read_table
+from tendonfmu.recordings.recording import Recording
+from tendonfmu.report.diagnosis_files import write_diagnosis
+from tendonfmu.tasks.phases import PhaseState
 
 PAGE = (Path(__file__).resolve().parents[1] / "docs" / "diagnose.md").read_text(encoding="utf-8")
 NAMED = {"diagnosis.html", "diagnosis.json", "extended.json", "extended.fmu", "nominal.json"}

@@ -24,12 +24,12 @@ from command import Call
 from diagnose_pairs import COUNT, make_pair
 from diagnose_quirks import QUIRKS
 from odd_finger import Columns, Pair
-from tendonfmu import diagnosis
-from tendonfmu.description import read_finger
-from tendonfmu.diagnosis import diagnose
-from tendonfmu.diagnosis_files import write_diagnosis
+from tendonfmu.diagnose import diagnosis
+from tendonfmu.diagnose.diagnosis import diagnose
 from tendonfmu.errors import InputError
-from tendonfmu.tables import write_table
+from tendonfmu.files.tables import write_table
+from tendonfmu.model.description import read_finger
+from tendonfmu.report.diagnosis_files import write_diagnosis
 
 SCHEMA = json.loads((files("tendonfmu") / "schema" / "diagnosis.schema.json").read_text(encoding="utf-8"))
 NAMES = list(QUIRKS)
@@ -192,7 +192,7 @@ def answered(monkeypatch: pytest.MonkeyPatch) -> Callable[[], int]:
         return found
 
     monkeypatch.setattr(diagnosis, "diagnose", answer)
-    monkeypatch.setattr("tendonfmu.diagnosis_files.write_diagnosis", lambda found, folder: {})
+    monkeypatch.setattr("tendonfmu.report.diagnosis_files.write_diagnosis", lambda found, folder: {})
     return lambda: calls
 
 

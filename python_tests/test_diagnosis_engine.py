@@ -16,29 +16,29 @@ from numpy.typing import NDArray
 
 from fit_cases import plain
 from fit_data import make_recording, wavy_forces, wavy_motion
-from tendonfmu.balance import moment_arms
-from tendonfmu.cause_gains import merged
-from tendonfmu.cause_search import bias_of, blocks_of, predicted_of, series_of
-from tendonfmu.description import FingerDescription
-from tendonfmu.diagnosis import PHASES
-from tendonfmu.diagnosis_search import NamedCause, _Rounds, _Trial, search
-from tendonfmu.diagnosis_series import block_prediction, exact_model, make_grid
-from tendonfmu.diagnosis_span import span_of
-from tendonfmu.effects import Place, by_name
-from tendonfmu.effects.presliding import is_spring, usual_time
-from tendonfmu.extension_fit import Accepted, FitSettings, FittedModel
-from tendonfmu.fit_recordings import FitRecording, Held, prepare
-from tendonfmu.gain import residual_of as online_residual
-from tendonfmu.hypotheses import HERE, Hypothesis
-from tendonfmu.interval import Interval
-from tendonfmu.native import Finger, image_from_json
-from tendonfmu.nominal_fit import fitted
-from tendonfmu.nuisance import residual_of
-from tendonfmu.online_error import OnlineError
-from tendonfmu.phases import Phases
-from tendonfmu.recording import Recording
-from tendonfmu.signal_choice import choose, least_sizes
-from tendonfmu.starting_point import delay_of_positions, scan
+from tendonfmu.diagnose.cause_gains import merged
+from tendonfmu.diagnose.cause_search import bias_of, blocks_of, predicted_of, series_of
+from tendonfmu.diagnose.diagnosis import PHASES
+from tendonfmu.diagnose.effects import Place, by_name
+from tendonfmu.diagnose.effects.presliding import is_spring, usual_time
+from tendonfmu.diagnose.extension_fit import Accepted, FitSettings, FittedModel
+from tendonfmu.diagnose.gain import residual_of as online_residual
+from tendonfmu.diagnose.hypotheses import HERE, Hypothesis
+from tendonfmu.diagnose.nominal_fit import fitted
+from tendonfmu.diagnose.online_error import OnlineError
+from tendonfmu.diagnose.search import NamedCause, _Rounds, _Trial, search
+from tendonfmu.diagnose.series import block_prediction, exact_model, make_grid
+from tendonfmu.diagnose.signal_choice import choose, least_sizes
+from tendonfmu.diagnose.span import span_of
+from tendonfmu.diagnose.starting_point import delay_of_positions, scan
+from tendonfmu.model.balance import moment_arms
+from tendonfmu.model.description import FingerDescription
+from tendonfmu.model.native import Finger, image_from_json
+from tendonfmu.recordings.prepared import FitRecording, Held, prepare
+from tendonfmu.recordings.recording import Recording
+from tendonfmu.statistics.interval import Interval
+from tendonfmu.statistics.splines import residual_of
+from tendonfmu.tasks.phases import Phases
 
 Numbers = NDArray[np.float64]
 RATE = 200.0  # Hz

@@ -22,11 +22,12 @@ pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not insta
 
 import diagnosis_examples as examples
 from real_browser import Elements, framed, measure, visit
-from tendonfmu.diagnosis_page import PAGE, diagnosis_page, write_diagnosis_page
-from tendonfmu.diagnosis_report import build_report, report_text
-from tendonfmu.diagnosis_result import Diagnosis, FoundPlace, ModelErrors, Where
-from tendonfmu.diagnosis_size import size_of
-from tendonfmu.diagnosis_text import (
+from tendonfmu.diagnose.reported_causes import reported_causes
+from tendonfmu.diagnose.result import Diagnosis, FoundPlace, ModelErrors, Where
+from tendonfmu.diagnose.size import size_of
+from tendonfmu.report.diagnosis_page import PAGE, diagnosis_page, write_diagnosis_page
+from tendonfmu.report.diagnosis_report import build_report, report_text
+from tendonfmu.report.diagnosis_text import (
     headline,
     left_sentence,
     lines,
@@ -38,9 +39,8 @@ from tendonfmu.diagnosis_text import (
     title_of,
     unit_of,
 )
-from tendonfmu.diagnosis_waterfall import waterfall_of
-from tendonfmu.interval import Interval
-from tendonfmu.reported_causes import reported_causes
+from tendonfmu.report.diagnosis_waterfall import waterfall_of
+from tendonfmu.statistics.interval import Interval
 
 THRESHOLDS = (5e-4, 0.01)  # m/s, rad/s
 LARGEST = 5_000_000  # bytes
@@ -404,7 +404,7 @@ def test_the_tables_hold_the_numbers(page: str) -> None:
 
 def test_the_page_needs_no_plotting_library() -> None:
     """It takes longer to load than all that is drawn."""
-    code = "import sys, tendonfmu.diagnosis_page; sys.exit('matplotlib' in sys.modules)"
+    code = "import sys, tendonfmu.report.diagnosis_page; sys.exit('matplotlib' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tendonfmu.campaign_cases import Case
-from tendonfmu.diagnosis_result import Where
+from tendonfmu.diagnose.campaign.cases import Case
+from tendonfmu.diagnose.result import Where
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path += [str(ROOT / "bench"), str(ROOT / "python_tests" / "hidden_effects")]

@@ -20,11 +20,11 @@ pytest.importorskip("scipy", reason="SKIPPED: scipy is not installed")
 from scipy import io
 
 from command import Call
-from tendonfmu.converters import convert_file
-from tendonfmu.converters.emps import EDGE, MASS, convert
 from tendonfmu.errors import InputError
-from tendonfmu.native import run_recording
-from tendonfmu.recording import read_recording
+from tendonfmu.model.native import run_recording
+from tendonfmu.recordings.converters import convert_file
+from tendonfmu.recordings.converters.emps import EDGE, MASS, convert
+from tendonfmu.recordings.recording import read_recording
 
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLE = ROOT / "examples" / "emps"

@@ -15,7 +15,7 @@ from fit_cases import few_unknowns, groups, image_of, off_start, random_fit_case
 from fit_data import make_recording, wavy_forces, wavy_motion
 from oracle_trace import Trace, with_values, without_contact
 from random_fingers import Description, Recording, random_recording
-from tendonfmu import estimation
+from tendonfmu.estimate import estimation
 
 if not estimation.HAS_ESTIMATION:
     pytest.skip(f"SKIPPED: {estimation.ESTIMATION_MISSING}", allow_module_level=True)

@@ -16,7 +16,7 @@ from fit_cases import few_unknowns, groups, image_of, lasting_finger, small_fing
 from fit_data import make_recording, wavy_forces, wavy_motion
 from oracle_trace import with_values
 from random_fingers import Description, Recording
-from tendonfmu import estimation
+from tendonfmu.estimate import estimation
 
 if not estimation.HAS_ESTIMATION:
     pytest.skip(f"SKIPPED: {estimation.ESTIMATION_MISSING}", allow_module_level=True)

@@ -24,7 +24,7 @@ from fit_cases import (
 )
 from fit_data import make_recording, wavy_forces, wavy_motion
 from oracle_trace import Trace, run_recorder, with_values
-from tendonfmu import estimation
+from tendonfmu.estimate import estimation
 
 if not estimation.HAS_ESTIMATION:
     pytest.skip(f"SKIPPED: {estimation.ESTIMATION_MISSING}", allow_module_level=True)

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tendonfmu.estimation_signals import FEWEST, HIGHEST, LOWEST, OF_RATE, Signals, smoothing_of, zero_phase
-from tendonfmu.recording import Recording
+from tendonfmu.recordings.recording import Recording
+from tendonfmu.recordings.smoothing import FEWEST, HIGHEST, LOWEST, OF_RATE, Signals, smoothing_of, zero_phase
 
 Numbers = NDArray[np.float64]
 RATE = 1000.0

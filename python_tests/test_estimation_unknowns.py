@@ -23,7 +23,7 @@ from fit_cases import (
     twin_of,
 )
 from random_fingers import Description
-from tendonfmu import estimation
+from tendonfmu.estimate import estimation
 
 if not estimation.HAS_ESTIMATION:
     pytest.skip(f"SKIPPED: {estimation.ESTIMATION_MISSING}", allow_module_level=True)
@@ -208,7 +208,7 @@ def test_initial_torque_is_an_unknown_of_any_sign() -> None:
     ids=["stiffness", "noise", "threshold", "angle", "two kinds in one group"],
 )
 def test_what_cannot_be_estimated_is_refused(chosen: dict[str, int], named: str) -> None:
-    from tendonfmu.estimation import EstimationError
+    from tendonfmu.estimate.estimation import EstimationError
 
     with pytest.raises(EstimationError) as refused:
         estimator_of(SMALL, chosen)
@@ -225,7 +225,7 @@ def test_what_cannot_be_estimated_is_refused(chosen: dict[str, int], named: str)
     ids=["group too short", "scale too long"],
 )
 def test_wrong_lengths_are_refused(group: Any, scale: Any) -> None:
-    from tendonfmu.estimation import EstimationError
+    from tendonfmu.estimate.estimation import EstimationError
 
     with pytest.raises(EstimationError) as refused:
         estimation.Estimator(image_of(SMALL), group, scale)
@@ -235,7 +235,7 @@ def test_wrong_lengths_are_refused(group: Any, scale: Any) -> None:
 
 def test_free_groups_are_the_numbers_that_a_fit_counts() -> None:
     """The twin's choice of what is present is the description's own count (`tendonfmu check`)."""
-    from tendonfmu.description import estimated_numbers
+    from tendonfmu.model.description import estimated_numbers
 
     for seed in range(10):
         description = random_fit_case(seed, 60)[0]

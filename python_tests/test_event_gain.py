@@ -12,9 +12,9 @@ import pytest
 
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
 
-from tendonfmu import event_gain as module
-from tendonfmu.diagnosis_result import Event
-from tendonfmu.event_gain import event_gain
+from tendonfmu.diagnose import event_gain as module
+from tendonfmu.diagnose.event_gain import event_gain
+from tendonfmu.diagnose.result import Event
 
 TIME = np.arange(0.0, 60.0, 0.01)
 PUSHES = tuple(Event("a.csv", start, start + 0.5, (1,), 0.05, "a push") for start in (5.0, 21.0, 38.0, 54.0))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tendonfmu.cli import app
+from tendonfmu.cli.program import app
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT / "bench"))

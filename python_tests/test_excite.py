@@ -14,19 +14,19 @@ import pytest
 from scipy.interpolate import BPoly
 
 from excite_fingers import INDEX, INDEX_DATA, INDEX_RANGES, SMALL, SMALL_RANGES
-from tendonfmu import native
-from tendonfmu.balance import balanced_forces, moment_arms, pretension_vector
-from tendonfmu.coverage import EffectCoverage, coverage_of, durations
-from tendonfmu.description import estimated_numbers
 from tendonfmu.errors import InputError
-from tendonfmu.excitation import ACCELERATION, Excitation, Plan, plan_excitation
-from tendonfmu.excite import as_array, find_pretensions, find_ranges, read_subject
-from tendonfmu.friction_places import effects, working_point_weights
-from tendonfmu.identifiability import unknowns
-from tendonfmu.joint_coverage import joint_coverage
-from tendonfmu.quintic import evaluate
-from tendonfmu.tables import read_table
-from tendonfmu.tension_plan import Variation
+from tendonfmu.estimate.coverage import EffectCoverage, coverage_of, durations
+from tendonfmu.estimate.information import unknowns
+from tendonfmu.excite.excitation import ACCELERATION, Excitation, Plan, plan_excitation
+from tendonfmu.excite.joint_coverage import joint_coverage
+from tendonfmu.excite.tension_plan import Variation
+from tendonfmu.excite.training_motion import as_array, find_pretensions, find_ranges, read_subject
+from tendonfmu.files.tables import read_table
+from tendonfmu.model import native
+from tendonfmu.model.balance import balanced_forces, moment_arms, pretension_vector
+from tendonfmu.model.description import estimated_numbers
+from tendonfmu.model.friction_places import effects, working_point_weights
+from tendonfmu.statistics.quintic import evaluate
 
 
 @pytest.fixture(scope="module")

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 from plant_rigs import needs_plant
-from tendonfmu.excitation import Plan, plan_excitation
-from tendonfmu.excite import as_array, find_ranges, read_subject
-from tendonfmu.quintic import evaluate
+from tendonfmu.excite.excitation import Plan, plan_excitation
+from tendonfmu.excite.training_motion import as_array, find_ranges, read_subject
+from tendonfmu.statistics.quintic import evaluate
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = (ROOT / "docs" / "excite.md").read_text(encoding="utf-8")

@@ -14,10 +14,10 @@ import pytest
 from extension_cases import ROWS, name_of, random_rows
 from fmu_binary import FINGER
 from random_fingers import random_case
-from tendonfmu.description import read_finger
-from tendonfmu.model_variables import describe_model, read_table
-from tendonfmu.native import Finger
-from tendonfmu.signals import NUMBERS
+from tendonfmu.fmu.model_variables import describe_model, read_table
+from tendonfmu.model.description import read_finger
+from tendonfmu.model.native import Finger
+from tendonfmu.model.signals import NUMBERS
 from test_dependencies import Influence, Sample, declared, lively_recording, pairs, slopes, steps_apart
 
 SEEDS = range(12)

@@ -10,8 +10,8 @@ import pytest
 
 from fmu_binary import OK, Instance, UnpackedFmu, unpack
 from random_fingers import Recording, random_case
-from tendonfmu.native import Finger
-from tendonfmu.packaging import build_fmu
+from tendonfmu.fmu.packaging import build_fmu
+from tendonfmu.model.native import Finger
 from test_fmu_calls import SOURCE, derivative
 
 SAMPLES = 60

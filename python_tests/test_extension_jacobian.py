@@ -17,7 +17,7 @@ from oracle_extensions import read_rows
 from oracle_trace import Trace, run_recorder, with_values
 from random_extensions import MAGNITUDES, MAKE
 from random_fingers import Description, random_case
-from tendonfmu import estimation
+from tendonfmu.estimate import estimation
 
 if not estimation.HAS_ESTIMATION:
     pytest.skip(f"SKIPPED: {estimation.ESTIMATION_MISSING}", allow_module_level=True)

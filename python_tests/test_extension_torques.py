@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from extension_cases import ROWS, name_of
 from fmu_binary import FINGER
-from tendonfmu.native import Finger
+from tendonfmu.model.native import Finger
 
 Numbers = NDArray[np.float64]
 V_MIN = {"tendon": 0.002, "joint": 0.2}

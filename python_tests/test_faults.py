@@ -19,10 +19,10 @@ pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not insta
 import tendonfmu
 from command import Call
 from fmu_binary import FINGER
-from tendonfmu import description, native
+from tendonfmu.cli.fault_report import write_fault_report
 from tendonfmu.errors import InputError, InternalError, line_of, own_fault
-from tendonfmu.fault_report import write_fault_report
-from tendonfmu.whole_file import whole_file
+from tendonfmu.files.whole_file import whole_file
+from tendonfmu.model import description, native
 
 NAME = re.compile(r"tendonfmu-error-\d{8}-\d{6}(-\d+)?\.txt")
 

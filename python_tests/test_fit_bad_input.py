@@ -13,9 +13,9 @@ import pytest
 from fit_cases import jam, small_finger
 from fit_finger import made_recording
 from tendonfmu.errors import InputError
-from tendonfmu.fit_recordings import slack_sentences
-from tendonfmu.fitting import FitWarning, FrictionFit
-from tendonfmu.recording import Recording
+from tendonfmu.estimate.fitting import FitWarning, FrictionFit
+from tendonfmu.recordings.prepared import slack_sentences
+from tendonfmu.recordings.recording import Recording
 
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
 

@@ -17,7 +17,7 @@ import pytest
 from command import Call
 from fit_cases import small_finger
 from fit_finger import made_recording, moved_start, write_recording
-from tendonfmu.fit_structure import get_number
+from tendonfmu.estimate.structure import get_number
 
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
 

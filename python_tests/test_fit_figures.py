@@ -14,16 +14,23 @@ from matplotlib.image import imread
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
 from fit_pictures import index_finger, internal_values, made_up_picture, made_up_unknowns
-from tendonfmu import fit_law_figures, native
-from tendonfmu.fit_error_figures import correlation, correlation_sheet, error_sheet, relative_error, strongest_pairs
-from tendonfmu.fit_figures import SHOWN, fit_sheets, residual_sheets, rms, torque_sheets
-from tendonfmu.fit_law_figures import law_sheets
-from tendonfmu.fit_laws import CONFIDENCE, LawBands
-from tendonfmu.fit_picture import FitPicture
-from tendonfmu.fit_plots import draw_panel, png, write_sheet
-from tendonfmu.fit_sheet import Curve, MatrixPanel, Panel, Sheet
-from tendonfmu.friction_places import Effect, effects
-from tendonfmu.panel_styles import STYLES, size_of
+from tendonfmu.drawing.panel_styles import STYLES, size_of
+from tendonfmu.drawing.panels import draw_panel, png, write_sheet
+from tendonfmu.drawing.sheet import Curve, MatrixPanel, Panel, Sheet
+from tendonfmu.estimate.laws import CONFIDENCE, LawBands
+from tendonfmu.estimate.picture import FitPicture
+from tendonfmu.model import native
+from tendonfmu.model.friction_places import Effect, effects
+from tendonfmu.report import fit_law_figures
+from tendonfmu.report.fit_error_figures import (
+    correlation,
+    correlation_sheet,
+    error_sheet,
+    relative_error,
+    strongest_pairs,
+)
+from tendonfmu.report.fit_figures import SHOWN, fit_sheets, residual_sheets, rms, torque_sheets
+from tendonfmu.report.fit_law_figures import law_sheets
 
 MM, PERCENT, MILLI = 1e3, 1e2, 1e3
 

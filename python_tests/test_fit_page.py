@@ -22,13 +22,13 @@ pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not insta
 
 from fit_pictures import made_up_picture
 from real_browser import Elements, framed, measure, visit
-from tendonfmu.balance import balanced_forces, moment_arms
 from tendonfmu.errors import InputError
-from tendonfmu.fit_page import PAGE, write_fit_page
-from tendonfmu.fit_page import fit_page as render
-from tendonfmu.fit_picture import FitPicture
-from tendonfmu.fit_summary import residual_tables, rounded, summarise
-from tendonfmu.tables import write_table
+from tendonfmu.estimate.picture import FitPicture
+from tendonfmu.files.tables import write_table
+from tendonfmu.model.balance import balanced_forces, moment_arms
+from tendonfmu.report.fit_page import PAGE, write_fit_page
+from tendonfmu.report.fit_page import fit_page as render
+from tendonfmu.report.fit_summary import residual_tables, rounded, summarise
 
 LARGEST = 5_000_000  # bytes
 HOSTILE = "<script>alert('x')</script>&\"$\\frac{"

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from fit_data import wavy_motion
-from tendonfmu import estimation
-from tendonfmu.balance import balanced_forces
-from tendonfmu.description import FingerDescription, read_finger
+from tendonfmu.estimate import estimation
+from tendonfmu.model.balance import balanced_forces
+from tendonfmu.model.description import FingerDescription, read_finger
 
 if not estimation.HAS_ESTIMATION:
     pytest.skip(f"FIT NOT TESTED: {estimation.ESTIMATION_MISSING}", allow_module_level=True)

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from fit_cases import plain, small_finger
 from fit_finger import made_recording, moved_start
-from tendonfmu import native
-from tendonfmu.error_directions import few_directions, predicted
-from tendonfmu.fitting import FitWarning, FrictionFit
+from tendonfmu.estimate.fitting import FitWarning, FrictionFit
+from tendonfmu.model import native
+from tendonfmu.statistics.error_directions import few_directions, predicted
 
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
 

@@ -15,13 +15,13 @@ from scipy import stats
 
 from fit_cases import small_finger
 from fit_finger import asymmetric_finger, made_recording, moved_start, write_recording
-from tendonfmu import native
 from tendonfmu.errors import InputError
-from tendonfmu.fit_files import Unfinished, description_text, read_unfinished, write_unfinished
-from tendonfmu.fit_residuals import chi_square_tail, consistency, whiteness
-from tendonfmu.fit_structure import get_number, set_number, with_sides
-from tendonfmu.fitting import FitWarning, FrictionFit
-from tendonfmu.recording import Recording
+from tendonfmu.estimate.files import Unfinished, description_text, read_unfinished, write_unfinished
+from tendonfmu.estimate.fitting import FitWarning, FrictionFit
+from tendonfmu.estimate.structure import get_number, set_number, with_sides
+from tendonfmu.model import native
+from tendonfmu.recordings.recording import Recording
+from tendonfmu.recordings.residuals import chi_square_tail, consistency, whiteness
 
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
 

@@ -134,7 +134,7 @@ print(json.dumps(play([Instance(fmu) for fmu in fmus])))
 
 @pytest.fixture(scope="session")
 def other_fmu(tmp_path_factory: pytest.TempPathFactory) -> UnpackedFmu:
-    from tendonfmu.packaging import build_fmu
+    from tendonfmu.fmu.packaging import build_fmu
 
     folder = tmp_path_factory.mktemp("other_fmu")
     (folder / "finger.json").write_text(json.dumps(SECOND))

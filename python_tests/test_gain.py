@@ -16,13 +16,9 @@ from scipy.signal import lfilter
 
 from fit_cases import lasting_finger
 from fit_data import make_recording, wavy_forces, wavy_motion
-from tendonfmu import native
-from tendonfmu.contact_gain import detection_gain
-from tendonfmu.description import FingerDescription, read_finger
-from tendonfmu.effects import CANDIDATES, Place
-from tendonfmu.errors import InputError, InternalError
-from tendonfmu.estimation import HAS_ESTIMATION
-from tendonfmu.extension_fit import (
+from tendonfmu.diagnose.contact_gain import detection_gain
+from tendonfmu.diagnose.effects import CANDIDATES, Place
+from tendonfmu.diagnose.extension_fit import (
     Accepted,
     FitSettings,
     cause_parameters,
@@ -30,11 +26,15 @@ from tendonfmu.extension_fit import (
     fit_extended,
     fit_numbers,
 )
-from tendonfmu.fit_recordings import FitRecording, Held, prepare
-from tendonfmu.gain import measure_gain, residual_of, run_both
-from tendonfmu.gain_interval import blocks_of, gain_interval
-from tendonfmu.online_error import OnlineError
-from tendonfmu.recording import Recording, read_recording
+from tendonfmu.diagnose.gain import measure_gain, residual_of, run_both
+from tendonfmu.diagnose.online_error import OnlineError
+from tendonfmu.errors import InputError, InternalError
+from tendonfmu.estimate.estimation import HAS_ESTIMATION
+from tendonfmu.model import native
+from tendonfmu.model.description import FingerDescription, read_finger
+from tendonfmu.recordings.prepared import FitRecording, Held, prepare
+from tendonfmu.recordings.recording import Recording, read_recording
+from tendonfmu.statistics.gain_interval import blocks_of, gain_interval
 
 Array = NDArray[Any]
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"

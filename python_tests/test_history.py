@@ -18,16 +18,16 @@ pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eige
 from command import Call
 from dask_on_loopback import dask_processes
 from real_browser import Elements
-from tendonfmu import change_history
-from tendonfmu.change_history import History, Line, Size, diagnose_history, share_of, times_of
-from tendonfmu.change_trend import slope
-from tendonfmu.diagnosis_result import ChangedSize, Where
-from tendonfmu.diagnosis_text import Names
+from tendonfmu.diagnose.changes import history as change_history
+from tendonfmu.diagnose.changes.history import History, Line, Size, diagnose_history, share_of, times_of
+from tendonfmu.diagnose.changes.trend import slope
+from tendonfmu.diagnose.result import ChangedSize, Where
 from tendonfmu.errors import InputError
-from tendonfmu.history_files import write_history
-from tendonfmu.history_text import headline, trend_sentence
-from tendonfmu.interval import Interval
-from tendonfmu.jobs import workers_of
+from tendonfmu.report.diagnosis_text import Names
+from tendonfmu.report.history_files import write_history
+from tendonfmu.report.history_text import headline, trend_sentence
+from tendonfmu.statistics.interval import Interval
+from tendonfmu.tasks.jobs import workers_of
 from worn_finger import WELL, Worn, record, write_files
 
 NAMES = Names(("", "tip"), ("", ""))

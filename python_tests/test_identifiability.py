@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from excite_fingers import INDEX, SMALL, SMALL_RANGES
-from tendonfmu import native
-from tendonfmu.balance import balanced_forces
-from tendonfmu.excitation import Plan, plan_excitation
-from tendonfmu.excite import as_array, excite, find_ranges, read_subject, report
-from tendonfmu.identifiability import information, noise_of, sensitivities, unknowns
-from tendonfmu.judgement import LIMIT
-from tendonfmu.tension_plan import Variation
+from tendonfmu.estimate.identifiability import LIMIT
+from tendonfmu.estimate.information import information, noise_of, sensitivities, unknowns
+from tendonfmu.excite.excitation import Plan, plan_excitation
+from tendonfmu.excite.tension_plan import Variation
+from tendonfmu.excite.training_motion import as_array, excite, find_ranges, read_subject, report
+from tendonfmu.model import native
+from tendonfmu.model.balance import balanced_forces
 
 
 @pytest.fixture

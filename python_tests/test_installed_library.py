@@ -234,7 +234,7 @@ def test_the_program_of_the_page_learns_what_the_command_does(prefix: Path, tmp_
     if not has_estimation(prefix) or not shutil.which("pkg-config"):
         pytest.skip("SKIPPED: built without the estimation of parameters, or pkg-config is not installed")
     pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: the package is built without Eigen")
-    from tendonfmu.fitting import FrictionFit
+    from tendonfmu.estimate.fitting import FrictionFit
 
     page = (ROOT / "docs" / "fit.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"```c\n(.*?)```", page, re.DOTALL)

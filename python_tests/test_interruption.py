@@ -20,10 +20,10 @@ if os.name != "posix":
     pytest.skip("SKIPPED: signals as POSIX has them", allow_module_level=True)
 
 import diagnosis_examples as examples
-from tendonfmu.diagnosis_files import write_diagnosis
-from tendonfmu.diagnosis_report import REPORT
 from tendonfmu.errors import InputError
-from tendonfmu.interruption import ended_by_signals, uninterrupted, worker_threads
+from tendonfmu.report.diagnosis_files import write_diagnosis
+from tendonfmu.report.diagnosis_report import REPORT
+from tendonfmu.tasks.interruption import ended_by_signals, uninterrupted, worker_threads
 
 HERE = Path(__file__).resolve().parent
 PROMPT = 10.0  # s; on a busy machine
@@ -37,8 +37,10 @@ sys.path.insert(0, {here!r})
 import numpy as np
 from dataclasses import replace
 import diagnosis_examples as examples
-from tendonfmu import diagnosis, diagnosis_files, diagnosis_page
-from tendonfmu.interruption import worker_threads
+from tendonfmu.diagnose import diagnosis
+from tendonfmu.report import diagnosis_files
+from tendonfmu.report import diagnosis_page
+from tendonfmu.tasks.interruption import worker_threads
 def ready(): os.write(1, b"ready\\n")
 def brief(): return replace(examples.one_cause(), views=examples.one_cause().views[:1])
 {body}

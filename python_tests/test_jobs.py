@@ -13,9 +13,9 @@ import pytest
 
 import some_jobs
 from dask_on_loopback import dask_processes
-from tendonfmu import jobs as engine
 from tendonfmu.errors import InputError
-from tendonfmu.jobs import Job, rows_of, run_jobs, waiting_jobs, workers_of
+from tendonfmu.tasks import jobs as engine
+from tendonfmu.tasks.jobs import Job, rows_of, run_jobs, waiting_jobs, workers_of
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bench"))
 

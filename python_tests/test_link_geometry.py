@@ -15,14 +15,14 @@ import pytest
 from numpy.typing import NDArray
 
 from random_fingers import random_case
-from tendonfmu.description import read_finger
-from tendonfmu.fmu import run_fmu
-from tendonfmu.model_variables import read_table
-from tendonfmu.native import Finger, NativeError, image_from_json
-from tendonfmu.packaging import build_fmu, package_file
-from tendonfmu.recording import read_recording
-from tendonfmu.signals import PLACE
-from tendonfmu.tables import write_table
+from tendonfmu.files.tables import write_table
+from tendonfmu.fmu.fmpy_client import run_fmu
+from tendonfmu.fmu.model_variables import read_table
+from tendonfmu.fmu.packaging import build_fmu, package_file
+from tendonfmu.model.description import read_finger
+from tendonfmu.model.native import Finger, NativeError, image_from_json
+from tendonfmu.model.signals import PLACE
+from tendonfmu.recordings.recording import read_recording
 
 Array = NDArray[Any]
 SPREAD = (0.002, 0.0001)  # contact.deviation, N·m, and its growth with the mean force

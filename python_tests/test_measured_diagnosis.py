@@ -25,12 +25,12 @@ sys.path.insert(0, str(ROOT / "python_tests" / "hidden_effects"))
 
 from measured import EFFECTS, FORCE, Columns, Description, Machine, hide, put, residuals  # noqa: E402
 
-from tendonfmu.converters import convert_file  # noqa: E402
-from tendonfmu.diagnosis import diagnose  # noqa: E402
-from tendonfmu.fitting import FitWarning, FrictionFit  # noqa: E402
-from tendonfmu.native import run_recording  # noqa: E402
-from tendonfmu.recording import Recording  # noqa: E402
-from tendonfmu.tables import write_table  # noqa: E402
+from tendonfmu.diagnose.diagnosis import diagnose  # noqa: E402
+from tendonfmu.estimate.fitting import FitWarning, FrictionFit  # noqa: E402
+from tendonfmu.files.tables import write_table  # noqa: E402
+from tendonfmu.model.native import run_recording  # noqa: E402
+from tendonfmu.recordings.converters import convert_file  # noqa: E402
+from tendonfmu.recordings.recording import Recording  # noqa: E402
 
 DATA = Path(os.environ.get("TENDONFMU_DATA") or ROOT.parent / "shared" / "data")
 

@@ -11,12 +11,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tendonfmu.balance import moment_arms, pretension_vector
-from tendonfmu.discrimination import discriminating_motion
-from tendonfmu.effects import CANDIDATES, Place
-from tendonfmu.errors import InputError, InternalError
-from tendonfmu.estimation import HAS_ESTIMATION
-from tendonfmu.experiment_menu import (
+from tendonfmu.diagnose.effects import CANDIDATES, Place
+from tendonfmu.diagnose.experiments.discrimination import discriminating_motion
+from tendonfmu.diagnose.experiments.menu import (
     WIDER,
     Entry,
     Recorded,
@@ -27,14 +24,17 @@ from tendonfmu.experiment_menu import (
     motions,
     tensions,
 )
-from tendonfmu.experiment_motion import expected_recording, perform
-from tendonfmu.extension_fit import Accepted, FitSettings, extended_description, fit_numbers
-from tendonfmu.fit_recordings import FitRecording
-from tendonfmu.json_node import Node
-from tendonfmu.motion_plan import Joints, expand_motion
-from tendonfmu.native import NativeError
-from tendonfmu.next_experiment import Experiments, Question, plan_experiments
-from tendonfmu.tables import write_table
+from tendonfmu.diagnose.experiments.motion import expected_recording, perform
+from tendonfmu.diagnose.experiments.next_experiment import Experiments, Question, plan_experiments
+from tendonfmu.diagnose.extension_fit import Accepted, FitSettings, extended_description, fit_numbers
+from tendonfmu.errors import InputError, InternalError
+from tendonfmu.estimate.estimation import HAS_ESTIMATION
+from tendonfmu.files.json_node import Node
+from tendonfmu.files.tables import write_table
+from tendonfmu.model.balance import moment_arms, pretension_vector
+from tendonfmu.model.native import NativeError
+from tendonfmu.recordings.prepared import FitRecording
+from tendonfmu.simulate.motion_plan import Joints, expand_motion
 
 Array = NDArray[Any]
 NOISE = 0.001  # N·m

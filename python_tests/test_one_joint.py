@@ -19,13 +19,13 @@ from map_cases import SCHEMA, TURNING, VALIDATOR, edited, written
 
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
-from tendonfmu.converters.column_map import read_map
-from tendonfmu.converters.one_joint import central_velocity
-from tendonfmu.converters.one_joint_description import starting_numbers
-from tendonfmu.converters.table import convert_table
-from tendonfmu.description import read_finger
 from tendonfmu.errors import InputError
-from tendonfmu.tables import read_table, write_table
+from tendonfmu.files.tables import read_table, write_table
+from tendonfmu.model.description import read_finger
+from tendonfmu.recordings.converters.column_map import read_map
+from tendonfmu.recordings.converters.one_joint import central_velocity
+from tendonfmu.recordings.converters.one_joint_description import starting_numbers
+from tendonfmu.recordings.converters.table import convert_table
 
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLE = ROOT / "examples" / "one_joint"

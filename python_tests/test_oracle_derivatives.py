@@ -9,7 +9,7 @@ import numpy as np
 import oracle_derivatives
 from analytic_cases import ARM, LAW, finger, one_edge, recording
 from random_fingers import random_case
-from tendonfmu import native
+from tendonfmu.model import native
 
 # A central difference of torques near 0.1 N·m over 1e-3 N rounds at 1e-13; Richardson leaves about as much.
 CLOSE = 1e-9

@@ -22,11 +22,11 @@ from fmpy.validation import validate_fmu
 
 from fmu_binary import FINGER, Instance, fmi_platform, unpack
 from random_fingers import random_case, random_finger
-from tendonfmu import native
-from tendonfmu.dependencies import dependencies, structure_of
-from tendonfmu.description import read_finger
 from tendonfmu.errors import InputError
-from tendonfmu.packaging import build_fmu, model_identifier
+from tendonfmu.fmu.packaging import build_fmu, model_identifier
+from tendonfmu.model import native
+from tendonfmu.model.dependencies import dependencies, structure_of
+from tendonfmu.model.description import read_finger
 
 INDEX_FINGER = Path(__file__).parents[1] / "examples" / "fingers" / "index_finger.json"
 LAW = {"static": 0.03, "coulomb": 0.02, "stribeck_velocity": 0.005}
@@ -41,7 +41,7 @@ TINY: dict[str, Any] = {
     "extensions": [{"effect": "cover_hardening", "joint": 1, "stiffness": 0.1}],
 }
 
-BUILD = "import sys, pathlib, tendonfmu.packaging as p; p.build_fmu(*map(pathlib.Path, sys.argv[1:]))"
+BUILD = "import sys, pathlib, tendonfmu.fmu.packaging as p; p.build_fmu(*map(pathlib.Path, sys.argv[1:]))"
 
 Pack = Callable[[dict[str, Any]], Path]
 

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import pytest
 
-from tendonfmu.console import PhaseDisplay, time_left
-from tendonfmu.phases import Phases, PhaseState
+from tendonfmu.cli.console import PhaseDisplay, time_left
+from tendonfmu.tasks.phases import Phases, PhaseState
 
 SHARES = {"reading": 1.0, "fitting": 6.0, "judging": 3.0}
 

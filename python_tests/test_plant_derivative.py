@@ -13,7 +13,7 @@ from oracle_plant import PlantTwin
 from oracle_plant_parts import Multibody
 from plant_rigs import needs_plant
 from random_plants import random_plant, random_state
-from tendonfmu.plant import Plant
+from tendonfmu.simulate.plant import Plant
 
 Array = NDArray[Any]
 

@@ -13,9 +13,16 @@ from numpy.typing import NDArray
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
 from plant_rigs import needs_plant
-from tendonfmu.plant_figures import bristle_numbers, led, loop_figure, model_friction, presliding_figure, truth_figure
-from tendonfmu.rig import Rig, read_rig
-from tendonfmu.rig_drawing import GAP, rig_drawing
+from tendonfmu.report.plant_figures import (
+    bristle_numbers,
+    led,
+    loop_figure,
+    model_friction,
+    presliding_figure,
+    truth_figure,
+)
+from tendonfmu.report.rig_drawing import GAP, rig_drawing
+from tendonfmu.simulate.rig import Rig, read_rig
 
 RIGS = Path(__file__).resolve().parent.parent / "examples" / "rigs"
 JOINT, TENDON = 1, 4

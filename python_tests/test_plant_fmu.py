@@ -22,10 +22,10 @@ from fmu_binary import ERROR, FINGER, OK, Instance, UnpackedFmu, fmi_platform, u
 from plant_fmu_rig import SEED, TOLERANCE, fmu_rig, plant_binary, play
 from plant_rigs import needs_plant
 from tendonfmu.errors import InputError
-from tendonfmu.packaging import build_fmu
-from tendonfmu.plant import Plant
-from tendonfmu.plant_packaging import build_plant_fmu
-from tendonfmu.rig import read_rig
+from tendonfmu.fmu.packaging import build_fmu
+from tendonfmu.simulate.fmu_packaging import build_plant_fmu
+from tendonfmu.simulate.plant import Plant
+from tendonfmu.simulate.rig import read_rig
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tools"))
 from binary_contents import read_contents
@@ -33,7 +33,9 @@ from binary_contents import read_contents
 pytestmark = needs_plant
 
 INDEX_FINGER = Path(__file__).resolve().parent.parent / "examples" / "rigs" / "index_finger.json"
-BUILD = "import sys, pathlib, tendonfmu.plant_packaging as p; p.build_plant_fmu(*map(pathlib.Path, sys.argv[1:]))"
+BUILD = (
+    "import sys, pathlib, tendonfmu.simulate.fmu_packaging as p; p.build_plant_fmu(*map(pathlib.Path, sys.argv[1:]))"
+)
 LARGEST_BINARY = 2_000_000  # bytes
 SYSTEM_LIBRARIES = {"libc.so.6", "libm.so.6", "libgcc_s.so.1", "ld-linux-x86-64.so.2", "ld-linux-aarch64.so.1"}
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from fmu_binary import DISCARD, ERROR, OK, WARNING, Instance, UnpackedFmu, unpack
 from plant_fmu_rig import TOLERANCE, play
 from plant_rigs import needs_plant
-from tendonfmu.plant_packaging import build_plant_fmu
+from tendonfmu.simulate.fmu_packaging import build_plant_fmu
 from test_fmu_states import STATES, TABLE, checksum
 
 pytestmark = needs_plant

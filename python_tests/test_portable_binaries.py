@@ -243,7 +243,7 @@ class Fmu:
 
 @pytest.fixture(scope="module")
 def fmu(tmp_path_factory: pytest.TempPathFactory) -> Fmu:
-    from tendonfmu.packaging import build_fmu
+    from tendonfmu.fmu.packaging import build_fmu
 
     folder = tmp_path_factory.mktemp("fmu")
     with zipfile.ZipFile(build_fmu(FINGER, folder / "index_finger.fmu")) as archive:

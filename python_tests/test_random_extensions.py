@@ -60,10 +60,10 @@ def oracle_run(seed: int) -> oracle.Result:
 
 
 def run_sse2(description: Description, recording: Recording, source: int) -> dict[str, Any]:
-    finger = product("native").Finger.from_description(description, source)
+    finger = product("model.native").Finger.from_description(description, source)
     try:
         finger.kernel = "sse2"
-    except product("native").NativeError as refused:
+    except product("model.native").NativeError as refused:
         pytest.skip(f"SKIPPED: no such kernel on this machine ({refused})")
     outputs: dict[str, Any] = finger.run(recording, parts=True)
     return outputs
@@ -105,7 +105,7 @@ def test_each_row_matters() -> None:
     for seed in FINGERS:
         description, recording = case(seed)
         rows = description["extensions"]
-        finger = product("native").Finger
+        finger = product("model.native").Finger
         whole = finger.from_description(description, source_of(seed)).run(recording)["compensated_torque"]
         for effect in {row["effect"] for row in rows}:
             others = description | {"extensions": [row for row in rows if row["effect"] != effect]}
@@ -132,7 +132,7 @@ def test_agrees_with_the_oracle(runner: Runner) -> None:
 
 def test_a_restored_state_gives_the_same_bits() -> None:
     """Saved at any sample, continued elsewhere and again: what every effect remembers is in it."""
-    native = product("native")
+    native = product("model.native")
     for seed in FINGERS:
         description, recording = case(seed)
         whole = native.Finger.from_description(description, source_of(seed)).run(recording, parts=True)
@@ -150,7 +150,7 @@ def test_a_restored_state_gives_the_same_bits() -> None:
 
 
 def test_kernels_give_the_same_bits() -> None:
-    native = product("native")
+    native = product("model.native")
     for seed in FINGERS[::2]:
         description, recording = case(seed)
         found = []
@@ -169,7 +169,7 @@ def test_kernels_give_the_same_bits() -> None:
 
 
 def test_a_refused_sample_changes_nothing_that_effects_remember() -> None:
-    native = product("native")
+    native = product("model.native")
     for seed in FINGERS:
         description, recording = case(seed)
         source = source_of(seed)
@@ -198,7 +198,7 @@ def test_derivatives_are_those_of_the_oracle() -> None:
         k = 20 + seed % 7 * 10
         recording = {name: series[: k + 1] for name, series in inputs.items()}
         found, errors = oracle_derivatives.derivatives(description, recording, source, k)
-        finger = product("native").Finger.from_description(description, source)
+        finger = product("model.native").Finger.from_description(description, source)
         finger.run(recording)
         for name in oracle_derivatives.STEPS:
             for column, unit in enumerate(np.eye(inputs[name].shape[1])):

@@ -12,7 +12,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from tendonfmu.estimation import HAS_ESTIMATION
+from tendonfmu.estimate.estimation import HAS_ESTIMATION
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from fit_cases import small_finger
 from fit_finger import made_recording, moved_start
 from tendonfmu.errors import InputError
-from tendonfmu.fit_report import report_text
-from tendonfmu.fitting import FitWarning, FrictionFit
-from tendonfmu.previous_fit import read_previous_fit
-from tendonfmu.recording import Recording
+from tendonfmu.estimate.fitting import FitWarning, FrictionFit
+from tendonfmu.estimate.previous_fit import read_previous_fit
+from tendonfmu.estimate.report import report_text
+from tendonfmu.recordings.recording import Recording
 
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
 
@@ -66,7 +66,7 @@ def scores(found: FrictionFit) -> Numbers:
 
 
 def fitted_truth() -> dict[str, float]:
-    from tendonfmu.fit_structure import estimable_numbers
+    from tendonfmu.estimate.structure import estimable_numbers
 
     return {number.path: number.value for number in estimable_numbers(TRUTH)}
 

@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
 from tendonfmu.errors import InputError
-from tendonfmu.recording import read_recording
-from tendonfmu.tables import write_table
+from tendonfmu.files.tables import write_table
+from tendonfmu.recordings.recording import read_recording
 
 HEADER = "time,tendon_force[1],tendon_force[2],tendon_position[1],tendon_position[2]"
 ROWS = ["0.0,1.5,2.5,0.001,0.002", "0.01,1.25,2.25,0.0015,0.0025", "0.02,1.125,2.125,0.00175,0.00275"]

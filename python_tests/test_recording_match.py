@@ -14,12 +14,12 @@ import pytest
 from numpy.typing import NDArray
 
 from command import Call
-from tendonfmu.description import FingerDescription, read_finger
 from tendonfmu.errors import InputError
-from tendonfmu.fit_recordings import Held, prepare
-from tendonfmu.recording import Recording, read_recording
-from tendonfmu.recording_match import admit, belongs, refuse_errors
-from tendonfmu.tables import write_table
+from tendonfmu.files.tables import write_table
+from tendonfmu.model.description import FingerDescription, read_finger
+from tendonfmu.recordings.match import admit, belongs, refuse_errors
+from tendonfmu.recordings.prepared import Held, prepare
+from tendonfmu.recordings.recording import Recording, read_recording
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 INDEX = EXAMPLES / "fingers" / "index_finger.json"

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tendonfmu.estimation import ESTIMATION_MISSING, HAS_ESTIMATION
+from tendonfmu.estimate.estimation import ESTIMATION_MISSING, HAS_ESTIMATION
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "bench"))
@@ -44,7 +44,7 @@ def test_the_recording_is_the_models_own(case: Any) -> None:
     """At the truth nothing is left but the noise: ½ Σ e²/S has the mean and the spread of so many unit normals."""
     from recovery_case import image
 
-    from tendonfmu.estimation import Estimator
+    from tendonfmu.estimate.estimation import Estimator
 
     known = Estimator(image(case.truth))
     known.add_recording(case.recording, external_torque=case.recording["external_torque"])
@@ -59,7 +59,7 @@ def test_the_recording_is_the_models_own(case: Any) -> None:
 def test_the_fit_starts_off_the_truth(case: Any) -> None:
     from recovery_case import START_SPREAD, image
 
-    from tendonfmu.estimation import Estimator
+    from tendonfmu.estimate.estimation import Estimator
 
     true, start = (Estimator(image(case.truth)).start, Estimator(image(case.start)).start)
     off = np.log(start / true)

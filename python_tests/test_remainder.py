@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from synthetic_series import low_passed, make_series, nuisance_of, residual_of, with_effect
-from tendonfmu.diagnosis_series import Series
-from tendonfmu.nuisance import bias_splines
-from tendonfmu.remainder import measure_remainder
-from tendonfmu.residual_views import residual_views, whiteness
+from tendonfmu.diagnose.remainder import measure_remainder
+from tendonfmu.diagnose.residual_views import residual_views, whiteness
+from tendonfmu.diagnose.series import Series
+from tendonfmu.statistics.splines import bias_splines
 
 Numbers = NDArray[np.float64]
 

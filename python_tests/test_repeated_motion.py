@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from synthetic_series import ARMS, STEP, make_series
-from tendonfmu.diagnosis_series import Series
-from tendonfmu.repeated_motion import Repeat, find_repeats, less_reference, outside
+from tendonfmu.diagnose.changes.repeated_motion import Repeat, find_repeats, less_reference, outside
+from tendonfmu.diagnose.series import Series
 
 SECONDS = 12.0
 

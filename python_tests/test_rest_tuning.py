@@ -1,4 +1,4 @@
-"""What `tune` learns of rests (tendonfmu.rest_tuning), on made recordings of one joint between two tendons.
+"""What `tune` learns of rests (tendonfmu.detect.contact_at_rest), on made recordings of one joint between two tendons.
 
 The finger moves for 1 s and rests for 4 s, in turn. At rest its torque creeps towards another one, and positions and
 forces are noisy. Nothing of the product makes these recordings.
@@ -65,7 +65,7 @@ def dry(angle: Array) -> Array:
 
 
 def learned(*recordings: dict[str, Array]) -> tuple[Any, list[str]]:
-    free_motion, tuning = product("free_motion"), product("rest_tuning")
+    free_motion, tuning = product("detect.free_motion"), product("detect.contact_at_rest")
     parts = [
         free_motion.FreePart("made", arrays, np.full(len(arrays["time"]), 10.0), arrays["time"] >= 2.0,
                              np.full(len(arrays["time"]), 1.0 / RATE))
@@ -77,7 +77,7 @@ def learned(*recordings: dict[str, Array]) -> tuple[Any, list[str]]:
 
 def at_rest(rule: Any, arrays: dict[str, Array]) -> NDArray[np.bool_]:
     data = FINGER | {"contact": {"threshold": [1e6], "rest": dict(rule.keys)}}
-    return np.ravel(product("native").Finger.from_description(data).run(arrays)["contact_at_rest"])
+    return np.ravel(product("model.native").Finger.from_description(data).run(arrays)["contact_at_rest"])
 
 
 @pytest.fixture(scope="module")
@@ -132,7 +132,7 @@ def test_a_rate_that_the_rests_do_not_support_is_said() -> None:
 
 
 def test_tune_writes_the_rule_and_keeps_its_rate() -> None:
-    tuning, recording = product("detection_tuning"), product("recording")
+    tuning, recording = product("detect.tuning"), product("recordings.recording")
     sources = []
     for seed in (1, 2):
         groups = made(13.0, seed)

@@ -16,11 +16,11 @@ import pytest
 from plant_rigs import needs_plant
 from random_rigs import random_rig
 from rig_cases import EXAMPLES, FINGER, INDEX_RIGS, RIGS, changed, index_rig, with_everything, written
-from tendonfmu import plant
 from tendonfmu.cli import main
 from tendonfmu.errors import InputError
-from tendonfmu.rig import Rig, is_rig, read_rig
-from tendonfmu.simulation import plant_of
+from tendonfmu.simulate import plant
+from tendonfmu.simulate.rig import Rig, is_rig, read_rig
+from tendonfmu.simulate.simulation import plant_of
 
 # --- reading ----------------------------------------------------------------------------------------------------------
 

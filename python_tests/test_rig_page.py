@@ -13,8 +13,8 @@ import pytest
 
 from plant_rigs import needs_plant
 from rig_cases import written
-from tendonfmu.rig import read_rig
-from tendonfmu.simulation import simulate
+from tendonfmu.simulate.rig import read_rig
+from tendonfmu.simulate.simulation import simulate
 
 PAGE = (Path(__file__).parents[1] / "docs" / "rig.md").read_text(encoding="utf-8")
 SCHEMA = json.loads((files("tendonfmu") / "schema" / "rig.schema.json").read_text(encoding="utf-8"))

@@ -18,10 +18,10 @@ pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not insta
 
 from plant_rigs import needs_plant
 from random_rigs import random_rig
-from tendonfmu.native import Finger
-from tendonfmu.recording import read_recording
-from tendonfmu.rig import read_rig
-from tendonfmu.simulation import simulate
+from tendonfmu.model.native import Finger
+from tendonfmu.recordings.recording import read_recording
+from tendonfmu.simulate.rig import read_rig
+from tendonfmu.simulate.simulation import simulate
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 FINGER = json.loads((EXAMPLES / "fingers" / "index_finger.json").read_text(encoding="utf-8"))

@@ -20,12 +20,12 @@ pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not insta
 
 from command import Answer, Call
 from tendonfmu.cli import main
-from tendonfmu.detection_run import read_subject, residual_of, run_track, scaled_detection
-from tendonfmu.native import Finger
-from tendonfmu.recording import read_recording
-from tendonfmu.score_figures import contact_figure, delay_figure, event_figure, roc_figure
-from tendonfmu.scoring import score_recordings
-from tendonfmu.tables import read_table, write_table
+from tendonfmu.detect.run import read_subject, residual_of, run_track, scaled_detection
+from tendonfmu.detect.scoring import score_recordings
+from tendonfmu.files.tables import read_table, write_table
+from tendonfmu.model.native import Finger
+from tendonfmu.recordings.recording import read_recording
+from tendonfmu.report.score_figures import contact_figure, delay_figure, event_figure, roc_figure
 
 ROOT = Path(__file__).resolve().parents[1]
 INDEX = ROOT / "examples" / "fingers" / "index_finger.json"

@@ -276,14 +276,14 @@ def test_no_key_no_outputs_and_nothing_else_changes() -> None:
     ],
 )
 def test_refusals(fault: Any, message: str) -> None:
-    native = product("native")
+    native = product("model.native")
     data = finger([{"moment_arms": [ARM]}], contact={"threshold": [1.0]}) | {"sensor_fault": fault}
     with pytest.raises(native.NativeError, match=message):
         native.image_from_json(json.dumps(data))
 
 
 def test_positions_are_needed_with_every_source() -> None:
-    native = product("native")
+    native = product("model.native")
     recording = {name: values for name, values in moving(5).items() if name != "tendon_position"}
     with pytest.raises(native.NativeError, match=r"tendon_position is missing: .* sensor_fault"):
         native.Finger.from_description(pair(), 2).run(recording)
@@ -370,7 +370,7 @@ def test_the_fmu_has_the_outputs_only_with_the_key(tmp_path: Path) -> None:
     names = {}
     for name, data in (("watched", pair()), ("plain", {k: v for k, v in pair().items() if k != "sensor_fault"})):
         (tmp_path / f"{name}.json").write_text(json.dumps(data), encoding="utf-8")
-        fmu = product("packaging").build_fmu(tmp_path / f"{name}.json", tmp_path / f"{name}.fmu")
+        fmu = product("fmu.packaging").build_fmu(tmp_path / f"{name}.json", tmp_path / f"{name}.fmu")
         variables = fmpy.read_model_description(str(fmu)).modelVariables
         names[name] = {variable.name: variable for variable in variables}
     added = set(names["watched"]) - set(names["plain"])
@@ -391,7 +391,7 @@ def test_the_fmu_has_every_output_at_once(tmp_path: Path) -> None:
     data["contact"] = data["contact"] | {"rest": rest, "drift": {"threshold": [0.01] * joints}}
     data |= {"links": [{"axis": [0, 0, 1], "offset": [0.05, 0, 0]}] * joints, "tip": [0.05, 0, 0]}
     (tmp_path / "all.json").write_text(json.dumps(data), encoding="utf-8")
-    fmu = product("packaging").build_fmu(tmp_path / "all.json", tmp_path / "all.fmu")
+    fmu = product("fmu.packaging").build_fmu(tmp_path / "all.json", tmp_path / "all.fmu")
     outputs = {each.variable.name: each for each in fmpy.read_model_description(str(fmu)).outputs}
     assert {"contact_change[1]", "contact_at_rest", "contact_link", "sensor_fault[1]"} <= set(outputs)
     for name in ("contact_at_rest", "sensor_fault[1]"):
@@ -400,7 +400,7 @@ def test_the_fmu_has_every_output_at_once(tmp_path: Path) -> None:
 
 
 def test_a_saved_fault_goes_on() -> None:
-    native = product("native")
+    native = product("model.native")
     description, recording = failing_case(504)
     whole = NATIVE(description, recording, 1)
     assert whole["sensor_fault"].any()
@@ -416,7 +416,7 @@ def test_a_saved_fault_goes_on() -> None:
 
 def test_the_derivative_is_that_of_the_rows_in_use() -> None:
     """The failing tendon no longer moves the angle; before, each of the two did by half."""
-    native = product("native")
+    native = product("model.native")
     recording = changed(moving(12), "tendon_force", 0, slice(8, None), 0.0)
     expected = {6: [0.5 / ARM, -0.5 / ARM], 10: [0.0, -1.0 / ARM]}
     for samples, slopes in expected.items():

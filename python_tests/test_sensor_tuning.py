@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tendonfmu import native
-from tendonfmu.description import FingerDescription
-from tendonfmu.fit_files import with_values
-from tendonfmu.fit_structure import Choice, build_structure
-from tendonfmu.free_motion import FreePart
-from tendonfmu.sensor_tuning import AMPLE, HOLD_SAMPLES, finds_a_fault, learn_sensors
+from tendonfmu.detect.free_motion import FreePart
+from tendonfmu.detect.sensor_faults import AMPLE, HOLD_SAMPLES, finds_a_fault, learn_sensors
+from tendonfmu.estimate.files import with_values
+from tendonfmu.estimate.structure import Choice, build_structure
+from tendonfmu.model import native
+from tendonfmu.model.description import FingerDescription
 
 Array = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.native import Finger
-from tendonfmu.recording import Recording
-from tendonfmu.signal_noise import joint_position_noise, joint_torque_noise, white_noise
+from tendonfmu.model.native import Finger
+from tendonfmu.recordings.recording import Recording
+from tendonfmu.recordings.signal_noise import joint_position_noise, joint_torque_noise, white_noise
 
 Array = NDArray[Any]
 

@@ -15,7 +15,7 @@ import pytest
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
 from plant_rigs import needs_plant
-from tendonfmu.tables import read_table
+from tendonfmu.files.tables import read_table
 from test_rig_page import properties
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -19,12 +19,12 @@ from command import Call
 from plant_rigs import needs_plant
 from random_rigs import random_rig
 from rig_cases import RIGS, changed, index_rig, with_everything, written
-from tendonfmu import plant as binding
-from tendonfmu.plant import Plant, PlantError, SolverError
-from tendonfmu.recording import read_recording
-from tendonfmu.rig import read_rig
-from tendonfmu.simulation import CHUNK, ENERGIES, Simulation, simulate
-from tendonfmu.tables import write_table
+from tendonfmu.files.tables import write_table
+from tendonfmu.recordings.recording import read_recording
+from tendonfmu.simulate import plant as binding
+from tendonfmu.simulate.plant import Plant, PlantError, SolverError
+from tendonfmu.simulate.rig import read_rig
+from tendonfmu.simulate.simulation import CHUNK, ENERGIES, Simulation, simulate
 
 pytestmark = needs_plant
 

@@ -38,7 +38,7 @@ OUTPUTS = [
 
 @pytest.fixture(scope="module")
 def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from tendonfmu.ssp import build_ssp
+    from tendonfmu.simulate.ssp import build_ssp
 
     folder = tmp_path_factory.mktemp("ssp")
     (folder / "rig.json").write_text(json.dumps(fmu_rig()))
@@ -174,7 +174,7 @@ def test_the_finger_feels_the_push(by_hand: Table) -> None:
 
 
 def test_what_is_in_the_package(package: Path, tmp_path: Path) -> None:
-    from tendonfmu.ssp import build_ssp
+    from tendonfmu.simulate.ssp import build_ssp
 
     with zipfile.ZipFile(package) as archive:
         assert archive.namelist() == [
@@ -195,7 +195,7 @@ def test_what_is_in_the_package(package: Path, tmp_path: Path) -> None:
 
 def test_the_package_never_takes_the_place_of_its_rig(tmp_path: Path) -> None:
     from tendonfmu.errors import InputError
-    from tendonfmu.ssp import build_ssp
+    from tendonfmu.simulate.ssp import build_ssp
 
     base, rig = tmp_path / "base.json", tmp_path / "rig.json"
     base.write_text(json.dumps(fmu_rig()))
@@ -255,7 +255,7 @@ def test_the_snippets_of_the_page(module: str, package: Path, tmp_path: Path, mo
 
 @pytest.fixture(scope="module")
 def index_finger(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from tendonfmu.ssp import build_ssp
+    from tendonfmu.simulate.ssp import build_ssp
 
     rig = EXAMPLE.parent / "rigs" / "index_finger_pushes.json"
     return build_ssp(rig, tmp_path_factory.mktemp("index") / "finger.ssp")

@@ -11,8 +11,8 @@ import pytest
 
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
-from tendonfmu.fit_sheet import Band, Bars, Curve, Dots, Panel
-from tendonfmu.svg_panel import panel_svg
+from tendonfmu.drawing.sheet import Band, Bars, Curve, Dots, Panel
+from tendonfmu.drawing.svg import panel_svg
 
 X = np.linspace(0.0, 10.0, 5)
 PANEL = Panel(title="title", alt="what it shows", x_label="time (s)", y_label="torque (mN·m)", x_limits=(0.0, 10.0))

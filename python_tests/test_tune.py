@@ -22,7 +22,8 @@ pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not insta
 from scipy.special import chdtri, pdtr
 
 from command import Call
-from tendonfmu.alarm_level import (
+from tendonfmu.cli import main
+from tendonfmu.detect.alarm_level import (
     allowed_alarms,
     cells_of,
     count_alarms,
@@ -30,16 +31,15 @@ from tendonfmu.alarm_level import (
     level_for,
     rate_limit,
 )
-from tendonfmu.cli import main
-from tendonfmu.detection_bounds import SHARES, Bound, search_for
-from tendonfmu.detection_tuning import RELEASE, RELEASE_TIME, ContactTuning, TuneWarning
+from tendonfmu.detect.bounds import SHARES, Bound, search_for
+from tendonfmu.detect.free_motion import FreePart, FreeRun
+from tendonfmu.detect.level import Line, evidence_line, given_line, level_of, searched_line
+from tendonfmu.detect.noise import bias_noise, deviation, drift_variance, time_constant
+from tendonfmu.detect.tuning import RELEASE, RELEASE_TIME, ContactTuning, TuneWarning
 from tendonfmu.errors import InputError
-from tendonfmu.fit_residuals import BiasSettings, track
-from tendonfmu.free_motion import FreePart, FreeRun
-from tendonfmu.native import Finger
-from tendonfmu.tables import read_table, write_table
-from tendonfmu.tuning_level import Line, evidence_line, given_line, level_of, searched_line
-from tendonfmu.tuning_noise import bias_noise, deviation, drift_variance, time_constant
+from tendonfmu.files.tables import read_table, write_table
+from tendonfmu.model.native import Finger
+from tendonfmu.recordings.residuals import BiasSettings, track
 
 ROOT = Path(__file__).resolve().parents[1]
 INDEX = ROOT / "examples" / "fingers" / "index_finger.json"

@@ -17,11 +17,11 @@ import pytest
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
 from random_free_motion import random_free_case
-from tendonfmu.detection_tuning import METHODS, ContactTuning, TuneWarning
+from tendonfmu.detect.free_motion import closed_loop, free_parts
+from tendonfmu.detect.tune_report import build_report
+from tendonfmu.detect.tuning import METHODS, ContactTuning, TuneWarning
 from tendonfmu.errors import InputError
-from tendonfmu.free_motion import closed_loop, free_parts
-from tendonfmu.native import Finger
-from tendonfmu.tune_report import build_report
+from tendonfmu.model.native import Finger
 
 # 13, 23, 36 and 59: negative thresholds, or of 4e10, before bounds had a least; 1 is refused
 FEW, MANY = (0, 1, 3, 5, 13, 23, 36, 59), range(200)

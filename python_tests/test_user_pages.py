@@ -17,9 +17,9 @@ import pytest
 
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
-from tendonfmu.description import read_finger
-from tendonfmu.recording import GROUPS, read_recording
-from tendonfmu.tables import read_table
+from tendonfmu.files.tables import read_table
+from tendonfmu.model.description import read_finger
+from tendonfmu.recordings.recording import GROUPS, read_recording
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 FINGER_PAGE = (DOCS / "finger_description.md").read_text(encoding="utf-8")

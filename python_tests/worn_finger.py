@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu import native
-from tendonfmu.description import FingerDescription
-from tendonfmu.recording import Recording
-from tendonfmu.tables import write_table
+from tendonfmu.files.tables import write_table
+from tendonfmu.model import native
+from tendonfmu.model.description import FingerDescription
+from tendonfmu.recordings.recording import Recording
 
 Array = NDArray[np.float64]
 Columns = Mapping[str, Array]

@@ -15,15 +15,15 @@ from pathlib import Path
 import numpy as np
 from jaw_recordings import FAST, FAULT, data_folder, rms, torque_error
 
-from tendonfmu.console import PhaseDisplay, print_tables
-from tendonfmu.converters import convert_file
-from tendonfmu.diagnosis import diagnose
-from tendonfmu.diagnosis_files import write_diagnosis
-from tendonfmu.diagnosis_result import Diagnosis
-from tendonfmu.diagnosis_text import lines, tables
-from tendonfmu.native import run_recording
-from tendonfmu.recording import read_recording
-from tendonfmu.tables import write_table
+from tendonfmu.cli.console import PhaseDisplay, print_tables
+from tendonfmu.diagnose.diagnosis import diagnose
+from tendonfmu.diagnose.result import Diagnosis
+from tendonfmu.files.tables import write_table
+from tendonfmu.model.native import run_recording
+from tendonfmu.recordings.converters import convert_file
+from tendonfmu.recordings.recording import read_recording
+from tendonfmu.report.diagnosis_files import write_diagnosis
+from tendonfmu.report.diagnosis_text import lines, tables
 
 NOMINAL = Path(__file__).with_name("jaw_nominal.json")
 EVEN, ODD = ("00", "02", "04", "06", "08"), ("01", "03", "05", "07", "09")

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from jaw_recordings import FAST, SLOW, data_folder, read_run, rms, torque_error
 
-from tendonfmu.fitting import FrictionFit
-from tendonfmu.native import run_recording
-from tendonfmu.recording import Recording
+from tendonfmu.estimate.fitting import FrictionFit
+from tendonfmu.model.native import run_recording
+from tendonfmu.recordings.recording import Recording
 
 START = Path(__file__).with_name("jaw_start.json")
 DIGITS = 4  # written to jaw.json

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.converters import convert_file
 from tendonfmu.errors import InputError
-from tendonfmu.recording import Recording
+from tendonfmu.recordings.converters import convert_file
+from tendonfmu.recordings.recording import Recording
 
 Array = NDArray[Any]
 

@@ -62,8 +62,8 @@ def calibrate(folder: Path, jobs: int) -> Path:
 
 def rows(finger: Path) -> Iterator[tuple[str, list[str]]]:
     """(what, before → after of each joint in mN·m) of free motion, and of the time in contact."""
-    from tendonfmu.native import Finger
-    from tendonfmu.recording import read_recording
+    from tendonfmu.model.native import Finger
+    from tendonfmu.recordings.recording import read_recording
 
     description = json.loads(finger.read_text(encoding="utf-8"))
     for name, what in RECORDINGS.items():

@@ -15,13 +15,13 @@ from pathlib import Path
 
 from emps_recordings import KINEMATICS, MASS, PULSES, TRAINING, data_folder, read_emps, relative_as_published
 
-from tendonfmu.console import PhaseDisplay, print_tables
-from tendonfmu.converters import convert_file
-from tendonfmu.diagnosis import diagnose
-from tendonfmu.diagnosis_files import write_diagnosis
-from tendonfmu.diagnosis_result import Diagnosis
-from tendonfmu.diagnosis_text import lines, tables
-from tendonfmu.tables import write_table
+from tendonfmu.cli.console import PhaseDisplay, print_tables
+from tendonfmu.diagnose.diagnosis import diagnose
+from tendonfmu.diagnose.result import Diagnosis
+from tendonfmu.files.tables import write_table
+from tendonfmu.recordings.converters import convert_file
+from tendonfmu.report.diagnosis_files import write_diagnosis
+from tendonfmu.report.diagnosis_text import lines, tables
 
 NOMINAL = Path(__file__).with_name("emps.json")
 PUBLISHED = {TRAINING: 4.08, PULSES: 5.98}  # %, symmetric friction: Janot, Gautier, Brunot 2019

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
-from tendonfmu.converters import convert_file
-from tendonfmu.converters.emps import DECIMATION, MASS
 from tendonfmu.errors import InputError
-from tendonfmu.native import run_recording
-from tendonfmu.recording import Recording
+from tendonfmu.model.native import run_recording
+from tendonfmu.recordings.converters import convert_file
+from tendonfmu.recordings.converters.emps import DECIMATION, MASS
+from tendonfmu.recordings.recording import Recording
 
 Array = NDArray[np.float64]
 

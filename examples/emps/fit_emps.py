@@ -30,8 +30,8 @@ from emps_recordings import (
 )
 from scipy import io, optimize
 
-from tendonfmu.converters.emps import DECIMATION, MASS
-from tendonfmu.fitting import FitWarning, FrictionFit
+from tendonfmu.estimate.fitting import FitWarning, FrictionFit
+from tendonfmu.recordings.converters.emps import DECIMATION, MASS
 
 HERE = Path(__file__).parent
 MASSES = (50.0, 150.0)  # kg; searched between

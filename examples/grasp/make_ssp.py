@@ -8,19 +8,19 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from tendonfmu.description import read_finger
 from tendonfmu.errors import InputError
-from tendonfmu.packaging import members, pack
-from tendonfmu.rig import read_rig
-from tendonfmu.ssp import FRICTION_FMU, ssp_members
-from tendonfmu.whole_file import check_output, whole_file
+from tendonfmu.files.whole_file import check_output, whole_file
+from tendonfmu.fmu.packaging import members, pack
+from tendonfmu.model.description import read_finger
+from tendonfmu.simulate.rig import read_rig
+from tendonfmu.simulate.ssp import FRICTION_FMU, ssp_members
 
 RIG = Path(__file__).resolve().parent / "rig.json"
 FINGER = RIG.parent.parent / "fingers" / "index_finger.json"
 
 
 def build(finger: Path, output: Path) -> Path:
-    """As `tendonfmu.ssp.build_ssp`, with the friction FMU of `finger` in place of the rig's own. Raises InputError."""
+    """As `tendonfmu.simulate.ssp.build_ssp`, with the friction FMU of `finger` for the rig's own. Raises InputError."""
     rig = read_rig(RIG)
     check_output(output, finger, *rig.files)
     content = ssp_members(rig) | {f"resources/{FRICTION_FMU}": pack(members(read_finger(finger)))}

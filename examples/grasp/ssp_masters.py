@@ -18,7 +18,7 @@ import numpy as np
 from controller import STEP, Array, Loop, Task
 from grasp import RECORDED, TRUTH, measures, record, show
 
-from tendonfmu.ssp import FRICTION_FMU
+from tendonfmu.simulate.ssp import FRICTION_FMU
 
 
 class Master(Protocol):

@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from tendonfmu.detection_score import DetectionScore, score_detection
-from tendonfmu.native import Finger
-from tendonfmu.rig import read_rig
-from tendonfmu.simulation import Table, simulate
+from tendonfmu.detect.counting import DetectionScore, score_detection
+from tendonfmu.model.native import Finger
+from tendonfmu.simulate.rig import read_rig
+from tendonfmu.simulate.simulation import Table, simulate
 
 HERE = Path(__file__).resolve().parent
 FINGER = HERE.parent / "fingers" / "index_finger.json"

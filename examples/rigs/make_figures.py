@@ -8,10 +8,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from tendonfmu.plant_figures import loop_figure, presliding_figure, truth_figure
-from tendonfmu.plots import draw_loops, draw_presliding, draw_rig, draw_truth
-from tendonfmu.rig import read_rig
-from tendonfmu.rig_drawing import rig_drawing
+from tendonfmu.report.plant_figures import loop_figure, presliding_figure, truth_figure
+from tendonfmu.report.plots import draw_loops, draw_presliding, draw_rig, draw_truth
+from tendonfmu.report.rig_drawing import rig_drawing
+from tendonfmu.simulate.rig import read_rig
 
 HERE = Path(__file__).parent
 JOINT, TENDON = 1, 4  # mcp_flexion; the flexor of the middle joint, which passes it (from 0)

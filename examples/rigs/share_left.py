@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.native import Finger
-from tendonfmu.recording import read_recording
+from tendonfmu.model.native import Finger
+from tendonfmu.recordings.recording import read_recording
 
 HERE = Path(__file__).parent
 RECORDINGS = ("index_finger_free.parquet", "index_finger_free_x4.parquet")

@@ -20,7 +20,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from tendonfmu.fitting import FrictionFit
+from tendonfmu.estimate.fitting import FrictionFit
 
 ROOT = Path(__file__).resolve().parents[2]
 RIG = ROOT / "examples" / "rigs" / "index_finger.json"

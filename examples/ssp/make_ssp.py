@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 from tendonfmu.errors import InputError
-from tendonfmu.ssp import build_ssp
+from tendonfmu.simulate.ssp import build_ssp
 
 RIG = Path(__file__).resolve().parent.parent / "rigs" / "index_finger_pushes.json"
 

@@ -17,13 +17,13 @@ import fingers_in_numpy
 import numpy as np
 from foreign_case import Array, Case
 
-from tendonfmu.cause_search import look
-from tendonfmu.description import read_finger
-from tendonfmu.extension_fit import FitSettings
-from tendonfmu.fit_recordings import Held, prepare
-from tendonfmu.nuisance import residual_of
-from tendonfmu.recording import read_recording
-from tendonfmu.signal_choice import Estimation, choose
+from tendonfmu.diagnose.cause_search import look
+from tendonfmu.diagnose.extension_fit import FitSettings
+from tendonfmu.diagnose.signal_choice import Estimation, choose
+from tendonfmu.model.description import read_finger
+from tendonfmu.recordings.prepared import Held, prepare
+from tendonfmu.recordings.recording import read_recording
+from tendonfmu.statistics.splines import residual_of
 
 
 def survives(case: Case) -> float:

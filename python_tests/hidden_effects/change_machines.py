@@ -22,10 +22,10 @@ from change_case import Columns
 from measured import FORCE, LOAD, Description, Machine
 from scipy import io, signal
 
-from tendonfmu.converters import convert_file
-from tendonfmu.converters.emps import CUTOFF
-from tendonfmu.fitting import FitWarning, FrictionFit
-from tendonfmu.tables import write_table
+from tendonfmu.estimate.fitting import FitWarning, FrictionFit
+from tendonfmu.files.tables import write_table
+from tendonfmu.recordings.converters import convert_file
+from tendonfmu.recordings.converters.emps import CUTOFF
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]

@@ -31,8 +31,8 @@ from change_case import NOTHING, Case, Columns, Truth
 from change_fingers import NO_CHANGE, Change, How, Recorded
 from change_visibility import visible
 
-from tendonfmu.fitting import FitWarning, FrictionFit
-from tendonfmu.tables import write_table
+from tendonfmu.estimate.fitting import FitWarning, FrictionFit
+from tendonfmu.files.tables import write_table
 
 BED, MODEL = "simulated", "fitted"
 SECONDS, SHORT = 30.0, 12.0

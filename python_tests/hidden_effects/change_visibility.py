@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 from change_case import Array, Columns
 
-from tendonfmu.cause_search import look
-from tendonfmu.description import read_finger
-from tendonfmu.extension_fit import FitSettings
-from tendonfmu.fit_recordings import Held, prepare
-from tendonfmu.nuisance import residual_of
-from tendonfmu.recording import read_recording
-from tendonfmu.signal_choice import choose
-from tendonfmu.tables import write_table
+from tendonfmu.diagnose.cause_search import look
+from tendonfmu.diagnose.extension_fit import FitSettings
+from tendonfmu.diagnose.signal_choice import choose
+from tendonfmu.files.tables import write_table
+from tendonfmu.model.description import read_finger
+from tendonfmu.recordings.prepared import Held, prepare
+from tendonfmu.recordings.recording import read_recording
+from tendonfmu.statistics.splines import residual_of
 
 
 @dataclass(frozen=True)

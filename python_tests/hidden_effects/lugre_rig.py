@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from matched_rig import off_start
 
-from tendonfmu.rig import read_rig
-from tendonfmu.simulation import simulate
-from tendonfmu.tables import write_table
+from tendonfmu.files.tables import write_table
+from tendonfmu.simulate.rig import read_rig
+from tendonfmu.simulate.simulation import simulate
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # also where a campaign's worker is the caller
 from random_rigs import random_rig

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.native import run_recording
+from tendonfmu.model.native import run_recording
 
 Array = NDArray[np.float64]
 Columns = dict[str, Array]

@@ -30,10 +30,10 @@ sys.path.insert(0, str(HERE))
 
 from measured import EFFECTS, Columns, Hidden, Machine, hide  # noqa: E402
 
-from tendonfmu.converters import convert_file  # noqa: E402
-from tendonfmu.diagnosis import diagnose  # noqa: E402
-from tendonfmu.diagnosis_result import Cause, Diagnosis  # noqa: E402
-from tendonfmu.tables import write_table  # noqa: E402
+from tendonfmu.diagnose.diagnosis import diagnose  # noqa: E402
+from tendonfmu.diagnose.result import Cause, Diagnosis  # noqa: E402
+from tendonfmu.files.tables import write_table  # noqa: E402
+from tendonfmu.recordings.converters import convert_file  # noqa: E402
 
 DATA = Path(os.environ.get("TENDONFMU_DATA") or ROOT.parent / "shared" / "data")
 MACHINES = ("emps", "davinci")

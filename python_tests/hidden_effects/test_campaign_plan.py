@@ -15,7 +15,7 @@ from effects_hidden import placed, scaled
 from joint_strength import shown_strength
 from matched_rig import random_hand
 
-from tendonfmu.campaign_cases import Case, made, read_cases
+from tendonfmu.diagnose.campaign.cases import Case, made, read_cases
 
 ALL = argparse.Namespace(
     null=460, per_effect=4, strengths=list(STRENGTHS), double=60, absorbed=80, unknown=48, contact=16, foreign=1,

@@ -14,8 +14,8 @@ import cases
 import numpy as np
 import pytest
 
-from tendonfmu.diagnosis import diagnose
-from tendonfmu.diagnosis_result import Cause, Diagnosis
+from tendonfmu.diagnose.diagnosis import diagnose
+from tendonfmu.diagnose.result import Cause, Diagnosis
 
 SHORT = {"joints": 1, "seconds": 40.0, "rate": 250.0}
 

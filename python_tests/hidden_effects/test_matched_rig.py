@@ -15,7 +15,7 @@ from matched_rig import Hand, Made, Noise, coloured, random_hand, record
 from numpy.typing import NDArray
 from strength import group, kinematics, residual, strength_of
 
-from tendonfmu import native
+from tendonfmu.model import native
 
 Array = NDArray[Any]
 

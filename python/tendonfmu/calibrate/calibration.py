@@ -1,0 +1,407 @@
+"""From recordings of free motion to a tuned finger: structure, numbers, thresholds, and what they are worth.
+
+from tendonfmu.calibrate.calibration import calibrate
+
+found = calibrate("finger.json", ["free_10N.parquet", "free_30N.parquet"], "calibrated", pushes=["pushes.parquet"])
+found.report["error"], found.report["detection"], found.data
+
+Its steps are those of `diagnose`, of a fit to all recordings, of `tune` and of `score`, in this order; their results
+stay in the folder, so that a call that is repeated goes on where the one before ended.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.calibrate.fit import CalibratedFit, earlier_finger, fit_again, fit_all
+from tendonfmu.calibrate.parts import stretches_for_diagnosis
+from tendonfmu.calibrate.report import errors_of, record_next, recording_of, rms_of, structure_of, tuning_of
+from tendonfmu.detect.free_motion import require_no_contact
+from tendonfmu.detect.push_sizes import by_size
+from tendonfmu.detect.score_report import build_report as score_report
+from tendonfmu.detect.scoring import score_recordings
+from tendonfmu.detect.tuning import ContactTuning, TuneWarning
+from tendonfmu.diagnose.diagnosis import diagnose
+from tendonfmu.diagnose.extension_fit import FitSettings
+from tendonfmu.diagnose.result import Diagnosis
+from tendonfmu.errors import InputError
+from tendonfmu.estimate.files import check_given_once, check_unseen, description_text
+from tendonfmu.estimate.structure import described
+from tendonfmu.files.finite_numbers import finite
+from tendonfmu.files.whole_file import write_text
+from tendonfmu.model.description import FingerDescription, read_finger
+from tendonfmu.recordings.match import admit
+from tendonfmu.recordings.prepared import FitRecording, Held, prepare, require_noise
+from tendonfmu.recordings.recording import read_recording
+from tendonfmu.recordings.smoothing import Signals
+from tendonfmu.report.diagnosis_files import write_diagnosis
+from tendonfmu.report.diagnosis_page import PAGE
+from tendonfmu.tasks.phases import Phases, PhaseState
+from tendonfmu.tasks.steps import FOLDER, Steps, digest_of, digest_of_file
+
+Numbers = NDArray[np.float64]
+Data = Mapping[str, Any]
+
+FORMAT = "tendonfmu-calibration-1"
+DIAGNOSIS = "diagnosis"  # folder of the full diagnosis
+HELD = Held(0.2, 10.0)  # of the recordings, for the errors, where there are no tests
+NOTHING_ASKED: dict[str, Any] = {
+    "verdict": "not asked: the structure of the earlier calibration",
+    "causes": [],
+    "recordings": [],
+    "tests": [],
+    "unexplained": "",
+    "next_experiment": "",
+    "warnings": [],
+}
+PHASES = {
+    "reading": 3.0,
+    "what the model lacks": 45.0,
+    "all its numbers": 20.0,
+    "thresholds of contact": 30.0,
+    "pushes": 8.0,
+}
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """data: the calibrated description. report: `calibration.json`, but for the files. diagnosis: None where it was
+    not made in this call, but repeated or not asked for.
+    """
+
+    data: Data
+    report: dict[str, Any]
+    diagnosis: Diagnosis | None
+
+
+@dataclass(frozen=True)
+class Options:
+    """As `calibrate` takes them."""
+
+    kinematics: int = 1
+    false_alarms_per_hour: float = 6.0
+    confidence: float = 0.9
+    seed: int = 0
+    jobs: int = 1
+
+    @property
+    def of_alarms(self) -> dict[str, float]:
+        """What shapes the thresholds alone."""
+        return {"false_alarms_per_hour": self.false_alarms_per_hour, "confidence": self.confidence}
+
+    @property
+    def of_all(self) -> dict[str, int]:
+        """What shapes all results."""
+        return {"kinematics": self.kinematics, "seed": self.seed}
+
+
+def calibrate(
+    finger: Path | str,
+    free: Sequence[Path | str],
+    folder: Path | str,
+    *,
+    tests: Sequence[Path | str] = (),
+    pushes: Sequence[Path | str] = (),
+    previous: Path | str | None = None,
+    options: Options = Options(),
+    progress: Callable[[PhaseState], None] | None = None,
+) -> Calibration:
+    """finger: description, its structure as given. free: recordings of free motion. folder: for the results of the
+    steps and the page of the diagnosis. tests: free motion that errors are measured on; without them that is every
+    fifth stretch of 10 s of `free`, which no number is fitted to. pushes: recordings with labelled contact, to count
+    what is found. previous: description or fit report of an earlier calibration, for little data: its structure stays,
+    its numbers are the prior. progress: called with what is being done. Raises InputError.
+    """
+    begun = perf_counter()
+    phases = Phases(PHASES, progress or (lambda state: None))
+    given = [[Path(each) for each in group] for group in (free, tests, pushes)]
+    with phases.start("reading"):
+        start = _start(Path(finger), None if previous is None else Path(previous))
+        case = _read(start, given[0], given[1], given[2], options)
+    run = _Run(case, Path(folder), options, phases)
+    report, data = run.report()
+    return Calibration(
+        data,
+        {key: finite(value) for key, value in {**report, "seconds": perf_counter() - begun}.items()},
+        run.diagnosed,
+    )
+
+
+# --- what is given ----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Start:
+    """finger: what to begin with. previous: file of an earlier calibration, or None."""
+
+    finger: FingerDescription
+    previous: Path | None
+
+
+def _start(finger: Path, previous: Path | None) -> _Start:
+    given = read_finger(finger)
+    if previous is None:
+        return _Start(given, None)
+    earlier = earlier_finger(given, previous)
+    for what, names, other in (
+        ("joints", given.joint_names, earlier.joint_names),
+        ("tendons", given.tendon_names, earlier.tendon_names),
+    ):
+        if names != other:
+            raise InputError(f"{previous}: {what} {', '.join(other)}; expected {', '.join(names)} as of {finger}")
+    return _Start(earlier, previous)
+
+
+@dataclass(frozen=True)
+class _Case:
+    """free: prepared, with held-out stretches where there are no tests. sentences: about the recordings."""
+
+    start: _Start
+    free: list[FitRecording]
+    tests: list[FitRecording]
+    pushes: list[Path]
+    sentences: list[str]
+
+    @property
+    def finger(self) -> FingerDescription:
+        return self.start.finger
+
+    @property
+    def judged(self) -> list[FitRecording]:
+        return self.tests or self.free
+
+    @property
+    def made_from(self) -> dict[str, Any]:
+        from tendonfmu import __version__
+
+        files = [each.path for each in (*self.free, *self.tests)]
+        return {
+            "version": __version__,
+            "finger": digest_of({"data": self.finger.data}),
+            "previous": None if self.start.previous is None else digest_of_file(self.start.previous),
+            "recordings": [(file.name, digest_of_file(file)) for file in files],
+            "tests": len(self.tests),
+        }
+
+
+def _read(
+    start: _Start, free: Sequence[Path], tests: Sequence[Path], pushes: Sequence[Path], options: Options
+) -> _Case:
+    if not free:
+        raise InputError("no recording; expected at least one of free motion")
+    check_given_once(free, tests, "a test")
+    check_given_once(free, pushes, "one with pushes")
+    given = start.finger
+    read, others, touched = ([read_recording(each) for each in group] for group in (free, tests, pushes))
+    for each in (*read, *others):
+        require_no_contact(each)
+    sentences = admit(given, [*read, *others, *touched])
+    own = [prepare(given, each, options.kinematics, Held() if tests else HELD) for each in read]
+    unseen = [prepare(given, each, options.kinematics, Held()) for each in others]
+    require_noise(given, own)
+    check_unseen([each.recording for each in own], [each.recording for each in unseen])
+    return _Case(start, own, unseen, list(pushes), sentences)
+
+
+# --- the steps --------------------------------------------------------------------------------------------------------
+
+
+class _Run:
+    """One calibration: each step from the results of those before it."""
+
+    def __init__(self, case: _Case, folder: Path, options: Options, phases: Phases) -> None:
+        self._case, self._folder, self._options, self._phases = case, folder, options, phases
+        self._steps = Steps(folder, {**case.made_from, **options.of_all})
+        self._seconds: dict[str, float] = {}
+        self.diagnosed: Diagnosis | None = None
+
+    def report(self) -> tuple[dict[str, Any], Data]:
+        """And the calibrated description."""
+        case, steps = self._case, self._steps
+        if case.start.previous is None:
+            page = self._folder / DIAGNOSIS / PAGE
+            lacks = self._step("what the model lacks", "diagnosis", {}, self._diagnosis, page)
+            fitted = self._step("all its numbers", "fit", {}, lambda step: self._fit(lacks))
+        else:
+            lacks = NOTHING_ASKED
+            fitted = self._step("all its numbers", "refit", {}, lambda step: self._refit())
+        tuned = self._step(
+            "thresholds of contact", "tune", self._options.of_alarms, lambda step: self._tune(fitted, step)
+        )
+        pushed = None
+        if case.pushes:
+            files = {"pushes": [(file.name, digest_of_file(file)) for file in case.pushes]}
+            pushed = self._step(
+                "pushes", "score", files, lambda step: self._score(tuned, fitted["error"]["calibrated"], step)
+            )
+        report = {
+            "format": FORMAT,
+            "finger": case.finger.name,
+            "joints": case.finger.joint_names,
+            "recordings": [recording_of(each) for each in case.free],
+            "tests": [recording_of(each) for each in case.tests],
+            "error": fitted["error"],
+            "structure": {key: value for key, value in lacks.items() if key not in ("extended", "nominal", "warnings")},
+            "detection": {key: value for key, value in tuned.items() if key not in ("finger", "warnings")},
+            "pushes": pushed,
+            "next": list(record_next(lacks, tuned)),
+            "warnings": [
+                *case.sentences,
+                *(f"{each.path.name}: {text}" for each in (*case.free, *case.tests) for text in each.warnings),
+                *lacks["warnings"],
+                *fitted["warnings"],
+                *tuned["warnings"],
+                *([] if pushed is None else pushed["warnings"]),
+            ],
+            "options": {**self._options.of_all, **self._options.of_alarms},
+            "steps": {"seconds": self._seconds, "repeated": steps.repeated},
+        }
+        return report, tuned["finger"]
+
+    def _step(
+        self,
+        words: str,
+        name: str,
+        made_from: Mapping[str, Any],
+        compute: Callable[[Callable[[float], None]], dict[str, Any]],
+        page: Path | None = None,
+    ) -> dict[str, Any]:
+        begun = perf_counter()
+        with self._phases.start(words, 100) as step:
+            found = self._steps.result(name, made_from, lambda: compute(lambda share: step(int(100 * share))), page)
+        self._seconds[name] = perf_counter() - begun
+        return found
+
+    def _diagnosis(self, step: Callable[[float], None]) -> dict[str, Any]:
+        case, options = self._case, self._options
+        seen, judged = stretches_for_diagnosis(
+            [each.recording for each in case.free], [each.recording for each in case.tests]
+        )
+
+        def show(state: PhaseState) -> None:
+            part = state.done / state.total if state.total else 0.0
+            step((state.number - 1 + part) / state.count)
+
+        found = diagnose(
+            case.finger,
+            seen,
+            judged,
+            kinematics=options.kinematics,
+            seed=options.seed,
+            jobs=options.jobs,
+            checked=True,
+            progress=show,
+        )
+        self.diagnosed = found
+        write_diagnosis(found, self._folder / DIAGNOSIS)
+        return structure_of(found)
+
+    def _fit(self, lacks: dict[str, Any]) -> dict[str, Any]:
+        case = self._case
+        held_out = not case.tests
+        nominal, found = (self._fitted(lacks, name) for name in ("nominal", "extended"))
+        error = {
+            "held_out": held_out,
+            "bias_only": errors_of(None, case.judged, held_out, case.finger.data),
+            "as_given": errors_of(case.finger.data, case.judged, held_out),
+            "fitted": errors_of(nominal.data, case.judged, held_out),
+            "calibrated": errors_of(found.data, case.judged, held_out),
+        }
+        touched = [
+            f"{event.recording}: {event.start:.2f} to {event.end:.2f} s: {event.description}; left out of the fit"
+            for event in found.events
+        ]
+        return {"finger": found.data, "error": error, "warnings": [*found.warnings, *touched]}
+
+    def _refit(self) -> dict[str, Any]:
+        """The previous numbers are the prior; they stay where the new ones are no better on unseen motion."""
+        case, options = self._case, self._options
+        found = fit_again(
+            case.finger,
+            case.start.previous or Path(),
+            case.free,
+            share=0.0 if case.tests else HELD.share,
+            kinematics=options.kinematics,
+            threads=options.jobs,
+        )
+        held_out = not case.tests
+        before, after = (errors_of(data, case.judged, held_out) for data in (case.finger.data, found.data))
+        error = {
+            "held_out": held_out,
+            "bias_only": errors_of(None, case.judged, held_out, case.finger.data),
+            "previous": before,
+            "calibrated": after,
+        }
+        if sum(each**2 for each in after) <= sum(each**2 for each in before):
+            return {"finger": found.data, "error": error, "warnings": list(found.warnings)}
+        kept = (
+            f"the numbers fitted again leave {1e3 * rms_of(after):.3g} mN·m of motion that they were not fitted to, "
+            f"the earlier ones {1e3 * rms_of(before):.3g}: those are kept"
+        )
+        return {
+            "finger": case.finger.data,
+            "error": {**error, "calibrated": before},
+            "warnings": [*found.warnings, kept],
+        }
+
+    def _fitted(self, lacks: dict[str, Any], name: str) -> CalibratedFit:
+        """The nominal or the extended description, to all recordings."""
+        case, options = self._case, self._options
+        return fit_all(
+            described(case.finger, lacks[name]),
+            case.free,
+            Signals(**lacks["smoothing"]),
+            FitSettings(threads=options.jobs, path=case.finger.path),
+            given=case.finger.data,
+            seed=options.seed,
+            uncertainty=name == "extended",
+        )
+
+    def _tune(self, fitted: dict[str, Any], step: Callable[[float], None]) -> dict[str, Any]:
+        case, options = self._case, self._options
+        tuning = ContactTuning(
+            described(case.finger, fitted["finger"]),
+            false_alarms_per_hour=options.false_alarms_per_hour,
+            confidence=options.confidence,
+            kinematics=options.kinematics,
+            progress=lambda done, total: step(done / max(total, 1)),
+        )
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", TuneWarning)  # they are in the report
+            tuning.tune([each.recording for each in (*case.free, *case.tests)], checked=True)
+        return tuning_of(tuning)
+
+    def _score(self, tuned: dict[str, Any], left: Sequence[float], step: Callable[[float], None]) -> dict[str, Any]:
+        file = self._folder / FOLDER / "tuned.json"
+        write_text(file, description_text(tuned["finger"]))
+        scored = score_recordings(
+            file,
+            self._case.pushes,
+            kinematics=self._options.kinematics,
+            seed=self._options.seed,
+            progress=lambda done, total: step(done / max(total, 1)),
+        )
+        report = score_report(scored)
+        keys = (
+            "events",
+            "found",
+            "false_alarms",
+            "free_minutes",
+            "median_delay_s",
+            "found_share",
+            "free_rms",
+            "overhang",
+        )
+        return {
+            **{key: report[key] for key in keys},
+            "sizes": by_size(scored, left),
+            "warnings": list(scored.warnings),
+        }

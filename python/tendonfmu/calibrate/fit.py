@@ -1,0 +1,106 @@
+"""The numbers of a diagnosed finger, fitted to all of its free motion, and what is not known of them.
+
+A diagnosis finds the structure on a part of the recordings; its numbers are then worth more the more motion they are
+learned from. Where there is little motion, an earlier calibration is the prior.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tendonfmu.diagnose.cause_search import predicted_of, series_of
+from tendonfmu.diagnose.extension_fit import FitSettings, learn_numbers
+from tendonfmu.diagnose.result import Event
+from tendonfmu.diagnose.search import events_of, without_blocks
+from tendonfmu.diagnose.series import make_grid
+from tendonfmu.diagnose.signal_choice import estimation_recordings
+from tendonfmu.estimate.evaluation import evaluate
+from tendonfmu.estimate.files import with_uncertainty, with_values
+from tendonfmu.estimate.fitting import FitWarning, FrictionFit
+from tendonfmu.estimate.information import unknowns
+from tendonfmu.estimate.previous_fit import read_previous_fit, with_previous_values
+from tendonfmu.estimate.report import FORMAT as FIT_REPORT
+from tendonfmu.estimate.uncertainty import parameter_uncertainty
+from tendonfmu.files.json_node import read_json
+from tendonfmu.model.description import FingerDescription, read_finger
+from tendonfmu.recordings.prepared import FitRecording
+from tendonfmu.recordings.smoothing import Signals
+
+Data = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class CalibratedFit:
+    """data: the description as it runs online, with `contact.uncertainty`. events: what no friction explains in the
+    recordings, left out of the fit. warnings: sentences.
+    """
+
+    data: Data
+    events: tuple[Event, ...]
+    warnings: tuple[str, ...]
+
+
+def fit_all(
+    finger: FingerDescription,
+    recordings: Sequence[FitRecording],
+    signals: Signals,
+    settings: FitSettings,
+    *,
+    given: Data,
+    seed: int,
+    uncertainty: bool = True,
+) -> CalibratedFit:
+    """finger: as a diagnosis extended it, with numbers to begin at. recordings: of free motion, as they were measured.
+    given: the description that says how large its numbers may be. uncertainty: whether to say what is not known of
+    them. Raises InputError.
+    """
+    data = signals.description(finger.data)
+    if not unknowns(data):
+        return CalibratedFit(finger.data, (), ())
+    own = estimation_recordings(replace(finger, data=data), recordings, signals)
+    grid = make_grid(own)
+    events, out = events_of(data, own, grid, seed)
+    own = [without_blocks(each, k, grid, out) for k, each in enumerate(own)]
+    clean = predicted_of(data, own, grid, series_of(data, own, grid, out))
+    structure, learned = learn_numbers(data, clean, settings, given=signals.description(given))
+    fitted = with_values(structure, np.asarray(learned.estimator.values(learned.z)))
+    online = replace(fitted, data=signals.restored(fitted.data, finger.data))
+    if uncertainty and np.isfinite(learned.covariance).all():
+        judged = [evaluate(data, fitted.data, each) for each in own]
+        known = parameter_uncertainty(structure, learned, fitted.data, judged)
+        level = (finger.data["contact"] or {}).get("uncertainty_level")
+        online = with_uncertainty(online, known.directions, level)
+    return CalibratedFit(online.data, events, tuple(learned.warnings))
+
+
+def earlier_finger(given: FingerDescription, previous: Path) -> FingerDescription:
+    """The description of an earlier calibration; of a fit's report the given one with its values. Raises InputError."""
+    if read_json(previous, "an earlier calibration").get("format") == FIT_REPORT:
+        return with_previous_values(given, read_previous_fit(previous))
+    return read_finger(previous)
+
+
+def fit_again(
+    finger: FingerDescription,
+    previous: Path,
+    recordings: Sequence[FitRecording],
+    *,
+    share: float,
+    kinematics: int,
+    threads: int,
+) -> CalibratedFit:
+    """An earlier calibration fitted to new motion: its values and what is not known of them are the prior.
+
+    share: of the recordings' time that is held out. Raises InputError.
+    """
+    fitting = FrictionFit(finger, previous=previous, kinematics=kinematics, holdout=share, threads=threads)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FitWarning)  # they are in the report
+        fitting.fit([each.recording for each in recordings], checked=True)
+    return CalibratedFit(fitting.description_.data, (), tuple(fitting.warnings_))

@@ -1,0 +1,119 @@
+"""What a calibration reports of its steps, as JSON has it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tendonfmu.detect.contact_at_rest import LEFT_OUT
+from tendonfmu.detect.tune_report import build_report
+from tendonfmu.detect.tuning import ContactTuning
+from tendonfmu.diagnose.gain import residual_of
+from tendonfmu.diagnose.result import Diagnosis
+from tendonfmu.estimate.evaluation import residuals
+from tendonfmu.recordings.prepared import FitRecording
+from tendonfmu.recordings.residuals import rms
+from tendonfmu.report.diagnosis_page import cards_of
+from tendonfmu.report.diagnosis_text import names_of
+
+Data = Mapping[str, Any]
+
+OF_TUNING = (
+    "method",
+    "false_alarms_per_hour",
+    "tuned_for_per_hour",
+    "more_minutes",
+    "confidence",
+    "minutes",
+    "held_out",
+    "closed_loop",
+    "pretensions",
+    "rest",
+    "sensor_fault",
+)
+
+
+def structure_of(found: Diagnosis) -> dict[str, Any]:
+    """What the description lacked, with both models."""
+    shown = ("title", "place", "size", "gain", "explanation")
+    return {
+        "verdict": found.verdict,
+        "causes": [{key: card[key] for key in shown} for card in cards_of(found, names_of(found))[: len(found.causes)]],
+        "signals": found.signals,
+        "smoothing": {"cutoff": found.smoothing.cutoff, "every": found.smoothing.every},
+        "recordings": [Path(each).name for each in found.recordings],
+        "tests": [Path(each).name for each in found.tests],
+        "unexplained": found.unexplained.description,
+        "next_experiment": found.experiment.sentence if found.experiment.motion else "",
+        "nominal": found.nominal_data,
+        "extended": found.extended_data,
+        "warnings": list(found.warnings),
+    }
+
+
+def errors_of(
+    data: Data | None, recordings: Sequence[FitRecording], held_out: bool, settings: Data | None = None
+) -> list[float]:
+    """[n] N·m: rms of r on the samples that nothing was fitted to. data None: of no friction, with these settings."""
+    found, masks = [], []
+    for each in recordings:
+        left = residuals(settings or {}, each, None).residual if data is None else residual_of(data, each)
+        found.append(left)
+        masks.append((each.held_out if held_out else each.tracked) & np.isfinite(left).all(axis=1))
+    return list(rms(np.concatenate(found), np.concatenate(masks)))
+
+
+def rms_of(values: Sequence[float]) -> float:
+    """Of all joints together."""
+    return math.sqrt(sum(value**2 for value in values) / len(values))
+
+
+def tuning_of(tuning: ContactTuning) -> dict[str, Any]:
+    """What decides on contact, and what it is worth. That there were no rests to learn from is no warning here."""
+    report = build_report(tuning)
+    return {
+        "finger": tuning.description_.data,
+        "warnings": [text for text in report["warnings"] if not text.startswith(LEFT_OUT)],
+        **{key: report[key] for key in OF_TUNING},
+        "smallest_torque": smallest_torque(tuning),
+    }
+
+
+def smallest_torque(tuning: ContactTuning) -> dict[str, list[float]]:
+    """[n] N·m by joint: the sudden change that exceeds the bounds in half of the time, and in nine tenths of it; and
+    the slow one that exceeds those of contact.drift in half of the time."""
+    name = "innovation" if "innovation" in tuning.bounds_ else "residual"
+    bound, search = tuning.bounds_[name], tuning.searches_[name]
+    whole = bound.own(tuning.cells_.force)
+    whole = whole + bound.stuck_share * search.mean_stuck + bound.jump_share * search.mean_jump
+    parts = {"median": (whole, 0.5), "nine_tenths": (whole, 0.9)}
+    if "drift" in tuning.bounds_:
+        parts["slow"] = tuning.bounds_["drift"].own(tuning.cells_.force), 0.5
+    return {key: [float(value) for value in np.quantile(each, q, axis=0)] for key, (each, q) in parts.items()}
+
+
+def recording_of(each: FitRecording) -> dict[str, Any]:
+    return {"path": str(each.path), "minutes": each.duration / 60.0, "mean_force": each.mean_force}
+
+
+def record_next(lacks: Mapping[str, Any], tuned: Mapping[str, Any]) -> list[str]:
+    """What to record, the most useful first."""
+    found = []
+    if tuned["more_minutes"]:
+        found.append(
+            f"{tuned['more_minutes']:.0f} min more of free motion: thresholds are then for "
+            f"{tuned['false_alarms_per_hour']:g} false alarms an hour in place of {tuned['tuned_for_per_hour']:.3g}"
+        )
+    if len(tuned["pretensions"]) == 1:
+        found.append("the same motion at another pretension: what grows with the force is not known yet")
+    if tuned["rest"] is None:
+        found.append(
+            "rests of some seconds with standing motors, in all a few minutes: touches at rest can then be found"
+        )
+    if lacks["next_experiment"]:
+        found.append(lacks["next_experiment"])
+    return found

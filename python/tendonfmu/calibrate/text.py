@@ -1,0 +1,176 @@
+"""What a calibration says, in sentences and rows: for the page and for the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from tendonfmu.calibrate.report import rms_of
+from tendonfmu.report.fit_summary import rounded
+
+Report = Mapping[str, Any]
+Row = tuple[str, ...]
+
+MODELS = {
+    "bias_only": "no friction model, the bias alone",
+    "as_given": "the description as given",
+    "previous": "the earlier calibration",
+    "fitted": "its numbers fitted",
+    "calibrated": "calibrated",
+}
+
+
+def verdict(report: Report) -> tuple[str, str]:
+    """Tone, "good", "" or "bad", and one sentence."""
+    before, after = (rms_of(report["error"][name]) for name in (_first(report), "calibrated"))
+    less = 1.0 - after / before if before > 0 else 0.0
+    error = f"The error on motion that no number was fitted to fell from {mnm(before)} to {mnm(after)} mN·m"
+    causes = len(report["structure"]["causes"])
+    built = f", with {'one cause' if causes == 1 else f'{causes} causes'} built into the model" if causes else ""
+    alarms = f"; at most {per_hour(report)} false alarms an hour are expected in such motion."
+    if less < 0:
+        return (
+            "bad",
+            f"The calibrated model is no better than {MODELS[_first(report)]}: {mnm(before)} mN·m before, {mnm(after)} "
+            f"now{alarms}",
+        )
+    return "good" if less > 0.1 else "", f"{error}{built}{alarms}"
+
+
+def _first(report: Report) -> str:
+    """What was there before: the description as given, or an earlier calibration."""
+    return "previous" if "previous" in report["error"] else "as_given"
+
+
+def mnm(value: float) -> str:
+    return rounded(1e3 * value)
+
+
+def per_hour(report: Report) -> str:
+    """The upper limit of the rate of false alarms."""
+    limit = report["detection"]["held_out"]["limit"]
+    return "an unknown number of" if limit is None else f"{limit:.3g}"
+
+
+def tiles(report: Report) -> Iterator[tuple[str, str, str]]:
+    """(value, unit, meaning), those that matter first."""
+    error, detection = report["error"], report["detection"]
+    before, after = (mnm(rms_of(error[name])) for name in (_first(report), "calibrated"))
+    data = "held-out parts" if error["held_out"] else "test recordings"
+    yield f"{before} → {after}", "mN·m", f"error on {data}, all joints: {MODELS[_first(report)]}, and calibrated"
+    yield f"≤ {per_hour(report)}", "per hour", f"false alarms, with {100 * detection['confidence']:.0f} % confidence"
+    least = min(detection["smallest_torque"]["median"])
+    yield mnm(least), "mN·m", "smallest sudden change of a joint torque that is reported, half of the time"
+    pushes = report["pushes"]
+    if pushes is not None and pushes["events"]:
+        delay = pushes["median_delay_s"]
+        late = "" if delay is None else f", half of them within {1e3 * delay:.0f} ms"
+        yield f"{pushes['found']} of {pushes['events']}", "", f"labelled pushes found{late}"
+
+
+def error_rows(report: Report) -> list[Row]:
+    """A row per model: rms in mN·m by joint, and of all joints together."""
+    error = report["error"]
+    return [
+        (words, *(mnm(value) for value in error[name]), mnm(rms_of(error[name])))
+        for name, words in MODELS.items()
+        if name in error
+    ]
+
+
+TORQUE_HEADINGS = ("sudden, half of the time", "sudden, 9 of 10 times", "over seconds")
+
+
+def torque_rows(report: Report) -> list[Row]:
+    """A row per joint: the smallest change that is reported (`TORQUE_HEADINGS`)."""
+    smallest = report["detection"]["smallest_torque"]
+    joints = report["joints"]
+    columns = [[mnm(value) for value in smallest[key]] for key in ("median", "nine_tenths")]
+    slow = [mnm(value) for value in smallest["slow"]] if "slow" in smallest else ["not found"] * len(joints)
+    return list(zip(joints, *columns, slow, strict=True))
+
+
+def size_rows(report: Report) -> list[Row]:
+    """Labelled pushes by size; none without a reference sensor."""
+    rows: list[Row] = []
+    for each in (report["pushes"] or {}).get("sizes") or []:
+        if each["below"] is None:
+            size = f"{each['from']:g} times and more"
+        elif each["from"]:
+            size = f"{each['from']:g} to {each['below']:g} times"
+        else:
+            size = f"below {each['below']:g} times"
+        low, high = each["interval"]
+        rows.append((size, f"{each['found']} of {each['events']}", f"{100 * low:.0f} to {100 * high:.0f} %"))
+    return rows
+
+
+def cause_rows(report: Report) -> list[Row]:
+    return [
+        (each["title"], each["place"], each["size"], each["gain"].split("\u00a0%")[0] + "\u00a0%")
+        for each in report["structure"]["causes"]
+    ]
+
+
+def recording_rows(report: Report) -> list[Row]:
+    """(name, what for, minutes, mean tendon force)."""
+    return [
+        (
+            each["path"].rsplit("/", 1)[-1].rsplit("\\", 1)[-1],
+            role,
+            f"{each['minutes']:.1f}",
+            f"{each['mean_force']:.1f}",
+        )
+        for key, role in (("recordings", "free motion"), ("tests", "test"))
+        for each in report[key]
+    ]
+
+
+def sensor_sentence(report: Report) -> str:
+    """How far sensors and springs may differ before a fault is reported."""
+    found = report["detection"]["sensor_fault"]
+    if found["keys"] is None:
+        return f"Sensor faults are not watched: {found['left_out']}."
+    return (
+        f"A tendon sensor that contradicts its spring by more than {found['keys']['jump_margin']:.2g} N is reported as "
+        f"a sensor fault, not as contact; free motion shows differences of up to {found['largest_difference']:.2g} N."
+    )
+
+
+def push_sentence(report: Report) -> str:
+    pushes = report["pushes"]
+    alarms = pushes["false_alarms"]
+    many = "no false alarm" if alarms == 0 else f"{alarms} false alarm{'s' if alarms > 1 else ''}"
+    if not pushes["events"]:
+        return f"No push is labelled in them; {many} in {pushes['free_minutes']:.1f} min."
+    return (
+        f"{pushes['found']} of {pushes['events']} labelled pushes are found, with {many} in "
+        f"{pushes['free_minutes']:.1f} min without contact."
+    )
+
+
+def lines(report: Report) -> Iterator[str]:
+    """For the terminal."""
+    yield verdict(report)[1]
+    if report["pushes"] is not None:
+        yield push_sentence(report)
+    for sentence in report["next"]:
+        yield f"record next: {sentence}"
+
+
+def tables(report: Report) -> Iterator[tuple[str, Row, list[Row]]]:
+    """(title, headings, rows)."""
+    yield "error, rms in mN·m", ("model", *report["joints"], "all"), error_rows(report)
+    if report["structure"]["causes"]:
+        yield (
+            "built into the model",
+            ("cause", "place", "how much", "less error, the bias taken off"),
+            cause_rows(report),
+        )
+    yield (
+        "smallest change that is reported, mN·m",
+        ("joint", *TORQUE_HEADINGS),
+        torque_rows(report),
+    )
+    if sizes := size_rows(report):
+        yield "pushes found, by size over what free motion leaves", ("size", "found", "95 % interval"), sizes

@@ -1,0 +1,5 @@
+"""The command `tendonfmu`: one file a command parses, calls and prints; `program.py` puts them together."""
+
+from tendonfmu.cli.program import main
+
+__all__ = ["main"]

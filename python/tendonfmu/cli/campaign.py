@@ -1,0 +1,88 @@
+"""The command `campaign`: `register` adds it to the program of `program.py`."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tendonfmu.cli.console import print_tables, progress_bar, say
+from tendonfmu.cli.options import LeastGain, Progress
+
+
+def register(app: typer.Typer) -> None:
+    app.command()(campaign)
+
+
+def campaign(
+    cases: Annotated[
+        Path, typer.Argument(metavar="CASES.json", help="recordings whose cause is known, or their maker")
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder of the rows and their table")],
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="of a dask cluster \\[default: worker processes here]")
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, max=1024, help="worker processes here \\[default: one a processor]")
+    ] = None,
+    stop_after: Annotated[
+        float, typer.Option(min=0.0, metavar="SECONDS", help="begin no case after that time; go on another day")
+    ] = math.inf,
+    least_gain: LeastGain = 0.03,
+    beside: Annotated[
+        str | None, typer.Option(metavar="FILE.py:FUNCTION", help="rivals, asked to name a cause for each case, too")
+    ] = None,
+    again: Annotated[bool, typer.Option("--again", help="run cases that ended in an error once more")] = False,
+    report: Annotated[Path | None, typer.Option(metavar="R.md", help="the tables as Markdown")] = None,
+    progress: Progress = None,
+) -> None:
+    """Diagnose many recordings whose cause is known, and count how often the answer is right.
+
+    Each case writes its row as it ends; interrupted, the same command goes on where it was.
+    The rows together are DIR/campaign.parquet; every rate has its number of cases and its 95 % interval.
+    """
+    from tendonfmu.diagnose.campaign.campaign import How, collect, run_campaign, still_to_do
+    from tendonfmu.diagnose.campaign.cases import python_function, read_cases
+    from tendonfmu.diagnose.campaign.rates import EFFECT_HEADINGS, HEADINGS, by_effect, markdown, rates, rates_by_part
+    from tendonfmu.files.whole_file import check_output, check_output_folder, write_text
+    from tendonfmu.tasks.jobs import worker_count, workers_of
+
+    listed = read_cases(cases)
+    check_output_folder(output)
+    if report is not None:
+        check_output(report, cases)
+    if beside is not None:
+        python_function(beside, Path.cwd())
+    waiting = len(still_to_do(listed, output, again))
+    if waiting and stop_after > 0:
+        with (
+            workers_of(scheduler, min(workers or worker_count(), waiting)) as client,
+            progress_bar(progress) as bar,
+        ):
+            task = bar.add_task("cases", total=len(listed))
+            run_campaign(
+                listed,
+                output,
+                client,
+                how=How(None if beside is None else str(Path(beside).absolute()), least_gain),
+                stop_after=stop_after,
+                failed_again=again,
+                progress=lambda done, total: bar.update(task, completed=done, total=total),
+            )
+    rows = collect(listed, output)
+    if report is not None:
+        write_text(report, markdown(rows))
+    tables = [("rates", HEADINGS, [each.cells() for each in rates(rows)])]
+    by_part = [each.cells() for each in rates_by_part(rows)]
+    tables += [("by rig and joints", HEADINGS, by_part)] if by_part else []
+    effects = by_effect(rows)
+    print_tables([*tables, *([("single effects", EFFECT_HEADINGS, effects)] if effects else [])], [], left="goal")
+    failed = sum(1 for row in rows if row["error"])
+    for row in rows:
+        if row["error"]:
+            say(f"tendonfmu: {row['name']}: {row['error']}")
+    say(f"{output}: {len(rows)} of {len(listed)} cases, {failed} with an error")
+    if failed:
+        raise typer.Exit(1)

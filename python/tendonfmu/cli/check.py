@@ -1,0 +1,80 @@
+"""The command `check`: is a description sound, and do recordings belong to it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tendonfmu.cli.console import say, show
+from tendonfmu.cli.options import Subject
+from tendonfmu.errors import InputError
+
+if TYPE_CHECKING:
+    from tendonfmu.model.description import FingerDescription
+
+
+def register(app: typer.Typer) -> None:
+    """Adds the command."""
+    app.command()(check)
+
+
+def check(
+    file: Subject,
+    recordings: Annotated[
+        list[Path] | None, typer.Argument(metavar="[RECORDING]...", help="of this finger, .csv or .parquet")
+    ] = None,
+) -> None:
+    """Validate a finger description or a rig and say what it is. Exit 1 when it is refused.
+
+    With recordings: whether they belong to the finger, and what to write into the map of columns where they do not.
+    Exit 1 when one does not.
+    """
+    from tendonfmu.files.tables import check_format
+    from tendonfmu.model.description import read_finger
+    from tendonfmu.model.plausibility import description_findings
+    from tendonfmu.simulate.plant import require_plant
+    from tendonfmu.simulate.rig import is_rig
+    from tendonfmu.simulate.rig_summary import describe_rig
+
+    for recording in recordings or []:
+        check_format(recording)
+    rig = is_rig(file)
+    if rig:
+        require_plant()
+        if recordings:
+            raise InputError(f"{file}: a rig; expected a finger description to hold recordings against")
+    try:
+        finger = None if rig else read_finger(file)
+        lines = describe_rig(file) if finger is None else finger.summary()
+    except InputError as refused:
+        # the question was whether the description is sound; a file that cannot be read is bad input
+        say(f"tendonfmu: {refused}")
+        raise typer.Exit(1 if file.is_file() else 2) from None
+    for line in lines:
+        show(line)
+    if finger is not None:
+        for finding in description_findings(finger):
+            say(f"tendonfmu: warning: {finding.line()}")
+        _check_recordings(finger, recordings or [])
+
+
+def _check_recordings(finger: FingerDescription, files: list[Path]) -> None:
+    """Says of each whether it belongs to the finger. Exit 1 when one does not."""
+    from tendonfmu.recordings.match import belongs
+    from tendonfmu.recordings.match_text import verdict
+    from tendonfmu.recordings.recording import read_recording
+
+    strangers = 0
+    for file in files:
+        recording = read_recording(file)
+        findings = belongs(finger, [recording])
+        show(verdict(recording, findings))
+        for finding in findings:
+            show(f"{finding.severity}: {finding.line()}")
+        strangers += any(finding.severity == "error" for finding in findings)
+    if strangers:
+        count = f"{strangers} of {len(files)} recordings" if len(files) > 1 else str(files[0])
+        say(f"tendonfmu: {count}: does not belong to {finger.path} as it is; what to change is said above")
+        raise typer.Exit(1)

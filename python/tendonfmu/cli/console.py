@@ -1,0 +1,185 @@
+"""The terminal: messages, tables and progress bars for the commands. With `program.py` the only module that prints."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any, NoReturn
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+    from tendonfmu.tasks.phases import PhaseState
+
+
+def say(message: str) -> None:
+    """A line on standard error."""
+    print(message, file=sys.stderr)
+
+
+def show(line: str) -> None:
+    """A line of a result, on standard output."""
+    print(line)
+
+
+def leave(status: int) -> NoReturn:
+    """Ends the program, without waiting for threads that still compute."""
+    if any(not thread.daemon for thread in threading.enumerate() if thread is not threading.main_thread()):
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
+    sys.exit(status)
+
+
+def print_tables(tables: Iterable[Any], lines: Iterable[str], left: str) -> None:
+    """Tables of (title, headings, rows), then lines. left: heading of a further column that is text."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console()
+    if not console.is_terminal:  # nothing to fit into: no broken lines
+        console.width = 160
+    for title, headings, rows in tables:
+        table = Table(title=title, title_justify="left")
+        for k, heading in enumerate(headings):
+            table.add_column(heading, justify="right" if k > 0 and heading != left else "left")
+        for row in rows:
+            table.add_row(*row)
+        console.print(table)
+    for line in lines:
+        console.print(line, highlight=False, soft_wrap=True)
+
+
+def progress_bar(wanted: bool | None = None) -> Progress:
+    """A progress bar on standard error; unless it is said, only where that is a terminal."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True, force_terminal=wanted or None)
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        console=console,
+        disable=not (console.is_terminal if wanted is None else wanted),
+        transient=True,
+    )
+
+
+def phase_bar(bar: Progress) -> Callable[[str, int, int | None], None]:
+    """Shows where something of several phases is: called with the phase in words, done, and total or None."""
+    task = bar.add_task("reading", total=None)
+    now = ""
+
+    def show(phase: str, done: int, total: int | None) -> None:
+        nonlocal now, task
+        if phase != now:  # another task: a total, once given, cannot be taken back
+            bar.remove_task(task)
+            task = bar.add_task(phase, total=total)
+            now = phase
+        bar.update(task, completed=done, total=total)
+
+    return show
+
+
+class PhaseDisplay:
+    """Shows where a computation of several phases is, on standard error: called with a `phases.PhaseState`.
+
+    On a terminal a bar for the phase, elsewhere a line for each phase and at most one every `EVERY` seconds. wanted:
+    None shows it on a terminal alone.
+    """
+
+    EVERY = 10.0
+
+    def __init__(self, wanted: bool | None = None) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+        console = Console(stderr=True)
+        self._on_terminal = console.is_terminal
+        self._shown = console.is_terminal if wanted is None else wanted
+        self._bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[left]}"),
+            console=console,
+            disable=not (self._shown and self._on_terminal),
+            transient=True,
+        )
+        self._task: Any = None
+        self._phase: tuple[int, int] | None = None
+        self._said = 0.0  # s, of the last line
+
+    def __enter__(self) -> PhaseDisplay:
+        self._bar.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._bar.stop()
+
+    def __call__(self, state: PhaseState) -> None:
+        is_new = (state.number, state.count) != self._phase
+        self._phase = (state.number, state.count)
+        head = f"phase {state.number} of {state.count}: {state.words}"
+        if not self._shown:
+            return
+        if self._on_terminal:
+            self._show(head, state, is_new)
+        elif is_new or state.seconds - self._said >= self.EVERY:
+            self._said = state.seconds
+            count = "" if state.done == 0 or state.total is None else f"{state.done} of {state.total}"
+            say(", ".join(part for part in (head, count, time_left(state.left_s)) if part))
+
+    def note(self, words: str) -> None:
+        """Something after the last phase that takes a moment."""
+        self._phase = None
+        if self._shown and self._on_terminal:
+            self._replace(words, None, "")
+        elif self._shown:
+            say(words)
+
+    def refresh(self) -> None:
+        """Draws the bar now, not at its next moment."""
+        self._bar.refresh()
+
+    def _show(self, head: str, state: PhaseState, is_new: bool) -> None:
+        left = time_left(state.left_s)
+        if is_new:
+            self._replace(head, state.total, left)
+        self._bar.update(self._task, completed=state.done, total=state.total, left=left)
+
+    def _replace(self, description: str, total: int | None, left: str) -> None:
+        if self._task is not None:  # a total, once given, cannot be taken back
+            self._bar.remove_task(self._task)
+        self._task = self._bar.add_task(description, total=total, left=left)
+
+
+def time_left(seconds: float | None) -> str:
+    """In words, coarse: an estimate."""
+    if seconds is None:
+        return ""
+    if seconds < 90:
+        return f"about {max(5, 5 * round(seconds / 5))} s left"
+    return f"about {round(seconds / 60)} min left"
+
+
+def fit_bar(bar: Progress) -> Any:
+    """Shows where a fit is: its phase, cost and samples per second."""
+    task = bar.add_task("reading", total=None)
+    phase = ""
+
+    def show(now: Any) -> None:
+        nonlocal phase
+        if now.phase != phase:
+            bar.reset(task, total=now.total)
+            phase = now.phase
+        speed = bar.tasks[0].speed
+        rate = f", {speed:,.0f} samples/s" if speed else ""
+        cost = f", cost {now.cost:.6g}" if now.cost == now.cost else ""
+        bar.update(task, completed=now.done, total=now.total, description=f"{phase}{cost}{rate}")
+
+    return show

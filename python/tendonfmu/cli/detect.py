@@ -1,0 +1,152 @@
+"""The commands about contact: `register` adds each to the program of `program.py`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tendonfmu.cli.console import print_tables, progress_bar, say
+from tendonfmu.cli.options import (
+    Confidence,
+    FalseAlarms,
+    Figures,
+    FreeAtPretensions,
+    Kinematics,
+    Model,
+    Progress,
+    Report,
+)
+
+
+def register(app: typer.Typer) -> None:
+    """Adds the commands, in the order of the help page."""
+    app.command()(tune)
+    app.command()(score)
+
+
+def tune(
+    finger: Annotated[Path, typer.Argument(metavar="FINGER.json", help="finger description, fitted")],
+    recordings: FreeAtPretensions,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="TUNED.json", help="description to write")],
+    false_alarms_per_hour: FalseAlarms = 6.0,
+    confidence: Confidence = 0.9,
+    method: Annotated[
+        str, typer.Option(metavar="innovation|cusum|threshold", help="contact.method; threshold is the paper's")
+    ] = "innovation",
+    bias_time: Annotated[
+        float | None,
+        typer.Option(min=1e-3, max=1e4, metavar="SECONDS", help="time constant of the bias \\[default: as it is]"),
+    ] = None,
+    release_time: Annotated[
+        float,
+        typer.Option(min=0.0, metavar="SECONDS", help="in contact until the bias learns again; inf: never"),
+    ] = 2.0,
+    report: Report = None,
+    figures: Figures = None,
+    kinematics: Kinematics = 1,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="exit 1 and no file if there is too little free motion for RATE")
+    ] = False,
+    progress: Progress = None,
+) -> None:
+    """Choose what decides on contact, from free motion, for a stated rate of false alarms.
+
+    Noise and drift of the bias, bounds of the detection and the standard deviation of the estimated torque. With too
+    little free motion for the rate it tunes for the rate that there is enough for, and says which and how much more is
+    needed; with --strict it exits with 1 and writes no file.
+    """
+    import warnings
+
+    from tendonfmu.detect.support import NotEnough
+    from tendonfmu.detect.tune_report import build_report, report_text
+    from tendonfmu.detect.tuning import ContactTuning, TuneWarning
+    from tendonfmu.estimate.files import check_outputs
+    from tendonfmu.files.whole_file import write_text
+    from tendonfmu.report.tune_text import lines, tables
+
+    check_outputs(output, report, figures, [finger, *recordings])
+    with progress_bar(progress) as bar:
+        task = bar.add_task("bounds", total=None)
+        tuning = ContactTuning(
+            finger,
+            false_alarms_per_hour=false_alarms_per_hour,
+            confidence=confidence,
+            method=method,
+            bias_time=bias_time,
+            release_time=release_time,
+            kinematics=kinematics,
+            strict=strict,
+            progress=lambda done, total: bar.update(task, completed=done, total=total),
+        )
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", TuneWarning)  # said below, a line each
+                tuning.tune(list(recordings))
+        except NotEnough as refused:
+            say(f"tendonfmu: {refused}")
+            raise typer.Exit(1) from None
+    for sentence in tuning.warnings_:
+        say(f"tendonfmu: warning: {sentence}")
+    write_text(output, tuning.description_text())
+    if report is not None:
+        write_text(report, report_text(build_report(tuning)))
+    print_tables(tables(tuning), lines(tuning), left="joint")
+    say(f"{output}: {tuning.method}, tuned on {60 * tuning.hours_:.1f} min of free motion")
+    if figures is not None:
+        from tendonfmu.report.tune_figures import write_figures
+
+        for path, what in write_figures(tuning, figures).items():
+            say(f"{path}: {what}")
+
+
+def score(
+    model: Model,
+    recordings: Annotated[list[Path], typer.Argument(metavar="RECORDING", help="labelled or free, .csv or .parquet")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="SCORE.json", help="report to write")],
+    labels: Annotated[
+        str | None, typer.Option(metavar="COLUMN", help="1 in contact, else 0 \\[default: contact, where it is there]")
+    ] = None,
+    force: Annotated[
+        str | None, typer.Option(metavar="COLUMN", help="sensed force in N: told at each alarm, and drawn")
+    ] = None,
+    figures: Figures = None,
+    kinematics: Kinematics = 1,
+    seed: Annotated[int, typer.Option(min=0, max=2**53, help="of the intervals' resampling")] = 0,
+    progress: Progress = None,
+) -> None:
+    """Measure contact detection against labels: events found and missed, false alarms, delay, torque; a ROC.
+
+    An event is a labelled contact; labels closer than 100 ms are one.
+    It is found if an alarm begins in it and the 200 ms before it were silent.
+    An alarm that begins in no event, nor in the 100 ms after one, is false.
+    Everything has its 95 % interval; several recordings are pooled.
+    """
+    from tendonfmu.detect.score_report import build_report, report_text
+    from tendonfmu.detect.scoring import check_outputs, score_recordings
+    from tendonfmu.files.whole_file import write_text
+    from tendonfmu.report.score_text import lines, tables
+
+    check_outputs(output, figures, [model, *recordings])
+    with progress_bar(progress) as bar:
+        task = bar.add_task("runs", total=None)
+        scored = score_recordings(
+            model,
+            recordings,
+            labels=labels,
+            force=force,
+            kinematics=kinematics,
+            seed=seed,
+            progress=lambda done, total: bar.update(task, completed=done, total=total),
+        )
+    for sentence in scored.warnings:
+        say(f"tendonfmu: warning: {sentence}")
+    write_text(output, report_text(build_report(scored)))
+    print_tables(tables(scored), lines(scored), left="")
+    say(f"{output}: {scored.summary.events} events, {scored.summary.false_alarms} false alarms")
+    if figures is not None:
+        from tendonfmu.report.score_figures import write_figures
+
+        for path, what in write_figures(scored, figures).items():
+            say(f"{path}: {what}")

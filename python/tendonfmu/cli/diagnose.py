@@ -1,0 +1,177 @@
+"""The command about causes: `register` adds it to the program of `program.py`, whose `excite` calls `discriminate`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tendonfmu.cli.console import PhaseDisplay, print_tables, progress_bar, say
+from tendonfmu.cli.options import FingerFile, FreeRecordings, Jobs, Kinematics, LeastGain, Progress, Seed
+from tendonfmu.cli.several_values import SeveralValues
+from tendonfmu.errors import InputError
+
+
+def register(app: typer.Typer) -> None:
+    """Adds the command."""
+    app.command(cls=SeveralValues)(diagnose)
+
+
+def diagnose(
+    finger: FingerFile,
+    recordings: FreeRecordings,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder for page, report and model")],
+    test: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="RECORDING",
+            help="not trained on: the gain is measured here; may be repeated, or several at once after the recordings "
+            "\\[default: parts of the recordings]",
+        ),
+    ] = None,
+    reference: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="RECORDING",
+            help="of the same finger when it was well: says what has changed since, instead of what the model lacks; "
+            "another motion, pretension or length will do, the same motion tells most",
+        ),
+    ] = None,
+    history: Annotated[
+        bool,
+        typer.Option(
+            "--history",
+            help="each recording, in order of time, held against the reference, by default the first: a line per "
+            "recording and cause, and how fast it grows",
+        ),
+    ] = False,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="of a dask cluster, for --history \\[default: --jobs processes]"),
+    ] = None,
+    kinematics: Kinematics = 1,
+    least_gain: LeastGain = 0.03,
+    seed: Seed = 0,
+    jobs: Jobs = 1,
+    progress: Progress = None,
+) -> None:
+    """Show what the model gets wrong, name the cause, extend the model by it and measure the gain.
+
+    The given structure is fitted first: a cause is what that cannot mend. With --reference a cause is what has changed
+    since; several recordings of now, in order of time, show how it grows. DIR gets the page diagnosis.html,
+    diagnosis.json, figures, and the model with its causes, extended.json and extended.fmu; with --history the page
+    history.html, history.csv and history.png.
+    """
+    from tendonfmu.diagnose.diagnosis import diagnose as find
+    from tendonfmu.estimate.files import check_given_once
+    from tendonfmu.report.diagnosis_files import check_folder, write_diagnosis
+    from tendonfmu.report.diagnosis_text import lines, tables
+
+    if not 0.0 <= least_gain <= 0.5:  # NaN passes the range
+        raise InputError(f"--least-gain {least_gain:g}: expected 0 to 0.5")
+    tests, before = test or [], reference or []
+    if history:
+        if tests:
+            raise InputError("--test: with --history; expected recordings in order of time alone")
+        _history(finger, recordings, before, output, scheduler, kinematics, least_gain, seed, jobs, progress)
+        return
+    if scheduler is not None:
+        raise InputError("--scheduler: without --history; expected both or none")
+    check_folder(output, [finger, *recordings, *tests, *before])
+    check_given_once(recordings, tests, "a test")
+    check_given_once([*recordings, *tests], before, "the reference")
+    with PhaseDisplay(progress) as display:
+        found = find(
+            finger,
+            recordings,
+            tests,
+            kinematics=kinematics,
+            least_gain=least_gain,
+            seed=seed,
+            jobs=jobs,
+            reference=before or None,
+            progress=display,
+        )
+        display.note("writing the files")
+        written = write_diagnosis(found, output)
+    for sentence in found.warnings:
+        say(f"tendonfmu: warning: {sentence}")
+    print_tables(tables(found), lines(found), left="may also be")
+    for path, what in written.items():
+        say(f"{path}: {what}")
+
+
+def _history(
+    finger: Path,
+    recordings: list[Path],
+    reference: list[Path],
+    output: Path,
+    scheduler: str | None,
+    kinematics: int,
+    least_gain: float,
+    seed: int,
+    jobs: int,
+    progress: bool | None,
+) -> None:
+    """`diagnose --history`."""
+    from contextlib import nullcontext
+
+    from tendonfmu.diagnose.changes.history import diagnose_history
+    from tendonfmu.estimate.files import check_given_once
+    from tendonfmu.files.whole_file import check_output_folder
+    from tendonfmu.model.description import read_finger
+    from tendonfmu.report.diagnosis_text import Names
+    from tendonfmu.report.history_files import write_history
+    from tendonfmu.report.history_text import headline, rows_of_lines
+    from tendonfmu.tasks.jobs import workers_of
+
+    check_given_once(recordings, reference, "the reference")
+    check_output_folder(output)
+    given = read_finger(finger)
+    several = scheduler is not None or jobs > 1
+    with workers_of(scheduler, jobs) if several else nullcontext() as client, progress_bar(progress) as bar:
+        task = bar.add_task("recordings", total=2 * len(recordings))
+        found = diagnose_history(
+            given,
+            recordings,
+            reference,
+            rows=output,
+            client=client,
+            kinematics=kinematics,
+            least_gain=least_gain,
+            seed=seed,
+            progress=lambda done, total: bar.update(task, completed=done, total=total),
+        )
+    names = Names(tuple(given.joint_names), tuple(given.tendon_names))
+    written = write_history(found, names, output)
+    headings = ("cause", "place", "reference", "last", "named in", "trend")
+    rows = list(rows_of_lines(found, names))
+    print_tables([(found.finger, headings, rows)] if rows else (), [headline(found)], left="trend")
+    for name, why in found.failed:
+        say(f"tendonfmu: warning: {name} is left out: {why}")
+    for path, what in written.items():
+        say(f"{path}: {what}")
+
+
+def discriminate(context: typer.Context, finger: Path, folder: Path, output: Path, rate: float) -> None:
+    """`tendonfmu excite FINGER --discriminate DIR -o MOTION`: the motion that a diagnosis asked for."""
+    from tendonfmu.diagnose.experiments.discrimination import discriminating_motion
+    from tendonfmu.excite.training_motion import read_subject
+    from tendonfmu.files.tables import check_format, write_table
+    from tendonfmu.files.whole_file import check_output
+    from tendonfmu.simulate.rig import description_files, is_rig
+
+    own = {"finger", "output", "rate", "discriminate"}
+    for each in context.command.params:
+        source = context.get_parameter_source(str(each.name))
+        if each.name not in own and source is not None and source.name == "COMMANDLINE":
+            raise InputError(f"{each.opts[0]}: with --discriminate {folder}; expected no option but --rate beside it")
+    check_format(output)
+    check_output(output, *(description_files(finger) if is_rig(finger) else [finger]))
+    subject = read_subject(finger)
+    found = discriminating_motion(folder, subject.finger.data, limits=subject.limits, rate=rate)
+    columns = found.columns()
+    write_table(output, columns)
+    print_tables((), found.lines(), left="")
+    say(f"{output}: {len(columns['time'])} rows, {columns['time'][-1]:g} s")

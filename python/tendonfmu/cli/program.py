@@ -1,0 +1,424 @@
+"""The command `tendonfmu`: parses, calls, prints.
+
+Exit status: 0 done, 1 the answer is no, 2 bad usage or input, 3 a fault of tendonfmu itself, 130 and 143 interrupted.
+
+Results go to files or standard output, messages to standard error.
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from pathlib import Path
+from typing import Annotated, NoReturn
+
+import typer
+
+from tendonfmu.cli import calibrate as cli_calibrate
+from tendonfmu.cli import campaign as cli_campaign
+from tendonfmu.cli import check as cli_check
+from tendonfmu.cli import convert as cli_convert
+from tendonfmu.cli import detect as cli_detect
+from tendonfmu.cli import diagnose as cli_diagnose
+from tendonfmu.cli.console import fit_bar, leave, phase_bar, print_tables, progress_bar, say
+from tendonfmu.cli.fault_report import is_own_file, write_fault_report
+from tendonfmu.cli.options import FingerFile, FreeRecordings, Kinematics, Model, Progress, Report, Subject
+from tendonfmu.errors import InputError, line_of
+from tendonfmu.tasks.interruption import ended_by_signals
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="Friction of tendon-driven robot fingers: what the finger feels, without a tactile sensor.",
+)
+
+FAULT = 3
+INTERRUPTED = 130
+
+cli_check.register(app)
+
+
+def main() -> None:
+    """Entry point: every refusal is one line on standard error and exit status 2, every fault of its own one and 3."""
+    with ended_by_signals() as ending:
+        try:
+            status = app(standalone_mode=False)
+        except (InputError, OSError) as refused:
+            if isinstance(refused, BrokenPipeError):  # the reader of standard output has seen enough
+                sys.stderr.close()
+                sys.exit(0)
+            if isinstance(refused, OSError) and (refused.errno is None or is_own_file(refused.filename)):
+                _fault(refused)
+            _refuse(line_of(refused))
+        except (KeyboardInterrupt, typer.Abort):
+            _interrupted(ending.status)
+        except SystemExit as ended:
+            if ended.code == INTERRUPTED:  # the command has said what it leaves
+                leave(ending.status)
+            raise
+        except Exception as refused:
+            if not hasattr(refused, "format_message"):  # of bad usage; its class has moved between versions of typer
+                _fault(refused)
+            elif type(refused).__name__ == "NoArgsIsHelpError":
+                say(refused.format_message())
+                sys.exit(2)
+            else:
+                page = getattr(getattr(refused, "ctx", None), "command_path", "tendonfmu")
+                _refuse(f"{refused.format_message().rstrip('.')}; see {page} --help")
+        else:
+            if status == INTERRUPTED:  # newer versions of typer turn Ctrl-C into a status
+                _interrupted(ending.status)
+            sys.exit(status if isinstance(status, int) else 0)
+
+
+def _refuse(reason: str) -> NoReturn:
+    say(f"tendonfmu: {' '.join(reason.split())}")
+    sys.exit(2)
+
+
+def _fault(error: BaseException) -> NoReturn:
+    report = write_fault_report(error, sys.argv[1:])
+    where = "no report could be written" if report is None else f"please send the report {report}"
+    say(f"tendonfmu: a fault of tendonfmu, not of its input ({type(error).__name__}); {where}")
+    leave(FAULT)
+
+
+def _interrupted(status: int) -> NoReturn:
+    say("tendonfmu: interrupted; no file was left half written")
+    leave(status)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from tendonfmu import __version__
+
+        print(f"tendonfmu {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="show the version and exit")
+    ] = False,
+) -> None:
+    """Friction of tendon-driven robot fingers: what the finger feels, without a tactile sensor."""
+
+
+@app.command()
+def build(
+    file: Subject,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FINGER.fmu", help="FMU to write")],
+    binaries: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="folder of binaries by FMI platform, instead of those of this installation"),
+    ] = None,
+) -> None:
+    """Pack an FMI 2.0 co-simulation FMU: of a finger its friction, of a rig the simulated finger.
+
+    Needs no compiler; the same input gives the same bytes.
+    """
+    from tendonfmu.files.whole_file import check_output
+    from tendonfmu.fmu.packaging import build_fmu
+    from tendonfmu.simulate.fmu_packaging import build_plant_fmu
+    from tendonfmu.simulate.rig import is_rig, read_rig
+
+    check_output(output, *(read_rig(file).files if is_rig(file) else [file]))
+    (build_plant_fmu if is_rig(file) else build_fmu)(file, output, binaries=binaries)
+    say(f"{output}: {output.stat().st_size / 1024:.0f} KiB")
+
+
+@app.command()
+def run(
+    model: Model,
+    recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="recording, .csv or .parquet")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT.csv", help="outputs, .csv or .parquet")],
+    kinematics: Kinematics = 1,
+) -> None:
+    """Run the FMU over a recording: time and all outputs, one row per sample, each at its own sample's time."""
+    from tendonfmu.files.tables import check_format, write_table
+    from tendonfmu.files.whole_file import check_output
+    from tendonfmu.fmu.running import check_model, run_model, summary
+    from tendonfmu.recordings.recording import read_recording
+
+    check_model(model)
+    check_format(output)
+    check_output(output, model, recording)
+    samples = read_recording(recording)
+    with progress_bar() as bar:
+        task = bar.add_task("samples", total=len(samples))
+        table = run_model(
+            model, samples, kinematics_source=kinematics, progress=lambda done: bar.update(task, completed=done)
+        )
+    write_table(output, table)
+    say(f"{output}: {summary(table)}")
+
+
+@app.command()
+def simulate(
+    rig: Annotated[Path, typer.Argument(metavar="RIG.json", help="rig of a simulated finger")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="REC.parquet", help="recording, .csv or .parquet")],
+    truth: Annotated[
+        Path | None, typer.Option(metavar="TRUTH.parquet", help="true signals at the same times, .csv or .parquet")
+    ] = None,
+    integrator: Annotated[str | None, typer.Option(metavar="cvode|fixed_step", help="instead of the rig's own")] = None,
+    progress: Progress = None,
+) -> None:
+    """A recording of the simulated finger. The same rig gives the same numbers."""
+    from tendonfmu.files.tables import check_format, write_table
+    from tendonfmu.files.whole_file import check_output
+    from tendonfmu.simulate.plant import INTEGRATORS
+    from tendonfmu.simulate.rig import read_rig
+    from tendonfmu.simulate.simulation import simulate as simulate_rig
+
+    if integrator is not None and integrator not in INTEGRATORS:
+        raise InputError(f"--integrator {integrator}: expected {' or '.join(INTEGRATORS)}")
+    found = read_rig(rig)
+    outputs = [output] if truth is None else [output, truth]
+    for file in outputs:
+        check_format(file)
+        check_output(file, *found.files)
+    if truth is not None and truth.resolve() == output.resolve():
+        raise InputError(f"{truth}: the same file for recording and truth; expected two names")
+    with progress_bar(progress) as bar:
+        task = bar.add_task("samples", total=None)
+        result = simulate_rig(
+            found,
+            truth=truth is not None,
+            integrator=integrator,
+            progress=lambda done, total: bar.update(task, completed=done, total=total),
+        )
+    if truth is not None and result.truth is not None:
+        write_table(truth, result.truth)
+    write_table(output, result.recording)
+    for line in result.summary(found):
+        say(f"{output}: {line}")
+
+
+cli_convert.register(app)
+
+
+@app.command()
+def excite(
+    context: typer.Context,
+    finger: Annotated[Path, typer.Argument(metavar="FINGER.json|RIG.json", help="finger description, or rig of one")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="MOTION.csv", help="motion, .csv or .parquet")],
+    duration: Annotated[
+        float, typer.Option(min=1.0, max=1e5, help="s; at each pretension, or of all with --alternate")
+    ] = 400.0,
+    max_speed: Annotated[float, typer.Option(min=1e-3, max=100.0, help="rad/s; of every joint")] = 1.0,
+    range_: Annotated[
+        list[str] | None,
+        typer.Option("--range", metavar="JOINT=LOW:HIGH", help="rad; joint by number or name; may be repeated"),
+    ] = None,
+    pretension: Annotated[
+        list[float] | None,
+        typer.Option(min=1e-3, max=1e6, help="N; mean tendon force; may be repeated [default: 10]"),
+    ] = None,
+    alternate: Annotated[
+        float | None, typer.Option(min=1.0, metavar="SECONDS", help="change the pretension that often")
+    ] = None,
+    vary_tension: Annotated[
+        str | None,
+        typer.Option(metavar="LOW:HIGH", help="N; instead of a pretension, each tendon tight and loose in turn"),
+    ] = None,
+    vary_every: Annotated[float, typer.Option(min=2.0, max=1e5, help="s; other tensions that often")] = 10.0,
+    max_acceleration: Annotated[float, typer.Option(min=0.1, max=1e4, help="rad/s²; of every joint")] = 10.0,
+    rate: Annotated[float, typer.Option(min=20.0, max=10000.0, help="rows per second")] = 100.0,
+    seed: Annotated[int, typer.Option(min=0, max=2**53, help="of the strokes")] = 0,
+    report: Report = None,
+    discriminate: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="the next experiment of a diagnosis instead; with --rate alone"),
+    ] = None,
+) -> None:
+    """Plan a training motion, and say what it excites and which parameters it cannot identify."""
+    if discriminate is not None:
+        cli_diagnose.discriminate(context, finger, discriminate, output, rate)
+        return
+    import json
+    import shlex
+
+    from tendonfmu.excite import training_motion as exciting
+    from tendonfmu.excite.excitation import Plan
+    from tendonfmu.files.tables import check_format, write_table
+    from tendonfmu.files.whole_file import check_output, whole_file
+    from tendonfmu.report.excite_text import lines, tables
+    from tendonfmu.simulate.rig import description_files, is_rig
+
+    check_format(output)
+    for file in (output, *([report] if report is not None else [])):
+        check_output(file, *(description_files(finger) if is_rig(finger) else [finger]))
+    if report is not None and report.resolve() == output.resolve():
+        raise InputError(f"{report}: the same file for motion and report; expected two names")
+    subject = exciting.read_subject(finger)
+    ranges = exciting.find_ranges(subject, range_ or [])
+    for span in ranges:
+        if span.guessed:
+            say(f"tendonfmu: warning: joint {span.name}: {span.source}; --range {span.name}=LOW:HIGH says better")
+    vary = exciting.find_variation(vary_tension, vary_every, pretension, alternate)
+    levels = exciting.find_pretensions(subject, pretension or [])
+    plan = Plan(exciting.as_array(ranges), max_speed, duration, levels, alternate, rate, seed, vary, max_acceleration)
+    with progress_bar() as bar:
+        task = bar.add_task("judging the motion", total=None)
+        result = exciting.excite(subject, ranges, plan, lambda done, all_: bar.update(task, completed=done, total=all_))
+    write_table(output, result.motion.columns())
+    if report is not None:
+        everything = exciting.report(result, shlex.join(["tendonfmu", *sys.argv[1:]]))
+        with whole_file(report) as temporary:
+            temporary.write_text(json.dumps(everything, indent=1) + "\n", encoding="utf-8")
+    print_tables(tables(result), lines(result), left="cannot be identified")
+    say(f"{output}: {len(result.motion.time)} rows, {result.motion.time[-1]:g} s")
+
+
+@app.command()
+def fit(
+    finger: FingerFile,
+    recordings: FreeRecordings,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FITTED.json", help="description to write")],
+    method: Annotated[str, typer.Option(metavar="batch|ekf", help="maximum likelihood, or Kalman filter")] = "batch",
+    report: Report = None,
+    figures: Annotated[Path | None, typer.Option(metavar="DIR", help="folder for figures and report.html")] = None,
+    compare: Annotated[
+        list[Path] | None, typer.Option(metavar="RECORDING", help="judged, not trained on; may be repeated")
+    ] = None,
+    holdout: Annotated[
+        float, typer.Option(min=0.0, max=0.9, metavar="SHARE", help="of the time, not trained on")
+    ] = 0.0,
+    holdout_block: Annotated[float, typer.Option(min=1.0, metavar="SECONDS", help="longest block held out")] = 10.0,
+    kinematics: Kinematics = 1,
+    only: Annotated[
+        list[str] | None, typer.Option(metavar="PATTERN", help="estimate these numbers alone; may be repeated")
+    ] = None,
+    fix: Annotated[
+        list[str] | None, typer.Option(metavar="PATTERN", help="keep these numbers; may be repeated")
+    ] = None,
+    share: Annotated[
+        list[str] | None,
+        typer.Option(metavar="tendons|pulleys|PATTERN", help="laws that share their values; may be repeated"),
+    ] = None,
+    asymmetric: Annotated[
+        bool | None, typer.Option("--asymmetric/--symmetric", help="each side of a law on its own, or both the same")
+    ] = None,
+    prior: Annotated[
+        float, typer.Option(min=1e-6, max=1e6, help="what is known beforehand: standard deviation / magnitude")
+    ] = 1.0,
+    scale: Annotated[
+        list[str] | None, typer.Option(metavar="PATTERN=VALUE", help="expected magnitude, if not the description's")
+    ] = None,
+    previous: Annotated[
+        Path | None,
+        typer.Option("--from", metavar="PREVIOUS.json", help="report of an earlier fit, or its description: the prior"),
+    ] = None,
+    change: Annotated[
+        float, typer.Option(min=1e-6, max=10.0, help="with --from: how much numbers may have changed since, relative")
+    ] = 0.02,
+    effective_samples: Annotated[
+        bool | None,
+        typer.Option(help="residuals that last count as fewer samples, or as all \\[default: fewer with --from]"),
+    ] = None,
+    passes: Annotated[
+        int | None, typer.Option(min=1, help="most passes over the data \\[default: 60, of ekf 2]")
+    ] = None,
+    tolerance: Annotated[float, typer.Option(min=1e-9, max=0.5, help="last step in standard errors (batch)")] = 0.3,
+    drift: Annotated[float, typer.Option(min=0.0, max=1.0, help="relative variance of the numbers per s (ekf)")] = 0.0,
+    uncertainty: Annotated[
+        bool,
+        typer.Option("--uncertainty/--no-uncertainty", help="write what is not known of the friction, for detection"),
+    ] = True,
+    resume: Annotated[
+        Path | None, typer.Option(metavar="FITTED.unfinished.json", help="go on from an interrupted fit")
+    ] = None,
+    progress: Progress = None,
+) -> None:
+    """Estimate the numbers of a finger from recordings of free motion, and say how well each is known.
+
+    PATTERN is a path of the description, such as tendons[*].edge_friction[2]*.viscous; * stands for anything. Ctrl-C
+    leaves the best so far in FITTED.unfinished.json.
+    """
+    from tendonfmu.estimate.files import check_outputs, write_unfinished
+    from tendonfmu.estimate.fitting import FitWarning, FrictionFit
+    from tendonfmu.estimate.report import report_text
+    from tendonfmu.files.whole_file import write_text
+    from tendonfmu.report.fit_text import lines, tables
+
+    inputs = [finger, *recordings, *(compare or []), *(each for each in (previous, resume) if each is not None)]
+    check_outputs(output, report, figures, inputs)
+    with progress_bar(progress) as bar:
+        fitting = FrictionFit(
+            finger,
+            method,
+            kinematics=kinematics,
+            holdout=holdout,
+            holdout_block=holdout_block,
+            sides="given" if asymmetric is None else "asymmetric" if asymmetric else "symmetric",
+            only=only or [],
+            fix=fix or [],
+            share=share or [],
+            prior=prior,
+            scale=scale or [],
+            previous=previous,
+            change=change,
+            effective_samples=effective_samples,
+            max_passes=passes,
+            tolerance=tolerance,
+            parameter_drift=drift,
+            uncertainty=uncertainty,
+            start=resume,
+            progress=fit_bar(bar),
+        )
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", FitWarning)  # said below, a line each
+                fitting.fit(recordings, compare=compare or [])
+        except KeyboardInterrupt:
+            if fitting.unfinished_ is None:
+                raise
+            bar.stop()
+            left = write_unfinished(output, fitting.unfinished_)
+            say(f"tendonfmu: interrupted; the best so far is in {left}; --resume {left} goes on from there")
+            sys.exit(INTERRUPTED)
+    for sentence in fitting.warnings_:
+        say(f"tendonfmu: warning: {sentence}")
+    write_text(output, fitting.description_text())
+    if report is not None:
+        write_text(report, report_text(fitting.report_))
+    print_tables(tables(fitting), lines(fitting), left="joint")
+    say(f"{output}: {len(fitting.parameters_)} numbers estimated")
+    if figures is not None:
+        from tendonfmu.report.fit_page import write_fit_page
+
+        for path, what in write_fit_page(fitting.picture(), figures).items():
+            say(f"{path}: {what}")
+
+
+cli_calibrate.register(app)
+cli_diagnose.register(app)
+cli_detect.register(app)
+cli_campaign.register(app)
+
+
+@app.command()
+def demo(
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder for the results")] = Path(
+        "tendonfmu-demo"
+    ),
+) -> None:
+    """The whole story on built-in data, in a minute: calibrate, detect, diagnose what is hidden in the data, fit, run.
+
+    DIR gets story.html, which tells all of it, and all that it is made from.
+    """
+    from tendonfmu.demo.demo import Story
+    from tendonfmu.demo.text import chapter_lines, chapter_tables, file_lines
+
+    story = Story(output)
+    if story.missing:
+        say(f"tendonfmu: warning: {story.missing}")
+    for number, chapter in enumerate(story.chapters, start=1):
+        say(f"{number} {chapter.name}: {chapter.title[:1].lower()}{chapter.title[1:]}")
+        with progress_bar() as bar:
+            chapter.run(phase_bar(bar))
+        print_tables(chapter_tables(story, chapter.name), chapter_lines(story, chapter.name), left="")
+    story.write()
+    print_tables((), file_lines(story), left="")

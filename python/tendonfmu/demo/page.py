@@ -1,0 +1,146 @@
+"""The page of the demo: its chapters with their figures in one HTML file that needs nothing else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from tendonfmu.calibrate import text as calibration_text
+from tendonfmu.calibrate.calibration import DIAGNOSIS
+from tendonfmu.calibrate.files import PAGE as CALIBRATION_PAGE
+from tendonfmu.demo.demo import CALIBRATION, FIT, TRAINING, TWO_JOINTS, UNSEEN, Story
+from tendonfmu.demo.figures import story_sheets
+from tendonfmu.demo.run import FLEXION, FREE, FREE_X4, MINUTES, PUSHES
+from tendonfmu.demo.text import alarms, chapter_tables, detection_sentence, fit_sentence
+from tendonfmu.diagnose.result import Diagnosis
+from tendonfmu.files.whole_file import whole_file
+from tendonfmu.report.diagnosis_page import PAGE as DIAGNOSIS_PAGE
+from tendonfmu.report.diagnosis_page import Tile, cards_of, drawn_sheets
+from tendonfmu.report.diagnosis_text import (
+    at_place,
+    error_sentence,
+    headline,
+    left_sentence,
+    names_of,
+    percent,
+    together,
+    unit_of,
+)
+from tendonfmu.report.diagnosis_waterfall import waterfall_of
+from tendonfmu.report.fit_page import PAGE as FIT_PAGE
+from tendonfmu.report.fit_page import PageFigure, draw_sheet, render
+from tendonfmu.report.fit_summary import residual_tables, rounded
+
+PAGE = "story.html"
+
+
+def write_story(story: Story, file: Path) -> None:
+    """All chapters of a story that was told to its end. The file appears whole or not at all."""
+    text = story_page(story, [draw_sheet(sheet) for sheet in story_sheets(story)])
+    with whole_file(file) as partial:
+        partial.write_text(text, encoding="utf-8")
+
+
+def story_page(story: Story, figures: list[PageFigure]) -> str:
+    """HTML text of the page."""
+    by_section: dict[str, list[PageFigure]] = {}
+    for figure in figures:
+        by_section.setdefault(figure.sheet.section, []).append(figure)
+    return render(
+        "story.html.jinja",
+        chapters=story.chapters,
+        tiles=[(each.name, _tile(story, each.name)) for each in story.chapters],
+        tables={each.name: list(chapter_tables(story, each.name)) for each in story.chapters},
+        figures=by_section,
+        calibrate=None if story.missing else _calibrate(story),
+        detect=_detect(story),
+        diagnosis=None if story.missing else _diagnosis(story),
+        fit=None if story.missing else {"sentence": fit_sentence(story), "page": f"{FIT}/{FIT_PAGE}"},
+        run=_run(story),
+        missing=story.missing,
+        files=[(path.relative_to(story.folder).as_posix(), what) for path, what in story.files.items()],
+    )
+
+
+def _tile(story: Story, chapter: str) -> Tile:
+    """The figure that matters in a chapter."""
+    results = story.finger.results
+    if chapter == "calibrate":
+        return Tile(*next(calibration_text.tiles(story.calibration.report)))
+    if chapter == "run":
+        joint = next(each for each in results[FREE].joints if each.name == FLEXION)
+        left = f"{1e3 * joint.measured:.0f} → {1e3 * joint.left:.1f}"
+        return Tile(left, "mN·m", "torque at the base of the finger, before and after its friction is subtracted")
+    if chapter == "fit":
+        unseen = list(residual_tables(story.fit.picture()))[-1]
+        fitted = f"{rounded(unseen.all.start)} → {rounded(unseen.all.fitted)}"
+        return Tile(fitted, unseen.unit, "error on an unseen recording, before and after friction is learned")
+    if chapter == "detect":
+        score = results[PUSHES].score
+        found = f"{score.found} of {len(score.events)}"
+        return Tile(
+            found, "", f"pushes found, without a touch sensor, by a finger calibrated on {MINUTES} min of motion"
+        )
+    return _tile_of_cause(story.diagnosis)
+
+
+def _tile_of_cause(found: Diagnosis) -> Tile:
+    factor, unit = unit_of(found)
+    before, after = (rounded(factor * together(each.test_rms)) for each in (found.nominal, found.extended))
+    if not found.causes:
+        return Tile(before, unit, "error on an unseen recording; no cause was found")
+    first = found.causes[0]
+    cause = f"{at_place(first.title, first.where, names_of(found))}, found and built in"
+    meaning = f"error on an unseen recording: {percent(found.gain.value)} less with {cause}"
+    return Tile(f"{before} → {after}", unit, meaning)
+
+
+def _calibrate(story: Story) -> dict[str, Any]:
+    report = story.calibration.report
+    tone, sentence = calibration_text.verdict(report)
+    return {
+        "command": f"tendonfmu calibrate {TWO_JOINTS} {TRAINING} --test {UNSEEN} -o {CALIBRATION}",
+        "seconds": f"{report['seconds']:.0f}",
+        "tone": tone,
+        "verdict": sentence,
+        "warnings": report["warnings"],
+        "next": report["next"],
+        "page": f"{CALIBRATION}/{CALIBRATION_PAGE}",
+    }
+
+
+def _run(story: Story) -> dict[str, Any]:
+    results = story.finger.results
+    return {
+        "finger": story.finger.description.name.replace("_", " "),
+        "joint": FLEXION.replace("_", " "),
+        "force": f"{results[FREE].mean_force:.0f}",
+        "more": f"{results[FREE_X4].mean_force:.0f}",
+        "alarms": alarms(results[FREE].score),
+        "more_alarms": alarms(results[FREE_X4].score),
+    }
+
+
+def _detect(story: Story) -> dict[str, Any]:
+    result = story.finger.results[PUSHES]
+    return {
+        "sentence": detection_sentence(result.score),
+        "as_given": detection_sentence(story.finger.as_given),
+        "minutes": MINUTES,
+        "seconds": f"{result.seconds:.0f}",
+    }
+
+
+def _diagnosis(story: Story) -> dict[str, Any]:
+    found = story.diagnosis
+    names = names_of(found)
+    return {
+        "headline": headline(found),
+        "error": error_sentence(found),
+        "left": left_sentence(found),
+        "fall": waterfall_of(found, names),
+        "cards": cards_of(found, names),
+        "figures": drawn_sheets(found),
+        "tested": found.tested,
+        "page": f"{CALIBRATION}/{DIAGNOSIS}/{DIAGNOSIS_PAGE}",
+    }

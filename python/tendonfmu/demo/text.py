@@ -1,0 +1,140 @@
+"""What the demo shows, in words: rows and lines that `cli/program.py` prints, and sentences of its page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from tendonfmu.calibrate import text as calibration_text
+from tendonfmu.demo.demo import Story
+from tendonfmu.demo.run import FREE, FREE_X4, PUSHES, RecordingResult
+from tendonfmu.detect.counting import DetectionScore
+from tendonfmu.report.diagnosis_text import confusion_sentence, error_sentence, headline, names_of
+from tendonfmu.report.fit_summary import ResidualTable, residual_tables, rounded
+
+Row = tuple[str, ...]
+Table = tuple[str, Row, list[Row]]
+
+
+def chapter_tables(story: Story, chapter: str) -> Iterator[Table]:
+    """(title, headings, rows) of a chapter that was run."""
+    results = story.finger.results
+    if chapter == "calibrate":
+        yield from calibration_text.tables(story.calibration.report)
+    if chapter == "run":
+        yield _left(story.finger.description.name, [results[FREE], results[FREE_X4]])
+    if chapter == "detect":
+        yield _pushed(results[PUSHES])
+    if chapter == "fit":
+        yield _fitted(list(residual_tables(story.fit.picture())))
+
+
+def chapter_lines(story: Story, chapter: str) -> Iterator[str]:
+    """Its lines, after the tables."""
+    results = story.finger.results
+    if chapter == "calibrate":
+        report = story.calibration.report
+        yield from (f"warning: {sentence}" for sentence in report["warnings"])
+        yield from calibration_text.lines(report)
+    if chapter == "run":
+        for name in (FREE, FREE_X4):
+            yield f"{_motion(results[name])}: alarms without a push: {alarms(results[name].score)}"
+    if chapter == "fit":
+        yield fit_sentence(story)
+    if chapter == "detect":
+        yield f"calibrated: {detection_sentence(results[PUSHES].score)}"
+        yield f"as given:   {detection_sentence(story.finger.as_given)}"
+    if chapter == "diagnose":
+        yield from cause_lines(story)
+
+
+def file_lines(story: Story) -> Iterator[str]:
+    """What was written."""
+    for path, what in story.files.items():
+        yield f"  {path}  {what}"
+
+
+def _motion(result: RecordingResult) -> str:
+    what = "the same motion" if result.name == FREE_X4 else "free motion"
+    return f"{what}, {result.mean_force:.0f} N"
+
+
+def _left(finger: str, results: Sequence[RecordingResult]) -> Table:
+    rows = []
+    for joints in zip(*(result.joints for result in results), strict=True):
+        cells = [f"{1e3 * joint.measured:.1f} → {1e3 * joint.left:.1f}" for joint in joints]
+        rows.append((joints[0].name, *cells))
+    title = f"{finger}: joint torque → left after compensation, rms in mN·m"
+    return title, ("", *map(_motion, results)), rows
+
+
+def _pushed(result: RecordingResult) -> Table:
+    rows: list[Row] = [
+        (
+            joint.name,
+            f"{1e3 * joint.measured:.1f} → {1e3 * joint.left:.1f}",
+            f"{1e3 * joint.load:.1f} → {1e3 * joint.error:.1f}",
+        )
+        for joint in result.joints
+    ]
+    headings = ("", "nobody pushes\ntorque → left", "while pushed\nexternal → error")
+    return f"pushes on the fingertip, {result.mean_force:.0f} N, rms in mN·m", headings, rows
+
+
+def _fitted(tables: Sequence[ResidualTable]) -> Table:
+    rows: list[Row] = []
+    for table, name in zip(tables, ("training", "unseen"), strict=True):
+        for row in [*table.rows[:-1], table.all]:
+            cells = (row.torque, row.bias_only, row.start, row.fitted)
+            rows.append((f"{name}, {row.name.replace('_', ' ')}", *map(rounded, cells)))
+    headings = ("", "torque", "no friction model", "before the fit", "fitted")
+    return f"two-joint finger: torque and what the model leaves of it, rms in {tables[0].unit}", headings, rows
+
+
+# --- sentences --------------------------------------------------------------------------------------------------------
+
+
+def fit_sentence(story: Story) -> str:
+    """How many numbers from how much motion, and what that does for a recording that was not trained on."""
+    report = story.fit.report_
+    unseen = list(residual_tables(story.fit.picture()))[-1]
+    seconds = sum(each["duration"] for each in report["recordings"])
+    return (
+        f"{report['identified']['of']} numbers from {seconds:.0f} s of motion in {report['seconds']:.1f} s; on a "
+        f"recording that it has not seen the error falls from {rounded(unseen.all.start)} to "
+        f"{rounded(unseen.all.fitted)} {unseen.unit} rms"
+    )
+
+
+def detection_sentence(score: DetectionScore) -> str:
+    """Pushes found, and alarms without one."""
+    return f"{push_sentence(score)}; alarms without a push: {alarms(score)}"
+
+
+def push_sentence(score: DetectionScore) -> str:
+    """How many pushes were found, and how soon."""
+    text = f"{score.found} of {len(score.events)} pushes found"
+    return f"{text}, half of them within {1e3 * np.median(score.delays):.0f} ms" if score.found else text
+
+
+def alarms(score: DetectionScore) -> str:
+    """Alarms without a push."""
+    if not score.false_alarms:
+        return "none"
+    begin, end = max(score.false_alarms, key=lambda alarm: alarm[1] - alarm[0])
+    many = f"{len(score.false_alarms)}, {100 * score.free_alarm_share:.1f} % of the time"
+    feeds = " (in contact the bias is frozen: an alarm can feed itself)" if end - begin > 1.0 else ""
+    return f"{many}, the longest {end - begin:.1f} s from {begin:.1f} s on{feeds}"
+
+
+def cause_lines(story: Story) -> Iterator[str]:
+    """Verdict, each cause with its size, and the gain."""
+    found = story.diagnosis
+    names = names_of(found)
+    yield headline(found)
+    for cause in found.causes:
+        yield f"  {cause.where.effect} at {names.place(cause.where) or 'the whole finger'}: {cause.size}"
+        if confusion := confusion_sentence(cause, names):
+            yield f"  {confusion}"
+    yield error_sentence(found)

@@ -1,0 +1,258 @@
+"""The rule for contact at rest, learned from the rests in free motion (docs/contract-additions.md, contact.rest).
+
+How far a standing motor moves comes from its positions; how much the torques change at rest from the runtime, which
+decides what a rest is. Bounds are fitted to some of the rests and scaled until the others keep the rate.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from tendonfmu.detect.alarm_level import allowed_alarms, rate_limit
+from tendonfmu.detect.free_motion import NEVER, FreePart
+from tendonfmu.model import native
+
+Numbers = NDArray[np.float64]
+
+SETTLE_TIME = 0.3  # s; the default of contact.rest.settle_time
+INNOVATION_TIME = 0.5  # s; a touch rises within that, and what creeps meanwhile is little
+LEAST_REST = 0.5  # s; shorter rests are not learned from: a stop in passing
+LEFT_OUT = "contact.rest is left out: "  # and why
+LEAST_MINUTES, LEAST_RESTS = 2.0, 20  # in all; from fewer no bound can be held out
+STANDING_SHARE = 0.05  # of all windows; the span of positions at this quantile is that of standing motors
+TRAVEL_SPANS = 2.0  # spans of standing motors that a motor may be from the mark, which is a noisy sample itself
+SLOWEST = 0.5  # of velocity_threshold.tendon: a motor faster than this moves, and its span is not noise
+NOISE_LEVEL = 5.0  # σ: 100,000 independent averages an hour and joint pass it once in 17 hours
+FOLDS = 5
+BEYOND = 1.2  # beyond the largest change that was seen, where none may be above: the next hour's largest is not known
+_ROUNDS, _RAISE = 12, 1.1  # how often, and by how much, bounds are raised until the running finger keeps the rate
+
+
+@dataclass(frozen=True)
+class RestRule:
+    """keys: `contact.rest`. rests, hours: learned from. held_out: alarms in rests that the bounds were not fitted to.
+    alarms: of the finger as it runs. limit: 1/h of rest, upper, of their rate.
+    """
+
+    keys: Mapping[str, Any]
+    rests: int
+    hours: float
+    held_out: int
+    alarms: int
+    limit: float
+
+
+@dataclass(frozen=True)
+class Rest:
+    """One rest. time: [K] s since it began. change, sudden: [K, n] N·m, |c| and |y|. noise: [n] N·m, σ of c."""
+
+    time: Numbers
+    change: Numbers
+    sudden: Numbers
+    noise: Numbers
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """[n] N·m: contact.rest.threshold, creep and innovation.threshold."""
+
+    threshold: Numbers
+    creep: Numbers
+    sudden: Numbers
+
+    def scaled(self, factor: float) -> Bounds:
+        return Bounds(factor * self.threshold, factor * self.creep, factor * self.sudden)
+
+    def keys(self, travel: float) -> dict[str, Any]:
+        """`contact.rest`."""
+        return {
+            "travel": travel,
+            "settle_time": SETTLE_TIME,
+            "threshold": _rounded(self.threshold),
+            "creep": _rounded(self.creep),
+            "innovation": {"time": INNOVATION_TIME, "threshold": _rounded(self.sudden)},
+        }
+
+
+def learn_rest(
+    data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int, rate: float, confidence: float
+) -> tuple[RestRule | None, list[str]]:
+    """The rule for a rate of false alarms per hour of rest, or none; and sentences: why none, or what it supports."""
+    if not all("tendon_position" in part.arrays for part in parts):
+        return None, [_left_out("there are no tendon positions")]
+    travel = standing_travel(data, parts)
+    if travel is None:
+        return None, [_left_out(f"the motors never stand for {SETTLE_TIME:g} s")]
+    joints = len(data["joints"])
+    never = {"travel": travel, "settle_time": SETTLE_TIME, "threshold": [NEVER] * joints}
+    rests = find_rests(data, parts, kinematics, never)
+    hours = sum(float(each.time[-1]) for each in rests) / 3600.0
+    if 60.0 * hours < LEAST_MINUTES or len(rests) < LEAST_RESTS:
+        return None, [
+            _left_out(
+                f"{len(rests)} rests of {60.0 * hours:.2g} min in all; expected at least {LEAST_RESTS} of more than "
+                f"{LEAST_REST:g} s and {LEAST_MINUTES:g} min in all"
+            )
+        ]
+    allowed = max(0, allowed_alarms(hours, rate, confidence))
+    factor, held_out = level(rests, allowed)
+    bounds = fit_bounds(rests).scaled(factor)
+    for _ in range(_ROUNDS):
+        alarms = count_alarms(data, parts, kinematics, bounds.keys(travel))
+        if alarms <= allowed:
+            break
+        bounds = bounds.scaled(_RAISE)
+    limit = rate_limit(max(alarms, held_out), hours, confidence)
+    found = RestRule(bounds.keys(travel), len(rests), hours, held_out, alarms, limit)
+    sentences = []
+    if limit > rate:
+        sentences.append(
+            f"contact.rest: {len(rests)} rests of {60.0 * hours:.3g} min support at most {limit:.3g} false alarms per "
+            f"hour of rest at confidence {confidence:g}, not {rate:g}"
+        )
+    return found, sentences
+
+
+def _left_out(why: str) -> str:
+    return f"{LEFT_OUT}{why}"
+
+
+# --- motors -----------------------------------------------------------------------------------------------------------
+
+
+def standing_travel(data: Mapping[str, Any], parts: Sequence[FreePart]) -> float | None:
+    """m, within which a standing motor stays; None where no motor ever stands.
+
+    The span of the noisiest motor over windows of SETTLE_TIME, at the quantile STANDING_SHARE, or the resolution.
+    """
+    spans, resolution = [], np.inf
+    for part in parts:
+        position = part.arrays["tendon_position"]
+        moved = np.abs(np.diff(position, axis=0))
+        resolution = min(resolution, float(moved[moved > 0].min(initial=np.inf)))
+        width = int(np.searchsorted(part.time, part.time[0] + SETTLE_TIME))
+        whole = len(position) // max(width, 1) * width
+        if width and whole:
+            spans.append(np.ptp(position[:whole].reshape(-1, width, position.shape[1]), axis=1).max(axis=1))
+    if not spans or not np.isfinite(resolution):
+        return None
+    span = float(np.quantile(np.concatenate(spans), STANDING_SHARE))
+    given = (data.get("velocity_threshold") or {}).get("tendon")
+    slowest = SLOWEST * (0.0005 if given is None else float(given)) * SETTLE_TIME
+    if span > max(slowest, resolution):
+        return None
+    return float(f"{TRAVEL_SPANS * max(span, resolution):.3g}")
+
+
+# --- torques ----------------------------------------------------------------------------------------------------------
+
+
+def find_rests(
+    data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int, rule: Mapping[str, Any]
+) -> list[Rest]:
+    """The rests of more than LEAST_REST in all parts, as the runtime has them."""
+    found = []
+    for part, outputs in _runs(data, parts, kinematics, rule):
+        change = outputs["contact_change"]
+        standing = (change != 0.0).any(axis=1) & part.counted
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], standing.astype(int), [0]])))
+        for begin, end in edges.reshape(-1, 2):
+            time = part.time[begin:end] - part.time[begin]
+            if time[-1] >= LEAST_REST:
+                inside = change[begin:end]
+                found.append(Rest(time, np.abs(inside), np.abs(_innovation(time, inside)), _noise(time, inside)))
+    return found
+
+
+def _innovation(time: Numbers, change: Numbers) -> Numbers:
+    """[K, n] y of a rest without contact: c less m, which follows it; at the median step, which the runtime takes each
+    for itself."""
+    share = -np.expm1(-float(np.median(np.diff(time))) / INNOVATION_TIME)
+    followed = lfilter([share], [1.0, share - 1.0], change, axis=0)
+    return np.asarray(change - np.vstack([np.zeros((1, change.shape[1])), followed[:-1]]))
+
+
+def _noise(time: Numbers, change: Numbers) -> Numbers:
+    """[n] σ of c without what creeps: of second differences over 0.1 s, by their median."""
+    lag = max(1, int(np.searchsorted(time, 0.1)))
+    if len(time) <= 2 * lag:
+        return np.zeros(change.shape[1])
+    bend = change[2 * lag :] - 2.0 * change[lag:-lag] + change[: -2 * lag]
+    # 0.6745 σ is the median of |x|; three independent averages with weights 1, −2, 1
+    return np.asarray(np.median(np.abs(bend), axis=0) / (0.6745 * np.sqrt(6.0)))
+
+
+def fit_bounds(rests: Sequence[Rest]) -> Bounds:
+    """The least that no change of these rests exceeds, noise apart.
+
+    Both thresholds hold the noise of a change, a difference of two averages; `threshold` also what changes within
+    SETTLE_TIME. Creep holds the rest, which grows with the root of the time as the runtime has it.
+    """
+    noise = NOISE_LEVEL * np.sqrt(2.0) * np.median([each.noise for each in rests], axis=0)
+    early = np.max([each.change[each.time <= SETTLE_TIME].max(axis=0) for each in rests], axis=0)
+    threshold = _above_zero(np.maximum(noise, early))
+    creep = np.zeros_like(threshold)
+    for each in rests:
+        late = each.time > SETTLE_TIME
+        slope = (each.change[late] - threshold) / np.sqrt(each.time[late])[:, None]
+        creep = np.maximum(creep, slope.max(axis=0, initial=0.0))
+    sudden = _above_zero(np.maximum(noise, np.max([each.sudden.max(axis=0) for each in rests], axis=0)))
+    return Bounds(threshold, creep, sudden)
+
+
+def _above_zero(values: Numbers) -> Numbers:
+    """[n] as the keys want them, at joints that feel nothing too."""
+    return np.asarray(np.maximum(values, 1e-9 + 1e-3 * values.max()))
+
+
+def excess(rest: Rest, bounds: Bounds) -> float:
+    """The largest ratio of a change to its bound."""
+    bound = bounds.threshold + bounds.creep * np.sqrt(rest.time)[:, None]
+    return float(max((rest.change / bound).max(), (rest.sudden / bounds.sudden).max()))
+
+
+def level(rests: Sequence[Rest], allowed: int) -> tuple[float, int]:
+    """Factor on bounds fitted to all rests, at least 1, and the alarms that it leaves in rests held out in turn."""
+    held = np.zeros(len(rests))
+    for fold in range(FOLDS):
+        bounds = fit_bounds([each for k, each in enumerate(rests) if k % FOLDS != fold])
+        held[fold::FOLDS] = [excess(each, bounds) for each in rests[fold::FOLDS]]
+    largest = np.sort(held)[::-1]
+    factor = max(1.0, float(largest[allowed]) if allowed < len(held) else 0.0)
+    if not allowed:
+        factor *= BEYOND
+    return factor, int((held > factor).sum())
+
+
+def count_alarms(data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int, rule: Mapping[str, Any]) -> int:
+    """Begins of `contact_at_rest` of the finger with this rule, in counted time."""
+    count = 0
+    for part, outputs in _runs(data, parts, kinematics, rule):
+        alarm = outputs["contact_at_rest"].ravel().astype(int)
+        begins = np.diff(alarm, prepend=0) > 0
+        count += int((begins & part.counted).sum())
+    return count
+
+
+def _runs(
+    data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int, rule: Mapping[str, Any]
+) -> list[tuple[FreePart, dict[str, NDArray[Any]]]]:
+    contact = {**data["contact"], "rest": dict(rule)}
+    finger = native.Finger.from_description(json.dumps({**data, "contact": contact}), kinematics)
+    begin, found = finger.save_state(), []
+    for part in parts:
+        finger.restore_state(begin)
+        outputs = finger.run(part.arrays)
+        found.append((part, {name: outputs[name] for name in ("contact_change", "contact_at_rest")}))
+    return found
+
+
+def _rounded(values: Numbers) -> list[float]:
+    return [float(f"{value:.4g}") for value in values]

@@ -1,0 +1,274 @@
+"""Detected contact against labelled contact: what was found, missed, said without contact, and how late.
+
+The one way of counting of the product: the commands `score` and `tune`, the demo and the campaigns of bench/ use it.
+What is counted here is only counted; `summary.py` has the shares, rates and intervals.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.recordings.faults import gaps
+
+Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Spans = NDArray[np.int64]
+
+MERGED = 0.1  # s; labelled stretches, or alarms, closer than this are one
+SILENT = 0.2  # s before an onset without any sample of contact, or the event is not found
+GRACE = 0.1  # s after an event in which an alarm is neither false nor free time
+BLOCK = 2.0  # s of free time; longer than residuals and alarms of free motion are correlated
+_EQUAL = 1e-9  # s; times of a CSV are decimal
+
+
+@dataclass(frozen=True)
+class Signals:
+    """What else is known of each sample; None: not known.
+
+    residual: [N, n] N·m before the bias update, NaN where there is none. compensated: [N, n] N·m, the estimate of the
+    external torque; deviation: [N, n] N·m, its standard deviation as told. external: [N, n] N·m of a reference sensor.
+    force: [N] N, sensed.
+    """
+
+    residual: Numbers | None = None
+    compensated: Numbers | None = None
+    external: Numbers | None = None
+    force: Numbers | None = None
+    deviation: Numbers | None = None
+
+
+@dataclass(frozen=True)
+class Event:
+    """One labelled contact. Times in s, NaN where there is none.
+
+    onset, end: first and last labelled sample. silent: no sample of contact in the `SILENT` time before. alarm: first
+    sample of the first alarm that begins in [onset, end]. held: that alarm lasts until less than `MERGED` before the
+    end. held_share: part of the time from alarm to end that is contact. overhang: s of free time in alarms that began
+    in the event or its grace. compensated, external: [n] N·m at the alarm; force: N at it.
+    """
+
+    onset: float
+    end: float
+    silent: bool
+    alarm: float = math.nan
+    held: bool = False
+    held_share: float = math.nan
+    overhang: float = 0.0
+    compensated: Numbers | None = None
+    external: Numbers | None = None
+    force: float = math.nan
+
+    @property
+    def found(self) -> bool:
+        return self.silent and not math.isnan(self.alarm)
+
+    @property
+    def delay(self) -> float:
+        """s; NaN unless found."""
+        return self.alarm - self.onset if self.found else math.nan
+
+
+@dataclass(frozen=True)
+class FreeBlocks:
+    """Sums over [b] blocks of about `BLOCK` seconds of free time.
+
+    seconds, alarm_seconds: in all, and in alarm. samples: that have a residual. squares: [b, n] sum of its squares.
+    """
+
+    seconds: Numbers
+    alarm_seconds: Numbers
+    samples: Numbers
+    squares: Numbers
+
+
+@dataclass(frozen=True)
+class ContactSums:
+    """Sums over the samples of [e] events with a reference sensor; x: reference, y: compensated torque, N·m.
+
+    samples: [e]. The others [e, n]: of (y − x)², x, y, x², y², x·y; how many samples are `within` two of the standard
+    deviations that are told of y, NaN without these.
+    """
+
+    samples: Numbers
+    errors: Numbers
+    x: Numbers
+    y: Numbers
+    xx: Numbers
+    yy: Numbers
+    xy: Numbers
+    within: Numbers
+
+
+@dataclass(frozen=True)
+class DetectionScore:
+    """Of one recording, or of several pooled.
+
+    false_alarms: (begin, end) s, first and last sample of each. contact: None without a reference sensor.
+    """
+
+    events: list[Event]
+    false_alarms: list[tuple[float, float]]
+    free: FreeBlocks
+    contact: ContactSums | None
+
+    @property
+    def found(self) -> int:
+        return sum(event.found for event in self.events)
+
+    @property
+    def missed(self) -> int:
+        return len(self.events) - self.found
+
+    @property
+    def free_seconds(self) -> float:
+        return float(self.free.seconds.sum())
+
+    @property
+    def free_alarm_share(self) -> float:
+        """Part of the free time in alarm: false alarms and overhang; 0 without free time."""
+        return float(self.free.alarm_seconds.sum()) / self.free_seconds if self.free_seconds else 0.0
+
+    @property
+    def delays(self) -> Numbers:
+        """[found] s."""
+        return np.array([event.delay for event in self.events if event.found], dtype=float)
+
+
+def score_detection(time: Numbers, label: Flags, alarm: Flags, signals: Signals | None = None) -> DetectionScore:
+    """Scores one recording.
+
+    time: [N] s, increasing. label, alarm: [N], whether there is contact and whether the detector says so.
+
+    An event is found if an alarm begins in [onset, end] and the 0.2 s before the onset were silent. An alarm that
+    begins outside every [onset, end + 0.1 s] is false. Free time is the time outside all of these.
+    """
+    time = np.asarray(time, dtype=float)
+    label, alarm = (np.asarray(flags).ravel().astype(bool) for flags in (label, alarm))
+    given = signals or Signals()
+    spans, alarms = stretches(time, label), stretches(time, alarm)
+    free = _free(time, spans)
+    seconds = sample_seconds(time)
+    hanging = np.concatenate([[0.0], np.cumsum(seconds * (free & alarm))])
+    starts = alarms[:, 0]
+    events = [_event(time, alarm, alarms, span, hanging, given) for span in spans]
+    false = alarms[free[starts]]
+    return DetectionScore(
+        events=events,
+        false_alarms=[(float(time[begin]), float(time[end])) for begin, end in false],
+        free=_free_blocks(seconds, free, alarm, given.residual),
+        contact=_contact_sums(spans, given),
+    )
+
+
+def stretches(time: Numbers, flags: Flags) -> Spans:
+    """[k, 2] first and last sample of each stretch of set flags, those closer than `MERGED` put together."""
+    edges = np.diff(np.concatenate([[0], np.asarray(flags).astype(np.int8), [0]]))
+    first, last = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0) - 1
+    apart = time[first[1:]] - time[last[:-1]] >= MERGED - _EQUAL
+    one = np.ones(min(len(first), 1), dtype=bool)
+    return np.column_stack([first[np.concatenate([one, apart])], last[np.concatenate([apart, one])]])
+
+
+def sample_seconds(time: Numbers) -> Numbers:
+    """[N] s that each sample stands for: until the next one; at a gap and at the end a usual step."""
+    if len(time) < 2:
+        return np.zeros(len(time))
+    step = np.diff(time)
+    usual = float(np.median(step))
+    seconds = np.append(step, usual)
+    seconds[[k - 1 for k in gaps(time)]] = usual
+    return seconds
+
+
+def _free(time: Numbers, spans: Spans) -> Flags:
+    """[N] samples outside every [onset, end + GRACE]."""
+    free = np.ones(len(time), dtype=bool)
+    for first, last in spans:
+        free[first : np.searchsorted(time, time[last] + GRACE + _EQUAL)] = False
+    return free
+
+
+def _event(time: Numbers, alarm: Flags, alarms: Spans, span: Spans, hanging: Numbers, given: Signals) -> Event:
+    """hanging: [N + 1] s of free time in alarm before each sample."""
+    first, last = int(span[0]), int(span[1])
+    before = int(np.searchsorted(time, time[first] - SILENT - _EQUAL))
+    grace = int(np.searchsorted(time, time[last] + GRACE + _EQUAL))
+    own = alarms[(alarms[:, 0] >= first) & (alarms[:, 0] < grace)]
+    event = Event(
+        onset=float(time[first]),
+        end=float(time[last]),
+        silent=not alarm[before:first].any(),
+        overhang=float(sum(hanging[end + 1] - hanging[begin] for begin, end in own)),
+    )
+    inside = own[own[:, 0] <= last]
+    if not len(inside):
+        return event
+    begin, end = int(inside[0, 0]), int(inside[0, 1])
+    return Event(
+        event.onset,
+        event.end,
+        event.silent,
+        alarm=float(time[begin]),
+        held=bool(time[last] - time[end] < MERGED - _EQUAL),
+        held_share=float(alarm[begin : last + 1].mean()),
+        overhang=event.overhang,
+        compensated=None if given.compensated is None else given.compensated[begin],
+        external=None if given.external is None else given.external[begin],
+        force=math.nan if given.force is None else float(given.force[begin]),
+    )
+
+
+def _free_blocks(seconds: Numbers, free: Flags, alarm: Flags, residual: Numbers | None) -> FreeBlocks:
+    left = np.zeros((len(free), 0)) if residual is None else residual
+    known = free & ~np.isnan(left).any(axis=1) if left.shape[1] else np.zeros_like(free)
+    passed = np.cumsum(seconds * free)
+    count = max(1, round(float(passed[-1]) / BLOCK)) if len(passed) else 1
+    length = float(passed[-1]) / count if len(passed) and passed[-1] > 0 else 1.0
+    block = np.minimum((np.maximum(passed - 0.5 * seconds, 0.0) / length).astype(int), count - 1)
+
+    def summed(values: Numbers) -> Numbers:
+        return np.asarray(np.bincount(block[free], weights=values[free], minlength=count), dtype=float)
+
+    squares = np.where(known[:, None], left, 0.0) ** 2
+    return FreeBlocks(
+        seconds=summed(seconds),
+        alarm_seconds=summed(seconds * alarm),
+        samples=summed(known.astype(float)),
+        squares=np.column_stack([summed(squares[:, j]) for j in range(left.shape[1])] or [np.zeros((count, 0))]),
+    )
+
+
+def _contact_sums(spans: Spans, given: Signals) -> ContactSums | None:
+    x, y = given.external, given.compensated
+    if x is None or y is None:
+        return None
+    within = (
+        np.full_like(x, math.nan) if given.deviation is None else (np.abs(y - x) <= 2 * given.deviation).astype(float)
+    )
+    columns = ((y - x) ** 2, x, y, x * x, y * y, x * y, within)
+    sums = [
+        np.array([values[first : last + 1].sum(axis=0) for first, last in spans]).reshape(len(spans), x.shape[1])
+        for values in columns
+    ]
+    return ContactSums(np.array([last + 1.0 - first for first, last in spans], dtype=float), *sums)
+
+
+def pooled(scores: Sequence[DetectionScore]) -> DetectionScore:
+    """Several recordings as one; what only some of them have is of these."""
+    contacts = [score.contact for score in scores if score.contact is not None]
+    return DetectionScore(
+        events=[event for score in scores for event in score.events],
+        false_alarms=[alarm for score in scores for alarm in score.false_alarms],
+        free=FreeBlocks(*_joined([score.free for score in scores])),
+        contact=ContactSums(*_joined(contacts)) if contacts else None,
+    )
+
+
+def _joined(parts: Sequence[FreeBlocks] | Sequence[ContactSums]) -> list[Numbers]:
+    """Every array of the parts, one after the other."""
+    return [np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])]

@@ -1,0 +1,218 @@
+"""Recordings of free motion to tune contact detection on: checked for contact, and what a finger leaves of them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.detect.counting import sample_seconds
+from tendonfmu.errors import InputError
+from tendonfmu.model import native
+from tendonfmu.model.description import FingerDescription
+from tendonfmu.recordings.prepared import Held, prepare
+from tendonfmu.recordings.recording import Recording
+
+Numbers = NDArray[np.float64]
+Signal = NDArray[np.float32]  # of millions of samples; seven digits are enough to choose thresholds
+Flags = NDArray[np.bool_]
+
+SETTLING = 2.0  # s after the start, while the bias forgets its initial variance: not counted
+NEVER = 1e9  # N·m; no threshold that anything passes
+BEYOND_NOISE = 6.0  # times the noise of a reference sensor, on average of `SMOOTHED`: then it feels something
+SMOOTHED = 0.05  # s
+STILL = 0.01  # share of time with motion; less says nothing of friction
+
+
+@dataclass(frozen=True)
+class FreePart:
+    """A stretch of a recording without a gap, over which a finger starts anew.
+
+    arrays: of `native.Finger.run`. counted: [N] settled, no stuck sensor. seconds: [N] s that each sample stands for.
+    """
+
+    source: str
+    arrays: Mapping[str, Numbers]
+    mean_force: Numbers
+    counted: Flags
+    seconds: Numbers
+
+    @property
+    def time(self) -> Numbers:
+        return self.arrays["time"]
+
+    @property
+    def hours(self) -> float:
+        return float(self.seconds[self.counted].sum()) / 3600.0
+
+
+@dataclass(frozen=True)
+class FreeRun:
+    """What a finger that never sees contact leaves of a part, all [N, n] and in N·m.
+
+    residual, innovation, drift: r, y and d. stuck, jump: H and J. known: standard deviation that is known before any
+    tuning, of the bias and of the model's uncertainty; uncertain: u, of the latter alone.
+    """
+
+    part: FreePart
+    residual: Signal
+    innovation: Signal
+    drift: Signal
+    stuck: Signal
+    jump: Signal
+    known: Signal
+    uncertain: Signal
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Time constants of what is computed: innovation T, jump T_J and stuck T_H, s."""
+
+    innovation: float
+    jump: float
+    stuck: float
+
+
+# --- recordings -------------------------------------------------------------------------------------------------------
+
+
+def free_parts(finger: FingerDescription, recording: Recording, kinematics: int) -> tuple[list[FreePart], list[str]]:
+    """The parts of a recording, and sentences about it. Raises InputError: in contact, without motion, or unsound."""
+    require_no_contact(recording)
+    groups = {name: values for name, values in recording.groups.items() if name != "external_torque"}
+    prepared = prepare(finger, replace(recording, groups=groups, contact=None), kinematics, Held())
+    _refuse_stillness(finger, recording, prepared.model.joint_speed)
+    force = np.abs(groups["tendon_force"]).mean(axis=1)
+    parts = []
+    for rows in prepared.parts:
+        time = recording.time[rows]
+        settled = time - time[0] >= SETTLING
+        arrays = prepared.arrays(rows)
+        counted = settled & ~prepared.faulty[rows]
+        parts.append(FreePart(str(recording.path), arrays, force[rows], counted, sample_seconds(time)))
+    sentences = [sentence.replace("are fitted as", "count as") for sentence in prepared.warnings]
+    return parts, sentences
+
+
+def require_no_contact(recording: Recording) -> None:
+    """Raises InputError where a label or a reference sensor says that something touches the finger."""
+    label = recording.contact
+    if label is not None and label.any():
+        first = int(np.flatnonzero(label)[0])
+        raise InputError(
+            f"{recording.path}: column contact, row {first + 1}: 1 at {recording.time[first]:.6g} s, and in "
+            f"{int(label.sum())} samples; expected 0 throughout: false alarms are counted in free motion"
+        )
+    reference = recording.groups.get("external_torque")
+    if reference is None:
+        return
+    off = np.abs(_smoothed(reference - np.median(reference, axis=0), recording.time))
+    # of differences, so that contact does not count as noise; 90 % of a normal distribution lies within 1.645 σ
+    step = np.diff(reference, axis=0) if len(reference) > 1 else np.zeros((1, reference.shape[1]))
+    noise = np.quantile(np.abs(step), 0.9, axis=0) / (1.645 * np.sqrt(2.0))
+    wrong = np.argwhere(off > BEYOND_NOISE * noise + 1e-9)
+    if len(wrong):
+        row, j = wrong[0]
+        raise InputError(
+            f"{recording.path}: column external_torque[{j + 1}], row {row + 1}: {reference[row, j]:.4g} N.m at "
+            f"{recording.time[row]:.6g} s; expected at most {BEYOND_NOISE * noise[j]:.2g} N.m beside its median, "
+            f"{BEYOND_NOISE:g} times its noise, as in free motion"
+        )
+
+
+def _smoothed(values: Numbers, time: Numbers) -> Numbers:
+    """[N, n] running mean over about `SMOOTHED`."""
+    width = 1 if len(time) < 2 else max(1, min(len(time), round(SMOOTHED / float(np.median(np.diff(time))))))
+    total = np.cumsum(np.vstack([np.zeros((1, values.shape[1])), values]), axis=0)
+    begin = np.clip(np.arange(len(values)) - width // 2, 0, len(values) - width)
+    return np.asarray((total[begin + width] - total[begin]) / width)
+
+
+def _refuse_stillness(finger: FingerDescription, recording: Recording, speed: Numbers) -> None:
+    given = (finger.data.get("velocity_threshold") or {}).get("joint")
+    least = 0.01 if given is None else float(given)
+    share = float(np.nanmean((np.abs(speed) > least).any(axis=1)))
+    if share < STILL:
+        raise InputError(
+            f"{recording.path}: no motion: no joint is faster than velocity_threshold.joint = {least:g} rad/s in "
+            f"{100 * (1 - share):.1f} % of the time; expected free motion with stops and reversals of all joints"
+        )
+
+
+# --- runs -------------------------------------------------------------------------------------------------------------
+
+
+def run_free(data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int, clock: Clock) -> list[FreeRun]:
+    """Every part with contact switched off."""
+    probe = _finger(_open_loop(data, clock), kinematics)
+    plain = _finger(_without_uncertainty(_open_loop(data, clock)), kinematics) if _is_uncertain(data) else None
+    begin, plain_begin = probe.save_state(), None if plain is None else plain.save_state()
+    runs = []
+    for part in parts:
+        probe.restore_state(begin)
+        found = _run(probe, part)
+        known = found["compensated_torque_std"]
+        uncertain = np.zeros_like(known)
+        if plain is not None and plain_begin is not None:
+            plain.restore_state(plain_begin)
+            of_bias = _run(plain, part)["compensated_torque_std"]
+            uncertain = np.sqrt(np.maximum(known**2 - of_bias**2, 0.0))
+        names = ("residual", "innovation", "drift", "stuck_friction", "friction_jump")
+        arrays = [*(found[name] for name in names), known, uncertain]
+        runs.append(FreeRun(part, *(values.astype(np.float32) for values in arrays)))
+    return runs
+
+
+def _is_uncertain(data: Mapping[str, Any]) -> bool:
+    return (data.get("contact") or {}).get("uncertainty") is not None
+
+
+def _open_loop(data: Mapping[str, Any], clock: Clock) -> dict[str, Any]:
+    """The description that computes all that decides on contact, and never decides for it."""
+    never = [NEVER] * len(data["joints"])
+    given = data["contact"].get("friction_bound") or {}
+    contact: dict[str, Any] = {
+        "method": "innovation",
+        "threshold": never,
+        "innovation": {"time": clock.innovation, "threshold": never},
+        "drift": {"threshold": never},
+        "friction_bound": {
+            **given,
+            "stuck_share": 0.0,
+            "jump_share": 0.0,
+            "jump_time": clock.jump,
+            "stuck_time": clock.stuck,
+        },
+    }
+    if _is_uncertain(data):
+        contact["uncertainty"] = data["contact"]["uncertainty"]
+    return {**data, "contact": contact, "sensor_fault": None}
+
+
+def _without_uncertainty(data: Mapping[str, Any]) -> dict[str, Any]:
+    return {**data, "contact": {key: value for key, value in data["contact"].items() if key != "uncertainty"}}
+
+
+def _finger(data: Mapping[str, Any], kinematics: int) -> native.Finger:
+    return native.Finger(native.image_from_json(json.dumps(data)), kinematics)
+
+
+def _run(finger: native.Finger, part: FreePart) -> dict[str, NDArray[Any]]:
+    try:
+        return finger.run(part.arrays)
+    except native.NativeError as refused:
+        raise InputError(f"{part.source}: {refused}") from None
+
+
+def closed_loop(data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int) -> list[Flags]:
+    """[N] `contact` of the finger as it is, over every part."""
+    finger = _finger(data, kinematics)
+    begin, found = finger.save_state(), []
+    for part in parts:
+        finger.restore_state(begin)
+        found.append(np.asarray(_run(finger, part)["contact"]).ravel().astype(bool))
+    return found

@@ -1,0 +1,211 @@
+"""Runs a finger, or its FMU, over recordings for a score: the decision of every sample and what it was made of."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.detect.counting import DetectionScore, Signals, pooled, score_detection
+from tendonfmu.errors import InputError
+from tendonfmu.fmu.running import check_model, run_model
+from tendonfmu.model import native
+from tendonfmu.model.description import FingerDescription, read_finger
+from tendonfmu.model.signals import inputs_used, watches_motors
+from tendonfmu.recordings.recording import Recording
+from tendonfmu.recordings.residuals import model_alone
+
+Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+# what decides, in the description's `contact`
+THRESHOLDS = ("threshold", "threshold_per_force")
+SHARES = ("stuck_share", "jump_share")
+REST_BOUNDS = (*THRESHOLDS, "creep")
+UNCERTAINTY_LEVEL = ("uncertainty_level", 3.0)  # key and default
+LARGEST = {"stuck_share": 10.0, "jump_share": 10.0, "uncertainty_level": 100.0}
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is scored. path: as given. finger: its description. packed: it came as an FMU, which is what runs."""
+
+    path: Path
+    finger: FingerDescription
+    packed: bool
+
+
+@dataclass(frozen=True)
+class Track:
+    """A finger over a recording. label: [N], False throughout without labels. outputs: of `native.Finger.run`.
+
+    residual: [N, n] N·m before the bias update, NaN where it cannot be known. force: [N] N, sensed, or None.
+    """
+
+    recording: Recording
+    label: Flags
+    outputs: Mapping[str, NDArray[Any]]
+    residual: Numbers
+    force: Numbers | None
+
+    @property
+    def alarm(self) -> Flags:
+        return np.asarray(self.outputs["contact"].ravel().astype(bool))
+
+    @property
+    def external(self) -> Numbers | None:
+        """[N, n] N·m of the reference sensor, or None."""
+        return self.recording.groups.get("external_torque")
+
+    def score(self) -> DetectionScore:
+        outputs = self.outputs
+        signals = Signals(
+            residual=self.residual,
+            compensated=outputs["compensated_torque"],
+            external=self.external,
+            force=self.force,
+            deviation=outputs.get("compensated_torque_std"),
+        )
+        return score_detection(self.recording.time, self.label, self.alarm, signals)
+
+    def decisions(self) -> DetectionScore:
+        """The same of the decisions alone."""
+        return score_detection(self.recording.time, self.label, self.alarm)
+
+
+def read_subject(model: Path) -> Subject:
+    """A description, or an FMU with the description it was made of. Raises InputError."""
+    check_model(model)
+    if model.suffix.lower() == ".json":
+        return Subject(model, read_finger(model), packed=False)
+    try:
+        with zipfile.ZipFile(model) as archive:
+            text = archive.read("resources/finger.json")
+    except (OSError, zipfile.BadZipFile):
+        raise InputError(f"{model}: not an FMU; expected FINGER.json or FINGER.fmu") from None
+    except KeyError:
+        raise InputError(f"{model}: no resources/finger.json in it; expected an FMU of `tendonfmu build`") from None
+    try:
+        return Subject(
+            model, FingerDescription(model, text, json.loads(text), native.image_from_json(text)), packed=True
+        )
+    except ValueError as refused:
+        raise InputError(f"{model}: resources/finger.json: {refused}") from None
+
+
+def run_track(subject: Subject, recording: Recording, kinematics: int, force: str | None) -> Track:
+    """force: column with the sensed force, or None. Raises InputError where the recording does not fit the finger."""
+    data = subject.finger.data
+    joints, tendons = len(data["joints"]), len(data["tendons"])
+    recording.require(joints, tendons, inputs_used(kinematics, watches_motors(data)))
+    if subject.packed:
+        outputs = _grouped(run_model(subject.path, recording, kinematics_source=kinematics))
+    else:
+        outputs = _run(subject.finger.image, recording, kinematics)
+    label = np.zeros(len(recording), dtype=bool) if recording.contact is None else recording.contact
+    sensed = None if force is None else recording.others.get(force)
+    if "residual" in outputs:  # of `native.Finger.run`, 0 at the first sample
+        residual = outputs["residual"].copy()
+        residual[0] = np.nan
+    else:
+        residual = residual_of(data, recording, outputs, kinematics)
+    return Track(recording, label, outputs, residual, sensed)
+
+
+def _run(image: bytes, recording: Recording, kinematics: int) -> dict[str, NDArray[Any]]:
+    try:
+        return native.Finger(image, kinematics).run(recording.arrays())
+    except native.NativeError as refused:
+        raise InputError(f"{recording.path}: {refused}") from None
+
+
+def _grouped(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """[N, n] of the columns name[1], name[2], ...; what has no index as it is."""
+    groups: dict[str, list[NDArray[Any]]] = {}
+    for name, column in columns.items():
+        groups.setdefault(name.partition("[")[0], []).append(column)
+    return {name: each[0] if name in columns else np.column_stack(each) for name, each in groups.items()}
+
+
+def residual_of(
+    data: Mapping[str, Any], recording: Recording, outputs: Mapping[str, NDArray[Any]], kinematics: int
+) -> Numbers:
+    """[N, n] residual before the bias has seen the sample, N·m, NaN for the first sample.
+
+    What the update took from it is in the bias: r = compensated + (b − b before), wherever the bias did not jump by
+    itself. Where it did, at the start and end of stiction, r = compensated/(1 − K) with the gain between those of the
+    samples around it, in contact that of the last such sample.
+    """
+    whole = slice(0, len(recording))
+    jumps = model_alone(data, [recording.arrays()], [whole], len(recording), kinematics).jump
+    jumped = (jumps != 0).any(axis=1)
+    left, moved = outputs["compensated_torque"], np.diff(outputs["bias_torque"], axis=0, prepend=np.nan)
+    residual = left + moved
+    power = np.sum(residual**2, axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        gain = np.sum(residual * moved, axis=1) / power
+        gain[jumped] = np.nan
+        contact = np.asarray(outputs["contact"]).ravel().astype(bool)
+        near = np.where(contact, _last_known(gain, contact), _between_known(gain, ~contact))
+        residual[jumped] = (left / (1 - near[:, None]))[jumped]
+    residual[~np.isfinite(residual)] = np.nan
+    return np.asarray(residual)
+
+
+def _last_known(values: Numbers, chosen: Flags) -> Numbers:
+    """[N] the last finite value among the chosen up to each sample; 0 before any."""
+    known = chosen & np.isfinite(values)
+    index = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))
+    return np.where(index >= 0, values[index], 0.0)
+
+
+def _between_known(values: Numbers, chosen: Flags) -> Numbers:
+    """[N] interpolated between the finite values among the chosen; NaN without any."""
+    known = np.flatnonzero(chosen & np.isfinite(values))
+    if not len(known):
+        return np.full(len(values), np.nan)
+    return np.asarray(np.interp(np.arange(len(values)), known, values[known]))
+
+
+# --- other thresholds -------------------------------------------------------------------------------------------------
+
+
+def scaled_detection(data: Mapping[str, Any], factor: float) -> dict[str, Any]:
+    """The description with every bound that decides on contact times a factor, as far as its range goes.
+
+    These are the thresholds of the torque and of the innovation, with the parts that friction and its uncertainty add,
+    and of the change at rest (docs/contract-additions.md, steps 5a and 5): the whole right side of |r| > threshold, of
+    |y| > B and of |c| > D.
+    """
+    contact = dict(data["contact"])
+    _scale(contact, THRESHOLDS, factor)
+    for part, keys in (("innovation", THRESHOLDS), ("friction_bound", SHARES), ("rest", REST_BOUNDS)):
+        if contact.get(part) is not None:
+            contact[part] = dict(contact[part])
+            _scale(contact[part], keys, factor)
+    if contact.get("uncertainty") is not None:
+        contact.setdefault(*UNCERTAINTY_LEVEL)
+        _scale(contact, UNCERTAINTY_LEVEL[:1], factor)
+    return {**data, "contact": contact}
+
+
+def _scale(part: dict[str, Any], keys: Iterable[str], factor: float) -> None:
+    for key in keys:
+        value = part.get(key)
+        if isinstance(value, list | tuple):
+            part[key] = [None if each is None else factor * each for each in value]
+        elif value is not None:
+            part[key] = min(factor * value, LARGEST[key])
+
+
+def score_scaled(subject: Subject, tracks: Sequence[Track], kinematics: int, factor: float) -> DetectionScore:
+    """All recordings again with scaled detection, pooled; without what the ROC does not show."""
+    image = native.image_from_json(json.dumps(scaled_detection(subject.finger.data, factor)))
+    runs = (replace(track, outputs=_run(image, track.recording, kinematics)) for track in tracks)
+    return pooled([run.decisions() for run in runs])

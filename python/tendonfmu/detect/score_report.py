@@ -1,0 +1,195 @@
+"""The report of a score, "tendonfmu-score-1" (docs/score.md), as JSON with null for what is not known."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.detect.counting import GRACE, MERGED, SILENT, DetectionScore, Event
+from tendonfmu.detect.run import Subject, Track
+from tendonfmu.detect.summary import RocPoint, Summary
+from tendonfmu.files.finite_numbers import finite
+from tendonfmu.statistics.intervals import CONFIDENCE, Estimate
+
+FORMAT = "tendonfmu-score-1"
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A finished score. scores, summaries: of each track. roc: None with the reason in no_roc."""
+
+    subject: Subject
+    kinematics: int
+    labels: str
+    seed: int
+    tracks: Sequence[Track]
+    scores: Sequence[DetectionScore]
+    summaries: Sequence[Summary]
+    summary: Summary
+    roc: Sequence[RocPoint] | None
+    no_roc: str | None
+    warnings: Sequence[str]
+
+
+def build_report(scored: Scored) -> dict[str, Any]:
+    """The whole report."""
+    report = {
+        "format": FORMAT,
+        "finger": scored.subject.finger.name,
+        "model": str(scored.subject.path),
+        "joints": scored.subject.finger.joint_names,
+        "kinematics": scored.kinematics,
+        "labels": scored.labels,
+        "definitions": {"merged_s": MERGED, "silent_s": SILENT, "grace_s": GRACE},
+        "confidence": CONFIDENCE,
+        "seed": scored.seed,
+        "warnings": list(scored.warnings),
+        **_summary(scored.summary),
+        "roc": {
+            "points": None if scored.roc is None else [_point(point) for point in scored.roc],
+            "absent": scored.no_roc,
+        },
+        "recordings": [_recording(*each) for each in zip(scored.tracks, scored.scores, scored.summaries, strict=True)],
+    }
+    return {key: finite(value) for key, value in report.items()}
+
+
+def report_text(report: Mapping[str, Any]) -> str:
+    """JSON with an event, a recording's other key, or a point of the ROC on one line each."""
+    parts = []
+    for key, value in report.items():
+        text = _flat(value)
+        if key == "recordings":
+            text = "[\n  " + ",\n  ".join(_recording_text(each) for each in value) + "]"
+        elif key == "roc" and value["points"] is not None:
+            text = f'{{"points": {_rows(value["points"], "   ")}, "absent": null}}'
+        parts.append(f" {json.dumps(key)}: {text}")
+    return "{\n" + ",\n".join(parts) + "\n}\n"
+
+
+def _recording_text(entry: Mapping[str, Any]) -> str:
+    listed = ("event_list", "false_alarm_list")
+    return (
+        "{"
+        + ",\n   ".join(
+            f'"{key}": {_rows(each, "    ") if key in listed else _flat(each)}' for key, each in entry.items()
+        )
+        + "}"
+    )
+
+
+def _rows(values: Sequence[Any], indent: str) -> str:
+    return "[" + "".join(f"\n{indent}{_flat(each)}," for each in values).rstrip(",") + "]"
+
+
+def _flat(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)
+
+
+# --- parts ------------------------------------------------------------------------------------------------------------
+
+
+def _summary(found: Summary) -> dict[str, Any]:
+    contact = found.contact
+    return {
+        "events": found.events,
+        "found": found.found,
+        "missed": found.events - found.found,
+        "missed_in_alarm": found.masked,
+        "found_share": _estimate(found.found_share),
+        "false_alarms": found.false_alarms,
+        "false_alarms_interval": _interval(found.false_alarm_count),
+        "false_alarms_per_minute": _estimate(found.false_alarms_per_minute),
+        "free_minutes": found.free_minutes,
+        "free_alarm_share": _estimate(found.free_alarm_share),
+        "median_delay_s": found.delay["median"].value,
+        "delay_s": {name: _estimate(each) for name, each in found.delay.items()},
+        "held": found.held,
+        "held_share": _estimate(found.held_share),
+        "overhang": {
+            "events": found.overhang_events,
+            "seconds": found.overhang_seconds,
+            "longest_s": found.longest_overhang,
+            "per_event_s": _estimate(found.overhang),
+        },
+        "at_alarm": {
+            "force": None if found.force_at_alarm is None else _estimate(found.force_at_alarm),
+            "external_torque": _estimates(found.external_at_alarm),
+            "compensated_torque": _estimates(found.compensated_at_alarm),
+        },
+        "free_rms": [each.value for each in found.free_rms],
+        "free_rms_interval": [_interval(each) for each in found.free_rms],
+        "contact_torque_rms_error": None if contact is None else [each.value for each in contact.rms],
+        "contact_torque_rms_error_interval": None if contact is None else [_interval(each) for each in contact.rms],
+        "contact_torque_correlation": None if contact is None else _estimates(contact.correlation),
+        "contact_torque_slope": None if contact is None else _estimates(contact.slope),
+        "contact_torque_within_two_std": None if contact is None else _estimates(contact.within),
+    }
+
+
+def _recording(track: Track, score: DetectionScore, summary: Summary) -> dict[str, Any]:
+    time = track.recording.time
+    return {
+        "path": str(track.recording.path),
+        "samples": len(time),
+        "duration_s": float(time[-1] - time[0]),
+        "labelled": track.recording.contact is not None,
+        "external_torque": track.external is not None,
+        "sensed_force": track.force is not None,
+        "mean_force": float(np.abs(track.recording.groups["tendon_force"]).mean()),
+        **_summary(summary),
+        "event_list": [_event(event) for event in score.events],
+        "false_alarm_list": [{"begin_s": begin, "end_s": end} for begin, end in score.false_alarms],
+    }
+
+
+def _event(event: Event) -> dict[str, Any]:
+    return {
+        "onset_s": event.onset,
+        "end_s": event.end,
+        "found": event.found,
+        "silent_before": event.silent,
+        "alarm_s": event.alarm,
+        "delay_s": event.delay,
+        "held": event.held,
+        "held_share": event.held_share,
+        "overhang_s": event.overhang,
+        "force": event.force,
+        "external_torque": _numbers(event.external),
+        "compensated_torque": _numbers(event.compensated),
+    }
+
+
+def _point(point: RocPoint) -> dict[str, Any]:
+    return {
+        "factor": point.factor,
+        "found": point.found,
+        "missed_in_alarm": point.masked,
+        "found_share": _estimate(point.found_share),
+        "false_alarms": point.false_alarms,
+        "false_alarms_per_hour": _estimate(point.false_alarms_per_hour),
+        "free_alarm_share": point.free_alarm_share,
+        "median_delay_s": point.median_delay,
+    }
+
+
+def _estimate(found: Estimate) -> dict[str, Any]:
+    return {"value": found.value, "interval": _interval(found)}
+
+
+def _estimates(found: Sequence[Estimate] | None) -> list[dict[str, Any]] | None:
+    return None if found is None else [_estimate(each) for each in found]
+
+
+def _interval(found: Estimate) -> list[float] | None:
+    return None if math.isnan(found.low) or math.isnan(found.high) else [found.low, found.high]
+
+
+def _numbers(values: NDArray[np.float64] | None) -> list[float] | None:
+    return None if values is None else [float(value) for value in values]

@@ -1,0 +1,155 @@
+"""The rule for failing sensors, learned from free motion (docs/contract-additions.md, sensor_fault).
+
+Resolutions are those of the sensors; the margin is what noise, sampling and springs that are not as described make of
+the difference between each force and its spring, with as much again. The finger as it runs must find no fault.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.detect.free_motion import FreePart
+from tendonfmu.model import native
+
+Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+# s, and so many samples at slow rates. Shorter than the default of sensor_fault.hold_time: free motion shows that
+# channels that are read at different times make no fault of it.
+HOLD_TIME, HOLD_SAMPLES = 0.02, 5
+RECOVERY_TIME = 0.5  # s, the default
+WINDOW = 0.1  # s, within which a spring is compared with its force: longer than a sound force stands in motion
+AMPLE = 2.0  # times the largest difference that was seen: what is to come may be twice as far off
+TAUT = 1.0  # N; below, a tendon may be slack, and the others do not tell its length
+WIDEST = 0.25  # of the mean tendon force; a wider margin would hide what it is for
+LEAST_FREEDOM = 0.1  # as the runtime has it: 1 − leverage of a row that the others can tell
+NOISE_SHARE = 0.5  # of the noise of a sample: what changes by less stands
+ROUNDING = 1e-9  # of the largest value: smaller steps are none of the sensor's
+RAISE = 1.5  # by which the margin is raised until no fault is found
+
+
+@dataclass(frozen=True)
+class SensorRule:
+    """keys: `sensor_fault`; None: left out, and why. largest: N, the largest difference between force and spring."""
+
+    keys: Mapping[str, float] | None
+    largest: float
+    why: str
+
+
+def learn_sensors(data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int) -> SensorRule:
+    """The rule, with which the finger as it runs finds no fault in any part."""
+    if not all("tendon_position" in part.arrays for part in parts):
+        return SensorRule(None, np.nan, "there are no tendon positions")
+    gaps = [gap for part in parts for gap in _gaps(data, part, kinematics)]
+    if not any(each.known.any() for each in gaps):
+        return SensorRule(None, np.nan, "no tendon's length follows from the others")
+    largest = max(max(each.jump(), each.span()) for each in gaps)
+    step = max(float(np.median(np.diff(part.time))) for part in parts)
+    keys = {
+        "hold_time": round(max(HOLD_TIME, HOLD_SAMPLES * step), 6),
+        "force_resolution": _resolution([part.arrays["tendon_force"] for part in parts]),
+        "position_resolution": _resolution([part.arrays["tendon_position"] for part in parts]),
+        "jump_margin": float(f"{max(AMPLE * largest, 1e-6):.3g}"),
+        "recovery_time": RECOVERY_TIME,
+    }
+    widest = WIDEST * min(float(part.mean_force.mean()) for part in parts)
+    while keys["jump_margin"] <= widest:
+        if not finds_a_fault(data, parts, kinematics, keys):
+            return SensorRule(keys, largest, "")
+        keys["jump_margin"] = float(f"{RAISE * keys['jump_margin']:.3g}")
+    why = f"a sensor seems to fail in free motion, by more than {widest:.2g} N"
+    if AMPLE * largest > widest:
+        why = (
+            f"forces differ from their springs by up to {largest:.2g} N in free motion; expected at most "
+            f"{widest / AMPLE:.2g} N of springs and moment arms that are as described"
+        )
+    return SensorRule(None, largest, why)
+
+
+def finds_a_fault(
+    data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int, keys: Mapping[str, float]
+) -> bool:
+    """Whether the finger with these keys finds one in counted time."""
+    finger = native.Finger.from_description(json.dumps({**data, "sensor_fault": dict(keys)}), kinematics)
+    begin = finger.save_state()
+    for part in parts:
+        finger.restore_state(begin)
+        if finger.run(part.arrays)["sensor_fault"][part.counted].any():
+            return True
+    return False
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Of one tendon in one part. force, gap: [N] N, f0 and y − f0. stretched: [N − 1] N, k·(|Δx0| + |Δw|). known: [N]
+    the others tell w. window: samples."""
+
+    force: Numbers
+    gap: Numbers
+    stretched: Numbers
+    known: Flags
+    window: int
+
+    def jump(self) -> float:
+        """N, by which the force changes within a sample beyond its spring."""
+        both = self.known[1:] & self.known[:-1]
+        beyond = np.abs(np.diff(self.force)) - self.stretched
+        return float(beyond[both].max(initial=0.0))
+
+    def span(self) -> float:
+        """N, by which force and spring differ within a window."""
+        whole = len(self.gap) // self.window * self.window
+        inside = self.gap[:whole].reshape(-1, self.window)
+        known = self.known[:whole].reshape(-1, self.window)
+        low = np.where(known, inside, np.inf).min(axis=1)
+        high = np.where(known, inside, -np.inf).max(axis=1)
+        return float((high - low)[known.any(axis=1)].max(initial=0.0))
+
+
+def _gaps(data: Mapping[str, Any], part: FreePart, kinematics: int) -> Iterator[Gap]:
+    R = np.array([tendon["moment_arms"] for tendon in data["tendons"]], dtype=np.float64)
+    k = np.array([tendon["stiffness"] for tendon in data["tendons"]], dtype=np.float64)
+    loops = np.array([bool(tendon.get("bidirectional")) for tendon in data["tendons"]])
+    force, position = part.arrays["tendon_force"], part.arrays["tendon_position"]
+    taut = (force > TAUT) | loops
+    w, told = _joint_side(R, position - force / k, part.arrays.get("joint_position"), kinematics)
+    window = max(1, min(len(force), int(np.searchsorted(part.time, part.time[0] + WINDOW))))
+    for i in np.flatnonzero(told):
+        others = np.arange(len(k)) != i
+        known = taut[:, others].all(axis=1) if kinematics == 1 else np.ones(len(force), dtype=bool)
+        stretched = k[i] * (np.abs(np.diff(position[:, i])) + np.abs(np.diff(w[:, i])))
+        gap = k[i] * (position[:, i] - w[:, i]) - force[:, i]
+        yield Gap(force[:, i], gap, stretched, known & taut[:, i] & part.counted, window)
+
+
+def _joint_side(R: Numbers, spring_end: Numbers, angle: Numbers | None, kinematics: int) -> tuple[Numbers, Flags]:
+    """[N, m] m, R q of each tendon as the others, or the measured angles, have it; [m] whether they do."""
+    if kinematics != 1 and angle is not None:
+        return angle @ R.T, np.ones(len(R), dtype=bool)
+    inverse = np.linalg.pinv(R)
+    leverage = np.einsum("ij,ji->i", R, inverse)
+    told = 1.0 - leverage >= LEAST_FREEDOM
+    all_together = spring_end @ inverse.T @ R.T
+    ratio = np.where(told, leverage / np.where(told, 1.0 - leverage, 1.0), 0.0)
+    return np.asarray(all_together - ratio * (spring_end - all_together)), np.asarray(told)
+
+
+def _resolution(arrays: Sequence[Numbers]) -> float:
+    """The smallest step of a sensor, or a share of its noise where that is more; in its unit."""
+    smallest, noise = np.inf, np.inf
+    for values in arrays:
+        step = np.abs(np.diff(values, axis=0))
+        smallest = min(smallest, float(step[step > ROUNDING * np.abs(values).max()].min(initial=np.inf)))
+        if len(values) > 2:
+            bend = np.abs(values[2:] - 2.0 * values[1:-1] + values[:-2])
+            # 0.6745 σ is the median of |x|; three independent samples with weights 1, −2, 1
+            noise = min(noise, float(np.median(bend, axis=0).min() / (0.6745 * np.sqrt(6.0))))
+    found = max(smallest if np.isfinite(smallest) else 0.0, NOISE_SHARE * noise if np.isfinite(noise) else 0.0)
+    return float(f"{found:.3g}")

@@ -1,0 +1,210 @@
+"""What a counted score says: shares, rates, delays and errors with 95 % intervals, and the ROC over thresholds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.detect.counting import ContactSums, DetectionScore, Event, FreeBlocks
+from tendonfmu.statistics.intervals import Estimate, of_sums, quantile, rate, share
+
+Numbers = NDArray[np.float64]
+
+QUARTILES = {"lower_quartile": 0.25, "median": 0.5, "upper_quartile": 0.75, "ninety_percent": 0.9}
+FACTORS = tuple(2.0 ** (k / 4) for k in range(-8, 13))  # on the thresholds: 0.25 to 8, the description's own among them
+
+
+@dataclass(frozen=True)
+class ContactError:
+    """Of the compensated torque against the reference during events, by joint [n]. rms in N·m.
+
+    within: share of the samples within two of the standard deviations that are told, None without these.
+    """
+
+    rms: list[Estimate]
+    correlation: list[Estimate]
+    slope: list[Estimate]
+    within: list[Estimate] | None
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Of a recording or of several pooled.
+
+    masked: events missed because there was contact before. held: found events whose alarm lasts to their end.
+    delay: s, by name of `QUARTILES`. at_alarm: medians over the found events; force in N, compensated and external
+    torque [n] as magnitudes in N·m, None where it is not known. overhang_events, overhang_seconds, longest_overhang:
+    alarms that outlast their event. contact: None without a reference sensor or without an event.
+    """
+
+    events: int
+    found: int
+    masked: int
+    held: int
+    false_alarms: int
+    free_minutes: float
+    found_share: Estimate
+    held_share: Estimate
+    false_alarm_count: Estimate
+    false_alarms_per_minute: Estimate
+    delay: dict[str, Estimate]
+    force_at_alarm: Estimate | None
+    compensated_at_alarm: list[Estimate] | None
+    external_at_alarm: list[Estimate] | None
+    overhang_events: int
+    overhang_seconds: float
+    longest_overhang: float
+    overhang: Estimate
+    free_alarm_share: Estimate
+    free_rms: list[Estimate]
+    contact: ContactError | None
+
+
+def summarise(score: DetectionScore, seed: int = 0) -> Summary:
+    """seed: of the resampling."""
+    found = [event for event in score.events if event.found]
+    alarms, minutes = len(score.false_alarms), score.free_seconds / 60.0
+    overhang = np.array([event.overhang for event in score.events], dtype=float)
+    held = sum(event.held for event in found)
+    return Summary(
+        events=len(score.events),
+        found=len(found),
+        masked=sum(not event.silent for event in score.events),
+        held=held,
+        false_alarms=alarms,
+        free_minutes=minutes,
+        found_share=share(len(found), len(score.events)),
+        held_share=share(held, len(found)),
+        false_alarm_count=rate(alarms, 1.0),
+        false_alarms_per_minute=rate(alarms, minutes),
+        delay={name: quantile(score.delays, part, seed) for name, part in QUARTILES.items()},
+        force_at_alarm=_force(found, seed),
+        compensated_at_alarm=_torques([event.compensated for event in found], seed),
+        external_at_alarm=_torques([event.external for event in found], seed),
+        overhang_events=int((overhang > 0).sum()),
+        overhang_seconds=float(overhang.sum()),
+        longest_overhang=float(overhang.max(initial=0.0)),
+        overhang=_mean(overhang, seed),
+        free_alarm_share=_alarm_share(score.free, seed),
+        free_rms=_free_rms(score.free, seed),
+        contact=_contact_error(score.contact, seed),
+    )
+
+
+def _force(found: Sequence[Event], seed: int) -> Estimate | None:
+    known = np.array([event.force for event in found if not math.isnan(event.force)], dtype=float)
+    return quantile(known, 0.5, seed) if len(known) else None
+
+
+def _torques(values: Sequence[Numbers | None], seed: int) -> list[Estimate] | None:
+    """Median magnitude of each joint."""
+    known = [np.abs(value) for value in values if value is not None]
+    return [quantile(column, 0.5, seed) for column in np.array(known).T] if known else None
+
+
+def _mean(values: Numbers, seed: int) -> Estimate:
+    """Where all are 0, resampling sees nothing else: no interval."""
+    if not values.any():
+        return Estimate(0.0 if len(values) else math.nan)
+    return of_sums(np.column_stack([np.ones(len(values)), values]), _ratio, seed)[0]
+
+
+def _alarm_share(free: FreeBlocks, seed: int) -> Estimate:
+    """Where no block has an alarm, resampling sees none either: then the exact bound of the share of such blocks."""
+    if not free.seconds.sum():
+        return Estimate(math.nan)
+    if not free.alarm_seconds.any():
+        return Estimate(0.0, 0.0, share(0, len(free.seconds)).high)
+    return of_sums(np.column_stack([free.seconds, free.alarm_seconds]), _ratio, seed)[0]
+
+
+def _free_rms(free: FreeBlocks, seed: int) -> list[Estimate]:
+    if not free.samples.sum():
+        return [Estimate(math.nan)] * free.squares.shape[1]
+    return of_sums(np.column_stack([free.samples, free.squares]), _root_mean, seed)
+
+
+def _ratio(sums: Numbers) -> Numbers:
+    return np.asarray(sums[:, 1:] / sums[:, :1])
+
+
+def _root_mean(sums: Numbers) -> Numbers:
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(np.sqrt(sums[:, 1:] / sums[:, :1]))
+
+
+def _contact_error(sums: ContactSums | None, seed: int) -> ContactError | None:
+    if sums is None or not len(sums.samples):
+        return None
+    moments = np.hstack([sums.samples[:, None], sums.x, sums.y, sums.xx, sums.yy, sums.xy])
+    told = ~np.isnan(sums.within).any(axis=1)
+    within = np.column_stack([sums.samples, sums.within])[told]
+    return ContactError(
+        rms=of_sums(np.column_stack([sums.samples, sums.errors]), _root_mean, seed),
+        correlation=of_sums(moments, lambda drawn: _regression(drawn)[0], seed),
+        slope=of_sums(moments, lambda drawn: _regression(drawn)[1], seed),
+        within=of_sums(within, _ratio, seed) if len(within) else None,
+    )
+
+
+def _regression(sums: Numbers) -> tuple[Numbers, Numbers]:
+    """Correlation and slope of y on x, [r, n] each, NaN where x (or y) does not vary.
+
+    sums: [r, 1 + 5 n] number of samples, and sums of x, y, x², y², x·y.
+    """
+    count = sums[:, :1]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        x, y, xx, yy, xy = (part / count for part in np.split(sums[:, 1:], 5, axis=1))
+        spread_x, spread_y, both = _varied(xx - x * x, xx), _varied(yy - y * y, yy), xy - x * y
+        return both / np.sqrt(spread_x * spread_y), both / spread_x
+
+
+def _varied(variance: Numbers, power: Numbers) -> Numbers:
+    """NaN in place of what is rounding alone."""
+    return np.where(variance > 1e-12 * power, variance, np.nan)
+
+
+# --- ROC --------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class RocPoint:
+    """The thresholds times `factor`: what is found, and how often there is an alarm without contact."""
+
+    factor: float
+    events: int
+    found: int
+    masked: int
+    false_alarms: int
+    found_share: Estimate
+    false_alarms_per_hour: Estimate
+    free_alarm_share: float
+    median_delay: float
+
+
+def roc(score_at: Callable[[float], DetectionScore], factors: Sequence[float] = FACTORS) -> list[RocPoint]:
+    """score_at: the pooled score with all thresholds times a factor; the finger runs anew, as contact stops its bias.
+
+    Few false alarms are no good sign where the free time is in alarm: one that never ends is one.
+    """
+    points = []
+    for factor in factors:
+        score = score_at(factor)
+        points.append(
+            RocPoint(
+                factor=factor,
+                events=len(score.events),
+                found=score.found,
+                masked=sum(not event.silent for event in score.events),
+                false_alarms=len(score.false_alarms),
+                found_share=share(score.found, len(score.events)),
+                false_alarms_per_hour=rate(len(score.false_alarms), score.free_seconds / 3600.0),
+                free_alarm_share=score.free_alarm_share,
+                median_delay=float(np.median(score.delays)) if score.found else math.nan,
+            )
+        )
+    return points

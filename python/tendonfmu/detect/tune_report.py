@@ -1,0 +1,162 @@
+"""The report of a tuning, "tendonfmu-tune-1": what was chosen, on how much motion, and what it is worth."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from tendonfmu.detect.alarm_level import rate_limit
+from tendonfmu.detect.closed_loop import LoopAlarms
+from tendonfmu.detect.tuning import ContactTuning
+from tendonfmu.files.finite_numbers import finite
+from tendonfmu.statistics.intervals import rate
+
+FORMAT = "tendonfmu-tune-1"
+FACTORS = np.round(np.geomspace(0.5, 2.0, 25), 6)  # on the chosen bases: the tail of the alarms
+
+
+def build_report(tuning: ContactTuning) -> dict[str, Any]:
+    """Everything in SI units, null for what is not known."""
+    found = {
+        "format": FORMAT,
+        "finger": tuning.description_.name,
+        "joints": tuning.description_.joint_names,
+        "kinematics": tuning.kinematics,
+        "method": tuning.method,
+        "false_alarms_per_hour": tuning.false_alarms_per_hour,
+        "confidence": tuning.confidence,
+        "tuned_for_per_hour": tuning.rate_,
+        "more_minutes": tuning.more_minutes_,
+        "holds_for": _holds_for(tuning),
+        "minutes": 60.0 * tuning.hours_,
+        "allowed_alarms": tuning.allowed_,
+        "warnings": list(tuning.warnings_),
+        "bias": {**tuning.bias_.keys(), "time_constant": tuning.bias_.time_constant, "mean_force": tuning.bias_.force},
+        "contact": tuning.description_.data["contact"],
+        "levels": {name: _level(tuning, name) for name in tuning.lines_},
+        "level_raised": tuning.level_raised_,
+        "in_sample": _counted(tuning, tuning.tail(np.ones(1))[0][1]),
+        "held_out": _counted(tuning, tuning.held_out_[0]),
+        "closed_loop": _loop(tuning),
+        "rest": _rest(tuning),
+        "sensor_fault": _sensors(tuning),
+        "pretensions": [_pretension(tuning, g) for g in range(len(tuning.pretensions_))],
+        "tail": [_point(tuning, *each) for each in tuning.tail(FACTORS)],
+        "tried": _tried(tuning),
+        "seconds": tuning.seconds_,
+    }
+    return {key: finite(value) for key, value in found.items()}
+
+
+def _holds_for(tuning: ContactTuning) -> dict[str, Any]:
+    """Mean tendon forces (N) that the thresholds were chosen on, and whether anything is known of their growth."""
+    low, high = tuning.forces_
+    return {"lowest_force": low, "highest_force": high, "pretensions": len(tuning.pretensions_)}
+
+
+def report_text(report: Mapping[str, Any]) -> str:
+    """JSON with an entry of each list on a line of its own."""
+    parts = []
+    for key, value in report.items():
+        if isinstance(value, list) and value and isinstance(value[0], dict):
+            text = "[" + ",".join(f"\n  {_flat(each)}" for each in value) + "]"
+        else:
+            text = _flat(value)
+        parts.append(f" {json.dumps(key)}: {text}")
+    return "{\n" + ",\n".join(parts) + "\n}\n"
+
+
+def _flat(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)
+
+
+def _counted(tuning: ContactTuning, alarms: int, hours: float | None = None) -> dict[str, Any]:
+    """alarms, their rate in 1/h with its two-sided 95 % interval, and the upper limit at the tuning's confidence."""
+    span = tuning.hours_ if hours is None else hours
+    found = rate(alarms, span)
+    return {
+        "alarms": alarms,
+        "minutes": 60.0 * span,
+        "per_hour": found.value,
+        "interval": [found.low, found.high],
+        "limit": rate_limit(alarms, span, tuning.confidence),
+    }
+
+
+def _rest(tuning: ContactTuning) -> dict[str, Any] | None:
+    """What contact.rest was learned from, and its alarms; None without rests."""
+    rule = tuning.rest_
+    if rule is None:
+        return None
+    counted = {"alarms": rule.alarms, "held_out": rule.held_out, "limit": rule.limit}
+    return {"rests": rule.rests, "minutes": 60.0 * rule.hours, **counted}
+
+
+def _sensors(tuning: ContactTuning) -> dict[str, Any]:
+    """The keys of sensor_fault (None: why) and the largest difference between a force and its spring, N."""
+    rule = tuning.sensors_
+    keys = None if rule.keys is None else dict(rule.keys)
+    return {"keys": keys, "largest_difference": rule.largest, "left_out": rule.why}
+
+
+def _level(tuning: ContactTuning, name: str) -> dict[str, Any]:
+    level, line = tuning.levels_[name], tuning.lines_[name]
+    return {
+        "in_sample": level.in_sample,
+        "held_out": level.held_out,
+        "compared": {"base": line.bound.base.tolist(), "per_force": line.bound.per_force.tolist()},
+    }
+
+
+def _loop(tuning: ContactTuning) -> dict[str, Any]:
+    alarms = sum(each.alarms for each in tuning.loop_)
+    seconds = sum(each.seconds for each in tuning.loop_)
+    return {
+        **_counted(tuning, alarms),
+        "longest_s": max(each.longest for each in tuning.loop_),
+        "share_in_alarm": sum(each.alarm_seconds for each in tuning.loop_) / seconds,
+        "at_start": sum(each.at_start for each in tuning.loop_),
+        "parts": [_part(each) for each in tuning.loop_],
+    }
+
+
+def _part(found: LoopAlarms) -> dict[str, Any]:
+    return {
+        "path": found.source,
+        "minutes": 60.0 * found.hours,
+        "alarms": found.alarms,
+        "at_start": found.at_start,
+        "longest_s": found.longest,
+        "share_in_alarm": found.alarm_seconds / found.seconds,
+        "begins": found.begins,
+        "ends": found.ends,
+    }
+
+
+def _pretension(tuning: ContactTuning, g: int) -> dict[str, Any]:
+    found = tuning.pretensions_[g]
+    return {
+        "mean_force": found.force,
+        "free_rms": found.rms,
+        **_counted(tuning, found.alarms, found.hours),
+        "torque_std_mean_square": tuning.deviation_.square[g].tolist(),
+    }
+
+
+def _point(tuning: ContactTuning, factor: float, in_sample: int, held_out: int) -> dict[str, Any]:
+    return {"factor": factor, "in_sample": _counted(tuning, in_sample), "held_out": _counted(tuning, held_out)}
+
+
+def _tried(tuning: ContactTuning) -> list[dict[str, Any]]:
+    line = tuning.lines_.get("innovation")
+    if line is None:
+        return []
+    ordered = sorted(line.tried, key=lambda each: each.mean_log)
+    return [
+        {"stuck_share": each.stuck_share, "jump_share": each.jump_share, "least_load": math.exp(each.mean_log)}
+        for each in ordered
+    ]

@@ -1,0 +1,435 @@
+"""Contact detection tuned on free motion for a stated rate of false alarms, in the manner of scikit-learn.
+
+    tuning = ContactTuning("fitted.json", false_alarms_per_hour=6).tune(["free_10N.parquet", "free_40N.parquet"])
+    tuning.description_
+
+Bounds are chosen on runs without contact detection; what they are worth is counted on blocks that they were not chosen
+on, and again with the tuned finger as it will run.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.detect.alarm_level import alarms_above, cells_of, least_hours, rate_limit
+from tendonfmu.detect.bounds import Bound, Search, search_for
+from tendonfmu.detect.closed_loop import LoopAlarms, count_loop
+from tendonfmu.detect.contact_at_rest import RestRule, learn_rest
+from tendonfmu.detect.free_motion import Clock, FreePart, FreeRun, free_parts, run_free
+from tendonfmu.detect.level import SECOND_SHARE, Level, Line, evidence_line, given_line, level_of, searched_line
+from tendonfmu.detect.noise import BiasNoise, Deviation, bias_noise, deviation, wanted_time
+from tendonfmu.detect.sensor_faults import SensorRule, learn_sensors
+from tendonfmu.detect.support import NotEnough, hours_by_pretension, supported
+from tendonfmu.errors import InputError
+from tendonfmu.estimate.constructor_arguments import ConstructorArguments
+from tendonfmu.estimate.files import check_given_once, description_text
+from tendonfmu.estimate.structure import own_copy
+from tendonfmu.model import native
+from tendonfmu.model.description import FingerDescription, read_finger
+from tendonfmu.recordings.match import admit
+from tendonfmu.recordings.recording import Recording, read_recording
+
+Numbers = NDArray[np.float64]
+Source = str | os.PathLike[str] | Recording
+Finger = str | os.PathLike[str] | Mapping[str, Any] | FingerDescription
+
+METHODS = ("innovation", "cusum", "threshold")
+INNOVATION_TIME = 0.05  # s, T
+JUMP_TIME = 0.06  # s, T_J
+STUCK_TIME = 0.25  # s, T_H
+STUCK_TIME_PRESLIDING = 0.06  # s, where presliding says how friction turns over after break-away
+EVIDENCE_TIME = 0.02  # s, τ_e
+RELEASE = {"release_ratio": 1.0, "hold_time": 0.05}  # 1, s
+RELEASE_TIME = 2.0  # s
+LEAST_DRIFT = (
+    10.0  # min of free motion: 60 of the slow means that contact.drift compares with, not a few that a fit knows
+)
+START_SHARE = 1.0  # bias.start_share: all friction may stand either way before the start
+_STEP, _STEPS = 1.05, 12  # by which the level is raised, and how often, until the running finger keeps the rate
+_DIGITS = 6
+
+
+class TuneWarning(UserWarning):
+    """What a tuning has to say about its recordings and its result."""
+
+
+@dataclass(frozen=True)
+class Pretension:
+    """Free motion at one pretension. alarms: false ones of the tuned finger; limit: 1/h, upper, of their rate."""
+
+    force: float
+    hours: float
+    rms: list[float]
+    alarms: int
+    limit: float
+
+
+class ContactTuning(ConstructorArguments):
+    """Chooses what decides on contact from recordings of free motion.
+
+    finger: description: its file, parsed JSON, or as `read_finger` gives it.
+    false_alarms_per_hour, confidence: the rate of false alarms in free motion like that of the recordings is at most
+        that, with this confidence.
+    method: "innovation", "cusum" or "threshold" (contact.method).
+    bias_time: s, time constant of the bias; None: as in the description, at the recordings' mean force.
+    release_time: s in contact after which the bias learns again; math.inf: never.
+    kinematics: 1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
+    strict: too little free motion for the rate is refused; else the tuning is for the rate that it supports.
+    innovation_time, jump_time, stuck_time, evidence_time: s, written as such; stuck_time None: by whether it has
+        presliding. progress: called with (steps done, all).
+
+    After `tune`: description_ (tuned), bias_, lines_, levels_, bounds_ (by "residual", "innovation", "drift"),
+    deviation_, cells_, runs_, pretensions_, rest_ (None: no rests), sensors_ (of sensor_fault), held_out_ (alarms, 1/h
+    upper limit), loop_ (alarms of the finger as it runs), rate_ (1/h that it is tuned for), more_minutes_ (missing for
+    the wished rate), allowed_, hours_, forces_ (N, the lowest and the highest recorded mean force), level_raised_,
+    warnings_, seconds_.
+    """
+
+    def __init__(
+        self,
+        finger: Finger,
+        *,
+        false_alarms_per_hour: float = 6.0,
+        confidence: float = 0.9,
+        method: str = "innovation",
+        bias_time: float | None = None,
+        release_time: float = RELEASE_TIME,
+        kinematics: int = 1,
+        strict: bool = False,
+        innovation_time: float = INNOVATION_TIME,
+        jump_time: float = JUMP_TIME,
+        stuck_time: float | None = None,
+        evidence_time: float = EVIDENCE_TIME,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> None:
+        self.finger = finger
+        self.false_alarms_per_hour = false_alarms_per_hour
+        self.confidence = confidence
+        self.method = method
+        self.bias_time = bias_time
+        self.release_time = release_time
+        self.kinematics = kinematics
+        self.strict = strict
+        self.innovation_time = innovation_time
+        self.jump_time = jump_time
+        self.stuck_time = stuck_time
+        self.evidence_time = evidence_time
+        self.progress = progress
+
+    def tune(self, recordings: Source | Sequence[Source], *, checked: bool = False) -> ContactTuning:
+        """Learns from recordings of free motion. checked: they were held against the finger, and what is to be said of
+        them was said.
+
+        Raises InputError: contact in them, or not sound; NotEnough: no free motion, or with `strict` too little.
+        """
+        begin = perf_counter()
+        self._check_options()
+        self.start_ = _read(self.finger)
+        parts = self._parts(_listed(recordings), checked)
+        self.hours_ = sum(part.hours for part in parts)
+        self.cells_ = cells_of(parts)
+        self.forces_ = (float(self.cells_.force.min()), float(self.cells_.force.max()))
+        self._support()
+        self._run(parts)
+        self._choose()
+        self._learn_rest(parts)
+        self.sensors_: SensorRule = learn_sensors(self.start_.data, parts, self.kinematics)
+        self._close_the_loop(parts)
+        self.pretensions_ = self._by_pretension()
+        self.seconds_ = perf_counter() - begin
+        self._judge()
+        for sentence in self.warnings_:
+            warnings.warn(sentence, TuneWarning, stacklevel=2)
+        return self
+
+    def _check_options(self) -> None:
+        checks = (
+            (self.method in METHODS, "method", " or ".join(METHODS)),
+            (0 < self.false_alarms_per_hour <= 3600, "false_alarms_per_hour", "above 0 and at most 3600, 1/h"),
+            (0.5 <= self.confidence < 1, "confidence", "from 0.5 to below 1"),
+            (self.bias_time is None or 1e-3 <= self.bias_time <= 1e4, "bias_time", "from 0.001 to 10000 s"),
+            (0 <= self.release_time <= 1e9 or self.release_time == math.inf, "release_time", "0 to 1e9 s, or inf"),
+            (self.kinematics in (1, 2, 3), "kinematics", "1, 2 or 3"),
+            (0 < self.innovation_time <= 100, "innovation_time", "above 0 and at most 100 s"),
+            (0 < self.jump_time <= 100, "jump_time", "above 0 and at most 100 s"),
+            (self.stuck_time is None or 0 <= self.stuck_time <= 100, "stuck_time", "0 to 100 s"),
+            (0 < self.evidence_time <= 100, "evidence_time", "above 0 and at most 100 s"),
+        )
+        for sound, name, expectation in checks:
+            if not sound:
+                raise InputError(f"{name} = {getattr(self, name)!r}: expected {expectation}")
+
+    # --- recordings ---------------------------------------------------------------------------------------------------
+
+    def _parts(self, sources: Sequence[Source], checked: bool) -> list[FreePart]:
+        check_given_once(sources, [])
+        if not sources:
+            raise InputError("no recording; expected at least one of free motion")
+        recordings = [each if isinstance(each, Recording) else read_recording(each) for each in sources]
+        parts: list[FreePart] = []
+        self.warnings_: list[str] = [] if checked else admit(self.start_, recordings)
+        for recording in recordings:
+            found, sentences = free_parts(self.start_, recording, self.kinematics)
+            parts += found
+            self.warnings_ += [] if checked else [f"{recording.path}: {sentence}" for sentence in sentences]
+        if not any(part.counted.any() for part in parts):
+            raise NotEnough("no free motion beyond the first 2 s of a recording; expected minutes of it", 0.0)
+        return parts
+
+    def _support(self) -> None:
+        found = supported(self.cells_, self.hours_, self.false_alarms_per_hour, self.confidence, self.strict)
+        self.rate_, self.allowed_, self.more_minutes_ = found.rate, found.allowed, found.more
+        self.warnings_ += [found.sentence] if found.sentence else []
+
+    # --- bias, bounds, levels -----------------------------------------------------------------------------------------
+
+    def _run(self, parts: Sequence[FreePart]) -> None:
+        """The bias, and runs with it: residuals depend on the bias, its noise on the residuals."""
+        given = self.start_.data["contact"].get("friction_bound") or {}
+        jump, stuck = self.jump_time, self._stuck_time()
+        if self.method == "threshold":  # whose friction bound stays as it is
+            jump, stuck = float(given.get("jump_time") or jump), float(given.get("stuck_time") or 0.0)
+        clock = Clock(self.innovation_time, jump, stuck)
+        time = wanted_time(self.start_.data, parts, self.bias_time)
+        bias = self.start_.data.get("bias") or {}
+        start = START_SHARE if bias.get("start_share") is None else bias["start_share"]
+        data = {**self.start_.data, "bias": {**bias, "start_share": start}}
+        if self.method != "threshold" and self._slides():
+            data["contact"] = {**data["contact"], "friction_bound": {**given, "stuck_presliding": True}}
+        for _ in range(2):
+            self.runs_: list[FreeRun] = run_free(data, parts, self.kinematics, clock)
+            self.bias_: BiasNoise = bias_noise(data, self.runs_, self.cells_, time)
+            data = {**data, "bias": {**(data.get("bias") or {}), **self.bias_.keys()}}
+        self.runs_ = run_free(data, parts, self.kinematics, clock)
+        self._data = data
+
+    def _slides(self) -> bool:
+        return any(row["effect"] == "presliding" for row in self.start_.data.get("extensions") or [])
+
+    def _stuck_time(self) -> float:
+        """s, T_H."""
+        if self.stuck_time is not None:
+            return self.stuck_time
+        return STUCK_TIME_PRESLIDING if self._slides() else STUCK_TIME
+
+    def _choose(self) -> None:
+        """Lines of `contact.innovation` and `contact.threshold`, and their levels."""
+        contact = self.start_.data["contact"]
+        uncertainty = contact.get("uncertainty_level")
+        level = 3.0 if uncertainty is None else float(uncertainty)
+        second = self.allowed_ // SECOND_SHARE
+        slow = search_for(self.runs_, self.cells_, "residual", self.rate_, level)
+        self.searches_: dict[str, Search] = {"residual": slow}
+        self.lines_: dict[str, Line] = {}
+        self.levels_: dict[str, Level] = {}
+        if self.method == "threshold":
+            given = contact.get("friction_bound") or {}
+            pair = (float(given.get("stuck_share") or 0.0), float(given.get("jump_share") or 0.0))
+            self.lines_["residual"] = given_line(slow, [pair] * 3, self.allowed_)
+            self.levels_["residual"] = level_of(self.lines_["residual"], self.cells_, self.allowed_)
+            return
+        fast = search_for(self.runs_, self.cells_, "innovation", self.rate_)
+        line = searched_line(fast, self.allowed_, self._tick)
+        self.lines_["residual"] = behind = given_line(slow, line.shares, second)
+        self.levels_["residual"] = above = level_of(behind, self.cells_, second)
+        if self.method == "cusum":
+            line = evidence_line(fast, line, [run.part for run in self.runs_], self.evidence_time)
+        self._choose_drift(second)
+        order, factor = self.cells_.order, above.factor
+        above_others, held_above = behind.statistic > factor, behind.held > factor
+        if "drift" in self.lines_:
+            drift, drifted = self.lines_["drift"], self.levels_["drift"].factor
+            above_others, held_above = above_others | (drift.statistic > drifted), held_above | (drift.held > drifted)
+        others, held = order[above_others], order[held_above]
+        self.lines_["innovation"] = line
+        self.levels_["innovation"] = level_of(line, self.cells_, self.allowed_, others, held)
+        self.searches_["innovation"] = fast
+
+    def _choose_drift(self, allowed: int) -> None:
+        """The line of `contact.drift`: slow loads, for which friction's jumps and stiction are no excuse."""
+        if 60.0 * self.hours_ < LEAST_DRIFT:
+            self.warnings_.append(
+                f"contact.drift is left out, so slow loads are not found: {60 * self.hours_:.1f} min of free motion; "
+                f"expected {LEAST_DRIFT:g} or more"
+            )
+            return
+        slow = search_for(self.runs_, self.cells_, "drift", self.rate_)
+        self.lines_["drift"] = line = given_line(slow, [(0.0, 0.0)] * 3, allowed)
+        self.levels_["drift"] = level_of(line, self.cells_, allowed)
+        self.searches_["drift"] = slow
+
+    def _tick(self) -> None:
+        self._ticks = getattr(self, "_ticks", 0) + 1
+        if self.progress is not None:
+            self.progress(min(self._ticks, 25), 25)
+
+    def _bounds(self, raised: float) -> dict[str, Bound]:
+        return {name: line.bound.scaled(raised * self.levels_[name].factor) for name, line in self.lines_.items()}
+
+    def _learn_rest(self, parts: Sequence[FreePart]) -> None:
+        rate, confidence = self.false_alarms_per_hour, self.confidence
+        self.rest_: RestRule | None
+        self.rest_, sentences = learn_rest(self.start_.data, parts, self.kinematics, rate, confidence)
+        self.warnings_ += sentences
+
+    # --- the finger as it runs ----------------------------------------------------------------------------------------
+
+    def _close_the_loop(self, parts: Sequence[FreePart]) -> None:
+        """Raises the level until the tuned finger, whose bias stops in contact, keeps the rate too."""
+        raised = 1.0
+        for _ in range(_STEPS):
+            self.bounds_ = self._bounds(raised)
+            main = self.bounds_.get("innovation", self.bounds_["residual"])
+            self.deviation_: Deviation = deviation(self.runs_, self.cells_, main)
+            data = self._tuned()
+            self.loop_: list[LoopAlarms] = count_loop(data, parts, self.kinematics)
+            if sum(each.alarms for each in self.loop_) <= self.allowed_:
+                break
+            raised *= _STEP
+        self.level_raised_ = raised
+        text = description_text(data).encode()
+        self.description_ = FingerDescription(self.start_.path, text, data, native.image_from_json(text))
+
+    def _tuned(self) -> dict[str, Any]:
+        """The description with everything that was learned."""
+        data = own_copy(self._data)
+        contact: dict[str, Any] = {**data["contact"], "method": self.method}
+        for key in ("innovation", "threshold", "threshold_per_force", "drift"):
+            contact.pop(key, None)
+        slow = self.bounds_["residual"]
+        contact |= {"threshold": _rounded(slow.base), "threshold_per_force": _rounded(slow.per_force)}
+        if self.method != "threshold":
+            fast = self.bounds_["innovation"]
+            contact["innovation"] = {
+                "time": self.innovation_time,
+                "threshold": _rounded(fast.base),
+                "threshold_per_force": _rounded(fast.per_force),
+                **({"evidence_time": self.evidence_time} if self.method == "cusum" else {}),
+            }
+            contact["friction_bound"] = {
+                **(contact.get("friction_bound") or {}),
+                "stuck_share": fast.stuck_share,
+                "stuck_time": self._stuck_time(),
+                "jump_share": fast.jump_share,
+                "jump_time": self.jump_time,
+            }
+        if "drift" in self.bounds_:
+            drift = self.bounds_["drift"]
+            contact["drift"] = {"threshold": _rounded(drift.base), "threshold_per_force": _rounded(drift.per_force)}
+        contact |= {
+            "deviation": _rounded(self.deviation_.base),
+            "deviation_per_force": _rounded(self.deviation_.per_force),
+            **RELEASE,
+        }
+        contact.pop("release_time", None)
+        if math.isfinite(self.release_time):
+            contact["release_time"] = self.release_time
+        if self.rest_ is not None:
+            contact["rest"] = dict(self.rest_.keys)
+        data = {key: value for key, value in data.items() if key != "sensor_fault"}
+        if self.sensors_.keys is not None:
+            data["sensor_fault"] = dict(self.sensors_.keys)
+        return {**data, "contact": contact}
+
+    # --- what it is worth ---------------------------------------------------------------------------------------------
+
+    def _factor(self, name: str) -> float:
+        return self.level_raised_ * self.levels_[name].factor
+
+    def tail(self, factors: Numbers) -> list[tuple[float, int, int]]:
+        """(factor, alarms in sample, alarms held out) with all bounds' bases at a factor on the chosen ones."""
+        return [
+            (float(factor), self._alarms("statistic", float(factor)), self._alarms("held", float(factor)))
+            for factor in factors
+        ]
+
+    def _alarms(self, which: str, factor: float) -> int:
+        above = np.zeros(len(self.cells_.order), dtype=bool)
+        for name, line in self.lines_.items():
+            above |= getattr(line, which) > factor * self._factor(name)
+        return alarms_above(self.cells_.order, above)
+
+    def _by_pretension(self) -> list[Pretension]:
+        found = []
+        square = self.searches_["residual"].mean_square
+        for g, (force, hours) in enumerate(hours_by_pretension(self.cells_)):
+            rows = self.cells_.group == g
+            alarms = sum(each.alarms_in(self.cells_, g) for each in self.loop_)
+            rms = [float(value) for value in np.sqrt(square[rows].mean(axis=0))]
+            found.append(Pretension(force, hours, rms, alarms, rate_limit(alarms, hours, self.confidence)))
+        return found
+
+    def _judge(self) -> None:
+        held = self._alarms("held", 1.0)
+        self.held_out_ = (held, rate_limit(held, self.hours_, self.confidence))
+        alarms = sum(each.alarms for each in self.loop_)
+        if alarms > self.allowed_:
+            self.warnings_.append(
+                f"the tuned finger alarms {alarms} times in {60 * self.hours_:.1f} min even with bounds "
+                f"{self.level_raised_:.2f} times as high; expected at most {self.allowed_}"
+            )
+        if held > self.allowed_:
+            self.warnings_.append(
+                f"{held} alarms in the held-out halves, where {self.allowed_} are allowed: the rate is not supported"
+            )
+        self.warnings_ += self._sentences()
+
+    def _sentences(self) -> list[str]:
+        found = []
+        least = least_hours(self.rate_, self.confidence)
+        for each in self.pretensions_:
+            if each.hours < least and len(self.pretensions_) > 1:
+                found.append(
+                    f"{60 * each.hours:.1f} min at {each.force:.3g} N: alone they support no rate below "
+                    f"{rate_limit(0, each.hours, self.confidence):.3g} per hour; with {60 * (least - each.hours):.1f} "
+                    "min more they might"
+                )
+        if len(self.pretensions_) == 1:
+            low, high = self.forces_
+            found.append(
+                f"one pretension, {self.pretensions_[0].force:.3g} N: what grows with the force is not known, "
+                f"thresholds are constants and hold for mean tendon forces of {low:.3g} to {high:.3g} N; below they "
+                "miss more, above they raise more false alarms; expected recordings at several pretensions"
+            )
+        start = sum(each.at_start for each in self.loop_)
+        if start:
+            found.append(f"{start} alarms within 2 s of a start, which are not counted: bias.initial_variance is small")
+        wide = [self.start_.joint_names[j] for j in np.flatnonzero(self.deviation_.too_wide)]
+        if wide:
+            found.append(f"compensated_torque_std is too large at {', '.join(wide)}: bounds alone exceed the residuals")
+        return found
+
+    def description_text(self) -> str:
+        """The tuned description as JSON, as `tendonfmu tune -o` writes it."""
+        return description_text(self.description_.data)
+
+
+def _rounded(values: Numbers) -> list[float]:
+    return [float(f"{value:.{_DIGITS}g}") for value in values]
+
+
+def _read(finger: Finger) -> FingerDescription:
+    if isinstance(finger, FingerDescription):
+        return finger
+    if isinstance(finger, Mapping):
+        text = json.dumps(finger).encode()
+        try:
+            return FingerDescription(Path("finger"), text, finger, native.image_from_json(text))
+        except native.NativeError as refused:
+            raise InputError(f"finger: {refused}") from None
+    return read_finger(Path(finger))
+
+
+def _listed(sources: Source | Sequence[Source]) -> list[Source]:
+    return [sources] if isinstance(sources, Recording | str | os.PathLike) else list(sources)

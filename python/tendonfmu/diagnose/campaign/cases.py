@@ -1,0 +1,243 @@
+"""The cases of a diagnosis campaign: recordings whose cause is known, and who makes them.
+
+CASES.json:
+
+    {"format": "tendonfmu-campaign-1", "cases": [
+      {"name": "monday_3", "group": "single", "finger": "nominal.json", "recordings": ["a.parquet"], "kinematics": 2,
+       "truth": [{"effect": "gravity", "joint": 2}], "facts": {"strength": 0.1}},
+      {"name": "seed_7", "group": "null", "maker": "cases.py:make", "arguments": {"seed": 7}}
+    ]}
+
+Names of files are relative to CASES.json. A maker is a Python function FILE.py:NAME, called as NAME(folder,
+**arguments) on the machine that runs the case; it writes files into the folder and returns the keys of the first kind.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import re
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from tendonfmu.errors import InputError
+from tendonfmu.files.json_node import Node, Refusal, read_json
+
+FORMAT = "tendonfmu-campaign-1"
+GROUPS = ("null", "single", "double", "absorbed", "unknown", "contact")
+NOT_IN_MODEL = ("contact", "unknown")
+
+_KEYS = (
+    "name",
+    "group",
+    "rig",
+    "finger",
+    "recordings",
+    "test",
+    "gain_recordings",
+    "kinematics",
+    "seed",
+    "truth",
+    "also",
+    "facts",
+    "maker",
+    "arguments",
+    "experiment",
+)
+_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.\-]{0,119}")
+_MAKER = re.compile(r"(?P<file>.+\.py):(?P<function>[A-Za-z_]\w*)")
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What is hidden. joint, tendon: from 1, None where it has none."""
+
+    effect: str
+    joint: int | None = None
+    tendon: int | None = None
+
+
+@dataclass(frozen=True)
+class Case:
+    """One diagnosis to make and to judge.
+
+    name: of its row's file. group: of `GROUPS`. rig: what made it, for the table. finger, recordings, test: as for
+    `tendonfmu diagnose`. gain_recordings: long recordings of the same finger, for the true gain of the extended model.
+    truth: empty for null. also: effects that the rig has although the description lacks them: naming them is neither
+    right nor false. facts: numbers and words that go into the row. maker, arguments: instead of files.
+    experiment: FILE.py:FUNCTION that carries out what a diagnosis asks for, FUNCTION(folder, motion, **arguments) ->
+    name of the recording; motion: as in `diagnosis.json`.
+    """
+
+    name: str
+    group: str
+    folder: Path
+    rig: str = ""
+    finger: Path | None = None
+    recordings: tuple[Path, ...] = ()
+    test: tuple[Path, ...] = ()
+    gain_recordings: tuple[Path, ...] = ()
+    kinematics: int = 1
+    seed: int = 0
+    truth: tuple[Truth, ...] = ()
+    also: tuple[str, ...] = ()
+    facts: Mapping[str, float | str] = field(default_factory=dict)
+    maker: str | None = None
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    experiment: str | None = None
+
+
+def read_cases(path: Path) -> list[Case]:
+    """All cases of a file, names unique. Raises InputError: file, key path, value, what was expected."""
+    try:
+        root = Node(read_json(path, "the cases of a campaign")).keys(("format", "cases"))
+        root.member("format").choice(FORMAT)
+        nodes = root.member("cases").elements()
+        if not nodes:
+            root.member("cases").refuse("a list of at least one case")
+        cases, taken = [], dict[str, int]()
+        for k, node in enumerate(nodes, start=1):
+            case = case_of(node, path.absolute().parent)
+            if case.name in taken:
+                node.member("name").refuse(f"another name than that of cases[{taken[case.name]}]")
+            taken[case.name] = k
+            cases.append(case)
+    except Refusal as refused:
+        raise InputError(f"{path}: {refused}") from None
+    return cases
+
+
+def case_of(node: Node, folder: Path) -> Case:
+    """One case; folder: of its files. Raises Refusal."""
+    node.keys(_KEYS)
+    name = node.member("name").text("a name")
+    if not _NAME.fullmatch(name):
+        node.member("name").refuse("letters, digits, dots, hyphens and underscores, at most 120")
+    group, rig, maker = node.member("group"), node.member("rig"), node.member("maker")
+    group.choice(*GROUPS)
+    common = {
+        "name": name,
+        "group": group.value,
+        "folder": folder,
+        "rig": "" if rig.absent else rig.text("words for what made the recording"),
+        "seed": node.member("seed").integer(0, 2**53, default=0),
+    }
+    arguments = node.member("arguments")
+    for each in (maker, node.member("experiment")):
+        if not each.absent and not _MAKER.fullmatch(each.text("FILE.py:FUNCTION")):
+            each.refuse("FILE.py:FUNCTION")
+    if not maker.absent:
+        if not isinstance(arguments.value or {}, dict):
+            arguments.refuse("an object")
+        return Case(**common, maker=maker.value, arguments=arguments.value or {})
+    if not arguments.absent:
+        arguments.refuse("no arguments without a maker")
+    return Case(**common, **_files(node, folder), **_hidden(node, group.value), facts=_facts(node))
+
+
+def _files(node: Node, folder: Path) -> dict[str, Any]:
+    def several(key: str) -> tuple[Path, ...]:
+        member = node.member(key)
+        if not member.absent and not isinstance(member.value, list):
+            member.refuse("a list of names of recordings")
+        return tuple(folder / each.text("the name of a recording") for each in member.elements())
+
+    recordings = several("recordings")
+    if not recordings:
+        node.member("recordings").refuse("a list of at least one name of a recording")
+    return {
+        "finger": folder / node.member("finger").text("the name of a finger description, or a maker"),
+        "recordings": recordings,
+        "test": several("test"),
+        "experiment": node.member("experiment").value,
+        "gain_recordings": several("gain_recordings"),
+        "kinematics": node.member("kinematics").integer(1, 3, default=1),
+    }
+
+
+def _hidden(node: Node, group: str) -> dict[str, Any]:
+    also = node.member("also")
+    if not also.absent and not isinstance(also.value, list):
+        also.refuse("a list of names of effects")
+    found = tuple(each.text("the name of an effect") for each in also.elements())
+    return {"truth": _truth(node, group), "also": found}
+
+
+def _truth(node: Node, group: str) -> tuple[Truth, ...]:
+    found = []
+    for each in node.member("truth").elements():
+        each.keys(("effect", "joint", "tendon"))
+        at = {
+            key: None if each.member(key).absent else each.member(key).integer(1, limit)
+            for key, limit in (("joint", 16), ("tendon", 64))
+        }
+        found.append(Truth(each.member("effect").text("the name of an effect"), **at))
+    counts = {"null": (0,), "double": (2,)}.get(group, (1,))
+    if len(found) not in counts:
+        node.member("truth").refuse(f"{counts[0]} effects for the group {group}")
+    return tuple(found)
+
+
+def _facts(node: Node) -> dict[str, float | str]:
+    facts = node.member("facts")
+    if facts.absent:
+        return {}
+    if not isinstance(facts.value, dict):
+        facts.refuse("an object of numbers and words")
+    for key, value in facts.value.items():
+        if isinstance(value, bool) or not isinstance(value, int | float | str):
+            facts.member(key).refuse("a number or a word")
+    return {key: value if isinstance(value, str) else float(value) for key, value in facts.value.items()}
+
+
+# --- makers -----------------------------------------------------------------------------------------------------------
+
+
+def made(case: Case, folder: Path) -> Case:
+    """The case with its files; those of a maker are written into the folder. Raises InputError."""
+    if case.maker is None:
+        return case
+    found = python_function(case.maker, case.folder)(folder, **case.arguments)
+    if not isinstance(found, Mapping):
+        raise InputError(f"{case.maker}: returned {type(found).__name__}; expected the keys of a case with files")
+    value = {"name": case.name, "group": case.group, "rig": case.rig or None, "seed": case.seed, **found}
+    try:
+        return replace(case_of(Node(value, case.name), folder), arguments=case.arguments)
+    except Refusal as refused:
+        raise InputError(f"{case.maker}: {refused}") from None
+
+
+def python_function(name: str, folder: Path) -> Callable[..., Any]:
+    """FILE.py:FUNCTION, the file relative to a folder. Raises InputError."""
+    match = _MAKER.fullmatch(name)
+    if match is None:
+        raise InputError(f"{name!r}: no function of a Python file; expected FILE.py:FUNCTION")
+    module = _module((folder / match["file"]).resolve())
+    function = getattr(module, match["function"], None)
+    if not callable(function):
+        raise InputError(f"{name}: no function {match['function']}; expected one in {match['file']}")
+    return function  # type: ignore[no-any-return]
+
+
+def _module(file: Path) -> ModuleType:
+    """A Python file as a module, once a process. Its folder can be imported from, as when it is run."""
+    name = f"tendonfmu_campaign_{hashlib.sha256(str(file).encode()).hexdigest()[:12]}"
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = importlib.util.spec_from_file_location(name, file)
+    if not file.is_file() or spec is None or spec.loader is None:
+        raise InputError(f"{file}: no such file; expected the Python file of a maker")
+    if str(file.parent) not in sys.path:
+        sys.path.append(str(file.parent))
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[name]
+        raise
+    return module

@@ -1,0 +1,144 @@
+"""A description and recordings seen as columns: what it leaves of the torque, and what every effect would add."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.diagnose.candidate_columns import CandidateColumns, candidate_columns, without_uncertainty
+from tendonfmu.diagnose.cause_selection import Selection
+from tendonfmu.diagnose.confirmation import Confirmation
+from tendonfmu.diagnose.effects import CANDIDATES, Candidate
+from tendonfmu.diagnose.hypotheses import Hypothesis, Key, hypotheses
+from tendonfmu.diagnose.least_sizes import LeastSizes
+from tendonfmu.diagnose.regressors import predicted_forces
+from tendonfmu.diagnose.series import Grid, Series, block_prediction, make_series
+from tendonfmu.estimate.estimation import Estimator
+from tendonfmu.model import native
+from tendonfmu.model.balance import moment_arms
+from tendonfmu.recordings.prepared import FitRecording
+from tendonfmu.recordings.residuals import bias_settings
+from tendonfmu.statistics.block_averages import Blocks
+from tendonfmu.statistics.block_grams import Grams
+from tendonfmu.statistics.folds import Folds, make_folds
+from tendonfmu.statistics.splines import KNOTS, TRENDS, Splines, bias_splines, constant_bias, residual_of
+
+Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class View:
+    """A description and what it may lack, on all recordings.
+
+    predicted: the recordings with the forces that the model predicts. splines: [B, s] of the slow bias. grams: products
+    of all columns. least: sizes that the sensors can show.
+    """
+
+    data: Mapping[str, Any]
+    recordings: Sequence[FitRecording]
+    predicted: Sequence[FitRecording]
+    series: Series
+    splines: Splines
+    columns: CandidateColumns
+    folds: Folds
+    grams: Grams
+    least: LeastSizes
+
+    @cached_property
+    def selection(self) -> Selection:
+        reach = np.abs(self.series.angle[self.series.used]).max(axis=0, initial=0.0)
+        return Selection(self.grams, hypotheses(self.columns, moment_arms(self.data), reach), self.least)
+
+    def beside(self, keys: Collection[Key]) -> Selection:
+        """What is missing if these hypotheses are taken as present, each with all its shapes at that place."""
+        known = [each for each in self.selection.hypotheses if each.key in keys]
+        return Selection(self.grams, self.selection.hypotheses, self.least, known) if known else self.selection
+
+    @cached_property
+    def residual(self) -> Numbers:
+        """[B, n] N·m, bias and all that refitting can mend taken off."""
+        return residual_of(self.series, self.splines, self.columns.nominal)
+
+    @cached_property
+    def confirmation(self) -> Confirmation:
+        trends = bias_of(self.data, self.series, TRENDS)
+        return Confirmation(self.series, self.folds, self.splines, trends, self.columns.nominal)
+
+    def p_value(self, hypothesis: Hypothesis) -> float:
+        """Of a hypothesis being chance, corrected for all that were tried."""
+        used = np.flatnonzero(hypothesis.mix.any(axis=1))
+        columns = self.columns.values[:, :, used].astype(np.float64) @ hypothesis.mix[used]
+        return self.confirmation.p_value(columns, sum(len(each.shapes) for each in self.columns.proposals))
+
+
+def look(
+    data: Mapping[str, Any],
+    recordings: Sequence[FitRecording],
+    grid: Grid,
+    least: LeastSizes,
+    left_out: Flags | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    candidates: Sequence[Candidate] = CANDIDATES,
+) -> View:
+    """data: a fitted description. left_out: [B] blocks that are not looked at."""
+    series = series_of(data, recordings, grid, left_out)
+    splines = bias_of(data, series)
+    predicted = predicted_of(data, recordings, grid, series)
+    columns = candidate_columns(
+        data,
+        predicted,
+        blocks_of(grid, recordings),
+        candidates=candidates,
+        worth=least.worth,
+        progress=progress,
+    )
+    folds = make_folds(series)
+    grams = Grams(folds, series.target, columns.nominal, columns.values, splines, nominal_scale(data))
+    return View(data, recordings, predicted, series, splines, columns, folds, grams, least)
+
+
+def nominal_scale(data: Mapping[str, Any]) -> Numbers:
+    """[u] how large each number that a fit of the description estimates may be expected to be."""
+    estimator = Estimator(native.image_from_json(json.dumps(without_uncertainty(data))))
+    return np.array([each.scale for each in estimator.unknowns if not each.path.startswith("bias.")])
+
+
+def series_of(
+    data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, left_out: Flags | None = None
+) -> Series:
+    """left_out: [B] blocks that are not used."""
+    series = make_series(data, recordings, grid, block_prediction(data, recordings, grid))
+    return series if left_out is None else replace(series, used=series.used & ~left_out)
+
+
+def predicted_of(
+    data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, series: Series
+) -> list[FitRecording]:
+    """The recordings with the forces that the description predicts; series: of it."""
+    return predicted_forces(data, recordings, grid, series, residual_alone(data, series))
+
+
+def residual_alone(data: Mapping[str, Any], series: Series) -> Numbers:
+    """[B, n] N·m: what the description leaves, its numbers as they are, bias taken off."""
+    return residual_of(series, bias_of(data, series), np.zeros((*series.target.shape, 0)))
+
+
+def bias_of(data: Mapping[str, Any], series: Series, knots: float = KNOTS) -> Splines:
+    """[B, s]: splines, or constants where the description says that the bias does not wander. knots: s apart."""
+    return bias_splines(series, knots) if bias_settings(data).drift > 0 else constant_bias(series)
+
+
+def blocks_of(grid: Grid, recordings: Sequence[FitRecording]) -> Blocks:
+    """The grid's blocks, as `candidate_columns` takes them."""
+    found = [np.full(len(recording.time), -1, dtype=np.int64) for recording in recordings]
+    for segment in grid.segments:
+        numbers = np.repeat(np.arange(segment.first, segment.first + segment.count), segment.samples)
+        found[segment.recording][segment.part.start : segment.part.start + len(numbers)] = numbers
+    return Blocks(tuple(found), grid.blocks)

@@ -1,0 +1,189 @@
+"""The next cause: what lowers the error on unseen data most, if that is material, certain and no chance.
+
+Material: the rms on held-out folds falls by a stated share at least. Certain: its gain is more than two standard errors
+over the stretches. A size below what the sensors resolve is no cause. From coarse to fine: a place of its own is only
+taken where it is better than all places together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.diagnose.hypotheses import Hypothesis, Key
+from tendonfmu.diagnose.least_sizes import LeastSizes
+from tendonfmu.statistics.block_grams import Grams, standard_error
+
+Numbers = NDArray[np.float64]
+
+CERTAIN = 2.0  # standard errors above 0
+ALIKE = 1.64  # standard errors of the paired difference within which two causes are not told apart
+SAME = 0.015  # of the error, about a quarter of what is material: a smaller difference is none, however certain
+COMMON = {"presliding", "time_delay"}  # of every finger, and of how it was recorded
+FINER = 0.5  # standard errors by which a finer place has to be better: both have as many numbers
+NEAR = 0.1  # of what an effect takes away: derivatives of it tell its places apart no better
+LEAST_SHARE = 0.01  # of a candidate's variance that has to survive the refit for it to be visible
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A hypothesis on unseen data.
+
+    error: Σ e², (N·m)². by_stretch: [stretches] of it. magnitudes: [d] learned from everything.
+    """
+
+    hypothesis: Hypothesis
+    error: float
+    by_stretch: Numbers
+    magnitudes: Numbers
+
+
+@dataclass(frozen=True)
+class Pick:
+    """A cause. gain: 1 − rms with / rms without, on unseen data; error: its standard error. alike: the best hypothesis
+    of every other effect that the data cannot tell from it, best first.
+    """
+
+    judged: Judged
+    gain: float
+    error: float
+    alike: tuple[Hypothesis, ...]
+
+    @property
+    def hypothesis(self) -> Hypothesis:
+        return self.judged.hypothesis
+
+
+class Selection:
+    """All hypotheses judged with the same matrices."""
+
+    def __init__(
+        self, grams: Grams, hypotheses: Sequence[Hypothesis], least: LeastSizes, beside: Sequence[Hypothesis] = ()
+    ) -> None:
+        """beside: hypotheses that are taken as present, so that nothing else is credited with what they explain."""
+        self.grams = grams
+        self._beside = _Beside(beside)
+        self.shares = [grams.surviving(each.mix) for each in hypotheses]
+        self.hypotheses = list(hypotheses)
+        self.base = grams.by_stretch(*self._beside.judged(grams)) if beside else grams.by_stretch(None, None)
+        effects = {each.effect for each in beside}
+        found = []
+        for hypothesis, share in zip(hypotheses, self.shares, strict=True):
+            if share < LEAST_SHARE or hypothesis.effect in effects:
+                continue
+            columns = self._beside.with_(hypothesis)
+            magnitudes = grams.magnitudes(*columns)[len(self._beside.low) :]
+            if least.resolved(hypothesis, magnitudes):
+                error, by_fold = grams.error(*columns)
+                if error <= (1.0 - hypothesis.least_gain) ** 2 * self.base.sum():
+                    found.append((error, hypothesis, magnitudes, by_fold))
+        self._found = sorted(found, key=lambda each: each[0])
+        self._known: dict[int, Judged] = {}
+
+    def ranked(self) -> list[Judged]:
+        """The best hypothesis of each effect that lowers the error, the best first."""
+        seen: dict[str, int] = {}
+        for k, (error, hypothesis, _, _) in enumerate(self._found):
+            if error < self.base.sum():
+                seen.setdefault(hypothesis.effect, k)
+        return [self._judged(k) for k in seen.values()]
+
+    def _judged(self, number: int) -> Judged:
+        if number not in self._known:
+            error, hypothesis, magnitudes, by_fold = self._found[number]
+            mix, _, _ = self._beside.with_(hypothesis)
+            self._known[number] = Judged(hypothesis, error, self.grams.by_stretch(mix, by_fold), magnitudes)
+        return self._known[number]
+
+    def gain(self, judged: Judged, before: Numbers | None = None) -> tuple[float, float]:
+        """1 − rms with / rms without, and its standard error. before: [stretches] Σ e² without; None: of the model."""
+        whole = self.base if before is None else before
+        return rms_gain(whole, judged.by_stretch)
+
+    def best(self, least_gain: float, tried: Collection[str] = ()) -> Pick | None:
+        """The effect that lowers the error most, at the coarsest place that is as good; None where none is material and
+        certain. tried: effects that are left out."""
+        ranked = [each for each in self.ranked() if each.hypothesis.effect not in tried]
+        if not ranked:
+            return None
+        judged = self.refined(ranked[0].hypothesis.effect)
+        gain, error = self.gain(judged)
+        if gain < least_gain or gain <= CERTAIN * error:
+            return None
+        others = [each for each in ranked if each.hypothesis.effect != judged.hypothesis.effect]
+        alike = [each.hypothesis for each in others if is_alike(each.by_stretch, judged.by_stretch)]
+        return Pick(judged, gain, error, tuple(alike))
+
+    def refined(self, effect: str) -> Judged:
+        """The best place at the coarsest level, then finer ones as long as they are certainly better."""
+        levels: dict[int, int] = {}
+        for k, (_, hypothesis, _, _) in enumerate(self._found):
+            if hypothesis.effect == effect:
+                levels.setdefault(hypothesis.level, k)
+        places = [self._judged(levels[level]) for level in sorted(levels)]
+        chosen = places[0]
+        for judged in places[1:]:
+            gain, error = self.gain(judged, chosen.by_stretch)
+            if gain > FINER * error:
+                chosen = judged
+        return chosen
+
+    def near(self, judged: Judged) -> list[Judged]:
+        """The same effect at other places of the same level that is nearly as good, the best first."""
+        own = judged.hypothesis
+        most = judged.error + NEAR * (float(self.base.sum()) - judged.error)
+        seen: dict[Key, int] = {}
+        for k, (error, each, _, _) in enumerate(self._found):
+            if (each.effect, each.level) == (own.effect, own.level) and each.key != own.key and error <= most:
+                seen.setdefault(each.key, k)
+        return [self._judged(k) for k in seen.values()]
+
+
+def names_with(effect: str, named: Collection[str]) -> int:
+    """How many names there are with this one: a model that is a little wrong everywhere can always be given one more,
+    so that each name has to pay more than the one before. COMMON ones, and further places of one, do not count."""
+    others = set(named) - COMMON
+    return 1 if effect in COMMON or effect in others else 1 + len(others)
+
+
+def is_alike(other: Numbers, best: Numbers) -> bool:
+    """Whether errors by stretch [K] cannot be told from those of the best."""
+    behind = other - best
+    return bool(behind.sum() <= max(ALIKE * standard_error(behind), SAME * best.sum()))
+
+
+class _Beside:
+    """Columns of hypotheses that are always there."""
+
+    def __init__(self, hypotheses: Sequence[Hypothesis]) -> None:
+        self._mixes = [each.mix for each in hypotheses]
+        self.low = np.concatenate([np.zeros(0), *(each.low for each in hypotheses)])
+        self._high = np.concatenate([np.zeros(0), *(each.high for each in hypotheses)])
+
+    def judged(self, grams: Grams) -> tuple[Numbers, Numbers]:
+        """Their mix [c, d], and their magnitudes without each fold [f, d]."""
+        mix = np.concatenate(self._mixes, axis=1)
+        return mix, grams.error(mix, self.low, self._high)[1]
+
+    def with_(self, hypothesis: Hypothesis) -> tuple[Numbers, Numbers, Numbers]:
+        """Mix and bounds of all, the hypothesis last."""
+        return (
+            np.concatenate([*self._mixes, hypothesis.mix], axis=1),
+            np.concatenate([self.low, hypothesis.low]),
+            np.concatenate([self._high, hypothesis.high]),
+        )
+
+
+def rms_gain(before: Numbers, after: Numbers) -> tuple[float, float]:
+    """1 − rms after / rms before of Σ e² by stretch [K], and its standard error (delta method over stretches)."""
+    whole, left = float(before.sum()), float(after.sum())
+    if whole <= 0.0:
+        return 0.0, np.inf
+    ratio = np.sqrt(left / whole)
+    if ratio <= 0.0:
+        return 1.0, 0.0
+    spread = standard_error(after - left / whole * before)
+    return 1.0 - ratio, float(spread / (2.0 * ratio * whole))

@@ -1,0 +1,186 @@
+"""The numbers that a description has, as what may have changed: each at its place, by the name of its effect."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.diagnose.effects import Place
+from tendonfmu.diagnose.hypotheses import EVERYWHERE, HERE, SHARED, SOMEWHERE, Hypothesis
+from tendonfmu.estimate.estimation import Estimator, Unknown
+from tendonfmu.estimate.structure import own_copy, set_number
+from tendonfmu.model import native
+
+Numbers = NDArray[np.float64]
+Data = Mapping[str, Any]
+
+_LAW = re.compile(
+    r"(?:joints\[(?P<joint>\d+)\]\.(?P<own>friction|load_friction)"
+    r"|tendons\[(?P<tendon>\d+)\]\.(?P<along>edge_friction|pulley_friction)\[(?P<at>\d+)\])"
+    r"(?:\.laws\[\d+\])?(?:\.(?P<side>positive|negative))?\.(?P<number>[a-z_]+)"
+)
+_COVER = re.compile(r"joints\[(\d+)\]\.cover\.stiffness")
+_ROW = re.compile(r"extensions\[(\d+)\]\.([a-z_]+)")
+_OF_LAW = {"friction": "joint_friction", "load_friction": "joint_load_friction"}
+_OF_NUMBER = {"viscous": "viscous_friction", "static": "stribeck", "stribeck_velocity": "stribeck"}
+
+
+@dataclass(frozen=True)
+class Number:
+    """One unknown of a description's fit. effect: of the contract. side: of its law, 0 where both are one. index: among
+    the unknowns. value: in the unit of the unknown."""
+
+    effect: str
+    place: Place
+    side: int
+    index: int
+    path: str
+    value: float
+    low: float
+    high: float
+
+
+def estimator_of(data: Data) -> tuple[Estimator, list[str]]:
+    """Of all numbers that a fit estimates, and the paths of the description's parameters."""
+    plain = {**data, "sensor_fault": None}
+    image = native.image_from_json(json.dumps(plain))
+    return Estimator(image), [parameter.path for parameter in native.Finger(image).parameters()]
+
+
+def numbers_of(data: Data) -> list[Number]:
+    """In the order of `derivative_passes.nominal_directions`."""
+    estimator, _ = estimator_of(data)
+    unknowns = [each for each in estimator.unknowns if not each.path.startswith("bias.")]
+    return [_number(data, k, each) for k, each in enumerate(unknowns)]
+
+
+def _number(data: Data, index: int, unknown: Unknown) -> Number:
+    effect, place, side = _owner(data, unknown.path)
+    return Number(effect, place, side, index, unknown.path, unknown.start, unknown.lower, unknown.upper)
+
+
+def _owner(data: Data, path: str) -> tuple[str, Place, int]:
+    """Effect, place and side of a number."""
+    if law := _LAW.fullmatch(path):
+        side = {"positive": 1, "negative": -1}.get(law["side"], 0)
+        effect = _OF_NUMBER.get(law["number"]) or _OF_LAW.get(law["own"] or "") or law["along"]
+        joint, tendon = (int(law["joint"]), None) if law["joint"] else (int(law["at"]), int(law["tendon"]))
+        return effect, Place(joint, tendon), side
+    if cover := _COVER.fullmatch(path):
+        return "cover_stiffness", Place(int(cover[1])), 0
+    if matched := _ROW.fullmatch(path):
+        row = data["extensions"][int(matched[1]) - 1]
+        return row["effect"], Place(row.get("joint"), row.get("tendon")), 0
+    return path, Place(), 0
+
+
+# --- hypotheses -------------------------------------------------------------------------------------------------------
+
+
+def number_hypotheses(numbers: Sequence[Number], count: int, first: int) -> list[Hypothesis]:
+    """Each effect at each place, of one joint or tendon, and everywhere; the coarse ones first.
+
+    count: of all columns; first: that of the first number. Both sides of a law by as much of what each is, and one side
+    against the other (asymmetric friction).
+    """
+    by_place: dict[tuple[str, Place], list[Number]] = {}
+    for number in numbers:
+        by_place.setdefault((number.effect, number.place), []).append(number)
+    found = []
+    for (effect, place), own in by_place.items():
+        level = EVERYWHERE if place == Place() else HERE
+        if any(each.side for each in own):
+            found += list(_two_sided(effect, place, own, count, first, level))
+        else:
+            found.append(_free(effect, place, own, count, first, level))
+    for effect in SHARED:
+        places = {place: own for (name, place), own in by_place.items() if name == effect}
+        found += list(_groups(effect, places, count, first))
+    return sorted(found, key=lambda each: each.level)
+
+
+def _free(effect: str, place: Place, own: Sequence[Number], count: int, first: int, level: int) -> Hypothesis:
+    """Each number by itself: of working points, or of a term with several."""
+    mix = np.zeros((count, len(own)))
+    for k, each in enumerate(own):
+        mix[first + each.index, k] = 1.0
+    low, high = _bounds(own)
+    return Hypothesis(effect, place.joint, place.tendon, level, (), mix, low, high)
+
+
+def _bounds(own: Sequence[Number]) -> tuple[Numbers, Numbers]:
+    """[d] of what may be added."""
+    value = np.array([each.value for each in own])
+    low, high = np.array([each.low for each in own]), np.array([each.high for each in own])
+    return low - value, high - value
+
+
+def _two_sided(
+    effect: str, place: Place, own: Sequence[Number], count: int, first: int, level: int
+) -> Iterator[Hypothesis]:
+    yield _scaled(effect, place, own, count, first, level)
+    if effect not in ("stribeck",):
+        sides = [[each for each in own if each.side == side] for side in (1, -1)]
+        mix = np.zeros((count, 1))
+        for side, members in zip((1.0, -1.0), sides, strict=True):
+            for each in members:
+                mix[first + each.index, 0] = side
+        most = min(each.value - each.low for each in own)
+        yield Hypothesis(
+            "asymmetric_friction", place.joint, place.tendon, level, (), mix, np.array([-most]), np.array([most])
+        )
+
+
+def _scaled(effect: str, place: Place, own: Sequence[Number], count: int, first: int, level: int) -> Hypothesis:
+    """All numbers by the same share of what they are."""
+    mix = np.zeros((count, 1))
+    size = np.array([abs(each.value) for each in own])
+    size = np.where(size > 0.0, size, size.max(initial=0.0) or 1.0)
+    for each, share in zip(own, size, strict=True):
+        mix[first + each.index, 0] = share
+    low = max(float((each.low - each.value) / share) for each, share in zip(own, size, strict=True))
+    high = min(float((each.high - each.value) / share) for each, share in zip(own, size, strict=True))
+    return Hypothesis(effect, place.joint, place.tendon, level, (), mix, np.array([low]), np.array([high]))
+
+
+def _groups(effect: str, places: Mapping[Place, Sequence[Number]], count: int, first: int) -> Iterator[Hypothesis]:
+    """Of all places, of those of each joint and of each tendon; only where that is more than one place and not all."""
+    if len(places) < 2:
+        return
+    groups: dict[tuple[int | None, int | None], list[Place]] = {(None, None): list(places)}
+    for place in places:
+        if place.joint is not None:
+            groups.setdefault((place.joint, None), []).append(place)
+        if place.tendon is not None:
+            groups.setdefault((None, place.tendon), []).append(place)
+    for (joint, tendon), members in groups.items():
+        whole = (joint, tendon) == (None, None)
+        if len(members) < 2 or (not whole and len(members) == len(places)):
+            continue
+        own = [each for place in members for each in places[place]]
+        yield _scaled(effect, Place(joint, tendon), own, count, first, EVERYWHERE if whole else SOMEWHERE)
+
+
+# --- a description with changed numbers ------------------------------------------------------------------------------
+
+
+def changed(data: Data, added: Numbers) -> dict[str, Any]:
+    """The description with [u] added to its unknowns, within their boxes."""
+    estimator, paths = estimator_of(data)
+    z = estimator.start.copy()
+    rows = [k for k, each in enumerate(estimator.unknowns) if not each.path.startswith("bias.")]
+    z[rows] += added
+    low, high = (np.array([getattr(each, end) for each in estimator.unknowns]) for end in ("lower", "upper"))
+    z = np.clip(z, low, high)
+    before, after = estimator.values(estimator.start), estimator.values(z)
+    result = own_copy(data)
+    for path, one, other in zip(paths, before, after, strict=True):
+        if one != other:
+            set_number(result, path, float(other))
+    return result

@@ -1,0 +1,150 @@
+"""What the extended model means for contact detection: both models tuned alike on free motion, both scored on labels.
+
+The thresholds of each are the lowest that keep the same rate of false alarms in the same free motion
+(`detection_tuning.ContactTuning`); events, false alarms and delays are counted by `detection_score`.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.detect.alarm_level import least_hours
+from tendonfmu.detect.counting import DetectionScore, pooled
+from tendonfmu.detect.free_motion import SETTLING, free_parts
+from tendonfmu.detect.run import Subject, run_track
+from tendonfmu.detect.tuning import ContactTuning, TuneWarning
+from tendonfmu.diagnose.result import DetectionGain
+from tendonfmu.errors import InputError
+from tendonfmu.model import native
+from tendonfmu.model.description import FingerDescription
+from tendonfmu.recordings.prepared import FitRecording
+from tendonfmu.recordings.recording import Recording
+
+Data = Mapping[str, Any]
+Flags = NDArray[np.bool_]
+
+RATE = 6.0  # 1/h of false alarms that both are tuned for, or what the free motion supports
+CONFIDENCE = 0.9
+_SHORTEST = 4.0  # s, of a stretch without contact that is taken as free motion
+_MARGIN = 1.0  # s, beside contact
+_SPARE = 1.3  # times the least time that supports a rate: recordings are cut into blocks
+
+
+def detection_gain(nominal: Data, extended: Data, recordings: Sequence[FitRecording]) -> DetectionGain | None:
+    """None without labelled contact, or where nothing can be tuned: no free motion, or a bias that does not drift.
+
+    nominal, extended: fitted descriptions. recordings: all of the diagnosis, for training and tests; those without any
+    contact are free motion, and where there are none, the stretches without contact of the others.
+    """
+    labelled = [each.recording for each in recordings if each.recording.contact is not None]
+    labelled = [each for each in labelled if each.contact is not None and each.contact.any()]
+    if not labelled:
+        return None
+    kinematics = recordings[0].kinematics
+    free = _free_motion(_described(nominal), [each.recording for each in recordings], kinematics)
+    if not free:
+        return None
+    hours = sum(float(each.time[-1] - each.time[0]) - SETTLING for each in free) / 3600
+    rate = max(RATE, _SPARE * least_hours(1.0, CONFIDENCE) / hours)
+    if rate > 3600:
+        return None
+    try:
+        tuned = [_tuned(data, free, kinematics, rate) for data in (nominal, extended)]
+    except InputError:  # no thresholds can be tuned, such as of a bias without drift
+        return None
+    before, after = (_score(data, labelled, kinematics) for data in tuned)
+    return DetectionGain(
+        events=len(before.events),
+        found_before=before.found,
+        found_after=after.found,
+        false_alarms_before=len(before.false_alarms),
+        false_alarms_after=len(after.false_alarms),
+        median_delay_before=_median(before),
+        median_delay_after=_median(after),
+        thresholds_before=_thresholds(tuned[0]),
+        thresholds_after=_thresholds(tuned[1]),
+    )
+
+
+# --- free motion ------------------------------------------------------------------------------------------------------
+
+
+def _free_motion(finger: FingerDescription, recordings: Sequence[Recording], kinematics: int) -> list[Recording]:
+    whole = [each for each in recordings if each.contact is None or not each.contact.any()]
+    found = [each for each in whole if _is_free(finger, each, kinematics)]
+    if found:
+        return found
+    pieces = [piece for each in recordings if each.contact is not None for piece in _pieces(each, each.contact)]
+    return [piece for piece in pieces if _is_free(finger, piece, kinematics)]
+
+
+def _is_free(finger: FingerDescription, recording: Recording, kinematics: int) -> bool:
+    """Whether it counts as free motion: long enough, moving, and without a load that a reference sensor feels."""
+    try:
+        parts, _ = free_parts(finger, recording, kinematics)
+    except InputError:
+        return False
+    return any(part.counted.any() for part in parts)
+
+
+def _pieces(recording: Recording, contact: Flags) -> list[Recording]:
+    """Stretches without contact and not close to it."""
+    time = recording.time
+    touched = time[contact]
+    after = np.searchsorted(touched, time - _MARGIN) < np.searchsorted(touched, time + _MARGIN, side="right")
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], (~after).astype(np.int8), [0]])))
+    found = []
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        if time[end - 1] - time[begin] >= _SHORTEST:
+            groups = {name: np.ascontiguousarray(values[begin:end]) for name, values in recording.groups.items()}
+            piece = Recording(Path(f"{recording.path}, from {time[begin]:.4g} s"), time[begin:end].copy(), groups)
+            found.append(replace(piece, contact=np.zeros(end - begin, dtype=bool)))
+    return found
+
+
+# --- tuned and scored -------------------------------------------------------------------------------------------------
+
+
+def _tuned(data: Data, free: Sequence[Recording], kinematics: int, rate: float) -> Data:
+    method = str((data["contact"] or {}).get("method") or "innovation")
+    tuning = ContactTuning(
+        _described(data),
+        false_alarms_per_hour=rate,
+        confidence=CONFIDENCE,
+        method=method,
+        kinematics=kinematics,
+        strict=True,
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", TuneWarning)
+        return tuning.tune(list(free), checked=True).description_.data
+
+
+def _score(data: Data, recordings: Sequence[Recording], kinematics: int) -> DetectionScore:
+    subject = Subject(Path("finger"), _described(data), packed=False)
+    return pooled([run_track(subject, each, kinematics, None).score() for each in recordings])
+
+
+def _thresholds(data: Data) -> tuple[float, ...]:
+    """[n] N·m, of what decides first."""
+    contact = data["contact"]
+    found = (contact.get("innovation") or contact)["threshold"]
+    return tuple(math.inf if each is None else float(each) for each in found)
+
+
+def _median(score: DetectionScore) -> float | None:
+    return float(np.median(score.delays)) if len(score.delays) else None
+
+
+def _described(data: Data) -> FingerDescription:
+    text = json.dumps(data).encode()
+    return FingerDescription(Path("finger"), text, data, native.image_from_json(text))

@@ -1,0 +1,187 @@
+"""Changes of a finger description that add a term at a strength of zero: they leave its torque as it is.
+
+Laws that are absent get next to no friction (the estimator takes a law without any as a mistake); a law with two sides
+or with working points in place of a single one starts with equal sides and equal laws. Paths
+are those of the FMU's parameters.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from tendonfmu.estimate.structure import MAGNITUDES, get_number, own_copy, set_number
+
+Data = Mapping[str, Any]
+
+ABSENT, POINTS, SIDES, COVER = "absent", "points", "sides", "cover"  # kinds of edits, in the order of their making
+_NEXT_TO_NONE = 1e-15  # of the force, or N·m
+_ORDER = (ABSENT, POINTS, SIDES, COVER)
+_LAW = re.compile(
+    r"(?P<law>joints\[\d+\]\.(?:load_)?friction|tendons\[\d+\]\.(?:edge|pulley)_friction\[\d+\])"
+    r"(?:\.laws\[(?P<point>\d+)\])?(?:\.(?P<side>positive|negative))?\.(?P<number>[a-z_]+)"
+)
+_TENDON_LAW = re.compile(r"tendons\[(\d+)\]\.((?:edge|pulley)_friction)\[(\d+)\]")
+
+
+@dataclass(frozen=True)
+class Edit:
+    """kind: "absent", a law where there was none; "points", working points at `angles` (rad) in place of a single edge
+    law; "sides", two sides in place of one; "cover", a cover without stiffness. path: of the effect or of the joint.
+    """
+
+    kind: str
+    path: str
+    angles: tuple[float, ...] = ()
+
+
+def apply_edits(
+    data: Data, edits: Iterable[Edit], rows: Sequence[Mapping[str, Any]], settings: Mapping[str, float]
+) -> dict[str, Any]:
+    """A copy with the edits made, rows added to `extensions` and Stribeck velocities set.
+
+    settings: path of a law's effect -> Stribeck velocity of all of its laws, m/s or rad/s.
+    """
+    result = own_copy(data)
+    for edit in sorted(edits, key=lambda each: _ORDER.index(each.kind)):
+        _MAKE[edit.kind](result, edit)
+    for path, velocity in settings.items():
+        for side in sides_at(result, path):
+            side["stribeck_velocity"] = velocity
+    if rows:
+        result["extensions"] = [*(result.get("extensions") or []), *({**row} for row in rows)]
+    return result
+
+
+def _add_law(data: dict[str, Any], edit: Edit) -> None:
+    law = {"static": _NEXT_TO_NONE, "coulomb": _NEXT_TO_NONE, "stribeck_velocity": 1.0, "viscous": 0.0}
+    matched = _TENDON_LAW.fullmatch(edit.path)
+    if matched is None:
+        set_number(data, edit.path, law)  # type: ignore[arg-type]
+        return
+    tendon, kind, joint = data["tendons"][int(matched[1]) - 1], matched[2], int(matched[3])
+    entries = list(tendon.get(kind) or [])
+    entries += [None] * (joint - len(entries))
+    entries[joint - 1] = law
+    tendon[kind] = entries
+
+
+def _add_points(data: dict[str, Any], edit: Edit) -> None:
+    law = get_number(data, edit.path)
+    laws = [own_copy(law) for _ in edit.angles]
+    set_number(data, edit.path, {"angles": list(edit.angles), "laws": laws})  # type: ignore[arg-type]
+
+
+def _add_sides(data: dict[str, Any], edit: Edit) -> None:
+    law = get_number(data, edit.path)
+    for one in laws_of(law):
+        if one.get("positive") is None:
+            both = {side: dict(one) for side in ("positive", "negative")}
+            one.clear()
+            one.update(both)
+
+
+def _add_cover(data: dict[str, Any], edit: Edit) -> None:
+    joint = get_number(data, edit.path)
+    cover = joint.get("cover") or {}
+    joint["cover"] = {"stiffness": 0.0, "rest_angle": float(cover.get("rest_angle") or 0.0)}
+
+
+_MAKE = {ABSENT: _add_law, POINTS: _add_points, SIDES: _add_sides, COVER: _add_cover}
+
+
+# --- laws -------------------------------------------------------------------------------------------------------------
+
+
+def laws_of(entry: Any) -> list[dict[str, Any]]:
+    """The laws of an effect: those of its working points, or the only one."""
+    return list(entry["laws"]) if entry.get("laws") is not None else [entry]
+
+
+def sides_at(data: Data, path: str) -> list[dict[str, Any]]:
+    """All sides of all laws of the effect at a path."""
+    found = []
+    for law in laws_of(get_number(data, path)):
+        found += [law] if law.get("positive") is None else [law["positive"], law["negative"]]
+    return found
+
+
+def law_columns(data: Data, path: str, numbers: Iterable[str]) -> Iterator[tuple[str, str]]:
+    """(path, number) of each of `numbers` in all laws and sides of the effect at a path."""
+    entry = get_number(data, path)
+    pointed = entry.get("laws") is not None
+    for k, law in enumerate(laws_of(entry), start=1):
+        at = f"{path}.laws[{k}]" if pointed else path
+        for side in ("",) if law.get("positive") is None else (".positive", ".negative"):
+            for number in numbers:
+                yield f"{at}{side}.{number}", number
+
+
+def finer_paths(data: Data, path: str) -> list[str]:
+    """The numbers of an edited description that make up a number of the one before: all working points and sides.
+
+    data: the edited description. path: of a number before.
+    """
+    matched = _LAW.fullmatch(path)
+    if matched is None:
+        return [path]
+    entry = get_number(data, matched["law"])
+    laws = entry.get("laws")
+    numbers = [matched["point"]] if matched["point"] else [None] if laws is None else range(1, len(laws) + 1)
+    found = []
+    for k in numbers:
+        at = matched["law"] if k is None else f"{matched['law']}.laws[{k}]"
+        law = entry if k is None else laws[int(k) - 1]
+        sides = [matched["side"]] if matched["side"] else [None]
+        if law.get("positive") is not None and not matched["side"]:
+            sides = ["positive", "negative"]
+        found += [f"{at}.{matched['number']}" if side is None else f"{at}.{side}.{matched['number']}" for side in sides]
+    return found
+
+
+def is_law_number(path: str) -> bool:
+    """Whether a path is that of a number of a friction law."""
+    return _LAW.fullmatch(path) is not None
+
+
+# --- numbers ----------------------------------------------------------------------------------------------------------
+
+
+def add_to_number(data: dict[str, Any], path: str, value: float) -> None:
+    """Adds to a number in place; `coulomb` of a law takes `static` along."""
+    matched = _LAW.fullmatch(path)
+    if matched is not None and matched["number"] == "coulomb":
+        static = f"{path.rsplit('.', 1)[0]}.static"
+        set_number(data, static, float(get_number(data, static)) + value)
+    before = data_number(data, path)
+    set_number(data, path, before + value)
+
+
+def data_number(data: Data, path: str) -> float:
+    """A number of a description, 0 where its key is left out."""
+    try:
+        value = get_number(data, path)
+    except KeyError:
+        return 0.0
+    return float(value or 0.0)
+
+
+def raise_to(data: dict[str, Any], edits: Iterable[Edit], settings: Mapping[str, float], share: float) -> None:
+    """Keeps every number of the edited laws valid and present: at least `share` of its law's coulomb friction."""
+    for path in {edit.path for edit in edits if edit.kind != COVER} | set(settings):
+        sides = sides_at(data, path)
+        largest = max(abs(float(side["static"])) for side in sides) or 1e-6
+        for side in sides:
+            drop = float(side["static"]) - float(side["coulomb"])
+            side["coulomb"] = max(float(side["coulomb"]), share * largest)
+            side["static"] = side["coulomb"] + max(drop, 0.0)
+            if side.get("viscous") is not None:
+                side["viscous"] = max(float(side["viscous"]), 0.0)
+
+
+def magnitudes_of(side: Mapping[str, Any]) -> tuple[float, float, float]:
+    """Coulomb friction, static − coulomb and viscous friction of a side."""
+    static, coulomb, _, viscous = (float(side.get(key) or 0.0) for key in MAGNITUDES)
+    return coulomb, static - coulomb, viscous

@@ -1,0 +1,38 @@
+"""The torque that it takes to accelerate a joint."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from tendonfmu.diagnose.effects.candidate import Candidate, Data, Place, Variant, no_shape
+from tendonfmu.diagnose.effects.extension_row import row_variant
+from tendonfmu.diagnose.effects.friction_law_places import all_joints, without_rows
+
+NAME = "inertia"
+
+
+def _places(data: Data, kinematics: int) -> list[Place]:
+    return without_rows(data, NAME, all_joints(data))
+
+
+def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
+    return row_variant(data, NAME, place, shape, {"inertia": 0})
+
+
+CANDIDATE = Candidate(
+    name=NAME,
+    title="the link's inertia",
+    explanation=(
+        "A torque in proportion to the joint's acceleration: the link's mass, or a motor's that is geared to it. "
+        "Negative where a known load has too much of it taken off."
+    ),
+    sign=0,
+    excited_by="fast starts and stops of this joint, with the same travel at different accelerations",
+    confused_with=("time_delay", "viscous_friction", "tendon_nonlinearity"),
+    coordinate="acceleration",
+    unit="kg.m2",
+    number="moment of inertia",
+    find_places=_places,
+    find_shapes=no_shape,
+    make=_variant,
+)

@@ -1,0 +1,101 @@
+"""The residual over a cause's own coordinate, with and without the cause."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.diagnose.effects.candidate import Candidate, Place
+from tendonfmu.diagnose.result import Evidence
+from tendonfmu.diagnose.series import Series
+
+Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+BINS = 24
+SHOWN = 4.0  # squared means of the bins, without the cause over with it
+FEWEST = 10  # blocks of a bin
+
+
+def evidence(
+    places: Sequence[Place], candidate: Candidate, series: Series, before: Numbers, after: Numbers
+) -> tuple[Evidence, ...]:
+    """Of the joint where the cause changes most: one picture over the effect's own coordinate. Where that shows little,
+    over the torque that the cause adds: without the cause the residual follows it with slope 1.
+
+    places: of the cause. before, after: [B, n] N·m residual without and with the cause.
+    """
+    change = np.sum((before - after)[series.used] ** 2, axis=0)
+    joint = int(np.argmax(change))
+    pair = (before[:, joint], after[:, joint])
+    own = _binned(*coordinate_of(_nearest(places, joint), candidate.coordinate, series, joint), series, pair, joint)
+    if own and shown(own[0]):
+        return own
+    added = (f"torque of this cause at joint {joint + 1}", "N·m", (before - after)[:, joint])
+    return _binned(*added, series, pair, joint) or own
+
+
+def _nearest(places: Sequence[Place], joint: int) -> Place:
+    """The place at that joint, if there is one."""
+    return next((each for each in places if each.joint == joint + 1), places[0])
+
+
+def shown(found: Evidence) -> bool:
+    """Whether the cause takes away most of what the means of the bins were."""
+    return float(np.sum(found.before**2)) >= SHOWN * float(np.sum(found.after**2))
+
+
+def _binned(
+    label: str, unit: str, values: Numbers, series: Series, pair: tuple[Numbers, Numbers], joint: int
+) -> tuple[Evidence, ...]:
+    """Over bins of equal count; nothing where there are too few blocks. values: [B]. pair: [B] without and with."""
+    kept = series.used & np.isfinite(values)
+    bins = min(BINS, int(kept.sum()) // FEWEST)
+    if bins < 2:
+        return ()
+    order = np.flatnonzero(kept)[np.argsort(values[kept], kind="stable")]
+    parts = np.array_split(order, bins)
+    before, after = (np.array([each[rows].mean() for rows in parts]) for each in pair)
+    before_std, after_std = (standard_errors(each, parts, series) for each in pair)
+    coordinate = np.array([values[rows].mean() for rows in parts])
+    return (Evidence(joint + 1, label, unit, coordinate, before, after, before_std, after_std),)
+
+
+def standard_errors(values: Numbers, parts: list[NDArray[np.int64]], series: Series) -> Numbers:
+    """Of the means; neighbouring blocks of time are not independent, so whole seconds count as one."""
+    second = np.floor(series.time).astype(np.int64) + 1_000_000 * series.recording
+    found = []
+    for rows in parts:
+        _, member = np.unique(second[rows], return_inverse=True)
+        sums = np.bincount(member, weights=values[rows] - values[rows].mean())
+        found.append(np.sqrt(np.sum(sums**2)) / len(rows))
+    return np.array(found)
+
+
+def coordinate_of(place: Place, kind: str, series: Series, joint: int) -> tuple[str, str, Numbers]:
+    """Label, unit, [B] values."""
+    own = joint if place.joint is None else place.joint - 1
+    tendon = None if place.tendon is None else place.tendon - 1
+    if kind == "velocity" and tendon is not None:
+        return f"velocity of tendon {tendon + 1}", "m/s", series.tendon_velocity[:, tendon, own]
+    if kind in ("force", "load"):
+        if tendon is None:
+            return "mean tendon force", "N", np.abs(series.force).mean(axis=1)
+        return f"force of tendon {tendon + 1}", "N", series.force[:, tendon]
+    of_joint: Mapping[str, tuple[str, str, Numbers]] = {
+        "velocity": ("velocity", "rad/s", series.velocity),
+        "angle": ("angle", "rad", series.angle),
+        "travel": ("travel since the last reversal", "rad", _signed_travel(series)),
+        "acceleration": ("acceleration", "rad/s²", series.acceleration),
+    }
+    if kind in of_joint:
+        label, unit, values = of_joint[kind]
+        return f"{label} of joint {own + 1}", unit, values[:, own]
+    return "time", "s", series.time
+
+
+def _signed_travel(series: Series) -> Numbers:
+    """[B, n] rad, in the direction of motion."""
+    return np.asarray(series.travel * np.sign(series.velocity))

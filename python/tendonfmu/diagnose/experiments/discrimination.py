@@ -1,0 +1,100 @@
+"""The motion that a diagnosis asked for (`tendonfmu excite FINGER --discriminate DIR`)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.diagnose.experiments.menu import Entry, entry_from_json
+from tendonfmu.diagnose.experiments.motion import Performed, perform
+from tendonfmu.errors import InputError
+
+Numbers = NDArray[np.float64]
+
+REPORT = "diagnosis.json"
+FORMAT = "tendonfmu-diagnosis-1"
+RATE = 100.0  # rows per second
+
+
+@dataclass(frozen=True)
+class Discrimination:
+    """What to record next. sentence: what it tells. entry: of the menu; performed: its motion."""
+
+    sentence: str
+    entry: Entry
+    performed: Performed
+
+    def columns(self) -> dict[str, Numbers]:
+        """Name -> [N], as `tendonfmu excite` writes a motion."""
+        return self.performed.columns()
+
+    def lines(self) -> Iterator[str]:
+        """What it tells, how long it takes, and which known load belongs to which time."""
+        time, load = self.performed.time, self.performed.load
+        yield self.sentence
+        yield f"{time[-1]:.0f} s: {self.entry.words}"
+        if load.any():
+            edges = np.flatnonzero(np.any(np.diff(load, axis=0) != 0, axis=1)) + 1
+            for begin, end in zip([0, *edges], [*edges, len(time)], strict=True):
+                if end - begin > 1:  # standing, not changing
+                    torques = ", ".join(f"{value:.3g}" for value in load[begin])
+                    yield f"known load {torques} N·m from {time[begin]:.1f} to {time[end - 1]:.1f} s"
+
+
+def discriminating_motion(
+    folder: Path,
+    data: Mapping[str, Any],
+    *,
+    limits: Sequence[tuple[float, float]] | None = None,
+    rate: float = RATE,
+) -> Discrimination:
+    """folder: of a diagnosis. data: the finger's description. limits: [n] of (low, high) rad that its joints have, if
+    they are known. rate: rows per second. Raises InputError.
+    """
+    report = _read_report(folder / REPORT)
+    experiment = report.get("experiment") or {}
+    motion = experiment.get("motion") or {}
+    if not motion:
+        said = report.get("next_experiment") or "nothing is left to tell apart"
+        raise InputError(f"{folder / REPORT}: no further experiment to plan: {said}")
+    try:
+        found = performed_of(data, motion, rate)
+    except InputError as wrong:
+        raise InputError(f"{folder / REPORT}: {wrong}") from None
+    _refuse_beyond(folder / REPORT, found[1], limits)
+    return Discrimination(str(experiment.get("sentence") or report.get("next_experiment") or ""), *found)
+
+
+def performed_of(data: Mapping[str, Any], motion: Mapping[str, Any], rate: float = RATE) -> tuple[Entry, Performed]:
+    """The entry of `diagnosis_result.Experiment.motion` and its motion. Raises InputError."""
+    entry = entry_from_json(motion, len(data["joints"]))
+    return entry, perform(data, entry, rate, int(motion.get("seed", 0)))
+
+
+def _read_report(path: Path) -> dict[str, Any]:
+    try:
+        report = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as failed:
+        raise InputError(f"{path}: {failed.strerror}; expected the folder of a `tendonfmu diagnose`") from None
+    except ValueError as wrong:
+        raise InputError(f"{path}: not JSON ({wrong}); expected a report of `tendonfmu diagnose`") from None
+    found = report.get("format") if isinstance(report, dict) else None
+    if found != FORMAT:
+        raise InputError(f'{path}: format = {json.dumps(found)}; expected "{FORMAT}"')
+    return dict(report)
+
+
+def _refuse_beyond(path: Path, performed: Performed, limits: Sequence[tuple[float, float]] | None) -> None:
+    for j, (low, high) in enumerate(limits or (), start=1):
+        least, most = float(performed.position[:, j - 1].min()), float(performed.position[:, j - 1].max())
+        if not low <= least <= most <= high:
+            raise InputError(
+                f"{path}: experiment.motion: joint {j} moves from {least:.3g} to {most:.3g} rad; expected within its "
+                f"limits {low:.3g} to {high:.3g} rad"
+            )

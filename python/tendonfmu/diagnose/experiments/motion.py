@@ -1,0 +1,210 @@
+"""The motion of an experiment of the menu, sample by sample: for the table that a robot or a rig runs, and for the
+recording that the model expects of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.diagnose.experiments.menu import Entry, Section, own_tension
+from tendonfmu.excite.excitation import Excitation, Plan, plan_excitation
+from tendonfmu.model.balance import balanced_forces, moment_arms
+from tendonfmu.recordings.prepared import FitRecording
+from tendonfmu.recordings.recording import Recording
+from tendonfmu.recordings.residuals import model_alone
+from tendonfmu.statistics.quintic import evaluate
+
+Numbers = NDArray[np.float64]
+Data = Mapping[str, Any]
+
+_SPREAD = (0.75, 1.35)  # times the frequency of the swing, of the first and the last of the ways in which tensions can
+_CLOSE = 1e-9  # of the largest singular value: moment arms that are dependent
+_CHANGE = 2.0  # s, at least, from one section to the next
+_PEAK_OVER_MEAN = 1.875  # speed of a quintic stroke from rest to rest
+
+
+@dataclass(frozen=True)
+class Performed:
+    """time: [N] s. position, velocity, acceleration: [N, n] rad, rad/s, rad/s². tension: [N, m] N, that holds itself.
+    load: [N, n] N·m, known. tendon_position: [N, m] m, motor side, without friction and load.
+    """
+
+    time: Numbers
+    position: Numbers
+    velocity: Numbers
+    acceleration: Numbers
+    tension: Numbers
+    load: Numbers
+    tendon_position: Numbers
+
+    def columns(self) -> dict[str, Numbers]:
+        """Name -> [N], as `tendonfmu excite` writes it."""
+        table = {"time": self.time}
+        groups = {
+            "joint_position": self.position,
+            "joint_velocity": self.velocity,
+            "joint_acceleration": self.acceleration,
+            "tendon_position": self.tendon_position,
+        }
+        for name, values in groups.items():
+            table |= {f"{name}[{k}]": column for k, column in enumerate(values.T, start=1)}
+        return table | {"pretension": self.tension.mean(axis=1)}
+
+
+def perform(data: Data, entry: Entry, rate: float, seed: int = 0) -> Performed:
+    """An entry's sections one after the other, at rest between them. rate: 1/s. Raises InputError."""
+    pieces: list[Performed] = []
+    for number, section in enumerate(entry.sections):
+        piece = _section(data, section, rate, seed + number)
+        if pieces:
+            pieces.append(_passage(pieces[-1], piece, section.max_speed, rate))
+        pieces.append(piece)
+    return _joined(data, pieces, rate)
+
+
+def expected_recording(data: Data, performed: Performed, kinematics: int) -> FitRecording:
+    """What the model expects to be recorded: the forces that carry its friction and the load, all samples free motion.
+
+    kinematics: source of the recordings to come, 1 to 3.
+    """
+    spread = np.linalg.pinv(moment_arms(data))
+    motion = {
+        "time": performed.time,
+        "joint_position": performed.position,
+        "joint_velocity": performed.velocity,
+    }
+    force = balanced_forces(data, motion, performed.tension + performed.load @ spread)
+    groups = {
+        "tendon_force": force,
+        "tendon_position": performed.position @ moment_arms(data).T + force / _stiffness(data),
+        "joint_position": performed.position,
+        "joint_velocity": performed.velocity,
+        "external_torque": performed.load,
+    }
+    samples, whole = len(performed.time), [slice(0, len(performed.time))]
+    recording = Recording(Path("experiment"), performed.time, groups)
+    none = np.zeros(samples, dtype=bool)
+    return FitRecording(
+        recording=recording,
+        kinematics=kinematics,
+        target=np.asarray(force @ moment_arms(data) - performed.load),
+        train=~none,
+        held_out=none,
+        contact_out=none,
+        faulty=none,
+        parts=whole,
+        model=model_alone(data, [recording.arrays()], whole, samples, kinematics),
+        warnings=[],
+    )
+
+
+# --- parts ------------------------------------------------------------------------------------------------------------
+
+
+def _section(data: Data, section: Section, rate: float, seed: int) -> Performed:
+    plan = Plan(
+        ranges=np.array(section.ranges, dtype=float),
+        max_speed=section.max_speed,
+        duration=section.seconds,
+        pretensions=(section.pretension if own_tension(data).any() else 0.0,),
+        rate=rate,
+        seed=seed,
+        max_acceleration=section.max_acceleration,
+    )
+    motion: Excitation = plan_excitation(_plannable(data), plan)
+    load = np.array(section.load or [0.0] * len(section.ranges), dtype=float)
+    return Performed(
+        time=motion.time,
+        position=motion.joint_position,
+        velocity=motion.joint_velocity,
+        acceleration=motion.joint_acceleration,
+        tension=_tension(data, section, motion),
+        load=np.tile(load, (len(motion.time), 1)),
+        tendon_position=motion.tendon_position,
+    )
+
+
+def _plannable(data: Data) -> Data:
+    """The finger as a plan takes it: tendons that a known load alone holds count as loops, which need no pretension."""
+    if own_tension(data).any():
+        return data
+    return {**data, "tendons": [{**tendon, "bidirectional": True} for tendon in data["tendons"]]}
+
+
+def _tension(data: Data, section: Section, motion: Excitation) -> Numbers:
+    """[N, m] N that hold themselves. Where they swing, each way in which tensions can change without turning a joint
+    has a frequency of its own, so that no two tendons swing alike; together they stay within the limits.
+    """
+    if section.swing is None:
+        return motion.tension
+    arms, time = moment_arms(data), motion.time
+    left, sizes, _ = np.linalg.svd(arms)
+    ways = left[:, int(np.sum(sizes > _CLOSE * sizes[0])) :]
+    shares = own_tension(data)
+    pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
+    low, high = np.where(pulls, section.lowest, -section.highest), np.full(len(arms), section.highest)
+    even = shares * float(np.clip(section.pretension, _fit(low, shares, np.max), _fit(high, shares, np.min)))
+    reach = np.abs(ways).sum(axis=1)
+    room = np.minimum(np.maximum(even - low, 0.0), np.maximum(high - even, 0.0))
+    size = float(np.min(room[reach > _CLOSE] / reach[reach > _CLOSE]))
+    rates = section.swing * np.geomspace(*_SPREAD, ways.shape[1]) if ways.shape[1] > 1 else np.array([section.swing])
+    # at rest at both ends
+    grow, _, _ = evaluate(np.array([[0.0, 0, 0, 0], [_CHANGE, 1, 0, 0]]), np.minimum(time, time[-1] - time))
+    waves = np.sin(2 * np.pi * time[:, None] * rates + np.arange(len(rates)))
+    return np.asarray(even + size * (grow[:, None] * waves) @ ways.T)
+
+
+def _fit(limit: Numbers, shares: Numbers, worst: Any) -> float:
+    """Pretension at which every tendon's share keeps its limit."""
+    used = shares > _CLOSE
+    return float(worst(limit[used] / shares[used]))
+
+
+def _passage(before: Performed, after: Performed, speed: float, rate: float) -> Performed:
+    """From the end of one section to the beginning of the next, from rest to rest; its ends belong to these."""
+    way = float(np.abs(after.position[0] - before.position[-1]).max())
+    rows = int(np.ceil(max(_CHANGE, _PEAK_OVER_MEAN * way / (0.5 * speed)) * rate))
+    time = np.arange(1, rows) / rate
+    position, velocity, acceleration = _stroke(before.position[-1], after.position[0], rows / rate, time)
+    return Performed(
+        time=time,
+        position=position,
+        velocity=velocity,
+        acceleration=acceleration,
+        tension=_stroke(before.tension[-1], after.tension[0], rows / rate, time)[0],
+        load=_stroke(before.load[-1], after.load[0], rows / rate, time)[0],
+        tendon_position=np.zeros((len(time), before.tension.shape[1])),
+    )
+
+
+def _stroke(start: Numbers, end: Numbers, seconds: float, time: Numbers) -> tuple[Numbers, Numbers, Numbers]:
+    """[K, n] quintics from rest to rest, with their first and second derivatives."""
+    share, slope, bend = evaluate(np.array([[0.0, 0.0, 0.0, 0.0], [seconds, 1.0, 0.0, 0.0]]), time)
+    way = (end - start)[None]
+    return start[None] + share[:, None] * way, slope[:, None] * way, bend[:, None] * way
+
+
+def _joined(data: Data, pieces: Sequence[Performed], rate: float) -> Performed:
+    position, velocity, acceleration, tension, load = (
+        np.concatenate([getattr(piece, name) for piece in pieces])
+        for name in ("position", "velocity", "acceleration", "tension", "load")
+    )
+    return Performed(
+        time=np.arange(len(position)) / rate,
+        position=position,
+        velocity=velocity,
+        acceleration=acceleration,
+        tension=tension,
+        load=load,
+        tendon_position=position @ moment_arms(data).T + tension / _stiffness(data),
+    )
+
+
+def _stiffness(data: Data) -> Numbers:
+    return np.array([tendon["stiffness"] for tendon in data["tendons"]], dtype=float)

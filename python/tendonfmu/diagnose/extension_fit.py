@@ -1,0 +1,292 @@
+"""The extended finger: the nominal description with the terms of the accepted causes, all numbers fitted again.
+
+The same likelihood, the same bias settings and the same samples as for the nominal fit (`FrictionFit`, method batch);
+what is left out here is its judging of every number, so that a selection may fit again and again.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.errors import InputError
+from tendonfmu.estimate.files import description_text, with_values
+from tendonfmu.estimate.methods import Interrupted, Learned, Settings, Watch, learn_batch
+from tendonfmu.estimate.structure import Choice, Structure, build_structure, get_number
+from tendonfmu.estimate.verdicts import slopes
+from tendonfmu.model import native
+from tendonfmu.model.balance import moment_arms
+from tendonfmu.model.description import FingerDescription
+from tendonfmu.recordings.prepared import FitRecording
+
+if TYPE_CHECKING:
+    from tendonfmu.diagnose.effects.candidate import Candidate, Place
+
+Numbers = NDArray[np.float64]
+
+MOST_SAMPLES = 20_000  # that a fit learns from, about
+BOUND = 1e-6  # of the range to a bound: a number that is as near has run into it
+NEW = 3.0  # times its start: the standard deviation of what is known of a new number before
+_SIDE = re.compile(r"\.(positive|negative)(?=\.|$)")
+_POINT = re.compile(r"\.laws\[\d+\]")
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """A cause that was accepted: a candidate at a place, its non-linear numbers, its magnitudes as estimated so far."""
+
+    candidate: Candidate
+    place: Place
+    shape: Mapping[str, float] = field(default_factory=dict)
+    magnitudes: Any = ()
+
+    def added_to(self, data: Mapping[str, Any]) -> dict[str, Any]:
+        """The description with this cause's term."""
+        return self.candidate.extended(data, self.place, self.shape, self.magnitudes)
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """Options of `FrictionFit`, method batch. threads 0: all cores. path: of the description, for messages."""
+
+    choice: Choice = field(default_factory=Choice)
+    prior: float = 1.0
+    max_passes: int = 60
+    tolerance: float = 0.3
+    threads: int = 0
+    path: Path = Path("finger")
+
+
+@dataclass(frozen=True)
+class FittedModel:
+    """A description whose numbers were fitted.
+
+    given: the description that says how large each number may be (its values are the prior's standard deviations).
+    values, errors: by path of an estimated number, SI; errors are standard errors of white noise, NaN at a bound.
+    cost: ½ Σ e²/S with the prior's part. at_bound: paths. warnings: sentences.
+    """
+
+    data: Mapping[str, Any]
+    given: Mapping[str, Any]
+    values: Mapping[str, float]
+    errors: Mapping[str, float]
+    cost: float
+    at_bound: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    def text(self) -> str:
+        """As JSON, as `tendonfmu fit -o` writes it."""
+        return description_text(self.data)
+
+
+def fit_numbers(
+    data: Mapping[str, Any],
+    recordings: Sequence[FitRecording],
+    settings: FitSettings = FitSettings(),
+    *,
+    given: Mapping[str, Any] | None = None,
+) -> FittedModel:
+    """Fits the numbers of a description to the samples of `FitRecording.train`.
+
+    data: where the fit begins. given: the description that says how large numbers may be, data itself by default; a
+    number that it has and that a fit before has driven towards 0 can then come back. The torque that is explained is
+    `FitRecording.target`, also where the recording's forces are others (`regressors.predicted_forces`: without the
+    noise, which a term that scales with the force would fit by shrinking it). Raises InputError.
+    """
+    origin = data if given is None else given
+    structure, learned = learn_numbers(data, recordings, settings, given=origin)
+    numbers = np.asarray(learned.estimator.values(learned.z))
+    finger = with_values(structure, numbers)
+    at_bound = _at_bound(learned)
+    errors = _standard_errors(structure, learned)
+    return FittedModel(
+        data=finger.data,
+        given=origin,
+        values={number.path: float(numbers[structure.index[number.path]]) for number in structure.numbers},
+        errors={path: np.nan if path in at_bound else error for path, error in errors.items()},
+        cost=float(learned.cost),
+        at_bound=at_bound,
+        warnings=tuple(learned.warnings),
+    )
+
+
+def learn_numbers(
+    data: Mapping[str, Any], recordings: Sequence[FitRecording], settings: FitSettings, *, given: Mapping[str, Any]
+) -> tuple[Structure, Learned]:
+    """What `fit_numbers` learns, with all that is known of it."""
+    every = -(-sum(int(recording.train.sum()) for recording in recordings) // MOST_SAMPLES)
+    recordings = [_thinned(_with_own_target(data, recording), max(every, 1)) for recording in recordings]
+    structure = _with_scale(build_structure(_described(data, settings.path), settings.choice), given)
+    options = Settings(
+        prior=settings.prior,
+        max_passes=settings.max_passes,
+        tolerance=settings.tolerance,
+        threads=settings.threads,
+        effective=False,  # a diagnosis has its own noise model (`whitening`)
+    )
+    try:
+        return structure, learn_batch(structure, recordings, Watch(None), options, None)
+    except Interrupted:  # a fit that is only a part of something has no use for what it has so far
+        raise KeyboardInterrupt from None
+
+
+def fit_extended(
+    nominal: FittedModel,
+    causes: Sequence[Accepted],
+    recordings: Sequence[FitRecording],
+    settings: FitSettings = FitSettings(),
+) -> FittedModel:
+    """The nominal model with the causes' terms, all numbers fitted again, beginning at the nominal fit.
+
+    recordings: those of the nominal fit, with the same masks. Raises InputError.
+    """
+    causes = possible(nominal.data, causes)
+    if not causes:
+        return nominal
+    begin = extended_description(nominal.data, causes)
+    choice = settings.choice
+    if choice.only:
+        new = {path for own in added_paths(nominal.data, causes) for path in own}
+        structure = build_structure(_described(begin, settings.path), Choice(choice.sides))
+        known = {number.path for number in structure.numbers}
+        choice = replace(choice, only=(*choice.only, *sorted(new & known)))
+    return fit_numbers(begin, recordings, replace(settings, choice=choice), given=nominal.given)
+
+
+def cause_parameters(
+    nominal: Mapping[str, Any], causes: Sequence[Accepted], model: FittedModel
+) -> tuple[Mapping[str, tuple[float, str]], ...]:
+    """By cause its numbers in a model that was fitted with all of them: path -> (value, unit)."""
+    units = {parameter.path: parameter.unit for parameter in native.Finger.from_description(model.data).parameters()}
+    return tuple(_parameters(model, own, units) for own in added_paths(nominal, causes))
+
+
+def extended_description(data: Mapping[str, Any], causes: Sequence[Accepted]) -> Mapping[str, Any]:
+    """The description with the causes' terms, one after the other."""
+    for cause in causes:
+        data = cause.added_to(data)
+    return data
+
+
+def added_paths(data: Mapping[str, Any], causes: Sequence[Accepted]) -> tuple[tuple[str, ...], ...]:
+    """By cause the paths of the numbers that it adds or, where a law becomes two sides or more points, replaces."""
+    found = []
+    for cause in causes:
+        extended = cause.added_to(data)
+        before = dict(_leaves(data))
+        # what is only written down differently is no number of the cause
+        found.append(tuple(path for path, value in _leaves(extended) if path not in before or before[path] != value))
+        data = extended
+    return tuple(found)
+
+
+def _parameters(model: FittedModel, paths: Sequence[str], units: Mapping[str, str]) -> dict[str, tuple[float, str]]:
+    """Of the paths those that were estimated, and all numbers of extensions."""
+    own = (path for path in paths if path in model.values or (path in units and path.startswith("extensions[")))
+    return {path: (float(get_number(model.data, path)), units[path]) for path in own}
+
+
+# --- parts ------------------------------------------------------------------------------------------------------------
+
+
+def possible(data: Mapping[str, Any], causes: Sequence[Accepted]) -> list[Accepted]:
+    """Without those that change a law which only a cause that is not among them brings."""
+    found = []
+    for cause in causes:
+        try:
+            data = cause.added_to(data)
+        except (KeyError, StopIteration, AttributeError):  # no such law: nothing to change where it should be
+            continue
+        found.append(cause)
+    return found
+
+
+def _with_own_target(data: Mapping[str, Any], recording: FitRecording) -> FitRecording:
+    """The recording with the external torque that makes its own target of its forces."""
+    groups = recording.recording.groups
+    known = groups["tendon_force"] @ moment_arms(data) - recording.target
+    given = groups.get("external_torque", np.zeros_like(known))
+    if np.allclose(known, given, rtol=1e-9, atol=1e-9 * float(np.abs(recording.target).max(initial=0.0))):
+        return recording
+    return replace(recording, recording=replace(recording.recording, groups={**groups, "external_torque": known}))
+
+
+def _thinned(recording: FitRecording, every: int) -> FitRecording:
+    """Learns from one in so many samples: noise that is coloured tells no more, and the model still sees them all."""
+    if every == 1:
+        return recording
+    return replace(recording, train=recording.train & (np.arange(len(recording.train)) % every == 0))
+
+
+def _described(data: Mapping[str, Any], path: Path) -> FingerDescription:
+    text = json.dumps(data).encode()
+    try:
+        return FingerDescription(path, text, data, native.image_from_json(text))
+    except native.NativeError as refused:
+        raise InputError(f"{path}: {refused}") from None
+
+
+def _with_scale(structure: Structure, given: Mapping[str, Any]) -> Structure:
+    """Expected magnitudes from the given description, wherever it has the number, or the law before it was split; of
+    what is new some times where it starts.
+    """
+    scale = structure.scale.copy()
+    for number in structure.numbers:
+        for path in (number.path, number.with_path):
+            if path is None or not np.isnan(scale[structure.index[path]]):
+                continue
+            for known in (path, _SIDE.sub("", path), _SIDE.sub("", _POINT.sub("", path))):
+                value = _number_or_none(given, known)
+                if value:
+                    scale[structure.index[path]] = abs(value)
+                    break
+            else:
+                begin = _number_or_none(structure.start.data, path)
+                scale[structure.index[path]] = NEW * abs(begin) if begin else np.nan
+    return replace(structure, scale=scale)
+
+
+def _number_or_none(data: Mapping[str, Any], path: str) -> float | None:
+    try:
+        value = get_number(data, path)
+    except (KeyError, IndexError, TypeError):
+        return None
+    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
+
+
+def _at_bound(learned: Learned) -> tuple[str, ...]:
+    """Paths of the numbers whose unknown has run into a bound of its box."""
+    found = []
+    for unknown, z in zip(learned.estimator.unknowns, learned.z, strict=True):
+        reach = BOUND * max(unknown.scale, abs(z))
+        if z - unknown.lower <= reach or unknown.upper - z <= reach:
+            found.append(unknown.path)
+    return tuple(found)
+
+
+def _leaves(data: Any, path: str = "") -> Iterator[tuple[str, float]]:
+    """(path, value) of all numbers of a parsed description, indices from 1."""
+    if isinstance(data, Mapping):
+        for key, value in data.items():
+            yield from _leaves(value, f"{path}.{key}" if path else key)
+    elif isinstance(data, list | tuple):
+        for k, value in enumerate(data, start=1):
+            yield from _leaves(value, f"{path}[{k}]")
+    elif isinstance(data, int | float) and not isinstance(data, bool):
+        yield path, float(data)
+
+
+def _standard_errors(structure: Structure, learned: Learned) -> dict[str, float]:
+    """By path, from the covariance of the unknowns (delta method)."""
+    matrix = slopes(learned.estimator, learned.z)[[structure.index[number.path] for number in structure.numbers]]
+    variance = np.einsum("pu,uv,pv->p", matrix, learned.covariance, matrix)
+    return {
+        number.path: float(np.sqrt(max(part, 0.0))) for number, part in zip(structure.numbers, variance, strict=True)
+    }

@@ -1,0 +1,264 @@
+"""What an extension is worth: both FMUs run over data that neither was fitted to, and their residuals compared.
+
+The residual r is τ less T of eq. (10) and less the bias before it has seen the sample. It is no output of an FMU:
+compensated_torque = (1 − K)·r is what the update leaves of it. So the core runs over the same samples beside it: where
+all outputs of both agree, its r is that of the FMU, and tells how the bias jumped. A known external torque, labelled
+contact and gaps need the bias filter once more, over y − T (`fit_residuals.track`), with the T that the FMU put out; in
+a recording without them that is r of the core again, and both are compared.
+"""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.diagnose.result import ModelErrors
+from tendonfmu.errors import InputError, InternalError
+from tendonfmu.estimate.evaluation import residuals
+from tendonfmu.estimate.files import description_text
+from tendonfmu.fmu.fmpy_client import run_fmu
+from tendonfmu.fmu.packaging import build_fmu
+from tendonfmu.model import native
+from tendonfmu.model.signals import NUMBERS
+from tendonfmu.recordings.prepared import FitRecording
+from tendonfmu.recordings.residuals import BiasSettings, Model, bias_settings, delayed_torque, rms
+from tendonfmu.statistics.gain_interval import Blocks, blocks_of, gain_interval
+from tendonfmu.statistics.interval import Interval
+
+Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Data = Mapping[str, Any]
+
+AGREEMENT = 1e-9  # of the largest value of an output's series: what any two implementations may differ by
+_NEVER = 1e9  # N·m; no contact threshold is ever passed
+_THRESHOLD = re.compile(r"contact\.(innovation\.)?threshold\[")
+_TINY = 1e-12  # N·m, of a series that is 0
+
+
+@dataclass(frozen=True)
+class Gain:
+    """nominal, extended: rms per joint on the samples trained on, and on those of the test.
+
+    value: 1 − rms_extended/rms_nominal over all joints on the test. steps: rms over all joints on the test, N·m, of
+    each model of a sequence. blocks: of how many seconds-long blocks of the test the
+    intervals are. held_out: the test is held-out blocks of the training recordings. agreement: largest difference
+    between an FMU's outputs and the core's, in units of the output's largest value.
+    """
+
+    nominal: ModelErrors
+    extended: ModelErrors
+    bias_only_rms: tuple[float, ...]
+    value: Interval
+    steps: tuple[float, ...]
+    blocks: int
+    held_out: bool
+    agreement: float
+
+
+def measure_gain(
+    nominal: Data,
+    extended: Data,
+    training: Sequence[FitRecording],
+    tests: Sequence[FitRecording] = (),
+    *,
+    between: Sequence[Data] = (),
+    seed: int = 0,
+) -> Gain:
+    """nominal, extended: fitted descriptions with the same `bias`. tests: recordings that nothing was fitted to; where
+    there are none, the samples `held_out` of the training recordings. between: models with some of the causes.
+
+    The FMUs of nominal and extended are run; the models between them by the core alone. Raises InputError where
+    there is nothing to test on, InternalError where the FMU does not agree with the core.
+    """
+    test = _Test.of(training, tests)
+    _check_settings(nominal, extended)
+    runs = {"nominal": [run_both(nominal, each) for each in test.recordings]}
+    same = extended == nominal
+    runs["extended"] = runs["nominal"] if same else [run_both(extended, each) for each in test.recordings]
+    left = {name: [run.residual for run in found] for name, found in runs.items()}
+    before, after = test.squares(left["nominal"]), test.squares(left["extended"])
+    sequence = [before, *(test.squares_of(data) for data in between), *([] if same else [after])]
+    return Gain(
+        nominal=ModelErrors(test.trained(nominal, left["nominal"]), test.tested(left["nominal"])),
+        extended=ModelErrors(test.trained(extended, left["extended"]), test.tested(left["extended"])),
+        bias_only_rms=test.tested([residuals(extended, each, None).residual for each in test.recordings]),
+        value=gain_interval(before, after, seed),
+        steps=tuple(float(np.sqrt(squares.sum() / max(test.count, 1))) for squares in sequence),
+        blocks=len(before),
+        held_out=test.held_out,
+        agreement=max(run.agreement for found in runs.values() for run in found),
+    )
+
+
+def require_unseen(training: Sequence[FitRecording], tests: Sequence[FitRecording]) -> None:
+    """Raises InputError where there is nothing to measure a gain on."""
+    _Test.of(training, tests)
+
+
+def _check_settings(nominal: Data, extended: Data) -> None:
+    if _filter_of(nominal) != _filter_of(extended):
+        raise InternalError("bias: not the same in both descriptions; rms would tell nothing")
+
+
+def _filter_of(data: Data) -> BiasSettings:
+    """The bias filter's settings; where the bias begins is a number that is fitted, and may differ."""
+    return replace(bias_settings(data), initial_torque=None)
+
+
+def residual_of(data: Data, recording: FitRecording) -> Numbers:
+    """[N, n] r before the bias update, N·m, by the core alone: of the whole recording, whose friction remembers
+    across gaps as an FMU does, while the bias begins anew after them; NaN where there is none.
+    """
+    return residuals(data, recording, _model(data, recording, _core_outputs(data, recording))).residual
+
+
+# --- an FMU and the core side by side ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class BothRun:
+    """residual: [N, n] r, N·m. agreement: largest difference of the outputs of FMU and core, in units of the output's
+    largest value; where the recording is one piece of free motion, that of r, too.
+    """
+
+    residual: Numbers
+    agreement: float
+
+
+def run_both(data: Data, recording: FitRecording) -> BothRun:
+    """Packs the FMU of a description, runs it over a recording without contact detection, and takes r from its T.
+
+    Raises InputError where FMU and core do not agree.
+    """
+    outputs, beside = _fmu_outputs(data, recording), _core_outputs(data, recording)
+    agreement = max(_difference(outputs[name], beside[name]) for name in NUMBERS)
+    left = residuals(data, recording, _model(data, recording, {**beside, **outputs})).residual
+    if _one_piece(data, recording):
+        size = max(float(np.abs(beside["friction_torque"]).max()), float(np.abs(beside["joint_torque"]).max()))
+        agreement = max(agreement, float(np.abs(left[1:] - beside["residual"][1:]).max()) / max(size, _TINY))
+    if not agreement <= AGREEMENT:
+        raise InternalError(
+            f"{recording.path}: the FMU's outputs and the core's differ by {agreement:.3g} of their largest value; "
+            f"expected at most {AGREEMENT:g}"
+        )
+    return BothRun(left, agreement)
+
+
+def _fmu_outputs(data: Data, recording: FitRecording) -> dict[str, Numbers]:
+    """[N, n] by group, of the FMU as packed, its contact thresholds out of reach by start values."""
+    out_of_reach = {
+        parameter.path: min(_NEVER, parameter.maximum)
+        for parameter in native.Finger.from_description(data).parameters()
+        if _THRESHOLD.match(parameter.path)
+    }
+    with tempfile.TemporaryDirectory(prefix="tendonfmu-") as folder:
+        file = Path(folder) / "finger.json"
+        file.write_text(description_text(data), encoding="utf-8")
+        fmu = build_fmu(file, file.with_suffix(".fmu"), illustrated=False)
+        columns = run_fmu(fmu, recording.recording, kinematics_source=recording.kinematics, parameters=out_of_reach)
+    return {
+        name: np.column_stack([columns[f"{name}[{j}]"] for j in range(1, len(data["joints"]) + 1)]) for name in NUMBERS
+    }
+
+
+def _core_outputs(data: Data, recording: FitRecording) -> dict[str, Any]:
+    """Of `native.Finger.run`, without contact detection."""
+    free = {**data, "contact": {"threshold": [_NEVER] * len(data["joints"])}, "sensor_fault": None}
+    return native.Finger.from_description(free, recording.kinematics).run(recording.recording.arrays())
+
+
+def _model(data: Data, recording: FitRecording, outputs: Mapping[str, Any]) -> Model:
+    """T and Δb of a run: the bias moves by Δb and by what the update takes from r, which is r − compensated_torque."""
+    bias = outputs["bias_torque"]
+    torque = outputs["friction_torque"] - bias
+    jump = np.diff(bias, axis=0, prepend=bias[:1]) - (outputs["residual"] - outputs["compensated_torque"])
+    jump[0] = 0.0
+    return Model(
+        torque=torque - delayed_torque(data, recording.recording.groups, outputs["joint_torque"]),
+        jump=jump,
+        joint_angle=outputs["joint_angle"],
+        joint_speed=outputs["joint_speed"],
+        slack=outputs["slack"],
+    )
+
+
+def _one_piece(data: Data, recording: FitRecording) -> bool:
+    """Whether the bias filter of the FMU sees what a judgement of the fit sees: all of it, and the same mean force."""
+    rows = data.get("extensions") or []
+    delayed = any(row["effect"] == "time_delay" and row["delay"] < 0 for row in rows)
+    same_noise = not (delayed and bias_settings(data).per_force)
+    return len(recording.parts) == 1 and recording.external is None and bool(recording.tracked.all()) and same_noise
+
+
+def _difference(mine: Numbers, other: Numbers) -> float:
+    """Largest difference in units of the largest value."""
+    return float(np.abs(mine - other).max()) / max(float(np.abs(other).max()), _TINY)
+
+
+# --- the samples of the test ------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Test:
+    """Recordings with the samples that are tested on, and their blocks."""
+
+    training: Sequence[FitRecording]
+    recordings: Sequence[FitRecording]
+    masks: Sequence[Flags]
+    blocks: Sequence[Blocks]
+    held_out: bool
+
+    @classmethod
+    def of(cls, training: Sequence[FitRecording], tests: Sequence[FitRecording]) -> _Test:
+        held_out = not tests
+        recordings = training if held_out else tests
+        masks = [_judged(each, each.held_out if held_out else each.tracked) for each in recordings]
+        if not any(mask.any() for mask in masks):
+            raise InputError(
+                f"{recordings[0].path}: no sample to measure the gain on; expected free motion of some seconds"
+            )
+        blocks = [blocks_of(each.time, mask) for each, mask in zip(recordings, masks, strict=True)]
+        return cls(training, recordings, masks, blocks, held_out)
+
+    def squares(self, left: Sequence[Numbers]) -> Numbers:
+        """[B] sums of squares over all joints of the residuals [N, n] of the recordings, by block."""
+        return np.concatenate(
+            [block.sums(np.sum(each**2, axis=1)) for block, each in zip(self.blocks, left, strict=True)]
+        )
+
+    def squares_of(self, data: Data) -> Numbers:
+        """The same of a description, by the core."""
+        return self.squares([residual_of(data, each) for each in self.recordings])
+
+    @property
+    def count(self) -> int:
+        """Samples that are judged, times joints."""
+        return sum(int(mask.sum()) for mask in self.masks) * int(self.recordings[0].target.shape[1])
+
+    def tested(self, left: Sequence[Numbers]) -> tuple[float, ...]:
+        return _pooled(left, self.masks)
+
+    def trained(self, data: Data, left: Sequence[Numbers]) -> tuple[float, ...]:
+        """left: of the recordings tested on, which are those trained on where blocks were held out."""
+        found = left if self.held_out else [residual_of(data, each) for each in self.training]
+        return _pooled(found, [_judged(each, each.train) for each in self.training])
+
+
+def _judged(recording: FitRecording, chosen: Flags) -> Flags:
+    """[N] without the samples that have no residual: the first of each part, and those before the bias has begun."""
+    judged = np.zeros(len(recording.time), dtype=bool)
+    for part in recording.parts:
+        if recording.tracked[part].any():
+            judged[part.start + int(np.argmax(recording.tracked[part])) + 1 : part.stop] = True
+    return chosen & judged
+
+
+def _pooled(left: Sequence[Numbers], masks: Sequence[Flags]) -> tuple[float, ...]:
+    return tuple(rms(np.concatenate(left), np.concatenate(masks)))

@@ -1,0 +1,87 @@
+"""Tendon forces without the noise that they share with the target.
+
+The joint torque that is to be explained is made of the measured forces, and so is every column that has a force in it.
+What no model explains of the torque is in both: a column that carries it fits the noise, and would be a cause of every
+recording. Columns are therefore taken at the forces that the model itself predicts: the measured ones less the
+unexplained torque, spread over the tendons as the smallest forces that make it (errors in variables; instrument).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.diagnose.series import Grid, Series, exact_model
+from tendonfmu.model.balance import moment_arms
+from tendonfmu.recordings.prepared import FitRecording
+
+Numbers = NDArray[np.float64]
+
+MOST_SHIFT = 10.0  # times the largest measured force
+
+
+def predicted_forces(
+    data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, series: Series, residual: Numbers
+) -> list[FitRecording]:
+    """The recordings with forces, and tendon positions that go with them, so that angles stay as measured.
+
+    data: the fitted description. residual: [B, n] N·m of it, bias taken off.
+    """
+    arms = moment_arms(data)
+    spread = np.linalg.pinv(arms)
+    stiffness = np.array([tendon["stiffness"] for tendon in data["tendons"]])
+    pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
+    found = []
+    for number, recording in enumerate(recordings):
+        groups = dict(recording.recording.groups)
+        force = groups["tendon_force"]
+        most = MOST_SHIFT * np.abs(force).max(initial=0.0)  # a model that explains nothing predicts no forces either
+        shift = np.clip(_unexplained(data, recording, number, grid, series, residual) @ spread, -most, most)
+        predicted = np.where(pulls & (force > 0), np.maximum(force - shift, 0.0), force - shift)
+        groups["tendon_force"] = predicted
+        if "tendon_position" in groups:
+            # a description with a delay pairs the position of now with the force of `delay` s later
+            change = _shifted(recording, (predicted - force) / stiffness, _delay(data))
+            groups["tendon_position"] = groups["tendon_position"] + change
+        found.append(replace(recording, recording=replace(recording.recording, groups=groups)))
+    return found
+
+
+def _delay(data: Mapping[str, Any]) -> float:
+    """s by which the description says that forces come later than positions."""
+    rows = data.get("extensions") or []
+    return float(sum(row["delay"] for row in rows if row["effect"] == "time_delay"))
+
+
+def _shifted(recording: FitRecording, values: Numbers, delay: float) -> Numbers:
+    """[N, m] values of `delay` s later, within each part."""
+    if not delay:
+        return values
+    found: Numbers = values.copy()
+    for part in recording.parts:
+        time = recording.time[part]
+        for i in range(values.shape[1]):
+            found[part, i] = np.interp(time + delay, time, values[part, i])
+    return found
+
+
+def _unexplained(
+    data: Mapping[str, Any], recording: FitRecording, number: int, grid: Grid, series: Series, residual: Numbers
+) -> Numbers:
+    """[N, n] N·m at every sample; 0 where nothing is learned from."""
+    model = exact_model(data, recording)
+    found = np.zeros_like(recording.target)
+    for segment in grid.segments:
+        if segment.recording != number:
+            continue
+        part, blocks = segment.part, segment.blocks
+        left = recording.target[part] - model[part]
+        slow = series.target[blocks] - residual[blocks]
+        time = recording.time[part]
+        for j in range(left.shape[1]):
+            found[part, j] = left[:, j] - np.interp(time, series.time[blocks], slow[:, j])
+    return np.where(recording.train[:, None], found, 0.0)

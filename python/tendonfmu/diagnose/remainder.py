@@ -1,0 +1,132 @@
+"""How much of a residual could be explained at all, and where that part lives.
+
+Two looks: a flexible learner on everything that is known of the motion and its past (remainder_learner.py), and steady
+oscillations in time (statistics/spectral_line.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import ttest_1samp
+
+from tendonfmu.diagnose.remainder_features import features
+from tendonfmu.diagnose.remainder_learner import Choice, Learner, choices
+from tendonfmu.diagnose.remainder_text import described
+from tendonfmu.statistics.block_grams import standard_error
+from tendonfmu.statistics.folds import make_folds
+from tendonfmu.statistics.spectral_line import Line, find_lines
+from tendonfmu.statistics.splines import Splines
+from tendonfmu.statistics.whitening import Whitener, whitener
+
+if TYPE_CHECKING:
+    from tendonfmu.diagnose.series import Series
+
+Numbers = NDArray[np.float64]
+
+LEVEL = 0.01  # of a wrong "unknown", family-wise
+LEAST_SHARE = 0.02  # of the residual's variance: smaller parts are not reported
+CERTAIN = 2.0  # standard errors over the stretches
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One part of the remainder.
+
+    joint: from 1. group: key of GROUPS or "line". subject: "joint 2", "tendons 1 and 3", or "".
+    """
+
+    joint: int
+    group: str
+    subject: str
+    line: Line | None = None
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What is explainable of a residual [B, n].
+
+    share: per joint, of its variance that is predicted on unseen stretches. gain: [stretches, n] the same by stretch,
+    (N·m)². square: [n] of the residual, (N·m)². p_value: of there being nothing, over all joints. unknown: whether
+    there is something for certain. prediction: [B, n] N·m, 0 where not used. findings: what is certain.
+    """
+
+    share: tuple[float, ...]
+    gain: Numbers
+    square: Numbers
+    p_value: float
+    unknown: bool
+    description: str
+    prediction: Numbers
+    findings: tuple[Finding, ...]
+
+
+def measure_remainder(
+    series: Series, residual: Numbers, splines: Splines, *, force: Numbers | None = None, seed: int = 0
+) -> Remainder:
+    """residual: [B, n] N·m. splines: [B, s] of the bias, whose span was taken from it. force: [B, m] N predicted by the
+    model, for the learner; without it only what makes no torque of the measured one.
+    """
+    joints, folds = residual.shape[1], make_folds(series)
+    residual = np.where(series.used[:, None], residual, 0.0)
+    if not folds.enough:
+        nothing = np.zeros((folds.stretches, joints))
+        return Remainder((0.0,) * joints, nothing, np.zeros(joints), 1.0, False, "", np.zeros_like(residual), ())
+    seen = features(series, force=force, seed=seed)
+    learner = Learner(seen, residual, splines, folds)
+    tried = choices(seen)
+    everything = learner.predicted(tried[0].columns)
+    prediction, findings, p_values = np.zeros_like(residual), [], []
+    for joint in range(joints):
+        gain = learner.gains(everything)[:, joint]
+        p_values.append(_p_value(gain))
+        if gain.sum() > CERTAIN * standard_error(gain):
+            prediction[folds.rows, joint] = everything[:, joint]
+    large = [_share(learner.target[:, j], prediction[folds.rows, j]) >= LEAST_SHARE for j in range(joints)]
+    if any(large):
+        named = _named(learner, tried[1:])
+        findings += [Finding(j + 1, named[j].group, named[j].subject) for j in range(joints) if large[j]]
+    lines = _lines(series, residual, prediction, findings)
+    p_value = min([1.0, *(joints * each for each in p_values), *lines])
+    gain = learner.gains(prediction[folds.rows])
+    share = tuple(_share(learner.target[:, j], prediction[folds.rows, j]) for j in range(joints))
+    certain = [each for each in findings if share[each.joint - 1] >= LEAST_SHARE]
+    text = described(series, residual, prediction, certain, share) if certain else ""
+    square = np.sum(learner.target**2, axis=0)
+    return Remainder(share, gain, square, p_value, bool(certain), text, prediction, tuple(certain))
+
+
+def _share(target: Numbers, prediction: Numbers) -> float:
+    whole = float(np.sum(target**2))
+    return max(0.0, 1.0 - float(np.sum((target - prediction) ** 2)) / whole) if whole > 0.0 else 0.0
+
+
+def _p_value(gain: Numbers) -> float:
+    """Of gains by stretch [K] being chance: a one-sided t test."""
+    if not np.any(gain):
+        return 1.0
+    return float(ttest_1samp(gain, 0.0, alternative="greater").pvalue)
+
+
+def _named(learner: Learner, tried: Sequence[Choice]) -> list[Choice]:
+    """Of each joint the set of columns with a name that predicts best."""
+    known = [each for each in tried if each.group != "interaction"]
+    left = [np.sum((learner.target - learner.predicted(each.columns)) ** 2, axis=0) for each in known]
+    return [known[k] for k in np.argmin(left, axis=0)]
+
+
+def _lines(series: Series, residual: Numbers, prediction: Numbers, findings: list[Finding]) -> list[float]:
+    """Adds steady oscillations to findings and prediction [B, n]; their p-values."""
+    filters, found = whitener(series, residual - prediction), []
+    joints = residual.shape[1]
+    for joint in range(joints):
+        own = Whitener(filters.coefficients[:, joint : joint + 1], filters.scale[joint : joint + 1], filters.valid)
+        lines, wave = find_lines(series, residual[:, joint] - prediction[:, joint], own, level=LEVEL / joints)
+        prediction[:, joint] += wave
+        findings += [Finding(joint + 1, "line", "", each) for each in lines]
+        found += [min(1.0, joints * each.p_value) for each in lines]
+    return found

@@ -1,0 +1,90 @@
+"""The causes that a report lists: those with a term in the extended model; then contact and unknown, without one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from tendonfmu.diagnose.contact_scan import LEVEL as SCAN_LEVEL
+from tendonfmu.diagnose.result import Cause, Diagnosis, Where
+from tendonfmu.diagnose.size import quantity
+
+CONTACT, UNKNOWN = "contact", "unknown"
+LOAD = "load"  # a contact that lasts: of a change
+TITLES = {
+    LOAD: "a load on the finger that was not there, or a sensor's zero that has moved",
+    CONTACT: "something touches the finger, or stops it",
+    UNKNOWN: "something that no effect on the list explains",
+}
+_EXPLANATIONS = {
+    LOAD: "The mean torque that the model leaves has moved, far beyond what it does in the reference. No friction does "
+    "that. Look whether something touches or pulls the finger, and what the sensors show without a tendon; the bias "
+    "takes it up at run time.",
+    CONTACT: "In some stretches a torque comes and goes that no friction explains. They are left out of the fit; the "
+    "gain is what leaving them out takes away from the error on the training recordings.",
+    UNKNOWN: "What is left can be predicted in part from what was recorded, but it has the shape of no effect on the "
+    "list. The gain is what predicting it takes away from the error in unseen stretches.",
+}
+LEAST_GAIN = 0.1  # of a contact, for certain: it is judged on the recordings that it was found in
+LEAST_PEAK = 6.0  # rms of what the extended model leaves, that the peak of a contact is at least
+
+
+def reported_causes(found: Diagnosis) -> list[Cause]:
+    """In order of gain; contact and unknown at the end, each only where its gain is above 0 for certain."""
+    return [*found.causes, *_load(found), *_contact(found), *_unknown(found)]
+
+
+def _load(found: Diagnosis) -> Iterator[Cause]:
+    load = found.load
+    if load is None or not load.gain.low > 0.0:
+        return
+    size = load.size
+    yield Cause(
+        where=Where(CONTACT, load.joint),
+        title=TITLES[LOAD],
+        explanation=_EXPLANATIONS[LOAD],
+        p_value=load.p_value,
+        gain=load.gain,
+        confusable_with=(Where("force_offset"), Where("gravity", load.joint)),
+        parameters={},
+        size=f"{quantity(size.change.value, size.unit, sign=True)} all the time",
+        changed=size,
+    )
+
+
+def _contact(found: Diagnosis) -> Iterator[Cause]:
+    events = [event for event in found.events if event.peak >= LEAST_PEAK * max(found.extended.train_rms)]
+    gain = found.event_gain
+    if not events or gain is None or not gain.low >= LEAST_GAIN:
+        return
+    joints = {joint for event in events for joint in event.joints}
+    joint = joints.pop() if len(joints) == 1 else None
+    count = "one event" if len(events) == 1 else f"{len(events)} events"
+    seconds = sum(event.end - event.start for event in events)
+    yield Cause(
+        where=Where(CONTACT, joint),
+        title=TITLES[CONTACT],
+        explanation=_EXPLANATIONS[CONTACT],
+        p_value=SCAN_LEVEL,  # of any event where there is none
+        gain=gain,
+        confusable_with=(),
+        parameters={},
+        size=f"{count}, {seconds:.1f} s in all",
+    )
+
+
+def _unknown(found: Diagnosis) -> Iterator[Cause]:
+    rest = found.unexplained
+    if not rest.unknown or not rest.gain.low > 0.0:
+        return
+    yield Cause(
+        where=Where(UNKNOWN, int(np.argmax(rest.by_joint)) + 1 if any(rest.by_joint) else None),
+        title=TITLES[UNKNOWN],
+        explanation=_EXPLANATIONS[UNKNOWN],
+        p_value=rest.p_value,
+        gain=rest.gain,
+        confusable_with=(),
+        parameters={},
+        size=rest.description.rstrip("."),
+    )

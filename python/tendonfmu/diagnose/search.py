@@ -1,0 +1,373 @@
+"""From recordings to the causes that a description lacks: signals, starting point, and one cause after the other.
+
+After each cause the extended description is fitted again with all its numbers, and everything is looked at anew around
+it: derivatives of a wrong model would ask for small pieces that mend the linearisation. The search ends at the first
+candidate that is not material and certain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.diagnose.cause_search import View, bias_of, look, predicted_of, residual_alone, series_of
+from tendonfmu.diagnose.cause_selection import CERTAIN, Judged, Pick, Selection, is_alike, rms_gain
+from tendonfmu.diagnose.contact_scan import left_out, scan_events
+from tendonfmu.diagnose.effects import CANDIDATES, Candidate, Place
+from tendonfmu.diagnose.effects.presliding import is_spring
+from tendonfmu.diagnose.extension_fit import (
+    Accepted,
+    FitSettings,
+    FittedModel,
+    extended_description,
+    fit_extended,
+    possible,
+)
+from tendonfmu.diagnose.hypotheses import SCALING, Hypothesis, Key
+from tendonfmu.diagnose.nominal_fit import fitted
+from tendonfmu.diagnose.online_error import OnlineError
+from tendonfmu.diagnose.result import Event
+from tendonfmu.diagnose.series import Grid
+from tendonfmu.diagnose.signal_choice import Estimation
+from tendonfmu.diagnose.span import span_of
+from tendonfmu.diagnose.starting_point import presliding_everywhere
+from tendonfmu.model.extensions import extended_row
+from tendonfmu.recordings.prepared import FitRecording
+from tendonfmu.statistics.interval import Interval
+from tendonfmu.tasks.phases import Phases, Step
+
+Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+MOST_CAUSES = 8
+SIGNIFICANCE = 0.01  # family-wise
+MOST_FITTED = 3  # effects that columns cannot tell apart
+WIDESPREAD = {"presliding"}  # in every finger, and different from place to place
+MOST_REFUSED = 4  # effects that selection named and the fit, or the test, did not bear out
+
+
+@dataclass(frozen=True)
+class NamedCause:
+    """A cause as it was found. effect, joint, tendon: where, None for everywhere. accepted: its places, as a
+    description takes them. gain, error: 1 − rms with / rms without on held-out folds, and its standard error. alike:
+    what the data cannot tell from it.
+    """
+
+    effect: str
+    joint: int | None
+    tendon: int | None
+    accepted: tuple[Accepted, ...]
+    gain: float
+    error: float
+    p_value: float
+    alike: tuple[Hypothesis, ...]
+    hypothesis: Hypothesis | None = None  # as it was selected; None: it is part of the start
+    measured: Interval | None = None  # on unseen data, as it runs online
+
+    @property
+    def key(self) -> Key:
+        return self.effect, self.joint, self.tendon
+
+    @property
+    def interval(self) -> Interval:
+        """The measured gain, else that of the held-out folds, with 95 %."""
+        return self.measured or Interval(self.gain, self.gain - 1.96 * self.error, self.gain + 1.96 * self.error)
+
+
+@dataclass(frozen=True)
+class Search:
+    """estimation: signals and recordings. nominal, extended: fitted descriptions, with the settings for estimating.
+    first, last: what each lacks and leaves. causes: in the order in which they were found; models: [causes + 1] after
+    each, the nominal one first. small: certain but not material. events: contact and stalls. out: [B] blocks in them.
+    fitted_to: recordings with forces that the model predicts, events left out.
+    """
+
+    estimation: Estimation
+    nominal: FittedModel
+    extended: FittedModel
+    first: View
+    last: View
+    causes: tuple[NamedCause, ...]
+    models: tuple[FittedModel, ...]
+    small: tuple[NamedCause, ...]
+    events: tuple[Event, ...]
+    out: Flags
+    fitted_to: Sequence[FitRecording]
+
+
+def accepted_of(hypothesis: Hypothesis, magnitudes: Numbers) -> tuple[Accepted, ...]:
+    """The places of a hypothesis with its common magnitudes [d], as `extension_fit` takes them."""
+    return tuple(
+        Accepted(
+            member.proposal.candidate,
+            member.proposal.place,
+            dict(member.shape.shape),
+            tuple(float(weight * value) for weight, value in zip(member.weights, magnitudes, strict=True)),
+        )
+        for member in hypothesis.members
+    )
+
+
+def search(
+    recordings: Sequence[FitRecording],
+    chosen: Estimation,
+    *,
+    least_gain: float,
+    seed: int,
+    phases: Phases,
+) -> Search:
+    """recordings: as they were measured; chosen: what is
+    estimated from; `train` says where to look."""
+    settings = chosen.settings
+    with phases.start("contact"):
+        events, out = events_of(chosen.model.data, chosen.recordings, chosen.grid, seed)
+    nominal = chosen.nominal
+    own = [without_blocks(each, k, chosen.grid, out) for k, each in enumerate(chosen.recordings)]
+    clean = predicted_of(nominal.data, own, chosen.grid, series_of(nominal.data, own, chosen.grid, out))
+    nominal = fitted(nominal.data, clean, settings, given=nominal.given)
+    touched = chosen.recordings  # with the events in them
+    chosen = replace(chosen, nominal=nominal, recordings=own)
+    online = OnlineError(chosen.online(nominal.data), [without_events(each, events) for each in recordings])
+    with phases.start("causes", MOST_CAUSES) as step:
+        rounds = _Rounds(chosen, out, online, least_gain, settings)
+        rounds.run(step)
+    if events:
+        # what the causes explain was no event
+        left, _ = events_of(rounds.models[-1].data, touched, chosen.grid, seed)
+        events = tuple(event for event in events if any(_overlap(event, other) for other in left))
+    return Search(
+        estimation=chosen,
+        nominal=nominal,
+        extended=rounds.models[-1],
+        first=rounds.first,
+        last=rounds.view,
+        causes=tuple(rounds.causes),
+        models=tuple(rounds.models),
+        small=(*rounds.refused, *rounds.small()),
+        events=events,
+        out=out,
+        fitted_to=clean,
+    )
+
+
+def _overlap(one: Event, other: Event) -> bool:
+    return one.recording == other.recording and one.start < other.end and other.start < one.end
+
+
+def events_of(
+    data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, seed: int
+) -> tuple[tuple[Event, ...], Flags]:
+    """What no friction explains in the residual of a model, and the blocks [B] that lie in it."""
+    series = series_of(data, recordings, grid)
+    names = [str(recording.path) for recording in recordings]
+    events = scan_events(series, residual_alone(data, series), bias_of(data, series), names, seed=seed)
+    return events, left_out(series, events, names)
+
+
+def without_events(recording: FitRecording, events: Sequence[Event]) -> FitRecording:
+    """The recording without the samples of events in it."""
+    inside = np.zeros(len(recording.time), dtype=bool)
+    for event in events:
+        if event.recording == str(recording.path):
+            inside |= (recording.time >= event.start) & (recording.time <= event.end)
+    return replace(recording, train=recording.train & ~inside, held_out=recording.held_out & ~inside)
+
+
+def without_blocks(recording: FitRecording, number: int, grid: Grid, out: Flags) -> FitRecording:
+    """The recording without the samples of the blocks [B] that are out."""
+    train = recording.train.copy()
+    for segment in grid.segments:
+        if segment.recording == number:
+            begin = segment.part.start
+            rows = np.flatnonzero(np.repeat(out[segment.blocks], segment.samples))
+            train[begin + rows] = False
+    return replace(recording, train=train)
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """A cause and the model fitted with it; None where there is none. error: [K] Σ e² on held-out folds, by stretch."""
+
+    cause: NamedCause
+    model: FittedModel | None
+    error: Numbers
+
+
+class _Rounds:
+    """Cause after cause; models and views after each."""
+
+    def __init__(
+        self,
+        chosen: Estimation,
+        out: Flags,
+        online: OnlineError,
+        least_gain: float,
+        settings: FitSettings,
+    ) -> None:
+        self.causes: list[NamedCause] = []
+        self.refused: list[NamedCause] = []
+        self.models = [chosen.nominal]
+        self._chosen, self._out, self._online = chosen, out, online
+        self._least_gain, self._settings = least_gain, settings
+        # the start is fitted before anything is chosen: until then only what the nominal model leaves is asked for
+        self.view = self.first = self._look(chosen.nominal, () if chosen.start.causes else CANDIDATES)
+
+    def run(self, step: Step) -> None:
+        for accepted in self._chosen.start.causes:
+            self._take(self._tried(_together(accepted)), ())
+        if not self.view.columns.proposals:
+            self.view = self._look(self.models[-1])
+        self._search(step)
+        if self._tries_presliding():
+            self._search(step)
+
+    def _search(self, step: Step) -> None:
+        while len(self.causes) < MOST_CAUSES and len(self.refused) < MOST_REFUSED:
+            step(len(self.causes))
+            # what was refused explains something: no other effect is credited with that; but a correction of the torque
+            # itself lowers any error by shrinking the torque
+            known = {each.key for each in self.refused if each.effect not in SCALING}
+            tried = {each.effect for each in self.refused}
+            selection = self.view.beside(known)
+            picked = selection.best(self._least_gain, tried)
+            if picked is None:
+                break
+            trial = self._best_fitted(selection, picked)
+            if trial.cause.p_value >= SIGNIFICANCE or not self._take(trial):
+                self.refused.append(trial.cause)
+
+    def _best_fitted(self, selection: Selection, picked: Pick) -> _Trial:
+        """Columns of a wrong model mislead: of the effects that they cannot tell apart, the fitted models decide."""
+        own = self._named(picked.judged, selection)
+        rivals = [self._named(selection.refined(each.effect), selection) for each in _to_fit(picked)]
+        trials = [self._tried(each) for each in (own, *(each for each in rivals if each.p_value < SIGNIFICANCE))]
+        best = min(trials, key=lambda each: float(each.error.sum()))
+        same = [each for each in trials if each.model is not None and is_alike(each.error, best.error)]
+        # what is there already explains the data without a new name
+        widespread = WIDESPREAD & {each.effect for each in self.causes}
+        best = next((each for each in same if each.cause.effect in widespread), best)
+        fitted_effects = {each.cause.effect for each in trials}
+        alike = [each.cause.hypothesis for each in same if each is not best and each.cause.hypothesis is not None]
+        alike += [each for each in picked.alike if each.effect not in fitted_effects]
+        best = self._at_best_place(best, selection)
+        return replace(best, cause=replace(best.cause, alike=tuple(alike)))
+
+    def _at_best_place(self, trial: _Trial, selection: Selection) -> _Trial:
+        """Derivatives tell the places of a large effect apart less well than the models that are fitted with it."""
+        judged = selection.refined(trial.cause.effect)
+        if trial.cause.hypothesis is not judged.hypothesis:
+            return trial
+        others = [self._named(each, selection) for each in selection.near(judged)[: MOST_FITTED - 1]]
+        trials = [trial, *(self._tried(each) for each in others if each.p_value < SIGNIFICANCE)]
+        return min(trials, key=lambda each: float(each.error.sum()))
+
+    def _tries_presliding(self) -> bool:
+        """Where none was taken: its distance may be far below what the scan tries. True if it was taken."""
+        chosen = self._chosen
+        if any(each.effect == "presliding" for each in [*self.causes, *self.refused]):
+            return False
+        span = span_of(self.models[-1].data, chosen.recordings)
+        tried = presliding_everywhere(self.models[-1].data, chosen.recordings[0].kinematics, span)
+        return bool(tried) and self._take(self._tried(_together(tried[0])))
+
+    def _named(self, judged: Judged, selection: Selection) -> NamedCause:
+        own = judged.hypothesis
+        accepted = accepted_of(own, judged.magnitudes)
+        gain, error = selection.gain(judged)
+        p_value = self.view.p_value(own)
+        return NamedCause(own.effect, own.joint, own.tendon, accepted, gain, error, p_value, (), own)
+
+    def _tried(self, cause: NamedCause) -> _Trial:
+        """Fits the description with a further cause."""
+        everything = [each for known in [*self.causes, cause] for each in known.accepted]
+        accepted = possible(self.models[0].data, everything)
+        if len(accepted) < len(everything):
+            return _Trial(cause, None, np.array([np.inf]))
+        own = self._chosen.recordings
+        # forces that the model without a delay predicts are not late: no fit would find it in them
+        begin = extended_description(self.models[-1].data, cause.accepted)
+        clean = predicted_of(begin, own, self._chosen.grid, series_of(begin, own, self._chosen.grid, self._out))
+        model = fit_extended(self.models[0], accepted, clean, self._settings)
+        # again with the forces that the model with the cause predicts: those of the one before know nothing of it
+        clean = predicted_of(
+            model.data, own, self._chosen.grid, series_of(model.data, own, self._chosen.grid, self._out)
+        )
+        model = fitted(model.data, clean, self._settings, given=self.models[0].given)
+        if not self._resolved(cause, model):
+            return _Trial(cause, None, np.array([np.inf]))
+        return _Trial(cause, model, self._look(model, ()).selection.base)
+
+    def _take(self, trial: _Trial, candidates: Sequence[Candidate] = CANDIDATES) -> bool:
+        """Keeps a further cause where it lowers the error on unseen stretches materially and certainly, and that of
+        the model as it runs online. candidates: looked at around the new model."""
+        before, after, model, cause = self.view.selection.base, trial.error, trial.model, trial.cause
+        gain, error = rms_gain(before, after) if model is not None else (0.0, 0.0)
+        if model is None or gain < self._least_gain or gain <= CERTAIN * error or not self._runs_better(model):
+            return False
+        if cause.p_value >= SIGNIFICANCE:  # of the start: a step that has no column in the view before
+            cause = replace(cause, p_value=_step_p_value(before, after))
+        self.causes.append(replace(cause, gain=gain, error=error))
+        self.models.append(model)
+        self.view = self._look(model, candidates)
+        return True
+
+    def _runs_better(self, model: FittedModel) -> bool:
+        """Whether it leaves less than the last model as both run online, with a slow bias taken off and of r."""
+        before, after = (self._chosen.online(each.data) for each in (self.models[-1], model))
+        left, found = (self._online.by_stretch(each).sum() for each in (before, after))
+        return bool(found < left and self._online.square(after) < self._online.square(before))
+
+    def _resolved(self, cause: NamedCause, model: FittedModel) -> bool:
+        """Whether the sensors can show a fitted play or delay of this size, and presliding is no spring."""
+        if cause.effect == "presliding" and is_spring(model.data, span_of(model.data, self._chosen.recordings)):
+            return False
+        own = [extended_row(model.data, cause.effect, each.place) for each in cause.accepted]
+        least = self._chosen.least
+        return all(least.shows(cause.effect, each.place, row) for each, row in zip(cause.accepted, own, strict=True))
+
+    def _look(self, model: FittedModel, candidates: Sequence[Candidate] = CANDIDATES) -> View:
+        chosen = self._chosen
+        return look(model.data, chosen.recordings, chosen.grid, chosen.least, self._out, candidates=candidates)
+
+    def small(self) -> list[NamedCause]:
+        """Of every effect that is certain but not material the best place."""
+        found = []
+        known = {each.effect for each in self.refused}
+        for judged in self.view.selection.ranked():
+            gain, error = self.view.selection.gain(judged)
+            if (
+                judged.hypothesis.effect not in known
+                and gain > CERTAIN * error
+                and (p_value := self.view.p_value(judged.hypothesis)) < SIGNIFICANCE
+            ):
+                found.append(_small(judged, gain, error, p_value))
+        return found
+
+
+def _to_fit(picked: Pick) -> list[Hypothesis]:
+    """What a pick cannot be told from and may be in its place. A correction of the torque itself may only stand for
+    another one: it lowers any error."""
+    scaling = picked.hypothesis.effect in SCALING
+    return [each for each in picked.alike if scaling or each.effect not in SCALING][: MOST_FITTED - 1]
+
+
+def _together(places: tuple[Accepted, ...]) -> NamedCause:
+    """A cause of the start, at one place or at all."""
+    place = places[0].place if len(places) == 1 else Place()
+    return NamedCause(places[0].candidate.name, place.joint, place.tendon, places, 0.0, 0.0, 1.0, ())
+
+
+def _small(judged: Judged, gain: float, error: float, p_value: float) -> NamedCause:
+    own = judged.hypothesis
+    return NamedCause(own.effect, own.joint, own.tendon, accepted_of(own, judged.magnitudes), gain, error, p_value, ())
+
+
+def _step_p_value(before: Numbers, after: Numbers) -> float:
+    """Of a gain by stretch [K] being chance: a one-sided t test."""
+    from scipy.stats import ttest_1samp
+
+    return float(ttest_1samp(before - after, 0.0, alternative="greater").pvalue) if len(before) > 1 else 1.0

@@ -1,0 +1,232 @@
+"""Recordings and models as a diagnosis sees them: averaged over short blocks of time.
+
+The estimator's model of a joint is y_k = T_k + b_k + e_k with b_k = b_{k−1} + Δb_k + w_k (runtime/include/
+tendonfmu_estimation.h). With G_k = T_k + Σ Δb up to k, y − G is a slow bias plus noise. G and its derivatives by the
+numbers of the description are all that is looked at here.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.model import native
+from tendonfmu.model.balance import moment_arms
+from tendonfmu.model.friction_places import DEFAULT_THRESHOLD
+from tendonfmu.recordings.prepared import FitRecording
+from tendonfmu.recordings.residuals import delayed_torque
+from tendonfmu.statistics.blocks import Blocks
+
+Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Array = NDArray[Any]
+
+SHORTEST_STEP = 0.01  # s, of a block
+MOST_BLOCKS = 20_000
+_NEVER = 1e9  # N·m; no contact threshold is ever passed
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A stretch of a recording without a gap, cut into blocks of equally many samples.
+
+    recording: its number, from 0. part: its samples there. first, count: its blocks in the whole; samples: of a block.
+    """
+
+    recording: int
+    part: slice
+    first: int
+    count: int
+    samples: int
+
+    @property
+    def blocks(self) -> slice:
+        return slice(self.first, self.first + self.count)
+
+    def mean(self, values: Array) -> Array:
+        """[count, ...] of values [samples of the part or as many as the blocks have, ...]."""
+        whole = values[: self.count * self.samples]
+        return np.asarray(whole.reshape(self.count, self.samples, *whole.shape[1:]).mean(axis=1))
+
+
+@dataclass(frozen=True)
+class Grid:
+    """All segments, one after another. step: s, of a block. The estimator's recordings are the segments."""
+
+    segments: tuple[Segment, ...]
+    step: float
+
+    @property
+    def blocks(self) -> int:
+        return sum(segment.count for segment in self.segments)
+
+
+@dataclass(frozen=True)
+class Series(Blocks):
+    """All recordings one after another, block means; n joints, m tendons.
+
+    target: [B, n] y − G, N·m. angle [B, n] rad, velocity [B, n] rad/s,
+    acceleration [B, n] rad/s², force [B, m] N, tendon_velocity [B, m, n] m/s (ẋ_ij), travel [B, n] rad since the joint
+    last turned round.
+    """
+
+    angle: Numbers
+    velocity: Numbers
+    acceleration: Numbers
+    force: Numbers
+    tendon_velocity: Numbers
+    travel: Numbers
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Derivatives of G [B, n, c], averaged like the series; names [c]."""
+
+    values: Array
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A candidate at a place with one choice of its non-linear numbers: columns first .. first + count − 1 of a bank.
+
+    effect, joint, tendon: as in the report. signs: expected of each magnitude, 0 either. shape: the choice. origin:
+    whatever made it (the candidate), for the caller.
+    """
+
+    effect: str
+    joint: int | None
+    tendon: int | None
+    signs: tuple[int, ...]
+    shape: Mapping[str, float]
+    first: int
+    count: int
+    origin: Any = None
+
+    @property
+    def place(self) -> tuple[str, int | None, int | None]:
+        return self.effect, self.joint, self.tendon
+
+
+@dataclass(frozen=True)
+class Bank:
+    """Columns of all that may be missing."""
+
+    columns: Columns
+    trials: tuple[Trial, ...]
+
+
+def make_grid(recordings: Sequence[FitRecording]) -> Grid:
+    """Blocks of about 10 ms, longer where there would be very many, never shorter than a sample."""
+    duration = sum(recording.duration for recording in recordings)
+    step = max(SHORTEST_STEP, duration / MOST_BLOCKS)
+    segments, first = [], 0
+    for number, recording in enumerate(recordings):
+        samples = max(1, round(step / float(np.median(np.diff(recording.time)))))
+        for part in recording.parts:
+            count = (part.stop - part.start) // samples
+            if count and recording.train[part].any():
+                segments.append(Segment(number, part, first, count, samples))
+                first += count
+    return Grid(tuple(segments), step)
+
+
+def exact_model(
+    data: Mapping[str, Any], recording: FitRecording, *, entry_load: bool | None = None, jumps: bool = True
+) -> Numbers:
+    """[N, n] N·m: G of a description by a run of the core, NaN outside the parts; T alone without the jumps, which
+    depend on how a recording begins.
+
+    entry_load: in place of what the description says. Less the delay of the measured torque, where the description
+    delays the forces: measured τ less this is what bias and noise are.
+    """
+    given = data.get("bias") or {}
+    joints = len(data["joints"])
+    kept = {key: given[key] for key in ("forget_rate", "entry_load") if given.get(key) is not None}
+    still = {**kept, "drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": [0.0] * joints}
+    if entry_load is not None:
+        still["entry_load"] = entry_load
+    alone = {**data, "bias": still, "contact": {"threshold": [_NEVER] * joints}, "sensor_fault": None}
+    image, found = native.image_from_json(json.dumps(alone)), np.full(recording.target.shape, np.nan)
+    for part in recording.parts:
+        arrays = recording.arrays(part)
+        outputs = native.Finger(image, kinematics_source=recording.kinematics).run(arrays)
+        found[part] = outputs["friction_torque"] - delayed_torque(data, arrays, outputs["joint_torque"])
+        if not jumps:
+            found[part] -= outputs["bias_torque"]
+    return found
+
+
+def block_prediction(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid) -> Numbers:
+    """[B, n] N·m: block means of `exact_model`."""
+    whole = {segment.recording: exact_model(data, recordings[segment.recording]) for segment in grid.segments}
+    return np.concatenate([segment.mean(whole[segment.recording][segment.part]) for segment in grid.segments])
+
+
+# --- the series -------------------------------------------------------------------------------------------------------
+
+
+def make_series(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, torque: Numbers) -> Series:
+    """torque: [B, n] G of the description `data`. The angles and velocities are those the model uses."""
+    whole = [recordings[segment.recording] for segment in grid.segments]
+    pieces = list(zip(grid.segments, whole, strict=True))
+    threshold = _joint_threshold(data)
+
+    def gathered(values: Sequence[Array]) -> Array:
+        found = [segment.mean(each[segment.part]) for segment, each in zip(grid.segments, values, strict=True)]
+        return np.concatenate(found)
+
+    angle = gathered([each.model.joint_angle for each in whole])
+    velocity = gathered([each.model.joint_speed for each in whole])
+    arms = moment_arms(data)
+    return Series(
+        time=gathered([each.time for each in whole]),
+        recording=np.concatenate([np.full(segment.count, segment.recording) for segment in grid.segments]),
+        segment=np.concatenate([np.full(segment.count, k) for k, segment in enumerate(grid.segments)]),
+        target=gathered([each.target for each in whole]) - torque,
+        used=np.concatenate([segment.mean(each.train[segment.part]) == 1.0 for segment, each in pieces]),
+        step=grid.step,
+        angle=angle,
+        velocity=velocity,
+        acceleration=np.concatenate([_slope(velocity[segment.blocks], grid.step) for segment in grid.segments]),
+        force=gathered([each.recording.groups["tendon_force"] for each in whole]),
+        tendon_velocity=_tendon_velocity(arms, velocity),
+        travel=np.concatenate(
+            [_travel(each.model.joint_angle, each.model.joint_speed, threshold, segment) for segment, each in pieces]
+        ),
+    )
+
+
+def _joint_threshold(data: Mapping[str, Any]) -> float:
+    given = (data.get("velocity_threshold") or {}).get("joint")
+    return DEFAULT_THRESHOLD["joint"] if given is None else float(given)
+
+
+def _slope(values: Numbers, step: float) -> Numbers:
+    return np.gradient(values, step, axis=0) if len(values) > 1 else np.zeros_like(values)
+
+
+def _tendon_velocity(arms: Numbers, velocity: Numbers) -> Numbers:
+    """[B, m, n] ẋ_ij = Σ_{j'≥j} r_ij' q̇_j' (eq. 5). arms: [m, n]."""
+    products = velocity[:, None, :] * arms[None]
+    return np.asarray(np.cumsum(products[:, :, ::-1], axis=2)[:, :, ::-1])
+
+
+def _travel(angle: Numbers, speed: Numbers, threshold: float, segment: Segment) -> Numbers:
+    """[count, n] rad since each joint last turned round; speeds below the threshold turn nothing."""
+    angle, speed = angle[segment.part], speed[segment.part]
+    found = np.empty_like(angle)
+    for j in range(angle.shape[1]):
+        moving = np.abs(speed[:, j]) > threshold
+        last = np.maximum.accumulate(np.where(moving, np.arange(len(angle)), 0))
+        side = np.sign(speed[last, j])
+        turned = np.flatnonzero(np.diff(side, prepend=side[0]))
+        start = np.zeros(len(angle), dtype=np.int64)
+        start[turned] = turned
+        found[:, j] = np.abs(angle[:, j] - angle[np.maximum.accumulate(start), j])
+    return segment.mean(found)

@@ -1,0 +1,118 @@
+"""What range the recordings of a diagnosis cover: the grids of the candidates' non-linear numbers follow it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.model.balance import moment_arms
+from tendonfmu.recordings.prepared import FitRecording
+
+Numbers = NDArray[np.float64]
+
+_OUTER = 0.01  # share of samples beyond each end of a range: a stray one does not stretch it
+_FAST = 0.95  # quantile of what counts as fast
+_LOOKED_AT = 50_000  # samples, about
+_DEAD = 0.02  # of the range: smaller turns are noise, not reversals
+
+
+@dataclass(frozen=True)
+class Span:
+    """Ranges of the signals over all samples that are used.
+
+    angle: [n, 2] rad, 1 % and 99 % quantiles. speed: [n] rad/s, 95 % quantile of |q̇|. tendon_speed: [m, n] m/s, the
+    same of |ẋ_ij|. position: [m, 2] m, of the joint-side tendon position x1 = R q. travel: [n] rad, tendon_travel: [m]
+    m, median distance from one reversal to the next. force: [m, 2] N. acceleration: [n] rad/s², 95 % quantile.
+    torque: [n] N·m, standard deviation of the torque to be explained. duration: s, of the longest part without a gap.
+    step: s, median time from sample to sample.
+    """
+
+    angle: Numbers
+    speed: Numbers
+    tendon_speed: Numbers
+    position: Numbers
+    travel: Numbers
+    tendon_travel: Numbers
+    force: Numbers
+    acceleration: Numbers
+    torque: Numbers
+    duration: float
+    step: float
+
+
+def span_of(data: Mapping[str, Any], recordings: Sequence[FitRecording]) -> Span:
+    """Of a valid description and recordings made ready for it."""
+    arms = moment_arms(data)
+    every = max(1, sum(len(each.time) for each in recordings) // _LOOKED_AT)
+    rows = [np.flatnonzero(each.train)[::every] for each in recordings]
+    angle, speed, force, torque, acceleration = (
+        np.concatenate(found)
+        for found in zip(*(_signals(each, row) for each, row in zip(recordings, rows, strict=True)), strict=True)
+    )
+    sliding = np.cumsum((speed[:, None, :] * arms)[:, :, ::-1], axis=2)[:, :, ::-1]
+    steps = np.concatenate([np.diff(each.time[part]) for each in recordings for part in each.parts])
+    angles = [each.model.joint_angle[part] for each in recordings for part in each.parts]
+    return Span(
+        angle=_range(angle),
+        speed=np.quantile(np.abs(speed), _FAST, axis=0),
+        tendon_speed=np.quantile(np.abs(sliding), _FAST, axis=0),
+        position=_range(angle @ arms.T),
+        travel=_travels(angles),
+        tendon_travel=_travels([each @ arms.T for each in angles]),
+        force=_range(force),
+        acceleration=np.quantile(np.abs(acceleration), _FAST, axis=0),
+        torque=np.std(torque, axis=0),
+        duration=max(float(each.time[part][-1] - each.time[part][0]) for each in recordings for part in each.parts),
+        step=float(np.median(steps)),
+    )
+
+
+def _signals(recording: FitRecording, rows: NDArray[np.intp]) -> tuple[Numbers, ...]:
+    model = recording.model
+    force = recording.recording.groups["tendon_force"]
+    acceleration = np.zeros_like(model.joint_speed)
+    for part in recording.parts:
+        acceleration[part] = np.gradient(model.joint_speed[part], recording.time[part], axis=0)
+    return tuple(
+        values[rows] for values in (model.joint_angle, model.joint_speed, force, recording.target, acceleration)
+    )
+
+
+def _range(values: Numbers) -> Numbers:
+    """[k, 2] of [N, k]."""
+    return np.asarray(np.quantile(values, [_OUTER, 1 - _OUTER], axis=0).T)
+
+
+def _travels(paths: Sequence[Numbers]) -> Numbers:
+    """[k] median distance between reversals, of [N, k] each; the range where there is none."""
+    count = paths[0].shape[1]
+    found = np.zeros(count)
+    for k in range(count):
+        values = [path[:, k] for path in paths]
+        whole = float(np.ptp(np.concatenate(values)))
+        turns = [np.abs(np.diff(_turning_points(each, _DEAD * whole))) for each in values]
+        distances = np.concatenate(turns)
+        found[k] = float(np.median(distances)) if len(distances) else whole
+    return found
+
+
+def _turning_points(path: Numbers, dead: float) -> Numbers:
+    """Positions at the path's start, end and reversals of more than `dead`."""
+    if dead <= 0:
+        return path[:1]
+    thinned = path[:: max(1, len(path) // 20_000)]
+    points, extreme, direction = [float(thinned[0])], float(thinned[0]), 0
+    for value in thinned.tolist():
+        if (direction >= 0 and value > extreme) or (direction <= 0 and value < extreme):
+            if direction == 0 and abs(value - points[0]) > dead:
+                direction = 1 if value > points[0] else -1
+            if direction:
+                extreme = value
+        elif direction and abs(value - extreme) > dead:
+            points.append(extreme)
+            extreme, direction = value, -direction
+    return np.array([*points, extreme])

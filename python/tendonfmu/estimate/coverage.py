@@ -1,0 +1,92 @@
+"""What a motion visits: how long each friction effect slides to either side or sticks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.model.friction_places import Effect, effects, sliding_velocity, velocity_threshold, working_point_weights
+
+Numbers = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Times:
+    """s; velocity above v_min, below −v_min, and between."""
+
+    positive: float
+    negative: float
+    stuck: float
+
+    @property
+    def total(self) -> float:
+        return self.positive + self.negative + self.stuck
+
+
+@dataclass(frozen=True)
+class EffectCoverage:
+    """Of one effect. points: [k] the same for each working point, weighted by its share of the interpolated value.
+
+    slowest, fastest: least and greatest |v| while it slides, m/s or rad/s, for (positive, negative) side; None where it
+    never does. threshold: v_min.
+    """
+
+    effect: Effect
+    threshold: float
+    times: Times
+    points: list[Times]
+    slowest: tuple[float | None, float | None]
+    fastest: tuple[float | None, float | None]
+
+
+def durations(time: Numbers) -> Numbers:
+    """[N] s for which each sample stands, by the trapezoidal rule: together the whole motion."""
+    step = np.diff(time)
+    result = np.zeros(len(time))
+    result[:-1] += step / 2
+    result[1:] += step / 2
+    return result
+
+
+def coverage_of(
+    data: Mapping[str, Any], joint_position: Numbers, joint_velocity: Numbers, share: Numbers
+) -> list[EffectCoverage]:
+    """Of every effect of a finger description, from samples in any order.
+
+    joint_position, joint_velocity: [N, n]. share: [N] s each stands for.
+    """
+    return [_cover(data, effect, joint_position, joint_velocity, share) for effect in effects(data)]
+
+
+def with_laws_of(data: Mapping[str, Any], coverage: Sequence[EffectCoverage]) -> list[EffectCoverage]:
+    """The same motion beside the laws of another description of the same structure."""
+    by_path = {effect.path: effect for effect in effects(data)}
+    return [replace(cover, effect=by_path[cover.effect.path]) for cover in coverage]
+
+
+def _cover(
+    data: Mapping[str, Any], effect: Effect, joint_position: Numbers, joint_velocity: Numbers, share: Numbers
+) -> EffectCoverage:
+    velocity = sliding_velocity(data, effect, joint_velocity)
+    threshold = velocity_threshold(data, effect)
+    sides = (velocity > threshold, velocity < -threshold)
+    masks = np.column_stack([*sides, ~(sides[0] | sides[1])]) * share[:, None]
+    points = working_point_weights(effect, joint_position).T @ masks
+    speed = np.abs(velocity)
+    return EffectCoverage(
+        effect=effect,
+        threshold=threshold,
+        times=Times(*masks.sum(axis=0).tolist()),
+        points=[Times(*row) for row in points.tolist()],
+        slowest=_ends(speed, sides, np.min),
+        fastest=_ends(speed, sides, np.max),
+    )
+
+
+def _ends(speed: Numbers, sides: tuple[Any, Any], end: Any) -> tuple[float | None, float | None]:
+    positive, negative = (float(end(speed[side])) if side.any() else None for side in sides)
+    return positive, negative

@@ -1,0 +1,81 @@
+"""A fitted finger judged on a recording: what it leaves, what the bias alone leaves, what the model alone leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.recordings.prepared import FitRecording
+from tendonfmu.recordings.residuals import Model, Residuals, bias_settings, model_alone, rms, track
+
+Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """On one recording. The bias filter learns from every sample without contact, held out or not, as at run time.
+
+    model: the fitted finger's T. fit, start: residuals with the fitted numbers and with those of the start. bias_only:
+    with the same bias filter and no friction at all. model_only: [N, n] y − T less a constant per part, N·m.
+    """
+
+    recording: FitRecording
+    model: Model
+    fit: Residuals
+    start: Residuals
+    bias_only: Residuals
+    model_only: Numbers
+
+
+def model_over(data: Mapping[str, Any], recording: FitRecording) -> Model:
+    """T of a description over the parts of a recording."""
+    arrays = [recording.arrays(part) for part in recording.parts]
+    return model_alone(data, arrays, recording.parts, len(recording.time), recording.kinematics)
+
+
+def residuals(data: Mapping[str, Any], recording: FitRecording, model: Model | None) -> Residuals:
+    """With the description's bias filter. model None: no friction at all."""
+    mean_force = np.abs(recording.recording.groups["tendon_force"]).mean(axis=1)
+    remainder = recording.target if model is None else recording.target - model.torque
+    jump = None if model is None else model.jump
+    settings = bias_settings(data)
+    return track(settings, recording.time, mean_force, remainder, jump, recording.tracked, recording.parts)
+
+
+def evaluate(start: Mapping[str, Any], fitted: Mapping[str, Any], recording: FitRecording) -> Evaluation:
+    """start, fitted: descriptions; `recording.model` is the start's."""
+    model = model_over(fitted, recording)
+    rest = recording.target - model.torque
+    for part in recording.parts:
+        chosen = recording.train[part] if recording.train[part].any() else recording.tracked[part]
+        if chosen.any():
+            rest[part] -= rest[part][chosen].mean(axis=0)
+    return Evaluation(
+        recording=recording,
+        model=model,
+        fit=residuals(fitted, recording, model),
+        start=residuals(start, recording, recording.model),
+        bias_only=residuals(fitted, recording, None),
+        model_only=rest,
+    )
+
+
+def residual_entry(found: Sequence[Evaluation], which: str) -> dict[str, list[float]] | None:
+    """rms [n] by joint over the samples that `which` names ("train", "held_out" or "tracked"); None without any."""
+    chosen = [np.asarray(getattr(each.recording, which)) for each in found]
+    if not any(flags.any() for flags in chosen):
+        return None
+    flags = np.concatenate(chosen) & ~np.isnan(np.concatenate([each.fit.residual for each in found])).any(axis=1)
+    series = {
+        "rms": [each.fit.residual for each in found],
+        "start_rms": [each.start.residual for each in found],
+        "bias_only_rms": [each.bias_only.residual for each in found],
+        "model_only_rms": [each.model_only for each in found],
+        "torque_rms": [each.recording.target for each in found],
+    }
+    return {name: rms(np.concatenate(values), flags) for name, values in series.items()}

@@ -1,0 +1,219 @@
+"""The files of a fit: the fitted description, and what an interrupted fit leaves to go on from."""
+
+from __future__ import annotations
+
+import filecmp
+import json
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.errors import InputError, InternalError
+from tendonfmu.estimate.structure import Structure, own_copy, set_number
+from tendonfmu.files.json_node import read_json
+from tendonfmu.files.whole_file import check_output, check_output_folder, write_text
+from tendonfmu.model import native
+from tendonfmu.model.description import FingerDescription
+from tendonfmu.recordings.recording import Recording
+
+Numbers = NDArray[np.float64]
+
+UNFINISHED = "tendonfmu-fit-unfinished-1"
+DIGITS = 10  # of a fitted number; far below any standard error, and enough to keep static above coulomb friction
+_WIDTH = 160  # of a line of JSON that stays one line: a law with all digits does
+
+
+def check_outputs(output: Path, report: Path | None, figures: Path | None, inputs: Sequence[Path]) -> None:
+    """Raises InputError where a result cannot be written, or would take the place of an input."""
+    for file in (output, *([report] if report is not None else [])):
+        if file.suffix.lower() != ".json":
+            raise InputError(f"{file}: expected a name that ends in .json")
+        check_output(file, *inputs)
+    if report is not None and report.resolve() == output.resolve():
+        raise InputError(f"{report}: the same file for description and report; expected two names")
+    if figures is not None:
+        check_output_folder(figures)
+
+
+def check_given_once(training: Iterable[object], compared: Iterable[object], role: str = "compared with") -> None:
+    """Raises InputError where a file is trained on twice, as if it were two measurements, or compared as if new.
+
+    Files are the same when one name leads to the other, or when they hold the same bytes; `check_unseen` compares what
+    is measured. Recordings in memory may be pieces of one file. role: of those compared, in words.
+    """
+    seen: dict[Path, bool] = {}
+    for sources, trained in ((training, True), (compared, False)):
+        for source in sources:
+            if not isinstance(source, str | os.PathLike):
+                continue
+            file = Path(source).resolve()
+            same = next((each for each in seen if each == file or _same_bytes(each, file)), None)
+            if same is not None:
+                what = "" if same == file else f", as {same.name}"
+                if seen[same] and not trained:
+                    raise InputError(f"{source}: {role}, but trained on as well{what}; expected another recording")
+                raise InputError(f"{source}: given twice{what}; expected each recording once")
+            seen[file] = trained
+
+
+def _same_bytes(one: Path, other: Path) -> bool:
+    """Whether two files hold the same; False where one is empty or cannot be read, which is said later."""
+    try:
+        return one.stat().st_size == other.stat().st_size > 0 and filecmp.cmp(one, other, shallow=False)
+    except OSError:
+        return False
+
+
+def check_unseen(training: Iterable[Recording], tests: Iterable[Recording], role: str = "a test") -> None:
+    """Raises InputError where a recording that is to be unseen holds the samples of one that is trained on.
+
+    Also when they begin at another time, or are in another format or order of columns.
+    """
+    known = [(each, _measured(each)) for each in training]
+    for test in tests:
+        own = _measured(test)
+        for other, measured in known:
+            if own.shape == measured.shape and np.array_equal(own, measured):
+                raise InputError(
+                    f"{test.path}: {role}, but trained on as well: the same samples as {other.path}; expected another "
+                    "recording"
+                )
+
+
+def _measured(recording: Recording) -> Numbers:
+    """[N, 2m] forces and positions."""
+    return np.hstack([recording.groups["tendon_force"], recording.groups["tendon_position"]])
+
+
+# --- descriptions -----------------------------------------------------------------------------------------------------
+
+
+def with_values(structure: Structure, values: Numbers) -> FingerDescription:
+    """The start's description with the estimated numbers replaced; all else as it was.
+
+    values: [p] of all parameters, in canonical order.
+    """
+    data = own_copy(structure.start.data)
+    for number in structure.numbers:
+        for path in (number.path, number.with_path):
+            if path is not None:
+                set_number(data, path, float(f"{values[structure.index[path]]:.{DIGITS}g}"))
+    if structure.sensor_fault is not None:
+        data["sensor_fault"] = dict(structure.sensor_fault)
+    text = description_text(data).encode()
+    try:
+        return FingerDescription(structure.start.path, text, data, native.image_from_json(text))
+    except native.NativeError as refused:  # a fit keeps every bound
+        raise InternalError(f"{structure.start.path}: the fitted description is refused: {refused}") from refused
+
+
+def with_uncertainty(
+    finger: FingerDescription, directions: Sequence[Sequence[Sequence[float]]], level: float | None
+) -> FingerDescription:
+    """The description with `contact.uncertainty`, and `contact.uncertainty_level` where one was given.
+
+    directions: by joint, up to four of m + 3 numbers each.
+    """
+    contact = {**finger.data["contact"], "uncertainty": directions}
+    data = {**finger.data, "contact": contact if level is None else {**contact, "uncertainty_level": level}}
+    text = description_text(data).encode()
+    return FingerDescription(finger.path, text, data, native.image_from_json(text))
+
+
+def description_text(data: Mapping[str, Any]) -> str:
+    """JSON as a person would lay it out: a law, or a list of numbers, on one line."""
+    return _laid_out(data, "") + "\n"
+
+
+def _laid_out(value: Any, indent: str) -> str:
+    flat = json.dumps(value, ensure_ascii=False)
+    inner = list(value.values()) if isinstance(value, dict) else value if isinstance(value, list) else []
+    leaf = not any(isinstance(each, dict | list) for each in inner)
+    if not inner or (leaf and len(indent) + len(flat) <= _WIDTH):
+        return flat
+    deeper = indent + "  "
+    if isinstance(value, dict):
+        parts = [f"{json.dumps(key, ensure_ascii=False)}: {_laid_out(each, deeper)}" for key, each in value.items()]
+        return "{\n" + ",\n".join(deeper + part for part in parts) + f"\n{indent}}}"
+    parts = [_laid_out(each, deeper) for each in value]
+    return "[\n" + ",\n".join(deeper + part for part in parts) + f"\n{indent}]"
+
+
+# --- an interrupted fit -----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Unfinished:
+    """The best so far. z: [u]. unknowns: "path role" of each. cost: negative log likelihood with the prior, or NaN."""
+
+    finger: str
+    method: str
+    z: Numbers
+    unknowns: Sequence[str]
+    cost: float
+    options: Mapping[str, Any]
+    description: Mapping[str, Any]
+
+
+def unfinished_path(output: Path) -> Path:
+    """Where an interrupted fit to `output` leaves what it has."""
+    return output.with_name(f"{output.stem}.unfinished.json")
+
+
+def write_unfinished(output: Path, found: Unfinished) -> Path:
+    """Beside `output`; returns the file."""
+    content = {
+        "format": UNFINISHED,
+        "finger": found.finger,
+        "method": found.method,
+        "cost": found.cost if np.isfinite(found.cost) else None,
+        "options": dict(found.options),
+        "unknowns": list(found.unknowns),
+        "z": [float(value) for value in found.z],
+        "description": dict(found.description),
+    }
+    path = unfinished_path(output)
+    write_text(path, json.dumps(content, indent=1, ensure_ascii=False) + "\n")
+    return path
+
+
+def read_unfinished(path: Path) -> Unfinished:
+    """Raises InputError: no such file, another format, a key that is missing or wrong."""
+    content = read_json(path, "what an interrupted fit left")
+    if not isinstance(content, dict) or content.get("format") != UNFINISHED:
+        found = content.get("format") if isinstance(content, dict) else None
+        raise InputError(f'{path}: format = {json.dumps(found)}; expected "{UNFINISHED}", of an interrupted fit')
+    numbers, names, data = content.get("z"), content.get("unknowns"), content.get("description")
+    if not isinstance(numbers, list) or not all(type(z) in (int, float) for z in numbers):
+        raise InputError(f"{path}: z: expected a list of numbers")
+    if not isinstance(names, list) or len(names) != len(numbers) or not isinstance(data, dict):
+        raise InputError(
+            f"{path}: unknowns, description: expected one name for each of the {len(numbers)} z, and an object"
+        )
+    return Unfinished(
+        finger=str(content.get("finger")),
+        method=str(content.get("method")),
+        z=np.array(numbers, dtype=float),
+        unknowns=[str(name) for name in names],
+        cost=float("nan") if content.get("cost") is None else float(content["cost"]),
+        options=content.get("options") or {},
+        description=data,
+    )
+
+
+def resumed_start(path: Path, unknowns: Sequence[str]) -> Numbers:
+    """[u] where to go on. Raises InputError unless the interrupted fit estimated the same unknowns."""
+    found = read_unfinished(path)
+    if list(found.unknowns) == list(unknowns):
+        return found.z
+    other = sorted(set(found.unknowns) ^ set(unknowns))
+    what = f"such as {other[0]}" if other else "in another order"
+    raise InputError(
+        f"{path}: an interrupted fit of {len(found.unknowns)} unknowns, {len(unknowns)} are asked for now ({what} "
+        "is not in both); expected the same finger, --asymmetric, --only, --fix and --share"
+    )

@@ -1,0 +1,469 @@
+"""Learning a finger's friction from contact-free motion, in the manner of scikit-learn.
+
+from tendonfmu.estimate.fitting import FrictionFit
+
+fit = FrictionFit("finger.json", holdout=0.2).fit(["monday.parquet", "tuesday.parquet"])
+fit.parameters_["tendons[1].edge_friction[2].coulomb"], fit.report_["residual"]["held_out"]["rms"]
+fit.score("wednesday.parquet")
+"""
+
+from __future__ import annotations
+
+import inspect
+import json
+import os
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.errors import InputError
+from tendonfmu.estimate.constructor_arguments import ConstructorArguments
+from tendonfmu.estimate.coverage import EffectCoverage, coverage_of, with_laws_of
+from tendonfmu.estimate.evaluation import Evaluation, evaluate, model_over, residuals
+from tendonfmu.estimate.files import (
+    Unfinished,
+    check_given_once,
+    description_text,
+    resumed_start,
+    with_uncertainty,
+    with_values,
+)
+from tendonfmu.estimate.methods import Interrupted, Learned, Settings, Watch, learn_batch, learn_ekf, unknown_names
+from tendonfmu.estimate.picture import FitPicture, FitSeries
+from tendonfmu.estimate.previous_fit import CHANGE, PreviousFit, read_previous_fit, with_previous_values
+from tendonfmu.estimate.report import Outcome, Run, build_report
+from tendonfmu.estimate.structure import Choice, build_structure
+from tendonfmu.estimate.uncertainty import parameter_uncertainty
+from tendonfmu.estimate.verdicts import Fitted, Knowledge, judge_numbers
+from tendonfmu.model import native
+from tendonfmu.model.description import FingerDescription, read_finger
+from tendonfmu.recordings.match import admit
+from tendonfmu.recordings.prepared import (
+    FitRecording,
+    Held,
+    motion_of,
+    prepare,
+    refuse_stillness,
+    require_noise,
+    slack_sentences,
+)
+from tendonfmu.recordings.recording import Recording, read_recording
+from tendonfmu.recordings.residuals import bias_settings
+
+Numbers = NDArray[np.float64]
+Finger = FingerDescription | Mapping[str, Any] | str | os.PathLike[str]
+Source = Recording | str | os.PathLike[str]
+
+METHODS = {"batch": (learn_batch, 60), "ekf": (learn_ekf, 2)}  # with the passes over the data, at most
+LEAST_NIS, MOST_NIS, MOST_LAG_ONE = 0.5, 2.0, 0.3  # beyond, a warning
+_MORE_PASSES = ": allow more (--passes), or estimate fewer numbers (--only, --fix, --share)"
+SIDES = ("given", "symmetric", "asymmetric")
+
+
+class FitWarning(UserWarning):
+    """Something about the recordings or the fit that a user should know; also in `FrictionFit.warnings_`."""
+
+
+class FrictionFit(ConstructorArguments):
+    """Estimates the numbers of a finger description (paper, sections V and VI).
+
+    finger: description: its file, parsed JSON, or as `read_finger` gives it. What is absent there stays absent.
+    method: "batch", maximum likelihood; or "ekf", the paper's extended Kalman filter.
+    kinematics: 1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
+    holdout: share of time not trained on, evenly spread blocks of `holdout_block` s or less.
+    sides: "given", "symmetric" (both sides of every law equal) or "asymmetric" (each on its own).
+    only, fix: patterns of the numbers to estimate, or not to; share: "tendons", "pulleys" or patterns of what
+        shares its values. Patterns are those of `fit_structure`; a single one may be a string.
+    prior: standard deviation known beforehand, in units of each number's expected magnitude; scale: "PATTERN=VALUE",
+        expected magnitudes other than the description's own values.
+    max_passes: over the data, at most; None: 60 of "batch", 2 of "ekf". tolerance (length of the last step in standard
+        errors), threads (0: all cores): of "batch".
+    uncertainty: whether the fitted description says what is not known of its friction (`contact.uncertainty`).
+    parameter_drift: of the filter, relative variance per s with which the parameters may wander.
+    effective_samples: whether samples count for their share of an effective number where the residuals are not white
+        (`effective_number`); otherwise each counts as one. None: with `previous` alone.
+    previous: report of an earlier fit, or the description that it wrote: its numbers and their errors are start and
+        prior (`previous_fit`), and `prior` is for what it does not have. change: relative standard deviation of what
+        may have changed since.
+    start: file of an interrupted fit to go on from. progress: called with a `fit_methods.Progress`; False stops.
+
+    After `fit`: description_ (fitted), parameters_ and standard_errors_ (by path), covariance_ [p, p] in their order,
+    report_ (JSON of `tendonfmu fit --report`), warnings_, finished_, converged_, n_iter_, cost_, z_, unknowns_.
+    """
+
+    def __init__(
+        self,
+        finger: Finger,
+        method: str = "batch",
+        *,
+        kinematics: int = 1,
+        holdout: float = 0.0,
+        holdout_block: float = 10.0,
+        sides: str = "given",
+        only: Sequence[str] = (),
+        fix: Sequence[str] = (),
+        share: Sequence[str] = (),
+        prior: float = 1.0,
+        scale: Sequence[str] = (),
+        max_passes: int | None = None,
+        tolerance: float = 0.3,
+        threads: int = 0,
+        uncertainty: bool = True,
+        parameter_drift: float = 0.0,
+        effective_samples: bool | None = None,
+        previous: str | os.PathLike[str] | None = None,
+        change: float = CHANGE,
+        start: str | os.PathLike[str] | None = None,
+        progress: Callable[[Any], bool | None] | None = None,
+    ) -> None:
+        self.finger = finger
+        self.method = method
+        self.kinematics = kinematics
+        self.holdout = holdout
+        self.holdout_block = holdout_block
+        self.sides = sides
+        self.only = only
+        self.fix = fix
+        self.share = share
+        self.prior = prior
+        self.scale = scale
+        self.max_passes = max_passes
+        self.tolerance = tolerance
+        self.threads = threads
+        self.uncertainty = uncertainty
+        self.parameter_drift = parameter_drift
+        self.effective_samples = effective_samples
+        self.previous = previous
+        self.change = change
+        self.start = start
+        self.progress = progress
+
+    def __repr__(self) -> str:
+        defaults = inspect.signature(type(self).__init__).parameters
+        given = {name: value for name, value in self.get_params().items() if value is not defaults[name].default}
+        return f"FrictionFit({', '.join(f'{name}={value!r}' for name, value in given.items())})"
+
+    # --- fit ----------------------------------------------------------------------------------------------------------
+
+    def fit(
+        self, recordings: Source | Sequence[Source], compare: Source | Sequence[Source] = (), *, checked: bool = False
+    ) -> FrictionFit:
+        """Learns from recordings, each with a bias path of its own. compare: recordings to judge only. checked: they
+        were held against the finger, and what is to be said of them was said.
+
+        Raises InputError where nothing sound can come of it. Ctrl-C, or progress returning False, leaves `finished_`
+        False and the best so far in `unfinished_`; Ctrl-C goes on as KeyboardInterrupt.
+        """
+        self._check_options()
+        self.finished_ = False
+        self.unfinished_: Unfinished | None = None
+        finger = _read_finger(self.finger)
+        previous = None if self.previous is None else read_previous_fit(Path(self.previous))
+        if previous is not None:
+            finger = with_previous_values(finger, previous)
+        chosen = (self.only, self.fix, self.share, self.scale)
+        structure = build_structure(finger, Choice(self.sides, *map(_listed_text, chosen)))
+        self.structure_, self.start_ = structure, structure.start
+        held = Held(self.holdout, self.holdout_block, strict=True)
+        check_given_once(_listed(recordings), _listed(compare))
+        training, others = ([_read_recording(each) for each in _listed(group)] for group in (recordings, compare))
+        if not training:
+            raise InputError("no recording; expected at least one")
+        found = [] if checked else admit(self.start_, [*training, *others])
+        self.recordings_ = [self._prepared(each, held) for each in training]
+        compared = [self._prepared(each, Held()) for each in others]
+        require_noise(self.start_, self.recordings_)
+        found += self._motion_warnings(not checked)
+        learned = self._learn(previous, Watch(self.progress))
+        if learned is None:
+            return self
+        # what was estimated is not lost when judging it is interrupted
+        self.unfinished_ = self._unfinished(Interrupted(learned.estimator, learned.z, learned.cost, by_user=True))
+        self._conclude(learned, compared, found)
+        self.unfinished_ = None
+        return self
+
+    def _check_options(self) -> None:
+        checks = (
+            (self.method in METHODS, "method", self.method, " or ".join(METHODS)),
+            (self.sides in SIDES, "sides", self.sides, ", ".join(SIDES)),
+            (self.kinematics in (1, 2, 3), "kinematics", self.kinematics, "1, 2 or 3"),
+            (0 <= self.holdout <= 0.9, "holdout", self.holdout, "a share from 0 to 0.9"),
+            (self.holdout_block >= 1, "holdout_block", self.holdout_block, "at least 1 s"),
+            (
+                0 < self.prior <= 1e6,
+                "prior",
+                self.prior,
+                "above 0 and at most 1e6, in units of the expected magnitudes",
+            ),
+            (self.max_passes is None or self.max_passes >= 1, "max_passes", self.max_passes, "at least 1"),
+            (0 < self.tolerance < 1, "tolerance", self.tolerance, "between 0 and 1"),
+            (0 < self.change <= 10, "change", self.change, "above 0 and at most 10, relative to the previous values"),
+            (0 <= self.parameter_drift <= 1, "parameter_drift", self.parameter_drift, "0 to 1, per s"),
+            (
+                self.parameter_drift == 0 or self.method == "ekf",
+                "parameter_drift",
+                self.parameter_drift,
+                f"0 with method {self.method}; only those of method ekf wander",
+            ),
+        )
+        for sound, name, value, expectation in checks:
+            if not sound:
+                raise InputError(f"{name} = {value!r}: expected {expectation}")
+
+    def _prepared(self, source: Source, held: Held) -> FitRecording:
+        return prepare(self.start_, _read_recording(source), self.kinematics, held)
+
+    def _motion_warnings(self, of_recordings: bool) -> list[str]:
+        self.coverage_: list[EffectCoverage] = coverage_of(self.start_.data, *motion_of(self.recordings_))
+        moves = {cover.effect.path: cover.times.positive + cover.times.negative > 0 for cover in self.coverage_}
+        several = len(self.recordings_) > 1
+        found = [
+            f"{each.path}: {sentence}" if several else sentence
+            for each in (self.recordings_ if of_recordings else [])
+            for sentence in each.warnings
+        ]
+        return [*found, *refuse_stillness(self.start_, self.recordings_, moves)]
+
+    def _learn(self, previous: PreviousFit | None, watch: Watch) -> Learned | None:
+        """None where it was stopped."""
+        begin = perf_counter()
+        learn, passes = METHODS[self.method]
+        settings = Settings(
+            prior=self.prior,
+            max_passes=passes if self.max_passes is None else self.max_passes,
+            tolerance=self.tolerance,
+            threads=self.threads,
+            parameter_drift=self.parameter_drift,
+            effective=previous is not None if self.effective_samples is None else self.effective_samples,
+            previous=previous,
+            change=self.change,
+            noise=bias_settings(self.start_.data).noise,
+        )
+        start = None if self.start is None else partial(resumed_start, Path(self.start))
+        try:
+            learned = learn(self.structure_, self.recordings_, watch, settings, start)
+        except Interrupted as stopped:
+            self.unfinished_ = self._unfinished(stopped)
+            if stopped.by_user:
+                raise KeyboardInterrupt from None
+            return None
+        self.seconds_ = perf_counter() - begin
+        return learned
+
+    def _unfinished(self, stopped: Interrupted) -> Unfinished:
+        fitted = with_values(self.structure_, np.asarray(stopped.estimator.values(stopped.z)))
+        return Unfinished(
+            finger=fitted.name,
+            method=self.method,
+            z=stopped.z,
+            unknowns=unknown_names(stopped.estimator),
+            cost=stopped.cost,
+            options=self._options(),
+            description=fitted.data,
+        )
+
+    def _options(self) -> dict[str, Any]:
+        """Those that shape the result, as JSON has them."""
+        left_out = ("finger", "progress", "threads")
+        given = {name: value for name, value in self.get_params().items() if name not in left_out}
+        given |= {name: list(_listed_text(given[name])) for name in ("only", "fix", "share", "scale")}
+        return {
+            name: os.fspath(value)
+            if isinstance(value, os.PathLike)
+            else list(value)
+            if isinstance(value, tuple)
+            else value
+            for name, value in given.items()
+        }
+
+    def _conclude(self, learned: Learned, compared: list[FitRecording], found: list[str]) -> None:
+        """All learned values, from what was estimated."""
+        self.unknowns_, self.z_, self.z_covariance_ = learned.estimator.unknowns, learned.z, learned.covariance
+        self.description_ = with_values(self.structure_, np.asarray(learned.estimator.values(learned.z)))
+        self.numbers_, self.covariance_ = judge_numbers(self.structure_, self._knowledge(learned))
+        self.parameters_ = {number.number.path: number.value for number in self.numbers_}
+        self.standard_errors_ = {number.number.path: number.standard_error for number in self.numbers_}
+        start, fitted = self.start_.data, self.description_.data
+        self.training_ = [evaluate(start, fitted, each) for each in self.recordings_]
+        self.comparisons_ = [evaluate(start, fitted, each) for each in compared]
+        told = self.uncertainty and bool(np.isfinite(learned.covariance).all())
+        uncertainty = self._tell_uncertainty(learned) if told else None
+        self.converged_, self.n_iter_, self.cost_ = learned.converged, learned.iterations, learned.cost
+        slack = np.concatenate([each.model.slack[each.recording.train] for each in self.training_])
+        self.warnings_ = [*found, *slack_sentences(slack, self.description_), *_fit_sentences(learned, self.numbers_)]
+        innovations = learned.innovations or [_trained(each) for each in self.training_]
+        run = Run(self.method, learned.converged, learned.iterations, learned.passes, self.seconds_, learned.cost)
+        self.report_ = build_report(
+            Outcome(
+                fitted=self.description_,
+                run=run,
+                options=self._options(),
+                warnings=self.warnings_,
+                numbers=self.numbers_,
+                names=unknown_names(learned.estimator),
+                covariance=learned.covariance,
+                innovations=innovations,
+                weights=learned.weights,
+                training=self.training_,
+                comparisons=self.comparisons_,
+                uncertainty=uncertainty,
+            )
+        )
+        self.warnings_ += _noise_sentences(self.report_["innovations"])
+        self.report_["warnings"] = list(self.warnings_)
+        self.finished_ = True
+        for sentence in self.warnings_:
+            warnings.warn(sentence, FitWarning, stacklevel=3)
+
+    def _tell_uncertainty(self, learned: Learned) -> dict[str, Any]:
+        """Writes `contact.uncertainty` into the fitted description; returns what the report says of it."""
+        found = parameter_uncertainty(self.structure_, learned, self.description_.data, self.training_)
+        level = (_read_finger(self.finger).data["contact"] or {}).get("uncertainty_level")
+        self.description_ = with_uncertainty(self.description_, found.directions, level)
+        return found.entry
+
+    def _knowledge(self, learned: Learned) -> Knowledge:
+        return Knowledge(
+            estimator=learned.estimator,
+            z=learned.z,
+            covariance=learned.covariance,
+            information=learned.information,
+            fitted=self.description_,
+            coverage=with_laws_of(self.description_.data, self.coverage_),
+            noise=bias_settings(self.description_.data).noise,
+        )
+
+    # --- what was learned, on other recordings ------------------------------------------------------------------------
+
+    def predict(self, recording: Source) -> Numbers:
+        """[N, n] N·m: T_eff before the bias learns from the sample itself; NaN where there is none, such as for the
+        first sample. τ, less external_torque where the recording has it, minus this is the residual.
+        """
+        prepared, left = self._left(recording)
+        return np.asarray(prepared.target - left)
+
+    def score(self, recording: Source) -> float:
+        """1 − Σ residual² / Σ (torque − mean)² over all joints and samples without contact; 1 is perfect."""
+        prepared, left = self._left(recording)
+        rows = prepared.tracked & ~np.isnan(left).any(axis=1)
+        torque = prepared.target[rows]
+        return float(1 - np.sum(left[rows] ** 2) / np.sum((torque - torque.mean(axis=0)) ** 2))
+
+    def _left(self, source: Source) -> tuple[FitRecording, Numbers]:
+        self._require_fitted()
+        prepared = self._prepared(source, Held())
+        data = self.description_.data
+        return prepared, residuals(data, prepared, model_over(data, prepared)).residual
+
+    def _require_fitted(self) -> None:
+        if not getattr(self, "finished_", False):
+            raise InputError("FrictionFit: not fitted yet; expected a call of fit that was not interrupted")
+
+    def picture(self) -> FitPicture:
+        """What `fit_page.write_fit_page` draws."""
+        self._require_fitted()
+        return FitPicture(
+            report=self.report_,
+            start=self.start_.data,
+            fitted=self.description_.data,
+            unknowns=self.unknowns_,
+            z=self.z_,
+            covariance=self.z_covariance_,
+            series=[
+                *(_series(each, "training") for each in self.training_),
+                *(_series(each, "comparison") for each in self.comparisons_),
+            ],
+        )
+
+    def description_text(self) -> str:
+        """The fitted description as JSON, as `tendonfmu fit -o` writes it."""
+        self._require_fitted()
+        return description_text(self.description_.data)
+
+
+def _read_finger(finger: Finger) -> FingerDescription:
+    if isinstance(finger, FingerDescription):
+        return finger
+    if isinstance(finger, Mapping):
+        text = json.dumps(finger).encode()
+        try:
+            return FingerDescription(Path("finger"), text, finger, native.image_from_json(text))
+        except native.NativeError as refused:
+            raise InputError(f"finger: {refused}") from None
+    return read_finger(Path(finger))
+
+
+def _read_recording(source: Source) -> Recording:
+    return source if isinstance(source, Recording) else read_recording(source)
+
+
+def _listed(sources: Source | Sequence[Source]) -> list[Source]:
+    return [sources] if isinstance(sources, Recording | str | os.PathLike) else list(sources)
+
+
+def _listed_text(patterns: str | Sequence[str]) -> Sequence[str]:
+    """A single pattern is meant as one, not as its letters."""
+    return [patterns] if isinstance(patterns, str) else patterns
+
+
+def _trained(found: Evaluation) -> Numbers:
+    """[N, n] standardised innovations of the samples trained on, NaN elsewhere."""
+    return np.where(found.recording.train[:, None], found.fit.standardised, np.nan)
+
+
+def _fit_sentences(learned: Learned, numbers: Sequence[Fitted]) -> list[str]:
+    more = "" if learned.converged else _MORE_PASSES
+    found = [f"{sentence}{more}" for sentence in learned.warnings]
+    at_bound = [number for number in numbers if number.at_bound]
+    if at_bound:
+        some = ", ".join(number.number.path for number in at_bound[:3])
+        more = f" and {len(at_bound) - 3} more" if len(at_bound) > 3 else ""
+        many = f"{len(at_bound)} numbers" if len(at_bound) > 1 else "1 number"
+        found.append(f"{many} ended at a bound: {some}{more}")
+    return found
+
+
+def _noise_sentences(innovations: Mapping[str, Any]) -> list[str]:
+    """Where the noise settings are far from what the residuals show, and the standard errors with them."""
+    nis, lag_one = innovations["nis"]["mean"], innovations["whiteness"]["lag_one"]
+    found = []
+    times = "-" if nis is None else f"{nis:.2g}" if nis < 100 else f"{nis:.0f}"
+    if nis is not None and not LEAST_NIS <= nis <= MOST_NIS:
+        found.append(
+            f"the residuals' variance is {times} times what bias.noise_std, noise_std_per_force, noise_time and "
+            "drift_variance say: standard errors are those of the settings, not of the data"
+        )
+    far = max((abs(value) for value in lag_one if value is not None), default=0.0)
+    if far > MOST_LAG_ONE:
+        samples, worth = (sum(innovations["effective"][key]) for key in ("samples", "worth"))
+        counted = f"{samples:.0f} samples count as {worth:.0f}" if worth < samples else "each sample counts as new"
+        found.append(
+            f"residuals are not white (autocorrelation {far:.2f} from one sample to the next): the model misses "
+            f"something, or the noise is not that of single samples; {counted}, take the standard errors with care"
+        )
+    return found
+
+
+def _series(found: Evaluation, role: Any) -> FitSeries:
+    recording, model = found.recording, found.model
+    training = role == "training"
+    return FitSeries(
+        label=recording.path.stem,
+        role=role,
+        mean_force=recording.mean_force,
+        time=recording.time,
+        torque=recording.target,
+        residual=found.fit.residual,
+        model_torque=model.torque,
+        joint_angle=model.joint_angle,
+        joint_speed=model.joint_speed,
+        used=recording.train if training else np.zeros(len(recording.time), dtype=bool),
+        held_out=recording.held_out if training and recording.held_out.any() else None,
+    )

@@ -1,0 +1,204 @@
+"""Judges what a motion tells about each number of a finger: standard error, and why a number cannot be told."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.estimate.coverage import EffectCoverage
+from tendonfmu.estimate.information import Unknown
+
+Numbers = NDArray[np.float64]
+
+LIMIT = 0.3  # relative standard error up to which a number counts as identifiable
+PRIOR = 10.0  # relative, known beforehand: next to nothing, yet every information can be inverted
+PARTNERS = 3
+COMBINATIONS = 20
+_ALIKE = 0.3  # correlation of errors from which a number is named as a partner
+_MEMBER = 0.25  # share of the largest part from which a number is named in a combination
+_TIME = 1e-9  # s; less is rounding
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """On one number. error, error_alone: relative standard error, of all numbers together and with all others known;
+    at most `PRIOR`. cause: "" where identifiable, else a key of `CAUSES`; reason: in words. partners: paths.
+    """
+
+    number: Unknown
+    error: float
+    error_alone: float
+    cause: str
+    reason: str
+    partners: list[str]
+
+    @property
+    def identifiable(self) -> bool:
+        return not self.cause
+
+
+CAUSES = {
+    "side": "never slides, or never to that side",
+    "working_point": "never slides near that working point",
+    "slow": "never slides as slowly as its Stribeck velocity",
+    "noise": "too little torque beside noise and drift, even with all else known",
+    "combination": "seen, but only in combination with others",
+}
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """verdicts: of all numbers, in order. directions: how many independent combinations of relative changes are known
+    within `LIMIT`. combinations: the least known ones of numbers that show by themselves: (relative standard error,
+    [(path, weight)]).
+    """
+
+    verdicts: list[Verdict]
+    directions: int
+    combinations: list[tuple[float, list[tuple[str, float]]]]
+
+
+def judge(numbers: Sequence[Unknown], information: Numbers, coverage: Sequence[EffectCoverage]) -> Judgement:
+    """information: [p, p] about relative changes, of `identifiability.information`."""
+    if not numbers:
+        return Judgement([], 0, [])
+    known = information + np.eye(len(numbers)) / PRIOR**2
+    covariance = np.linalg.inv(known)
+    error = np.sqrt(np.diag(covariance))
+    alone = 1 / np.sqrt(np.diag(known))
+    verdicts = explain(numbers, error, alone, covariance / np.outer(error, error), coverage)
+    directions = int(np.sum(np.linalg.eigvalsh(information) > 1 / LIMIT**2))
+    return Judgement(verdicts, directions, _combinations(numbers, known, alone))
+
+
+def explain(
+    numbers: Sequence[Unknown], error: Numbers, alone: Numbers, correlation: Numbers, coverage: Sequence[EffectCoverage]
+) -> list[Verdict]:
+    """A verdict on each number. error, alone: [p] relative standard errors, of all numbers together and with all others
+    known. correlation: [p, p] of the errors.
+    """
+    by_path = {cover.effect.path: cover for cover in coverage}
+    verdicts = []
+    for k, number in enumerate(numbers):
+        cause, reason, partners = "", "", []
+        if not error[k] <= LIMIT:
+            cover = by_path[number.effect.path] if number.effect is not None else None
+            cause, reason = _cause(number, cover, float(alone[k]))
+            if cause == "combination":
+                partners = _partners(k, correlation[k], numbers)
+                reason += ", ".join(partners)
+        verdicts.append(Verdict(number, float(error[k]), float(alone[k]), cause, reason, partners))
+    return verdicts
+
+
+def _cause(number: Unknown, cover: EffectCoverage | None, alone: float) -> tuple[str, str]:
+    found = unvisited(number, cover) if cover is not None else None
+    if found is not None:
+        return found
+    if alone > LIMIT:
+        size = f"± {alone:.0%}" if alone < PRIOR / 2 else "nothing is known"
+        return "noise", f"{CAUSES['noise']}: {size}"
+    return "combination", "only in combination with "
+
+
+def unvisited(number: Unknown, cover: EffectCoverage) -> tuple[str, str] | None:
+    """(cause, reason) where it is the motion that never does what shows the number."""
+    part = number.path.split(".")[-2]
+    sides = [part] if part in ("positive", "negative") else ["positive", "negative"]
+    time = sum(getattr(cover.times, side) for side in sides)
+    if time <= _TIME:
+        where = f" to the {part} side" if len(sides) == 1 else ""
+        return "side", f"never slides{where}: always within v_min = {cover.threshold:g}" if not where else (
+            f"never slides{where}"
+        )
+    point = cover.points[number.point]
+    if sum(getattr(point, side) for side in sides) <= _TIME:
+        angle, joint = cover.effect.angles[number.point], cover.effect.joint - 1
+        verb = "never slides while joint" if point.total > _TIME else "joint"
+        how = "is near" if point.total > _TIME else "never comes near"
+        return "working_point", f"{verb} {joint} {how} working point {number.point + 1} at {angle:g} rad"
+    law = cover.effect.laws[number.point]
+    stribeck = float(law.get(part, law)["stribeck_velocity"])
+    least = min(
+        slow
+        for slow, side in zip(cover.slowest, ("positive", "negative"), strict=True)
+        if slow is not None and side in sides
+    )
+    if number.key in ("static", "stribeck_velocity") and number.with_path is None and least > stribeck:
+        return "slow", f"never slides slower than {least:.3g}, its stribeck_velocity is {stribeck:g}"
+    return None
+
+
+def _partners(k: int, correlation: Numbers, numbers: Sequence[Unknown]) -> list[str]:
+    """The numbers whose errors go along most with number k's, at least one."""
+    order = [int(i) for i in np.argsort(-np.abs(correlation)) if i != k]
+    near = [i for i in order if abs(correlation[i]) >= _ALIKE][:PARTNERS] or order[:1]
+    return [numbers[i].path for i in near]
+
+
+def _combinations(
+    numbers: Sequence[Unknown], known: Numbers, alone: Numbers
+) -> list[tuple[float, list[tuple[str, float]]]]:
+    """Eigenvectors of the information with the least eigenvalues, among the numbers that show by themselves."""
+    seen = np.flatnonzero(alone <= LIMIT)
+    values, vectors = np.linalg.eigh(known[np.ix_(seen, seen)])
+    result = []
+    for value, vector in list(zip(values, vectors.T, strict=True))[:COMBINATIONS]:
+        if value > 1 / LIMIT**2:
+            break
+        vector = vector * np.sign(vector[np.argmax(np.abs(vector))])
+        members = [int(i) for i in np.argsort(-np.abs(vector)) if abs(vector[i]) >= _MEMBER * np.max(np.abs(vector))]
+        result.append((float(value**-0.5), [(numbers[seen[i]].path, float(vector[i])) for i in members]))
+    return result
+
+
+def counts_by_kind(verdicts: Sequence[Verdict]) -> dict[tuple[str, str], tuple[int, int, int]]:
+    """(kind, key) -> (numbers, identifiable, within `LIMIT` with all else known)."""
+    result: dict[tuple[str, str], tuple[int, int, int]] = {}
+    for verdict in verdicts:
+        place = (verdict.number.kind, verdict.number.key)
+        total, known, alone = result.get(place, (0, 0, 0))
+        result[place] = (total + 1, known + verdict.identifiable, alone + (verdict.error_alone <= LIMIT))
+    return result
+
+
+def causes(verdicts: Sequence[Verdict]) -> dict[str, int]:
+    """Cause -> how many numbers, most first."""
+    found = [verdict.cause for verdict in verdicts if verdict.cause]
+    return dict(sorted(((cause, found.count(cause)) for cause in set(found)), key=lambda item: -item[1]))
+
+
+def as_json(judgement: Judgement) -> dict[str, Any]:
+    """For the report."""
+    parameters: list[Mapping[str, Any]] = [
+        {
+            "path": verdict.number.path,
+            "value": verdict.number.value,
+            "relative_standard_error": verdict.error,
+            "relative_standard_error_alone": verdict.error_alone,
+            "identifiable": verdict.identifiable,
+            "cause": verdict.cause or None,
+            "reason": verdict.reason or None,
+            "in_combination_with": verdict.partners,
+        }
+        for verdict in judgement.verdicts
+    ]
+    return {
+        "identifiable_limit": LIMIT,
+        "numbers": len(parameters),
+        "identifiable": sum(verdict.identifiable for verdict in judgement.verdicts),
+        "identifiable_alone": sum(verdict.error_alone <= LIMIT for verdict in judgement.verdicts),
+        "known_combinations": judgement.directions,
+        "parameters": parameters,
+        "least_known_combinations": [
+            {
+                "relative_standard_error": error,
+                "members": [{"path": path, "weight": weight} for path, weight in members],
+            }
+            for error, members in judgement.combinations
+        ],
+    }

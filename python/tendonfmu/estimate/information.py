@@ -1,0 +1,289 @@
+"""What a motion can tell about a finger's friction parameters: Fisher information of the innovations of the model's own
+bias filter.
+
+Assumed: the joint torques τ carry independent white noise of the description's `bias.noise_std` (+ per force), the bias
+is a random walk of `bias.drift_variance`, so slow changes tell little. The derivatives of
+T_eff by the parameters are differences of runs of the C core itself, with the jumps of fig. 5 in them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.model import native
+from tendonfmu.model.balance import friction_probe
+from tendonfmu.model.extensions import extension_numbers
+from tendonfmu.model.friction_places import Effect, effects, working_point_weights
+
+Numbers = NDArray[np.float64]
+Progress = Callable[[int, int], None]
+
+STEP = 1e-4  # of a value: T is linear in three of the four numbers of a law, and nearly so in the fourth over this
+_ELEMENTS = 4_000_000  # sensitivities in memory at a time
+_DEFAULTS = {"noise_std": 0.01, "noise_std_per_force": 0.0, "drift_variance": 1e-6}  # as in the core
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A number to be estimated.
+
+    path: as in the description. value: SI. effect: of which it is, if any; point: which of its laws, from 0.
+    with_path: what moves by the same amount (static where it equals coulomb). extension: name of the effect whose
+    number it is in `extensions`. size: expected magnitude, where the value may be 0.
+    """
+
+    path: str
+    value: float
+    effect: Effect | None = None
+    point: int = 0
+    with_path: str | None = None
+    extension: str | None = None
+    size: float = 1.0
+
+    @property
+    def kind(self) -> str:
+        """Of what it is a number: edge_friction, cover, bias, extensions.gravity."""
+        if self.effect is not None:
+            return self.effect.kind
+        if self.extension is not None:
+            return f"extensions.{self.extension}"
+        return self.path.rsplit(".", 1)[0].rsplit(".", 1)[-1].split("[")[0]
+
+    @property
+    def key(self) -> str:
+        """Last part of the path: static, coulomb, stribeck_velocity, viscous, stiffness."""
+        return self.path.rsplit(".", 1)[1]
+
+    @property
+    def reference(self) -> float:
+        """Size to which steps and errors are related: the value, or where that is 0 the static friction of its law."""
+        if self.value or self.effect is None:
+            return abs(self.value) or self.size
+        law = self.effect.laws[self.point]
+        return float(law.get(self.path.split(".")[-2], law)["static"]) or 1.0
+
+
+def unknowns(data: Mapping[str, Any]) -> list[Unknown]:
+    """The numbers that a fit estimates (`description.estimated_numbers`), but for the biases, which are tracked."""
+    found = [number for effect in effects(data) for number in _numbers_of(effect)]
+    for j, joint in enumerate(data["joints"], start=1):
+        stiffness = (joint.get("cover") or {}).get("stiffness")
+        if stiffness:
+            found.append(Unknown(f"joints[{j}].cover.stiffness", float(stiffness)))
+    found += [
+        Unknown(each.path, each.value, extension=each.effect, size=each.magnitude)
+        for each in extension_numbers(data)
+        if not each.left_out
+    ]
+    return found
+
+
+def _numbers_of(effect: Effect) -> Iterator[Unknown]:
+    for point, (path, law) in enumerate(zip(effect.law_paths, effect.laws, strict=True)):
+        asymmetric = law.get("positive") is not None
+        for side in ("positive", "negative") if asymmetric else ("",):
+            values, prefix = (law[side], f"{path}.{side}") if side else (law, path)
+            stribeck = values["static"] != values["coulomb"]
+            tied = None if stribeck else f"{prefix}.static"
+            yield Unknown(f"{prefix}.coulomb", float(values["coulomb"]), effect, point, tied)
+            for key in ("static", "stribeck_velocity") if stribeck else ():
+                yield Unknown(f"{prefix}.{key}", float(values[key]), effect, point)
+            if values.get("viscous"):
+                yield Unknown(f"{prefix}.viscous", float(values["viscous"]), effect, point)
+
+
+# --- sensitivities ----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Bundle:
+    """Numbers that one run perturbs together, since what each changes can be told apart afterwards.
+
+    members: the numbers; columns: the index of each. Friction in different joints turns different joints; of the
+    neighbouring working points of an edge every other one is never active at the same angle.
+    """
+
+    members: list[Unknown]
+    columns: list[int]
+
+    @property
+    def steps(self) -> list[tuple[str, float]]:
+        """Path and what is added to it."""
+        return [
+            (path, _sign(number) * STEP * number.reference)
+            for number in self.members
+            for path in (number.path, number.with_path)
+            if path is not None
+        ]
+
+    def shares(self, joint_position: Numbers) -> Iterator[tuple[int, Unknown, slice, Numbers]]:
+        """(column, number, whose torque, [N, 1] 1 where a sample's change is that number's)."""
+        effect = self.members[0].effect
+        active = np.ones((len(joint_position), len(self.members)))
+        if effect is not None and len(effect.angles) > 1:
+            weights = working_point_weights(effect, joint_position)
+            active = (weights[:, [number.point for number in self.members]] > 0).astype(float)
+        for k, (column, number) in enumerate(zip(self.columns, self.members, strict=True)):
+            joint = _joint_of(number)
+            yield column, number, slice(joint, None if joint is None else joint + 1), active[:, k : k + 1]
+
+
+def _bundles(numbers: Sequence[Unknown]) -> list[_Bundle]:
+    groups: dict[str, list[int]] = {}
+    for column, number in enumerate(numbers):
+        name = number.path
+        if _joint_of(number) is not None:
+            name = number.path.split(".", 1)[1]
+        elif number.effect is not None and len(number.effect.angles) > 1:
+            name = f"{number.effect.path}{number.path.split(']')[-1]} {number.point % 2}"
+        groups.setdefault(name, []).append(column)
+    return [_Bundle([numbers[k] for k in columns], columns) for columns in groups.values()]
+
+
+def _joint_of(number: Unknown) -> int | None:
+    """Joint whose own friction or cover it is, from 0."""
+    path = number.path
+    return int(path[len("joints[") : path.index("]")]) - 1 if path.startswith("joints[") else None
+
+
+def _sign(number: Unknown) -> int:
+    """Coulomb friction may not exceed the static one, so it steps down where it can; a delay not its limit."""
+    down = number.key == "delay" or (number.key == "coulomb" and number.with_path is None)
+    return -1 if down and number.value > 0 else 1
+
+
+class _Run:
+    """A finger with some numbers changed, advanced over a motion part by part."""
+
+    def __init__(self, finger: native.Finger, steps: Sequence[tuple[str, float]]) -> None:
+        plain = {path: finger.get(path) for path, _ in steps}
+        finger.set({path: plain[path] + step for path, step in steps})
+        self._state = finger.save_state()
+        finger.set(plain)
+        self._bias = np.zeros((1, finger.joints))
+
+    def advance(self, finger: native.Finger, part: Mapping[str, Numbers]) -> tuple[Numbers, Numbers]:
+        """[N, n] T of eq. (10) and the bias increments Δb over the part, N·m."""
+        finger.restore_state(self._state)
+        found = finger.run(part)
+        self._state = finger.save_state()
+        bias = found["bias_torque"]
+        jump = np.diff(bias, axis=0, prepend=self._bias)
+        self._bias = bias[-1:]
+        return found["friction_torque"] - bias, jump
+
+
+def sensitivities(
+    data: Mapping[str, Any],
+    numbers: Sequence[Unknown],
+    motion: Mapping[str, Numbers],
+    progress: Progress | None = None,
+) -> Iterator[Numbers]:
+    """[S, n, p] part by part: change of T_eff (N·m) per relative change of each number, the bias moved by fig. 5 alone.
+
+    motion: `time` [N], `joint_position`, `joint_velocity` [N, n], `tendon_force` [N, m].
+    """
+    finger = friction_probe(data)
+    samples, joints = motion["joint_position"].shape
+    bundles = _bundles(numbers)
+    base, runs = _Run(finger, ()), [_Run(finger, bundle.steps) for bundle in bundles]
+    held = np.zeros((joints, len(numbers)))  # by the bias, from the parts before
+    length = max(200, _ELEMENTS // (joints * max(len(numbers), 1)))
+    starts = range(0, samples, length)
+    for number, begin in enumerate(starts):
+        part = {name: values[begin : begin + length] for name, values in motion.items()}
+        plain = base.advance(finger, part)
+        changes = np.zeros((len(part["time"]), joints, len(numbers)))
+        for done, (bundle, run) in enumerate(zip(bundles, runs, strict=True), start=1):
+            found = run.advance(finger, part)
+            _share_out(bundle, found, plain, part["joint_position"], changes, held)
+            if progress is not None:
+                progress(number * len(bundles) + done, len(starts) * len(bundles))
+        yield changes
+
+
+def _share_out(
+    bundle: _Bundle,
+    found: tuple[Numbers, Numbers],
+    plain: tuple[Numbers, Numbers],
+    joint_position: Numbers,
+    changes: Numbers,
+    held: Numbers,
+) -> None:
+    """Writes the columns of a bundle into `changes`, and what its bias holds at the end into `held`."""
+    torque, jump = ((new - old) / STEP for new, old in zip(found, plain, strict=True))
+    for column, number, joint, active in bundle.shares(joint_position):
+        sign = _sign(number)
+        bias = held[joint, column] + sign * np.cumsum((active * jump)[:, joint], axis=0)
+        changes[:, joint, column] = sign * (active * torque)[:, joint] + bias
+        held[joint, column] = bias[-1]
+
+
+# --- information ------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Noise:
+    """What is assumed of the measured torque.
+
+    std (N·m) and per_force (N·m per N of mean tendon force) of a sample that stands for `time` (s); drift of the bias
+    in (N·m)²/s; initial variance of the bias in (N·m)², None: that of one sample.
+    """
+
+    std: float
+    per_force: float
+    time: float
+    drift: float
+    initial: float | None
+
+
+def noise_of(data: Mapping[str, Any], sample_time: float) -> Noise:
+    """From `bias` of a description with its defaults. sample_time: s, for which noise per sample is meant.
+
+    A finger without noise is judged with the default noise_std: without any, everything could be seen.
+    """
+    bias = data.get("bias") or {}
+    value = {key: default if bias.get(key) is None else float(bias[key]) for key, default in _DEFAULTS.items()}
+    if not value["noise_std"] and not value["noise_std_per_force"]:
+        value["noise_std"] = _DEFAULTS["noise_std"]
+    initial = bias.get("initial_variance")
+    return Noise(
+        std=value["noise_std"],
+        per_force=value["noise_std_per_force"],
+        time=float(bias.get("noise_time") or sample_time),
+        drift=value["drift_variance"],
+        initial=None if initial is None else float(initial),
+    )
+
+
+def information(parts: Iterable[Numbers], time: Numbers, mean_force: Numbers, noise: Noise) -> Numbers:
+    """[p, p] Fisher information of the innovations about relative changes of the numbers.
+
+    parts: of `sensitivities`. time: [N] s. mean_force: [N] N. The bias filter of fig. 5 runs over
+    every column; it takes the first sample as it is.
+    """
+    step = np.diff(time, prepend=time[0])
+    per_sample = (noise.std + noise.per_force * mean_force) ** 2
+    variance = float(per_sample[0]) if noise.initial is None else noise.initial
+    spread = per_sample * noise.time / np.maximum(step, 1e-12)
+    k, total, bias = 0, np.zeros((0, 0)), np.zeros((0, 0))
+    for part in parts:
+        if k == 0:
+            bias, total = part[0].copy(), np.zeros((part.shape[2], part.shape[2]))
+        for row in part:
+            row -= bias
+            if k > 0:
+                variance += noise.drift * step[k]
+                gain = variance / (variance + spread[k])
+                bias += gain * row
+                row /= np.sqrt(variance + spread[k])
+                variance *= 1 - gain
+            k += 1
+        rows = part.reshape(-1, part.shape[2])
+        total += rows.T @ rows
+    return total

@@ -1,0 +1,126 @@
+"""Friction laws of a fit with their confidence bands: the start's and the fitted curves over velocity, or over the
+angle where a law has working points.
+
+The band is 1.96 standard errors of the curve, by the delta method in the fit's own unknowns (coulomb, drop = static −
+coulomb, rate = 1/stribeck_velocity, viscous), in all but the rate exactly linear. It is cut off below 0, where no
+friction is.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.estimate.picture import FitPicture
+from tendonfmu.model.description import Law
+from tendonfmu.model.friction_places import Effect
+from tendonfmu.model.native import Finger
+
+Numbers = NDArray[np.float64]
+
+CONFIDENCE = 1.96  # standard errors: 95 %
+_LAST = {"coulomb": "coulomb", "drop": "static", "rate": "stribeck_velocity", "viscous": "viscous", "static": "coulomb"}
+
+
+@dataclass(frozen=True)
+class LawCurve:
+    """Friction of one side over what it is drawn along, [N] each: fitted, confidence band, start."""
+
+    fitted: Numbers
+    low: Numbers
+    high: Numbers
+    start: Numbers
+
+
+def side_of(law: Law, sign: int) -> Law:
+    """The side of a law that serves a direction of sliding, +1 or −1."""
+    if law.get("positive") is None:
+        return law
+    found: Law = law["positive" if sign > 0 else "negative"]
+    return found
+
+
+def side_path(path: str, law: Law, sign: int) -> str:
+    """Path of that side: the law's own where it is symmetric."""
+    if law.get("positive") is None:
+        return path
+    return f"{path}.{'positive' if sign > 0 else 'negative'}"
+
+
+def magnitude(side: Law, speed: Numbers) -> Numbers:
+    """|F| at speed |v|, eq. (1)."""
+    drop = float(side["static"]) - float(side["coulomb"])
+    viscous = float(side.get("viscous") or 0.0)
+    return np.asarray(side["coulomb"] + drop * np.exp(-speed / side["stribeck_velocity"]) + viscous * speed)
+
+
+def slopes(side: Law, speed: Numbers) -> Mapping[str, Numbers]:
+    """Role of an unknown -> derivative of |F| by it, [N]."""
+    drop, decay = float(side["static"]) - float(side["coulomb"]), np.exp(-speed / side["stribeck_velocity"])
+    one = np.ones_like(speed)
+    return {"coulomb": one, "static": one, "drop": decay, "rate": -drop * speed * decay, "viscous": speed}
+
+
+class LawBands:
+    """Curves of any law of a fit; the laws of both descriptions are found by their effect."""
+
+    def __init__(self, picture: FitPicture) -> None:
+        parameters = Finger.from_description(json.dumps(picture.fitted)).parameters()
+        paths = [parameter.path for parameter in parameters]
+        self._covariance = np.asarray(picture.covariance)
+        self._column = {
+            (paths[k], unknown.role): column
+            for column, unknown in enumerate(picture.unknowns)
+            for k in unknown.parameters
+        }
+
+    def over_speed(self, start: Effect, fitted: Effect, sign: int, speed: Numbers) -> LawCurve:
+        """Of an effect with a single law, [N] speeds."""
+        weights = np.ones((len(speed), 1))
+        return self._curve(start, fitted, sign, speed, weights)
+
+    def over_angle(self, start: Effect, fitted: Effect, sign: int, speed: float, angle: Numbers) -> LawCurve:
+        """Of an effect with working points at one speed, [N] angles of the joint before."""
+        unit = np.eye(len(fitted.angles))
+        weights = np.column_stack([np.interp(angle, fitted.angles, row) for row in unit])
+        return self._curve(start, fitted, sign, np.full_like(angle, speed), weights)
+
+    def _curve(self, start: Effect, fitted: Effect, sign: int, speed: Numbers, weights: Numbers) -> LawCurve:
+        value = _mixed(fitted, sign, speed, weights)
+        error = self._standard_error(fitted, sign, speed, weights)
+        low, high = value - CONFIDENCE * error, value + CONFIDENCE * error
+        return LawCurve(value, np.maximum(low, 0.0), high, _mixed(start, sign, speed, weights))
+
+    def _standard_error(self, effect: Effect, sign: int, speed: Numbers, weights: Numbers) -> Numbers:
+        gradients: dict[int, Numbers] = {}  # column of z -> [N]; laws that share a value add up
+        for share, law, path in zip(weights.T, effect.laws, effect.law_paths, strict=True):
+            prefix = side_path(path, law, sign)
+            for role, slope in slopes(side_of(law, sign), speed).items():
+                column = self._column.get((f"{prefix}.{_LAST[role]}", role))
+                if column is not None:
+                    gradients[column] = gradients.get(column, np.zeros_like(speed)) + share * slope
+        if not gradients:
+            return np.zeros_like(speed)
+        columns = np.array(list(gradients))
+        slope = np.column_stack(list(gradients.values()))
+        variance = np.einsum("ki,ij,kj->k", slope, self._covariance[np.ix_(columns, columns)], slope)
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+
+def _mixed(effect: Effect, sign: int, speed: Numbers, weights: Numbers) -> Numbers:
+    values = [magnitude(side_of(law, sign), speed) for law in effect.laws]
+    return np.asarray(np.sum(weights * np.column_stack(values), axis=1))
+
+
+def asymmetric(effect: Effect) -> bool:
+    return any(law.get("positive") is not None for law in effect.laws)
+
+
+def numbers_of(effect: Effect, report: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """The report's entries of an effect's estimated numbers."""
+    return [entry for entry in report["parameters"] if entry["path"].startswith(f"{effect.path}.")]

@@ -1,0 +1,352 @@
+"""The two methods of a fit, over the estimator of `estimation.py`: what they are given, and what they leave.
+
+Both fit with each sample counting as one first. Where the residuals that this leaves are not white, each sample then
+counts for its share of an effective number of samples (`effective_number`), by joint and stretch of a recording, and
+the balance of data and prior, the estimates and their covariance follow. Residuals are measured once, at the first fit:
+those of a fit that the prior holds back are those of a wrong model, and more coloured for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.errors import InputError
+from tendonfmu.estimate.estimation import BatchResult, EstimationError, Estimator, Learner
+from tendonfmu.estimate.files import with_values
+from tendonfmu.estimate.previous_fit import PreviousFit, known_information
+from tendonfmu.estimate.structure import Structure
+from tendonfmu.recordings.prepared import FitRecording
+from tendonfmu.statistics.effective_number import sample_weights
+
+Numbers = NDArray[np.float64]
+Start = Callable[[Sequence[str]], Numbers]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Options of `FrictionFit` by their names. effective: whether samples count for their share of an effective number.
+    previous: of the structure's start; change: what may have changed since, relative; noise: of the description, N·m.
+    """
+
+    prior: float = 1.0
+    max_passes: int = 60
+    tolerance: float = 0.3
+    threads: int = 0
+    parameter_drift: float = 0.0
+    effective: bool = True
+    previous: PreviousFit | None = None
+    change: float = 0.0
+    noise: float = 0.0
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a fit is. phase: in words. done, total: samples of this phase. cost: so far, NaN where not known."""
+
+    phase: str
+    iteration: int
+    done: int
+    total: int
+    cost: float
+
+
+@dataclass(frozen=True)
+class Learned:
+    """A finished estimation. covariance: [u, u] of z, prior included; information: [u, u] of the data alone.
+    weights: [N, n] by recording, what each sample counts for. innovations: standardised [N, n] by recording where the
+    method has its own, else empty. warnings: sentences.
+    """
+
+    estimator: Estimator
+    z: Numbers
+    covariance: Numbers
+    information: Numbers
+    cost: float
+    iterations: int
+    passes: int
+    converged: bool
+    weights: list[Numbers]
+    innovations: list[Numbers]
+    warnings: list[str]
+
+
+class Interrupted(Exception):
+    """The estimation was stopped; what it had. by_user: by Ctrl-C."""
+
+    def __init__(self, estimator: Estimator, z: Numbers, cost: float, by_user: bool) -> None:
+        super().__init__("stopped")
+        self.estimator, self.z, self.cost, self.by_user = estimator, z, cost, by_user
+
+
+class Watch:
+    """Passes progress on, and remembers that somebody wants to stop: Ctrl-C while the library computes shows here."""
+
+    def __init__(self, progress: Callable[[Progress], bool | None] | None) -> None:
+        self._progress = progress
+        self.stopped, self.by_user = False, False
+
+    def __call__(self, progress: Progress) -> bool:
+        """Whether to go on."""
+        try:
+            answer = self._progress(progress) if self._progress is not None else None
+        except KeyboardInterrupt:
+            self.by_user = True
+            answer = False
+        self.stopped = self.stopped or answer is False
+        return not self.stopped
+
+
+def unknown_names(estimator: Estimator) -> list[str]:
+    """[u] path of each unknown with its role: `….drop` is static − coulomb, `….rate` 1/stribeck_velocity."""
+    return [
+        unknown.path if unknown.role == "value" else f"{unknown.path.rsplit('.', 1)[0]}.{unknown.role}"
+        for unknown in estimator.unknowns
+    ]
+
+
+def _estimator(structure: Structure) -> Estimator:
+    """Raises InputError: a number whose size nothing tells."""
+    try:
+        return Estimator(structure.start.image, structure.group, structure.scale)
+    except EstimationError as refused:
+        raise InputError(f"{structure.start.path}: {refused}") from None
+
+
+def _starting_point(estimator: Estimator, start: Start | None) -> Numbers:
+    if start is None:
+        return estimator.start
+    return _within(estimator, start(unknown_names(estimator)))
+
+
+def _rows(recording: FitRecording, part: slice) -> dict[str, Any]:
+    """What the estimator takes of one part."""
+    external = recording.external
+    return {
+        "arrays": recording.arrays(part),
+        "kinematics_source": recording.kinematics,
+        "external_torque": None if external is None else np.ascontiguousarray(external[part]),
+        "use": np.ascontiguousarray(recording.train[part]),
+    }
+
+
+def _add_recordings(estimator: Estimator, recordings: Sequence[FitRecording]) -> list[tuple[int, slice]]:
+    """Adds each stretch that has something to learn from; returns of each its recording's place and its rows."""
+    added = []
+    for place, recording in enumerate(recordings):
+        for part in recording.parts:
+            if np.count_nonzero(recording.train[part]) > 1:
+                estimator.add_recording(**_rows(recording, part))
+                added.append((place, part))
+    if not added:
+        paths = ", ".join(str(recording.path) for recording in recordings)
+        raise InputError(f"{paths}: no two samples to learn from between two gaps; expected motion without contact")
+    return added
+
+
+def _measured_weights(
+    estimator: Estimator,
+    z: Numbers,
+    recordings: Sequence[FitRecording],
+    added: Sequence[tuple[int, slice]],
+    settings: Settings,
+) -> list[Numbers]:
+    """[N, n] by recording: the share of a sample that each counts for, by the residuals at z [u]."""
+    weights = [np.ones_like(recording.target) for recording in recordings]
+    most = 1.0 if settings.previous is None else settings.previous.share
+    for number, (place, part) in enumerate(added):
+        innovation, variance, _ = estimator.innovations(number, z)  # the variance is NaN where nothing is learned
+        found = sample_weights(innovation / np.sqrt(variance)[:, None])
+        weights[place][part] = np.minimum(found, most)
+    return weights
+
+
+def learn_batch(
+    structure: Structure,
+    recordings: Sequence[FitRecording],
+    watch: Watch,
+    settings: Settings,
+    start: Start | None,
+) -> Learned:
+    """Maximum likelihood. Raises Interrupted."""
+    estimator = _estimator(structure)
+    begin = _starting_point(estimator, start)
+    added = _add_recordings(estimator, recordings)
+    prior = settings.prior
+    if settings.previous is not None:
+        estimator.set_known(_known(estimator, settings))
+        prior = np.inf  # it is in what is known
+    found = _fitted(estimator, begin, prior, settings, watch, "")
+    steps, passes = found.steps, found.passes
+    weights = [np.ones_like(recording.target) for recording in recordings]
+    if settings.effective:
+        weights = _measured_weights(estimator, found.z, recordings, added, settings)
+    if any((each < 1).any() for each in weights):
+        for number, (place, part) in enumerate(added):
+            estimator.set_weights(number, weights[place][part.start])
+        found = _fitted(estimator, found.z, prior, settings, watch, ", with effective samples")
+        steps, passes = steps + found.steps, passes + found.passes
+    return Learned(
+        estimator=estimator,
+        z=found.z,
+        covariance=found.covariance,
+        information=found.information,
+        cost=found.cost,
+        iterations=steps,
+        passes=passes,
+        converged=found.converged,
+        weights=weights,
+        innovations=[],
+        warnings=[] if found.converged else [f"not converged after {passes} passes over the data"],
+    )
+
+
+def _known(estimator: Estimator, settings: Settings) -> Numbers:
+    """[u, u] information of the previous fit."""
+    assert settings.previous is not None
+    names = unknown_names(estimator)
+    return known_information(estimator, names, settings.previous, settings.change, settings.prior, settings.noise)
+
+
+def _fitted(
+    estimator: Estimator, begin: Numbers, prior: float, settings: Settings, watch: Watch, what: str
+) -> BatchResult:
+    """Fits from `begin` [u]. what: behind each phase, in words. Raises Interrupted."""
+    best, best_cost = begin, float("nan")
+
+    def show(number: int, stride: int, done: int, total: int, cost: float, z: Numbers) -> bool:
+        nonlocal best, best_cost
+        best, best_cost = np.array(z, dtype=float), float(cost)
+        phase = f"pass {number}" if stride == 1 else f"pass {number}, 1 of {stride} samples"
+        return watch(Progress(f"{phase}{what}", number, done, total, cost))
+
+    try:
+        found = estimator.fit(
+            begin,
+            prior_std=prior,
+            max_passes=settings.max_passes,
+            tolerance=settings.tolerance,
+            threads=settings.threads,
+            progress=show,
+        )
+    except KeyboardInterrupt:
+        raise Interrupted(estimator, best, best_cost, by_user=True) from None
+    if watch.stopped or found.stopped:
+        raise Interrupted(estimator, found.z, found.cost, watch.by_user)
+    return found
+
+
+def _slack(samples: int) -> str:
+    return f"the filter did not learn from {samples} samples in which the model found a tendon slack"
+
+
+def learn_ekf(
+    structure: Structure,
+    recordings: Sequence[FitRecording],
+    watch: Watch,
+    settings: Settings,
+    start: Start | None,
+) -> Learned:
+    """The extended Kalman filter over all recordings in their order, each pass but the first linearised where the one
+    before arrived. Raises Interrupted.
+
+    Its noise is that of its bias filter too, so a sample's share cannot go into it. What the last pass says of the data
+    is a Gaussian: it is weighted as a whole, with the share of all samples together, and joined with the prior again.
+    Numbers that wander (`parameter_drift`) have no such sum, and stay as the filter has them.
+    """
+    estimator = _estimator(structure)
+    learner = _learner(structure, estimator, settings, start)
+    innovations: list[Numbers] = []
+    for number in range(1, settings.max_passes + 1):
+        if number > 1:
+            learner.begin_pass()
+        innovations = _filter_once(learner, estimator, recordings, watch, number)
+    z, covariance = learner.z, learner.covariance
+    plain = np.diag(1 / (settings.prior * np.array([unknown.scale for unknown in learner.unknowns])) ** 2)
+    information = np.asarray(np.linalg.inv(covariance) - plain, dtype=np.float64)
+    weights = [np.ones_like(recording.target) for recording in recordings]
+    if settings.effective and settings.parameter_drift == 0:
+        weights = _common_weight(estimator, z, recordings, settings)
+    share = float(weights[0][0, 0])
+    if share < 1 or settings.previous is not None:
+        # what the data alone say, about the prior's mean: on going on the filter began elsewhere
+        first = np.array([unknown.start for unknown in learner.unknowns])
+        mean = first if settings.previous is None else estimator.start
+        pull = share * (np.linalg.solve(covariance, z - first) + information @ (first - mean))
+        known = plain if settings.previous is None else _known(estimator, settings)
+        information = share * information
+        covariance = np.asarray(np.linalg.inv(information + known), dtype=np.float64)
+        z = _within(estimator, mean + covariance @ pull)
+    return Learned(
+        estimator=estimator,
+        z=z,
+        covariance=covariance,
+        information=information,
+        cost=float("nan"),
+        iterations=settings.max_passes,
+        passes=settings.max_passes,
+        converged=True,
+        weights=weights,
+        innovations=innovations,
+        warnings=[_slack(learner.slack_samples)] if learner.slack_samples else [],
+    )
+
+
+def _common_weight(
+    estimator: Estimator, z: Numbers, recordings: Sequence[FitRecording], settings: Settings
+) -> list[Numbers]:
+    """[N, n] by recording, the same everywhere: the share of all samples trained on together."""
+    found = _measured_weights(estimator, z, recordings, _add_recordings(estimator, recordings), settings)
+    trained = np.concatenate([each[recording.train] for each, recording in zip(found, recordings, strict=True)])
+    return [np.full_like(each, trained.mean()) for each in found]
+
+
+def _within(estimator: Estimator, z: Numbers) -> Numbers:
+    low, high = (np.array([getattr(unknown, end) for unknown in estimator.unknowns]) for end in ("lower", "upper"))
+    return np.asarray(np.clip(z, low, high))
+
+
+def _filter_once(
+    learner: Learner, estimator: Estimator, recordings: Sequence[FitRecording], watch: Watch, number: int
+) -> list[Numbers]:
+    """Standardised innovations [N, n] by recording, NaN where not trained on."""
+    total, before = sum(len(recording.time) for recording in recordings), 0
+
+    def show(done: int, _: int) -> bool:
+        return watch(Progress(f"filtering, pass {number}", number, before + done, total, float("nan")))
+
+    innovations = []
+    for recording in recordings:
+        found = np.full(recording.target.shape, np.nan)
+        for part in recording.parts:
+            try:
+                outputs = learner.run(**_rows(recording, part), progress=show)
+            except EstimationError as refused:  # the filter diverges: a unit is wrong, or a scale
+                raise InputError(f"{recording.path}: {refused}") from None
+            except KeyboardInterrupt:
+                raise Interrupted(estimator, learner.z, float("nan"), by_user=True) from None
+            if watch.stopped:
+                raise Interrupted(estimator, learner.z, float("nan"), watch.by_user)
+            found[part] = outputs["innovation"] / np.sqrt(outputs["innovation_variance"])
+            before += part.stop - part.start
+        innovations.append(np.where(recording.train[:, None], found, np.nan))
+    return innovations
+
+
+def _learner(structure: Structure, estimator: Estimator, settings: Settings, start: Start | None) -> Learner:
+    """It begins at its description's numbers: on going on, those of the interrupted fit, with the scale as it was."""
+    image, scale = structure.start.image, structure.scale
+    if start is not None:
+        own = np.abs(estimator.values(estimator.start))
+        scale = np.where(np.isnan(scale), own, scale)
+        image = with_values(structure, estimator.values(_starting_point(estimator, start))).image
+    try:
+        return Learner(
+            image, structure.group, scale, prior_std=settings.prior, parameter_drift=settings.parameter_drift
+        )
+    except EstimationError as refused:
+        raise InputError(f"{structure.start.path}: {refused}") from None

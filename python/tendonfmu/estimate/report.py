@@ -1,0 +1,150 @@
+"""The report of a fit, "tendonfmu-fit-1": everything that is known, as JSON with null for what is not a number."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.estimate.evaluation import Evaluation, residual_entry
+from tendonfmu.estimate.verdicts import Fitted
+from tendonfmu.files.finite_numbers import finite
+from tendonfmu.model import native
+from tendonfmu.model.description import FingerDescription
+from tendonfmu.recordings.residuals import consistency, whiteness
+from tendonfmu.statistics.effective_number import effective_samples
+
+Numbers = NDArray[np.float64]
+
+FORMAT = "tendonfmu-fit-1"
+
+
+@dataclass(frozen=True)
+class Run:
+    """How the estimation went. method: "batch" or "ekf". cost: negative log likelihood with the prior, or NaN."""
+
+    method: str
+    converged: bool
+    iterations: int
+    passes: int
+    seconds: float
+    cost: float
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A finished fit.
+
+    names: [u] "path.role" of the unknowns. covariance: [u, u] of them. innovations: [N, n] standardised, of each
+    recording, NaN where not trained on. weights: [N, n] of each, what a sample counts for. training, comparisons:
+    judged recordings. uncertainty: of the modelled friction torque, None where not asked for.
+    """
+
+    fitted: FingerDescription
+    run: Run
+    options: Mapping[str, Any]
+    warnings: Sequence[str]
+    numbers: Sequence[Fitted]
+    names: Sequence[str]
+    covariance: Numbers
+    innovations: Sequence[Numbers]
+    weights: Sequence[Numbers]
+    training: Sequence[Evaluation]
+    comparisons: Sequence[Evaluation]
+    uncertainty: Mapping[str, Any] | None
+
+
+def build_report(found: Outcome) -> dict[str, Any]:
+    """The whole report; numbers that are not finite are None."""
+    run = found.run
+    units = {parameter.path: parameter.unit for parameter in native.Finger(found.fitted.image).parameters()}
+    report = {
+        "format": FORMAT,
+        "finger": found.fitted.name,
+        "method": run.method,
+        "converged": run.converged,
+        "finished": True,
+        "iterations": run.iterations,
+        "passes": run.passes,
+        "seconds": run.seconds,
+        "cost": run.cost,
+        "options": dict(found.options),
+        "warnings": list(found.warnings),
+        "recordings": [each.recording.entry() for each in found.training],
+        "parameters": [_parameter(number, units) for number in found.numbers],
+        "correlation": {
+            "paths": list(found.names),
+            "standard_errors": np.sqrt(np.maximum(np.diag(found.covariance), 0.0)).tolist(),
+            "matrix": _correlation(found.covariance),
+        },
+        "identified": {"count": sum(number.identified for number in found.numbers), "of": len(found.numbers)},
+        "residual": {
+            "train": residual_entry(found.training, "train"),
+            "held_out": residual_entry(found.training, "held_out"),
+            "comparisons": [_comparison(each) for each in found.comparisons],
+        },
+        "innovations": _innovations(found),
+        "uncertainty": found.uncertainty,
+    }
+    return {key: finite(value) for key, value in report.items()}
+
+
+def report_text(report: Mapping[str, Any]) -> str:
+    """JSON, a parameter or a row of the correlation on one line each."""
+    parts = []
+    for key, value in report.items():
+        if key == "parameters":
+            text = _lines(value)
+        elif key == "correlation":
+            keys = ("paths", "standard_errors", "matrix")
+            text = "{" + ",\n  ".join(f"{json.dumps(own)}: {_lines(value[own])}" for own in keys) + "}"
+        else:
+            text = json.dumps(value, ensure_ascii=False, allow_nan=False)
+        parts.append(f" {json.dumps(key)}: {text}")
+    return "{\n" + ",\n".join(parts) + "\n}\n"
+
+
+def _lines(values: Sequence[Any]) -> str:
+    return "[\n  " + ",\n  ".join(json.dumps(each, ensure_ascii=False, allow_nan=False) for each in values) + "]"
+
+
+def _parameter(number: Fitted, units: Mapping[str, str]) -> dict[str, Any]:
+    return {
+        "path": number.number.path,
+        "unit": units[number.number.path],
+        "start": number.start,
+        "value": number.value,
+        "standard_error": number.standard_error,
+        "identified": number.identified,
+        "at_bound": number.at_bound,
+        "reason": number.cause or None,
+        "explanation": number.reason or None,
+        "advice": number.advice or None,
+    }
+
+
+def _innovations(found: Outcome) -> dict[str, Any]:
+    """What the residuals of the samples trained on are like, and how many independent ones they are worth."""
+    samples, worth = effective_samples(found.innovations, found.weights)
+    share = float(worth.sum() / samples.sum()) if samples.sum() else 1.0
+    return {
+        "nis": consistency(found.innovations, share),
+        "whiteness": whiteness(found.innovations),
+        "effective": {"samples": samples.tolist(), "worth": worth.tolist()},
+    }
+
+
+def _comparison(found: Evaluation) -> dict[str, Any]:
+    entry = found.recording.entry()
+    label = found.recording.path.stem
+    return {"label": label, **entry, **(residual_entry([found], "tracked") or {})}
+
+
+def _correlation(covariance: Numbers) -> list[list[float]]:
+    error = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    matrix = covariance / np.outer(error, error)
+    return [[float(f"{value:.4g}") for value in row] for row in matrix.tolist()]

@@ -1,0 +1,120 @@
+"""How far the residuals of a fit are from the white noise that its covariance assumes.
+
+The covariance of a fit counts each sample as new. What a model misses lasts for many, so the sum of the likelihood's
+gradient over a block of time (its score) varies more than the information says. The scores of blocks that are longer
+than the residuals remember give the true covariance of the estimates, C (Σ s sᵀ) C ("sandwich" with clusters in time:
+Liang and Zeger 1986, eq. 7), whatever the residuals' size and shape in time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.estimate.estimation import Estimator
+from tendonfmu.estimate.evaluation import Evaluation
+from tendonfmu.recordings.residuals import BiasSettings, bias_settings, track
+
+Numbers = NDArray[np.float64]
+
+BLOCKS = 80  # about; few enough to be long, many enough for a sum of squares
+SHORTEST = 2.0  # s; several times what the bias filter remembers
+FEWEST = 10  # blocks, if they are shorter for it
+_SAMPLES, _SIZE = 8000, 15_000_000  # looked at in all; times joints and unknowns, at most
+_LEAST = 8  # samples of a block
+
+
+@dataclass(frozen=True)
+class Scores:
+    """scores: [B, u] gradient of ½ Σ e²/S over each block, less their mean. block_time: s of a block."""
+
+    scores: Numbers
+    block_time: float
+
+
+def block_scores(
+    estimator: Estimator,
+    z: Numbers,
+    data: Mapping[str, Any],
+    training: Sequence[Evaluation],
+    weights: Sequence[Numbers],
+) -> Scores:
+    """At the estimate z [u] of a fitted description, over the samples trained on.
+
+    estimator: of the start's description; the blocks are added to its recordings. weights: [N, n] by recording, what
+    each sample counts for.
+
+    Every so many'th sample is looked at, with the bias filter of that rate; each block's bias begins anew.
+    """
+    seconds = sum(found.recording.duration for found in training)
+    samples = sum(len(found.recording.time) for found in training)
+    size = len(data["joints"]) * len(z)
+    every = max(1, math.ceil(samples / min(_SAMPLES, max(_SIZE // size, _SAMPLES // 8))))
+    length = min(max(seconds / BLOCKS, SHORTEST), seconds / FEWEST)
+    settings = _settings(data, every)
+    found = [
+        _score(estimator, z, settings, evaluation, rows, own)
+        for evaluation, own in zip(training, weights, strict=True)
+        for rows in _blocks(evaluation, length, every)
+    ]
+    scores = np.array(found).reshape(len(found), len(z))
+    return Scores(scores - scores.mean(axis=0) if len(found) else scores, length)
+
+
+def _settings(data: Mapping[str, Any], every: int) -> BiasSettings:
+    """For every so many'th sample: noise said by sample averages out, noise said by time does so by itself."""
+    settings = replace(bias_settings(data), initial_torque=None)
+    if settings.noise_time is not None:
+        return settings
+    root = math.sqrt(every)
+    return replace(settings, noise=settings.noise / root, per_force=settings.per_force / root)
+
+
+def _blocks(found: Evaluation, length: float, every: int) -> Iterator[NDArray[np.intp]]:
+    """Rows of each block that has some to learn from."""
+    recording = found.recording
+    for part in recording.parts:
+        rows = np.arange(part.start, part.stop, every)
+        number = np.floor((recording.time[rows] - recording.time[part.start]) / length)
+        for block in np.split(rows, np.flatnonzero(np.diff(number)) + 1):
+            if recording.train[block].sum() >= _LEAST:
+                yield block
+
+
+def _score(
+    estimator: Estimator,
+    z: Numbers,
+    settings: BiasSettings,
+    found: Evaluation,
+    rows: NDArray[np.intp],
+    weights: Numbers,
+) -> Numbers:
+    """[u] of one block. The filter is linear, so it takes y − T and its derivatives alike."""
+    recording = found.recording
+    time, learns = recording.time[rows], recording.train[rows]
+    number = estimator.add_recording(sampled(found, rows, time), kinematics_source=3)
+    torque, jump, by_torque, by_jump = estimator.jacobian(number, z, 0, len(rows))
+    joints = torque.shape[1]
+    remainder = np.hstack([recording.target[rows] - torque, -by_torque.reshape(len(rows), -1)])
+    jumps = np.hstack([jump, by_jump.reshape(len(rows), -1)])
+    mean_force = np.abs(recording.recording.groups["tendon_force"][rows]).mean(axis=1)
+    left = track(settings, time, mean_force, remainder, jumps, learns, [slice(0, len(rows))])
+    chosen = learns & ~np.isnan(left.residual).any(axis=1)
+    residual = left.residual[chosen, :joints] / left.variance[chosen, None] * weights[rows][chosen]
+    slopes = left.residual[chosen, joints:].reshape(-1, joints, len(z))
+    return np.asarray(np.tensordot(residual, slopes, axes=((0, 1), (0, 1))))
+
+
+def sampled(found: Evaluation, rows: NDArray[np.intp], time: Numbers) -> dict[str, Numbers]:
+    """Rows of a recording as one with measured angles and speeds: T needs nothing of the samples between."""
+    return {
+        "time": np.ascontiguousarray(time),
+        "tendon_force": np.ascontiguousarray(found.recording.recording.groups["tendon_force"][rows]),
+        "joint_position": np.ascontiguousarray(found.model.joint_angle[rows]),
+        "joint_velocity": np.ascontiguousarray(found.model.joint_speed[rows]),
+    }

@@ -1,0 +1,361 @@
+"""Which numbers of a finger a fit estimates, and which of them share one value.
+
+A pattern is a path of the description in which `*` stands for anything and `?` for one character; brackets are
+literal. It matches a number, or a part of the description and so all numbers in it: `tendons[*].edge_friction[2]`.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.errors import InputError
+from tendonfmu.estimate.information import Unknown, unknowns
+from tendonfmu.model import native
+from tendonfmu.model.description import FingerDescription, sides
+from tendonfmu.model.extensions import LEFT_OUT
+from tendonfmu.model.friction_places import effects
+
+MAGNITUDES = ("static", "coulomb", "stribeck_velocity", "viscous")
+SHARED_BY_WORD = {
+    "tendons": ("tendons[*].edge_friction[*]", "tendons[*].pulley_friction[*]"),
+    "pulleys": ("tendons[*].pulley_friction[*]",),
+}
+FIXED = -1
+
+_INDEX = re.compile(r"\[(\d+)\]")
+
+
+@dataclass(frozen=True)
+class Structure:
+    """What is fitted. start: the description that the fit begins with, laws expanded or tied, shared values made equal,
+    without `contact.uncertainty`.
+
+    numbers: those estimated, in the order of identifiability.unknowns, `bias.initial_torque` last. group: [p] of all
+    parameters of the description in canonical order, −1 fixed, equal numbers share one value. scale: [p] expected
+    magnitudes, NaN where the start's own. index: path -> place among the p. sensor_fault: of the description, which the
+    start lacks.
+    """
+
+    start: FingerDescription
+    numbers: list[Unknown]
+    group: NDArray[np.int32]
+    scale: NDArray[np.float64]
+    index: Mapping[str, int]
+    sensor_fault: Mapping[str, Any] | None = None
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What was asked for. sides: "given", "symmetric" or "asymmetric". only, fix: patterns; share: "tendons", "pulleys"
+    or patterns; scale: "PATTERN=VALUE", the expected magnitude in the description's unit.
+    """
+
+    sides: str = "given"
+    only: Sequence[str] = ()
+    fix: Sequence[str] = ()
+    share: Sequence[str] = ()
+    scale: Sequence[str] = ()
+
+
+def build_structure(finger: FingerDescription, choice: Choice) -> Structure:
+    """Raises InputError where a pattern matches nothing, nothing is left to estimate, or shared laws differ in kind."""
+    data = _model_alone(with_sides(finger.data, choice.sides))
+    numbers = estimable_numbers(data)
+    if not numbers:
+        raise InputError(f"{finger.path}: nothing to estimate: no friction, cover or extension; expected at least one")
+    chosen = _chosen(numbers, choice)
+    owners = _owners(chosen, data, choice.share)
+    data = _with_equal_values(data, chosen, owners)
+    start = described(finger, data)
+    paths = [parameter.path for parameter in native.Finger(start.image).parameters()]
+    index = {path: k for k, path in enumerate(paths)}
+    group = np.full(len(paths), FIXED, dtype=np.int32)
+    for number, owner in zip(chosen, owners, strict=True):
+        group[index[number.path]] = owner
+        if number.with_path is not None:
+            group[index[number.with_path]] = owner
+    return Structure(
+        start=start,
+        sensor_fault=finger.data.get("sensor_fault"),
+        numbers=_numbered(start, chosen),
+        group=group,
+        scale=_scales(paths, chosen, choice.scale),
+        index=index,
+    )
+
+
+def _model_alone(data: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Directions of uncertainty tell of numbers that are about to change; a watch over sensors is no part of them."""
+    if data.get("sensor_fault") is not None:
+        data = {key: value for key, value in data.items() if key != "sensor_fault"}
+    contact = data.get("contact") or {}
+    if contact.get("uncertainty") is None:
+        return data
+    return {**data, "contact": {key: value for key, value in contact.items() if not key.startswith("uncertainty")}}
+
+
+def values_of(structure: Structure, finger: FingerDescription) -> list[Unknown]:
+    """The estimated numbers as they are in another description of the same structure."""
+    return _numbered(finger, structure.numbers)
+
+
+def _numbered(finger: FingerDescription, numbers: Sequence[Unknown]) -> list[Unknown]:
+    by_path = {effect.path: effect for effect in effects(finger.data)}
+    return [
+        replace(
+            number,
+            value=_value(finger.data, number.path),
+            effect=None if number.effect is None else by_path[number.effect.path],
+        )
+        for number in numbers
+    ]
+
+
+def own_copy(data: Mapping[str, Any]) -> dict[str, Any]:
+    """A copy in which no law is the same object as another, as parsed JSON made by a program may have them."""
+    copied: dict[str, Any] = json.loads(json.dumps(data))
+    return copied
+
+
+def estimable_numbers(data: Mapping[str, Any]) -> list[Unknown]:
+    """What a fit of a parsed description may estimate: all that is present, `bias.initial_torque` last."""
+    return [*unknowns(data), *_initial_torques(data)]
+
+
+def described(finger: FingerDescription, data: Mapping[str, Any]) -> FingerDescription:
+    """The same finger with other numbers, seen by the native reader. Raises InputError."""
+    if data is finger.data or data == finger.data:
+        return finger
+    text = json.dumps(data).encode()
+    try:
+        return FingerDescription(finger.path, text, data, native.image_from_json(text))
+    except native.NativeError as refused:
+        raise InputError(f"{finger.path}: {refused}") from None
+
+
+def _initial_torques(data: Mapping[str, Any]) -> list[Unknown]:
+    given = (data.get("bias") or {}).get("initial_torque") or []
+    return [Unknown(f"bias.initial_torque[{j}]", float(value)) for j, value in enumerate(given, start=1)]
+
+
+# --- sides of laws ----------------------------------------------------------------------------------------------------
+
+
+def with_sides(data: Mapping[str, Any], wanted: str) -> Mapping[str, Any]:
+    """The description with every law "symmetric", "asymmetric", or as "given".
+
+    A symmetric law becomes two equal sides; two sides become one, the mean of their magnitudes.
+    """
+    if wanted == "given":
+        return data
+    change = _two_sides if wanted == "asymmetric" else _one_side
+    result: dict[str, Any] = own_copy(data)
+    for joint in result["joints"]:
+        for kind in ("friction", "load_friction"):
+            if joint.get(kind) is not None:
+                joint[kind] = change(joint[kind])
+    for tendon in result["tendons"]:
+        for kind in ("pulley_friction", "edge_friction"):
+            if tendon.get(kind) is not None:
+                tendon[kind] = [_of_entry(entry, change) for entry in tendon[kind]]
+    return result
+
+
+def _of_entry(entry: Any, change: Callable[[Any], Any]) -> Any:
+    if entry is None:
+        return None
+    if entry.get("laws") is not None:
+        return {**entry, "laws": [change(law) for law in entry["laws"]]}
+    return change(entry)
+
+
+def _two_sides(law: dict[str, Any]) -> dict[str, Any]:
+    return law if len(sides(law)) == 2 else {"positive": dict(law), "negative": dict(law)}
+
+
+def _one_side(law: dict[str, Any]) -> dict[str, Any]:
+    both = sides(law)
+    if len(both) == 1:
+        return law
+    mean = {key: float(np.mean([side.get(key) or 0.0 for side in both])) for key in MAGNITUDES}
+    return {key: value for key, value in mean.items() if key != "viscous" or value}
+
+
+# --- patterns ---------------------------------------------------------------------------------------------------------
+
+
+def matcher(pattern: str) -> re.Pattern[str]:
+    """Group 1 of a match is what the pattern itself stands for, group 2 what follows inside that part."""
+    body = "".join({"*": ".*?", "?": "."}.get(letter, re.escape(letter)) for letter in pattern)
+    return re.compile(rf"({body})((?:[.\[].*)?)")
+
+
+def _select(numbers: Sequence[Unknown], patterns: Iterable[str], option: str) -> set[str]:
+    """Paths of the numbers that match any pattern; each has to match at least one."""
+    found: set[str] = set()
+    for pattern in patterns:
+        match = matcher(pattern).fullmatch
+        hits = {n.path for n in numbers if match(n.path) or (n.with_path is not None and match(n.with_path))}
+        if not hits:
+            raise InputError(_no_match(option, pattern, numbers))
+        found |= hits
+    return found
+
+
+def _no_match(option: str, pattern: str, numbers: Sequence[Unknown]) -> str:
+    return (
+        f"{option} {pattern}: matches none of the {len(numbers)} numbers that a fit of this finger estimates; "
+        f"expected a path such as {numbers[0].path}, where * stands for anything"
+    )
+
+
+def _chosen(numbers: list[Unknown], choice: Choice) -> list[Unknown]:
+    only = _select(numbers, choice.only, "--only") if choice.only else {number.path for number in numbers}
+    fixed = _select(numbers, choice.fix, "--fix")
+    chosen = [number for number in numbers if number.path in only - fixed]
+    if not chosen:
+        raise InputError("--only, --fix: no number is left to estimate; expected at least one")
+    return chosen
+
+
+def _scales(paths: list[str], chosen: Sequence[Unknown], given: Sequence[str]) -> NDArray[np.float64]:
+    scale = np.full(len(paths), np.nan)
+    for text in given:
+        pattern, _, number = text.rpartition("=")
+        try:
+            value = float(number)
+        except ValueError:
+            value = np.nan
+        if not pattern or not 0 < value < np.inf:
+            raise InputError(f"--scale {text}: expected PATTERN=VALUE with a value above 0, in the description's unit")
+        hits = _select(chosen, [pattern], "--scale")
+        for k, path in enumerate(paths):
+            if path in hits:
+                scale[k] = value
+    return scale
+
+
+# --- sharing ----------------------------------------------------------------------------------------------------------
+
+
+def _owners(numbers: Sequence[Unknown], data: Mapping[str, Any], share: Sequence[str]) -> list[int]:
+    """[numbers] group of each: its own, or the first that it shares a value with."""
+    owners = list(range(len(numbers)))
+    for key in _shared_keys(numbers, data, share):
+        first: dict[str, int] = {}
+        for k, name in enumerate(key):
+            if name is None:
+                continue
+            other = owners[first.setdefault(name, k)]
+            owners = [other if owner == owners[k] else owner for owner in owners]
+    _check_alike(numbers, owners)
+    return owners
+
+
+def _shared_keys(
+    numbers: Sequence[Unknown], data: Mapping[str, Any], share: Sequence[str]
+) -> Iterator[list[str | None]]:
+    """For each thing to share by: [numbers] a name that is equal where values are, None where nothing is shared."""
+    for asked in share:
+        if asked == "tendons":  # the same place of every tendon
+            keys = [_place(number, keep=1) if number.path.startswith("tendons[") else None for number in numbers]
+        elif asked == "pulleys":  # all pulleys of a tendon
+            is_pulley = [".pulley_friction[" in number.path for number in numbers]
+            keys = [_place(n, keep=0) if pulley else None for n, pulley in zip(numbers, is_pulley, strict=True)]
+        else:
+            match = matcher(asked).fullmatch
+            found = [match(number.path) for number in numbers]
+            keys = [None if hit is None else _rest(n, hit[2]) for n, hit in zip(numbers, found, strict=True)]
+        if not any(keys):
+            raise InputError(_no_match("--share", asked, numbers))
+        yield keys
+
+
+def _place(number: Unknown, keep: int) -> str:
+    """The number's path without the tendon (keep 1), or without the joint (keep 0); working points by their angle."""
+    path = _by_angle(number)
+    start, end = [match.span() for match in _INDEX.finditer(path)][1 - keep]
+    return path[:start] + path[end:]
+
+
+def _rest(number: Unknown, rest: str) -> str:
+    """What follows a match, working points by their angle; the magnitude where the match is the whole path."""
+    return re.sub(r"\.laws\[\d+\]", f".laws@{_angle(number)}", rest) if rest else number.key
+
+
+def _angle(number: Unknown) -> str:
+    return repr(number.effect.angles[number.point]) if number.effect is not None and number.effect.angles else ""
+
+
+def _by_angle(number: Unknown) -> str:
+    return re.sub(r"\.laws\[\d+\]", f".laws@{_angle(number)}", number.path)
+
+
+def _check_alike(numbers: Sequence[Unknown], owners: Sequence[int]) -> None:
+    """Only numbers of one meaning share a value: the same magnitude, with or without a Stribeck effect."""
+    for number, owner in zip(numbers, owners, strict=True):
+        first = numbers[owner]
+        if number.key != first.key:
+            raise InputError(
+                f"--share: {number.path} and {first.path} would share a value; expected the same magnitude of both"
+            )
+        if (number.with_path is None) != (first.with_path is None):
+            having, lacking = (first, number) if first.with_path is None else (number, first)
+            raise InputError(
+                f"--share: {having.path} belongs to a law with a Stribeck effect, {lacking.path} to one without "
+                "(static = coulomb); expected laws of the same structure"
+            )
+
+
+def _with_equal_values(data: Mapping[str, Any], numbers: Sequence[Unknown], owners: Sequence[int]) -> Mapping[str, Any]:
+    """Numbers that share a value start from their mean."""
+    if len(set(owners)) == len(owners):
+        return data
+    result = own_copy(data)
+    for owner in set(owners):
+        members = [number for number, own in zip(numbers, owners, strict=True) if own == owner]
+        mean = float(np.mean([member.value for member in members]))
+        for member in members:
+            set_number(result, member.path, mean)
+            if member.with_path is not None:
+                set_number(result, member.with_path, mean)
+    return result
+
+
+def set_number(data: Any, path: str, value: float) -> None:
+    """Writes a number of a parsed description, in place.
+
+    path: such as `tendons[1].edge_friction[2].coulomb`, indices from 1.
+    """
+    *way, last = _steps(path)
+    for step in way:
+        data = data[step]
+    data[last] = value
+
+
+def _value(data: Any, path: str) -> float:
+    """Of an extension's number that is left out: what is taken for it."""
+    try:
+        return float(get_number(data, path))
+    except KeyError:
+        if not path.startswith("extensions["):
+            raise
+        return LEFT_OUT.get(path.rpartition(".")[2], 0.0)
+
+
+def get_number(data: Any, path: str) -> Any:
+    """Reads a number of a parsed description."""
+    for step in _steps(path):
+        data = data[step]
+    return data
+
+
+def _steps(path: str) -> list[Any]:
+    return [int(index) - 1 if index else name for name, index in re.findall(r"([a-z_]+)|\[(\d+)\]", path)]

@@ -1,0 +1,216 @@
+"""What a fit does not know of the modelled friction torque, as `contact.uncertainty` has it: at most four directions
+per joint, each a relative error of every part of the joint's friction (tendons, joint friction, joint load friction,
+cover; docs/contract-additions.md, step 4a).
+
+With g the derivative of T_j by the unknowns and C their covariance, T_j has the variance gᵀ C g. C is the fit's, with
+the information of the data shrunk by as much as the residuals vary more than white noise (`fit_scores`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.estimate.estimation import Estimator
+from tendonfmu.estimate.evaluation import Evaluation
+from tendonfmu.estimate.methods import Learned
+from tendonfmu.estimate.scores import block_scores, sampled
+from tendonfmu.estimate.structure import Structure
+from tendonfmu.model import native
+from tendonfmu.statistics.error_directions import few_directions, predicted, squares
+
+Numbers = NDArray[np.float64]
+Rows = NDArray[np.intp]
+
+LOAD = 4.0  # times the recorded forces: the directions are to hold at other pretensions, too
+WORST = 0.99  # quantile of the error that is stated
+ROLES = ("train", "held_out")  # of samples
+DIGITS = 6  # of a written number
+_SAMPLES, _SIZE = 1000, 2_000_000  # looked at; times joints and unknowns, at most
+_CHUNK = 500_000  # numbers of a Jacobian at a time
+_STEP = 0.01  # s between samples that are looked at one by one; no result depends on it
+_ROUNDING = 1e-9  # of a variance: keeps a covariance with rounding errors positive
+_NEVER = 1e9  # N·m; no contact threshold is ever passed
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """directions: for each joint up to four lists of m + 3 numbers. entry: of the report."""
+
+    directions: list[list[list[float]]]
+    entry: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Samples of the motion, by joint. parts: [n, K, m + 3] N·m of the friction torque. slopes: [n, K, u] of T, N·m per
+    column of `Known.factor`.
+    """
+
+    parts: Numbers
+    slopes: Numbers
+
+
+@dataclass(frozen=True)
+class Known:
+    """The covariance C of the unknowns as F Fᵀ, F [u, u], and what of each column is known by data: Fᵀ H F, H their
+    information, is diagonal, `share` [u], from 0 (prior alone) to 1 (data alone).
+    """
+
+    factor: Numbers
+    share: Numbers
+
+    def growth(self, inflation: float) -> Numbers:
+        """[u] of the variance along each column of F, when the data know so many times less. The prior, which is no
+        measurement, stays.
+        """
+        return np.asarray(1 / (1 - self.share + self.share / inflation))
+
+
+@dataclass(frozen=True)
+class JointUncertainty:
+    """Of one joint. captured: share of the variance in the leading directions, before what they leave out is put back.
+    stated: for each set of samples rms standard deviation, rms error of the predicted one and its quantile `WORST`.
+    """
+
+    directions: list[list[float]]
+    inflation: float
+    captured: float
+    stated: dict[str, tuple[float, float, float]]
+
+
+def parameter_uncertainty(
+    structure: Structure, learned: Learned, data: Mapping[str, Any], training: Sequence[Evaluation]
+) -> Uncertainty:
+    """Of a finished fit. data: the fitted description. training: judged recordings."""
+    known = known_of(learned.covariance, learned.information)
+    estimator = Estimator(structure.start.image, structure.group, structure.scale)
+    blocks = block_scores(estimator, learned.z, data, training, learned.weights)
+    scores = blocks.scores @ known.factor
+    motion = Motion(estimator, learned.z, data, known)
+    trained, held = ([np.flatnonzero(getattr(each.recording, which)) for each in training] for which in ROLES)
+    seen = {"train": motion.look(training, trained), "loaded": motion.look(training, trained, LOAD)}
+    if any(len(rows) for rows in held):
+        seen["held_out"] = motion.look(training, held)
+    joints = [
+        _of_joint({which: Seen(each.parts[j], each.slopes[j]) for which, each in seen.items()}, known, scores)
+        for j in range(len(data["joints"]))
+    ]
+    entry = {
+        "blocks": len(scores),
+        "block_time": blocks.block_time,
+        "inflation": [joint.inflation for joint in joints],
+        "directions": [len(joint.directions) for joint in joints],
+        "captured": [joint.captured for joint in joints],
+        "train": _stated(joints, "train"),
+        "held_out": _stated(joints, "held_out") if "held_out" in seen else None,
+        "loaded": _stated(joints, "loaded"),
+    }
+    return Uncertainty([joint.directions for joint in joints], entry)
+
+
+def _of_joint(seen: Mapping[str, Seen], known: Known, scores: Numbers) -> JointUncertainty:
+    """seen: [K, m + 3] and [K, u] of the joint."""
+    inflation = inflation_of(seen["train"].slopes, known, scores)
+    growth = np.sqrt(known.growth(inflation))
+    slopes = {which: each.slopes * growth for which, each in seen.items()}
+    std = {which: np.sqrt(squares(each)) for which, each in slopes.items()}
+    # so that the larger torques under more load do not count for more
+    size = {which: _rms(std[which]) or 1.0 for which in ("train", "loaded")}
+    directions, captured = few_directions(
+        np.concatenate([seen[which].parts / size[which] for which in size]),
+        np.concatenate([slopes[which] / size[which] for which in size]),
+    )
+    written = [[float(f"{value:.{DIGITS}g}") for value in row] for row in directions.tolist()]
+    stated = {}
+    for which, each in seen.items():
+        error = np.abs(predicted(each.parts, np.array(written).reshape(-1, each.parts.shape[1])) - std[which])
+        stated[which] = (_rms(std[which]), _rms(error), float(np.quantile(error, WORST)))
+    return JointUncertainty(written, inflation, captured, stated)
+
+
+def _rms(values: Numbers) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _stated(joints: Sequence[JointUncertainty], which: str) -> dict[str, list[float]]:
+    rows = zip(*(joint.stated[which] for joint in joints), strict=True)
+    return dict(zip(("std", "error_rms", "error_worst"), map(list, rows), strict=True))
+
+
+def known_of(covariance: Numbers, information: Numbers) -> Known:
+    """covariance: [u, u], prior included; information: [u, u] of the data alone."""
+    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    correlation = covariance / np.outer(scale, scale)  # units do not matter to it
+    correlation[np.diag_indices_from(correlation)] += _ROUNDING
+    root = scale[:, None] * np.linalg.cholesky(correlation)
+    share, turn = np.linalg.eigh(root.T @ information @ root)
+    return Known(root @ turn, np.clip(share, 0.0, 1.0))
+
+
+def inflation_of(slopes: Numbers, known: Known, scores: Numbers) -> float:
+    """How many times the sampling variance of the torque exceeds what white residuals of the settings' size would give,
+    on average over samples. slopes: [K, u] by the columns of F; scores: [B, u] Fᵀ s of each block.
+
+    1 where nothing of the torque is estimated, or where too few blocks say nothing.
+    """
+    if len(scores) < 2:
+        return 1.0
+    found = float(np.sum((slopes @ scores.T) ** 2)) * len(scores) / (len(scores) - 1)
+    assumed = float(np.sum(squares(slopes * np.sqrt(known.share))))
+    return found / assumed if assumed > 0 and found > 0 else 1.0
+
+
+# --- samples of the motion --------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Looks at samples of recordings. estimator: of the start's description; z: [u] the estimate; data: the fitted
+    description.
+    """
+
+    estimator: Estimator
+    z: Numbers
+    data: Mapping[str, Any]
+    known: Known
+
+    def look(self, recordings: Sequence[Evaluation], rows: Sequence[Rows], load: float = 1.0) -> Seen:
+        """Every so many'th of the rows of each recording. load: times the recorded tendon forces."""
+        joints, tendons, unknowns = len(self.data["joints"]), len(self.data["tendons"]), len(self.z)
+        most = min(_SAMPLES, max(_SIZE // (joints * unknowns), _SAMPLES // 10))
+        every = max(1, math.ceil(sum(map(len, rows)) / most))
+        chosen = [each[::every] for each in rows]
+        total = sum(map(len, chosen))
+        seen = Seen(np.empty((joints, total, tendons + 3)), np.empty((joints, total, unknowns)))
+        at = 0
+        for found, each in zip(recordings, chosen, strict=True):
+            for chunk in np.array_split(each, len(each) * joints * unknowns // _CHUNK + 1):
+                arrays = sampled(found, chunk, _STEP * np.arange(len(chunk), dtype=np.float64))
+                arrays["tendon_force"] *= load
+                taken = slice(at, at + len(chunk))
+                seen.parts[:, taken] = friction_parts(self.data, arrays).transpose(1, 0, 2)
+                seen.slopes[:, taken] = (self._slopes(arrays) @ self.known.factor).transpose(1, 0, 2)
+                at = taken.stop
+        return seen
+
+    def _slopes(self, arrays: Mapping[str, Numbers]) -> Numbers:
+        """[K, n, u] of T by the unknowns."""
+        number = self.estimator.add_recording(arrays, kinematics_source=3)
+        return self.estimator.jacobian(number, self.z, 0, len(arrays["time"]))[2]
+
+
+def friction_parts(data: Mapping[str, Any], arrays: Mapping[str, Numbers]) -> Numbers:
+    """[K, n, m + 3] N·m: what each tendon, the joint's friction, its load friction and its cover make of T.
+
+    arrays: as `native.Finger.run` takes them, with measured angles and speeds.
+    """
+    joints, tendons = len(data["joints"]), len(data["tendons"])
+    none = [[[0.0] * (tendons + 3)]] * joints
+    asked = {**data, "contact": {"threshold": [_NEVER] * joints, "uncertainty": none}, "sensor_fault": None}
+    return np.asarray(native.Finger.from_description(asked, 3).run(arrays, parts=True)["friction_parts"])

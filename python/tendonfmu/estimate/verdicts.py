@@ -1,0 +1,239 @@
+"""How well a fit knows each number of the description, and what would tell those that it does not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.estimate.coverage import EffectCoverage
+from tendonfmu.estimate.identifiability import LIMIT, PRIOR, Verdict, explain, unvisited
+from tendonfmu.estimate.information import Unknown
+from tendonfmu.estimate.structure import Structure, values_of
+from tendonfmu.model.description import FingerDescription
+
+Numbers = NDArray[np.float64]
+
+CAUSES = {
+    "never_moves": "never slides at all",
+    "side": "never slides to that side",
+    "working_point": "never slides near that working point",
+    "slow": "never slides as slowly as its Stribeck velocity",
+    "noise": "too little torque beside noise and drift, even with all else known",
+    "combination": "seen, but only in combination with others",
+}
+_INSIDE = 1e-6  # of an unknown's size; step of the differences by which z becomes numbers of the description
+_AT_BOUND = 1e-6
+
+
+class FittedUnknown(Protocol):
+    """What is read of `estimation.Unknown`."""
+
+    @property
+    def path(self) -> str: ...
+    @property
+    def role(self) -> str: ...
+    @property
+    def parameters(self) -> tuple[int, ...]: ...
+    @property
+    def lower(self) -> float: ...
+    @property
+    def upper(self) -> float: ...
+    @property
+    def scale(self) -> float: ...
+
+
+class Estimates(Protocol):
+    """What is read of `estimation.Estimator`."""
+
+    @property
+    def unknowns(self) -> Sequence[FittedUnknown]: ...
+    def values(self, z: Numbers) -> Numbers: ...
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """One number after a fit. at_bound: "lower", "upper" or None. cause: "" where identified, else a key of `CAUSES`;
+    reason: in words; advice: which motion, load or option would tell it.
+    """
+
+    number: Unknown
+    start: float
+    standard_error: float
+    at_bound: str | None
+    cause: str
+    reason: str
+    advice: str
+
+    @property
+    def value(self) -> float:
+        return self.number.value
+
+    @property
+    def identified(self) -> bool:
+        return not self.cause
+
+
+@dataclass(frozen=True)
+class Knowledge:
+    """What a fit knows. z: [u]. covariance: [u, u] of z, prior included. information: [u, u] of the data alone.
+    fitted: the description with the values at z. coverage: of the recorded motion. noise: N·m; a bias.initial_torque
+    counts as at least that large.
+    """
+
+    estimator: Estimates
+    z: Numbers
+    covariance: Numbers
+    information: Numbers
+    fitted: FingerDescription
+    coverage: Sequence[EffectCoverage]
+    noise: float
+
+
+def slopes(estimator: Estimates, z: Numbers) -> Numbers:
+    """[p, u] derivative of all numbers of the description by the unknowns: the delta method's matrix.
+
+    static = coulomb + drop and vs = 1/rate: differences of the map itself, taken inside the bounds.
+    """
+    base = np.asarray(estimator.values(z))
+    columns = []
+    for k, unknown in enumerate(estimator.unknowns):
+        step = _INSIDE * max(abs(float(z[k])), 1e-3 * unknown.scale)
+        step = -step if z[k] + step > unknown.upper else step
+        moved = z.copy()
+        moved[k] += step
+        columns.append((np.asarray(estimator.values(moved)) - base) / step)
+    return np.column_stack(columns)
+
+
+def judge_numbers(structure: Structure, known: Knowledge) -> tuple[list[Fitted], Numbers]:
+    """All estimated numbers in order, and their covariance [p, p]."""
+    numbers = values_of(structure, known.fitted)
+    matrix = slopes(known.estimator, known.z)[[structure.index[number.path] for number in numbers]]
+    covariance = matrix @ known.covariance @ matrix.T
+    error = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    size = np.array([_size(number, known.noise) for number in numbers])
+    columns = _columns(structure, known.estimator)
+    deputies = _deputies(numbers, columns, known.coverage)
+    verdicts = _verdicts(numbers, deputies, known, matrix, covariance, size)
+    by_path = {cover.effect.path: cover for cover in known.coverage}
+    found = []
+    for k, (number, before) in enumerate(zip(numbers, structure.numbers, strict=True)):
+        verdict = verdicts[columns[k]]
+        cover = by_path[number.effect.path] if number.effect is not None else None
+        cause = _cause(verdict, cover) if error[k] > LIMIT * size[k] else ""
+        found.append(
+            Fitted(
+                number=number,
+                start=before.value,
+                standard_error=float(error[k]),
+                at_bound=_bound(known.estimator.unknowns[columns[k]], float(known.z[columns[k]])),
+                cause=cause,
+                reason=verdict.reason if cause else "",
+                advice=_advice(cause, verdict, cover, known.fitted) if cause else "",
+            )
+        )
+    return found, covariance
+
+
+def _size(number: Unknown, noise: float) -> float:
+    """What a standard error is related to: the value; a bias that starts at zero is not known the less."""
+    return max(abs(number.value), noise if number.path.startswith("bias.") else 1e-300)
+
+
+def _bound(unknown: FittedUnknown, value: float) -> str | None:
+    room = _AT_BOUND * unknown.scale
+    if value <= unknown.lower + 1e-3 * room:
+        return "lower"
+    return "upper" if value >= unknown.upper - room else None
+
+
+# --- one number for each unknown --------------------------------------------------------------------------------------
+
+
+def _columns(structure: Structure, estimator: Estimates) -> list[int]:
+    """[numbers] the unknown whose own number it is: of a drop the static friction, of a rate the Stribeck velocity."""
+    by_parameter: dict[int, int] = {}
+    for column, unknown in enumerate(estimator.unknowns):
+        for parameter in unknown.parameters:
+            by_parameter.setdefault(parameter, column)
+    return [by_parameter[structure.index[number.path]] for number in structure.numbers]
+
+
+def _deputies(numbers: Sequence[Unknown], columns: Sequence[int], coverage: Sequence[EffectCoverage]) -> list[int]:
+    """[unknowns] a number that stands for all that share its value, if possible one that the motion visits."""
+    by_path = {cover.effect.path: cover for cover in coverage}
+    first: dict[int, int] = {}
+    for k, (number, column) in enumerate(zip(numbers, columns, strict=True)):
+        if number.effect is None or unvisited(number, by_path[number.effect.path]) is None:
+            first.setdefault(column, k)
+    for k, column in enumerate(columns):
+        first.setdefault(column, k)
+    return [first[column] for column in sorted(first)]
+
+
+def _verdicts(
+    numbers: Sequence[Unknown],
+    deputies: Sequence[int],
+    known: Knowledge,
+    matrix: Numbers,
+    covariance: Numbers,
+    size: Numbers,
+) -> list[Verdict]:
+    """[unknowns] on the deputies' numbers: error from the whole, error_alone with all other numbers known."""
+    own = covariance[np.ix_(deputies, deputies)]
+    error = np.sqrt(np.maximum(np.diag(own), 1e-300))
+    inverse = np.linalg.inv(matrix[deputies])
+    seen = np.diag(inverse.T @ known.information @ inverse) * size[deputies] ** 2
+    alone = 1 / np.sqrt(np.maximum(seen, 0.0) + 1 / PRIOR**2)
+    correlation = own / np.outer(error, error)
+    return explain([numbers[k] for k in deputies], error / size[deputies], alone, correlation, known.coverage)
+
+
+# --- what would tell --------------------------------------------------------------------------------------------------
+
+
+def _cause(verdict: Verdict, cover: EffectCoverage | None) -> str:
+    """Of `judgement`, with friction that never slides to either side told apart."""
+    if cover is not None and verdict.cause == "side" and cover.times.positive + cover.times.negative <= 0:
+        return "never_moves"
+    return verdict.cause or "combination"
+
+
+def _advice(cause: str, verdict: Verdict, cover: EffectCoverage | None, finger: FingerDescription) -> str:
+    drive = finger.joint_names[cover.effect.drive - 1] if cover is not None else ""
+    unit = "m/s" if cover is not None and cover.effect.tendon else "rad/s"
+    if cover is not None and cause == "never_moves":
+        return f"move joint {drive} and those after it so that it slides faster than {cover.threshold:g} {unit}"
+    if cause == "side":
+        return f"move joint {drive} both ways"
+    if cover is not None and cause == "working_point":
+        effect, point = cover.effect, verdict.number.point
+        before = finger.joint_names[effect.joint - 2]
+        return f"move joint {drive} while joint {before} is near {effect.angles[point]:g} rad"
+    if cover is not None and cause == "slow":
+        return f"let joint {drive} turn round slowly: strokes at {cover.threshold:g} to {_stribeck(verdict):.3g} {unit}"
+    if cause == "noise":
+        return _more(verdict, cover)
+    partners = ", ".join(verdict.partners) or "others"
+    return f"change the pretension during the recording, or --fix or --share it with {partners}"
+
+
+def _more(verdict: Verdict, cover: EffectCoverage | None) -> str:
+    """What raises a number above the noise: load, or time (errors fall with its root)."""
+    load = "" if cover is not None and cover.effect.kind == "friction" else "more pretension (tendon force), or "
+    if verdict.error_alone >= PRIOR / 2:
+        return f"nothing in these recordings depends on it: {load}leave it out of the description, or --fix it"
+    longer = (verdict.error_alone / LIMIT) ** 2
+    return f"{load}a recording at least {longer:.2g} times as long with the same motion, or less noise"
+
+
+def _stribeck(verdict: Verdict) -> float:
+    effect, number = verdict.number.effect, verdict.number
+    if effect is None:
+        return 0.0
+    law = effect.laws[number.point]
+    return float(law.get(number.path.split(".")[-2], law)["stribeck_velocity"])

@@ -1,0 +1,268 @@
+"""Training motions: all joints at once, each with strokes of its own, over ranges of angle and velocity, with slow
+reversals and rests (paper, section VII; 400 s there).
+
+Strokes are stratified: their speeds and lengths follow a low-discrepancy sequence, most of them fast, and every few
+strokes one runs to an end of the range, so that each working point is passed in both directions. A stroke speeds up,
+keeps its speed and slows down, in quintic pieces whose ends lie on rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.errors import InputError
+from tendonfmu.excite.tension_plan import Variation, internal_tensions
+from tendonfmu.model.balance import moment_arms, pretension_vector
+from tendonfmu.statistics.quintic import evaluate
+
+Numbers = NDArray[np.float64]
+
+START = 2.0  # s; all joints at rest at the beginning of a block, while the pretension changes
+END = 1.0  # s; and at its end
+PRETENSION_CHANGE = 1.5  # s
+ACCELERATION = 10.0  # rad/s², never exceeded unless the plan allows more
+SPEED_UP = 0.15  # s, or as long as the greatest acceleration asks for
+SLOWEST = 0.05  # share of the greatest speed
+SLOW = 0.25  # share of the greatest speed; a reversal between two strokes up to it counts as slow
+SHORTEST, LONGEST = 0.3, 2.0  # s; of a stroke as drawn
+REST = 0.2, 1.5  # s; of a joint between two strokes
+REST_SHARE = 0.1
+ONWARD_SHARE = 0.1  # strokes that go on in the direction of the one before
+SWEEP_EVERY = 6  # strokes; that one runs to an end of the range
+SLOW_EVERY, SLOW_RUN = 10, 3  # of so many strokes so many in a row are slow, so that they turn round slowly too
+HOME_SPEED = 0.5  # share of the greatest speed
+_GOLDEN = (0.7548776662466927, 0.5698402909980532)  # Roberts' R2 sequence: even in the plane
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """One stroke of a joint. begin, end: s. start, target: rad. speed: rad/s, in its middle."""
+
+    begin: float
+    end: float
+    start: float
+    target: float
+    speed: float
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """A training motion, a row each 1/rate s.
+
+    time [N] s; joint_position, joint_velocity, joint_acceleration [N, n]; tension [N, m] N, that hold themselves;
+    pretension [N] N, their mean; tendon_position [N, m] m, motor side x0 that holds the posture at that tension without
+    friction.
+    knots: per joint [k, 4] of time, position, velocity, acceleration; strokes: per joint; blocks: (begin, end, N).
+    """
+
+    time: Numbers
+    joint_position: Numbers
+    joint_velocity: Numbers
+    joint_acceleration: Numbers
+    tension: Numbers
+    pretension: Numbers
+    tendon_position: Numbers
+    knots: list[Numbers]
+    strokes: list[list[Stroke]]
+    blocks: list[tuple[float, float, float]]
+
+    def columns(self) -> dict[str, Numbers]:
+        """Name -> [N], as in the file."""
+        table = {"time": self.time}
+        for name in ("joint_position", "joint_velocity", "joint_acceleration", "tendon_position"):
+            values: Numbers = getattr(self, name)
+            table |= {f"{name}[{k}]": column for k, column in enumerate(values.T, start=1)}
+        return table | {"pretension": self.pretension}
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is asked for. ranges: [n, 2] rad. max_speed: rad/s. duration: s, of the whole motion at each pretension, or
+    with `alternate` (s, how long at a time) of all together. pretensions: N. rate: rows per second. vary: the tensions
+    change by this instead of standing at a pretension. max_acceleration: rad/s².
+    """
+
+    ranges: Numbers
+    max_speed: float = 1.0
+    duration: float = 400.0
+    pretensions: Sequence[float] = (10.0,)
+    alternate: float | None = None
+    rate: float = 100.0
+    seed: int = 0
+    vary: Variation | None = None
+    max_acceleration: float = ACCELERATION
+
+
+def plan_excitation(data: Mapping[str, Any], plan: Plan) -> Excitation:
+    """The motion for a valid finger description. Raises InputError where it cannot be."""
+    blocks = _blocks(plan)
+    home = plan.ranges.mean(axis=1)
+    knots, strokes = [], []
+    for joint in range(len(plan.ranges)):
+        drawn = [
+            _JointBlock(plan, joint, part, float(home[joint])).draw(begin, end)
+            for part, (begin, end) in _parts(plan, blocks)
+        ]
+        path = np.array([knot for points, _ in drawn for knot in points])
+        # a row number is exact, a time is not: knots are told apart by their row
+        path = path[np.concatenate([[True], np.diff(path[:, 0]) > 0])]
+        path[:, 0] /= plan.rate
+        knots.append(path)
+        strokes.append([stroke for _, found in drawn for stroke in found])
+    return _sample(data, plan, knots, strokes, blocks)
+
+
+def _parts(plan: Plan, blocks: list[tuple[int, int, float]]) -> list[tuple[int, tuple[int, int]]]:
+    """(number of the drawing, rows) of each block: the same motion at each pretension, unless they alternate."""
+    return [(0 if plan.alternate is None else part, (begin, end)) for part, (begin, end, _) in enumerate(blocks)]
+
+
+def _blocks(plan: Plan) -> list[tuple[int, int, float]]:
+    """(first row, last row, pretension) of each block."""
+    rows = round(plan.duration * plan.rate)
+    levels = list(plan.pretensions)
+    if plan.alternate is None:
+        blocks = [(k * rows, (k + 1) * rows, level) for k, level in enumerate(levels)]
+    else:
+        count = max(len(levels), round(plan.duration / plan.alternate))
+        ends = [round(k * rows / count) for k in range(count + 1)]
+        blocks = [(ends[k], ends[k + 1], levels[k % len(levels)]) for k in range(count)]
+    span = float(np.max(np.ptp(plan.ranges, axis=1)))
+    least = START + END + 2 * SHORTEST + 2 * _speed_up(plan) + span / (HOME_SPEED * plan.max_speed)
+    shortest = min(end - begin for begin, end, _ in blocks) / plan.rate
+    if shortest < least:
+        what = "duration" if plan.alternate is None else "alternate"
+        raise InputError(
+            f"--{what}: {shortest:g} s at a pretension; expected at least {np.ceil(least):g} s "
+            f"for a range of {span:.3g} rad at {plan.max_speed:g} rad/s"
+        )
+    return blocks
+
+
+def _speed_up(plan: Plan) -> float:
+    """s; a quintic piece from rest to v in time T has its greatest acceleration 1.5 v/T in the middle."""
+    return max(SPEED_UP, 1.5 * plan.max_speed / plan.max_acceleration, 1 / plan.rate)
+
+
+class _JointBlock:
+    """Draws the strokes of one joint in one block; counts time in rows."""
+
+    def __init__(self, plan: Plan, joint: int, part: int, home: float) -> None:
+        self._random = np.random.default_rng([plan.seed, joint, part])
+        self._phase = self._random.random(2)
+        self._plan, self._home = plan, home
+        self._low, self._high = (float(limit) for limit in plan.ranges[joint])
+        self._ramp = int(np.ceil(_speed_up(plan) * plan.rate - 1e-9))
+        self._knots: list[tuple[float, float, float, float]] = []
+        self._strokes: list[Stroke] = []
+
+    def draw(self, first: int, last: int) -> tuple[list[tuple[float, float, float, float]], list[Stroke]]:
+        """Knots (row, position, velocity, acceleration) and strokes from one row to another, at home and at rest at
+        both.
+        """
+        rate, position, direction = self._plan.rate, self._home, 1 if self._random.random() < 0.5 else -1
+        row = first + round((START + self._random.random() * SHORTEST) * rate)
+        self._knots += [(first, position, 0.0, 0.0), (row, position, 0.0, 0.0)]
+        number = 0
+        while self._high > self._low:
+            direction *= 1 if self._random.random() < ONWARD_SHARE else -1
+            target, speed, direction = self._next(number, position, direction)
+            back = self._rows(self._home - target, HOME_SPEED * self._plan.max_speed)
+            end = row + self._rows(target - position, speed)
+            if end + back > last - round(END * rate):
+                break
+            row, position, number = self._stroke(row, position, target, speed), target, number + 1
+            if self._random.random() < REST_SHARE:
+                rest = round(self._random.uniform(*REST) * rate)
+                if row + rest + back <= last - round(END * rate):
+                    row += rest
+                    self._knots.append((row, position, 0.0, 0.0))
+        if position != self._home:
+            row = self._stroke(row, position, self._home, HOME_SPEED * self._plan.max_speed)
+        self._knots.append((last, self._home, 0.0, 0.0))
+        return self._knots, self._strokes
+
+    def _next(self, number: int, position: float, direction: int) -> tuple[float, float, int]:
+        """Target, speed and direction of a stroke; turns round where there is no room."""
+        first, second = (float((phase + number * step) % 1.0) for phase, step in zip(self._phase, _GOLDEN, strict=True))
+        # evenly over the logarithm of the speed when slow; with the square when not, so that most are fast
+        slow = number % SLOW_EVERY < SLOW_RUN
+        speed = self._plan.max_speed * (SLOW * (SLOWEST / SLOW) ** first if slow else SLOWEST ** (first * first))
+        time = SHORTEST * (LONGEST / SHORTEST) ** second
+        room = self._high - position if direction > 0 else position - self._low
+        if room < 0.02 * (self._high - self._low):
+            direction, room = -direction, self._high - self._low - room
+        if not slow and number % SWEEP_EVERY == SWEEP_EVERY - 1:
+            speed, time = max(speed, HOME_SPEED * self._plan.max_speed), np.inf
+        if time * speed >= room:
+            return (self._high if direction > 0 else self._low), speed, direction
+        return position + direction * time * speed, speed, direction
+
+    def _rows(self, way: float, speed: float) -> int:
+        return 2 * self._ramp + self._cruise(way, speed)
+
+    def _cruise(self, way: float, speed: float) -> int:
+        """Rows at full speed; speeding up and slowing down take the way of one ramp at full speed."""
+        return max(int(np.ceil(abs(way) / speed * self._plan.rate - self._ramp - 1e-9)), 0)
+
+    def _stroke(self, row: int, start: float, target: float, speed: float) -> int:
+        """Adds a stroke at most as fast as `speed`; returns the row at its end."""
+        way, cruise = target - start, self._cruise(target - start, speed)
+        velocity = way / (self._ramp + cruise) * self._plan.rate
+        part = velocity * self._ramp / self._plan.rate / 2
+        self._knots.append((row + self._ramp, start + part, velocity, 0.0))
+        if cruise:
+            self._knots.append((row + self._ramp + cruise, target - part, velocity, 0.0))
+        end = row + 2 * self._ramp + cruise
+        self._knots.append((end, target, 0.0, 0.0))
+        self._strokes.append(Stroke(row / self._plan.rate, end / self._plan.rate, start, target, abs(velocity)))
+        return end
+
+
+def _sample(
+    data: Mapping[str, Any],
+    plan: Plan,
+    knots: list[Numbers],
+    strokes: list[list[Stroke]],
+    blocks: list[tuple[int, int, float]],
+) -> Excitation:
+    time = np.arange(blocks[-1][1] + 1) / plan.rate
+    curves = [evaluate(path, time) for path in knots]
+    position, velocity, acceleration = (np.column_stack([curve[k] for curve in curves]) for k in range(3))
+    stiffness = np.array([tendon["stiffness"] for tendon in data["tendons"]], dtype=float)
+    if plan.vary is not None:
+        tension = internal_tensions(data, plan.vary, time, plan.seed)
+        pretension = tension.mean(axis=1)
+        blocks = [(blocks[0][0], blocks[-1][1], float(pretension.mean()))]
+    else:
+        pretension = _pretension(plan, blocks, time)
+        tension = np.outer(pretension, pretension_vector(data))
+    return Excitation(
+        time=time,
+        joint_position=position,
+        joint_velocity=velocity,
+        joint_acceleration=acceleration,
+        tension=tension,
+        pretension=pretension,
+        tendon_position=position @ moment_arms(data).T + tension / stiffness,
+        knots=knots,
+        strokes=strokes,
+        blocks=[(begin / plan.rate, end / plan.rate, level) for begin, end, level in blocks],
+    )
+
+
+def _pretension(plan: Plan, blocks: list[tuple[int, int, float]], time: Numbers) -> Numbers:
+    """[N] N, constant in each block but for the change at its beginning."""
+    level = np.array([[blocks[0][0], blocks[0][2], 0.0, 0.0]])
+    for (_, _, before), (begin, _, now) in pairwise(blocks):
+        change = round(PRETENSION_CHANGE * plan.rate)
+        level = np.vstack([level, [begin, before, 0.0, 0.0], [begin + change, now, 0.0, 0.0]])
+    level[:, 0] /= plan.rate
+    pretension, _, _ = evaluate(level, time)
+    return pretension

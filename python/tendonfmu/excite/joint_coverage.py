@@ -1,0 +1,56 @@
+"""How each joint moves in a training motion: strokes, reversals, rests."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.excite.excitation import SLOW, Excitation, Stroke
+
+Numbers = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class JointCoverage:
+    """Of one joint. lowest, highest: rad. fastest: rad/s. slow_reversals: between two strokes of at most `SLOW` of the
+    greatest speed. rests: between strokes, s in resting. moving: s.
+    """
+
+    lowest: float
+    highest: float
+    fastest: float
+    strokes: int
+    reversals: int
+    slow_reversals: int
+    rests: int
+    resting: float
+
+
+def joint_coverage(motion: Excitation, max_speed: float) -> list[JointCoverage]:
+    """Of every joint. max_speed: rad/s, of the plan."""
+    return [
+        _joint(strokes, motion.joint_position[:, j], motion.joint_velocity[:, j], max_speed)
+        for j, strokes in enumerate(motion.strokes)
+    ]
+
+
+def _joint(strokes: list[Stroke], position: Numbers, velocity: Numbers, max_speed: float) -> JointCoverage:
+    turns = [
+        (before, after)
+        for before, after in pairwise(strokes)
+        if (before.target - before.start) * (after.target - after.start) < 0
+    ]
+    rests = [after.begin - before.end for before, after in pairwise(strokes) if after.begin > before.end]
+    return JointCoverage(
+        lowest=float(position.min()),
+        highest=float(position.max()),
+        fastest=float(np.abs(velocity).max()),
+        strokes=len(strokes),
+        reversals=len(turns),
+        slow_reversals=sum(max(before.speed, after.speed) <= SLOW * max_speed for before, after in turns),
+        rests=len(rests),
+        resting=float(sum(rests)),
+    )

@@ -1,0 +1,106 @@
+"""Internal tensions of a training motion: patterns that hold themselves (Rᵀ f = 0), each tendon tight in some and loose
+in others, one after the other.
+
+With one constant pattern a flexor and its extensor, or two tendons that slide together, are seen as sums. The tensions
+of a finger of m tendons and n joints can change in m − n ways without turning a joint, so a fit can tell more apart.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.errors import InputError
+from tendonfmu.model.balance import moment_arms, pretension_vector
+from tendonfmu.statistics.quintic import evaluate
+
+Numbers = NDArray[np.float64]
+
+CHANGE = 1.5  # s; from one pattern to the next, while the joints move on
+SHORTEST = 2.0  # s; of a pattern, its change included
+_SWEEPS = 5000
+_CLOSE = 1e-6  # of the highest tension; what is left is made good by shrinking towards the even pattern
+_STREAM = 0x7E17  # of random numbers; joints have 0 to 15
+
+
+@dataclass(frozen=True)
+class Variation:
+    """lowest, highest: N, of every tendon that only pulls; cable loops go from −highest to highest. every: s."""
+
+    lowest: float
+    highest: float
+    every: float = 10.0
+
+
+def internal_tensions(data: Mapping[str, Any], variation: Variation, time: Numbers, seed: int) -> Numbers:
+    """[N, m] tensions at `time` [N] (s), N. Raises InputError where the finger has none within the limits.
+
+    Each pattern is the nearest one that holds itself to tendons drawn tight and loose at random, every tendon as often
+    the one as the other.
+    """
+    count = max(2, math.ceil(float(time[-1]) / variation.every))
+    random = np.random.default_rng([seed, _STREAM])
+    tight = np.arange(count) % 2 == 0
+    drawn = np.column_stack([random.permutation(tight) for _ in data["tendons"]])
+    patterns = _Patterns(data, variation)
+    values = np.array([patterns.nearest(row) for row in drawn])
+    return np.column_stack([_series(values[:, i], variation.every, time) for i in range(values.shape[1])])
+
+
+def _series(values: Numbers, every: float, time: Numbers) -> Numbers:
+    """[N] one tendon's tension: constant, and changing for `CHANGE` at the beginning of each pattern but the first."""
+    begin = every * np.arange(1, len(values))
+    knots = np.zeros((2 * len(begin) + 1, 4))
+    knots[1::2, 0], knots[2::2, 0] = begin, begin + CHANGE
+    knots[0, 1], knots[1::2, 1], knots[2::2, 1] = values[0], values[:-1], values[1:]
+    tension, _, _ = evaluate(knots, time)
+    return tension
+
+
+class _Patterns:
+    """The tensions of a finger that hold themselves within limits."""
+
+    def __init__(self, data: Mapping[str, Any], variation: Variation) -> None:
+        arms = moment_arms(data)
+        if np.linalg.matrix_rank(arms) == len(arms):
+            raise InputError(
+                f"--vary-tension {variation.lowest:g}:{variation.highest:g}: {len(arms)} tendons at "
+                f"{arms.shape[1]} joints hold no tension; expected more tendons than joints"
+            )
+        pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
+        self._project = np.eye(len(arms)) - arms @ np.linalg.pinv(arms)
+        self._high = np.full(len(arms), variation.highest)
+        self._low = np.where(pulls, variation.lowest, -variation.highest)
+        self._even = self._even_pattern(pretension_vector(data), pulls, variation)
+
+    def _even_pattern(self, shares: Numbers, pulls: NDArray[np.bool_], variation: Variation) -> Numbers:
+        """The pretension in the middle of those within the limits."""
+        low, high = variation.lowest, variation.highest
+        least = low / float(shares[pulls].min()) if pulls.any() else 0.0
+        most = high / float(np.abs(shares).max()) if shares.any() else 0.0
+        if least > most:
+            raise InputError(
+                f"--vary-tension {low:g}:{high:g}: no pretension that holds itself lies within; expected HIGH at least "
+                f"{least * high / (most * low):.3g} times LOW for these moment arms"
+            )
+        return 0.5 * (least + most) * shares
+
+    def nearest(self, tight: NDArray[np.bool_]) -> Numbers:
+        """[m] the tensions nearest to the highest where `tight` [m], the lowest elsewhere, by Dykstra's alternating
+        projections; shrunk towards the even pattern by what these leave, so that the limits hold.
+        """
+        found, correction = self._project @ np.where(tight, self._high, self._low), np.zeros(len(tight))
+        for _ in range(_SWEEPS):
+            within = np.clip(found + correction, self._low, self._high)
+            correction += found - within
+            found = self._project @ within
+            if np.abs(found - within).max() < _CLOSE * self._high[0]:
+                break
+        way = found - self._even
+        room = np.where(way > 0, self._high - self._even, self._even - self._low)
+        return self._even + way * min(1.0, float(np.min(room / np.maximum(np.abs(way), 1e-12))))

@@ -1,0 +1,273 @@
+"""From a finger or a rig to a training motion and to what it excites (command `tendonfmu excite`). Computes, prints
+nothing.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.errors import InputError
+from tendonfmu.estimate.coverage import EffectCoverage, coverage_of, durations
+from tendonfmu.estimate.identifiability import Judgement, as_json, judge
+from tendonfmu.estimate.information import Noise, Progress, information, noise_of, sensitivities, unknowns
+from tendonfmu.excite.excitation import Excitation, Plan, plan_excitation
+from tendonfmu.excite.joint_coverage import JointCoverage, joint_coverage
+from tendonfmu.excite.tension_plan import Variation
+from tendonfmu.model import native
+from tendonfmu.model.balance import balanced_forces, pretension_vector
+from tendonfmu.model.description import FingerDescription, read_finger
+
+RIG_FORMAT = "tendonfmu-rig-1"
+DEFAULT_PRETENSION = 10.0  # N
+STRONGEST = 1e6  # N
+MARGIN = 0.05  # of a rig's range between limits, kept free at either end
+UNKNOWN_RANGE = 0.5  # rad, either side of the rest angle
+ANALYSIS_RATE = 25.0  # 1/s; 100 gives the same count for the index finger, and standard errors within 1 %
+
+
+@dataclass(frozen=True)
+class Range:
+    """Of one joint, rad. source: where it comes from, in words; guessed: nothing was known."""
+
+    name: str
+    low: float
+    high: float
+    source: str
+    guessed: bool = False
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is to be moved: a finger, and the limits of its joints where a rig gives them, [n] of (low, high) rad."""
+
+    finger: FingerDescription
+    limits: list[tuple[float, float]] | None
+
+
+@dataclass(frozen=True)
+class ExciteResult:
+    """A motion and what it excites. slack: [m] s during which a tendon would have to push."""
+
+    subject: Subject
+    plan: Plan
+    ranges: list[Range]
+    motion: Excitation
+    joints: list[JointCoverage]
+    effects: list[EffectCoverage]
+    noise: Noise
+    slack: list[float]
+    judgement: Judgement
+
+
+def read_subject(path: Path) -> Subject:
+    """A finger description or a rig. Raises InputError."""
+    try:
+        data = json.loads(path.read_bytes())
+    except (OSError, ValueError):
+        return Subject(read_finger(path), None)  # says what is wrong
+    if not isinstance(data, dict) or data.get("format") != RIG_FORMAT:
+        return Subject(read_finger(path), None)
+    finger: Any = data.get("finger")
+    if isinstance(finger, str):
+        found = read_finger(path.parent / finger)
+    else:
+        text = json.dumps(finger).encode()
+        try:
+            found = FingerDescription(path, text, finger, native.image_from_json(text))
+        except native.NativeError as refused:
+            raise InputError(f"{path}: finger: {refused}") from None
+    return Subject(found, _limits(path, data, len(found.joint_names)))
+
+
+def _limits(path: Path, data: Mapping[str, Any], joints: int) -> list[tuple[float, float]] | None:
+    links = (data.get("physics") or {}).get("links") or []
+    if len(links) != joints:
+        raise InputError(f"{path}: physics.links: {len(links)} links; expected one per joint, {joints}")
+    limits = []
+    for k, link in enumerate(links, start=1):
+        try:
+            low, high = float(link["limits"]["lower"]), float(link["limits"]["upper"])
+        except (KeyError, TypeError, ValueError):
+            return None  # a rig may leave them out
+        if not low < high:
+            raise InputError(f"{path}: physics.links[{k}].limits: {low:g} to {high:g} rad; expected lower < upper")
+        limits.append((low, high))
+    return limits
+
+
+# --- ranges -----------------------------------------------------------------------------------------------------------
+
+
+def find_ranges(subject: Subject, given: Sequence[str]) -> list[Range]:
+    """[n] range of each joint. given: "JOINT=LOW:HIGH", joint by number or name, rad. Raises InputError."""
+    names = subject.finger.joint_names
+    asked = dict(_parse_range(text, names) for text in given)
+    ranges = []
+    for j, name in enumerate(names):
+        limits = subject.limits[j] if subject.limits is not None else None
+        if j not in asked:
+            ranges.append(_default_range(subject.finger.data, j, name, limits))
+            continue
+        low, high = asked[j]
+        if limits is not None and not limits[0] <= low <= high <= limits[1]:
+            raise InputError(
+                f"--range {name}={low:g}:{high:g}: beyond the joint; expected within its limits "
+                f"{limits[0]:g} to {limits[1]:g} rad"
+            )
+        ranges.append(Range(name, low, high, "given"))
+    return ranges
+
+
+def find_pretensions(subject: Subject, given: Sequence[float]) -> list[float]:
+    """N; 10 where none is given, 0 where cable loops alone can hold none. Raises InputError."""
+    if pretension_vector(subject.finger.data).any():
+        return list(given) or [DEFAULT_PRETENSION]
+    if any(given):
+        raise InputError(f"--pretension {max(given):g}: a finger of cable loops alone that holds none; expected 0")
+    return [0.0] * max(len(given), 1)
+
+
+def find_variation(
+    given: str | None, every: float, pretension: Sequence[float] | None = None, alternate: float | None = None
+) -> Variation | None:
+    """given: "LOW:HIGH" in N; every: s. pretension, alternate: as asked for beside it, which has no sense. Raises
+    InputError.
+    """
+    if given is None:
+        return None
+    for option, value in (("--pretension", pretension), ("--alternate", alternate)):
+        if value:
+            raise InputError(f"--vary-tension {given}: with {option}; expected one of the two")
+    low_text, _, high_text = given.partition(":")
+    try:
+        low, high = float(low_text), float(high_text)
+    except ValueError:
+        low, high = math.nan, math.nan
+    if not 0.0 < low < high <= STRONGEST:
+        raise InputError(f"--vary-tension {given}: expected LOW:HIGH in N, 0 < LOW < HIGH, at most {STRONGEST:g}")
+    return Variation(low, high, every)
+
+
+def as_array(ranges: Sequence[Range]) -> NDArray[np.float64]:
+    """[n, 2] low and high, rad."""
+    return np.array([[span.low, span.high] for span in ranges])
+
+
+def _parse_range(text: str, names: list[str]) -> tuple[int, tuple[float, float]]:
+    joint, _, span = text.rpartition("=")
+    low_text, _, high_text = span.partition(":")
+    try:
+        low, high = float(low_text), float(high_text)
+    except ValueError:
+        low, high = math.nan, math.nan
+    if not -1e3 <= low <= high <= 1e3:
+        raise InputError(f"--range {text}: expected JOINT=LOW:HIGH in rad, LOW <= HIGH")
+    if joint in names:
+        return names.index(joint), (low, high)
+    if joint.isdecimal() and 1 <= int(joint) <= len(names):
+        return int(joint) - 1, (low, high)
+    raise InputError(f"--range {text}: no joint {joint!r}; expected 1 to {len(names)} or one of {', '.join(names)}")
+
+
+def _default_range(data: Mapping[str, Any], j: int, name: str, limits: tuple[float, float] | None) -> Range:
+    edges = [(tendon.get("edge_friction") or [])[j + 1 : j + 2] for tendon in data["tendons"]]
+    angles = [angle for edge in edges for law in edge if law is not None for angle in law.get("angles") or []]
+    if limits is not None:
+        margin = MARGIN * (limits[1] - limits[0])
+        inside = (limits[0] + margin, limits[1] - margin)
+        low, high = max(min(angles, default=inside[0]), inside[0]), min(max(angles, default=inside[1]), inside[1])
+        if low < high:
+            return Range(name, low, high, f"limits of the rig less {MARGIN:.0%} at either end, and working points")
+        return Range(name, *inside, f"limits of the rig less {MARGIN:.0%} at either end")
+    if len(set(angles)) > 1:
+        return Range(name, min(angles), max(angles), "working points of the edges behind it")
+    rest = float((data["joints"][j].get("cover") or {}).get("rest_angle") or 0.0)
+    source = f"nothing is known: {UNKNOWN_RANGE:g} rad either side of the rest angle {rest:g}"
+    return Range(name, rest - UNKNOWN_RANGE, rest + UNKNOWN_RANGE, source, guessed=True)
+
+
+# --- the whole --------------------------------------------------------------------------------------------------------
+
+
+def excite(subject: Subject, ranges: list[Range], plan: Plan, progress: Progress | None = None) -> ExciteResult:
+    """Plans the motion and judges it. progress: called with (done, total) parts of the judgement."""
+    data = subject.finger.data
+    motion = plan_excitation(data, plan)
+    every = max(1, round(plan.rate / ANALYSIS_RATE))
+    samples = {
+        "time": motion.time[::every],
+        "joint_position": motion.joint_position[::every],
+        "joint_velocity": motion.joint_velocity[::every],
+    }
+    force = balanced_forces(data, samples, motion.tension[::every])
+    numbers, noise = unknowns(data), noise_of(data, 1 / plan.rate)
+    parts = sensitivities(data, numbers, {**samples, "tendon_force": force}, progress)
+    known = information(parts, samples["time"], np.abs(force).mean(axis=1), noise)
+    coverage = coverage_of(data, motion.joint_position, motion.joint_velocity, durations(motion.time))
+    pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
+    slack = ((force < 0) & pulls).T @ durations(samples["time"])
+    return ExciteResult(
+        subject=subject,
+        plan=plan,
+        ranges=ranges,
+        motion=motion,
+        joints=joint_coverage(motion, plan.max_speed),
+        effects=coverage,
+        noise=noise,
+        slack=slack.tolist(),
+        judgement=judge(numbers, known, coverage),
+    )
+
+
+def report(result: ExciteResult, command: str) -> dict[str, Any]:
+    """Everything, for `--report`. command: as it was called."""
+    plan, finger = result.plan, result.subject.finger
+    return {
+        "format": "tendonfmu-excitation-1",
+        "command": command,
+        "finger": finger.name,
+        "seed": plan.seed,
+        "rate": plan.rate,
+        "duration": float(result.motion.time[-1]),
+        "max_speed": plan.max_speed,
+        "max_acceleration": plan.max_acceleration,
+        "pretension": list(plan.pretensions) if plan.vary is None else None,
+        "vary_tension": None if plan.vary is None else asdict(plan.vary),
+        "blocks": [{"begin": a, "end": b, "pretension": level} for a, b, level in result.motion.blocks],
+        "joints": [
+            {"joint": j, "range": asdict(span), **asdict(cover)}
+            for j, (span, cover) in enumerate(zip(result.ranges, result.joints, strict=True), start=1)
+        ],
+        "effects": [_effect_entry(cover) for cover in result.effects],
+        "slack": result.slack,
+        "assumed_noise": asdict(result.noise),
+        "biases": len(finger.joint_names),
+        **as_json(result.judgement),
+    }
+
+
+def _effect_entry(cover: EffectCoverage) -> dict[str, Any]:
+    effect = cover.effect
+    entry = {
+        "path": effect.path,
+        "kind": effect.kind,
+        "joint": effect.joint,
+        "tendon": effect.tendon or None,
+        "velocity_threshold": cover.threshold,
+        "time": asdict(cover.times),
+        "slowest": cover.slowest,
+        "fastest": cover.fastest,
+    }
+    if effect.angles:
+        entry["working_points"] = [
+            {"angle": angle, "time": asdict(times)} for angle, times in zip(effect.angles, cover.points, strict=True)
+        ]
+    return entry

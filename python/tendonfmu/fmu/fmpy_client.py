@@ -1,0 +1,250 @@
+"""FMUs through fmpy, and only here: runs one over a recording, sample by sample."""
+
+from __future__ import annotations
+
+import ctypes
+import re
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.errors import InputError
+from tendonfmu.model.signals import FLAGS, INPUTS, NUMBERS, OPTIONAL_NUMBERS, PLACE, REST, SENSORS, inputs_used
+from tendonfmu.recordings.recording import Recording
+
+Progress = Callable[[int], None]
+
+
+@dataclass(frozen=True)
+class Variables:
+    """Variables of one FMU: group -> name -> value reference, in the order of their index.
+
+    types: group -> FMI type.
+    """
+
+    references: Mapping[str, Mapping[str, int]]
+    types: Mapping[str, str]
+
+    def of_type(self, kind: str) -> dict[str, int]:
+        """Name -> value reference of all groups of an FMI type."""
+        return {
+            name: reference
+            for group, names in self.references.items()
+            if self.types[group] == kind
+            for name, reference in names.items()
+        }
+
+    @property
+    def joints(self) -> int:
+        return len(self.references["compensated_torque"])
+
+    @property
+    def tendons(self) -> int:
+        return len(self.references["slack"])
+
+
+def run_fmu(
+    path: Path,
+    recording: Recording,
+    *,
+    kinematics_source: int = 1,
+    parameters: Mapping[str, float] | None = None,
+    progress: Progress | None = None,
+) -> dict[str, NDArray[Any]]:
+    """Runs a friction FMU over a recording and returns one row per sample, each at its own sample's time.
+
+    The FMU is stepped by hand: the inputs of sample k are set, fmi2DoStep takes it at t_k, and the outputs after it
+    belong to t_k; the last step goes one sample beyond the recording.
+
+    parameters: start values by path, beside `kinematics_source`.
+    Returns column name -> [N], `time` first. Raises InputError, with the FMU's own words where it refuses something.
+    """
+    with _unpacked(path) as folder:
+        run = _Run(path, folder, parameters or {})
+        recording.require(run.variables.joints, run.variables.tendons, run.inputs(kinematics_source))
+        return run.over(recording, kinematics_source, progress)
+
+
+@contextmanager
+def _unpacked(path: Path) -> Iterator[Path]:
+    from fmpy import extract
+
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    folder = Path(tempfile.mkdtemp(prefix="tendonfmu-"))
+    try:
+        extract(str(path), unzipdir=str(folder))
+        if not (folder / "modelDescription.xml").is_file():
+            raise InputError(f"{path}: no modelDescription.xml in it; expected an FMU of `tendonfmu build`")
+        yield folder
+    except (OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{path}: not an FMU ({error})") from None
+    except Exception as error:  # fmpy raises bare exceptions for broken archives
+        if type(error) is not Exception and type(error).__module__ != "zipfile":
+            raise
+        raise InputError(f"{path}: not an FMU ({error})") from None
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+class _Run:
+    """One instance of an FMU with arrays laid out once, so that a step is three calls."""
+
+    def __init__(self, path: Path, folder: Path, parameters: Mapping[str, float]) -> None:
+        from fmpy import read_model_description
+        from fmpy.fmi2 import FMU2Slave
+
+        self.path = path
+        self._at = str(path)  # what a refusal is about: the FMU, then the recording's row
+        self._parameters = parameters
+        self._messages: list[str] = []
+        description = read_model_description(str(folder), validate=False)
+        if description.fmiVersion != "2.0" or description.coSimulation is None:
+            raise InputError(f"{path}: FMI {description.fmiVersion}; expected an FMI 2.0 co-simulation FMU")
+        self._all = {variable.name: variable for variable in description.modelVariables}
+        missing = {group for group in (*OPTIONAL_NUMBERS, *PLACE, *REST, *SENSORS) if not self._has(group)}
+        present = [
+            group for group in (*NUMBERS, *OPTIONAL_NUMBERS, *FLAGS, *PLACE, *REST, *SENSORS) if group not in missing
+        ]
+        outputs = {group: self._group(group) for group in present}
+        types = {group: str(self._all[next(iter(names))].type) for group, names in outputs.items()}
+        self.variables = Variables(outputs, types)
+        self._inputs = {group: self._group(group) for group in INPUTS}
+        self._slave = FMU2Slave(
+            guid=description.guid,
+            unzipDirectory=str(folder),
+            modelIdentifier=description.coSimulation.modelIdentifier,
+            instanceName=description.modelName,
+        )
+
+    def inputs(self, source: int) -> tuple[str, ...]:
+        """Groups of inputs that the FMU uses."""
+        return inputs_used(source, self._has(REST[-1]) or self._has(SENSORS[-1]))
+
+    def _has(self, group: str) -> bool:
+        return group in self._all or f"{group}[1]" in self._all
+
+    def _group(self, group: str) -> dict[str, int]:
+        if group in self._all:
+            return {group: self._all[group].valueReference}
+        found = {}
+        for name, variable in self._all.items():
+            if match := re.fullmatch(rf"{group}\[(\d+)\]", name):
+                found[int(match[1])] = variable.valueReference
+        if not found:
+            raise InputError(f"{self.path}: no variable {group}[1]; expected a friction FMU of `tendonfmu build`")
+        return {f"{group}[{i}]": found[i] for i in sorted(found)}
+
+    @contextmanager
+    def _refusals(self) -> Iterator[None]:
+        """Turns fmpy's exceptions into one line with the FMU's own words."""
+        try:
+            yield
+        except (InputError, TypeError, AttributeError, NameError, AssertionError, ArithmeticError, MemoryError):
+            raise
+        except Exception as error:  # fmpy raises bare exceptions
+            reason = self._messages[-1] if self._messages else str(error)
+            raise InputError(f"{self._at}: {reason}") from None
+
+    def _instantiate(self) -> None:
+        from fmpy import calloc, free
+        from fmpy.fmi2 import (
+            fmi2CallbackAllocateMemoryTYPE,
+            fmi2CallbackFreeMemoryTYPE,
+            fmi2CallbackFunctions,
+            fmi2CallbackLoggerTYPE,
+        )
+
+        def log(_environment: Any, _instance: bytes, status: int, _category: bytes, message: bytes) -> None:
+            if status > 1:
+                self._messages.append(message.decode("utf-8", "replace").replace("%%", "%"))
+
+        self._callbacks = fmi2CallbackFunctions()
+        self._callbacks.logger = fmi2CallbackLoggerTYPE(log)
+        self._callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
+        self._callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
+        self._slave.instantiate(callbacks=self._callbacks, loggingOn=True)
+
+    def _initialise(self, start: float, source: int) -> None:
+        self._slave.setupExperiment(startTime=start)
+        if "kinematics_source" not in self._all:
+            raise InputError(
+                f"{self.path}: no parameter kinematics_source; expected a friction FMU of `tendonfmu build`"
+            )
+        self._slave.setInteger([self._all["kinematics_source"].valueReference], [source])
+        for path, value in self._parameters.items():
+            if path not in self._all:
+                raise InputError(f"{self.path}: no parameter {path!r} in this FMU")
+            self._slave.setReal([self._all[path].valueReference], [value])
+        self._slave.enterInitializationMode()
+
+    def over(self, recording: Recording, source: int, progress: Progress | None) -> dict[str, NDArray[Any]]:
+        with self._refusals():
+            self._instantiate()
+        try:
+            with self._refusals():
+                self._initialise(float(recording.time[0]), source)
+                columns = self._step(recording, self.inputs(source), progress)
+                self._slave.terminate()
+        finally:
+            self._slave.freeInstance()
+        ordered = (name for names in self.variables.references.values() for name in names)
+        return {"time": recording.time, **{name: columns[name] for name in ordered}}
+
+    def _step(
+        self, recording: Recording, groups: tuple[str, ...], progress: Progress | None
+    ) -> dict[str, NDArray[Any]]:
+        slave, component = self._slave, self._slave.component
+        set_vr = _references([vr for group in groups for vr in self._inputs[group].values()])
+        kinds = ("Real", "Boolean", "Integer")
+        get_vr, flag_vr, whole_vr = (_references(list(self.variables.of_type(kind).values())) for kind in kinds)
+        samples = np.ascontiguousarray(np.hstack([recording.groups[group] for group in groups]))
+        numbers = np.empty((len(recording), len(get_vr)))
+        flags = np.empty((len(recording), len(flag_vr)), dtype=np.int32)
+        whole = np.empty((len(recording), len(whole_vr)), dtype=np.int32)
+        inputs, real, boolean, integer = (_rows(table) for table in (samples, numbers, flags, whole))
+        times = recording.time.tolist()
+        steps = np.diff(recording.time).tolist()
+        steps.append(steps[-1] if steps else 1e-3)
+
+        self._at = f"{recording.path}: row 1"
+        slave.fmi2SetReal(component, set_vr, len(set_vr), inputs(0))
+        slave.exitInitializationMode()
+        for k, (time, step) in enumerate(zip(times, steps, strict=True)):
+            self._at = f"{recording.path}: row {k + 1}"
+            slave.fmi2SetReal(component, set_vr, len(set_vr), inputs(k))
+            slave.fmi2DoStep(component, time, step, 1)
+            slave.fmi2GetReal(component, get_vr, len(get_vr), real(k))
+            slave.fmi2GetBoolean(component, flag_vr, len(flag_vr), boolean(k))
+            if len(whole_vr):
+                slave.fmi2GetInteger(component, whole_vr, len(whole_vr), integer(k))
+            if progress and (k + 1) % 500 == 0:
+                progress(k + 1)
+        if progress:
+            progress(len(times))
+        tables: tuple[NDArray[Any], ...] = (numbers, flags.astype(bool), whole)
+        return {
+            name: table[:, i]
+            for kind, table in zip(kinds, tables, strict=True)
+            for i, name in enumerate(self.variables.of_type(kind))
+        }
+
+
+def _references(values: list[int]) -> Any:
+    return (ctypes.c_uint * len(values))(*values)
+
+
+def _rows(rows: NDArray[Any]) -> Callable[[int], Any]:
+    """k -> row k where it stands, as FMI's array of numbers."""
+    row = (ctypes.c_double if rows.dtype == np.float64 else ctypes.c_int) * rows.shape[1]
+    first, stride = rows.ctypes.data, rows.strides[0]
+    return lambda k: row.from_address(first + k * stride)

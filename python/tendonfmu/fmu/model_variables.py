@@ -1,0 +1,149 @@
+"""The FMU's variables, units and structure of one finger, from the table in modelDescription/variables.json."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from tendonfmu.model import native
+from tendonfmu.model.dependencies import Dependencies, dependencies, structure_of
+from tendonfmu.model.description import FingerDescription
+from tendonfmu.model.extensions import extension_rows, place_of
+
+# What XML 1.0 cannot hold, even escaped.
+NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+@dataclass(frozen=True)
+class VariableTable:
+    """variables.json. patterns: those of parameter descriptions, compiled."""
+
+    data: Mapping[str, Any]
+    patterns: list[tuple[re.Pattern[str], str]]
+
+
+def read_table(text: str) -> VariableTable:
+    data = json.loads(text)
+    patterns = [(re.compile(pattern), wording) for pattern, wording in data["parameters"]["descriptions"]]
+    return VariableTable(data, patterns)
+
+
+def describe_model(description: FingerDescription, table: VariableTable) -> dict[str, Any]:
+    """The template's context, but for what belongs to the package: identifier, GUID, version, sources.
+
+    See modelDescription/README.md.
+    """
+    finger = native.Finger(description.image)
+    sizes = group_sizes(finger.joints, finger.tendons)
+    has = {"links": finger.has_links, "rest": finger.watches_rest, "sensor_fault": finger.watches_sensors}
+    groups = present_groups(table, {need for need, given in has.items() if given})
+    variables = [variable for group in groups for variable in elements(group, sizes)]
+    variables += _parameters(finger.parameters(), table, description.data)
+    index = {variable["name"]: k for k, variable in enumerate(variables, start=1)}
+    late = any(row["effect"] == "time_delay" for row in extension_rows(description.data))
+    outputs = list(_outputs(groups, sizes, index, dependencies(structure_of(description)), late))
+    return {
+        "name": NOT_IN_XML.sub("?", description.name),
+        "description": f"Friction compensation of the tendon-driven finger {NOT_IN_XML.sub('?', description.name)}: "
+        f"{counted(finger.joints, 'joint')}, {counted(finger.tendons, 'tendon')}",
+        "units": units_of(variables, table),
+        "log_categories": table.data["log_categories"],
+        "variables": variables,
+        "outputs": outputs,
+        "initial_unknowns": [output["index"] for output in outputs],
+        "directional_derivative": True,
+        "default_experiment": {"start": 0.0, "stop": 10.0, "step": 0.001},
+    }
+
+
+def counted(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def group_sizes(joints: int, tendons: int) -> dict[str, int]:
+    """Elements of a group by its `size` in the table."""
+    return {"scalar": 1, "joints": joints, "tendons": tendons, "vector": 3}
+
+
+def present_groups(table: VariableTable, has: set[str]) -> list[Mapping[str, Any]]:
+    """The table's groups that a model has, given what it `has` of what they need."""
+    return [group for group in table.data["groups"] if group.get("needs") is None or group["needs"] in has]
+
+
+def units_of(variables: list[dict[str, Any]], table: VariableTable) -> dict[str, Any]:
+    """The table's units that the variables use."""
+    used = {variable.get("unit") for variable in variables}
+    return {unit: base for unit, base in table.data["units"].items() if unit in used}
+
+
+def _names(group: Mapping[str, Any], sizes: Mapping[str, int]) -> list[str]:
+    name = group["name"]
+    return [name] if group["size"] == "scalar" else [f"{name}[{i}]" for i in range(1, sizes[group["size"]] + 1)]
+
+
+def elements(group: Mapping[str, Any], sizes: Mapping[str, int]) -> Iterator[dict[str, Any]]:
+    """The variables of a group, as the template wants them."""
+    given = {key: group[key] for key in ("type", "causality", "variability")}
+    where = {key: group[key] for key in ("initial", "unit", "min", "max", "start") if key in group}
+    for i, name in enumerate(_names(group, sizes)):
+        text = group["description"].replace("{i}", str(i + 1))
+        yield {**given, **where, "name": name, "vr": group["base"] + i, "description": text}
+
+
+def _parameters(
+    parameters: list[native.Parameter], table: VariableTable, data: Mapping[str, Any]
+) -> Iterator[dict[str, Any]]:
+    settings = table.data["parameters"]
+    effects = {f"extensions[{k}]": place_of(row) for k, row in enumerate(extension_rows(data), start=1)}
+    for k, parameter in enumerate(parameters):
+        yield {
+            "name": parameter.path,
+            "vr": settings["base"] + k,
+            "type": settings["type"],
+            "causality": settings["causality"],
+            "variability": "tunable" if parameter.tunable else "fixed",
+            "initial": settings["initial"],
+            "description": parameter_description(parameter.path, table) + effects.get(parameter.path.split(".")[0], ""),
+            "unit": parameter.unit,
+            "min": parameter.minimum,
+            "max": parameter.maximum,
+            "start": parameter.start,
+            "above_minimum": parameter.above_minimum,
+        }
+
+
+def parameter_description(path: str, table: VariableTable) -> str:
+    """Wording of the first pattern that matches the whole path."""
+    for pattern, wording in table.patterns:
+        match = pattern.fullmatch(path)
+        if match:
+            return match.expand(wording)
+    raise LookupError(f"{path}: no description in variables.json")
+
+
+def _outputs(
+    present: list[Mapping[str, Any]],
+    sizes: Mapping[str, int],
+    index: Mapping[str, int],
+    structure: Dependencies,
+    late: bool,
+) -> Iterator[dict[str, Any]]:
+    """late: forces may be those of earlier samples, so that no dependency is by a fixed factor."""
+    groups = {group["name"]: group for group in present}
+    for group in present:
+        if group["causality"] != "output":
+            continue
+        for name, inputs in zip(_names(group, sizes), structure[group["name"]], strict=True):
+            known = {
+                index[_names(groups[of], sizes)[i]]: "dependent" if late else group["dependencies"][of]["kind"]
+                for of, elements in inputs.items()
+                for i in elements
+            }
+            yield {
+                "index": index[name],
+                "dependencies": sorted(known),
+                "kinds": [known[k] for k in sorted(known)],
+            }

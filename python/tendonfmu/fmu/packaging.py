@@ -1,0 +1,230 @@
+"""From a finger description to an FMU: an archive put together from parts that stand ready, without a compiler.
+
+Same input, same bytes: members are sorted, their times and permissions fixed.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+import re
+import unicodedata
+import zipfile
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from tendonfmu.errors import InputError, InternalError
+from tendonfmu.files.whole_file import whole_file
+from tendonfmu.fmu.model_variables import VariableTable, describe_model, read_table
+from tendonfmu.model import native
+from tendonfmu.model.description import FingerDescription, read_finger
+
+if TYPE_CHECKING:
+    from importlib.abc import Traversable
+
+BINARY_SUFFIXES = (".so", ".dll", ".dylib")
+BINARIES, BINARY_STEM = "binaries", "tendonfmu"
+
+# A model identifier names files and C functions: no words that a compiler or a file system keeps to itself.
+RESERVED = frozenset(
+    [
+        "auto",
+        "break",
+        "case",
+        "char",
+        "const",
+        "continue",
+        "default",
+        "do",
+        "double",
+        "else",
+        "enum",
+        "extern",
+        "float",
+        "for",
+        "goto",
+        "if",
+        "inline",
+        "int",
+        "long",
+        "register",
+        "restrict",
+        "return",
+        "short",
+        "signed",
+        "sizeof",
+        "static",
+        "struct",
+        "switch",
+        "typedef",
+        "union",
+        "unsigned",
+        "void",
+        "volatile",
+        "while",
+        "con",
+        "prn",
+        "aux",
+        "nul",
+    ]
+)
+
+
+def build_fmu(
+    description_path: Path, output_path: Path, *, binaries: Path | None = None, illustrated: bool = True
+) -> Path:
+    """Packs the FMU of a finger description and returns its path.
+
+    binaries: a folder of <FMI platform>/tendonfmu.<so, dll or dylib> in place of the installed ones. illustrated: with
+    pictures and a page for readers; without, it is packed sooner.
+    Raises InputError. output_path appears whole or not at all.
+    """
+    description = read_finger(description_path)
+    archive = pack(members(description, binaries=binaries, illustrated=illustrated))
+    with whole_file(output_path) as file:
+        file.write_bytes(archive)
+    return output_path
+
+
+def model_identifier(name: str) -> str:
+    """The name as a C identifier: `Zeigefinger, rechts` becomes `Zeigefinger_rechts`."""
+    plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode("ascii")
+    identifier = re.sub(r"[^A-Za-z0-9]+", "_", plain).strip("_")
+    if not identifier:
+        return "finger"
+    if identifier[0].isdigit() or identifier.lower() in RESERVED:
+        return f"finger_{identifier}"
+    return identifier
+
+
+def guid(resource: bytes, table: VariableTable) -> str:
+    """Identifier that the binary expects: of the model image, or rig, and of the table that it was compiled with."""
+    return native.image_guid(resource, variable_generator().salt(table.data))
+
+
+def members(
+    description: FingerDescription, *, binaries: Path | None = None, illustrated: bool = True
+) -> dict[str, bytes]:
+    """Path in the archive to content, for all files of the FMU. illustrated: see `build_fmu`."""
+    table = read_table(package_file("model_description/variables.json").read_text(encoding="utf-8"))
+    identifier = model_identifier(description.name)
+    sources = _sources()
+    model = describe_model(description, table)
+    context: dict[str, Any] = {
+        **model,
+        "model_identifier": identifier,
+        "guid": guid(description.image, table),
+        "version": native.version(),
+        "source_files": sources.pop("sources.txt").decode("ascii").split(),
+    }
+    content = {
+        "modelDescription.xml": model_description(context),
+        "resources/model.image": description.image,
+        "resources/finger.json": description.text,
+    }
+    if illustrated:
+        content |= _for_readers(description, context)
+    content |= {f"sources/{name}": data for name, data in sources.items()}
+    libraries = find_binaries(binaries, BINARIES, BINARY_STEM, identifier)
+    content |= {f"binaries/{path}": data for path, data in libraries.items()}
+    return content
+
+
+def _for_readers(description: FingerDescription, context: Mapping[str, Any]) -> dict[str, bytes]:
+    from tendonfmu.drawing.finger_picture import draw_finger
+    from tendonfmu.fmu.documentation import documentation_page
+    from tendonfmu.model.routing_geometry import finger_drawing
+
+    picture = io.BytesIO()
+    draw_finger(finger_drawing(description), picture)
+    return {
+        "model.png": picture.getvalue(),
+        "documentation/finger.png": picture.getvalue(),
+        "documentation/index.html": documentation_page(description, context).encode(),
+    }
+
+
+# --- parts -----------------------------------------------------------------------------------------------------------
+
+
+def package_file(path: str) -> Traversable:
+    return files("tendonfmu") / path
+
+
+def variable_generator() -> ModuleType:
+    """generate_variables.py, which wrote the table's salt into the C header."""
+    path = Path(str(package_file("model_description/generate_variables.py")))
+    spec = importlib.util.spec_from_file_location("tendonfmu_generate_variables", path)
+    if spec is None or spec.loader is None:
+        raise InternalError(f"{path}: not found; expected in the installed package")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def _sources() -> dict[str, bytes]:
+    return {file.name: file.read_bytes() for file in package_file("sources").iterdir() if file.is_file()}
+
+
+def find_binaries(folder: Path | None, installed: str, stem: str, identifier: str) -> dict[str, bytes]:
+    """<platform>/<identifier>.<suffix> to content, from <platform>/<stem>.<suffix> of the folder.
+
+    installed: folder of the package that takes its place where it is None. Raises InputError where there is none.
+    """
+    root: Traversable = package_file(installed) if folder is None else folder
+    found = {}
+    for platform in root.iterdir() if root.is_dir() else []:
+        for file in platform.iterdir() if platform.is_dir() else []:
+            suffix = Path(file.name).suffix
+            if Path(file.name).stem == stem and suffix in BINARY_SUFFIXES:
+                found[f"{platform.name}/{identifier}{suffix}"] = file.read_bytes()
+    if not found:
+        raise InputError(f"{root}: no binary; expected <FMI platform>/{stem}.so, .dll or .dylib in it")
+    return found
+
+
+def model_description(context: Mapping[str, Any]) -> bytes:
+    """The XML of a context (modelDescription/README.md), once FMI's schema accepts it."""
+    return _checked(_render_xml(context))
+
+
+def _render_xml(context: Mapping[str, Any]) -> bytes:
+    import jinja2
+
+    template = package_file("model_description/modelDescription.xml.jinja").read_text(encoding="utf-8")
+    environment = jinja2.Environment(undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
+    return environment.from_string(template).render(context).encode()
+
+
+def _checked(xml: bytes) -> bytes:
+    """The same XML, once FMI's schema accepts it. The schema comes with fmpy, whose import would take half a second."""
+    from lxml import etree
+
+    spec = importlib.util.find_spec("fmpy")
+    if spec is None or not spec.submodule_search_locations:
+        raise InternalError("modelDescription.xml: FMI's schema not found; expected the Python package fmpy")
+    schema_path = Path(spec.submodule_search_locations[0]) / "schema" / "fmi2" / "fmi2ModelDescription.xsd"
+    schema = etree.XMLSchema(etree.parse(str(schema_path)))
+    if not schema.validate(etree.fromstring(xml)):
+        error = schema.error_log[0]
+        raise InternalError(f"modelDescription.xml, line {error.line}: {error.message}")
+    return xml
+
+
+# --- archive ---------------------------------------------------------------------------------------------------------
+
+
+def pack(content: Mapping[str, bytes]) -> bytes:
+    """Zip archive with the members sorted by path, all of 1980-01-01 and readable by everyone."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as archive:
+        for path in sorted(content):
+            member = zipfile.ZipInfo(path, date_time=(1980, 1, 1, 0, 0, 0))
+            member.compress_type = zipfile.ZIP_DEFLATED
+            member.create_system = 3
+            member.external_attr = (0o755 if path.startswith("binaries/") else 0o644) << 16
+            archive.writestr(member, content[path])
+    return buffer.getvalue()

@@ -1,0 +1,241 @@
+"""Which inputs can matter to which outputs: the dependencies in the FMU's ModelStructure.
+
+They follow from the finger's structure: which friction exists, which tendon passes which joint (a moment arm of 0 in
+the description is a tendon that does not pass), which angles R⁺ takes from which tendon. They hold for all three
+kinematics sources and all values of the tunable parameters, with branch decisions frozen: that a
+contact elsewhere stops the bias of a joint makes no dependency.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from tendonfmu.model import native
+from tendonfmu.model.description import FingerDescription
+from tendonfmu.model.extensions import extension_rows
+from tendonfmu.model.signals import PLACE, REST, SENSORS
+
+# Extensions whose torque at their joint follows from its angle, or from its velocity.
+BY_OWN_ANGLE = frozenset({"cover_hardening", "moment_arm_variation", "pulley_eccentricity"})
+BY_OWN_VELOCITY = frozenset({"inertia", "load_friction"})
+
+VECTORS = frozenset({"fingertip_force", "fingertip_force_std"})
+
+Dependencies = dict[str, list[dict[str, list[int]]]]
+
+
+@dataclass
+class Motion:
+    """Joints, 0-based, whose angle or velocity can matter."""
+
+    angles: set[int] = field(default_factory=set)
+    velocities: set[int] = field(default_factory=set)
+
+    def add(self, other: Motion) -> None:
+        self.angles |= other.angles
+        self.velocities |= other.velocities
+
+
+@dataclass(frozen=True)
+class Structure:
+    """What of a description decides on dependencies.
+
+    passes: [m, n] true where a tendon has a moment arm. inverse: [n, m] true where R⁺ has an entry.
+    """
+
+    data: Mapping[str, Any]
+    passes: np.ndarray[Any, np.dtype[np.bool_]]
+    inverse: np.ndarray[Any, np.dtype[np.bool_]]
+
+    @property
+    def tendons(self) -> int:
+        return int(self.passes.shape[0])
+
+    @property
+    def joints(self) -> int:
+        return int(self.passes.shape[1])
+
+
+def structure_of(description: FingerDescription) -> Structure:
+    passes = np.array(description.moment_arms) != 0.0
+    inverse = _inverse_routing(description.image, *passes.shape) != 0.0
+    if description.data.get("sensor_fault") is not None:  # with a row that leaves, any may matter to any
+        inverse = np.ones_like(inverse)
+    return Structure(description.data, passes, inverse)
+
+
+def _inverse_routing(image: bytes, tendons: int, joints: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """[n, m] R⁺ as the runtime has it: the slopes of the joint angles by the tendon positions."""
+    finger = native.Finger(image, kinematics_source=1)
+    finger.run({"time": np.zeros(1), "tendon_force": np.zeros((1, tendons)), "tendon_position": np.zeros((1, tendons))})
+    columns = [finger.directional_derivative({"tendon_position": unit})["joint_angle"] for unit in np.eye(tendons)]
+    return np.asarray(np.array(columns).T.reshape(joints, tendons), dtype=np.float64)
+
+
+def dependencies(structure: Structure) -> Dependencies:
+    """For each output and element (0-based): input name to the elements, 0-based and ascending, that can matter."""
+    n, m = structure.joints, structure.tendons
+    torques = [_torque(structure, j) for j in range(n)]
+    by_joint = [_inputs(structure, motion, set(range(m))) for motion in torques]
+    everything = Motion()
+    for motion in torques:
+        everything.add(motion)
+    result: Dependencies = {
+        "joint_torque": [{"tendon_force": [i for i in range(m) if structure.passes[i, j]]} for j in range(n)],
+        "joint_angle": [_inputs(structure, Motion(angles={j}), set()) for j in range(n)],
+        "joint_speed": [_inputs(structure, Motion(velocities={j}), set()) for j in range(n)],
+        "contact": [_inputs(structure, everything, set(range(m)))],
+        "slack": [_slack(structure, i) for i in range(m)],
+    }
+    if structure.data.get("links") is not None:
+        everything.add(Motion(angles=set(range(n))))  # they turn the force at the tip
+        place = _inputs(structure, everything, set(range(m)))
+        result |= {name: [place] * (3 if name in VECTORS else 1) for name in PLACE}
+    for name in ("compensated_torque", "compensated_torque_std", "friction_torque", "bias_torque", "joint_contact"):
+        result[name] = by_joint
+    result |= _at_rest(structure, result)
+    return result | _with_sensors(structure, result)
+
+
+def _at_rest(structure: Structure, others: Dependencies) -> Dependencies:
+    """With contact.rest: whether the finger rests depends on all motors and forces, and so does what contact does."""
+    if (structure.data.get("contact") or {}).get("rest") is None:
+        return {}
+    tendons = list(range(structure.tendons))
+    watched = {"tendon_force": tendons, "tendon_position": tendons}
+    found: Dependencies = {
+        name: [element | watched for element in others[name]] for name in ("joint_contact", "contact")
+    }
+    return found | {name: [watched] * (structure.joints if name == REST[0] else 1) for name in REST}
+
+
+def _with_sensors(structure: Structure, others: Dependencies) -> Dependencies:
+    """With sensor_fault: what fails, and with it contact, depends on all sensors."""
+    if structure.data.get("sensor_fault") is None:
+        return {}
+    tendons, joints = list(range(structure.tendons)), list(range(structure.joints))
+    watched = {"tendon_force": tendons, "tendon_position": tendons, "joint_position": joints}
+    found: Dependencies = {
+        name: [element | watched for element in elements]
+        for name, elements in others.items()
+        if name in ("joint_contact", "contact", *PLACE, *REST)
+    }
+    return found | {SENSORS[0]: [watched] * structure.tendons, SENSORS[1]: [watched]}
+
+
+def _inputs(structure: Structure, motion: Motion, forces: set[int]) -> dict[str, list[int]]:
+    """Inputs behind joint angles and velocities, beside forces that matter by themselves.
+
+    Source 1 takes both from forces and positions by R⁺, source 2 velocities from positions, source 3 both as measured.
+    """
+    moving = motion.angles | motion.velocities
+    tendons = {i for j in moving for i in range(structure.tendons) if structure.inverse[j, i]}
+    return {
+        "tendon_force": sorted(forces | tendons),
+        "tendon_position": sorted(tendons),
+        "joint_position": sorted(moving),
+        "joint_velocity": sorted(motion.velocities),
+    }
+
+
+def _torque(structure: Structure, j: int) -> Motion:
+    """What friction and bias of joint j follow from, beside the forces.
+
+    All forces matter to them at every joint: the Kalman gain takes the noise by the mean of |f0|.
+    """
+    joint = structure.data["joints"][j]
+    motion = Motion()
+    if joint.get("cover") is not None:
+        motion.angles.add(j)
+    for kind in ("friction", "load_friction"):
+        if joint.get(kind) is not None:
+            motion.velocities.add(j)
+    for extension in extension_rows(structure.data):
+        motion.add(_extension(structure, extension, j))
+    for i in range(structure.tendons):
+        if structure.passes[i, j]:  # losses up to this joint's pulley, over the moment arm (eq. 10)
+            motion.add(_along_tendon(structure, i, j, j))
+        if joint.get("load_friction") is not None:  # f_B before this joint's pulley, in Σ f_B
+            motion.add(_along_tendon(structure, i, j, j - 1))
+    return motion
+
+
+def _extension(structure: Structure, extension: Mapping[str, Any], j: int) -> Motion:
+    """What the torque of an extension at joint j follows from, beside the forces and numbers.
+
+    Effects that are not named here change signals or friction: what comes out depends on the same inputs as before
+    (of a delay on those of earlier samples, and on the present ones as soon as its number is 0).
+    """
+    effect, place, tendon = extension["effect"], (extension.get("joint") or 0) - 1, (extension.get("tendon") or 0) - 1
+    if effect == "gravity":
+        return _weight(structure, place, j)
+    if effect == "joint_coupling":
+        return Motion(angles={place, place + 1}) if j in (place, place + 1) else Motion()
+    if effect == "preload_friction":  # the sides to which the tendon moves before joint `place`, or before each
+        first = max(place, 0)
+        felt = structure.passes[tendon, j] and j >= first
+        return Motion(velocities={k for k in range(first, structure.joints) if felt and structure.passes[tendon, k]})
+    if place == j:
+        return Motion({j} if effect in BY_OWN_ANGLE else set(), {j} if effect in BY_OWN_VELOCITY else set())
+    return Motion()
+
+
+def _weight(structure: Structure, link: int, j: int) -> Motion:
+    """The angles that turn a link, where joint j feels its weight."""
+    turning = {k for k in range(link + 1) if _axis_cosine(structure, k, link) != 0.0}
+    return Motion(angles=turning if j in turning else set())
+
+
+def _axis_cosine(structure: Structure, joint: int, other: int) -> float:
+    """Cosine of the angle between two axes, 1 without links; rounded as in the runtime, whose 0 is no dependency."""
+    links = structure.data.get("links")
+    if links is None:
+        return 1.0
+    a, b = (_unit(links[k]["axis"]) for k in (joint, other))
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _unit(axis: Sequence[float]) -> list[float]:
+    largest = max(abs(float(x)) for x in axis)
+    x, y, z = (float(number) / largest for number in axis)
+    length = math.sqrt(x * x + y * y + z * z)
+    return [x / length, y / length, z / length]
+
+
+def _along_tendon(structure: Structure, i: int, last_edge: int, last_pulley: int) -> Motion:
+    """What the losses of tendon i at the edges and pulleys up to these joints follow from."""
+    motion = Motion()
+    for is_edge, j, varies_with_angle in _effects(structure, i):
+        if j > (last_edge if is_edge else last_pulley):
+            continue
+        # an edge moves with ẋ_j, a pulley with ẋ_{j+1}
+        moving = {k for k in range(j if is_edge else j + 1, structure.joints) if structure.passes[i, k]}
+        if not moving:  # ẋ = 0 whatever the joints do: this effect never acts
+            continue
+        motion.velocities |= moving
+        if varies_with_angle:
+            motion.angles.add(j - 1)
+    return motion
+
+
+def _effects(structure: Structure, i: int) -> Iterator[tuple[bool, int, bool]]:
+    """(edge or pulley, its joint, whether it varies with the angle of the joint before) of each effect of a tendon."""
+    tendon = structure.data["tendons"][i]
+    for j, law in enumerate(tendon.get("pulley_friction") or []):
+        if law is not None:
+            yield False, j, False
+    for j, edge in enumerate(tendon.get("edge_friction") or []):
+        if edge is not None:
+            yield True, j, j > 0 and len(edge.get("angles") or []) > 1
+
+
+def _slack(structure: Structure, i: int) -> dict[str, list[int]]:
+    """A cable loop is never slack; the others by their own force and all their losses."""
+    if structure.data["tendons"][i].get("bidirectional"):
+        return {}
+    return _inputs(structure, _along_tendon(structure, i, structure.joints, structure.joints), {i})

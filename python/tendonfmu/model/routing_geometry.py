@@ -1,0 +1,188 @@
+"""Geometry of the routing drawing of a finger, after the paper's fig. 3: where each line and mark goes, in units of
+its own. `report/plots.py` draws it.
+
+The finger lies along x, base on the left. A tendon passes a joint above it where its moment arm is positive, below
+where it is negative. Tendons that end early run inside, so that they need not cross those that go on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.model.description import FingerDescription
+
+JOINT_SPACING = 2.5
+HUB_RADIUS = 0.32  # of the disc that stands for a joint
+LANE = 0.17  # between tendons on one side of a joint
+FLAT_BEFORE = 0.75  # how far before and behind a joint a tendon runs straight
+FLAT_BEHIND = 0.3
+EDGE_BEFORE = 0.6  # how far before a joint its edge stands
+MARGIN = 0.2  # of the finger's outline around its tendons
+SPRING_LENGTH = 0.9
+BASE = 1.9  # from the springs to the first joint
+LABEL_SPACING = 0.3
+
+Points = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class DrawnJoint:
+    """A joint at (x, 0) with its disc."""
+
+    name: str
+    x: float
+    radius: float
+
+
+@dataclass(frozen=True)
+class DrawnTendon:
+    """A tendon from its spring to where it ends.
+
+    line, spring: [k, 2] points. pulleys: [k, 2] where there is pulley friction. edges, varying_edges: [k, 2] where
+    there is friction before a joint, without and with working points.
+    """
+
+    name: str
+    line: Points
+    spring: Points
+    pulleys: Points
+    edges: Points
+    varying_edges: Points
+    bidirectional: bool
+
+
+@dataclass(frozen=True)
+class FingerDrawing:
+    """links: [n, 2] x of begin and end of the link behind each joint. outline: [k, 3] x, lower and upper side of the
+    finger around its tendons. left, right, height: bounds, −height to height.
+    """
+
+    name: str
+    joints: list[DrawnJoint]
+    links: Points
+    outline: Points
+    tendons: list[DrawnTendon]
+    left: float
+    right: float
+    height: float
+
+
+def finger_drawing(description: FingerDescription) -> FingerDrawing:
+    """Geometry of a finger of up to 16 joints and 64 tendons."""
+    R: Points = np.array(description.moment_arms)
+    heights = _heights(R)
+    x: Points = JOINT_SPACING * np.arange(float(R.shape[1]))
+    starts = _starts(heights)
+    tip = float(x[-1] + 0.75 * JOINT_SPACING)
+    outline = _outline(x, heights, tip)
+    joints = [DrawnJoint(name, float(x[j]), HUB_RADIUS) for j, name in enumerate(description.joint_names)]
+    tendons = [
+        _tendon(tendon, name, x, R[i], heights[i], float(starts[i]))
+        for i, (tendon, name) in enumerate(zip(description.data["tendons"], description.tendon_names, strict=True))
+    ]
+    return FingerDrawing(
+        name=description.name,
+        joints=joints,
+        links=np.column_stack([x, np.append(x[1:], tip - 2.0 * MARGIN)]),
+        outline=outline,
+        tendons=tendons,
+        left=-BASE - SPRING_LENGTH,
+        right=tip + MARGIN,
+        height=float(max(np.abs(outline[:, 1:]).max(), np.abs(starts).max() + LABEL_SPACING)),
+    )
+
+
+def _outline(x: Points, heights: Points, tip: float) -> Points:
+    """[k, 3] x, lower and upper side: around the tendons at each joint, smooth between, round at the tip."""
+    upper = np.maximum(heights.max(axis=0), HUB_RADIUS) + MARGIN
+    lower = np.minimum(heights.min(axis=0), -HUB_RADIUS) - MARGIN
+    at = np.linspace(x[0] - FLAT_BEFORE - 0.1, tip, 40 * len(x) + 40)
+    sides = [at]
+    for side in (lower, upper):
+        line = _smooth_line(x, side, float(side[0]))
+        bend = np.clip(1.0 - 2.0 * (tip - at) / (tip - x[-1]), 0.0, 1.0)
+        sides.append(np.interp(at, line[:, 0], line[:, 1]) * np.sqrt(1.0 - bend * bend))
+    return np.column_stack(sides)
+
+
+def _last_joints(R: Points) -> NDArray[np.intp]:
+    """[m] index of the last joint that each tendon passes."""
+    n = R.shape[1]
+    reached = np.where(R != 0.0, np.arange(n), 0)
+    return np.asarray(reached.max(axis=1))
+
+
+def _heights(R: Points) -> Points:
+    """[m, n] height at which each tendon passes each joint; near 0 where it has no moment arm."""
+    last = _last_joints(R)
+    heights = np.zeros(R.shape)
+    for j in range(R.shape[1]):
+        for side in (1.0, -1.0):
+            here = [i for i in np.lexsort((np.abs(R[:, j]), last)) if R[i, j] * side > 0.0]
+            heights[here, j] = side * (HUB_RADIUS + LANE * np.arange(len(here)))
+        through = np.flatnonzero((R[:, j] == 0.0) & (last > j))
+        heights[through, j] = 0.3 * LANE * (np.arange(len(through)) - 0.5 * (len(through) - 1))
+    return heights
+
+
+def _starts(heights: Points) -> Points:
+    """[m] height of each spring: evenly spread, in the order in which the tendons arrive at the first joint."""
+    m = len(heights)
+    order = np.lexsort(heights.T[::-1])
+    starts = np.empty(m)
+    starts[order] = LABEL_SPACING * (np.arange(m) - 0.5 * (m - 1))
+    return starts
+
+
+def _tendon(tendon: dict[str, object], name: str, x: Points, arms: Points, y: Points, start: float) -> DrawnTendon:
+    last = int(_last_joints(arms[None, :])[0])
+    line = _smooth_line(x[: last + 1], y[: last + 1], start)
+    pulleys = [(x[j], y[j]) for j in _present(tendon, "pulley_friction") if j <= last]
+    edges: dict[bool, list[tuple[float, float]]] = {False: [], True: []}
+    for j, edge in _present(tendon, "edge_friction").items():
+        if j <= last:
+            at = float(x[j]) - EDGE_BEFORE
+            varying = isinstance(edge, dict) and len(edge.get("angles") or []) > 1
+            edges[varying].append((at, float(np.interp(at, line[:, 0], line[:, 1]))))
+    return DrawnTendon(
+        name=name,
+        line=line,
+        spring=_spring(start),
+        pulleys=_points(pulleys),
+        edges=_points(edges[False]),
+        varying_edges=_points(edges[True]),
+        bidirectional=tendon.get("bidirectional") is True,
+    )
+
+
+def _present(tendon: dict[str, object], key: str) -> dict[int, object]:
+    """Joint, 0-based, to the entry there."""
+    entries = tendon.get(key)
+    return {j: entry for j, entry in enumerate(entries) if entry is not None} if isinstance(entries, list) else {}
+
+
+def _points(pairs: list[tuple[float, float]]) -> Points:
+    return np.array(pairs, dtype=float).reshape(-1, 2)
+
+
+def _smooth_line(x: Points, y: Points, start: float) -> Points:
+    """[k, 2] from the spring over all joints: straight at each, smooth between."""
+    knots_x = np.concatenate([[-BASE], np.column_stack([x - FLAT_BEFORE, x + FLAT_BEHIND]).ravel()])
+    knots_y = np.concatenate([[start], np.repeat(y, 2)])
+    share = np.linspace(0.0, 1.0, 24)
+    ease = share * share * (3.0 - 2.0 * share)
+    pieces = [
+        np.column_stack([a + (b - a) * share, c + (d - c) * ease])
+        for a, b, c, d in zip(knots_x, knots_x[1:], knots_y, knots_y[1:], strict=False)
+    ]
+    return np.concatenate(pieces)
+
+
+def _spring(height: float) -> Points:
+    """[k, 2] a zigzag that ends where the tendon begins."""
+    share = np.linspace(0.0, 1.0, 12)
+    swing = np.array([0.0, 0.0, *[0.07, -0.07] * 4, 0.0, 0.0])
+    return np.column_stack([-BASE - SPRING_LENGTH * (1.0 - share), height + swing])

@@ -1,0 +1,204 @@
+"""What is wrong with single channels of a recording: its clock, and sensors that clip, hold or come in coarse steps.
+
+Nothing here knows friction. Angles that a channel is held against come from the other channels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.model.description import FingerDescription
+from tendonfmu.recordings.faults import StuckSensor, expected_values, gaps, stuck_sensors
+from tendonfmu.recordings.recording import Recording
+from tendonfmu.recordings.signal_noise import value_step
+
+Numbers = NDArray[np.float64]
+
+# --- the clock: samples per second
+SLOWEST, FASTEST = 5.0, 1e5  # of anything that controls or records a finger
+USUAL = (20.0, 2e4)
+CLOCK_UNITS = ((1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
+FEWEST_STEPS = 20
+LOST = 1.5  # median steps; a longer one has lost samples
+WHOLE = 0.25  # of a median step: how near to a whole number of steps
+LOST_SHARE = 2e-3  # of the samples; fewer do no harm
+JITTER = 0.1  # of the median step, standard deviation; what a velocity is wrong by
+
+# --- channels
+CLIPPED_RUN = 5  # samples that repeat the extreme value
+CLIPPED_SHARE = 1e-3  # of the samples; fewer do no harm
+APPROACH = 10  # samples before a run over which the approach is seen
+SMOOTH_TURN = 12.0  # resolutions; a smooth signal approaches a turning point by less (8 over as long as it rests there)
+RESOLUTION = 2e-4  # of the range; a channel is not taken to be finer
+CERTAIN = 4.0  # standard deviations
+LEVELS = 40  # fewer steps in the range of a motion are coarse
+COARSE = {"tendon_force": 0.05, "tendon_position": 2e-5, "joint_position": 2e-3}  # N, m, rad; finer steps are never
+
+
+@dataclass(frozen=True)
+class Clock:
+    """The steps of time.
+
+    step: s, median. unit: factor to seconds and name of the unit that the times seem to be in, or None. senseless: no
+    control loop has such a rate. lost: samples that are not there. gaps: long ones. jitter: standard deviation of the
+    other steps over the median.
+    """
+
+    step: float
+    unit: tuple[float, str] | None
+    senseless: bool
+    lost: int
+    gaps: tuple[int, ...]
+    jitter: float
+
+
+@dataclass(frozen=True)
+class Clipped:
+    """A channel that repeats its largest or smallest value, and comes to it at speed.
+
+    value: in its unit. share: of the samples. runs: how often it comes there. is_top: at the largest value.
+    """
+
+    column: str
+    value: float
+    share: float
+    runs: int
+    is_top: bool
+
+
+@dataclass(frozen=True)
+class Coarse:
+    """A channel whose values come in steps that are coarse against its motion. step, range: in its unit."""
+
+    column: str
+    step: float
+    range: float
+
+
+@dataclass(frozen=True)
+class Held:
+    """A channel that holds a value although others say that it should change. share: of the samples."""
+
+    column: str
+    value: float
+    share: float
+    first: tuple[float, float]  # s, of the first time
+
+
+def read_clock(time: Numbers) -> Clock | None:
+    """None for too few samples. time: [N] s, strictly increasing."""
+    if len(time) <= FEWEST_STEPS:
+        return None
+    steps = np.diff(time)
+    median = float(np.median(steps))
+    rate = 1.0 / median
+    senseless = rate <= SLOWEST * (1 + 1e-6) or rate > FASTEST
+    units = [unit for unit in CLOCK_UNITS if USUAL[0] <= rate / unit[0] <= USUAL[1]] if senseless else []
+    long = gaps(time * (units[0][0] if units else 1.0))
+    short = np.delete(steps, np.asarray(long, dtype=int) - 1) / median
+    whole = np.round(short)
+    usual = 1.4826 * float(np.median(np.abs(short - 1.0)))  # standard deviation, lost samples apart
+    is_lost = (short > max(LOST, 1.0 + CERTAIN * usual)) & (np.abs(short - whole) < WHOLE)
+    return Clock(
+        step=median,
+        unit=units[0] if units else None,
+        senseless=senseless,
+        lost=int((whole[is_lost] - 1).sum()),
+        gaps=tuple(long),
+        jitter=float(np.std(short[~is_lost])),
+    )
+
+
+def clipped_channels(recording: Recording, finger: FingerDescription) -> Iterator[Clipped]:
+    """Forces, positions and angles that saturate.
+
+    A turning point of a smooth signal also repeats its extreme value, but comes to it slowly. A motor or a joint that
+    rests at its extreme is no fault: there the other channels rest as well.
+    """
+    for name in COARSE:
+        for k, column in enumerate(recording.groups.get(name, np.empty((0, 0))).T):
+            for is_top in (True, False):
+                sign = 1.0 if is_top else -1.0
+                runs = _clipped_runs(sign * column)
+                expected = expected_values(recording, finger, name, k) if runs and name != "tendon_force" else None
+                if expected is not None:
+                    runs = [run for run in runs if _bulges(sign * expected, run, _resolution(column))]
+                share = sum(end - begin for begin, end in runs) / len(column)
+                value = float(column.max() if is_top else column.min())
+                if share > CLIPPED_SHARE and not (name == "tendon_force" and value == 0.0):
+                    yield Clipped(f"{name}[{k + 1}]", value, share, len(runs), is_top)
+
+
+def _clipped_runs(column: Numbers) -> list[tuple[int, int]]:
+    """Runs (begin, end) at the largest value that are approached at speed."""
+    largest, extent = float(column.max()), float(np.ptp(column))
+    at = np.flatnonzero(column == largest)
+    if len(at) < CLIPPED_RUN or extent == 0.0:
+        return []
+    resolution = _resolution(column)
+    pieces = np.split(at, np.flatnonzero(np.diff(at) > 3) + 1)
+    runs = [(int(piece[0]), int(piece[-1]) + 1) for piece in pieces if len(piece) >= CLIPPED_RUN]
+    kept = []
+    for begin, end in runs:
+        reach = min(APPROACH, end - begin)
+        sides = [column[max(begin - reach, 0) : begin], column[end : end + reach]]
+        falls = [largest - float(side.min()) for side in sides if len(side)]
+        if falls and max(falls) > SMOOTH_TURN * resolution:
+            kept.append((begin, end))
+    return kept
+
+
+def _resolution(column: Numbers) -> float:
+    return max(value_step(column), RESOLUTION * float(np.ptp(column)))
+
+
+def _bulges(expected: Numbers, run: tuple[int, int], resolution: float) -> bool:
+    """Whether the others say that the channel goes up and comes back within a run, beyond noise.
+
+    Its middle half against its ends: what sticks and slips off jumps behind the run, not within it.
+    """
+    inside = expected[run[0] : run[1]]
+    eighth = len(inside) // 8
+    if not eighth:
+        return False
+    ends = np.concatenate([inside[:eighth], inside[-eighth:]])
+    middle = inside[2 * eighth : -2 * eighth]
+    noise = float(np.median(np.abs(np.diff(expected)))) * np.sqrt(1.0 / len(ends) + 1.0 / len(middle))
+    return bool(middle.mean() - ends.mean() > CERTAIN * noise + resolution)
+
+
+def coarse_channels(recording: Recording) -> Iterator[Coarse]:
+    """Channels that move in few steps."""
+    for name, finest in COARSE.items():
+        for k, column in enumerate(recording.groups.get(name, np.empty((0, 0))).T):
+            step, extent = value_step(column), float(np.ptp(column))
+            if step > finest and extent < LEVELS * step:
+                yield Coarse(f"{name}[{k + 1}]", step, extent)
+
+
+def held_channels(recording: Recording, finger: FingerDescription) -> list[Held]:
+    """Channels that stand still while others move, and those that never change while their group does."""
+    by_column: dict[str, list[StuckSensor]] = {}
+    for sensor in stuck_sensors(recording, finger):
+        by_column.setdefault(sensor.column, []).append(sensor)
+    found = [_held(recording.time, column, sensors) for column, sensors in by_column.items()]
+    for name in COARSE:
+        values = recording.groups.get(name, np.empty((1, 0)))
+        still = np.ptp(values, axis=0) == 0.0
+        moving = np.ptp(values, axis=0) > COARSE[name] * LEVELS
+        for k in np.flatnonzero(still):
+            column = f"{name}[{k + 1}]"
+            if moving.sum() > still.sum() and column not in by_column:
+                span = (float(recording.time[0]), float(recording.time[-1]))
+                found.append(Held(column, float(values[0, k]), 1.0, span))
+    return found
+
+
+def _held(time: Numbers, column: str, sensors: list[StuckSensor]) -> Held:
+    share = sum(sensor.end - sensor.begin for sensor in sensors) / len(time)
+    first = sensors[0]
+    return Held(column, first.value, share, (float(time[first.begin]), float(time[first.end - 1])))

@@ -1,0 +1,64 @@
+"""Third-party recordings to ours: one foreign format a file.
+
+A converter is a function (file, its own options) -> columns of a recording (docs/recording.md). To add one, write a
+module beside this and name it in `CONVERTERS`. Logs without a format of their own are read by a map of columns
+(`table`).
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from tendonfmu.errors import InputError
+
+Columns = dict[str, NDArray[Any]]
+Converter = Callable[..., Columns]
+
+
+@dataclass(frozen=True)
+class Source:
+    """A foreign format: the module that reads it, what it is, and the options of `convert` that it takes."""
+
+    module: str
+    about: str
+    options: tuple[str, ...]
+
+
+# by the name on the command line
+CONVERTERS = {
+    "davinci": Source(
+        "tendonfmu.recordings.converters.davinci",
+        "da Vinci tool characterisation, University of Minnesota (.TXT)",
+        ("radius", "pretension"),
+    ),
+    "emps": Source(
+        "tendonfmu.recordings.converters.emps",
+        "EMPS, electro-mechanical positioning system, nonlinear system identification benchmark (.mat)",
+        ("mass", "decimation"),
+    ),
+}
+
+
+def converter(name: str) -> Converter:
+    """The converter of that name; raises InputError listing the known ones."""
+    if name not in CONVERTERS:
+        raise InputError(f"convert: unknown format {name!r}; expected one of {', '.join(CONVERTERS)}, table")
+    convert: Converter = importlib.import_module(CONVERTERS[name].module).convert
+    return convert
+
+
+def convert_file(name: str, file: Path, options: Mapping[str, Any]) -> Columns:
+    """Columns of the recording in a foreign file. options: those that were given; raises InputError for a wrong one."""
+    convert = converter(name)
+    known = CONVERTERS[name].options
+    for option in options:
+        if option not in known:
+            takes = " or ".join(f"--{other}" for other in known)
+            raise InputError(f"convert {name}: no option --{option} for this format; expected {takes}")
+    return convert(file, **options)

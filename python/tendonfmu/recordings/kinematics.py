@@ -1,0 +1,300 @@
+"""Do tendon positions, tendon forces and joint angles fit together as x0 − f0/k = R q says, and if not, what mends it?
+
+The equation holds whatever rubs, touches or weighs, so it tells wrong columns before any friction is known. It tells
+nothing where a finger has as many joints as tendons and its joint angles are not measured. Zeros of the sensors do not
+count: covariances know no offsets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations, permutations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.model.description import FingerDescription
+from tendonfmu.recordings.faults import TURNS
+
+Numbers = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+FEWEST = 200  # samples; fewer tell no covariance
+MISFIT = 5e-4  # share of variance below which an equation fits: arms and springs are not known better than 2 %
+GAIN = 4.0  # times less misfit that a correction must bring
+ALIKE = 1.5  # times the best correction's misfit: both are named
+SAME = 2e-4  # share of variance below which two corrections are as good as each other
+NOTHING = 1e-6  # of the largest terms of an equation; one with smaller ones says nothing
+MOST_SUBSETS, MOST_ORDERS, MOST_CIRCLES = 8, 6, 16  # columns of which all subsets, orders, circles of three are tried
+NOISY = 10.0  # times the variance of its noise: an equation with less motion says nothing
+ROUNDS = 8  # corrections of one recording
+STRONGEST = 5000.0  # N; a tendon of a finger breaks before
+EQUATED = ("tendon_force", "tendon_position", "joint_position")  # groups of the equation, in the order of its columns
+# Units in which columns are often written, as factors to ours
+UNITS: dict[str, tuple[tuple[float, str], ...]] = {
+    "tendon_position": ((1e-3, "mm"), (1e-2, "cm"), (1e-6, "µm"), (0.0254, "inch")),
+    "tendon_force": (
+        (9.80665, "kgf or daN"),
+        (9.80665e-3, "gf or cN"),
+        (1e-3, "mN"),
+        (4.448222, "lbf"),
+        (1e3, "kN"),
+    ),
+    "joint_position": ((np.pi / 180, "degrees"), (1e-3, "mrad"), (2 * np.pi, "turns")),
+}
+
+
+@dataclass(frozen=True)
+class Correction:
+    """What a map of columns would have to say.
+
+    kind: "sign", "scale" or "exchange". columns: by name. factor: of a sign or scale. unit: that the scale comes from.
+    sources: of an exchange, the column that each of the columns has to be read from.
+    """
+
+    kind: str
+    columns: tuple[str, ...]
+    factor: float = 1.0
+    unit: str = ""
+    sources: tuple[str, ...] = ()
+
+    @property
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """Of an exchange: column and the one that it has to be read from."""
+        return tuple(zip(self.columns, self.sources, strict=True))
+
+
+@dataclass(frozen=True)
+class Repair:
+    """A correction that makes the equations fit, and the others that do so as well.
+
+    misfit, left: share of the variance that the equations leave that it changes, before and after it.
+    """
+
+    correction: Correction
+    alternatives: tuple[Correction, ...]
+    misfit: float
+    left: float
+
+
+class Balance:
+    """Second moments of a recording's columns, and the equations they have to satisfy.
+
+    columns: names. rows: [e, c] equations in m, 0 when satisfied. covariance: [c, c]. largest: [c] largest magnitudes.
+    tendons: indices of those that have a force at all; the others are left out.
+    """
+
+    def __init__(
+        self, finger: FingerDescription, groups: Mapping[str, Numbers], noise: Mapping[str, Numbers] | None = None
+    ) -> None:
+        """groups: `tendon_force`, `tendon_position`, and `joint_position` where it is measured; sound samples only.
+
+        noise: standard deviation of each column's noise, by group; None: none.
+        """
+        used = [name for name in EQUATED if name in groups]
+        self.columns = [f"{name}[{k + 1}]" for name in used for k in range(groups[name].shape[1])]
+        values = np.concatenate([groups[name] for name in used], axis=1)
+        self.covariance = np.cov(values, rowvar=False)
+        self.largest = np.abs(values).max(axis=0)
+        self._range = np.ptp(values, axis=0)
+        self._median = np.median(values, axis=0)
+        self._noise = np.concatenate([noise[name] for name in used]) ** 2 if noise else np.zeros(len(self.columns))
+        pulls = [not tendon.get("bidirectional") for tendon in finger.data["tendons"]]
+        self._pulls = np.flatnonzero(pulls)  # columns of forces, which come first
+        self.tendons = taut_tendons(groups["tendon_force"])
+        self.rows, self._angle = _equations(finger, self.tendons, "joint_position" in groups)
+
+    def misfits(self, transform: Numbers) -> Numbers:
+        """[e] share of the variance, noise apart, that each equation leaves; NaN for those that say nothing.
+
+        transform: [c, c], from the columns as they are to what they should be.
+        """
+        rows = self.rows @ transform
+        squares = rows**2
+        terms = squares @ np.diag(self.covariance)
+        noise = squares @ self._noise
+        left = np.maximum(((rows @ self.covariance) * rows).sum(axis=1) - noise, 0.0)
+        says = (terms > NOTHING * terms.max(initial=0.0)) & (terms > NOISY * noise)
+        return np.where(says, left / np.where(says, terms, 1.0), np.nan)
+
+    def misfit(self, transform: Numbers) -> float:
+        """Mean share over the equations that say something."""
+        return _mean(self.misfits(transform))
+
+    def worst(self, transform: Numbers) -> float:
+        """Largest share of an equation that says something."""
+        return float(np.nan_to_num(self.misfits(transform)).max(initial=0.0))
+
+    def is_plausible(self, transform: Numbers) -> bool:
+        """Joints that turn less than `TURNS`, forces of at most `STRONGEST`."""
+        turn = np.abs(self._angle @ transform) @ self._range
+        force = [k for k, name in enumerate(self.columns) if name.startswith("tendon_force")]
+        return bool(turn.max() < 2 * TURNS and (np.abs(transform) @ self.largest)[force].max() <= STRONGEST)
+
+    def pushing(self, transform: Numbers) -> int:
+        """How many tendons that can only pull have a negative force."""
+        return int(((transform @ self._median)[self._pulls] < 0.0).sum())
+
+    def plausible_scale(self) -> Correction | None:
+        """A unit of the positions or forces that makes angles plausible; of those that turn the joints most."""
+        groups = ("tendon_position", "tendon_force")
+        share = {name: [column in self.group(name) for column in self.columns] for name in groups}
+        turn = {name: float((np.abs(self._angle) @ (self._range * share[name])).max()) for name in groups}
+        name = max(groups, key=lambda group: turn[group])
+        for factor, unit in UNITS[name]:
+            correction = Correction("scale", tuple(self.group(name)), factor, unit)
+            if self.is_plausible(self.transform(correction)):
+                return correction
+        return None
+
+    def worst_tendon(self) -> int:
+        """Index from 0 of the tendon whose equation leaves most."""
+        return int(self.tendons[np.argmax(((self.rows @ self.covariance) * self.rows).sum(axis=1))])
+
+    def transform(self, correction: Correction) -> Numbers:
+        """[c, c] what a correction does."""
+        made = np.eye(len(self.columns))
+        if correction.kind == "exchange":
+            indices = {name: k for k, name in enumerate(self.columns)}
+            made[[indices[name] for name in correction.columns]] = np.eye(len(self.columns))[
+                [indices[name] for name in correction.sources]
+            ]
+        else:
+            for name in correction.columns:
+                k = self.columns.index(name)
+                made[k, k] = correction.factor
+        return made
+
+    def corrections(self) -> Iterator[Correction]:
+        """All that is tried: signs, exchanges and units of columns and of whole groups."""
+        groups = {name: self.group(name) for name in UNITS}
+        for name, columns in groups.items():
+            for subset in _subsets(columns):
+                yield Correction("sign", subset, -1.0)
+            for order in _orders(len(columns)):
+                yield _exchange([columns], order)
+            for factor, unit in UNITS[name]:
+                yield Correction("scale", tuple(columns), factor, unit)
+                if len(columns) > 1:
+                    for column in columns:
+                        yield Correction("scale", (column,), factor, unit)
+        for order in _orders(len(groups["tendon_force"])):
+            yield _exchange([groups["tendon_force"], groups["tendon_position"]], order)
+
+    def group(self, name: str) -> list[str]:
+        """Its columns."""
+        return [column for column in self.columns if column.startswith(f"{name}[")]
+
+
+def _equations(finger: FingerDescription, tendons: Indices, measured: bool) -> tuple[Numbers, Numbers]:
+    """[e, c] rows that are 0, and [n, c] joint angles by the tendons; columns as in `Balance`."""
+    arms = np.asarray(finger.moment_arms, dtype=float)
+    compliance = np.diag([1.0 / float(tendon["stiffness"]) for tendon in finger.data["tendons"]])
+    elastic = np.concatenate([-compliance, np.eye(len(arms))], axis=1)[tendons]
+    arms = arms[tendons]
+    inverse = np.linalg.pinv(arms)
+    angle = inverse @ elastic
+    if not measured:
+        return (np.eye(len(arms)) - arms @ inverse) @ elastic, angle
+    joints = np.zeros((len(angle), arms.shape[1]))
+    return np.concatenate([elastic, -arms], axis=1), np.concatenate([angle, joints], axis=1)
+
+
+def taut_tendons(force: Numbers) -> Indices:
+    """Indices from 0 of tendons with any force. force: [N, m]."""
+    return np.flatnonzero(force.any(axis=0))
+
+
+def tells(finger: FingerDescription, groups: Mapping[str, Numbers]) -> bool:
+    """Whether the equation tells anything: more of them than unknown joint angles."""
+    return "joint_position" in groups or len(taut_tendons(groups["tendon_force"])) > len(finger.joint_names)
+
+
+def repairs(balance: Balance) -> tuple[list[Repair], float]:
+    """Corrections that make the equations fit, the most effective first, and the misfit that they leave.
+
+    One after the other: each is the best one beside those before, and must lower the misfit of the equations that it
+    changes `GAIN` times.
+    """
+    done: list[Repair] = []
+    transform = np.eye(len(balance.columns))
+    misfit = balance.misfit(transform)
+    tried = list(balance.corrections()) if balance.worst(transform) > MISFIT else []
+    while tried and balance.worst(transform) > MISFIT and len(done) < ROUNDS:
+        scores = _scores(balance, tried, transform)
+        least = float(scores.min(initial=np.inf))
+        if not np.isfinite(least):
+            break
+        alike = np.flatnonzero(scores <= max(ALIKE * least, SAME))
+        rank = [(balance.pushing(balance.transform(tried[k]) @ transform), _size(tried[k]), scores[k]) for k in alike]
+        best = int(alike[min(range(len(alike)), key=lambda k: rank[k])])
+        others = tuple(tried[k] for k, key in zip(alike, rank, strict=True) if k != best and key[0] == min(rank)[0])
+        before = balance.misfits(transform)
+        transform = balance.transform(tried[best]) @ transform
+        after = balance.misfits(transform)
+        changed = np.abs(after - before) > NOTHING
+        done.append(Repair(tried[best], others, _mean(before[changed]), _mean(after[changed])))
+        misfit = float(scores[best])
+    return done, misfit
+
+
+def _scores(balance: Balance, tried: Sequence[Correction], transform: Numbers) -> Numbers:
+    """[tried] misfit with each; infinite where it gains too little, is implausible, or makes a tendon push."""
+    was, pushing = balance.is_plausible(transform), balance.pushing(transform)
+    before, whole = balance.misfits(transform), balance.misfit(transform)
+    scores = np.full(len(tried), np.inf)
+    for k, correction in enumerate(tried):
+        if not was and correction.kind != "scale":
+            continue
+        with_it = balance.transform(correction) @ transform
+        after = balance.misfits(with_it)
+        changed = np.abs(after - before) > NOTHING
+        if not changed.any() or _mean(after[changed]) * GAIN >= _mean(before[changed]) or _mean(after) >= whole:
+            continue
+        if balance.is_plausible(with_it) and balance.pushing(with_it) <= pushing:
+            scores[k] = _mean(after)
+    return scores
+
+
+def _size(correction: Correction) -> int:
+    """The less it changes the likelier it is: signs and columns in another place. A unit is that of all."""
+    return 0 if correction.kind == "scale" else len(correction.columns)
+
+
+def _mean(misfits: Numbers) -> float:
+    says = misfits[np.isfinite(misfits)]
+    return float(says.mean()) if len(says) else 0.0
+
+
+# --- what is tried ----------------------------------------------------------------------------------------------------
+
+
+def _subsets(columns: Sequence[str]) -> Iterator[tuple[str, ...]]:
+    """All of few columns; one, two and all of many."""
+    sizes = range(1, len(columns) + 1) if len(columns) <= MOST_SUBSETS else (1, 2, len(columns))
+    for size in sizes:
+        yield from combinations(columns, size)
+
+
+def _orders(count: int) -> Iterator[tuple[int, ...]]:
+    """All orders of few but the given one; of many, two exchanged or three in a circle."""
+    given = tuple(range(count))
+    if count <= MOST_ORDERS:
+        yield from (order for order in permutations(given) if order != given)
+        return
+    for i, j in combinations(given, 2):
+        yield tuple(j if k == i else i if k == j else k for k in given)
+    yield given[::-1]
+    if count <= MOST_CIRCLES:
+        for i, j, k in combinations(given, 3):
+            for one, two, three in ((i, j, k), (i, k, j)):
+                circle = {one: two, two: three, three: one}
+                yield tuple(circle.get(each, each) for each in given)
+
+
+def _exchange(groups: Sequence[Sequence[str]], order: Sequence[int]) -> Correction:
+    """Element k of each group read from element order[k]."""
+    moved = [k for k, source in enumerate(order) if source != k]
+    columns = tuple(group[k] for group in groups for k in moved)
+    return Correction("exchange", columns, sources=tuple(group[order[k]] for group in groups for k in moved))

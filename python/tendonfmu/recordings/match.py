@@ -1,0 +1,325 @@
+"""Do recordings belong to a finger description? Said before any fit, with what to write into the map of columns.
+
+`belongs` answers for all recordings, `admit` for a command that goes on with them. Errors are what makes every number
+of a fit wrong: signs, order and units of columns, sensors that are dead. Warnings are what makes it worse: a poor
+clock, sensors that clip now and then.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.errors import InputError
+from tendonfmu.model.description import FingerDescription
+from tendonfmu.model.findings import Finding
+from tendonfmu.model.plausibility import is_direct_drive
+from tendonfmu.recordings import match_text as text
+from tendonfmu.recordings.channels import (
+    clipped_channels,
+    coarse_channels,
+    held_channels,
+    read_clock,
+)
+from tendonfmu.recordings.faults import STUCK, TURNS, tendon_angles
+from tendonfmu.recordings.kinematics import EQUATED, FEWEST, GAIN, SAME, Balance, Correction, Repair, repairs, tells
+from tendonfmu.recordings.recording import GROUP_PER, Recording, check_numbers
+from tendonfmu.recordings.signal_noise import white_noise
+from tendonfmu.recordings.velocity import velocity_corrections
+
+Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+UNFIT, POOR = 0.15, 0.03  # share of variance that the equations may leave: beyond the first nothing fits
+HALF = 0.5  # of the samples: a fit refuses a sensor that is stuck in more
+MUCH_CLIPPED = 0.2  # of the samples
+NEGATIVE = 0.8  # of the samples: a tendon that pushes as often has a wrong sign or zero
+PUSHES = 0.01  # of the samples
+WINDOW = 0.02  # s; power is that of motion slower than this
+FEWEST_WINDOWS = 50
+MOST_COMPARED = 12  # corrections
+AGAINST = 0.15  # of the power at a joint; sound recordings have 0.6 and more, those with a wrong sign -0.3 and less
+STILL = 0.02  # rad; less motion says nothing
+SLACK = 0.01  # of the largest force of a tendon; a slack one does not follow its joints
+OPPOSED = 0.5  # of what forces and reference leave of each other, when their sum leaves less
+LEAST_KEPT = 0.2  # of the samples, for the equations
+LEFT_TO_THE_FIT = ("gaps", "held")  # kinds of findings
+
+
+def belongs(finger: FingerDescription, recordings: Sequence[Recording]) -> list[Finding]:
+    """What says that recordings do not belong to a finger, or are poor; nothing for sound ones.
+
+    Parameters
+    ----------
+    finger: a valid description.
+    recordings: as `read_recording` gives them.
+
+    Returns
+    -------
+    Findings in the order of the recordings, errors of each before its warnings.
+    """
+    found: list[Finding] = []
+    for recording in recordings:
+        of_this = _findings(finger, recording)
+        found += sorted(of_this, key=lambda finding: finding.severity != "error")
+    return found
+
+
+def admit(finger: FingerDescription, recordings: Sequence[Recording]) -> list[str]:
+    """Before a fit: raises InputError for a recording that does not belong to the finger, returns the warnings' lines.
+
+    Gaps and stuck sensors are left to `fit_recordings.prepare`, which knows which columns are used, and says what
+    becomes of the samples.
+    """
+    for recording in recordings:
+        check_numbers(recording)
+    return refuse_errors([each for each in belongs(finger, recordings) if each.kind not in LEFT_TO_THE_FIT])
+
+
+def refuse_errors(findings: Sequence[Finding]) -> list[str]:
+    """Raises InputError for the first error, returns the warnings' lines."""
+    for finding in findings:
+        if finding.severity == "error":
+            raise InputError(finding.line())
+    return [finding.line() for finding in findings]
+
+
+def _findings(finger: FingerDescription, recording: Recording) -> list[Finding]:
+    counts = {"tendon": len(finger.tendon_names), "joint": len(finger.joint_names)}
+    wrong = [name for name, values in recording.groups.items() if values.shape[1] != counts[GROUP_PER[name]]]
+    if wrong:
+        return [text.columns(recording.path, name, recording.groups[name].shape[1], counts) for name in wrong]
+    found = list(_of_clock(recording))
+    clock = next((finding for finding in found if finding.kind == "clock"), None)
+    unit = clock.entries.get("time", {}).get("scale") if clock else None
+    if isinstance(unit, float):
+        recording = replace(recording, time=recording.time * unit)
+    kinematic, mended = _of_kinematics(finger, recording)
+    stands = held_channels(mended, finger)
+    held = [
+        text.held(recording.path, each, "error" if each.share > HALF and each.value != 0.0 else "warning")
+        for each in stands
+    ]
+    dead = any(finding.severity == "error" for finding in held)
+    silent = any(each.share > HALF for each in stands)
+    if not dead:  # of a dead sensor no equation holds
+        found += kinematic
+        mended = _with_velocities(finger, mended, found)
+        found += _of_pushing(finger, mended, {column for finding in kinematic for column in finding.columns})
+        if not silent and not any(finding.severity == "error" for finding in found):
+            found += list(_of_power(finger, mended)) or list(_of_reference(finger, mended))
+    found += _of_channels(finger, mended, held)
+    return found
+
+
+# --- clock and channels -----------------------------------------------------------------------------------------------
+
+
+def _of_clock(recording: Recording) -> Iterator[Finding]:
+    clock = read_clock(recording.time)
+    if clock is None:
+        return
+    if clock.senseless:
+        yield text.senseless_rate(recording.path, clock, len(recording))
+    yield from text.clock_warnings(recording.path, clock, recording.time)
+
+
+def _of_channels(finger: FingerDescription, recording: Recording, held: Sequence[Finding]) -> Iterator[Finding]:
+    coarse = list(coarse_channels(recording))
+    clipped = list(clipped_channels(recording, finger))
+    steps = {each.column for each in coarse}
+    often = {each.column for each in clipped if each.runs > 1}
+    stands = [finding for finding in held if finding.severity == "error" or finding.columns[0] not in steps | often]
+    if stands or coarse:  # what the others say of a position is worth nothing then
+        clipped = [each for each in clipped if each.column.startswith("tendon_force")]
+    yield from stands
+    said = {finding.columns[0] for finding in stands}
+    for each in clipped:
+        if each.column not in said:
+            yield text.clipped(recording.path, each, "error" if each.share > MUCH_CLIPPED else "warning")
+    yield from (text.coarse(recording.path, each) for each in coarse if each.column not in said)
+
+
+# --- what the columns say of each other -------------------------------------------------------------------------------
+
+
+def _of_kinematics(finger: FingerDescription, recording: Recording) -> tuple[list[Finding], Recording]:
+    """Findings about signs, order and units of columns, and the recording as it would be with them mended."""
+    if len(recording) < FEWEST:
+        return [], recording
+    found: list[Finding] = []
+    balance, moves = _balance(finger, recording)
+    if moves and tells(finger, recording.groups):
+        done, left = repairs(balance)
+        if left > UNFIT:  # what mends a part of it only is a guess
+            return [text.unfit(recording.path, done[0].misfit if done else left, "error", balance)], recording
+        if len(done) == 1:
+            done = [_likeliest(finger, recording, done[0])]
+        found = [text.repair(recording.path, each) for each in done]
+        for each in done:
+            recording = _mended(recording, each.correction)
+        if left > POOR:
+            found.append(text.unfit(recording.path, left, "warning", balance))
+    turn = np.ptp(tendon_angles(recording, finger), axis=0)
+    if turn.max() > TURNS and not is_direct_drive(np.array(finger.moment_arms)):
+        correction = balance.plausible_scale() if not found else None
+        found.append(text.turns(recording.path, turn, finger.joint_names, correction))
+        if correction is not None:
+            recording = _mended(recording, correction)
+    return found, recording
+
+
+def _likeliest(finger: FingerDescription, recording: Recording, found: Repair) -> Repair:
+    """Of corrections that the equations cannot tell apart, first the one that suits velocities and friction."""
+    corrections = [found.correction, *found.alternatives]
+    if len(corrections) == 1 or len(corrections) > MOST_COMPARED:
+        return found
+    contradicted = []
+    for correction in corrections:
+        mended = _mended(recording, correction)
+        share = power_shares(finger, mended)
+        braked = 0 if share is None else int((share < 0.0).sum())
+        contradicted.append(sum(1 for _ in velocity_corrections(mended, finger)) + braked)
+    best = [each for each, count in zip(corrections, contradicted, strict=True) if count == min(contradicted)]
+    return replace(found, correction=best[0], alternatives=tuple(best[1:]))
+
+
+def _balance(finger: FingerDescription, recording: Recording) -> tuple[Balance, bool]:
+    """The equations over the samples that serve, and whether any joint moves in them."""
+    groups = {name: values for name, values in recording.groups.items() if name in EQUATED}
+    rows = _serving(finger, recording, groups)
+    kept = {name: values[rows] for name, values in groups.items()}
+    try:
+        noise = {name: white_noise(recording.time, values) for name, values in groups.items()}
+    except InputError:  # gaps everywhere
+        noise = {name: np.zeros(values.shape[1]) for name, values in groups.items()}
+    angles = [tendon_angles(recording, finger)[rows], *([kept["joint_position"]] if "joint_position" in kept else [])]
+    moves = any(float(np.ptp(angle, axis=0).max()) > STILL for angle in angles)
+    return Balance(finger, kept, noise), moves
+
+
+def _serving(finger: FingerDescription, recording: Recording, groups: Mapping[str, Numbers]) -> Flags:
+    """[N] samples in which no channel holds a value for long and no tendon is slack; all where too few are left."""
+    changing = np.ones(len(recording), dtype=bool)
+    for values in groups.values():
+        for column in values.T:
+            bounds = np.concatenate([[0], np.flatnonzero(np.diff(column)) + 1, [len(column)]])
+            for k in np.flatnonzero(recording.time[bounds[1:] - 1] - recording.time[bounds[:-1]] > STUCK):
+                changing[bounds[k] : bounds[k + 1]] = False
+    force = np.abs(groups["tendon_force"])
+    pulls = [not tendon.get("bidirectional") for tendon in finger.data["tendons"]]
+    taut = ((force >= SLACK * force.max(axis=0)) | ~np.array(pulls)).all(axis=1)
+    enough = max(FEWEST, LEAST_KEPT * len(recording))
+    for serving in (changing & taut, taut, changing):
+        if serving.sum() >= enough:
+            return np.asarray(serving)
+    return np.ones(len(recording), dtype=bool)
+
+
+def _mended(recording: Recording, correction: Correction) -> Recording:
+    groups = {name: values.copy() for name, values in recording.groups.items()}
+    if correction.kind == "exchange":
+        for column, source in correction.pairs:
+            (name, k), (_, other) = text.element(column), text.element(source)
+            groups[name][:, k] = recording.groups[name][:, other]
+    else:
+        for column in correction.columns:
+            name, k = text.element(column)
+            groups[name][:, k] *= correction.factor
+    return replace(recording, groups=groups)
+
+
+def _with_velocities(finger: FingerDescription, recording: Recording, found: list[Finding]) -> Recording:
+    """Adds findings about joint velocities; the recording as it would be with them mended."""
+    for correction, slope in velocity_corrections(recording, finger):
+        found.append(text.velocity(recording.path, correction, slope))
+        recording = _mended(recording, correction)
+    return recording
+
+
+def _of_pushing(finger: FingerDescription, recording: Recording, mended: set[str]) -> Iterator[Finding]:
+    """About tendons that pull only and have negative forces. mended: columns of which something is said already."""
+    share = (recording.groups["tendon_force"] < 0.0).mean(axis=0)
+    for i, tendon in enumerate(finger.data["tendons"]):
+        column = f"tendon_force[{i + 1}]"
+        if tendon.get("bidirectional") or share[i] <= PUSHES:
+            continue
+        force = recording.groups["tendon_force"][:, i]
+        is_zero = share[i] <= NEGATIVE or column in mended or _is_sign_right(finger, recording, i)
+        yield text.pushing(recording.path, column, finger.tendon_names[i], float(share[i]), float(force.min()), is_zero)
+
+
+def _is_sign_right(finger: FingerDescription, recording: Recording, i: int) -> bool:
+    """Whether the equations say that tendon i's force grows as its spring stretches."""
+    if not tells(finger, recording.groups) or len(recording) < FEWEST:
+        return False
+    balance, _ = _balance(finger, recording)
+    flipped = balance.transform(Correction("sign", (f"tendon_force[{i + 1}]",), -1.0))
+    return balance.misfit(np.eye(len(balance.columns))) * GAIN < balance.misfit(flipped)
+
+
+def _of_reference(finger: FingerDescription, recording: Recording) -> Iterator[Finding]:
+    """About external torques that the tendons do not hold: friction is what is left of the two (eq. 9)."""
+    external = recording.groups.get("external_torque")
+    if external is None:
+        return
+    torque = recording.groups["tendon_force"] @ np.asarray(finger.moment_arms, dtype=float)
+    left, opposed = (np.sqrt(((torque - sign * external) ** 2).mean(axis=0)) for sign in (1.0, -1.0))
+    for j in np.flatnonzero(opposed < OPPOSED * left):
+        yield text.reference(recording.path, f"external_torque[{j + 1}]", float(left[j]), float(opposed[j]))
+
+
+def _of_power(finger: FingerDescription, recording: Recording) -> Iterator[Finding]:
+    """About joints that move against the pull of their tendons, which friction cannot make them do."""
+    share = power_shares(finger, recording)
+    if share is not None and share.min() < -AGAINST:
+        yield text.against(recording.path, share, finger.joint_names, _turning(finger, recording))
+
+
+def _turning(finger: FingerDescription, recording: Recording) -> list[Correction]:
+    """Signs and exchanges that the equations do not see and that let every joint follow its tendons."""
+    balance, _ = _balance(finger, recording)
+    given = np.eye(len(balance.columns))
+    most, pushing = max(2 * balance.misfit(given), SAME), balance.pushing(given)
+    found: list[tuple[int, int, Correction]] = []
+    for correction in balance.corrections():
+        with_it = balance.transform(correction)
+        if correction.kind == "scale" or balance.pushing(with_it) > pushing or balance.misfit(with_it) > most:
+            continue
+        mended = _mended(recording, correction)
+        share = power_shares(finger, mended)
+        if share is not None and share.min() >= 0.0:
+            found.append((sum(1 for _ in _of_reference(finger, mended)), len(correction.columns), correction))
+        if len(found) >= MOST_COMPARED:
+            break
+    found.sort(key=lambda each: each[:2])
+    return [correction for opposed, _, correction in found if opposed == found[0][0]]
+
+
+def power_shares(finger: FingerDescription, recording: Recording) -> Numbers | None:
+    """[n] work that the tendons do on each joint over closed motions: friction makes it 1, springs 0.
+
+    0 too for joints that do not move. None for a recording that is too short.
+    """
+    external, angle = (recording.groups.get(name) for name in ("external_torque", "joint_position"))
+    torque = recording.groups["tendon_force"] @ np.asarray(finger.moment_arms, dtype=float)
+    if external is not None:
+        torque = torque - external
+    torque = torque - torque.mean(axis=0)  # a constant pull comes back all that it does
+    if angle is None:
+        angle = tendon_angles(recording, finger)
+    every = max(1, round(WINDOW / float(np.median(np.diff(recording.time))))) if len(torque) > FEWEST else len(torque)
+    count = len(torque) // every
+    if count < FEWEST_WINDOWS:
+        return None
+    pull, turn = (values[: count * every].reshape(count, every, -1).mean(axis=1) for values in (torque, angle))
+    work = (pull[1:] + pull[:-1]) / 2 * np.diff(turn, axis=0)
+    if recording.contact is not None and external is None:
+        touched = np.asarray(recording.contact[: count * every].reshape(count, every).any(axis=1))
+        work = work[~(touched[1:] | touched[:-1])]
+    work = np.where(np.ptp(angle, axis=0) > STILL, work, 0.0)
+    total = np.abs(work).sum(axis=0)
+    return np.asarray(work.sum(axis=0) / np.where(total > 0.0, total, 1.0))

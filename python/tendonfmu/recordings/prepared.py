@@ -1,0 +1,338 @@
+"""Recordings made ready for a fit: checked, cut at gaps, and each sample said to train, to be held out or left out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.errors import InputError
+from tendonfmu.model.balance import moment_arms
+from tendonfmu.model.description import FingerDescription
+from tendonfmu.model.friction_places import DEFAULT_THRESHOLD
+from tendonfmu.model.signals import INPUTS_OF_SOURCE, inputs_used, watches_motors
+from tendonfmu.recordings.faults import (
+    SETTLING,
+    StuckSensor,
+    gap_sentences,
+    gaps,
+    rate_sentences,
+    silent_tendons,
+    stuck_sensors,
+)
+from tendonfmu.recordings.recording import Recording, check_numbers
+from tendonfmu.recordings.residuals import Model, model_alone
+
+Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+FEWEST = 20  # samples of a part; fewer say nothing of a bias, let alone of friction
+_LOOKED_AT = 50_000  # samples, about, of which is said where the motion has been
+SHORTEST_BLOCK = 1.0  # s; of a held-out block
+
+
+@dataclass(frozen=True)
+class Held:
+    """Which share of time is held out (0 to below 1), in blocks of how many seconds at most.
+
+    strict: refuse a recording that is too short for blocks of `SHORTEST_BLOCK`; otherwise its blocks are shorter.
+    """
+
+    share: float = 0.0
+    block: float = 10.0
+    strict: bool = False
+
+
+@dataclass(frozen=True)
+class FitRecording:
+    """A recording of a fit.
+
+    target: [N, n] N·m that the model has to explain: τ, or τ − external_torque (eq. 9). train, held_out, contact_out,
+    faulty: [N] bool, each sample in at most one of them: trained on; held out; labelled contact without a reference;
+    left out for a stuck sensor, or for a part that is too short. parts: slices without a gap, each with a bias path of
+    its own. model: the given finger's own T, angles and speeds. warnings: sentences.
+    """
+
+    recording: Recording
+    kinematics: int
+    target: Numbers
+    train: Flags
+    held_out: Flags
+    contact_out: Flags
+    faulty: Flags
+    parts: list[slice]
+    model: Model
+    warnings: list[str]
+
+    @property
+    def path(self) -> Path:
+        return self.recording.path
+
+    @property
+    def time(self) -> Numbers:
+        return self.recording.time
+
+    @property
+    def tracked(self) -> Flags:
+        """[N] samples that the bias filter learns from when a finished fit is judged, as it would at run time."""
+        return self.train | self.held_out
+
+    @property
+    def external(self) -> Numbers | None:
+        """[N, n] N·m of the reference sensor, or None."""
+        return self.recording.groups.get("external_torque")
+
+    @property
+    def duration(self) -> float:
+        """s, without gaps."""
+        return float(sum(self.time[part.stop - 1] - self.time[part.start] for part in self.parts))
+
+    @property
+    def mean_force(self) -> float:
+        """N, of all tendons."""
+        return float(np.abs(self.recording.groups["tendon_force"]).mean())
+
+    def arrays(self, part: slice) -> dict[str, Numbers]:
+        """What `native.Finger.run` takes, of one part."""
+        return {name: np.ascontiguousarray(values[part]) for name, values in self.recording.arrays().items()}
+
+    def entry(self) -> dict[str, Any]:
+        """For the report."""
+        return {
+            "path": str(self.path),
+            "samples": len(self.time),
+            "used": int(self.train.sum()),
+            "held_out": int(self.held_out.sum()),
+            "contact_left_out": int(self.contact_out.sum()),
+            "faulty_left_out": int(self.faulty.sum()),
+            "parts": len(self.parts),
+            "duration": self.duration,
+            "mean_force": self.mean_force,
+            "kinematics": self.kinematics,
+            "external_torque": self.external is not None,
+        }
+
+
+def prepare(finger: FingerDescription, recording: Recording, kinematics: int, held: Held) -> FitRecording:
+    """Makes a recording ready, and says what of it is left out. Raises InputError where nothing sound can come of it.
+
+    Whether it belongs to the finger, `recording_match.admit` has to say before.
+    """
+    joints, tendons = len(finger.joint_names), len(finger.tendon_names)
+    recording.require(joints, tendons, inputs_used(kinematics, watches_motors(finger.data)))
+    check_numbers(recording)
+    target = recording.groups["tendon_force"] @ moment_arms(finger.data)
+    external = recording.groups.get("external_torque")
+    contact = np.zeros(len(recording), dtype=bool)
+    if external is not None:
+        target = target - external
+    elif recording.contact is not None:
+        contact = recording.contact.copy()
+    parts, short = _parts(recording.time)
+    warnings = [*gap_sentences(recording), *rate_sentences(recording, finger), *silent_tendons(recording, finger)]
+    if short.any() and parts:
+        warnings.append(f"{int(short.sum())} samples in parts of fewer than {FEWEST} between gaps are left out")
+    stuck, sentences = _stuck(recording, finger, kinematics)
+    faulty = (short | stuck) & ~contact
+    usable = ~(faulty | contact)
+    _refuse_too_little(recording, parts, usable, contact)
+    held_out = _held_out(recording, parts, held) & usable
+    model = model_alone(finger.data, [_arrays(recording, part) for part in parts], parts, len(recording), kinematics)
+    if contact.any():
+        warnings.append(f"{int(contact.sum())} samples labelled contact are left out: no column external_torque")
+    return FitRecording(
+        recording=recording,
+        kinematics=kinematics,
+        target=np.asarray(target),
+        train=usable & ~held_out,
+        held_out=held_out,
+        contact_out=contact,
+        faulty=faulty,
+        parts=parts,
+        model=model,
+        warnings=[*warnings, *sentences],
+    )
+
+
+def _arrays(recording: Recording, part: slice) -> dict[str, Numbers]:
+    return {name: values[part] for name, values in recording.arrays().items()}
+
+
+def _parts(time: Numbers) -> tuple[list[slice], Flags]:
+    """Slices between gaps that are long enough, and the samples [N] of those that are not."""
+    bounds = [0, *gaps(time), len(time)]
+    short, parts = np.zeros(len(time), dtype=bool), []
+    for begin, end in pairwise(bounds):
+        if end - begin >= FEWEST:
+            parts.append(slice(begin, end))
+        else:
+            short[begin:end] = True
+    return parts, short
+
+
+def _refuse_too_little(recording: Recording, parts: list[slice], usable: Flags, contact: Flags) -> None:
+    if not parts:
+        raise InputError(
+            f"{recording.path}: {len(recording)} samples without a gap at most; expected at least {FEWEST}, and some "
+            "minutes of motion for a sound fit"
+        )
+    if usable.sum() >= FEWEST:
+        return
+    why = f"{int(contact.sum())} of {len(recording)} are labelled contact and there is no column external_torque"
+    if not contact.any():
+        why = "the others are left out for a stuck sensor"
+    raise InputError(
+        f"{recording.path}: {int(usable.sum())} samples to fit to: {why}; expected at least {FEWEST} without contact"
+    )
+
+
+def slack_sentences(slack: Flags, finger: FingerDescription) -> list[str]:
+    """About tendons whose modelled force falls below zero. slack: [N, m]."""
+    share = slack.mean(axis=0)
+    return [
+        f"tendon {i + 1} ({finger.tendon_names[i]}) is slack in {_percent(part)} % of the samples: its modelled force "
+        "falls below 0 and counts as 0; the training should be modified: more pretension"
+        for i, part in enumerate(share)
+        if part > 0
+    ]
+
+
+def _percent(share: float) -> str:
+    """Two digits, and all of those of 100."""
+    return f"{100 * share:.2g}" if share < 0.995 else f"{100 * share:.0f}"
+
+
+# --- stuck sensors ----------------------------------------------------------------------------------------------------
+
+
+def _stuck(recording: Recording, finger: FingerDescription, kinematics: int) -> tuple[Flags, list[str]]:
+    """[N] samples to leave out, and sentences. A channel that is not used costs nothing."""
+    out, sentences = np.zeros(len(recording), dtype=bool), []
+    used = {"tendon_force", *INPUTS_OF_SOURCE[kinematics]}
+    by_column: dict[str, list[StuckSensor]] = {}
+    for sensor in stuck_sensors(recording, finger):
+        by_column.setdefault(sensor.column, []).append(sensor)
+    for column, found in by_column.items():
+        first = found[0]
+        begin, end = recording.time[first.begin], recording.time[first.end - 1]
+        more = f" and {len(found) - 1} times more" if len(found) > 1 else ""
+        what = f"{column} stands still at {first.value:.6g} from {begin:.4g} to {end:.4g} s{more} while others move"
+        lost = np.zeros(len(recording), dtype=bool)
+        for sensor in found:
+            lost |= _covered(recording.time, sensor)
+        if first.group not in used:
+            sentences.append(f"{what}: a stuck sensor; it is not used with kinematics {kinematics}")
+            continue
+        if lost.mean() > 0.5:
+            raise InputError(
+                f"{recording.path}: column {what}: a stuck sensor in {100 * lost.mean():.0f} % of the recording; "
+                "expected a working one"
+            )
+        out |= lost
+        sentences.append(
+            f"{what}: a stuck sensor; {int(lost.sum())} samples until {SETTLING:g} s after it are left out"
+        )
+    return out, sentences
+
+
+def _covered(time: Numbers, sensor: StuckSensor) -> Flags:
+    return np.asarray((time >= time[sensor.begin]) & (time <= time[sensor.end - 1] + SETTLING))
+
+
+# --- hold-out ---------------------------------------------------------------------------------------------------------
+
+
+def _held_out(recording: Recording, parts: list[slice], held: Held) -> Flags:
+    """[N] samples of every so many'th block of time, evenly spread; blocks count from the start of each part."""
+    out = np.zeros(len(recording), dtype=bool)
+    if not held.share:
+        return out
+    blocks = 0
+    for part in parts:
+        time = recording.time[part] - recording.time[part.start]
+        length = min(held.block, float(time[-1]) * held.share / 2)
+        if held.strict and length < SHORTEST_BLOCK:
+            continue
+        block = np.floor(time / length)
+        # the share's multiples that a block passes: 0.2 takes blocks 4, 9, 14, ...
+        out[part] = np.floor((block + 1) * held.share + 1e-9) > np.floor(block * held.share + 1e-9)
+        blocks += 1
+    if not blocks:
+        raise InputError(
+            f"{recording.path}: too short to hold out {held.share:g} of it in blocks of at least {SHORTEST_BLOCK:g} s; "
+            f"expected {2 * SHORTEST_BLOCK / held.share:.3g} s or more without a gap"
+        )
+    return out
+
+
+# --- all of them ------------------------------------------------------------------------------------------------------
+
+
+def motion_of(recordings: list[FitRecording]) -> tuple[Numbers, Numbers, Numbers]:
+    """Of the samples trained on: joint angle [K, n] rad, speed [K, n] rad/s, time [K] s that each stands for.
+
+    Every so many'th of very many: where a motion has been is seen well enough.
+    """
+    every = max(1, sum(len(each.time) for each in recordings) // _LOOKED_AT)
+    angle, speed, share = [], [], []
+    for each in recordings:
+        rows = np.flatnonzero(each.train)[::every]
+        angle.append(each.model.joint_angle[rows])
+        speed.append(each.model.joint_speed[rows])
+        share.append(_sample_time(each)[rows] * every)
+    return np.concatenate(angle), np.concatenate(speed), np.concatenate(share)
+
+
+def _sample_time(recording: FitRecording) -> Numbers:
+    step = np.zeros(len(recording.time))
+    for part in recording.parts:
+        step[part] = np.gradient(recording.time[part])
+    return step
+
+
+def refuse_stillness(finger: FingerDescription, recordings: list[FitRecording], moves: Mapping[str, bool]) -> list[str]:
+    """Refuses recordings without any motion; a sentence about joints that never move.
+
+    moves: path of each friction effect -> whether it ever slides in the samples trained on.
+    """
+    if not moves:
+        return []
+    if not any(moves.values()):
+        raise InputError(
+            f"{', '.join(str(each.path) for each in recordings)}: no motion: nothing is ever faster than "
+            "velocity_threshold; expected free motion of all joints (tendonfmu excite plans one)"
+        )
+    given = (finger.data.get("velocity_threshold") or {}).get("joint")
+    threshold = DEFAULT_THRESHOLD["joint"] if given is None else float(given)
+    fastest = np.max([np.abs(each.model.joint_speed[each.train]).max(axis=0) for each in recordings], axis=0)
+    return [
+        f"joint {j} ({finger.joint_names[j - 1]}) never moves faster than {threshold:g} rad/s: its own friction cannot "
+        "be told, its numbers stay near where they were"
+        for j in np.flatnonzero(fastest <= threshold) + 1
+    ]
+
+
+def require_noise(finger: FingerDescription, recordings: list[FitRecording]) -> None:
+    """Refuses a finger whose residuals would count infinitely much."""
+    bias = finger.data.get("bias") or {}
+    base = 0.01 if bias.get("noise_std") is None else float(bias["noise_std"])
+    per_force = float(bias.get("noise_std_per_force") or 0.0)
+    if base > 0:
+        return
+    if not per_force:
+        raise InputError(
+            f"{finger.path}: bias.noise_std = 0 and bias.noise_std_per_force = 0: every residual would count "
+            "infinitely much; expected the standard deviation of the joint torque's noise in N.m"
+        )
+    for each in recordings:
+        silent = np.flatnonzero(~each.recording.groups["tendon_force"].any(axis=1))
+        if silent.size:
+            raise InputError(
+                f"{finger.path}: bias.noise_std = 0, and row {int(silent[0]) + 1} of {each.path} has no tendon force: "
+                "its residual would count infinitely much; expected bias.noise_std above 0 (N.m)"
+            )

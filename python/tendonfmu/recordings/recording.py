@@ -1,0 +1,156 @@
+"""Recordings: columns, units and checks of docs/recording.md.
+
+A column is `time` (s) or one of the groups below with an index from 1, such as `tendon_force[3]`.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.errors import InputError
+from tendonfmu.files.tables import read_table
+
+# group: unit, and whether every recording has it
+GROUPS: dict[str, tuple[str, bool]] = {
+    "tendon_force": ("N", True),
+    "tendon_position": ("m", True),
+    "joint_position": ("rad", False),
+    "joint_velocity": ("rad/s", False),
+    "external_torque": ("N.m", False),
+}
+GROUP_PER = {name: "tendon" if name.startswith("tendon") else "joint" for name in GROUPS}
+LABEL = "contact"
+LARGEST, LATEST = 1e12, 1e15  # of a signal in its unit, and s: what the model takes
+
+_ELEMENT = re.compile(r"([a-z_]+)\[([1-9][0-9]*)\]")
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Measured samples of one finger.
+
+    time: [N] s, strictly increasing. groups: name -> [N, m] or [N, n], units in `GROUPS`.
+    contact: [N] bool label, or None. others: columns read because they were asked for, [N] each.
+    """
+
+    path: Path
+    time: NDArray[np.float64]
+    groups: Mapping[str, NDArray[np.float64]]
+    contact: NDArray[np.bool_] | None = None
+    others: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def arrays(self) -> dict[str, NDArray[np.float64]]:
+        """`time` and the groups in one dict, as `native.Finger.run` takes them."""
+        return {"time": self.time, **self.groups}
+
+    def require(self, joints: int, tendons: int, groups: tuple[str, ...]) -> None:
+        """Refuses a recording that does not fit a finger, or lacks a group that is needed."""
+        for name in groups:
+            if name not in self.groups:
+                raise InputError(f"{self.path}: no column {name}[1]; expected {name}[1..{joints}] for these kinematics")
+        for name, array in self.groups.items():
+            expected = tendons if GROUP_PER[name] == "tendon" else joints
+            if array.shape[1] != expected:
+                raise InputError(
+                    f"{self.path}: {array.shape[1]} columns {name}[...], expected {expected}: "
+                    f"the finger has {joints} joints and {tendons} tendons"
+                )
+
+
+def read_recording(path: str | os.PathLike[str], *, label: str = LABEL, others: Collection[str] = ()) -> Recording:
+    """Reads and checks a recording (.csv or .parquet). Raises InputError naming column and row.
+
+    label: column of the contact label, 0 or 1. others: further columns to keep where they are there.
+    """
+    file = Path(path)
+    known = {LABEL, label, *others}
+    table = read_table(file, partial(_check_columns, known=known), flags=(LABEL, label))
+    time = table["time"]
+    check_times(file, time)
+    found = table.get(label)
+    if found is not None and not np.isin(found, (0.0, 1.0)).all():
+        row = int(np.flatnonzero(~np.isin(found, (0.0, 1.0)))[0]) + 1
+        raise InputError(f"{file}: column {label}, row {row}: {found[row - 1]:g}; expected 0 or 1")
+    groups = {name: np.column_stack(columns) for name, columns in _grouped(table).items()}
+    kept = {name: table[name] for name in others if name in table}
+    return Recording(file, time, groups, None if found is None else found.astype(bool), kept)
+
+
+def check_numbers(recording: Recording) -> None:
+    """What the reader of files has seen to, for a recording that was made in memory. Raises InputError."""
+    check_times(recording.path, recording.time)
+    for name, values in recording.groups.items():
+        wrong = np.argwhere(~(np.abs(values) <= LARGEST))
+        if len(wrong):
+            row, column = wrong[0]
+            what = f"at most {LARGEST:g}" if np.isfinite(values[row, column]) else "a finite number"
+            raise InputError(
+                f"{recording.path}: column {name}[{column + 1}], row {row + 1}: {values[row, column]:g}; "
+                f"expected {what}"
+            )
+    if np.abs(recording.time).max(initial=0.0) > LATEST:
+        raise InputError(f"{recording.path}: column time: {recording.time[-1]:g} s; expected at most {LATEST:g} s")
+
+
+def check_times(file: Path, time: NDArray[np.float64]) -> None:
+    """Raises InputError unless times [N] increase strictly."""
+    late = np.flatnonzero(~(np.diff(time) > 0))
+    if late.size:
+        row = int(late[0]) + 2
+        raise InputError(
+            f"{file}: column time, row {row}: {float(time[row - 1])!r} s after {float(time[row - 2])!r} s; "
+            "expected increasing times"
+        )
+
+
+def _grouped(table: Mapping[str, NDArray[np.float64]]) -> dict[str, list[NDArray[np.float64]]]:
+    """Columns of each group in the order of their index."""
+    found: dict[str, dict[int, NDArray[np.float64]]] = {}
+    for name, column in table.items():
+        if match := _ELEMENT.fullmatch(name):
+            found.setdefault(match[1], {})[int(match[2])] = column
+    return {name: [columns[i] for i in sorted(columns)] for name, columns in found.items()}
+
+
+def _check_columns(file: Path, names: list[str], known: Collection[str]) -> None:
+    """Every column known, none missing, no gap in a group. known: columns beside time and the groups."""
+    for separator in ";\t":
+        if len(names) == 1 and separator in names[0]:
+            raise InputError(f"{file}: columns separated by {separator!r}; expected commas, and points in numbers")
+    if "time" not in names:
+        raise InputError(f"{file}: no column time; expected the time of every sample in s")
+    counts: dict[str, set[int]] = {name: set() for name in GROUPS}
+    for name in names:
+        match = _ELEMENT.fullmatch(name)
+        if match and match[1] in GROUPS:
+            counts[match[1]].add(int(match[2]))
+        elif name != "time" and name not in known:
+            groups = ", ".join(f"{group}[i]" for group in GROUPS)
+            raise InputError(f"{file}: unknown column {name!r}; expected time, {groups} or {LABEL}")
+    for name, indices in counts.items():
+        if not indices and GROUPS[name][1]:
+            raise InputError(f"{file}: no column {name}[1]; expected one {name}[i] per tendon, in {GROUPS[name][0]}")
+        for i in range(1, len(indices) + 1):
+            if i not in indices:
+                raise InputError(f"{file}: no column {name}[{i}], but {name}[{max(indices)}]; expected all from 1 on")
+    _check_sizes(file, {name: len(indices) for name, indices in counts.items() if indices})
+
+
+def _check_sizes(file: Path, sizes: Mapping[str, int]) -> None:
+    """As many columns in every group of the tendons, and in every group of the joints."""
+    first: dict[str, str] = {}
+    for name, size in sizes.items():
+        other = first.setdefault(GROUP_PER[name], name)
+        if size != sizes[other]:
+            raise InputError(f"{file}: {size} columns {name}[...], expected {sizes[other]} as of {other}[...]")

@@ -1,0 +1,274 @@
+"""What a finger leaves of the torque of a recording: residuals before the bias update, and what is random in them.
+
+T of eq. (10) and the jumps Δb of fig. 5 come from the C core; the bias filter of fig. 5 runs here,
+without contact detection, over the samples that it may learn from.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from statistics import NormalDist
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.model import native
+
+Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+LAGS = 20  # of the Ljung-Box test; even, so that the chi-square tail is a finite sum
+CONFIDENCE = 0.95
+_BLOCK, _SMALL = 64, 1e-30
+_NEVER = 1e9  # N·m; no contact threshold is ever passed
+_BIAS = {"noise_std": 0.01, "noise_std_per_force": 0.0, "drift_variance": 1e-6}  # defaults of the finger description
+
+
+@dataclass(frozen=True)
+class Model:
+    """A finger without bias filter over a recording, NaN (False) outside the parts.
+
+    torque: [N, n] T of eq. (10), N·m, less `delayed_torque`, so that measured τ − torque is what the bias sees. jump:
+    [N, n] Δb, N·m. joint_angle, joint_speed: [N, n] as used. slack: [N, m].
+    """
+
+    torque: Numbers
+    jump: Numbers
+    joint_angle: Numbers
+    joint_speed: Numbers
+    slack: Flags
+
+
+def model_alone(
+    data: Mapping[str, Any], arrays: Sequence[Mapping[str, Numbers]], parts: Sequence[slice], samples: int, source: int
+) -> Model:
+    """arrays: of `native.Finger.run`, one for each part; each begins anew. source: kinematics, 1 to 3."""
+    joints, tendons = len(data["joints"]), len(data["tendons"])
+    probe = native.Finger(native.image_from_json(json.dumps(_without_filter(data))), kinematics_source=source)
+    start = probe.save_state()
+    torque, jump, angle, speed = (np.full((samples, joints), np.nan) for _ in range(4))
+    slack = np.zeros((samples, tendons), dtype=bool)
+    for part, given in zip(parts, arrays, strict=True):
+        probe.restore_state(start)
+        found = probe.run(given)
+        bias = found["bias_torque"]
+        torque[part] = found["friction_torque"] - bias - delayed_torque(data, given, found["joint_torque"])
+        jump[part] = np.diff(bias, axis=0, prepend=bias[:1])
+        angle[part], speed[part] = found["joint_angle"], found["joint_speed"]
+        slack[part] = found["slack"]
+    return Model(torque, jump, angle, speed, slack)
+
+
+def delayed_torque(data: Mapping[str, Any], arrays: Mapping[str, Numbers], torque: Numbers) -> Numbers | float:
+    """[N, n] N·m: τ of the forces in use less that of the measured ones; 0 unless a `time_delay` below 0 delays forces.
+
+    torque: [N, n] τ in use.
+    """
+    rows = data.get("extensions") or []
+    if not any(row["effect"] == "time_delay" and row["delay"] < 0 for row in rows):
+        return 0.0
+    arms = np.array([tendon["moment_arms"] for tendon in data["tendons"]], dtype=float)
+    return np.asarray(torque - arrays["tendon_force"] @ arms)
+
+
+def _without_filter(data: Mapping[str, Any]) -> dict[str, Any]:
+    """The description whose bias moves by the jumps alone, and that never sees contact."""
+    bias = {key: value for key, value in (data.get("bias") or {}).items() if key in ("forget_rate", "entry_load")}
+    still = {**bias, "drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": [0.0] * len(data["joints"])}
+    never = {"threshold": [_NEVER] * len(data["joints"])}
+    return {**data, "bias": still, "contact": never, "sensor_fault": None}
+
+
+# --- the bias filter --------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """residual: [N, n] r before the bias update, N·m, NaN for the first sample of a part and outside the parts.
+    variance: [N] S of it, (N·m)². bias: [N, n] b before the update, N·m.
+    """
+
+    residual: Numbers
+    variance: Numbers
+    bias: Numbers
+
+    @property
+    def standardised(self) -> Numbers:
+        """[N, n] r/√S."""
+        return np.asarray(self.residual / np.sqrt(self.variance)[:, None])
+
+
+@dataclass(frozen=True)
+class BiasSettings:
+    """Of a description, with the defaults: see docs/finger_description.md. initial_torque: [n] N·m or None."""
+
+    drift: float
+    noise: float
+    per_force: float
+    noise_time: float | None
+    initial_variance: float | None
+    initial_torque: Numbers | None
+
+
+def bias_settings(data: Mapping[str, Any]) -> BiasSettings:
+    given = data.get("bias") or {}
+    value = {key: default if given.get(key) is None else float(given[key]) for key, default in _BIAS.items()}
+    optional = {
+        key: None if given.get(key) is None else float(given[key]) for key in ("noise_time", "initial_variance")
+    }
+    torque = given.get("initial_torque")
+    return BiasSettings(
+        drift=value["drift_variance"],
+        noise=value["noise_std"],
+        per_force=value["noise_std_per_force"],
+        **optional,
+        initial_torque=None if torque is None else np.array(torque, dtype=float),
+    )
+
+
+def track(
+    settings: BiasSettings,
+    time: Numbers,
+    mean_force: Numbers,
+    remainder: Numbers,
+    jump: Numbers | None,
+    learns: Flags,
+    parts: Sequence[slice],
+) -> Residuals:
+    """Runs the bias filter over y − T.
+
+    time: [N] s. mean_force: [N] N. remainder: [N, n] y − T, N·m. jump: [N, n] Δb, None: none. learns: [N] samples that
+    update the bias. parts: begin anew each.
+    """
+    residual, bias = np.full_like(remainder, np.nan), np.full_like(remainder, np.nan)
+    variance = np.full(len(time), np.nan)
+    for whole in parts:
+        # the first sample that may be learned from starts the bias, unless the description says where it starts
+        late = 0 if settings.initial_torque is not None else int(np.argmax(learns[whole]))
+        if settings.initial_torque is None and not learns[whole].any():
+            continue
+        part = slice(whole.start + late, whole.stop)
+        gain, variance[part] = _gains(settings, time[part], mean_force[part], learns[part])
+        moved = np.zeros_like(remainder[part]) if jump is None else jump[part]
+        first = remainder[part][0] if settings.initial_torque is None else settings.initial_torque
+        bias[part] = _filter(remainder[part], moved, gain, first)
+        residual[part] = remainder[part] - bias[part]
+        residual[part.start] = np.nan
+    return Residuals(residual, variance, bias)
+
+
+def _gains(settings: BiasSettings, time: Numbers, mean_force: Numbers, learns: Flags) -> tuple[Numbers, Numbers]:
+    """K [N], 0 where nothing is learned, and S [N] (NaN for the first sample)."""
+    step = np.diff(time, prepend=time[0])
+    spread = (settings.noise + settings.per_force * mean_force) ** 2
+    known = float(spread[0]) if settings.initial_variance is None else settings.initial_variance
+    if settings.noise_time is not None:
+        spread = spread * settings.noise_time / np.maximum(step, 1e-300)
+    gains, total = [0.0], np.full(len(time), np.nan)
+    rows = zip((settings.drift * step).tolist()[1:], spread.tolist()[1:], learns.tolist()[1:], strict=True)
+    for k, (drift, noise, learn) in enumerate(rows, start=1):
+        known += drift
+        total[k] = known + noise
+        gain = known / (known + noise) if learn and known + noise > 0 else 0.0
+        known *= 1 - gain
+        gains.append(gain)
+    return np.array(gains), total
+
+
+def _filter(remainder: Numbers, jump: Numbers, gain: Numbers, first: Numbers) -> Numbers:
+    """[N, n] b before each update: s_k = (1 − K_k)(s_k−1 + Δb_k) + K_k (y − T)_k, b_k = s_k−1 + Δb_k, s_0 = first.
+
+    In blocks, s = A (s_before + Σ c/A) with A the running product of 1 − K: exact but for rounding, while A is far from
+    underflow; blocks of an eager filter, whose A is not, are walked through.
+    """
+    after = np.empty_like(remainder)
+    keep = 1 - gain[:, None]
+    forced = keep * jump + gain[:, None] * remainder
+    after[0] = state = first
+    for begin in range(1, len(remainder), _BLOCK):
+        rows = slice(begin, begin + _BLOCK)
+        product = np.cumprod(keep[rows], axis=0)
+        if product[-1, 0] > _SMALL:
+            after[rows] = product * (state + np.cumsum(forced[rows] / product, axis=0))
+        else:
+            for k in range(*rows.indices(len(remainder))):
+                after[k] = state = keep[k] * state + forced[k]
+        state = after[rows][-1]
+    before = np.empty_like(after)
+    before[0], before[1:] = first, after[:-1] + jump[1:]
+    return before
+
+
+# --- what is random in them -------------------------------------------------------------------------------------------
+
+
+def rms(values: Numbers, chosen: Flags) -> list[float]:
+    """[n] root mean square of the chosen rows, NaN left out; NaN where there are none."""
+    picked = values[chosen]
+    picked = picked[~np.isnan(picked).any(axis=1)]
+    if not len(picked):
+        return [math.nan] * values.shape[1]
+    return [float(value) for value in np.sqrt(np.mean(picked**2, axis=0))]
+
+
+def consistency(standardised: Sequence[Numbers], share: float = 1.0) -> dict[str, Any]:
+    """NIS: the mean of the squared standardised innovations, 1 for a consistent filter, and its chi-square interval.
+
+    standardised: [N, n] each, NaN where not used. share: independent ones among them, above 0, at most 1. Quantiles of
+    χ²_k by Wilson and Hilferty (1931), within 1e-3 of the interval's width from 30 innovations on.
+    """
+    values = np.concatenate([each[~np.isnan(each)] for each in standardised])
+    if not len(values):
+        return {"mean": math.nan, "interval": [math.nan, math.nan], "consistent": False}
+    mean = float(np.mean(values**2))
+    count = max(share * len(values), 1.0)
+    low, high = (_mean_chi_square(count, p) for p in ((1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2))
+    return {"mean": mean, "interval": [low, high], "consistent": bool(low <= mean <= high)}
+
+
+def _mean_chi_square(count: float, probability: float) -> float:
+    """Quantile of χ²_count/count."""
+    part = 2 / (9 * count)
+    return float((1 - part + NormalDist().inv_cdf(probability) * math.sqrt(part)) ** 3)
+
+
+def whiteness(standardised: Sequence[Numbers]) -> dict[str, list[float]]:
+    """Per joint: autocorrelation at lag one, and p of the Ljung-Box test over `LAGS` lags.
+
+    standardised: [N, n] each, NaN where not used: pairs across those do not count.
+    """
+    joints = standardised[0].shape[1]
+    lag_one, p_value = [], []
+    for j in range(joints):
+        series = [each[:, j] for each in standardised]
+        power = sum(float(np.nansum(each**2)) for each in series)
+        count = sum(int(np.sum(~np.isnan(each))) for each in series)
+        if count <= LAGS + 1 or not power:
+            lag_one.append(math.nan)
+            p_value.append(math.nan)
+            continue
+        found = [_lagged(series, lag) / power for lag in range(1, LAGS + 1)]
+        statistic = count * (count + 2) * sum(r * r / (count - lag) for lag, r in enumerate(found, start=1))
+        lag_one.append(found[0])
+        p_value.append(chi_square_tail(statistic, LAGS))
+    return {"lag_one": lag_one, "ljung_box_p": p_value}
+
+
+def _lagged(series: Sequence[Numbers], lag: int) -> float:
+    return sum(float(np.nansum(each[lag:] * each[:-lag])) for each in series if len(each) > lag)
+
+
+def chi_square_tail(value: float, degrees: int) -> float:
+    """P(χ²_degrees > value) for an even number of degrees: exp(−x) Σ x^i/i!, x = value/2 (exact)."""
+    half = value / 2
+    return float(sum(_poisson_terms(half, degrees // 2)))
+
+
+def _poisson_terms(rate: float, count: int) -> Iterator[float]:
+    for k in range(count):
+        log = -rate + (k * math.log(rate) if rate > 0 else 0.0 if k == 0 else -math.inf) - math.lgamma(k + 1)
+        yield math.exp(log) if log > -745 else 0.0

@@ -1,0 +1,162 @@
+"""How noisy a recording's joint positions and joint torques are: what `position_filter.noise` of the description needs.
+
+The noise is what a sample has beside the smooth curve through its neighbours. A cubic through the two samples before
+and the two after predicts each sample, at their true times; what is left is noise, as long as the motion is slow
+against four samples. Of many short blocks the median counts, so that impacts and stick-slip do not. Quantisation counts
+too: a signal in steps of width d has at least the standard deviation d/√12 of its rounding, also where it rests.
+
+Noise is taken as white: a sensor with a low-pass of its own appears quieter than it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.errors import InputError
+from tendonfmu.model.balance import moment_arms
+from tendonfmu.recordings.prepared import FitRecording
+from tendonfmu.recordings.recording import Recording
+
+Numbers = NDArray[np.float64]
+
+NEIGHBOURS = (-2, -1, 1, 2)  # samples of the cubic
+BLOCK = 40  # samples
+FEWEST = 60  # samples: less says nothing
+GAP = 3.0  # times the median step: no cubic across a longer one
+LEAST = 1e-6  # rad, the least that the description takes
+GRID = 1e-3  # of a step: how well differences must fit to be multiples of it
+MOST_LEVELS = 0.5  # of the samples may differ where values come in steps
+
+
+def joint_position_noise(data: Mapping[str, Any], recording: Recording | FitRecording, kinematics: int = 1) -> Numbers:
+    """Standard deviation of the noise of the joint angles in one sample.
+
+    Parameters
+    ----------
+    data: a valid finger description.
+    recording: `Recording` or `FitRecording`; a `FitRecording` has its own kinematics.
+    kinematics: 1: angles from tendon positions and forces; 2, 3: measured joint positions.
+
+    Returns
+    -------
+    [n] rad, at least 1e-6, as `position_filter.noise` takes it.
+
+    Raises
+    ------
+    InputError: the recording has no such columns, or fewer than 60 samples without a gap.
+    """
+    if isinstance(recording, FitRecording):
+        kinematics = recording.kinematics
+        recording = recording.recording
+    joints, tendons = len(data["joints"]), len(data["tendons"])
+    if kinematics != 1:
+        recording.require(joints, tendons, ("joint_position",))
+        angles = recording.groups["joint_position"]
+        floor = _rounding(angles)
+    else:
+        recording.require(joints, tendons, ("tendon_force", "tendon_position"))
+        force, position = recording.groups["tendon_force"], recording.groups["tendon_position"]
+        compliance = np.array([1.0 / tendon["stiffness"] for tendon in data["tendons"]])
+        routing = np.linalg.pinv(moment_arms(data))  # R⁺, [n, m]
+        angles = (position - force * compliance) @ routing.T
+        floor = np.sqrt(routing**2 @ (_rounding(position) ** 2 + (_rounding(force) * compliance) ** 2))
+    return np.asarray(np.maximum(np.maximum(white_noise(recording.time, angles), floor), LEAST))
+
+
+def joint_torque_noise(data: Mapping[str, Any], recording: Recording | FitRecording) -> Numbers:
+    """Standard deviation of the noise of the joint torques τ = Rᵀ f0 in one sample.
+
+    Parameters
+    ----------
+    data: a valid finger description.
+    recording: `Recording` or `FitRecording`.
+
+    Returns
+    -------
+    [n] N·m.
+
+    Raises
+    ------
+    InputError: the recording does not fit the finger, or has fewer than 60 samples without a gap.
+    """
+    if isinstance(recording, FitRecording):
+        recording = recording.recording
+    recording.require(len(data["joints"]), len(data["tendons"]), ("tendon_force",))
+    arms, force = moment_arms(data), recording.groups["tendon_force"]
+    floor = np.sqrt((arms**2).T @ _rounding(force) ** 2)
+    return np.asarray(np.maximum(white_noise(recording.time, force @ arms), floor))
+
+
+def white_noise(time: Numbers, values: Numbers) -> Numbers:
+    """Standard deviation of what each column has beside the smooth curve through its neighbours.
+
+    Parameters
+    ----------
+    time: [N] s, strictly increasing; steps may vary.
+    values: [N, c].
+
+    Returns
+    -------
+    [c], in the unit of the values.
+
+    Raises
+    ------
+    InputError: fewer than 60 samples without a gap.
+    """
+    reach = max(NEIGHBOURS)
+    if len(time) < FEWEST:
+        raise InputError(f"recording of {len(time)} samples: expected at least {FEWEST} to estimate noise from")
+    at = np.arange(reach, len(time) - reach)
+    distance = np.stack([time[at + offset] - time[at] for offset in NEIGHBOURS])  # [4, K]
+    weights = np.stack([_lagrange(distance, k) for k in range(len(NEIGHBOURS))])
+    left = values[at].astype(float)
+    for weight, offset in zip(weights, NEIGHBOURS, strict=True):
+        left = left - weight[:, None] * values[at + offset]
+    left /= np.sqrt(1.0 + (weights**2).sum(axis=0))[:, None]
+    steps = np.diff(time)
+    whole = np.lib.stride_tricks.sliding_window_view(steps, 2 * reach).max(axis=1) <= GAP * np.median(steps)
+    left = left[whole]
+    if len(left) < FEWEST - 2 * reach:
+        raise InputError(f"recording of {len(left)} samples without a gap: expected at least {FEWEST - 2 * reach}")
+    blocks = [left[begin : begin + BLOCK] for begin in range(0, len(left) - BLOCK + 1, BLOCK)] or [left]
+    variance = np.stack([(block**2).mean(axis=0) for block in blocks])
+    return np.array([_of_blocks(column) for column in variance.T])
+
+
+def _lagrange(distance: Numbers, k: int) -> Numbers:
+    """[K] weight of neighbour k in the cubic's value at distance 0."""
+    weight = np.ones(distance.shape[1])
+    for other in range(len(distance)):
+        if other != k:
+            weight *= distance[other] / (distance[other] - distance[k])
+    return weight
+
+
+def _of_blocks(variance: Numbers) -> float:
+    """From the variances of blocks: blocks in which nothing changes say nothing of a quantised signal."""
+    changing = variance[variance > 0.0]
+    return float(np.sqrt(np.median(changing))) if len(changing) else 0.0
+
+
+def _rounding(values: Numbers) -> Numbers:
+    """[c] standard deviation of the rounding of columns whose values come in equal steps; else 0."""
+    return np.asarray(np.array([value_step(column) for column in values.T]) / np.sqrt(12.0))
+
+
+def value_step(column: Numbers) -> float:
+    """Width of the equal steps in which a column's [N] values come, in its unit; 0 if they come in none."""
+    levels = np.unique(column)
+    if len(levels) < 2 or len(levels) > MOST_LEVELS * len(column):
+        return 0.0
+    steps = np.diff(levels)
+    # equal values may differ by rounding of the file
+    steps = steps[steps > 1e-9 * np.abs(levels).max()]
+    if not len(steps):
+        return 0.0
+    step = float(np.median(steps[steps <= 1.5 * steps.min()]))
+    multiples = steps / step
+    return step if np.abs(multiples - np.round(multiples)).max() <= GRID * max(1.0, multiples.max()) else 0.0

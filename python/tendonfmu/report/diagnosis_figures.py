@@ -1,0 +1,218 @@
+"""What the figures of a diagnosis show: sheets of panels (`drawing/sheet.py`), ready to be drawn."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.diagnose.result import Cause, Diagnosis, Evidence, ResidualView
+from tendonfmu.drawing.sheet import Band, Bars, Curve, Dots, Panel, Sheet
+from tendonfmu.report.diagnosis_text import Names, at_place, names_of, unit_of
+from tendonfmu.report.diagnosis_words import Words, words_of
+
+Numbers = NDArray[np.float64]
+TWO_SIDED = 1.96  # standard errors of a 95 % interval
+_TITLES = {
+    "time": "Over time",
+    "angle": "Over the joint angle",
+    "velocity": "Over the joint velocity",
+    "tendon_force": "Over the tendon force",
+    "load": "Over the load",
+    "travel": "Over the travel since reversal",
+    "spectrum": "Spectrum",
+    "autocorrelation": "Autocorrelation",
+}
+_BINNED = ("angle", "velocity", "tendon_force", "load", "travel")
+_STYLES = ("before", "after")
+_CAUSE_KEYS = (("before_dots", "without it"), ("after_dots", "with it"), ("after", "95 % interval of the mean"))
+_CHANGE_KEYS = (
+    ("reference_dots", "then, in the reference"),
+    ("before_dots", "now"),
+    ("after_dots", "now, with the change in the model"),
+    ("after", "95 % interval of the mean"),
+)
+_ROOM = 3.0  # times the largest mean: more of the scatter within bins would hide the means
+
+
+def diagnosis_sheets(found: Diagnosis) -> list[Sheet]:
+    """The evidence for each cause, then the residual at each joint."""
+    names = names_of(found)
+    return [
+        *(_cause_sheet(found, names, k, cause) for k, cause in enumerate(found.causes, start=1) if cause.evidence),
+        *(_joint_sheet(found, names, j, views) for j, views in _by_joint(found.views)),
+    ]
+
+
+# --- evidence for a cause ---------------------------------------------------------------------------------------------
+
+
+def _cause_sheet(found: Diagnosis, names: Names, number: int, cause: Cause) -> Sheet:
+    factor, unit = unit_of(found)
+    panels = tuple(_evidence_panel(each, names, factor, unit) for each in cause.evidence)
+    return Sheet(
+        section=f"cause_{number}",
+        name=f"cause_{number}",
+        title=f"{number}. {at_place(cause.title[:1].upper() + cause.title[1:], cause.where, names)}",
+        caption="",
+        keys=_CHANGE_KEYS if cause.changed else _CAUSE_KEYS,
+        panels=(*_same_scale(panels), *_by_recording(found, cause)),
+    )
+
+
+def _by_recording(found: Diagnosis, cause: Cause) -> Iterator[Panel]:
+    """How large a change is in each of several new recordings."""
+    changed = cause.changed
+    if changed is None or not changed.by:
+        return
+    factor, told = (100.0, "%") if changed.unit in ("", "1") else (1.0, changed.unit.replace(".", "·"))
+    x = np.arange(1.0, len(changed.by) + 1.0)
+    value, low, high = (
+        factor * np.array([getattr(each, end) for each in changed.by]) for end in ("value", "low", "high")
+    )
+    then = np.full(2, factor * changed.reference.value)
+    yield Panel(
+        title="In each of the new recordings",
+        alt=f"Size of this change in each of {len(changed.by)} new recordings, in their order",
+        x_label="new recording, in the order given",
+        y_label=f"{changed.number.replace('_', ' ')} ({told})",
+        curves=(Curve("after_line", x, value), Curve("start", np.array([1.0, x[-1]]), then)),
+        bars=(Bars("after", x, low, high),),
+        dots=(Dots("after_dots", x, value),),
+        ticks=tuple((float(k), str(int(k))) for k in x) if len(x) <= 12 else (),
+    )
+
+
+def _evidence_panel(found: Evidence, names: Names, factor: float, unit: str) -> Panel:
+    shown = [("before", found.before, found.before_std), ("after", found.after, found.after_std)]
+    if found.reference is not None and found.reference_std is not None:
+        shown.append(("reference", found.reference, found.reference_std))
+    x, x_unit = (factor * found.coordinate, unit) if found.unit == "N·m" else (found.coordinate, found.unit)
+    return Panel(
+        title=f"Residual at {names.joint(found.joint)}",
+        alt=f"Mean residual at {names.joint(found.joint)} over {found.label}, without and with this in the model",
+        x_label=f"{found.label} ({x_unit})",
+        y_label=f"residual ({unit})",
+        curves=tuple(Curve(f"{style}_line", x, factor * mean) for style, mean, _ in shown),
+        bars=tuple(
+            Bars(style, x, factor * (mean - TWO_SIDED * std), factor * (mean + TWO_SIDED * std))
+            for style, mean, std in shown
+        ),
+        dots=tuple(Dots(f"{style}_dots", x, factor * mean) for style, mean, _ in shown),
+        near_x=_near(found.coordinate) if found.label.startswith("travel") else 0.0,
+    )
+
+
+def _near(travel: Numbers) -> float:
+    """What happens after a reversal happens within a small part of the travel: there the axis is stretched."""
+    size = np.abs(travel[np.isfinite(travel)])
+    return float(np.quantile(size, 0.25)) if len(size) else 0.0
+
+
+def _same_scale(panels: Sequence[Panel]) -> tuple[Panel, ...]:
+    """Panels to be compared: all with the limits of the widest."""
+    ends = [end for panel in panels for bars in panel.bars for end in (*bars.low, *bars.high) if math.isfinite(end)]
+    if not ends:
+        return tuple(panels)
+    margin = 0.06 * (max(ends) - min(ends)) or 1.0
+    limits = (min(ends) - margin, max(ends) + margin)
+    return tuple(replace(panel, y_limits=limits) for panel in panels)
+
+
+# --- the residual of a joint ------------------------------------------------------------------------------------------
+
+
+def _by_joint(views: Sequence[ResidualView]) -> Iterator[tuple[int, list[ResidualView]]]:
+    for joint in sorted({view.joint for view in views}):
+        yield (
+            joint,
+            sorted(
+                (view for view in views if view.joint == joint and np.isfinite(view.before).any()),
+                key=lambda view: _order(view.kind),
+            ),
+        )
+
+
+def _order(kind: str) -> int:
+    return list(_TITLES).index(kind) if kind in _TITLES else len(_TITLES)
+
+
+def _joint_sheet(found: Diagnosis, names: Names, joint: int, views: Sequence[ResidualView]) -> Sheet:
+    factor, unit = unit_of(found)
+    if not found.causes:  # the extended model is the nominal one
+        views = [replace(view, after=np.full_like(view.after, math.nan)) for view in views]
+    limits = _shared_limits([view for view in views if view.kind in _BINNED], factor)
+    return Sheet(
+        section="views",
+        name=f"residual_{joint}",
+        title=f"Residual at {names.joint(joint)}",
+        caption="",
+        keys=(
+            *(_before_after(found) if found.causes else _before_after(found)[:1]),
+            ("before_scatter", f"scatter within a bin, {words_of(found.kind).nominal}"),
+        ),
+        panels=tuple(_view_panel(view, names, factor, unit, limits, words_of(found.kind)) for view in views),
+    )
+
+
+def _before_after(found: Diagnosis) -> tuple[tuple[str, str], ...]:
+    words = words_of(found.kind)
+    return ("before", words.refitted), ("after", words.extended)
+
+
+def _shared_limits(views: Sequence[ResidualView], factor: float) -> tuple[float, float] | None:
+    """Of all binned views of a joint, so that they can be compared: the means, and of the scatter what fits."""
+    means = [value for view in views for value in (*view.before, *view.after) if math.isfinite(value)]
+    if not means:
+        return None
+    mean = max(abs(value) for value in means)
+    ends = [(view.before, view.before_std) for view in views if view.before_std is not None]
+    wide = max((float(np.nanmax(np.abs(m) + s, initial=0.0)) for m, s in ends), default=0.0)
+    largest = factor * max(mean, min(wide, _ROOM * mean))
+    return (-1.12 * largest, 1.12 * largest) if largest > 0 else None
+
+
+def _view_panel(
+    view: ResidualView, names: Names, factor: float, unit: str, limits: tuple[float, float] | None, words: Words
+) -> Panel:
+    title = _TITLES.get(view.kind, f"Over {view.label}")
+    models = f"of the {words.nominal} and of the {words.extended}"
+    panel = Panel(
+        title=title,
+        alt=f"Residual at {names.joint(view.joint)}, {title.lower()}, {models}",
+        x_label=f"{view.label} ({view.unit})" if view.unit not in ("", "1") else view.label,
+        y_label=f"residual ({unit})",
+    )
+    if view.unit == "N·m":  # all torques in one unit
+        view = replace(view, x=factor * view.x, unit=unit)
+        panel = replace(panel, x_label=f"{view.label} ({unit})")
+    if view.kind == "spectrum":
+        return _spectrum(panel, view, factor, unit)
+    if view.kind == "autocorrelation":
+        curves = (Curve("start", view.x, np.zeros_like(view.x)), *_curves(view, 1.0))
+        return replace(panel, y_label="", curves=curves, y_limits=(min(-0.25, 1.1 * _least(view)), 1.05))
+    if view.kind not in _BINNED:
+        return replace(panel, curves=_curves(view, factor))
+    bands: tuple[Band, ...] = ()
+    if view.before_std is not None:
+        low, high = view.before - view.before_std, view.before + view.before_std
+        bands = (Band("before_scatter", view.x, factor * low, factor * high),)
+    near = _near(view.x) if view.kind == "travel" else 0.0
+    return replace(panel, bands=bands, curves=_curves(view, factor), y_limits=limits, near_x=near)
+
+
+def _spectrum(panel: Panel, view: ResidualView, factor: float, unit: str) -> Panel:
+    shown = view.x > 0
+    curves = tuple(replace(each, x=each.x[shown], y=each.y[shown]) for each in _curves(view, factor**2))
+    return replace(panel, y_label=f"power (({unit})²/Hz)", curves=curves, log_x=True, log_y=True)
+
+
+def _curves(view: ResidualView, factor: float) -> tuple[Curve, ...]:
+    return tuple(Curve(style, view.x, factor * getattr(view, style)) for style in _STYLES)
+
+
+def _least(view: ResidualView) -> float:
+    return float(np.nanmin([view.before, view.after]))

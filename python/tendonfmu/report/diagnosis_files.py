@@ -1,0 +1,119 @@
+"""The files of a diagnosis: a folder that holds all of them, or is as it was before."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from tendonfmu.diagnose.result import Diagnosis
+from tendonfmu.errors import InputError, own_fault
+from tendonfmu.estimate.files import description_text
+from tendonfmu.files.whole_file import check_output, check_output_folder, is_about, write_text
+from tendonfmu.fmu.packaging import build_fmu
+from tendonfmu.report.diagnosis_page import PAGE, write_diagnosis_page
+from tendonfmu.report.diagnosis_report import EXTENDED, EXTENDED_FMU, NOMINAL, REPORT, build_report, report_text
+from tendonfmu.tasks.interruption import uninterrupted
+
+_SUFFIXES = (".html", ".json", ".fmu", ".png")  # figures of the versions that wrote them beside the page
+_NAMED = (REPORT, EXTENDED, EXTENDED_FMU, PAGE, NOMINAL)
+
+
+def check_folder(folder: Path, inputs: Sequence[Path]) -> None:
+    """Raises InputError where the folder cannot be, or a result would take the place of an input."""
+    check_output_folder(folder)
+    if folder.is_dir():
+        for name in _NAMED:
+            check_output(folder / name, *inputs)
+
+
+def write_diagnosis(found: Diagnosis, folder: Path) -> dict[Path, str]:
+    """Writes report, both descriptions, the FMU and the page. Returns file -> what is in it, in order of use.
+
+    Everything is made beside the folder and then moved into it, at once also for Ctrl-C; files that an earlier
+    diagnosis left there are removed. Raises InputError where nothing can be written: the folder is then as before.
+    """
+    beside = folder.absolute().parent
+    try:
+        beside.mkdir(parents=True, exist_ok=True)
+        with _folder_beside(folder) as made_in:
+            (made_in / "new").mkdir()
+            with own_fault("the files of the diagnosis"):
+                made = _make(found, made_in / "new")
+            with uninterrupted():
+                _move(made, folder, made_in / "old")
+    except OSError as error:
+        if not is_about(error, beside):
+            raise
+        raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from None
+    return {folder / file.name: what for file, what in made.items()}
+
+
+@contextmanager
+def _folder_beside(folder: Path) -> Iterator[Path]:
+    """A temporary folder on the same disk, whose removal is not interrupted."""
+    name = tempfile.mkdtemp(dir=folder.absolute().parent, prefix=f".{folder.absolute().name}-")
+    try:
+        yield Path(name)
+    finally:
+        with uninterrupted():
+            shutil.rmtree(name, ignore_errors=True)
+
+
+def _move(files: Iterable[Path], folder: Path, old: Path) -> None:
+    """Moves files into a folder, the report last, and takes those of an earlier diagnosis out; on an error, back.
+
+    old: folder to be made for what was there before.
+    """
+    is_new = not folder.exists()
+    folder.mkdir(exist_ok=True)
+    old.mkdir()
+    moved: list[tuple[Path, Path]] = []
+    ordered = sorted(files, key=lambda file: file.name == REPORT)
+    names = {*_earlier(folder), *(file.name for file in ordered)}
+    leaving = [(folder / name, old / name) for name in sorted(names) if (folder / name).is_file()]
+    try:
+        for source, target in (*leaving, *((file, folder / file.name) for file in ordered)):
+            os.replace(source, target)
+            moved.append((source, target))
+    except BaseException:
+        for source, target in reversed(moved):
+            os.replace(target, source)
+        if is_new:
+            folder.rmdir()
+        raise
+
+
+def _make(found: Diagnosis, folder: Path) -> dict[Path, str]:
+    """All files, in a folder of their own."""
+    page = write_diagnosis_page(found, folder)
+    causes = len(found.causes)
+    added = "nothing added" if causes == 0 else "its cause" if causes == 1 else f"its {causes} causes"
+    for name, data in ((NOMINAL, found.nominal_data), (EXTENDED, found.extended_data)):
+        write_text(folder / name, description_text(dict(data)))
+    build_fmu(folder / EXTENDED, folder / EXTENDED_FMU, illustrated=False)  # a drawing takes longer than all the rest
+    files = {
+        folder / PAGE: page.pop(folder / PAGE),
+        folder / REPORT: "the same numbers",
+        folder / EXTENDED: f"the finger with {added}, fitted",
+        folder / EXTENDED_FMU: "the same as an FMU",
+        folder / NOMINAL: "the given structure, fitted",
+        **page,
+    }
+    write_text(folder / REPORT, report_text(build_report(found, [file.name for file in files])))
+    return files
+
+
+def _earlier(folder: Path) -> list[str]:
+    """Names of what the report of an earlier diagnosis lists, and nothing else: also figures of causes that are no
+    more."""
+    try:
+        listed = json.loads((folder / REPORT).read_bytes())["files"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return []
+    texts = [name for name in listed if isinstance(name, str)] if isinstance(listed, list) else []
+    return [name for name in texts if Path(name).name == name and Path(name).suffix in _SUFFIXES]

@@ -1,0 +1,293 @@
+"""The page of a diagnosis: one HTML file with its figures in it that needs nothing else.
+
+Without scripts and without anything from elsewhere; every text is escaped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from markupsafe import Markup
+
+from tendonfmu.diagnose.effects.friction_law_places import thresholds
+from tendonfmu.diagnose.reported_causes import CONTACT, UNKNOWN, reported_causes
+from tendonfmu.diagnose.result import Cause, DetectionGain, Diagnosis
+from tendonfmu.diagnose.size import count_of, size_at
+from tendonfmu.drawing.sheet import Panel, Sheet
+from tendonfmu.drawing.svg import panel_svg
+from tendonfmu.files.whole_file import whole_file
+from tendonfmu.report.diagnosis_figures import diagnosis_sheets
+from tendonfmu.report.diagnosis_text import (
+    Names,
+    at_place,
+    change_rows,
+    confusion_sentence,
+    error_rows,
+    error_sentence,
+    headline,
+    hidden_sentences,
+    left_of,
+    left_sentence,
+    names_of,
+    next_sentence,
+    parameter_rows,
+    percent,
+    percent_interval,
+    place_rows,
+    probability,
+    tested_sentence,
+    title_of,
+    together,
+    too_small_sentence,
+    unit_of,
+    unseen,
+)
+from tendonfmu.report.diagnosis_waterfall import waterfall_of
+from tendonfmu.report.diagnosis_words import words_of
+from tendonfmu.report.fit_page import keys_of, render
+from tendonfmu.report.fit_summary import rounded
+
+PAGE = "diagnosis.html"
+_MOST = 4  # pairs that are listed
+_LONG = 90  # letters of a size that is a sentence
+_TONES = {"adequate": "good", "explained": "good", "partly explained": "", "unexplained": "bad"}
+
+
+@dataclass(frozen=True)
+class Tile:
+    """A figure that matters, and what it is."""
+
+    value: str
+    unit: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class DrawnSheet:
+    """A sheet as the page shows it. keys: (CSS class, CSS colour, opacity, meaning). size: of its panels."""
+
+    sheet: Sheet
+    keys: list[tuple[str, str, float, str]]
+    size: str
+    drawings: list[Markup]
+
+
+def write_diagnosis_page(found: Diagnosis, folder: Path) -> dict[Path, str]:
+    """Writes `diagnosis.html` into a folder that exists.
+
+    Returns file -> what is in it. It appears whole or not at all. Raises InputError where it cannot be written.
+    """
+    page = folder / PAGE
+    text = diagnosis_page(found)
+    with whole_file(page) as partial:
+        partial.write_text(text, encoding="utf-8")
+    return {page: "all of it, to be read in a browser"}
+
+
+def diagnosis_page(found: Diagnosis) -> str:
+    """HTML text of the page."""
+    names, (factor, unit) = names_of(found), unit_of(found)
+    return render(
+        "diagnosis.html.jinja",
+        found=found,
+        words=words_of(found.kind),
+        unit=unit,
+        first=_first_screen(found, names),
+        fall=waterfall_of(found, names),
+        cards=cards_of(found, names),
+        too_small=_too_small(found, names),
+        errors=_errors(found, names, factor),
+        events=_events(found, names, factor),
+        detection=None if found.detection is None else _detection(found.detection, factor, unit),
+        method=list(_method(found)),
+        invisible=[
+            (each.title, names.place(each.where) or "everywhere", percent(each.surviving_share), each.experiment)
+            for each in found.invisible
+        ],
+        figures=drawn_sheets(found),
+    )
+
+
+def drawn_sheets(found: Diagnosis) -> dict[str, list[DrawnSheet]]:
+    """Section -> its figures: "cause_1" and so on, and "views"."""
+    figures: dict[str, list[DrawnSheet]] = {}
+    for sheet in diagnosis_sheets(found):
+        figures.setdefault(sheet.section, []).append(_drawn(sheet))
+    return figures
+
+
+def _drawn(sheet: Sheet) -> DrawnSheet:
+    panels = [panel for panel in sheet.panels if isinstance(panel, Panel)]
+    return DrawnSheet(
+        sheet, keys_of(sheet), panels[0].size if panels else "small", [panel_svg(each) for each in panels]
+    )
+
+
+# --- the first screen -------------------------------------------------------------------------------------------------
+
+
+def _first_screen(found: Diagnosis, names: Names) -> dict[str, Any]:
+    return {
+        "tone": _TONES[found.verdict],
+        "headline": headline(found),
+        "error": error_sentence(found),
+        "left": left_sentence(found),
+        "tiles": list(_tiles(found)),
+        "untold": list(_untold(found, names)),
+        "next": next_sentence(found),
+        "experiment": list(_experiment(found, names)),
+    }
+
+
+def _tiles(found: Diagnosis) -> Iterator[Tile]:
+    words, (factor, unit) = words_of(found.kind), unit_of(found)
+    before, after = (rounded(factor * together(each.test_rms)) for each in (found.nominal, found.extended))
+    data = "held-out parts" if found.held_out else "unseen data"
+    if found.causes:
+        yield Tile(
+            f"{before} → {after}",
+            unit,
+            f"error on {data}, all joints, with the {words.nominal} and the {words.extended}",
+        )
+        low, high = percent(found.gain.low).split("\u00a0")[0], percent(found.gain.high)
+        yield Tile(percent(found.gain.value), "", f"less error, 95 % interval {low} to {high}")
+    else:
+        yield Tile(before, unit, f"error on {data}, all joints")
+    if left := left_of(found):
+        yield Tile(left.told(left.noise), unit, "of what is left is noise: nothing that was recorded predicts it")
+        if left.nameless > 0.0:
+            yield Tile(left.told(left.nameless), unit, f"of what is left {words.no_name}")
+
+
+def _untold(found: Diagnosis, names: Names) -> Iterator[str]:
+    for k, cause in enumerate(found.causes, start=1):
+        if text := confusion_sentence(cause, names):
+            yield f"Cause {k}, {at_place(cause.title, cause.where, names)}: {text[0].lower()}{text[1:]}"
+    yield from hidden_sentences(found, names)
+
+
+def _experiment(found: Diagnosis, names: Names) -> Iterator[str]:
+    plan = found.experiment
+    for one, other in plan.separates[:_MOST]:
+        first, second = (at_place(title_of(each.effect), each, names) for each in (one, other))
+        yield f"Tells apart: {first}; and {second}."
+    if len(plan.separates) > _MOST:
+        yield f"And {count_of(len(plan.separates) - _MOST, 'more pair')}."
+    if plan.makes_visible:
+        titles = dict.fromkeys(title_of(where.effect) for where in plan.makes_visible)
+        yield f"Makes visible: {'; '.join(titles)}."
+    if plan.distance > 0:
+        yield f"Each of them then stands out by {plan.distance:.2g} times the noise or more."
+
+
+# --- tables -----------------------------------------------------------------------------------------------------------
+
+
+def cards_of(found: Diagnosis, names: Names) -> list[dict[str, Any]]:
+    """What a page tells of each cause; contact and unknown, which have no term in the model, come last."""
+    return [_card(found, cause, names) for cause in reported_causes(found)]
+
+
+def _card(found: Diagnosis, cause: Cause, names: Names) -> dict[str, Any]:
+    """certainty: of the cause, small. places: (joint, tendon, size) where the cause has numbers."""
+    certainty = f"p = {probability(cause.p_value)}".replace("= <", "<")
+    where = cause.where.effect
+    meaning = {
+        CONTACT: "less error about the level of now than about that of the reference"
+        if cause.changed
+        else "less error on the training recordings without these stretches",
+        UNKNOWN: "less error if what can be predicted were known",
+    }
+    others = "" if len(found.causes) < 2 else "; the other causes kept"
+    own = f"less error in means of 10 ms, the slow bias taken off{others}"
+    if found.kind == "change":
+        others = others.replace("causes", "changes")
+        own = f"less of what is left of the new recordings beside what is wrong in both{others}"
+    # the tiles and the waterfall show r itself
+    numbers = thresholds(found.extended_data)
+    sizes = [size_at(where, each.parameters, numbers) for each in cause.places]
+    return {
+        "title": _capital(cause.title),
+        "full": at_place(_capital(cause.title), cause.where, names),
+        "place": _capital(names.places(cause)),
+        "size": cause.size,
+        "long": len(cause.size) > _LONG,
+        "gain": f"{percent_interval(cause.gain)} {meaning.get(where, own)}",
+        "certainty": certainty,
+        "explanation": cause.explanation,
+        "confusion": confusion_sentence(cause, names),
+        "places": place_rows(cause, names, sizes) if cause.parameters else [],
+        "parameters": parameter_rows(cause.parameters),
+        "sizes": change_rows(cause, found.recordings),
+    }
+
+
+def _too_small(found: Diagnosis, names: Names) -> dict[str, Any]:
+    return {
+        "sentence": too_small_sentence(found),
+        "rows": [
+            (_capital(cause.title), names.places(cause), percent_interval(cause.gain), probability(cause.p_value))
+            for cause in found.too_small
+        ],
+    }
+
+
+def _errors(found: Diagnosis, names: Names, factor: float) -> list[dict[str, Any]]:
+    """A row per joint, and one of all together: rms, then the whiteness."""
+    rows = []
+    for j, row in enumerate(error_rows(found, names, factor)):
+        total = j == len(found.nominal.train_rms)
+        known = j < len(found.whiteness) and not total
+        white = [rounded(value, 2) for value in found.whiteness[j]] if known else ["", ""]
+        rows.append({"total": total, "cells": [*row, *white]})
+    return rows
+
+
+def _events(found: Diagnosis, names: Names, factor: float) -> list[dict[str, str]]:
+    return [
+        {
+            "recording": event.recording,
+            "start": f"{event.start:.2f}",
+            "end": f"{event.end:.2f}",
+            "joints": ", ".join(names.joint(joint) for joint in event.joints),
+            "peak": rounded(factor * event.peak),
+            "description": event.description,
+        }
+        for event in found.events
+    ]
+
+
+def _detection(found: DetectionGain, factor: float, unit: str) -> dict[str, Any]:
+    def seconds(value: float | None) -> str:
+        return "–" if value is None else f"{1e3 * value:.0f} ms"
+
+    def levels(values: Sequence[float]) -> str:
+        return ", ".join(rounded(factor * value) for value in values)
+
+    return {
+        "events": found.events,
+        "rows": [
+            ("found", found.found_before, found.found_after),
+            ("false alarms", found.false_alarms_before, found.false_alarms_after),
+            ("median delay", seconds(found.median_delay_before), seconds(found.median_delay_after)),
+            (f"thresholds ({unit})", levels(found.thresholds_before), levels(found.thresholds_after)),
+        ],
+    }
+
+
+def _method(found: Diagnosis) -> Iterator[str]:
+    """In sentences, with the numbers that count."""
+    yield words_of(found.kind).method.format(least=percent(found.least_gain))
+    yield f"The numbers were estimated from {found.signals}; errors and gains are those of the raw signals."
+    if text := tested_sentence(found):
+        yield text
+    if found.repeated:
+        yield f"{count_of(found.repeated, 'motion')} of the reference, made again, were compared sample by sample."
+    yield f"The gain was measured on {unseen(found)}, by running both models. Seed {found.seed}."
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]

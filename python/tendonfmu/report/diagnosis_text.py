@@ -1,0 +1,403 @@
+"""A diagnosis in plain words: names of places, sentences for page and terminal, and the tables that are printed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from tendonfmu.diagnose.reported_causes import CONTACT, TITLES, reported_causes
+from tendonfmu.diagnose.result import Cause, Diagnosis, FoundPlace, Invisible, Where
+from tendonfmu.diagnose.size import quantity
+from tendonfmu.report.diagnosis_words import words_of
+from tendonfmu.report.fit_summary import rounded
+from tendonfmu.statistics.interval import Interval
+
+NBSP = "\u00a0"
+_NUMBERS = ("No", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine", "Ten")
+_MOST_PLACES = 4  # that are listed
+_TOLD = 2  # effects that are told at length
+Row = tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Names:
+    """Of joints and tendons, as the description has them; empty where it has none."""
+
+    joints: tuple[str, ...]
+    tendons: tuple[str, ...]
+
+    def place(self, where: Where) -> str:
+        """Such as "joint 2 (pip), tendon 1 (fdp)"; empty for the whole finger."""
+        parts = (("joint", where.joint, self.joints), ("tendon", where.tendon, self.tendons))
+        return ", ".join(_numbered(kind, number, names) for kind, number, names in parts if number is not None)
+
+    def joint(self, number: int) -> str:
+        """Such as "joint 2 (pip)"."""
+        return _numbered("joint", number, self.joints)
+
+    def places(self, cause: Cause) -> str:
+        """Of a cause: its place, or how many it has; "everywhere" for the whole finger."""
+        place = self.place(cause.where)
+        if len(cause.places) < 2:
+            return place or "everywhere"
+        return f"{place}, {len(cause.places)} places" if place else f"{len(cause.places)} places"
+
+
+def _numbered(kind: str, number: int, names: Sequence[str]) -> str:
+    name = names[number - 1] if 0 < number <= len(names) else ""
+    plain = f"{kind} {number}"
+    return plain if name.replace("_", " ").lower() in ("", plain, str(number)) else f"{plain} ({name})"
+
+
+def names_of(found: Diagnosis) -> Names:
+    """From the fitted description."""
+    return Names(*(tuple(str(each.get("name") or "") for each in found.nominal_data[key]) for key in _KINDS))
+
+
+_KINDS = ("joints", "tendons")
+
+
+def title_of(effect: str) -> str:
+    """A few plain words for an effect of docs/diagnose.md."""
+    from tendonfmu.diagnose.effects import CANDIDATES
+
+    titles = {candidate.name: candidate.title for candidate in CANDIDATES} | TITLES
+    return titles.get(effect, effect.replace("_", " "))
+
+
+def at_place(title: str, where: Where, names: Names) -> str:
+    """Such as "friction grows with the force, at joint 1 (mcp)"."""
+    place = names.place(where)
+    return f"{title}, at {place}" if place else title
+
+
+# --- numbers ----------------------------------------------------------------------------------------------------------
+
+
+def unit_of(found: Diagnosis) -> tuple[float, str]:
+    """Factor and name of the unit in which torques are told, all alike."""
+    rms = [*found.nominal.train_rms, *found.nominal.test_rms, *found.bias_only_rms]
+    largest = max((value for value in rms if math.isfinite(value)), default=0.0)
+    return (1e3, "mN·m") if largest < 2.0 else (1.0, "N·m")
+
+
+def together(values: Sequence[float]) -> float:
+    """rms over all joints of the rms of each; NaN without any."""
+    known = [value for value in values if math.isfinite(value)]
+    return math.sqrt(sum(value * value for value in known) / len(known)) if known else math.nan
+
+
+def percent(share: float) -> str:
+    """Two digits where that is enough: 31 %, 4.2 %, −0.3 %."""
+    if not math.isfinite(share):
+        return "–"
+    value = 100 * share
+    text = f"{value:.0f}" if abs(value) >= 9.95 else f"{value:.1f}"
+    text = "0" if float(text) == 0 else text.replace("-", "−")
+    return f"{text}{NBSP}%"
+
+
+def percent_interval(found: Interval) -> str:
+    """Such as "31 % (27 to 35 %)"."""
+    if not (math.isfinite(found.low) and math.isfinite(found.high)):
+        return percent(found.value)
+    return f"{percent(found.value)} ({percent(found.low).removesuffix(f'{NBSP}%')} to {percent(found.high)})"
+
+
+def probability(p_value: float) -> str:
+    """A p-value: 0.008, 3.4e-5; bounded where it is below what a computer tells."""
+    if not math.isfinite(p_value):
+        return "–"
+    if p_value < 1e-12:
+        return "< 1e-12"
+    mantissa, _, exponent = f"{p_value:.2g}".partition("e")
+    return f"{mantissa}e{int(exponent)}" if exponent else mantissa
+
+
+def magnitude(value: float, unit: str) -> str:
+    """A number of the description with its unit, as people write it."""
+    told = unit.replace(".", "·")
+    return f"{value:.4g}".replace("-", "−") + ("" if unit in ("", "1") else f"{NBSP}{told}")
+
+
+# --- sentences --------------------------------------------------------------------------------------------------------
+
+
+def headline(found: Diagnosis) -> str:
+    """The verdict, in one sentence; a second one where something touches the finger."""
+    count = len(found.causes)
+    what = "changes" if found.kind == "change" else "causes"
+    many = f"{_NUMBERS[count] if count < len(_NUMBERS) else count} {what}"
+    text = words_of(found.kind).headlines[found.verdict][min(count, 2)].format(Many=many, many=many.lower())
+    if count == 1:
+        cause = found.causes[0]
+        size = f", {cause.size}" if cause.changed else ""
+        text = f"{text[:-1]}: {at_place(cause.title, cause.where, names_of(found))}{size}."
+    for cause in reported_causes(found):
+        if cause.where.effect == CONTACT and cause.changed is None:
+            text += f" In some stretches {cause.title}: they were left out ({cause.size})."
+        elif cause.where.effect == CONTACT:
+            told = f"{at_place(cause.title, cause.where, names_of(found))}, {cause.size}."
+            text = f"{text} And {told}" if count else f"{told[0].upper()}{told[1:]}"
+    return text
+
+
+def error_sentence(found: Diagnosis) -> str:
+    """Error before and after on unseen data, with the interval of the gain, and what the bias alone would leave."""
+    factor, unit = unit_of(found)
+    nominal, extended = (together(each.test_rms) for each in (found.nominal, found.extended))
+    where = unseen(found)
+    if found.causes:
+        text = (
+            f"On {where} the error{words_of(found.kind).error} falls from {rounded(factor * nominal)} to "
+            f"{rounded(factor * extended)} {unit} rms, "
+            f"by {percent_interval(found.gain)}"
+        )
+    else:
+        text = f"On {where} the error{words_of(found.kind).error} is {rounded(factor * nominal)} {unit} rms"
+    bias = together(found.bias_only_rms)
+    if math.isfinite(bias):
+        text += f"; without any friction model it would be {rounded(factor * bias)}"
+    return f"{text}."
+
+
+@dataclass(frozen=True)
+class Left:
+    """What is left on unseen data, in the unit of `unit_of`; the parts add up to the whole as they are shown.
+
+    whole: rms over all joints. noise: what nothing recorded predicts. nameless: the rest. digits: behind the point.
+    """
+
+    whole: float
+    noise: float
+    nameless: float
+    digits: int
+
+    def told(self, value: float) -> str:
+        return f"{value:.{self.digits}f}"
+
+
+def left_of(found: Diagnosis) -> Left | None:
+    """None where the noise floor is not known."""
+    factor, _ = unit_of(found)
+    whole, noise = factor * together(found.extended.test_rms), factor * together(found.noise_floor)
+    if not (math.isfinite(whole) and math.isfinite(noise)):
+        return None
+    digits = len(rounded(whole).partition(".")[2])
+    whole, noise = round(whole, digits), round(min(noise, whole), digits)
+    return Left(whole, noise, round(whole - noise, digits), digits)
+
+
+def left_sentence(found: Diagnosis) -> str:
+    """How much is left, how much of that could be predicted, and how much is noise; empty where that is not known."""
+    left, (_, unit) = left_of(found), unit_of(found)
+    if left is None:
+        return ""
+    whole = f"{left.told(left.whole)} {unit} are left"
+    if left.nameless <= 0.0:
+        return f"{whole}. Nothing that was recorded predicts any of it: to these sensors it is noise."
+    little = "" if found.unexplained.unknown or found.kind == "change" else ", and is too little to matter"
+    return (
+        f"{whole}. {left.told(left.nameless)} of it {words_of(found.kind).no_name}{little}; "
+        f"the rest, {left.told(left.noise)}, is noise to these sensors."
+    )
+
+
+def unknown_sentence(found: Diagnosis) -> str:
+    """Where that lives which can be predicted and has no name; empty where it is too little to matter."""
+    where = found.unexplained.description.strip().rstrip(".") if found.unexplained.unknown else ""
+    return f"{where[0].upper()}{where[1:]}." if where else ""
+
+
+def too_small_sentence(found: Diagnosis) -> str:
+    """What stands in the list of what is too small."""
+    return words_of(found.kind).small.format(least=percent(found.least_gain))
+
+
+def unseen(found: Diagnosis) -> str:
+    """On which data the gain was measured."""
+    if found.held_out:
+        return "parts of the recordings that were held out"
+    return "a recording that it has not seen" if len(found.tests) == 1 else "recordings that it has not seen"
+
+
+def tested_sentence(found: Diagnosis) -> str:
+    """How many were tried, and what the p-values mean."""
+    if not found.tested:
+        return ""
+    return (
+        f"{found.tested} effects at places were tried. A p-value says how often the strongest of all of them would "
+        "look like that by chance if nothing were missing."
+    )
+
+
+def confusion_sentence(cause: Cause, names: Names) -> str:
+    """What the data cannot tell it from; empty without any."""
+    if not cause.confusable_with:
+        return ""
+    others = [at_place(title_of(other.effect), other, names) for other in cause.confusable_with]
+    return f"These data cannot tell it from: {'; '.join(others)}."
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """One effect that cannot be seen, at all its places. share: the largest that survives the refit."""
+
+    title: str
+    places: str
+    share: float
+    experiment: str
+
+
+def hidden(found: Diagnosis, names: Names) -> list[Hidden]:
+    """Effects that cannot be seen, one each: the experiment of the place that shows most."""
+    by_effect: dict[str, list[Invisible]] = {}
+    for each in found.invisible:
+        by_effect.setdefault(each.where.effect, []).append(each)
+    effects = []
+    for members in by_effect.values():
+        best = max(members, key=lambda each: each.surviving_share)
+        places = [names.place(each.where) for each in members]
+        text = "" if places == [""] else "; ".join(each or "the whole finger" for each in places)
+        if len(places) > _MOST_PLACES:
+            text = f"{len(places)} places, such as {places[0]}"
+        effects.append(Hidden(best.title, text, best.surviving_share, best.experiment))
+    return effects
+
+
+def hidden_sentences(found: Diagnosis, names: Names) -> Iterator[str]:
+    """What cannot be seen: one or two effects with how they could be, more in one sentence."""
+    effects = hidden(found, names)
+    if len(effects) > _TOLD:
+        listed = "; ".join(f"{each.title} ({each.places})" if each.places else each.title for each in effects)
+        absorbs = "what is shared with the reference" if found.kind == "change" else "refitting"
+        yield f"{len(effects)} effects are not visible in these data, since {absorbs} absorbs them: {listed}."
+        return
+    for each in effects:
+        place = f", at {each.places}" if each.places else ""
+        what, _, _ = each.experiment.partition(":")  # what to do; what it tells stands in the table of all
+        experiment = f" To see it: {what[0].lower()}{what[1:].rstrip('.')}." if what else ""
+        if what.startswith("No "):
+            experiment = f" {what.rstrip('.')}."
+        yield (
+            f"Not visible in these data: {each.title}{place}. Refitting absorbs it; {percent(each.share)} would be "
+            f"left.{experiment}"
+        )
+
+
+def next_sentence(found: Diagnosis) -> str:
+    """What to record next."""
+    sentence = found.experiment.sentence.rstrip(".")
+    if found.kind == "change" and not sentence:
+        return "No further recording is needed: nothing is left to be told apart."
+    return f"{sentence}." if sentence else "No further experiment is needed: nothing is left to be told apart."
+
+
+# --- printed ----------------------------------------------------------------------------------------------------------
+
+
+def tables(found: Diagnosis) -> Iterator[tuple[str, Row, list[Row]]]:
+    """(title, headings, rows) of the causes and of the errors by joint."""
+    names, causes = names_of(found), reported_causes(found)
+    if causes:
+        first = "change" if found.kind == "change" else "cause"
+        headings: Row = (first, "place", "size", "gain", "may also be")
+        rows: list[Row] = [
+            (
+                f"{k}. {cause.where.effect}",
+                names.places(cause),
+                "see below" if cause.where.effect in TITLES and not cause.changed else cause.size,
+                percent_interval(cause.gain),
+                ", ".join(dict.fromkeys(other.effect for other in cause.confusable_with)) or "-",
+            )
+            for k, cause in enumerate(causes, start=1)
+        ]
+        yield f"{found.finger}: {found.verdict}", headings, rows
+    factor, unit = unit_of(found)
+    words = words_of(found.kind)
+    before, after = words.nominal_column, words.extended_column
+    headings = ("joint", "bias only", before, after, f"{before}, test", f"{after}, test", "noise floor")
+    yield f"residual before the bias learns from it, rms in {unit}", headings, error_rows(found, names, factor)
+
+
+def error_rows(found: Diagnosis, names: Names, factor: float) -> list[Row]:
+    """By joint: bias alone, nominal and extended on training and test data, noise floor; all joints where several."""
+    columns = [
+        found.bias_only_rms,
+        found.nominal.train_rms,
+        found.extended.train_rms,
+        found.nominal.test_rms,
+        found.extended.test_rms,
+        found.noise_floor,
+    ]
+    rows = [
+        (
+            names.joint(j),
+            *(rounded(factor * values[0]) if values else "–" for values in (c[j - 1 : j] for c in columns)),
+        )
+        for j in range(1, len(found.nominal.train_rms) + 1)
+    ]
+    if len(rows) > 1:
+        rows.append(("all joints", *(rounded(factor * together(column)) for column in columns)))
+    return rows
+
+
+def lines(found: Diagnosis) -> Iterator[str]:
+    """Verdict, error, causes, what is left, what could not be told, and what to do next."""
+    names = names_of(found)
+    yield headline(found)
+    yield error_sentence(found)
+    for k, cause in enumerate(found.causes, start=1):
+        yield f"  {k}. {at_place(cause.title, cause.where, names)}: {cause.size}"
+        if confusion := confusion_sentence(cause, names):
+            yield f"     {confusion}"
+    for sentence in (left_sentence(found), unknown_sentence(found)):
+        if sentence:
+            yield sentence
+    if found.too_small:
+        small = dict.fromkeys(at_place(each.where.effect, each.where, names) for each in found.too_small)
+        yield f"too small to matter: {'; '.join(small)}"
+    yield from hidden_sentences(found, names)
+    for event in found.events:
+        yield f"left out: {event.recording}, {event.start:.2f} to {event.end:.2f} s: {event.description}"
+    yield f"estimated from {found.signals}"
+    yield f"next: {next_sentence(found)}"
+
+
+def place_rows(cause: Cause, names: Names, sizes: Sequence[str]) -> list[tuple[str, str, str]]:
+    """(joint, tendon, size) of each place of a cause; sizes: of each."""
+    return [
+        (_at("joint", each, names), _at("tendon", each, names), size)
+        for each, size in zip(cause.places, sizes, strict=True)
+    ]
+
+
+def _at(kind: str, place: FoundPlace, names: Names) -> str:
+    number, all_names = (place.joint, names.joints) if kind == "joint" else (place.tendon, names.tendons)
+    if number is not None:
+        return _numbered(kind, number, all_names).removeprefix(f"{kind} ")
+    return "all" if place.joint is None and place.tendon is None else "–"
+
+
+def parameter_rows(parameters: Mapping[str, tuple[float, str]]) -> list[tuple[str, str]]:
+    """(path, value with unit)."""
+    return [(path, magnitude(value, unit)) for path, (value, unit) in parameters.items()]
+
+
+def change_rows(cause: Cause, recordings: Sequence[str]) -> list[tuple[str, str]]:
+    """(when, main number with its 95 % interval): in the reference, and now or in each of several new recordings."""
+    changed = cause.changed
+    if changed is None:
+        return []
+    now = zip(recordings, changed.by, strict=False) if changed.by else [("now", changed.now)]
+    return [
+        ("reference", quantity(changed.reference.value, changed.unit)),
+        *((Path(name).name, _quantity_interval(each, changed.unit)) for name, each in now),
+    ]
+
+
+def _quantity_interval(found: Interval, unit: str) -> str:
+    low, high = (quantity(each, unit) for each in (found.low, found.high))
+    return f"{quantity(found.value, unit)} ({low} to {high})"

@@ -1,0 +1,114 @@
+"""What a motion excites, in words: rows and lines that `cli/program.py` prints."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import groupby
+
+from tendonfmu.estimate.coverage import EffectCoverage
+from tendonfmu.estimate.identifiability import CAUSES, LIMIT, Verdict, causes, counts_by_kind
+from tendonfmu.excite.training_motion import ExciteResult
+
+Row = tuple[str, ...]
+KEYS = ("static", "coulomb", "stribeck_velocity", "viscous")
+NEVER = ("side", "working_point", "slow")  # causes that another motion mends
+
+
+def tables(result: ExciteResult) -> Iterator[tuple[str, Row, list[Row]]]:
+    """(title, headings, rows) of joints, effects and kinds of numbers."""
+    motion = result.motion
+    yield (
+        f"{result.subject.finger.name}: {motion.time[-1]:g} s of motion, {_load(result)}",
+        ("joint", "range, rad", "fastest, rad/s", "strokes", "reversals", "slow ones", "rests", "resting, s"),
+        [
+            (
+                span.name,
+                f"{cover.lowest:.3g} to {cover.highest:.3g}",
+                f"{cover.fastest:.2f}",
+                *map(str, (cover.strokes, cover.reversals, cover.slow_reversals, cover.rests)),
+                f"{cover.resting:.1f}",
+            )
+            for span, cover in zip(result.ranges, result.joints, strict=True)
+        ],
+    )
+    yield (
+        "friction effects: time on each side and below v_min",
+        ("effect", "positive, s", "negative, s", "still, s", "cannot be identified"),
+        [_effect_row(cover, result.judgement.verdicts) for cover in result.effects],
+    )
+    yield (
+        f"numbers with a standard error of at most {LIMIT:.0%}",
+        ("kind", "numbers", "identified", "if all else were known"),
+        [
+            (f"{kind}.{key}", *map(str, counts))
+            for (kind, key), counts in sorted(counts_by_kind(result.judgement.verdicts).items())
+        ],
+    )
+
+
+def _load(result: ExciteResult) -> str:
+    plan = result.plan
+    if plan.vary is None:
+        return f"pretension {', '.join(f'{level:g}' for level in plan.pretensions)} N"
+    return f"tensions of {plan.vary.lowest:g} to {plan.vary.highest:g} N, other ones every {plan.vary.every:g} s"
+
+
+def _effect_row(cover: EffectCoverage, verdicts: list[Verdict]) -> Row:
+    own = [v for v in verdicts if v.number.effect is not None and v.number.effect.path == cover.effect.path]
+    missing = []
+    for key in KEYS:
+        of_key = [v for v in own if v.number.key == key]
+        lost = [v for v in of_key if not v.identifiable]
+        if lost:
+            missing.append(key if len(lost) == len(of_key) else f"{key} {_which(lost)}")
+    times = cover.times
+    return (
+        cover.effect.path,
+        *(f"{seconds:.1f}" for seconds in (times.positive, times.negative, times.stuck)),
+        ", ".join(missing) or "-",
+    )
+
+
+def _which(lost: list[Verdict]) -> str:
+    """Which laws, and which sides of an asymmetric one."""
+    effect = lost[0].number.effect
+    if effect is not None and effect.angles:
+        return "of laws " + _runs(sorted({v.number.point + 1 for v in lost}))
+    return "of " + ", ".join(v.number.path.split(".")[-2] for v in lost)
+
+
+def _runs(numbers: list[int]) -> str:
+    """1, 2, 3, 5 as "1-3, 5"."""
+    parts = []
+    for _, group in groupby(enumerate(numbers), lambda pair: pair[1] - pair[0]):
+        run = [number for _, number in group]
+        parts.append(str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}")
+    return ", ".join(parts)
+
+
+def lines(result: ExciteResult) -> Iterator[str]:
+    """The sum of it, what it rests on, and what another motion would mend."""
+    judgement, noise = result.judgement, result.noise
+    verdicts = judgement.verdicts
+    known = sum(verdict.identifiable for verdict in verdicts)
+    yield (
+        f"{known} of {len(verdicts)} numbers can be identified one by one, "
+        f"{judgement.directions} independent combinations of them; each joint's bias is tracked besides"
+    )
+    for cause, count in causes(verdicts).items():
+        yield f"  {count} not: {CAUSES[cause]}"
+    tendons, joints = len(result.subject.finger.tendon_names), len(result.ranges)
+    if result.plan.vary is None and "combination" in causes(verdicts) and tendons > joints + 1:
+        yield "  --vary-tension LOW:HIGH loads the tendons in turn and tells more of those combinations apart"
+    yield (
+        f"assumed: white noise of {noise.std:g} N·m + {noise.per_force:g} N·m per N in each {1e3 * noise.time:g} ms, "
+        f"bias a random walk of {noise.drift:g} (N·m)²/s"
+    )
+    for verdict in verdicts:
+        if verdict.cause in NEVER:
+            yield f"  {verdict.number.path}: {verdict.reason}"
+    for i, seconds in enumerate(result.slack, start=1):
+        if seconds > 0:
+            name = result.subject.finger.tendon_names[i - 1]
+            higher = "--pretension" if result.plan.vary is None else "lowest tension of --vary-tension"
+            yield f"  {name} would go slack for {seconds:.1f} s: a higher {higher} keeps it taut"

@@ -1,0 +1,212 @@
+"""Panels of the friction laws of a fit: one sheet for the joints, one for each tendon."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.drawing.sheet import Band, Curve, Panel, Sheet
+from tendonfmu.estimate.laws import LawBands, LawCurve, asymmetric, numbers_of
+from tendonfmu.estimate.picture import FitPicture
+from tendonfmu.model.friction_places import Effect, effects, sliding_velocity, velocity_threshold
+
+Numbers = NDArray[np.float64]
+
+LAWS_DRAWN = 240  # friction effects at most; a snake of 16 joints and 64 tendons has thousands
+_LOOKED_AT = 20_000  # samples, for what a motion visits
+_POINTS = 160  # of a curve
+_HEADROOM = 2.5  # a band that is wider than this times the highest curve leaves the panel
+_LAW_KEYS = (
+    ("confidence", "95 % confidence"),
+    ("start", "start"),
+    ("data", "where the training's samples are"),
+)
+
+
+def law_sheets(picture: FitPicture) -> Iterator[Sheet]:
+    """One sheet for the friction in the joints, one for each tendon."""
+    desk = _Desk(picture)
+    pairs = list(zip(effects(picture.start), effects(picture.fitted), strict=True))
+    drawn = pairs[:LAWS_DRAWN]
+    hidden = f" {len(pairs) - len(drawn)} further laws of the finger are not drawn." if len(pairs) > len(drawn) else ""
+    for tendon in sorted({fitted.tendon for _, fitted in drawn}):
+        here = [(start, fitted) for start, fitted in drawn if fitted.tendon == tendon]
+        name = picture.tendon_names[tendon - 1] if tendon else ""
+        yield Sheet(
+            section="laws",
+            name=f"laws_tendon_{tendon}" if tendon else "laws_joints",
+            title=f"Tendon {tendon}: {name}" if tendon else "In the joints",
+            caption=_caption([fitted for _, fitted in here]) + hidden,
+            keys=_keys(picture, [fitted for _, fitted in here]),
+            panels=tuple(desk.panel(start, fitted) for start, fitted in here),
+            folded=tendon > 1,
+        )
+
+
+def _caption(drawn: Sequence[Effect]) -> str:
+    if not drawn[0].tendon:
+        load = any(effect.kind == "load_friction" for effect in drawn)
+        return "Friction over the joint's velocity." + (" Load friction is per newton of tendon force." if load else "")
+    text = "Share of the tendon force that is lost, over the tendon's velocity."
+    if any(effect.angles for effect in drawn):
+        text += " Laws with working points: over the angle of the joint before, at the training's median speed"
+        text += ", and at v_min where sliding begins." if any(map(_is_plain, drawn)) else "."
+    return text
+
+
+def _is_plain(effect: Effect) -> bool:
+    """Whether it has working points and one side for both directions."""
+    return bool(effect.angles) and not asymmetric(effect)
+
+
+def _keys(picture: FitPicture, drawn: Sequence[Effect]) -> tuple[tuple[str, str], ...]:
+    points = [effect for effect in drawn if effect.angles]
+    first = [("fitted", "fitted, over the angle at the median speed" if points else "fitted")]
+    if any(map(_is_plain, points)):
+        first += [("slow", "at v_min"), ("slow_limit", "its 95 %")]
+    if any(asymmetric(effect) for effect in points):
+        first += [("negative", "negative direction")]
+    still = any(not effect.angles and velocity_threshold(picture.fitted, effect) for effect in drawn)
+    rest = [("standstill", "below v_min: none acts, that is the bias's part")] if still else []
+    return (*first, *_LAW_KEYS, *rest)
+
+
+class _Motion:
+    """What the training visits: samples of angle and velocity, thinned."""
+
+    def __init__(self, picture: FitPicture) -> None:
+        self._data = picture.fitted
+        training = [series for series in picture.series if series.role == "training"]
+        every = max(1, sum(len(series.time) for series in training) // _LOOKED_AT)
+        none = np.empty((0, len(picture.fitted["joints"])))
+        angle = np.concatenate([none, *(series.joint_angle[series.used][::every] for series in training)])
+        speed = np.concatenate([none, *(series.joint_speed[series.used][::every] for series in training)])
+        known = np.isfinite(angle).all(axis=1) & np.isfinite(speed).all(axis=1)
+        self._angle, self._speed = angle[known], speed[known]
+
+    def sliding(self, effect: Effect) -> tuple[Numbers, Numbers]:
+        """Velocities with which the effect slides, signed, and the angles of the joint before at these samples."""
+        velocity = sliding_velocity(self._data, effect, self._speed)
+        angle = self._angle[:, effect.joint - 2] if effect.joint > 1 else np.zeros(len(velocity))
+        slides = np.abs(velocity) > velocity_threshold(self._data, effect)
+        return velocity[slides], angle[slides]
+
+
+class _Desk:
+    """Draws up the panels of one fit."""
+
+    def __init__(self, picture: FitPicture) -> None:
+        self._picture, self._bands, self._motion = picture, LawBands(picture), _Motion(picture)
+
+    def panel(self, start: Effect, fitted: Effect) -> Panel:
+        return self._over_angle(start, fitted) if fitted.angles else self._over_speed(start, fitted)
+
+    def _title(self, effect: Effect) -> str:
+        joint = self._picture.joint_names[effect.joint - 1]
+        if effect.tendon == 0:
+            return joint if effect.kind == "friction" else f"{joint}, load"
+        return f"{'pulley' if effect.kind == 'pulley_friction' else 'edge'} {effect.joint} ({joint})"
+
+    def _note(self, effect: Effect) -> str:
+        numbers = numbers_of(effect, self._picture.report)
+        return (
+            f"{sum(bool(entry['identified']) for entry in numbers)}/{len(numbers)} identified" if numbers else "fixed"
+        )
+
+    def _over_speed(self, start: Effect, fitted: Effect) -> Panel:
+        """Both directions as in fig. 2b: 0 below v_min."""
+        threshold = velocity_threshold(self._picture.fitted, fitted)
+        sliding, _ = self._motion.sliding(fitted)
+        slowest = max(threshold, 1e-6)
+        fastest = max(4.0 * slowest, float(np.quantile(np.abs(sliding), 0.995)) if sliding.size else 0.0)
+        speed = np.geomspace(slowest, fastest, _POINTS)
+        sides = [self._bands.over_speed(start, fitted, sign, speed) for sign in (-1, 1)]
+        factor, y_label = _unit(fitted, sides)
+        unit, x_label = (1e3, "tendon velocity (mm/s)") if fitted.tendon else (1.0, "velocity (rad/s)")
+        x = unit * np.concatenate([-speed[::-1], [-slowest, slowest], speed])
+        still = np.zeros(2)
+
+        def both(left: str, right: str) -> Numbers:
+            below, above = getattr(sides[0], left), getattr(sides[1], right)
+            return factor * np.concatenate([-below[::-1], still, above])
+
+        ends = factor * sides[1].fitted[[0, -1]]
+        top = factor * _top(sides)
+        limit = unit * fastest
+        return Panel(
+            title=self._title(fitted),
+            note=self._note(fitted),
+            alt=f"{self._title(fitted)}: {y_label} over {x_label}: fitted {ends[0]:.3g} where sliding "
+            f"begins, {ends[1]:.3g} at {limit:.3g}; {self._note(fitted)}.",
+            x_label=x_label,
+            y_label=y_label,
+            bands=(Band("confidence", x, both("high", "low"), both("low", "high")),),
+            curves=(Curve("start", x, both("start", "start")), Curve("fitted", x, both("fitted", "fitted"))),
+            stripes=((-unit * threshold, unit * threshold),) if threshold else (),
+            stripe_style="standstill",
+            data=_histogram(unit * sliding, -limit, limit),
+            x_limits=(-limit, limit),
+            y_limits=(-top, top),
+        )
+
+    def _over_angle(self, start: Effect, fitted: Effect) -> Panel:
+        """At two speeds, or both directions at one where they differ."""
+        threshold = velocity_threshold(self._picture.fitted, fitted)
+        sliding, visited = self._motion.sliding(fitted)
+        median = float(np.median(np.abs(sliding))) if sliding.size else 4.0 * threshold
+        margin = 0.04 * (fitted.angles[-1] - fitted.angles[0]) or 0.1
+        angle = np.union1d(np.linspace(fitted.angles[0] - margin, fitted.angles[-1] + margin, _POINTS), fitted.angles)
+        drawn = [("slow", 1, threshold), ("fitted", 1, median)]
+        if asymmetric(fitted):
+            drawn = [("negative", -1, median), ("fitted", 1, median)]
+        found = [self._bands.over_angle(start, fitted, sign, speed, angle) for _, sign, speed in drawn]
+        factor, y_label = _unit(fitted, found)
+        bands, curves = [], []
+        for (style, _, _), curve in zip(drawn, found, strict=True):
+            curves.append(Curve("start", angle, factor * curve.start))
+            if style == "slow":
+                curves += [Curve("slow_limit", angle, factor * limit) for limit in (curve.low, curve.high)]
+            else:
+                bands.append(Band(f"{style}_confidence", angle, factor * curve.low, factor * curve.high))
+            curves.append(Curve(style, angle, factor * curve.fitted))
+        before = self._picture.joint_names[fitted.joint - 2] if fitted.joint > 1 else ""
+        lowest, highest = factor * found[-1].fitted.min(), factor * found[-1].fitted.max()
+        return Panel(
+            title=self._title(fitted),
+            note=self._note(fitted),
+            alt=f"{self._title(fitted)}: {y_label} over the angle of {before or 'the base'}, {len(fitted.angles)} "
+            f"working points: fitted {lowest:.3g} to {highest:.3g}; {self._note(fitted)}.",
+            x_label=f"angle of {before} (rad)" if before else "angle (rad)",
+            y_label=y_label,
+            bands=tuple(bands),
+            curves=tuple(curves),
+            data=_histogram(visited, float(angle[0]), float(angle[-1])),
+            x_limits=(float(angle[0]), float(angle[-1])),
+            y_limits=(0.0, factor * _top(found)),
+        )
+
+
+def _top(curves: Sequence[LawCurve]) -> float:
+    """Upper end of the axis: all curves, and the bands where they are not too wide."""
+    lines = max(float(np.max([curve.fitted, curve.start])) for curve in curves)
+    bands = max(float(np.max(curve.high)) for curve in curves)
+    return 1.08 * max(lines, min(bands, _HEADROOM * lines)) or 1.0
+
+
+def _unit(effect: Effect, curves: Sequence[LawCurve]) -> tuple[float, str]:
+    """Factor and label of the friction."""
+    if effect.tendon:
+        return 1e2, "share of force (%)"
+    largest = _top(curves)
+    factor, unit = next((pair for pair in ((1.0, "N·m"), (1e3, "mN·m")) if pair[0] * largest >= 0.5), (1e6, "µN·m"))
+    return factor, f"friction ({unit})" if effect.kind == "friction" else f"load friction ({unit}/N)"
+
+
+def _histogram(values: Numbers, low: float, high: float) -> tuple[Numbers, Numbers] | None:
+    """Bin edges, and heights of which the highest is 1."""
+    if not values.size:
+        return None
+    counts, edges = np.histogram(values, 60, (low, high))
+    return edges, counts / max(int(counts.max()), 1)

@@ -1,0 +1,61 @@
+"""The files of a history: a table, a picture, a page."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from pathlib import Path
+
+from tendonfmu.diagnose.changes.history import History
+from tendonfmu.drawing.panels import draw_panel, write_sheet
+from tendonfmu.drawing.sheet import Panel, Sheet
+from tendonfmu.drawing.svg import panel_svg
+from tendonfmu.files.whole_file import whole_file
+from tendonfmu.report.diagnosis_text import Names
+from tendonfmu.report.fit_page import keys_of, render
+from tendonfmu.report.history_figures import history_sheet
+from tendonfmu.report.history_text import columns_of, headline, rows_of_lines, trend_sentence
+
+TABLE, PICTURE, PAGE = "history.csv", "history.png", "history.html"
+
+
+def write_history(found: History, names: Names, folder: Path) -> dict[Path, str]:
+    """file -> what is in it. Raises InputError where one cannot be written."""
+    sheet = history_sheet(found, names)
+    written: dict[Path, str] = {}
+    with whole_file(folder / PAGE) as file:
+        file.write_text(_page(found, names, sheet), encoding="utf-8")
+    written[folder / PAGE] = "all of it, to be read in a browser"
+    with whole_file(folder / TABLE) as file, file.open("w", encoding="utf-8", newline="") as stream:
+        columns = columns_of(found)
+        writer = csv.writer(stream)
+        writer.writerow(columns)
+        writer.writerows(zip(*columns.values(), strict=True))
+    written[folder / TABLE] = "a row per recording and cause"
+    if found.lines:
+        panels = [panel for panel in sheet.panels if isinstance(panel, Panel)]
+        write_sheet(sheet, [draw_panel(each) for each in panels], folder / PICTURE)
+        written[folder / PICTURE] = "sizes over time"
+    return written
+
+
+def _page(found: History, names: Names, sheet: Sheet) -> str:
+    return render(
+        "history.html.jinja",
+        found=found,
+        headline=headline(found),
+        sentences=list(_sentences(found, names)),
+        rows=list(rows_of_lines(found, names)),
+        recordings=[
+            (Path(name).name, f"{time:.1f}" if found.dated else f"{time:.0f}", verdict)
+            for name, time, verdict in zip(found.recordings, found.times, found.verdicts, strict=True)
+        ],
+        keys=keys_of(sheet),
+        drawings=[panel_svg(each) for each in sheet.panels if isinstance(each, Panel)],
+    )
+
+
+def _sentences(found: History, names: Names) -> Iterator[str]:
+    for line in found.lines:
+        text = trend_sentence(line, found, names)
+        yield f"{text[:1].upper()}{text[1:]}."

@@ -1,0 +1,368 @@
+"""The figures of fingers, recordings and rigs. It computes nothing: what it draws comes ready-made."""
+
+from __future__ import annotations
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import FancyBboxPatch, Patch
+
+from tendonfmu.drawing.finger_picture import EDGE_RED
+from tendonfmu.drawing.plot_style import (
+    BLUE,
+    DARK,
+    GREEN,
+    GREY,
+    LIGHT,
+    ORANGE,
+    PURPLE,
+    SKIN,
+    SKY,
+    VERMILION,
+    Target,
+    clean,
+    save,
+)
+from tendonfmu.model.routing_geometry import Points
+from tendonfmu.report.figure_data import CompensationFigure, JointCurves, ReferenceCurves, ReferenceFigure, StoryFigure
+from tendonfmu.report.plant_figures import LoopFigure, PreslidingFigure, TruthFigure
+from tendonfmu.report.rig_drawing import DrawnBody, DrawnRoute, RigDrawing, View
+
+# --- compensated recordings ------------------------------------------------------------------------------------------
+
+
+def draw_story(data: StoryFigure, target: Target) -> None:
+    """Free motions side by side, below them a recording with pushes, as PNG (the paper's figs. 6 to 8)."""
+    pushed = data.pushed
+    figure = Figure(figsize=(15.0, 6.4 + 4.4 * len(pushed.joints)), layout="constrained")
+    heights = [1.0, 0.8] + [1.0, 0.9] * len(pushed.joints) + [0.42]
+    grid = figure.add_gridspec(len(heights), len(data.free), height_ratios=heights)
+    for k, free in enumerate(data.free):
+        above = figure.add_subplot(grid[0, k])
+        below = figure.add_subplot(grid[1, k], sharex=above)
+        _draw_torques(above, free, free.joints[0])
+        _draw_compensated(below, free, free.joints[0])
+        below.set_xlabel("time (s)", fontsize=12)
+    panels = [figure.add_subplot(grid[2, :])]
+    panels += [figure.add_subplot(grid[row, :], sharex=panels[0]) for row in range(3, len(heights))]
+    for k, joint in enumerate(pushed.joints):
+        _draw_torques(panels[2 * k], pushed, joint)
+        _draw_compensated(panels[2 * k + 1], pushed, joint)
+    for axes in panels[:-1]:
+        axes.tick_params(labelbottom=False)
+    _draw_contacts(panels[-1], pushed)
+    panels[-1].set_xlabel("time (s)", fontsize=12)
+    _draw_story_legend(figure, data.title)
+    figure.align_ylabels(panels)
+    save(figure, target, 100)
+
+
+def _draw_story_legend(figure: Figure, title: str) -> None:
+    handles = [
+        Line2D([], [], color=DARK, linewidth=1.4, label="measured joint torque"),
+        Line2D([], [], color=SKY, linewidth=1.8, label="predicted friction and bias"),
+        Line2D([], [], color=BLUE, linewidth=1.4, label="compensated torque"),
+        Line2D([], [], color=GREEN, linewidth=3.4, alpha=0.55, label="external torque (sensor)"),
+        Patch(color=ORANGE, label="contact found"),
+        Patch(color=PURPLE, label="found without a push"),
+        Patch(color=GREY, label="contact labelled"),
+    ]
+    legend = figure.legend(
+        handles=handles, loc="outside upper center", ncols=4, frameon=False, fontsize=13, title=title
+    )
+    legend.get_title().set(fontsize=17, color=DARK)
+
+
+def _shade(axes: Axes, data: CompensationFigure) -> None:
+    for found, colour in ((data.found, ORANGE), (data.false, PURPLE)):
+        for begin, end in found:
+            axes.axvspan(begin, end, color=colour, alpha=0.2, linewidth=0)
+
+
+def _draw_torques(axes: Axes, data: CompensationFigure, joint: JointCurves) -> None:
+    clean(axes)
+    axes.plot(data.time, joint.measured, color=DARK, linewidth=1.1)
+    axes.plot(data.time, joint.predicted, color=SKY, linewidth=1.4)
+    axes.set_xlim(data.time[0], data.time[-1])
+    axes.tick_params(labelbottom=False)
+    axes.set_ylabel("N·m", fontsize=12)
+    axes.set_title(f"{data.title}: {joint.name}", loc="left", fontsize=14, fontweight="bold", color=DARK)
+
+
+def _draw_compensated(axes: Axes, data: CompensationFigure, joint: JointCurves) -> None:
+    clean(axes)
+    _shade(axes, data)
+    if joint.external is not None:
+        axes.plot(data.time, joint.external, color=GREEN, linewidth=3.4, alpha=0.55)
+    axes.plot(data.time, joint.compensated, color=BLUE, linewidth=1.1)
+    axes.set_ylabel("N·m", fontsize=12)
+
+
+def _draw_contacts(axes: Axes, data: CompensationFigure) -> None:
+    rows = [("found", [(data.found, ORANGE), (data.false, PURPLE)])]
+    if data.labelled is not None:
+        rows.append(("labelled", [(data.labelled, GREY)]))
+    for row, (_, bars) in enumerate(rows):
+        for found, colour in bars:
+            spans = [(begin, end - begin) for begin, end in found]
+            axes.broken_barh(spans, (-row - 0.36, 0.72), color=colour, linewidth=0)
+    axes.set_ylim(-len(rows) + 0.4, 0.6)
+    axes.set_yticks([-row for row in range(len(rows))], [f"{name}  " for name, _ in rows])
+    axes.tick_params(labelsize=12)
+    axes.tick_params(axis="y", length=0)
+    axes.spines[["top", "right", "left"]].set_visible(False)
+
+
+# --- compensated torque against a reference sensor -------------------------------------------------------------------
+
+
+def draw_reference(data: ReferenceFigure, target: Target) -> None:
+    """Compensated torque over the reference sensor's for some recordings, and the rms errors of all, as PNG."""
+    rows = len(data.drawn)
+    figure = Figure(figsize=(15.0, 2.9 * rows + 0.8), layout="constrained")
+    grid = figure.add_gridspec(rows, 2, width_ratios=[2.3, 1.0])
+    panels = [figure.add_subplot(grid[row, 0]) for row in range(rows)]
+    for axes, curves in zip(panels, data.drawn, strict=True):
+        _draw_against_sensor(axes, curves)
+    panels[-1].set_xlabel("time (s)")
+    figure.legend(handles=panels[0].get_lines(), loc="outside lower left", ncols=3, frameon=False, fontsize=11)
+    _draw_errors(figure.add_subplot(grid[:, 1]), data)
+    figure.suptitle(data.title, fontsize=15, color=DARK)
+    figure.align_ylabels(panels)
+    save(figure, target, 100)
+
+
+def _draw_against_sensor(axes: Axes, curves: ReferenceCurves) -> None:
+    clean(axes)
+    axes.plot(curves.time, curves.measured, color=GREY, linewidth=0.9, label="measured torque, friction included")
+    axes.plot(curves.time, curves.external, color=GREEN, linewidth=2.2, alpha=0.75, label="external torque (sensor)")
+    axes.plot(curves.time, curves.compensated, color=BLUE, linewidth=1.1, label="compensated torque")
+    axes.set_xlim(curves.time[0], curves.time[-1])
+    axes.set_ylabel("torque (N·m)")
+    axes.set_title(curves.title, loc="left", fontsize=12.5, fontweight="bold", color=DARK)
+
+
+def _draw_errors(axes: Axes, data: ReferenceFigure) -> None:
+    clean(axes)
+    for errors, shift, colour, label in (
+        (data.error_without, -0.2, LIGHT, "without a friction model"),
+        (data.error, 0.2, BLUE, "compensated"),
+    ):
+        places = [row + shift for row in range(len(errors))]
+        axes.bar(places, errors, width=0.38, color=colour, label=label)
+        for place, error in zip(places, errors, strict=True):
+            axes.text(place, error, f"{1e3 * error:.0f}", ha="center", va="bottom", fontsize=8, color=DARK)
+    axes.axhline(data.limit, color=VERMILION, linestyle="--", linewidth=1.1, label=f"limit {data.limit:g} N·m")
+    axes.set_xticks(range(len(data.names)), data.names)
+    axes.set_xlabel("recording")
+    axes.set_ylabel("rms error (N·m; figures in mN·m)")
+    axes.legend(loc="upper left", frameon=False, fontsize=11)
+
+
+# --- the simulated finger --------------------------------------------------------------------------------------------
+
+FLEXOR_COLOURS = (BLUE, SKY, "#332288", GREEN)
+EXTENSOR_COLOURS = (ORANGE, VERMILION, PURPLE, "#8A5A00")
+VIEW_HEIGHT = 21.0  # mm, from a view's middle to where the next one begins
+SMALL_SHOWN = (-14.0, 62.0)  # mrad
+
+
+def draw_rig(drawing: RigDrawing, target: Target) -> None:
+    """The finger of a rig to scale, from the side and from above: links, tendons, where friction acts, as PNG."""
+    labels = 28.0  # mm, for names on the left
+    left, right = drawing.left - labels, drawing.right + 4.0
+    low, high = -VIEW_HEIGHT - 26.0, 17.0
+    figure = Figure(figsize=(16.0, 16.0 * (high - low) / (right - left)))
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_axis_off()
+    axes.set_aspect("equal")
+    axes.set_xlim(left, right)
+    axes.set_ylim(low, high)
+    for view, middle in ((drawing.side, 0.0), (drawing.top, -VIEW_HEIGHT - 8.0)):
+        for body in drawing.bodies:
+            _draw_body(axes, body, middle)
+        for route in view.routes:
+            _draw_route(axes, route, middle, drawing.left)
+        _draw_view_joints(axes, view, middle)
+        axes.text(left + 1.0, middle + 12.5, f"{drawing.name} {view.title}", fontsize=14, fontweight="bold", color=DARK)
+    for label, x in drawing.side.stations:
+        axes.text(x, -12.6, label, ha="center", va="center", fontsize=10.5, color=DARK)
+        axes.plot([x, x], [-11.7, -10.9], color=GREY, linewidth=0.8)
+    for body in drawing.bodies:
+        _draw_length(axes, body, 15.0)
+    _draw_rig_legend(axes)
+    save(figure, target, 100)
+
+
+def _draw_body(axes: Axes, body: DrawnBody, middle: float) -> None:
+    box = FancyBboxPatch(
+        (body.begin, middle - body.radius),
+        body.end - body.begin,
+        2.0 * body.radius,
+        boxstyle="round,pad=0,rounding_size=2.5",
+        facecolor=SKIN,
+        edgecolor=LIGHT,
+        linewidth=1.2,
+        zorder=0.5,
+    )
+    axes.add_patch(box)
+
+
+def _draw_route(axes: Axes, route: DrawnRoute, middle: float, left: float) -> None:
+    colours = FLEXOR_COLOURS if route.flexor else EXTENSOR_COLOURS
+    colour = colours[route.colour % len(colours)]
+
+    def at(points: Points) -> tuple[Points, Points]:
+        return points[:, 0], points[:, 1] + middle
+
+    axes.plot(*at(route.spring), color=colour, linewidth=1.2, zorder=4)
+    axes.plot(*at(route.line), color=colour, linewidth=1.9, zorder=4)
+    axes.plot(*at(route.line[-1:]), marker="s", markersize=5.5, color=colour, zorder=5)
+    axes.plot(
+        *at(route.pulleys), "o", markersize=6.5, color="white", markeredgecolor=colour, markeredgewidth=1.7, zorder=6
+    )
+    axes.plot(
+        *at(route.edges), "o", markersize=6.0, color="white", markeredgecolor=EDGE_RED, markeredgewidth=1.7, zorder=7
+    )
+    axes.plot(*at(route.varying_edges), "o", markersize=6.0, color=EDGE_RED, markeredgecolor="white", zorder=7)
+    name = route.spring[0, 1] + middle
+    axes.text(left - 0.8, name, route.name, ha="right", va="center", fontsize=11.5, color=colour)
+
+
+def _draw_view_joints(axes: Axes, view: View, middle: float) -> None:
+    for name, x in view.joints:
+        axes.plot([x], [middle], "o", markersize=15, color="white", markeredgecolor=DARK, markeredgewidth=1.4, zorder=8)
+        axes.plot([x], [middle], "o", markersize=4, color=DARK, zorder=9)
+        text = axes.text(x, middle - 2.7, name, ha="center", va="center", fontsize=11.5, color=DARK, zorder=9)
+        text.set_bbox({"facecolor": SKIN, "edgecolor": "none", "pad": 1.0})
+
+
+def _draw_length(axes: Axes, body: DrawnBody, height: float) -> None:
+    arrow = {"arrowstyle": "<->", "color": GREY, "shrinkA": 0.0, "shrinkB": 0.0}
+    axes.annotate("", (body.begin, height), (body.end, height), arrowprops=arrow)
+    label = axes.text(
+        0.5 * (body.begin + body.end), height, f"{body.end - body.begin:g} mm", ha="center", va="center", fontsize=11.5
+    )
+    label.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 2.0})
+
+
+def _draw_rig_legend(axes: Axes) -> None:
+    def mark(face: str, edge: str, label: str) -> Line2D:
+        return Line2D([], [], linestyle="", marker="o", color=face, markeredgecolor=edge, markersize=7, label=label)
+
+    axes.legend(
+        handles=[
+            Line2D([], [], color=BLUE, linewidth=2.0, label="flexors (cold colours)"),
+            Line2D([], [], color=ORANGE, linewidth=2.0, label="extensors (warm colours)"),
+            mark("white", GREY, "pulley friction"),
+            mark("white", EDGE_RED, "edge friction"),
+            mark(EDGE_RED, EDGE_RED, "edge friction that varies with the angle"),
+            Line2D([], [], linestyle="", marker="s", color=GREY, markersize=6, label="end of a tendon"),
+        ],
+        loc="lower center",
+        ncols=6,
+        frameon=False,
+        fontsize=11.5,
+        handletextpad=0.4,
+    )
+
+
+def draw_loops(data: LoopFigure, target: Target) -> None:
+    """Friction torque of one joint over its angle, the rig's and the friction model's, as PNG."""
+    figure = Figure(figsize=(12.8, 6.4), layout="constrained")
+    axes = figure.subplots()
+    clean(axes)
+    for loop, colour in zip(data.loops, (BLUE, VERMILION), strict=False):
+        axes.plot(loop.angle, 1e3 * loop.rig, color=colour, linewidth=1.8, label=f"rig, {loop.label}")
+        axes.plot(loop.model_line[:, 0], 1e3 * loop.model_line[:, 1], color=DARK, linewidth=1.1, linestyle=(0, (4, 2)))
+    axes.plot([], [], color=DARK, linewidth=1.1, linestyle=(0, (4, 2)), label="friction model")
+    axes.set_xlabel("joint angle (rad)", fontsize=13)
+    axes.set_ylabel("friction torque (mN·m)", fontsize=13)
+    axes.set_title(f"{data.joint}, slowly to and fro", loc="left", fontsize=14, fontweight="bold", color=DARK)
+    axes.legend(loc="center", ncols=3, frameon=False, fontsize=13)
+    save(figure, target, 100)
+
+
+def draw_presliding(data: PreslidingFigure, target: Target) -> None:
+    """Torque and bristles after a reversal; small moves to and fro before a joint breaks away, as PNG."""
+    figure = Figure(figsize=(16.0, 6.4), layout="constrained")
+    turn, bent, small = figure.subplots(1, 3)
+    for loop, colour in zip(data.reversals, (BLUE, VERMILION), strict=False):
+        turn.plot(1e3 * loop.angle, 1e3 * loop.rig, color=colour, linewidth=1.9, label=f"rig, {loop.label}")
+        turn.plot(*1e3 * loop.model_line.T, color=DARK, linewidth=1.1, linestyle=(0, (4, 2)))
+    turn.plot([], [], color=DARK, linewidth=1.1, linestyle=(0, (4, 2)), label="friction model")
+    for contact, colour in zip(data.contacts, (EDGE_RED, PURPLE, GREEN), strict=False):
+        bent.plot(1e3 * contact.angle, contact.bristle, color=colour, linewidth=1.9, label=contact.label)
+    for level in (-1.0, 1.0):
+        bent.axhline(level, color=GREY, linewidth=1.0, linestyle=(0, (2, 2)))
+    bent.text(29.7, -0.985, "break-away", ha="right", va="bottom", fontsize=12, color=GREY)
+    _draw_small_moves(small, data)
+    for axes, title, way, torque in (
+        (turn, f"{data.joint} after a reversal", "distance back from the reversal (mrad)", "friction torque (mN·m)"),
+        (bent, f"bristles of {data.tendon} there", "distance back from the reversal (mrad)", "bristle w"),
+        (
+            small,
+            "small moves, then break-away",
+            "joint angle from where they begin (mrad)",
+            "friction torque (mN·m)",
+        ),
+    ):
+        clean(axes)
+        axes.set_title(title, loc="left", fontsize=14, fontweight="bold", color=DARK)
+        axes.set_xlabel(way, fontsize=13)
+        axes.set_ylabel(torque, fontsize=13)
+    for axes in (turn, bent):
+        axes.set_xlim(-0.8, 30.0)
+        axes.legend(loc="upper right", bbox_to_anchor=(1.0, 0.95), frameon=False, fontsize=12.5)
+    save(figure, target, 100)
+
+
+def _draw_small_moves(axes: Axes, data: PreslidingFigure) -> None:
+    angle, torque = 1e3 * data.small.angle, 1e3 * data.small.rig
+    end = data.turns[-1]
+    axes.plot(
+        angle[: end + 1], torque[: end + 1], color=SKY, linewidth=1.7, label=f"small moves to 1 ... {len(data.turns)}"
+    )
+    axes.plot(angle[end:], torque[end:], color=BLUE, linewidth=2.1, label=f"led away from {len(data.turns)}")
+    axes.plot(angle[data.turns], torque[data.turns], "o", color="white", markeredgecolor=SKY, markersize=13.5, zorder=4)
+    for number, k in enumerate(data.turns, start=1):
+        axes.text(
+            angle[k], torque[k], str(number), fontsize=11, color=DARK, ha="center", va="center_baseline", zorder=5
+        )
+    axes.legend(loc="upper right", bbox_to_anchor=(1.0, 0.45), frameon=False, fontsize=12.5)
+    axes.set_xlim(*SMALL_SHOWN)
+    near = angle[end:] < SMALL_SHOWN[1]
+    highest = end + int(torque[end:][near].argmax())
+    axes.annotate(
+        "break-away",
+        (angle[highest], torque[highest]),
+        (angle[highest] + 8.0, torque[highest] - 14.0),
+        arrowprops={"arrowstyle": "->", "color": DARK},
+        fontsize=12.5,
+    )
+
+
+def draw_truth(data: TruthFigure, target: Target) -> None:
+    """Tendon forces as measured, and the truth of one joint: its angle, and its torque with what takes it, as PNG."""
+    figure = Figure(figsize=(12.8, 7.6), layout="constrained")
+    panels = forces, angle, torque = figure.subplots(3, 1, sharex=True, height_ratios=[1.0, 0.7, 1.2])
+    for axes, name in zip(panels, ("tendon force (N)", "angle (rad)", "torque (mN·m)"), strict=True):
+        clean(axes)
+        axes.set_ylabel(name, fontsize=13)
+        for begin, end in data.contacts:
+            axes.axvspan(begin, end, color=ORANGE, alpha=0.18, linewidth=0)
+    for i, flexor in enumerate(data.flexors):
+        same = [k for k, other in enumerate(data.flexors) if other == flexor]
+        colours = FLEXOR_COLOURS if flexor else EXTENSOR_COLOURS
+        forces.plot(data.time, data.forces[:, i], color=colours[same.index(i) % len(colours)], linewidth=1.1)
+    forces.set_title("measured: all tendons", loc="left", fontsize=14, fontweight="bold", color=DARK)
+    angle.plot(data.time, data.angle, color=DARK, linewidth=1.3)
+    angle.set_title(f"truth: {data.joint}", loc="left", fontsize=14, fontweight="bold", color=DARK)
+    for (label, values), colour in zip(data.torques.items(), (DARK, SKY, GREEN), strict=True):
+        torque.plot(data.time, 1e3 * values, color=colour, linewidth=1.6, label=label)
+    torque.plot([], [], color=ORANGE, alpha=0.3, linewidth=9.0, label="contact")
+    torque.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=4, frameon=False, fontsize=12.5)
+    torque.set_xlabel("time (s)", fontsize=13)
+    torque.set_xlim(data.time[0], data.time[-1])
+    figure.align_ylabels(panels)
+    save(figure, target, 100)

@@ -1,0 +1,311 @@
+"""The figures of a score, computed for `score_plots.py`: torques and detection over time (fig. 8 of the paper), every
+event from its onset on, the ROC, and the delays.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.detect.counting import GRACE, DetectionScore, Event
+from tendonfmu.detect.run import Track
+from tendonfmu.detect.score_report import Scored
+from tendonfmu.detect.summary import RocPoint
+from tendonfmu.errors import InputError
+from tendonfmu.report.figure_data import Interval, intervals
+from tendonfmu.statistics.intervals import share
+
+Numbers = NDArray[np.float64]
+
+SHOWN = 20.0  # s of the recording, where most events are
+JOINTS = 4  # that are drawn
+BEFORE, AFTER, LONGEST = 0.3, 0.3, 2.5  # s; of an event's row before the onset, after the end, and at most after onset
+TAIL = 2.0  # times the delay of 90 %; what is found later is not drawn, but told
+NAMED = (0.25, 0.5, 1.0, 2.0, 4.0)  # factors
+_COLUMNS, _POINTS = 560, 5000
+
+
+@dataclass(frozen=True)
+class JointTorques:
+    """[N] N·m. external: of the reference sensor, or None."""
+
+    name: str
+    measured: Numbers
+    compensated: Numbers
+    external: Numbers | None
+
+
+@dataclass(frozen=True)
+class ContactFigure:
+    """time: [N] s. force: [N] N, sensed, or None. labelled: contact as labelled. found, masked, outside: alarm while an
+    event is there that is found, or missed; outside of events, and what outlasts these.
+    """
+
+    title: str
+    time: Numbers
+    joints: list[JointTorques]
+    force: Numbers | None
+    labelled: list[Interval]
+    found: list[Interval]
+    masked: list[Interval]
+    outside: list[Interval]
+
+
+@dataclass(frozen=True)
+class EventFigure:
+    """A row for each event, in order of delay, then the missed ones, those that began in an alarm last.
+
+    begin, end: s from the onset that are drawn. torque: [e, t] N·m, compensated torque, magnitude over all joints, NaN
+    beyond the recording. most: N·m, that few rows pass. groups: (what, how many rows). delay, length: [e] s; the delay
+    is NaN if missed.
+    """
+
+    title: str
+    begin: float
+    end: float
+    torque: Numbers
+    most: float
+    groups: list[tuple[str, int]]
+    delay: Numbers
+    length: Numbers
+
+
+@dataclass(frozen=True)
+class RocFigure:
+    """factors [f]. found, found_low, found_high: shares of the events; masked: of those that began in an alarm;
+    in_alarm: of the free time. rate, rate_low, rate_high: false alarms per hour.
+
+    own: index of the description's own thresholds. named: of points whose factor is written beside them. least: 1/h, of
+    one false alarm in all the free time.
+    """
+
+    title: str
+    factors: Numbers
+    found: Numbers
+    found_low: Numbers
+    found_high: Numbers
+    rate: Numbers
+    rate_low: Numbers
+    rate_high: Numbers
+    in_alarm: Numbers
+    masked: Numbers
+    own: int
+    named: list[int]
+    least: float
+
+
+@dataclass(frozen=True)
+class DelayFigure:
+    """delays: [k] s, increasing. share, low, high: [k] of all events found within that. median, ninety: s.
+
+    end: s that are drawn. later: how many delays are beyond. bins: of the histogram.
+    """
+
+    title: str
+    delays: Numbers
+    share: Numbers
+    low: Numbers
+    high: Numbers
+    median: float
+    ninety: float
+    end: float
+    later: int
+    bins: int
+
+
+def write_figures(scored: Scored, folder: Path) -> dict[Path, str]:
+    """Draws what there is to draw into a folder that is made if missing; file -> what is in it."""
+    from tendonfmu.report.score_plots import draw_contacts, draw_delays, draw_events, draw_roc
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be made ({error.strerror})") from None
+    written = {folder / "contacts.png": "torques, compensated torques, label and detection over time"}
+    draw_contacts(contact_figure(scored), folder / "contacts.png")
+    if scored.summary.events:
+        written[folder / "events.png"] = "every event from its onset on"
+        draw_events(event_figure(scored), folder / "events.png")
+    if scored.roc and scored.summary.events and scored.summary.free_minutes:
+        written[folder / "roc.png"] = "found events against false alarms, over thresholds"
+        draw_roc(roc_figure(scored, scored.roc), folder / "roc.png")
+    if scored.summary.found:
+        written[folder / "delays.png"] = "how soon events are found"
+        draw_delays(delay_figure(scored), folder / "delays.png")
+    return written
+
+
+# --- over time --------------------------------------------------------------------------------------------------------
+
+
+def contact_figure(scored: Scored) -> ContactFigure:
+    """The `SHOWN` seconds with most events, or of false alarms where there is none."""
+    counts = [_busiest(track, score) for track, score in zip(scored.tracks, scored.scores, strict=True)]
+    most = max(range(len(counts)), key=lambda k: counts[k][:2])
+    begin = counts[most][2]
+    track, score = scored.tracks[most], scored.scores[most]
+    time = track.recording.time
+    shown = (time >= begin) & (time <= begin + SHOWN)
+    rows, alarm = np.flatnonzero(shown), track.alarm
+    found, masked = _by_event(track, score)
+    rows = rows[:: max(1, len(rows) // _POINTS)]
+    torque, left = track.outputs["joint_torque"], track.outputs["compensated_torque"]
+    names = scored.subject.finger.joint_names
+    joints = [
+        JointTorques(
+            names[j], torque[rows, j], left[rows, j], None if track.external is None else track.external[rows, j]
+        )
+        for j in _strongest(track)
+    ]
+    return ContactFigure(
+        title=f"{scored.subject.finger.name}: {track.recording.path.name}",
+        time=time[rows],
+        joints=joints,
+        force=None if track.force is None else np.abs(track.force[rows]),
+        labelled=intervals(time, track.label & shown),
+        found=intervals(time, alarm & found & shown),
+        masked=intervals(time, alarm & masked & ~found & shown),
+        outside=intervals(time, alarm & ~masked & ~found & shown),
+    )
+
+
+def _busiest(track: Track, score: DetectionScore) -> tuple[int, int, float]:
+    """(events, those found, begin in s) of the window of `SHOWN` seconds with most of them, the earliest.
+
+    Of a recording without events: (0, false alarms, begin).
+    """
+    time = track.recording.time
+    onsets = np.array([event.onset for event in score.events])
+    found = np.array([event.onset for event in score.events if event.found])
+    alarms = np.array([begin for begin, _ in score.false_alarms])
+    last = max(float(time[-1]) - SHOWN, float(time[0]))
+    begins = np.clip([float(time[0]), *((onsets if len(onsets) else alarms) - 1.0)], time[0], last)
+
+    def within(starts: Numbers, begin: float) -> int:
+        return int(((starts >= begin) & (starts <= begin + SHOWN)).sum())
+
+    return max(
+        ((within(onsets, begin), within(found if len(onsets) else alarms, begin), float(begin)) for begin in begins),
+        key=lambda window: (window[0], window[1], -window[2]),
+    )
+
+
+def _by_event(track: Track, score: DetectionScore) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """[N] samples of events that are found, from the alarm on to the end and its grace; and of all other events."""
+    time = track.recording.time
+    found, others = np.zeros(len(time), dtype=bool), np.zeros(len(time), dtype=bool)
+    for event in score.events:
+        rows = (time >= event.onset) & (time <= event.end + GRACE)
+        (found if event.found else others)[rows] = True
+    return found, others
+
+
+def _strongest(track: Track) -> list[int]:
+    """The joints with most torque in contact (or ever), in their order."""
+    torque = track.outputs["compensated_torque"] if track.external is None else track.external
+    rows = track.label if track.label.any() else np.ones(len(torque), dtype=bool)
+    power = np.sum(torque[rows] ** 2, axis=0)
+    return sorted(int(j) for j in np.argsort(-power, kind="stable")[:JOINTS])
+
+
+# --- events -----------------------------------------------------------------------------------------------------------
+
+
+def event_figure(scored: Scored) -> EventFigure:
+    """Every event of every recording."""
+    rows: list[tuple[Event, Track]] = [
+        (event, track) for track, score in zip(scored.tracks, scored.scores, strict=True) for event in score.events
+    ]
+    rows.sort(key=lambda row: _order(row[0]))
+    length = np.array([event.end - event.onset for event, _ in rows])
+    end = min(float(length.max()) + AFTER, LONGEST)
+    grid = np.linspace(-BEFORE, end, _COLUMNS)
+    torque = np.array([_row(track, event.onset + grid) for event, track in rows])
+    found = scored.summary
+    groups = {
+        "found": found.found,
+        "missed": found.events - found.found - found.masked,
+        "missed, in\nan alarm before": found.masked,
+    }
+    return EventFigure(
+        title=f"{scored.subject.finger.name}: {len(rows)} events",
+        begin=-BEFORE,
+        end=end,
+        torque=torque,
+        most=float(np.nanquantile(torque, 0.99)),
+        groups=[(name, count) for name, count in groups.items() if count],
+        delay=np.array([event.delay for event, _ in rows]),
+        length=length,
+    )
+
+
+def _order(event: Event) -> tuple[int, float]:
+    """Group, and place in it."""
+    return (0, event.delay) if event.found else (1 if event.silent else 2, event.end - event.onset)
+
+
+def _row(track: Track, at: Numbers) -> Numbers:
+    """[t] N·m at the last sample before each time."""
+    time = track.recording.time
+    size = np.sqrt(np.sum(track.outputs["compensated_torque"] ** 2, axis=1))
+    index = np.searchsorted(time, at + 1e-9, side="right") - 1
+    inside = (index >= 0) & (at <= time[-1])
+    return np.where(inside, size[np.maximum(index, 0)], math.nan)
+
+
+# --- ROC and delays ---------------------------------------------------------------------------------------------------
+
+
+def roc_figure(scored: Scored, points: Sequence[RocPoint]) -> RocFigure:
+    shares, rates = [point.found_share for point in points], [point.false_alarms_per_hour for point in points]
+    minutes = scored.summary.free_minutes
+    return RocFigure(
+        title=f"{scored.subject.finger.name}: {scored.summary.events} events, {minutes:.3g} min of free time",
+        factors=np.array([point.factor for point in points]),
+        found=np.array([each.value for each in shares]),
+        found_low=np.array([each.low for each in shares]),
+        found_high=np.array([each.high for each in shares]),
+        rate=np.array([each.value for each in rates]),
+        rate_low=np.array([each.low for each in rates]),
+        rate_high=np.array([each.high for each in rates]),
+        in_alarm=np.array([point.free_alarm_share for point in points]),
+        masked=np.array([point.masked / point.events for point in points]),
+        own=int(np.argmin([abs(math.log(point.factor)) for point in points])),
+        named=_named(points),
+        least=60.0 / minutes,
+    )
+
+
+def _named(points: Sequence[RocPoint]) -> list[int]:
+    """Points of `NAMED` factors, one of those at the same place."""
+    places: dict[tuple[int, int], int] = {}
+    for k, point in enumerate(points):
+        if any(math.isclose(point.factor, each) for each in NAMED):
+            places[(point.found, point.false_alarms)] = k
+    return list(places.values())
+
+
+def delay_figure(scored: Scored) -> DelayFigure:
+    delays = np.sort([event.delay for score in scored.scores for event in score.events if event.found])
+    total, known = scored.summary.events, scored.summary.delay
+    end = float(delays[-1])
+    if end > TAIL * known["ninety_percent"].value > 0:
+        end = TAIL * known["ninety_percent"].value
+    within = [share(k, total) for k in range(1, len(delays) + 1)]
+    return DelayFigure(
+        title=f"{scored.subject.finger.name}: {len(delays)} of {total} events found",
+        delays=delays,
+        share=np.array([each.value for each in within]),
+        low=np.array([each.low for each in within]),
+        high=np.array([each.high for each in within]),
+        median=known["median"].value,
+        ninety=known["ninety_percent"].value,
+        end=end,
+        later=int((delays > end).sum()),
+        bins=int(np.clip(len(delays) // 2, 12, 40)),
+    )

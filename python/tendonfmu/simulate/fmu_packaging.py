@@ -1,0 +1,77 @@
+"""From a rig to the FMU of its simulated finger: the binary is the same for every rig, the rig is a resource.
+
+Same input, same bytes; no compiler (see fmu/packaging.py).
+"""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+from tendonfmu.errors import InputError
+from tendonfmu.files.whole_file import whole_file
+from tendonfmu.fmu.model_variables import read_table
+from tendonfmu.fmu.packaging import find_binaries, guid, model_description, model_identifier, pack, package_file
+from tendonfmu.model import native
+from tendonfmu.model.description import count
+from tendonfmu.simulate.fmu_variables import describe_plant
+from tendonfmu.simulate.plant import Plant, Settings, refused_by
+from tendonfmu.simulate.rig import Rig, read_rig
+
+BINARIES, BINARY_STEM = "binaries_plant", "tendonfmu_plant"
+LARGEST_SEED = 2**31 - 1
+
+
+def build_plant_fmu(rig_path: Path, output_path: Path, *, binaries: Path | None = None) -> Path:
+    """Packs the FMU of a rig's simulated finger and returns its path.
+
+    binaries: a folder of <FMI platform>/tendonfmu_plant.<so, dll or dylib> in place of the installed ones.
+    Raises InputError. output_path appears whole or not at all.
+    """
+    rig = read_rig(rig_path)
+    archive = pack(plant_members(rig, binaries=binaries))
+    with whole_file(output_path) as file:
+        file.write_bytes(archive)
+    return output_path
+
+
+def plant_members(rig: Rig, *, binaries: Path | None = None) -> dict[str, bytes]:
+    """Path in the archive to content, for all files of the FMU. Raises InputError where the plant refuses the rig."""
+    from tendonfmu.drawing.finger_picture import draw_finger
+    from tendonfmu.fmu.documentation import render_documentation
+    from tendonfmu.model.routing_geometry import finger_drawing
+
+    text = rig.json().encode()
+    table = read_table(package_file("model_description/plant_variables.json").read_text(encoding="utf-8"))
+    identifier = f"TendonFinger_{model_identifier(rig.name)}"
+    context: dict[str, Any] = {
+        **describe_plant(rig, _settings(rig, text), table),
+        "model_identifier": identifier,
+        "guid": guid(text, table),
+        "version": native.version(),
+        "source_files": [],
+    }
+    page = render_documentation("plant_documentation.html.jinja", context, summary=count(rig.finger), rig=rig)
+    picture = io.BytesIO()
+    draw_finger(finger_drawing(rig.finger), picture)
+    found = find_binaries(binaries, BINARIES, BINARY_STEM, identifier)
+    return {
+        "modelDescription.xml": model_description(context),
+        "model.png": picture.getvalue(),
+        "documentation/finger.png": picture.getvalue(),
+        "documentation/index.html": page.encode(),
+        "resources/rig.json": text,
+        **{f"binaries/{path}": data for path, data in found.items()},
+    }
+
+
+def _settings(rig: Rig, text: bytes) -> Settings:
+    """The rig's own settings, from a plant that has accepted it."""
+    with refused_by(rig.path):
+        settings = Plant(text).settings
+    if settings.seed > LARGEST_SEED:
+        raise InputError(
+            f"{rig.path}: seed = {settings.seed}: expected at most {LARGEST_SEED} in an FMU, whose Integer has 32 bits"
+        )
+    return settings

@@ -1,0 +1,273 @@
+"""What the motors of a simulated finger are told to do: the rig's `motion`, expanded to knots.
+
+Between knots a joint follows the quintic of the knots' positions, velocities and accelerations, before the first and
+after the last it stands. The pretension goes from knot to knot by a smooth step.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.errors import InputError
+from tendonfmu.files.json_node import Node
+from tendonfmu.files.tables import Table, read_table
+from tendonfmu.statistics.random_numbers import LARGEST_SEED, Draws
+
+Array = NDArray[np.float64]
+
+LONGEST = 1e6  # s
+# A stroke between resting points is a quintic; its peak speed is this times its mean speed (minimum jerk: Flash, Hogan,
+# "The coordination of arm movements", J. Neuroscience 5(7), 1985).
+PEAK_OVER_MEAN = 1.875
+SHORTEST_STROKE = 0.4  # s: a short way is made slowly, not with high accelerations
+MARGIN = 0.05  # of a joint's range at either end that strokes leave out by default
+FASTEST = 100.0  # rad/s
+STRONGEST = 1e5  # N
+# What the columns of a motion file may hold: lowest, highest, unit.
+RANGES = {
+    "time": (0.0, 1e9, "s"),
+    "pretension": (1e-9, STRONGEST, "N"),
+    "position": (-100.0, 100.0, "rad"),
+    "velocity": (-1e4, 1e4, "rad/s"),
+    "acceleration": (-1e7, 1e7, "rad/s2"),
+}
+STILL = 1e-9  # rad/s, rad/s2: what counts as standing at the ends of a motion file
+
+
+@dataclass(frozen=True)
+class Motion:
+    """An expanded motion. joints: per joint the knots {time s, position rad, velocity rad/s, acceleration rad/s2}.
+
+    pretension: knots {time s, value N}. says: the motion in words. file: read for it, or None.
+    """
+
+    joints: list[dict[str, list[float]]]
+    pretension: dict[str, list[float]]
+    says: str
+    file: Path | None = None
+
+    def expanded(self) -> dict[str, Any]:
+        """As the C++ reader takes it."""
+        return {"joints": self.joints, "pretension": self.pretension}
+
+
+@dataclass(frozen=True)
+class Joints:
+    """Limits of the joints, [n] rad; infinite where a joint has none."""
+
+    lower: Sequence[float]
+    upper: Sequence[float]
+
+    def __len__(self) -> int:
+        return len(self.lower)
+
+
+def expand_motion(motion: Node, joints: Joints, seed: int, duration: float | None) -> Motion:
+    """The rig's `motion` as knots. Raises Refusal with key path, or InputError with the file.
+
+    seed: used where the motion has none. duration: of the recording, s, if any; that of the motion where it has none.
+    """
+    if not isinstance(motion.value, dict):
+        motion.refuse('an object with the key kind: "still", "strokes" or "file"')
+    kind = motion.member("kind").choice("still", "strokes", "file")
+    if kind == "still":
+        return _still(motion, joints)
+    if kind == "file":
+        return _from_file(motion, joints)
+    return _strokes(motion, joints, seed, duration)
+
+
+# --- kinds ------------------------------------------------------------------------------------------------------------
+
+
+def _still(motion: Node, joints: Joints) -> Motion:
+    motion.keys(("kind", "duration", "position", "pretension"))
+    motion.member("duration").number(0.0, LONGEST, "s", default=LONGEST, above=True)
+    position = _posture(motion.member("position"), joints.lower, joints.upper)
+    return Motion([_standing(angle) for angle in position], _pretension(motion), "still")
+
+
+def _strokes(motion: Node, joints: Joints, seed: int, duration: float | None) -> Motion:
+    motion.keys(
+        (
+            "kind", "seed", "duration", "position", "still", "speed", "rest", "rest_share", "lower", "upper",
+            "pretension",
+        )
+    )  # fmt: skip
+    lower, upper = _range_of_strokes(motion, joints)
+    plan = _Strokes(
+        seed=motion.member("seed").integer(0, LARGEST_SEED, default=seed),
+        duration=motion.member("duration").number(0.0, LONGEST, "s", default=duration, above=True),
+        still=motion.member("still").number(0.0, LONGEST, "s", default=1.0),
+        speed=motion.member("speed").span(0.0, FASTEST, "rad/s", default=(0.15, 0.9), above=True),
+        rest=motion.member("rest").span(0.0, LONGEST, "s", default=(0.3, 1.5)),
+        rest_share=motion.member("rest_share").number(0.0, 1.0, "", default=0.25),
+    )
+    start = _posture(motion.member("position"), lower, upper)
+    return Motion(
+        [plan.of_joint(j, start[j], lower[j], upper[j]) for j in range(len(joints))],
+        _pretension(motion),
+        f"strokes of {plan.speed[0]:g} to {plan.speed[1]:g} rad/s for {plan.duration:g} s, seed {plan.seed}",
+    )
+
+
+@dataclass(frozen=True)
+class _Strokes:
+    """Every joint on its own: strokes between random targets, a rest after some of them."""
+
+    seed: int
+    duration: float
+    still: float
+    speed: tuple[float, float]
+    rest: tuple[float, float]
+    rest_share: float
+
+    def of_joint(self, joint: int, start: float, lower: float, upper: float) -> dict[str, list[float]]:
+        """Knots of one joint, which stands for `still` seconds at both ends."""
+        draws = Draws(self.seed, 1, joint)
+        angle, now, end = start, self.still, self.duration - self.still
+        times, angles = [0.0], [start]
+        while now + SHORTEST_STROKE <= end:
+            way = draws.between(lower, upper) - angle
+            seconds = max(SHORTEST_STROKE, PEAK_OVER_MEAN * abs(way) / draws.between(*self.speed))
+            if now + seconds > end:  # the last stroke ends where its time ends, no faster than drawn
+                way, seconds = way * (end - now) / seconds, end - now
+            if now > times[-1]:
+                times.append(now)
+                angles.append(angle)
+            angle, now = angle + way, now + seconds
+            times.append(now)
+            angles.append(angle)
+            if draws.share() < self.rest_share:
+                now += draws.between(*self.rest)
+        zeros = [0.0] * len(times)
+        return {"time": times, "position": angles, "velocity": zeros, "acceleration": list(zeros)}
+
+
+def _from_file(motion: Node, joints: Joints) -> Motion:
+    motion.keys(("kind", "file", "pretension"))
+    file = Path(motion.member("file").text("path of a table (.csv or .parquet), relative to the rig file"))
+    table = read_table(file, lambda path, names: _check_columns(path, names, len(joints)))
+    _check_motion(file, table, joints)
+    time = table["time"].tolist()
+    kinds = ("position", "velocity", "acceleration")
+    knots = [
+        {"time": time} | {kind: table[f"joint_{kind}[{j}]"].tolist() for kind in kinds}
+        for j in range(1, len(joints) + 1)
+    ]
+    has_column = "pretension" in table
+    if has_column and not motion.member("pretension").absent:
+        motion.member("pretension").refuse(f"nothing, since {file} has a column pretension")
+    pretension = _plateaus(table) if has_column else _pretension(motion)
+    return Motion(knots, pretension, f"{len(time)} rows of {file.name}, {time[0]:g} to {time[-1]:g} s", file)
+
+
+# --- parts ------------------------------------------------------------------------------------------------------------
+
+
+def _standing(angle: float) -> dict[str, list[float]]:
+    return {"time": [0.0], "position": [angle], "velocity": [0.0], "acceleration": [0.0]}
+
+
+def _posture(node: Node, lower: Sequence[float], upper: Sequence[float]) -> list[float]:
+    """[n] rad, the first posture: within reach; the middle of the range where none is given, 0 without limits."""
+    if node.absent:
+        middle = [0.5 * (low + high) for low, high in zip(lower, upper, strict=True)]
+        return [angle if math.isfinite(angle) else 0.0 for angle in middle]
+    angles = node.list_of(len(lower), "one angle per joint in rad", lambda angle: angle.number(-1e6, 1e6, "rad"))
+    for angle, element, low, high in zip(angles, node.elements(), lower, upper, strict=True):
+        if not low <= angle <= high:
+            element.refuse(f"an angle within the joint's range, {low:g} to {high:g} rad")
+    return angles
+
+
+def _range_of_strokes(motion: Node, joints: Joints) -> tuple[list[float], list[float]]:
+    """[n] lowest and highest targets: as given, or the limits less a margin."""
+    margin = [MARGIN * (high - low) for low, high in zip(joints.lower, joints.upper, strict=True)]
+    found = {
+        "lower": [low + part for low, part in zip(joints.lower, margin, strict=True)],
+        "upper": [high - part for high, part in zip(joints.upper, margin, strict=True)],
+    }
+    for key in found:
+        node = motion.member(key)
+        for j, angle in enumerate(found[key], start=1):
+            if node.absent and not math.isfinite(angle):
+                node.refuse(f"one angle per joint in rad, since physics.links[{j}] has no limits")
+        if not node.absent:
+            found[key] = _posture(node, joints.lower, joints.upper)
+    for element, low, high in zip(motion.member("upper").elements(), found["lower"], found["upper"], strict=False):
+        if high < low:
+            element.refuse(f"an angle not below motion.lower, {low:g} rad")
+    for element, low, high in zip(motion.member("lower").elements(), found["lower"], found["upper"], strict=False):
+        if high < low:
+            element.refuse(f"an angle not above motion.upper, {high:g} rad")
+    return found["lower"], found["upper"]
+
+
+def _pretension(motion: Node) -> dict[str, list[float]]:
+    force = motion.member("pretension").number(0.0, STRONGEST, "N, the mean tendon force", above=True)
+    return {"time": [0.0], "value": [force]}
+
+
+def _check_columns(file: Path, names: list[str], joints: int) -> None:
+    wanted = ["time"]
+    for j in range(1, joints + 1):
+        wanted += [f"joint_position[{j}]", f"joint_velocity[{j}]", f"joint_acceleration[{j}]"]
+    for name in wanted:
+        if name not in names:
+            raise InputError(f"{file}: no column {name}; expected {', '.join(wanted)} and at most pretension")
+    for name in names:
+        # excite's motor positions are for a robot: the rig commands its own motors
+        if name not in wanted and name != "pretension" and not name.startswith("tendon_position["):
+            raise InputError(f"{file}: unknown column {name!r}; expected {', '.join(wanted)} and at most pretension")
+
+
+def _check_motion(file: Path, table: Table, joints: Joints) -> None:
+    """Numbers in their ranges, times that increase, a start within reach, joints that stand at both ends."""
+    for name, column in table.items():
+        if name.startswith("tendon_position["):
+            continue
+        low, high, unit = RANGES[name.split("[")[0].removeprefix("joint_")]
+        _check_column(file, name, column, (column >= low) & (column <= high), f"{low:g} to {high:g} {unit}")
+    time = table["time"]
+    later = np.concatenate([[True], np.diff(time) > 0.0])
+    _check_column(file, "time", time, later, "a time after the row before, s")
+    for j, (lower, upper) in enumerate(zip(joints.lower, joints.upper, strict=True), start=1):
+        start = table[f"joint_position[{j}]"][:1]
+        reached = (start >= lower) & (start <= upper)
+        _check_column(
+            file,
+            f"joint_position[{j}]",
+            start,
+            reached,
+            f"a start within the joint's limits, {lower:g} to {upper:g} rad",
+        )
+        for kind in ("velocity", "acceleration"):
+            name = f"joint_{kind}[{j}]"
+            stands = np.abs(table[name]) <= STILL
+            stands[1:-1] = True
+            what = "0 in the first and the last row, before and after which the joints stand"
+            _check_column(file, name, table[name], stands, what)
+
+
+def _check_column(file: Path, name: str, column: Array, good: NDArray[np.bool_], expected: str) -> None:
+    """Refuses the first row that is not good."""
+    bad = np.flatnonzero(~good)
+    if bad.size:
+        row = int(bad[0]) + 1
+        raise InputError(f"{file}: column {name}, row {row}: {column[row - 1]:g}; expected {expected}")
+
+
+def _plateaus(table: Table) -> dict[str, list[float]]:
+    """Knots of a sampled pretension: the rows on either side of every change."""
+    time, value = table["time"], table["pretension"]
+    changes = np.diff(value) != 0.0
+    keep = np.concatenate([[True], changes]) | np.concatenate([changes, [False]])
+    return {"time": time[keep].tolist(), "value": value[keep].tolist()}

@@ -1,0 +1,273 @@
+"""Rig files (`tendonfmu-rig-1`): a finger description with physics, sensors, motion, pushes and a seed.
+
+A rig file is short: the finger by its path, the motion by a recipe, another rig as its `base`. Reading it gives the
+*expanded* rig that the plant takes: the finger inline, the motion as knots, the pushes as a list. What stands in the
+same way in both (physics, sensors, integration) is checked by the plant alone; `schema/rig.schema.json` says all of
+it to editors.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.errors import InputError
+from tendonfmu.files.json_node import Node, Refusal, read_json
+from tendonfmu.model import native
+from tendonfmu.model.description import FingerDescription, read_finger
+from tendonfmu.simulate.motion_plan import Joints, Motion, expand_motion
+from tendonfmu.simulate.pushes import Segment, expand_pushes
+from tendonfmu.statistics.random_numbers import LARGEST_SEED
+
+FORMAT = "tendonfmu-rig-1"
+WHAT = "a rig"
+LONGEST = 1e6  # s
+MOST_SAMPLES = 50_000_000
+LONGEST_BASE_CHAIN = 16
+
+# what a recording may hold beside tendon forces and positions
+COLUMNS = ("joint_position", "joint_velocity", "external_torque", "contact")
+
+TOP = (
+    "format", "base", "name", "version", "seed", "finger", "physics", "sensors", "motion", "pushes", "settle",
+    "integration", "recording",
+)  # fmt: skip
+# kinds of motion and pushes have keys of their own: another kind replaces the base's, the same kind changes it
+PATHS = (("finger",), ("motion", "file"))
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A rig that has been read and expanded; the plant has not seen it yet (see `tendonfmu.simulate.plant.Plant`).
+
+    path: where it was read. files: all files it was made of, itself first. data: merged with its bases.
+    finger: its description. motion: with its knots. expanded: as the plant takes it.
+    rate: samples per second. duration: of the recording, s, or None. columns: wanted beside the tendons'.
+    """
+
+    path: Path
+    files: list[Path]
+    data: Mapping[str, Any]
+    finger: FingerDescription
+    motion: Motion
+    expanded: Mapping[str, Any]
+    rate: float
+    duration: float | None
+    columns: list[str]
+
+    @property
+    def name(self) -> str:
+        return str(self.data["name"])
+
+    @property
+    def version(self) -> int:
+        return int(self.data["version"])
+
+    @property
+    def joints(self) -> int:
+        return len(self.finger.joint_names)
+
+    @property
+    def tendons(self) -> int:
+        return len(self.finger.tendon_names)
+
+    def json(self) -> str:
+        """The expanded rig as the plant reads it; the same rig gives the same text."""
+        return json.dumps(self.expanded, allow_nan=False)
+
+    def times(self) -> NDArray[np.float64]:
+        """[N] s: 0, 1/rate, ... below the recording's duration. Raises InputError where it has none."""
+        if self.duration is None:
+            raise InputError(f"{self.path}: recording: missing; expected an object with duration, s")
+        samples = _sample_count(self.duration, self.rate)
+        return np.asarray(np.arange(samples) / self.rate)
+
+
+def is_rig(path: Path) -> bool:
+    """Whether a file says that it is a rig, also a bad one. False for what is no JSON object or cannot be read."""
+    try:
+        with path.open(encoding="utf-8") as file:
+            data = json.load(file)
+    except (OSError, ValueError, RecursionError):
+        return False
+    return isinstance(data, dict) and str(data.get("format", "")).startswith("tendonfmu-rig-")
+
+
+def description_files(path: Path) -> list[Path]:
+    """The files that describe a rig: itself, its bases, its finger. Its motion is a result that may be made anew."""
+    files: list[Path] = []
+    finger = _with_base(path, files, []).get("finger")
+    return [*files, Path(finger)] if isinstance(finger, str) else files
+
+
+def read_rig(path: Path) -> Rig:
+    """Reads and expands a rig. Raises InputError: file, key path, value, what was expected.
+
+    Checks what the plant never sees; the rest is refused by `Plant(rig.json())`.
+    """
+    files: list[Path] = []
+    data = _with_base(path, files, [])
+    try:
+        return _expand(path, files, data)
+    except Refusal as refused:
+        raise InputError(f"{path}: {refused}") from None
+
+
+# --- base -------------------------------------------------------------------------------------------------------------
+
+
+def _with_base(path: Path, files: list[Path], chain: list[Path]) -> dict[str, Any]:
+    """The keys of a rig file, those it does not give taken from its base. files: those read are appended."""
+    if path.resolve() in [each.resolve() for each in chain]:
+        loop = " -> ".join(str(each) for each in (*chain, path))
+        raise InputError(f"{chain[-1]}: base: {loop}; expected no rig that is its own base")
+    if len(chain) >= LONGEST_BASE_CHAIN:
+        raise InputError(f"{chain[-1]}: base: {path}; expected at most {LONGEST_BASE_CHAIN - 1} bases in a row")
+    data = read_json(path, WHAT)
+    files.append(path)
+    try:
+        if isinstance(data, dict):
+            Node(data).member("format").choice(FORMAT)  # before its keys: it may be a finger
+        root = Node(data).keys(TOP)
+        base = root.member("base")
+        own = {key: value for key, value in data.items() if key != "base"}
+        _place_paths(own, path.parent)
+        if base.absent:
+            return own
+        other = path.parent / base.text("path of another rig, relative to this file")
+    except Refusal as refused:
+        raise InputError(f"{path}: {refused}") from None
+    return _merged(_with_base(other, files, [*chain, path]), own)
+
+
+def _place_paths(data: dict[str, Any], folder: Path) -> None:
+    """Paths are relative to the file in which they stand."""
+    for *way, key in PATHS:
+        place: Any = data
+        for step in way:
+            place = place.get(step) if isinstance(place, dict) else None
+        if isinstance(place, dict) and isinstance(place.get(key), str) and place[key]:
+            place[key] = str(folder / place[key])
+
+
+def _merged(base: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
+    """Keys of `own`, beside those of `base` that it does not give: objects key by key, everything else whole.
+
+    null takes a key away. A motion of another kind takes the place of the base's.
+    """
+    result = dict(base)
+    for key, value in own.items():
+        before = base.get(key)
+        if value is None:
+            result.pop(key, None)
+        elif (
+            isinstance(value, dict)
+            and isinstance(before, dict)
+            and value.get("kind", before.get("kind")) == before.get("kind")
+        ):
+            result[key] = _merged(before, value)
+        else:
+            result[key] = value
+    return result
+
+
+# --- expansion --------------------------------------------------------------------------------------------------------
+
+
+def _expand(path: Path, files: list[Path], data: dict[str, Any]) -> Rig:
+    root = Node(data).keys(TOP)
+    root.member("name").text("the rig's name")
+    root.member("version").integer(1, LARGEST_SEED)
+    seed = root.member("seed").integer(0, LARGEST_SEED, default=0)
+    finger = _finger(root.member("finger"), path, files)
+    segments, limits = _links(root.member("physics"), len(finger.joint_names))
+    rate = root.member("sensors").member("rate").number(1.0, 1e5, "Hz", default=1000.0)
+    duration, columns = _recording(root.member("recording"), rate)
+    motion = expand_motion(root.member("motion"), limits, seed, duration)
+    if motion.file is not None:
+        files.append(motion.file)
+    pushes = expand_pushes(root.member("pushes"), segments, seed, math.inf if duration is None else duration)
+    expanded = data | {
+        "finger": finger.data,
+        "seed": seed,
+        "motion": motion.expanded(),
+        "pushes": pushes,
+    }
+    return Rig(path, files, data, finger, motion, expanded, rate, duration, columns)
+
+
+def _finger(node: Node, path: Path, files: list[Path]) -> FingerDescription:
+    """The finger, by its path or inline."""
+    if isinstance(node.value, str):
+        file = Path(node.text("path of a finger description, relative to this file"))
+        files.append(file)
+        return read_finger(file)
+    if not isinstance(node.value, dict):
+        node.refuse("a finger description, or the path of one relative to this file")
+    text = json.dumps(node.value).encode()
+    try:
+        image = native.image_from_json(text)
+    except native.NativeError as refused:
+        raise Refusal(f"finger: {refused}") from None
+    return FingerDescription(path=path, text=text, data=node.value, image=image)
+
+
+def _links(physics: Node, joints: int) -> tuple[list[Segment], Joints]:
+    """What motion and pushes take from the links: their shape and the joints' limits. The plant checks the rest."""
+    if not isinstance(physics.value, dict):
+        physics.refuse("an object with links")
+    links = physics.member("links")
+    if not isinstance(links.value, list) or len(links.value) != joints:
+        links.refuse(f"a list of {joints}, one link per joint of the finger")
+    elements = links.elements()
+    ends = [_vector(link.member("offset"), "m") for link in elements[1:]] + [_vector(physics.member("tip"), "m")]
+    lower, upper = [], []
+    for link in elements:
+        limits = link.member("limits")
+        lower.append(-math.inf if limits.absent else limits.member("lower").number(-1e6, 1e6, "rad"))
+        upper.append(math.inf if limits.absent else limits.member("upper").number(-1e6, 1e6, "rad"))
+        if not lower[-1] < upper[-1]:
+            limits.member("upper").refuse(f"an angle above limits.lower, {lower[-1]:g} rad")
+    segments = [
+        Segment(j, end, _vector(link.member("axis"), "", required=True))
+        for j, (link, end) in enumerate(zip(elements, ends, strict=True), start=1)
+    ]
+    return segments, Joints(lower, upper)
+
+
+def _vector(node: Node, unit: str, required: bool = False) -> list[float]:
+    if node.absent and not required:
+        return [0.0, 0.0, 0.0]
+    meaning = f"x, y and z in {unit}" if unit else "x, y and z"
+    return node.list_of(3, meaning, lambda part: part.number(-1e6, 1e6, unit))
+
+
+def _recording(recording: Node, rate: float) -> tuple[float | None, list[str]]:
+    if recording.absent:
+        return None, []
+    recording.keys(("duration", "columns"))
+    duration = recording.member("duration").number(0.0, LONGEST, "s", above=True)
+    if _sample_count(duration, rate) > MOST_SAMPLES:
+        recording.member("duration").refuse(f"at most {MOST_SAMPLES} samples at {rate:g} Hz")
+    columns = recording.member("columns")
+    if columns.absent:
+        return duration, []
+    if not isinstance(columns.value, list):
+        columns.refuse(f"a list of {', '.join(COLUMNS)}")
+    wanted = [element.choice(*COLUMNS) for element in columns.elements()]
+    for element in columns.elements():
+        if wanted.count(element.value) > 1:
+            element.refuse("each column once")
+    return duration, [column for column in COLUMNS if column in wanted]
+
+
+def _sample_count(duration: float, rate: float) -> int:
+    """Samples 0, 1/rate, ... below the duration; rounding of the product decides nothing."""
+    return max(1, math.ceil(duration * rate - 1e-6))

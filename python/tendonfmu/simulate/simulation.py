@@ -1,0 +1,119 @@
+"""Recordings of the simulated finger, and the truth beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.simulate.plant import MEASURED, TRUE, Array, Plant, Statistics, refused_by, require_plant
+from tendonfmu.simulate.rig import Rig
+
+Table = dict[str, NDArray[np.float64]]
+
+# Samples in one call of the plant: between calls a bar moves and Ctrl-C is heard.
+CHUNK = 100
+ALWAYS = ("tendon_force", "tendon_position")
+ENERGIES = ("kinetic_energy", "potential_energy", "motor_work", "friction_work", "damping_work", "push_work")
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """recording: columns of docs/recording.md. truth: true signals at the same times, None unless asked for.
+
+    contact_seconds: with a force above the rig's `contact_force`. integrator: that was used. work: what it did.
+    """
+
+    recording: Table
+    truth: Table | None
+    contact_seconds: float
+    integrator: str
+    work: Statistics
+
+    def summary(self, rig: Rig) -> list[str]:
+        """What was simulated, in lines of text."""
+        time = self.recording["time"]
+        pushes = len(rig.expanded["pushes"])
+        counted = "1 push" if pushes == 1 else f"{pushes} pushes"
+        contact = f", {counted}, {self.contact_seconds:.2f} s in contact" if pushes else ""
+        return [
+            f"{len(time)} samples, {time[-1]:.3f} s of {rig.name}{contact}; {self.integrator}: {self.work.steps} steps"
+        ]
+
+
+def plant_of(rig: Rig) -> Plant:
+    """The plant of a rig. Raises InputError with the rig's file and the key path."""
+    with refused_by(rig.path):
+        return Plant(rig.json())
+
+
+def simulate(
+    rig: Rig,
+    *,
+    truth: bool = False,
+    integrator: str | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Simulation:
+    """Runs a rig from its initialisation to the end of its recording; the same rig gives the same numbers.
+
+    truth: also give the truth. integrator: "cvode" or "fixed_step" instead of the rig's. progress: called with
+    samples done and all samples. Raises InputError: a rig that is refused, or where the solver gave up, and why.
+    """
+    require_plant()
+    time = rig.times()
+    plant = plant_of(rig)
+    with refused_by(rig.path):
+        if integrator is not None:
+            plant.configure(integrator=integrator)
+        plant.initialise()
+        names = _wanted(rig, truth)
+        parts = []
+        for start in range(0, len(time), CHUNK):
+            progress(start, len(time))
+            parts.append(plant.run(time[start : start + CHUNK], names))
+        progress(len(time), len(time))
+        work = plant.statistics
+        used = plant.settings.integrator
+    signals = {name: np.concatenate([part[name] for part in parts]) for name in names}
+    return Simulation(
+        recording=_recording(rig, time, signals),
+        truth=_truth(time, signals) if truth else None,
+        contact_seconds=float(signals["contact"].sum()) / rig.rate,
+        integrator=used,
+        work=work,
+    )
+
+
+def _wanted(rig: Rig, truth: bool) -> list[str]:
+    measured = [f"measured_{name}" for name in MEASURED if name in ALWAYS or name in rig.columns]
+    return [*measured, *(TRUE if truth else ("contact",))]
+
+
+def _recording(rig: Rig, time: Array, signals: dict[str, Array]) -> Table:
+    table: Table = {"time": time}
+    for name in MEASURED:
+        if name in ALWAYS or name in rig.columns:
+            table |= _columns(name, signals[f"measured_{name}"])
+    if "contact" in rig.columns:
+        table["contact"] = signals["contact"]
+    return table
+
+
+def _truth(time: Array, signals: dict[str, Array]) -> Table:
+    table: Table = {"time": time}
+    for name in TRUE:
+        if name == "energy":
+            table |= {key: signals[name][:, k] for k, key in enumerate(ENERGIES)}
+        elif signals[name].ndim == 1:
+            table[name] = signals[name]
+        else:
+            table |= _columns(name, signals[name])
+    return table
+
+
+def _columns(name: str, array: Array) -> Table:
+    """Columns name[1], name[2], ... of [N, size]; -0.0 is written as 0.0."""
+    clean = array if array.dtype == bool else array + 0.0
+    return {f"{name}[{k + 1}]": np.ascontiguousarray(clean[:, k]) for k in range(array.shape[1])}

@@ -1,0 +1,367 @@
+"""Held-out errors of any subset of columns from Gram matrices: after they are made, no sample is touched.
+
+Target and columns are block means with the slow bias projected out of both. Of each fold the products of all columns
+are kept; leaving a fold out is a subtraction. What the nominal model's own numbers can mend is refitted without the
+fold each time (Frisch and Waugh, 1933): candidates and target are replaced by what that refit leaves of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from tendonfmu.statistics.folds import Folds
+from tendonfmu.statistics.splines import Span, Splines
+
+Numbers = NDArray[np.float64]
+Array = NDArray[Any]
+Indices = NDArray[np.intp]
+
+MEMORY = 20.0  # blocks that noise remembers, about: so many rows count as one against what is known beforehand
+_PIECE = 4096  # rows at a time
+_SMALLEST = 1e-100  # of a scale: its square is a number
+
+
+@dataclass(frozen=True)
+class _Fold:
+    """One fold left out.
+
+    refit: [u, c + 1] numbers of the nominal model per candidate, and of the target. energy [c, c], score [c]: what is
+    learned from, nominal numbers refitted. own_energy [c, c], own_score [c], own_square: the same on the fold itself.
+    """
+
+    refit: Numbers
+    energy: Numbers
+    score: Numbers
+    own_energy: Numbers
+    own_score: Numbers
+    own_square: float
+
+
+class Products:
+    """Columns free of a slow bias, and their products by fold: what does not depend on a target."""
+
+    def __init__(self, folds: Folds, nominal: Array, values: Array, splines: Splines) -> None:
+        """nominal: [B, n, u], values: [B, n, c]: derivatives. splines: [B, s] of the slow bias."""
+        self.folds, self.nominal_count, self.count = folds, nominal.shape[2], values.shape[2]
+        rows, joints = folds.rows, nominal.shape[1]
+        self.span = Span(splines[rows])
+        self.table = np.empty((len(rows), joints, self.nominal_count + self.count), dtype=np.float32)
+        for j in range(joints):
+            self.table[:, j, : self.nominal_count] = self.span.without(nominal[rows, j])
+            self.table[:, j, self.nominal_count :] = self.span.without(values[rows, j])
+        self.by_fold = [self._of(np.flatnonzero(folds.fold == number)) for number in range(folds.folds)]
+
+    def _of(self, rows: Indices) -> Numbers:
+        """[u + c]² of some rows."""
+        size, joints = self.table.shape[2], self.table.shape[1]
+        total = np.zeros((size, size))
+        for begin in range(0, len(rows), _PIECE):
+            part = rows[begin : begin + _PIECE]
+            columns = self.table[part].reshape(len(part) * joints, size).astype(np.float64)
+            total += columns.T @ columns
+        return total
+
+    def chosen(self, shared: Numbers | None, candidates: Indices | None) -> Products:
+        """With combinations [c, k] of the values among the nominal columns as well, and of the values some alone."""
+        u = self.nominal_count
+        mixed = np.zeros((self.count, 0)) if shared is None else shared
+        kept = np.arange(self.count) if candidates is None else candidates
+        if not mixed.shape[1] and len(kept) == self.count:
+            return self
+        found = copy(self)
+        found.nominal_count, found.count = u + mixed.shape[1], len(kept)
+        added = self.table[:, :, u:] @ mixed.astype(np.float32)
+        found.table = np.concatenate([self.table[:, :, :u], added, self.table[:, :, u + kept]], axis=2)
+        found.by_fold = [self._turned(each, mixed, u + kept) for each in self.by_fold]
+        return found
+
+    def _turned(self, products: Numbers, mixed: Numbers, kept: Indices) -> Numbers:
+        """[u + k + kept]² of [u + c]²; kept: indices among all columns."""
+        u = self.nominal_count
+        cross = products[:, u:] @ mixed
+        own = np.concatenate([np.arange(u), kept])
+        count = mixed.shape[1]
+        found = np.empty((len(own) + count, len(own) + count))
+        place = np.concatenate([np.arange(u), u + count + np.arange(len(kept))])
+        found[np.ix_(place, place)] = products[np.ix_(own, own)]
+        found[place, u : u + count] = cross[own]
+        found[u : u + count, place] = cross[own].T
+        found[u : u + count, u : u + count] = mixed.T @ cross[u:]
+        return found
+
+    def with_own(self, values: Array) -> Products:
+        """With other candidates [r, n, k], free of the slow bias already; r: the folds' rows."""
+        u = self.nominal_count
+        found = copy(self)
+        found.count = values.shape[2]
+        found.table = np.concatenate([self.table[:, :, :u], values.astype(np.float32)], axis=2)
+        found.by_fold = []
+        for number, products in enumerate(self.by_fold):
+            rows = self.folds.fold == number
+            part = found.table[rows]
+            own = part.reshape(part.shape[0] * part.shape[1], u + found.count).astype(np.float64)
+            cross = own.T @ own[:, u:]
+            both = np.empty((u + found.count, u + found.count))
+            both[:u, :u] = products[:u, :u]
+            both[:, u:] = cross
+            both[u:, :u] = cross[:u].T
+            found.by_fold.append(both)
+        return found
+
+
+class Grams:
+    """Products of a target, of the nominal model's columns and of candidates', by fold."""
+
+    def __init__(
+        self,
+        folds: Folds,
+        target: Numbers,
+        nominal: Array,
+        values: Array,
+        splines: Splines,
+        scale: Numbers,
+    ) -> None:
+        """target: [B, n] N·m. nominal: [B, n, u], values: [B, n, c]: derivatives. splines: [B, s] of the slow bias.
+        scale: [u] how far each nominal number may be expected to move: a ridge that decides where the data do not.
+        """
+        self._begin(Products(folds, nominal, values, splines), target, scale, None)
+
+    @classmethod
+    def of(cls, products: Products, target: Numbers, scale: Numbers, judged: NDArray[np.bool_] | None = None) -> Grams:
+        """judged: [f] folds whose errors count, all by default; the others are only learned from."""
+        found = cls.__new__(cls)
+        found._begin(products, target, scale, judged)
+        return found
+
+    def _begin(self, products: Products, target: Numbers, scale: Numbers, judged: NDArray[np.bool_] | None) -> None:
+        folds = self.folds = products.folds
+        self.nominal_count, self.count, self._table = products.nominal_count, products.count, products.table
+        self._judged = np.ones(folds.folds, dtype=bool) if judged is None else judged
+        self._counted = np.unique(folds.stretch[self._judged[folds.fold]])  # stretches
+        self._span = products.span
+        rows, joints = folds.rows, target.shape[1]
+        self._target = np.stack([self._span.without(target[rows, j][:, None])[:, 0] for j in range(joints)], axis=1)
+        self.square = float(np.sum(self._target**2))
+        by_fold = self._with_target(products.by_fold)
+        whole = np.sum(by_fold, axis=0)
+        spread = self.square / max(self._target.size, 1) * MEMORY
+        ridge = np.zeros(self.nominal_count)
+        known = np.isfinite(scale) & (scale > 0)
+        # a column that is 0 has a scale without bound: the quotient is squared, which cannot overflow
+        ridge[known] = (np.sqrt(spread) / np.maximum(scale[known], _SMALLEST)) ** 2
+        diagonal = np.diagonal(whole)[: self.nominal_count]
+        self._ridge = np.maximum(ridge, 1e-9 * diagonal) + 1e-300
+        self._by_fold = [self._left_out(whole - own, own) for own in by_fold]
+        self._whole = self._left_out(whole, whole)
+
+    # --- making -------------------------------------------------------------------------------------------------------
+
+    def _with_target(self, by_fold: Sequence[Numbers]) -> list[Numbers]:
+        """[u + c + 1]² of all columns and the target, of each fold."""
+        size = self._table.shape[2]
+        found = []
+        for number, columns in enumerate(by_fold):
+            rows = self.folds.fold == number
+            target = self._target[rows].reshape(-1)
+            own = self._table[rows].reshape(len(target), size)
+            both = np.empty((size + 1, size + 1))
+            both[:size, :size] = columns
+            both[:size, size] = both[size, :size] = own.T.astype(np.float64) @ target
+            both[size, size] = target @ target
+            found.append(both)
+        return found
+
+    def _left_out(self, learned: Numbers, own: Numbers) -> _Fold:
+        u = self.nominal_count
+        inner = learned[:u, :u] + np.diag(self._ridge)
+        refit = _solved(inner, learned[:u, u:])
+        after = learned[u:, u:] - learned[u:, :u] @ refit
+        mixed = own[u:, :u] @ refit
+        there = own[u:, u:] - mixed - mixed.T + refit.T @ own[:u, :u] @ refit
+        return _Fold(
+            refit=refit,
+            energy=after[:-1, :-1],
+            score=after[:-1, -1],
+            own_energy=there[:-1, :-1],
+            own_score=there[:-1, -1],
+            own_square=float(there[-1, -1]),
+        )
+
+    # --- errors -------------------------------------------------------------------------------------------------------
+
+    @property
+    def without(self) -> float:
+        """Σ e² on held-out folds, (N·m)², of the nominal model refitted, without any candidate."""
+        return float(sum(each.own_square for each, counts in zip(self._by_fold, self._judged, strict=True) if counts))
+
+    def surviving(self, mix: Numbers) -> float:
+        """Share of the variance of a combination of candidates [c, d] that the refit leaves: of its best direction."""
+        used = np.flatnonzero(mix.any(axis=1))
+        part, inner = mix[used], np.ix_(used, used)
+        before = part.T @ self._raw_energy()[inner] @ part
+        after = part.T @ self._whole.energy[inner] @ part
+        length = np.sqrt(np.diagonal(before))
+        if not (length > 0.0).all():
+            return 0.0
+        power, turned = np.linalg.eigh(before / (length[:, None] * length))
+        kept = power > 1e-6 * power[-1]
+        root = turned[:, kept] / np.sqrt(power[kept])
+        left = root.T @ (after / (length[:, None] * length)) @ root
+        return float(np.clip(np.linalg.eigvalsh(left)[-1], 0.0, 1.0))
+
+    def _raw_energy(self) -> Numbers:
+        if not hasattr(self, "_raw"):
+            values = self._table[:, :, self.nominal_count :].reshape(self._target.size, self.count)
+            self._raw = np.zeros((self.count, self.count))
+            for begin in range(0, len(values), _PIECE):
+                part = values[begin : begin + _PIECE].astype(np.float64)
+                self._raw += part.T @ part
+        return self._raw
+
+    def magnitudes(self, mix: Numbers, low: Numbers, high: Numbers) -> Numbers:
+        """[d] learned from everything, between bounds [d]."""
+        return bounded(mix.T @ self._whole.energy @ mix, mix.T @ self._whole.score, low, high)
+
+    def error(self, mix: Numbers, low: Numbers, high: Numbers) -> tuple[float, Numbers]:
+        """Σ e² on held-out folds, (N·m)², with a combination of candidates [c, d]; magnitudes without each [f, d]."""
+        left, found = 0.0, []
+        used = np.flatnonzero(mix.any(axis=1))
+        part = mix[used]
+        for each, counts in zip(self._by_fold, self._judged, strict=True):
+            energy, own = (part.T @ matrix[np.ix_(used, used)] @ part for matrix in (each.energy, each.own_energy))
+            theta = bounded(energy, part.T @ each.score[used], low, high)
+            gain = 2.0 * float(theta @ (part.T @ each.own_score[used])) - float(theta @ own @ theta)
+            left += (each.own_square - gain) if counts else 0.0
+            found.append(theta)
+        return left, np.array(found)
+
+    def by_stretch(self, mix: Numbers | None, magnitudes: Numbers | None) -> Numbers:
+        """[stretches that count] Σ e² on unseen samples. mix: [c, d], magnitudes: [f, d], as `error` gives them; None:
+        without."""
+        found = np.zeros(self.folds.stretches)
+        for number, counts in enumerate(self._judged):
+            if counts:
+                rows, left = self._unseen(number, mix, magnitudes)
+                found += np.bincount(self.folds.stretch[rows], np.sum(left**2, axis=1), minlength=self.folds.stretches)
+        return np.asarray(found[self._counted])
+
+    def unseen_residual(self, mix: Numbers | None = None, magnitudes: Numbers | None = None) -> Numbers:
+        """[r, n] N·m left on the unseen rows that count, in the order of `counted_stretch`. mix, magnitudes: as for
+        `by_stretch`."""
+        return np.concatenate([self._unseen(int(k), mix, magnitudes)[1] for k in np.flatnonzero(self._judged)])
+
+    @property
+    def counted_stretch(self) -> NDArray[np.int64]:
+        """[r] stretch of each unseen row that counts."""
+        own = [self.folds.stretch[self.folds.fold == k] for k in np.flatnonzero(self._judged)]
+        return np.asarray(np.concatenate(own), dtype=np.int64)
+
+    def _unseen(
+        self, number: int, mix: Numbers | None, magnitudes: Numbers | None
+    ) -> tuple[NDArray[np.bool_], Numbers]:
+        """Rows of a fold, and [r, n] N·m that the model learned without it leaves there."""
+        u, each = self.nominal_count, self._by_fold[number]
+        rows = self.folds.fold == number
+        change = np.zeros(u + self.count)
+        change[:u] = each.refit[:, -1]
+        if mix is not None and magnitudes is not None:
+            added = mix @ magnitudes[number]
+            change[u:] = added
+            change[:u] -= each.refit[:, :-1] @ added
+        used = np.flatnonzero(change)
+        return rows, np.asarray(self._target[rows] - self._table[rows][:, :, used] @ change[used])
+
+    def scores(self, mix: Numbers, magnitudes: Numbers) -> tuple[Numbers, Numbers]:
+        """Energy [d, d] of a combination of candidates [c, d], what refitting can mend taken off, and its product
+        with the unseen residual of each stretch [stretches, d]: the parts of a sandwich (cluster-robust) covariance."""
+        u, used = self.nominal_count, np.flatnonzero(mix.any(axis=1))
+        part = mix[used]
+        nominal = self._whole.refit[:, used] @ part
+        found = np.zeros((self.folds.stretches, mix.shape[1]))
+        for number in range(self.folds.folds):
+            rows, left = self._unseen(number, mix, magnitudes)
+            table = self._table[rows]
+            own = table[:, :, u + used] @ part - table[:, :, :u] @ nominal
+            np.add.at(found, self.folds.stretch[rows], np.einsum("rnd,rn->rd", own, left))
+        return part.T @ self._whole.energy[np.ix_(used, used)] @ part, found
+
+    def left(self) -> tuple[Numbers, Numbers]:
+        """[stretches, n] Σ e² of each joint on unseen samples, (N·m)², without any candidate, and [stretches] rows: of
+        all stretches, whether they count or not."""
+        found = np.zeros((self.folds.stretches, self._target.shape[1]))
+        for number in range(self.folds.folds):
+            rows, left = self._unseen(number, None, None)
+            np.add.at(found, self.folds.stretch[rows], left**2)
+        return found, np.bincount(self.folds.stretch, minlength=self.folds.stretches).astype(np.float64)
+
+    @property
+    def refitted(self) -> Numbers:
+        """[u] what refitting on everything adds to the nominal numbers, without any candidate."""
+        return np.asarray(self._whole.refit[:, -1])
+
+    def errors_of(self, targets: Numbers) -> Numbers:
+        """[K] Σ e² on held-out folds, (N·m)², of other targets [B, n, K], the nominal numbers refitted to each."""
+        u, rows = self.nominal_count, self.folds.rows
+        flat = self._table[:, :, :u].astype(np.float64)
+        left = np.stack([self._span.without(targets[rows, j]) for j in range(targets.shape[1])], axis=1)
+        score = [np.einsum("rnu,rnk->uk", flat[own], left[own]) for own in self._rows_of_folds()]
+        energy = [np.einsum("rnu,rnv->uv", flat[own], flat[own], optimize=True) for own in self._rows_of_folds()]
+        found = np.zeros(targets.shape[2])
+        for k, own in enumerate(self._rows_of_folds()):
+            inner = np.sum(energy, axis=0) - energy[k] + np.diag(self._ridge)
+            refit = _solved(inner, np.sum(score, axis=0) - score[k])
+            found += np.einsum("rnk,rnk->k", left[own], left[own])
+            found += np.einsum("uk,uk->k", refit, energy[k] @ refit - 2.0 * score[k])
+        return found
+
+    def _rows_of_folds(self) -> list[NDArray[np.bool_]]:
+        return [self.folds.fold == number for number in range(self.folds.folds)]
+
+    def residual(self) -> Numbers:
+        """[R, n] N·m left of the target by the nominal model refitted on everything."""
+        change = self._whole.refit[:, -1]
+        return np.asarray(self._target - self._table[:, :, : self.nominal_count] @ change)
+
+
+def bounded(energy: Numbers, score: Numbers, low: Numbers, high: Numbers) -> Numbers:
+    """[d] least squares between bounds: what lies beyond one is put there, the worst first, the rest solved again."""
+    count = len(score)
+    length = np.sqrt(np.maximum(np.diagonal(energy), 1e-300))
+    scaled = energy / (length[:, None] * length)
+    right, low, high = score / length, low * length, high * length
+    fixed = np.full(count, np.nan)
+    for _ in range(count + 1):
+        free = np.isnan(fixed)
+        found = np.where(free, 0.0, fixed)
+        if free.any():
+            inner = scaled[np.ix_(free, free)] + 1e-9 * np.eye(int(free.sum()))
+            found[free] = np.linalg.solve(inner, right[free] - scaled[np.ix_(free, ~free)] @ found[~free])
+        beyond = np.where(free, np.maximum(low - found, found - high), -np.inf)
+        worst = int(np.argmax(beyond)) if count else 0
+        if not count or beyond[worst] <= 0.0:
+            break
+        fixed[worst] = low[worst] if found[worst] < low[worst] else high[worst]
+    return np.asarray(found / length) if count else np.zeros(0)
+
+
+def _solved(matrix: Numbers, right: Numbers) -> Numbers:
+    """[u, k] of a symmetric matrix above 0, its columns brought to one length first."""
+    length = np.sqrt(np.diagonal(matrix))
+    if not len(length):
+        return np.zeros((0, right.shape[1]))
+    scaled = matrix / (length[:, None] * length) + 1e-12 * np.eye(len(length))
+    factor = cho_factor(scaled, lower=True, check_finite=False)
+    return np.asarray(cho_solve(factor, right / length[:, None], check_finite=False) / length[:, None])
+
+
+def standard_error(gains: Sequence[float] | Numbers) -> float:
+    """Of the sum of gains by stretch [K]; infinite for a single one."""
+    values = np.asarray(gains)
+    return float(np.sqrt(len(values)) * np.std(values, ddof=1)) if len(values) > 1 else np.inf

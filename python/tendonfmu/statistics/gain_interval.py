@@ -1,0 +1,139 @@
+"""The gain of one model over another with its 95 % interval, from paired residuals on blocks of time.
+
+Residuals are coloured, and how large they are depends on the motion; so blocks of about two seconds are drawn, each
+with the residuals of both models in it, and the logarithm of the ratio of their rms is studentised: the block bootstrap
+of Künsch, "The jackknife and the bootstrap for general stationary observations", Ann. Statist. 17 (1989), with the
+bootstrap-t of Efron and Tibshirani, "An introduction to the bootstrap" (1993), section 12.5.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.statistics.interval import Interval
+
+Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+BLOCK = 2.0  # s; longer than residuals of a fitted finger are correlated
+LEVEL = 0.95
+FEWEST = 3  # blocks; of fewer no interval can be said
+_FEW, _SHORTEST = 6, 0.5  # blocks that there ought to be; s, of a block
+_RESAMPLES = 4000
+_MOST = 400  # blocks; more are put together
+_LEAST_PLAIN = 12  # blocks; of fewer the resamples' own errors are too rough to divide by: Student's t instead
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Which block each sample is in. index: [N] from 0, −1 outside the chosen samples. count: of blocks."""
+
+    index: NDArray[np.intp]
+    count: int
+
+    def sums(self, values: Numbers) -> Numbers:
+        """[count] sums of values [N] over the blocks."""
+        chosen = self.index >= 0
+        return np.asarray(np.bincount(self.index[chosen], weights=values[chosen], minlength=self.count), dtype=float)
+
+
+def blocks_of(time: Numbers, chosen: Flags, length: float = BLOCK) -> Blocks:
+    """Cuts the chosen samples into blocks of about `length` s each, none across a stretch that is not chosen; of few
+    seconds into shorter ones.
+
+    time: [N] s. A stretch of less than half a block is one of its own only where it has no neighbour: it joins the
+    block before.
+    """
+    index = np.full(len(time), -1, dtype=np.intp)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(np.int8), [0]])))
+    chosen_seconds = sum(float(time[end - 1] - time[begin]) for begin, end in zip(edges[::2], edges[1::2], strict=True))
+    length = min(length, max(chosen_seconds / _FEW, _SHORTEST))
+    count = 0
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        span = float(time[end - 1] - time[begin])
+        parts = max(1, round(span / length))
+        if span < length / 2 and count:
+            index[begin:end] = count - 1
+            continue
+        share = (time[begin:end] - time[begin]) / span if span > 0 else np.zeros(end - begin)
+        index[begin:end] = count + np.minimum((share * parts).astype(np.intp), parts - 1)
+        count += parts
+    return Blocks(index, count)
+
+
+def gain_interval(before: Numbers, after: Numbers, seed: int = 0) -> Interval:
+    """1 − rms_after/rms_before with its 95 % interval.
+
+    before, after: [B] sums of squared residuals of both models over the same samples of each block, in time's order.
+    Where neighbouring blocks vary together they are put together first. NaN ends of fewer than three blocks.
+    """
+    total_before, total_after = float(before.sum()), float(after.sum())
+    if total_before <= 0:
+        return Interval(0.0, math.nan, math.nan)
+    value = 1 - math.sqrt(total_after / total_before)
+    if total_after <= 0 or len(before) < FEWEST:
+        return Interval(value, math.nan, math.nan)
+    pairs = _independent(np.column_stack([before, after]))
+    low, high = _log_ratio_ends(pairs, seed)
+    return Interval(value, 1 - math.exp(high), 1 - math.exp(low))
+
+
+def _log_ratio_ends(pairs: Numbers, seed: int) -> tuple[float, float]:
+    """Ends of the interval of log(rms after/rms before). pairs: [B, 2] sums of squares."""
+    estimate, error = (float(part[0]) for part in _log_ratio(np.ones((1, len(pairs))), pairs))
+    if error <= 0:
+        return estimate, estimate
+    low, high = _quantiles(pairs, estimate, seed)
+    return estimate - high * error, estimate - low * error
+
+
+def _quantiles(pairs: Numbers, estimate: float, seed: int) -> tuple[float, float]:
+    """Of the studentised log ratio."""
+    from scipy.stats import t
+
+    tail = (1 - LEVEL) / 2
+    plain = float(t.ppf(1 - tail, len(pairs) - 1))
+    if len(pairs) < _LEAST_PLAIN:
+        return -plain, plain
+    shares = np.full(len(pairs), 1 / len(pairs))
+    draws = np.random.default_rng(seed).multinomial(len(pairs), shares, _RESAMPLES).astype(float)
+    drawn, errors = _log_ratio(draws, pairs)
+    found = (drawn - estimate) / np.where(errors > 0, errors, np.nan)
+    low, high = np.nanquantile(found, [tail, 1 - tail])
+    return float(low), float(high)
+
+
+def _log_ratio(weights: Numbers, pairs: Numbers) -> tuple[Numbers, Numbers]:
+    """[R] log(rms after/rms before) with blocks counted `weights` [R, B] times, and [R] its standard error.
+
+    The error is that of a ratio of sums (delta method, or infinitesimal jackknife): with the shares a_b, c_b of a block
+    in both sums its influence is u_b = (a_b − c_b)/2, and the variance B/(B − 1) Σ u_b².
+    """
+    sums = weights @ pairs
+    estimate = 0.5 * np.log(sums[:, 1] / sums[:, 0])
+    share = weights[:, :, None] * pairs[None] / sums[:, None, :]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        single = np.where(weights > 0, (share[:, :, 1] - share[:, :, 0]) / (2 * weights), 0.0)
+    count = weights.sum(axis=1)
+    variance = np.sum(weights * single**2, axis=1) * count / (count - 1)
+    return estimate, np.sqrt(variance)
+
+
+def _independent(pairs: Numbers) -> Numbers:
+    """Neighbouring blocks put together in twos, while their influences are correlated beyond chance, or too many."""
+    while len(pairs) >= 2 * _LEAST_PLAIN:
+        sums = pairs.sum(axis=0)
+        influence = pairs[:, 1] / sums[1] - pairs[:, 0] / sums[0]
+        power = float(influence @ influence)
+        chance = power / math.sqrt(len(pairs))
+        if len(pairs) <= _MOST and (power <= 0 or influence[1:] @ influence[:-1] <= chance):
+            break
+        even = len(pairs) // 2 * 2
+        joined = pairs[:even].reshape(-1, 2, 2).sum(axis=1)
+        joined[-1] += pairs[even:].sum(axis=0)
+        pairs = joined
+    return pairs

@@ -1,0 +1,113 @@
+"""Oscillations at a steady frequency in a residual, whatever the hand does: vibration, mains, a motor's cogging.
+
+A periodogram of noise is exponentially distributed around its smooth spectrum; the largest of all its values has a
+known distribution (Fisher 1929; here with a local background, so that coloured noise is no line).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+from scipy.special import gammainccinv
+from scipy.stats import gamma
+
+from tendonfmu.statistics.whitening import Whitener
+
+if TYPE_CHECKING:
+    from tendonfmu.statistics.blocks import Blocks
+
+Numbers = NDArray[np.float64]
+
+LOWEST = 0.5  # Hz: slower ones belong to the bias
+BACKGROUND = 121  # bins of the smooth spectrum on either side
+MOST_LINES = 5
+
+
+@dataclass(frozen=True)
+class Line:
+    """frequency: Hz. amplitude: N·m, largest of the recordings. p_value: over all frequencies. share: of variance."""
+
+    frequency: float
+    amplitude: float
+    p_value: float
+    share: float
+
+
+def find_lines(
+    series: Blocks, residual: Numbers, filters: Whitener, *, level: float
+) -> tuple[tuple[Line, ...], Numbers]:
+    """Lines in the residual [B] of a joint with p-values up to the level, and their sum [B]; 0 in unused blocks.
+
+    filters: of this joint; lines are looked for in what it leaves, so that a steep spectrum does not spill over.
+    """
+    used = series.used & np.isfinite(residual)
+    left = np.where(used, residual, 0.0)
+    total, lines = np.zeros(len(residual)), []
+    variance = float(np.sum(left**2))
+    for _ in range(MOST_LINES):
+        flat = np.where(filters.valid, filters.apply(left[:, None])[:, 0], 0.0)
+        found = _strongest(series, flat, filters.valid)
+        if found is None or found[1] > level:
+            break
+        wave, amplitude = _fitted(series, left, used, found[0])
+        share = 1.0 - float(np.sum((left - wave) ** 2)) / max(float(np.sum(left**2)), 1e-300)
+        lines.append(Line(found[0], amplitude, found[1], share * float(np.sum(left**2)) / max(variance, 1e-300)))
+        left = left - wave
+        total += wave
+    return tuple(lines), total
+
+
+def _strongest(series: Blocks, flat: Numbers, used: NDArray[np.bool_]) -> tuple[float, float] | None:
+    """Frequency, Hz, and family-wise p-value of the highest point of the periodogram over its background."""
+    recordings = np.unique(series.recording)
+    places = [np.flatnonzero(series.recording == each) for each in recordings]
+    slots = [np.round((series.time[rows] - series.time[rows[0]]) / series.step).astype(int) for rows in places]
+    length = 2 * (max(int(slot[-1]) for slot in slots) + 1)
+    power, waves = np.zeros(length // 2 + 1), 0
+    for rows, slot in zip(places, slots, strict=True):
+        seen = int(used[rows].sum())
+        if seen * series.step < 5.0 / LOWEST:
+            continue
+        signal = np.zeros(length)
+        signal[slot] = flat[rows]
+        power += np.abs(np.fft.rfft(signal)) ** 2 / max(float(np.sum(flat[rows] ** 2)), 1e-300)
+        waves += 1
+    frequency = np.fft.rfftfreq(length, series.step)
+    allowed = (frequency >= LOWEST) & (frequency <= 0.45 / series.step)
+    if not waves or allowed.sum() < 4 * BACKGROUND:
+        return None
+    ratio = power / _background(power) * gammainccinv(waves, 0.5)
+    peak = int(np.argmax(np.where(allowed, ratio, 0.0)))
+    tests = 1.5 * float(allowed.sum())  # twice as fine as independent points, which are half of them
+    p_value = float(-np.expm1(tests * np.log1p(-min(gamma.sf(ratio[peak], waves), 1.0 - 1e-12))))
+    return float(frequency[peak]), p_value
+
+
+def _background(power: Numbers) -> Numbers:
+    """Median of the spectrum to the left or to the right of each point, the greater of both (an edge is no line)."""
+    size = BACKGROUND
+    middle = median_filter(power, size=size, mode="nearest")
+    gap = 4  # bins of the line itself
+    shift = size // 2 + gap
+    left = np.concatenate([np.full(shift, middle[0]), middle[:-shift]])
+    right = np.concatenate([middle[shift:], np.full(shift, middle[-1])])
+    return np.asarray(np.maximum(np.maximum(left, right), 1e-300))
+
+
+def _fitted(series: Blocks, left: Numbers, used: NDArray[np.bool_], near: float) -> tuple[Numbers, float]:
+    """Least-squares wave of each recording at the frequency, and the greatest amplitude."""
+    wave, amplitude = np.zeros(len(left)), 0.0
+    for each in np.unique(series.recording):
+        rows = (series.recording == each) & used
+        if not rows.any():
+            continue
+        phase = 2.0 * np.pi * near * (series.time[rows] - series.time[rows][0])
+        basis = np.stack([np.cos(phase), np.sin(phase), np.ones_like(phase)], axis=1)
+        weights = np.linalg.lstsq(basis, left[rows], rcond=None)[0]
+        wave[rows] = basis[:, :2] @ weights[:2]
+        amplitude = max(amplitude, float(np.hypot(weights[0], weights[1])))
+    return wave, amplitude

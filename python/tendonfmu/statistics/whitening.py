@@ -1,0 +1,117 @@
+"""Noise that remembers made white: an autoregressive model per joint, and what joints have in common.
+
+The model looks back over windows that grow with their distance (heterogeneous autoregression: Corsi, 2009), so that a
+few numbers describe both the short memory of coloured noise and the long one of a bias that wanders faster than its
+splines. How many windows is chosen by Schwarz's criterion. Filtering target and columns alike turns least squares into
+generalised least squares (Cochrane and Orcutt, 1949).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.statistics.blocks import Blocks
+
+Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Array = NDArray[Any]
+
+# first and last block before the present one whose mean is a regressor
+WINDOWS = ((1, 1), (2, 2), (3, 3), (4, 4), (5, 8), (9, 16), (17, 32), (33, 64), (65, 128))
+_ROOM = 20  # rows for each coefficient, at least
+
+
+@dataclass(frozen=True)
+class Whitener:
+    """coefficients: [p, n] of the means over the first p windows. scale: [n] N·m of what they leave. valid: [B] rows
+    whose windows are used and of the same stretch.
+    """
+
+    coefficients: Numbers
+    scale: Numbers
+    valid: Flags
+
+    def apply(self, values: Array) -> Array:
+        """[B, n, ...] filtered and in units of the noise; rows that are not valid are 0."""
+        shape = (1, values.shape[1], *[1] * (values.ndim - 2))
+        found = np.array(values, dtype=np.float64)
+        before = _sums(found)
+        for (first, last), own in zip(WINDOWS, self.coefficients, strict=False):
+            found[last:] -= own.reshape(shape) * _mean(before, first, last)
+        found /= self.scale.reshape(shape)
+        found[~self.valid] = 0.0
+        return found.astype(values.dtype, copy=False)
+
+
+def _sums(values: Numbers) -> Numbers:
+    """[B + 1, ...] sums of all rows before."""
+    return np.concatenate([np.zeros_like(values[:1]), np.cumsum(values, axis=0)])
+
+
+def _mean(before: Numbers, first: int, last: int) -> Numbers:
+    """[B − last, ...] mean over rows k − last .. k − first, for k from `last` on."""
+    rows = len(before) - 1
+    return np.asarray((before[last - first + 1 : rows - first + 1] - before[: rows - last]) / (last - first + 1))
+
+
+def valid_rows(series: Blocks, reach: int) -> Flags:
+    """[B] used rows with `reach` used ones before them in the same stretch without a gap."""
+    run = np.ones(len(series.time), dtype=bool)
+    run[1:] = series.used[1:] & series.used[:-1] & (series.segment[1:] == series.segment[:-1])
+    run[0] = False
+    last_break = np.maximum.accumulate(np.where(run, 0, np.arange(len(run))))
+    return np.asarray(series.used & (np.arange(len(run)) - last_break >= reach))
+
+
+def whitener(series: Blocks, residual: Numbers) -> Whitener:
+    """residual: [B, n] N·m, model and bias taken off. All joints look back as far as the one that needs most."""
+    most = _most_windows(series)
+    valid = valid_rows(series, _reach(most))
+    fits = [_autoregression(residual[:, j], valid, most) for j in range(residual.shape[1])]
+    count = max(len(fit) for fit in fits)
+    coefficients = np.zeros((count, residual.shape[1]))
+    for j, fit in enumerate(fits):
+        coefficients[: len(fit), j] = fit
+    plain = Whitener(coefficients, np.ones(residual.shape[1]), valid_rows(series, _reach(count)))
+    left = plain.apply(residual)[plain.valid]
+    scale = np.sqrt(np.mean(left**2, axis=0))
+    tiny = 1e-12 * max(float(np.abs(residual).max(initial=0.0)), 1e-12)
+    return Whitener(coefficients, np.maximum(scale, tiny), plain.valid)
+
+
+def _reach(windows: int) -> int:
+    return WINDOWS[windows - 1][1] if windows else 0
+
+
+def _most_windows(series: Blocks) -> int:
+    """So many that nine of ten used rows stay, and that each has rows enough."""
+    used = int(series.used.sum())
+    for count in range(len(WINDOWS), 0, -1):
+        rows = int(valid_rows(series, _reach(count)).sum())
+        if rows >= 0.9 * used and rows >= _ROOM * count:
+            return count
+    return 0
+
+
+def _autoregression(values: Numbers, valid: Flags, most: int) -> Numbers:
+    """[p] coefficients by least squares, p = 0..most of the least BIC; all see the same rows."""
+    rows = np.flatnonzero(valid)
+    target = values[rows]
+    before = _sums(values)
+    past = np.zeros((len(rows), most))
+    for k, (first, last) in enumerate(WINDOWS[:most]):
+        past[:, k] = _mean(before, first, last)[rows - last]
+    best, chosen = np.inf, np.zeros(0)
+    power = float(target @ target)
+    for order in range(most + 1):
+        own = past[:, :order]
+        fit = np.linalg.lstsq(own.T @ own, own.T @ target, rcond=1e-12)[0]
+        left = max(power - float(fit @ (own.T @ target)), 1e-300)
+        score = len(rows) * np.log(left) + order * np.log(max(len(rows), 2))
+        if score < best:
+            best, chosen = score, fit
+    return np.asarray(chosen)

@@ -1,0 +1,298 @@
+"""Many calls of one function, here or on the workers of `dask.distributed`: a row of answers each, resumed at any time.
+
+    jobs = [Job("monday", ("monday.parquet",)), Job("tuesday", ("tuesday.parquet",))]
+    with workers_of(address="tcp://head:8786") as client:
+        run_jobs(friction_of, jobs, Path("history"), client)
+    rows = rows_of(jobs, Path("history"))
+
+A job's row is DIR/rows/NAME.json, written whole as soon as the job ends; a job with a row is not run again. The process
+that asks writes the rows: workers need no common disk for them.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import tendonfmu
+from tendonfmu.errors import InputError
+from tendonfmu.files.whole_file import check_output_folder, whole_file
+
+ROWS = "rows"
+SECONDS_TO_CONNECT = 20.0
+
+Row = dict[str, Any]
+Function = Callable[..., Row]
+
+
+@dataclass(frozen=True)
+class Job:
+    """name: of its row's file, of characters that a file's name may have. arguments: of the function, to be pickled."""
+
+    name: str
+    arguments: tuple[Any, ...] = ()
+
+
+def row_file(folder: Path, name: str) -> Path:
+    return folder / ROWS / f"{name}.json"
+
+
+def read_row(folder: Path, name: str) -> Row | None:
+    """None where the job has not ended."""
+    file = row_file(folder, name)
+    return dict(json.loads(file.read_text(encoding="utf-8"))) if file.is_file() else None
+
+
+def rows_of(jobs: Sequence[Job], folder: Path) -> list[Row]:
+    """All rows there are, in the order of the jobs."""
+    return [row for row in (read_row(folder, job.name) for job in jobs) if row is not None]
+
+
+def waiting_jobs(jobs: Sequence[Job], folder: Path, failed_again: bool = False) -> list[Job]:
+    """Jobs without a row; failed_again: also those whose row is an error."""
+    return [job for job in jobs if _is_waiting(read_row(folder, job.name), failed_again)]
+
+
+def _is_waiting(row: Row | None, failed_again: bool) -> bool:
+    return row is None or (failed_again and bool(row.get("error")))
+
+
+def run_jobs(
+    function: Function,
+    jobs: Sequence[Job],
+    folder: Path,
+    client: Any = None,
+    *,
+    stop_after: float = math.inf,
+    failed_again: bool = False,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> int:
+    """Calls the function for each job without a row, and writes its row as it ends.
+
+    Parameters
+    ----------
+    function : of a module that workers can import; function(*arguments) -> row, a dict of numbers, words and None.
+        What it raises becomes the row's `error`.
+    jobs : with names that differ.
+    folder : of the rows.
+    client : of `workers_of`, or None: here, one after another.
+    stop_after : s, after which no further job begins.
+    failed_again : run jobs whose row is an error once more.
+    progress : called with the number of jobs that have a row, and of all.
+
+    Returns
+    -------
+    int : how many jobs ran.
+
+    Raises
+    ------
+    InputError : a folder that cannot be written, names that no file can have or that are not unique, a scheduler that
+        was lost.
+    """
+    _check_names([job.name for job in jobs])
+    check_output_folder(folder)
+    (folder / ROWS).mkdir(parents=True, exist_ok=True)
+    waiting = waiting_jobs(jobs, folder, failed_again)
+    done = len(jobs) - len(waiting)
+    progress(done, len(jobs))
+    count = 0
+    for row in _rows(function, waiting, client, time.monotonic() + stop_after):
+        write_row(folder, row)
+        count += 1
+        progress(done + count, len(jobs))
+    return count
+
+
+def _check_names(names: Sequence[str]) -> None:
+    taken = set[str]()
+    for name in names:
+        if not name or name.startswith(".") or Path(name).name != name or "\\" in name:
+            raise InputError(f"jobs: name {name!r}; expected one that a file can have")
+        if name in taken:
+            raise InputError(f"jobs: the name {name} stands twice; expected names that differ")
+        taken.add(name)
+
+
+def write_row(folder: Path, row: Row) -> None:
+    with whole_file(row_file(folder, row["name"])) as file:
+        file.write_text(_json(row) + "\n", encoding="utf-8")
+
+
+def _json(row: Row) -> str:
+    return json.dumps(_plain(row), indent=1, allow_nan=False)
+
+
+def _plain(row: Row) -> Row:
+    """Numbers of numpy as those of JSON; what is not finite as null."""
+    found: Row = {}
+    for key, value in row.items():
+        value = value.item() if isinstance(value, np.generic) else value
+        found[key] = None if isinstance(value, float) and not math.isfinite(value) else value
+    return found
+
+
+def failed_row(name: str, failed: BaseException) -> Row:
+    return {"name": name, "error": f"{type(failed).__name__}: {' '.join(str(failed).split())}"}
+
+
+def call(function: Function, job: Job) -> Row:
+    """The job's row, made where it runs."""
+    begin, begin_cpu = time.perf_counter(), time.process_time()
+    try:
+        row = {"error": "", **function(*job.arguments), "name": job.name}
+        _json(row)  # what no row can hold is an error of the job
+    except Exception as failed:  # days of work go on: the row says what happened
+        row = failed_row(job.name, failed)
+    return row | {"run_seconds": time.perf_counter() - begin, "cpu_seconds": time.process_time() - begin_cpu}
+
+
+def _rows(function: Function, jobs: Sequence[Job], client: Any, deadline: float) -> Iterator[Row]:
+    """Each row as it ends."""
+    waiting = iter(jobs)
+
+    def next_job() -> Job | None:
+        return next(waiting, None) if time.monotonic() < deadline else None
+
+    if client is not None:
+        yield from _rows_of_workers(function, next_job, client)
+        return
+    while (job := next_job()) is not None:
+        yield call(function, job)
+
+
+def _rows_of_workers(function: Function, next_job: Callable[[], Job | None], client: Any) -> Iterator[Row]:
+    """Only as many jobs are under way as there are threads to take them: dask blames all jobs of a worker that dies, so
+    none waits there beside another one.
+
+    Dask runs a job of a worker that died once more on another one. A job is under way until its row is here, so each
+    one gives one row, however often it ran.
+    """
+    import distributed
+
+    library: Any = distributed  # it has no types
+    under_way: dict[Any, Job] = {}
+    pending = library.as_completed()
+
+    def top_up() -> None:
+        while len(under_way) < max(1, sum(client.nthreads().values())):
+            job = next_job()
+            if job is None:
+                return
+            future = client.submit(call, function, job, pure=False)
+            under_way[future] = job
+            pending.add(future)
+
+    try:
+        top_up()
+        for future in pending:
+            yield _row_of(future, under_way.pop(future))
+            top_up()
+    except (OSError, library.CancelledError) as lost:  # what a job raises is in its row
+        words = " ".join(str(lost).split())
+        raise InputError(
+            f"the dask scheduler was lost ({type(lost).__name__}: {words}); expected it to stay: the same command "
+            "goes on"
+        ) from None
+
+
+def _row_of(future: Any, job: Job) -> Row:
+    """Errors of the job that `call` could not catch: a function that the worker cannot import, a job that ends one
+    worker after another (memory, a crash) until dask gives it up."""
+    try:
+        return failed_row(job.name, _first_of(future.exception())) if future.status == "error" else future.result()
+    finally:
+        future.release()  # else dask makes it again when the worker that has it dies
+
+
+def _first_of(failed: BaseException) -> BaseException:
+    """What dask wraps in an error of its own."""
+    while failed.__cause__ is not None:
+        failed = failed.__cause__
+    return failed
+
+
+# --- workers ----------------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def workers_of(address: str | None = None, count: int = 1) -> Iterator[Any]:
+    """A dask client: of the scheduler at an address (tcp://HOST:PORT), or of so many worker processes here.
+
+    Raises InputError without dask, without an answer from the address, and for workers of another version.
+    """
+    library = _library()
+    if address is None:
+        with _local_workers(library, count) as client:
+            yield client
+        return
+    try:
+        client = library.Client(address, timeout=SECONDS_TO_CONNECT)
+    except (OSError, ValueError) as failed:
+        raise InputError(f"--scheduler {address}: {failed}; expected the address of a dask scheduler") from None
+    with client:
+        check_versions(client, address)
+        yield client
+
+
+def _library() -> Any:
+    try:
+        import distributed
+    except ImportError as missing:
+        wanted = "expected dask and distributed: pip install 'tendonfmu[campaign]'"
+        raise InputError(f"no module {missing.name}; {wanted}") from None
+    return distributed
+
+
+@contextmanager
+def _local_workers(library: Any, count: int) -> Iterator[Any]:
+    """One thread of linear algebra per worker; a port of its own, so that two campaigns do not meet."""
+    import dask
+
+    limits = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    with (
+        dask.config.set({"distributed.nanny.pre-spawn-environ": limits}),
+        library.LocalCluster(
+            n_workers=count, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0"
+        ) as here,
+        library.Client(here) as client,
+    ):
+        yield client
+
+
+def version_here() -> str:
+    """Of the package where it runs."""
+    return tendonfmu.__version__
+
+
+def check_versions(client: Any, address: str) -> None:
+    """Raises InputError where there is no worker, or a scheduler or worker without tendonfmu of this version."""
+    try:
+        client.wait_for_workers(1, timeout=SECONDS_TO_CONNECT)
+    except TimeoutError:
+        raise InputError(f"--scheduler {address}: no workers; expected at least one, `dask worker {address}`") from None
+    try:
+        # the scheduler reads jobs, too
+        found = {"the scheduler": client.run_on_scheduler(version_here), **client.run(version_here)}
+    except Exception as failed:  # of any of them: no such module, most often
+        words = " ".join(str(_first_of(failed)).split())
+        raise InputError(
+            f"--scheduler {address}: it or a worker cannot import tendonfmu ({words}); expected version "
+            f"{version_here()} there"
+        ) from None
+    for place, version in found.items():
+        if version != version_here():
+            raise InputError(f"--scheduler {address}: {place} has tendonfmu {version}; expected {version_here()}")
+
+
+def worker_count() -> int:
+    """As many as there are processors to use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

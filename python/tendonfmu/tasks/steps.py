@@ -1,0 +1,80 @@
+"""Steps of a long computation whose results stay in a folder: what is done and unchanged is not done again.
+
+A result is JSON and belongs to all that it was made from: the digest of the files, of the options, of the results
+before it and of the version of the product.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from tendonfmu.files.whole_file import write_text
+
+FOLDER = ".steps"
+FORMAT = "tendonfmu-calibration-step-1"
+
+
+class Steps:
+    """In a folder. made_from: what every step depends on, as JSON has it."""
+
+    def __init__(self, folder: Path, made_from: Mapping[str, Any]) -> None:
+        self._folder = folder / FOLDER
+        self._before = digest_of(made_from)
+        self.repeated: list[str] = []  # names of the steps whose results were there
+
+    def result(
+        self,
+        name: str,
+        made_from: Mapping[str, Any],
+        compute: Callable[[], dict[str, Any]],
+        page: Path | None = None,
+    ) -> dict[str, Any]:
+        """Of this step, computed unless it is there already. made_from: what it depends on beside the steps before.
+        page: a file that the step writes, too: it has to be there.
+        """
+        key = self._before = digest_of({"before": self._before, "name": name, **made_from})
+        file = self._folder / f"{name}.json"
+        found = _read(file, key)
+        if found is not None and (page is None or page.is_file()):
+            self.repeated.append(name)
+            return found
+        result = compute()
+        self._folder.mkdir(parents=True, exist_ok=True)
+        write_text(file, json.dumps({"format": FORMAT, "key": key, "result": result}) + "\n")
+        # as a later call reads it: tuples become lists at once
+        return dict(json.loads(json.dumps(result)))
+
+
+def forget_steps(folder: Path) -> None:
+    """The next calibration in this folder does everything anew."""
+    shutil.rmtree(folder / FOLDER, ignore_errors=True)
+
+
+def _read(file: Path, key: str) -> dict[str, Any] | None:
+    """A result with this key; None where there is none, or where something else stands there."""
+    try:
+        content = json.loads(file.read_bytes())
+    except (OSError, ValueError):
+        return None
+    if not isinstance(content, dict) or content.get("format") != FORMAT or content.get("key") != key:
+        return None
+    result = content.get("result")
+    return result if isinstance(result, dict) else None
+
+
+def digest_of(content: Mapping[str, Any]) -> str:
+    """Of JSON, whatever the order of its keys."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def digest_of_file(file: Path) -> str:
+    found = hashlib.sha256()
+    with file.open("rb") as opened:
+        while piece := opened.read(1 << 20):
+            found.update(piece)
+    return found.hexdigest()
