@@ -15,7 +15,7 @@ pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not i
 
 from command import Call
 from real_browser import Elements, find_browser, measure
-from tendonfmu.demo.demo import demo
+from tendonfmu.demo import demo
 from tendonfmu.files.tables import read_table
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -95,7 +95,7 @@ def tune(
     print_tables(tables(tuning), lines(tuning), left="joint")
     say(f"{output}: {tuning.method}, tuned on {60 * tuning.hours_:.1f} min of free motion")
     if figures is not None:
-        from tendonfmu.report.tune_figures import write_figures
+        from tendonfmu.report.tune_files import write_figures
 
         for path, what in write_figures(tuning, figures).items():
             say(f"{path}: {what}")
@@ -146,7 +146,7 @@ def score(
     print_tables(tables(scored), lines(scored), left="")
     say(f"{output}: {scored.summary.events} events, {scored.summary.false_alarms} false alarms")
     if figures is not None:
-        from tendonfmu.report.score_figures import write_figures
+        from tendonfmu.report.score_files import write_figures
 
         for path, what in write_figures(scored, figures).items():
             say(f"{path}: {what}")

@@ -410,6 +410,7 @@ def demo(
     DIR gets story.html, which tells all of it, and all that it is made from.
     """
     from tendonfmu.demo.demo import Story
+    from tendonfmu.demo.page import write_story
     from tendonfmu.demo.text import chapter_lines, chapter_tables, file_lines
 
     story = Story(output)
@@ -420,5 +421,5 @@ def demo(
         with progress_bar() as bar:
             chapter.run(phase_bar(bar))
         print_tables(chapter_tables(story, chapter.name), chapter_lines(story, chapter.name), left="")
-    story.write()
+    write_story(story)
     print_tables((), file_lines(story), left="")

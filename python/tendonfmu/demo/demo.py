@@ -46,7 +46,7 @@ class Chapter:
 
 
 class Story:
-    """The demo in a folder: the chapters are run one by one, in order; `write` then makes the page of all of them.
+    """The demo in a folder: the chapters are run one by one, in order; `write_story` (page.py) then makes the page.
 
     finger: of detect and run. calibration, fit: of theirs. diagnosis: of the calibration. files: path -> what is in it.
     missing: why chapters are left out, empty if none is.
@@ -80,14 +80,9 @@ class Story:
         """In the order of the story, the page first."""
         return {**self._files, **self.finger.files}
 
-    def write(self) -> Path:
-        """The page of the whole story."""
-        from tendonfmu.demo.page import PAGE, write_story
-
-        page = self.folder / PAGE
-        write_story(self, page)
+    def add_page(self, page: Path) -> None:
+        """Puts the page of the whole story before all other files."""
         self._files = {page: "the whole story, to be read in a browser", **self._files}
-        return page
 
     def _calibrate(self, phase: Phase) -> None:
         from tendonfmu.calibrate.calibration import calibrate

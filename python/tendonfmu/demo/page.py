@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 from tendonfmu.calibrate import text as calibration_text
@@ -34,11 +33,13 @@ from tendonfmu.report.fit_summary import residual_tables, rounded
 PAGE = "story.html"
 
 
-def write_story(story: Story, file: Path) -> None:
+def write_story(story: Story) -> None:
     """All chapters of a story that was told to its end. The file appears whole or not at all."""
+    file = story.folder / PAGE
     text = story_page(story, [draw_sheet(sheet) for sheet in story_sheets(story)])
     with whole_file(file) as partial:
         partial.write_text(text, encoding="utf-8")
+    story.add_page(file)
 
 
 def story_page(story: Story, figures: list[PageFigure]) -> str:

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import ttest_1samp
 
-from tendonfmu.diagnose.remainder_features import features
+from tendonfmu.diagnose.remainder_features import Finding, features
 from tendonfmu.diagnose.remainder_learner import Choice, Learner, choices
 from tendonfmu.diagnose.remainder_text import described
 from tendonfmu.statistics.block_grams import standard_error
 from tendonfmu.statistics.folds import make_folds
-from tendonfmu.statistics.spectral_line import Line, find_lines
+from tendonfmu.statistics.spectral_line import find_lines
 from tendonfmu.statistics.splines import Splines
 from tendonfmu.statistics.whitening import Whitener, whitener
 
@@ -31,19 +31,6 @@ Numbers = NDArray[np.float64]
 LEVEL = 0.01  # of a wrong "unknown", family-wise
 LEAST_SHARE = 0.02  # of the residual's variance: smaller parts are not reported
 CERTAIN = 2.0  # standard errors over the stretches
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One part of the remainder.
-
-    joint: from 1. group: key of GROUPS or "line". subject: "joint 2", "tendons 1 and 3", or "".
-    """
-
-    joint: int
-    group: str
-    subject: str
-    line: Line | None = None
 
 
 @dataclass(frozen=True)

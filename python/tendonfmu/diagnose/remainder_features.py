@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 from sklearn.preprocessing import SplineTransformer  # type: ignore[import-untyped]
 
+from tendonfmu.statistics.spectral_line import Line
+
 if TYPE_CHECKING:
     from tendonfmu.diagnose.series import Series
 
@@ -26,6 +28,19 @@ TRAVELS = (0.03, 0.1, 0.3, 1.0)  # scales of presliding, of the median stroke
 MOST_PAIRS = 30  # of tendons: neighbours by number first
 RANDOM = 100  # columns of random functions of two or three states
 MOVING = 0.03  # of the 95 % quantile of a speed: slower counts as rest
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One part of the remainder.
+
+    joint: from 1. group: key of GROUPS or "line". subject: "joint 2", "tendons 1 and 3", or "".
+    """
+
+    joint: int
+    group: str
+    subject: str
+    line: Line | None = None
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import welch
 
-from tendonfmu.diagnose.remainder_features import GROUPS
+from tendonfmu.diagnose.remainder_features import GROUPS, Finding
 
 if TYPE_CHECKING:
-    from tendonfmu.diagnose.remainder import Finding
     from tendonfmu.diagnose.series import Series
 
 Numbers = NDArray[np.float64]

@@ -7,7 +7,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,6 @@ from tendonfmu.detect.counting import GRACE, DetectionScore, Event
 from tendonfmu.detect.run import Track
 from tendonfmu.detect.score_report import Scored
 from tendonfmu.detect.summary import RocPoint
-from tendonfmu.errors import InputError
 from tendonfmu.report.figure_data import Interval, intervals
 from tendonfmu.statistics.intervals import share
 
@@ -116,31 +114,6 @@ class DelayFigure:
     end: float
     later: int
     bins: int
-
-
-def write_figures(scored: Scored, folder: Path) -> dict[Path, str]:
-    """Draws what there is to draw into a folder that is made if missing; file -> what is in it."""
-    from tendonfmu.report.score_plots import draw_contacts, draw_delays, draw_events, draw_roc
-
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be made ({error.strerror})") from None
-    written = {folder / "contacts.png": "torques, compensated torques, label and detection over time"}
-    draw_contacts(contact_figure(scored), folder / "contacts.png")
-    if scored.summary.events:
-        written[folder / "events.png"] = "every event from its onset on"
-        draw_events(event_figure(scored), folder / "events.png")
-    if scored.roc and scored.summary.events and scored.summary.free_minutes:
-        written[folder / "roc.png"] = "found events against false alarms, over thresholds"
-        draw_roc(roc_figure(scored, scored.roc), folder / "roc.png")
-    if scored.summary.found:
-        written[folder / "delays.png"] = "how soon events are found"
-        draw_delays(delay_figure(scored), folder / "delays.png")
-    return written
-
-
-# --- over time --------------------------------------------------------------------------------------------------------
 
 
 def contact_figure(scored: Scored) -> ContactFigure:

@@ -13,7 +13,6 @@ from tendonfmu.detect.alarm_level import rate_limit
 from tendonfmu.detect.bounds import tail_levels
 from tendonfmu.detect.free_motion import FreeRun
 from tendonfmu.detect.tuning import ContactTuning
-from tendonfmu.errors import InputError
 from tendonfmu.statistics.intervals import rate
 
 Numbers = NDArray[np.float64]
@@ -82,24 +81,6 @@ class WorstFigure:
     title: str
     signal: str
     moments: list[Moment]
-
-
-def write_figures(tuning: ContactTuning, folder: Path) -> dict[Path, str]:
-    """Draws into a folder that is made if missing; file -> what is in it."""
-    from tendonfmu.report.tune_plots import draw_bounds, draw_tail, draw_worst
-
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be made ({error.strerror})") from None
-    draw_tail(tail_figure(tuning), folder / "tail.png")
-    draw_bounds(bound_figure(tuning), folder / "bounds.png")
-    draw_worst(worst_figure(tuning), folder / "worst.png")
-    return {
-        folder / "tail.png": "false alarms over the level of the bounds",
-        folder / "bounds.png": "bounds over the mean force",
-        folder / "worst.png": "the moments of free motion nearest to an alarm",
-    }
 
 
 def tail_figure(tuning: ContactTuning) -> TailFigure:

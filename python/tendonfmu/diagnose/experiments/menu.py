@@ -1,7 +1,7 @@
 """What else could be recorded: a menu of motions, pretensions and known loads, mostly in the range that was recorded.
 
-An entry is a list of sections, each a training motion of `excite/excitation.py` with a pretension and a load of its own;
-it is plain JSON (`Menu`), so that a report can carry it and `tendonfmu excite --discriminate` can write it.
+An entry is a list of sections, each a training motion of `excite/excitation.py` with a pretension and a load of its
+own; it is plain JSON (`Menu`), so that a report can carry it and `tendonfmu excite --discriminate` can write it.
 """
 
 from __future__ import annotations
