@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from detection_cases import PRETENSIONS, RIG, Numbers, Take, read_truth, recording_file, takes, write_rig
 
-from tendonfmu.files.whole_file import whole_file
+from tendonfmu.files.writing import whole_file
 from tendonfmu.model import native
 from tendonfmu.recordings.recording import read_recording
 from tendonfmu.simulate.rig import read_rig

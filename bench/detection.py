@@ -44,7 +44,7 @@ from detection_rivals import Detector, HighPass, best_thresholds, from_json, mak
 from detection_table import Campaign, Free, Outcome, report
 from numpy.typing import NDArray
 
-from tendonfmu.files.whole_file import whole_file
+from tendonfmu.files.writing import whole_file
 from tendonfmu.recordings.recording import Recording, read_recording
 
 WINDOWS = (0.04, 0.3)  # s from the onset until the matched detector decides; every push is held for 0.3 s

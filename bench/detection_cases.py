@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from tendonfmu.estimate.fitting import FrictionFit
 from tendonfmu.files.json_node import Node
 from tendonfmu.files.tables import read_table, write_table
-from tendonfmu.files.whole_file import whole_file
+from tendonfmu.files.writing import whole_file
 from tendonfmu.model.balance import moment_arms
 from tendonfmu.recordings.recording import read_recording
 from tendonfmu.simulate.motion_plan import Joints, expand_motion

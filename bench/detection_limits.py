@@ -42,7 +42,7 @@ from detection_limit_cases import (
 from detection_limit_table import ramp_tables, recovery_table, stuck_tables
 
 from tendonfmu.detect.counting import Event, score_detection, stretches
-from tendonfmu.files.whole_file import whole_file
+from tendonfmu.files.writing import whole_file
 from tendonfmu.model.balance import moment_arms
 from tendonfmu.model.native import Finger, image_from_json
 

@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 from mujoco_pushes import FREE, PRETENSIONS, PUSHED, description_file, make, place
 
-from tendonfmu.files.whole_file import whole_file
+from tendonfmu.files.writing import whole_file
 
 FINGERS = (1, 3, 19, 4, 6)
 SIZES = (6.0, 3.0, 1.5)  # times the residual's rms: least sizes of classes

@@ -25,7 +25,7 @@ from rich.console import Console
 from rich.table import Table
 
 from tendonfmu.estimate.estimation import Estimator, Learner
-from tendonfmu.files.whole_file import whole_file
+from tendonfmu.files.writing import whole_file
 
 Numbers = NDArray[np.float64]
 Row = dict[str, float]

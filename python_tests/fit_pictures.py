@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.estimate.information import unknowns
+from tendonfmu.estimate.fisher_information import unknowns
 from tendonfmu.estimate.picture import FitPicture, FitSeries, Role
 from tendonfmu.model import native
 from tendonfmu.recordings.recording import read_recording

@@ -13,7 +13,7 @@ pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eige
 from synthetic_series import make_series
 from tendonfmu.diagnose.changes.load import steady_load
 from tendonfmu.diagnose.diagnosis import diagnose
-from tendonfmu.diagnose.reported_causes import reported_causes
+from tendonfmu.diagnose.reported import reported_causes
 from tendonfmu.diagnose.result import Diagnosis, SteadyLoad
 from tendonfmu.diagnose.series import Series
 from worn_finger import WELL, How, finger, record, recording

@@ -16,7 +16,7 @@ import pytest
 
 from fmu_binary import FINGER
 from random_fingers import random_case
-from tendonfmu.model.dependencies import Dependencies, dependencies, structure_of
+from tendonfmu.model.output_dependencies import Dependencies, dependencies, structure_of
 from tendonfmu.model.description import read_finger
 from tendonfmu.model.native import FLAGS, INPUTS, NUMBERS, Finger
 

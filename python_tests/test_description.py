@@ -18,7 +18,7 @@ import extension_cases
 from fmu_binary import FINGER
 from random_fingers import random_finger
 from tendonfmu.errors import InputError
-from tendonfmu.estimate.information import unknowns
+from tendonfmu.estimate.fisher_information import unknowns
 from tendonfmu.model.description import count, read_finger
 from tendonfmu.model.extensions import MAGNITUDES, extension_numbers
 from tendonfmu.model.native import Finger, NativeError, image_from_json

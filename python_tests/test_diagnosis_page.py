@@ -22,7 +22,7 @@ pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not insta
 
 import diagnosis_examples as examples
 from real_browser import Elements, framed, measure, visit
-from tendonfmu.diagnose.reported_causes import reported_causes
+from tendonfmu.diagnose.reported import reported_causes
 from tendonfmu.diagnose.result import Diagnosis, FoundPlace, ModelErrors, Where
 from tendonfmu.diagnose.size import size_of
 from tendonfmu.report.diagnosis_page import PAGE, diagnosis_page, write_diagnosis_page

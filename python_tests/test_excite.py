@@ -16,7 +16,7 @@ from scipy.interpolate import BPoly
 from excite_fingers import INDEX, INDEX_DATA, INDEX_RANGES, SMALL, SMALL_RANGES
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.coverage import EffectCoverage, coverage_of, durations
-from tendonfmu.estimate.information import unknowns
+from tendonfmu.estimate.fisher_information import unknowns
 from tendonfmu.excite.excitation import ACCELERATION, Excitation, Plan, plan_excitation
 from tendonfmu.excite.joint_coverage import joint_coverage
 from tendonfmu.excite.tension_plan import Variation

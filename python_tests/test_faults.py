@@ -21,7 +21,7 @@ from command import Call
 from fmu_binary import FINGER
 from tendonfmu.cli.fault_report import write_fault_report
 from tendonfmu.errors import InputError, InternalError, line_of, own_fault
-from tendonfmu.files.whole_file import whole_file
+from tendonfmu.files.writing import whole_file
 from tendonfmu.model import description, native
 
 NAME = re.compile(r"tendonfmu-error-\d{8}-\d{6}(-\d+)?\.txt")

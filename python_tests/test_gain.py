@@ -34,7 +34,7 @@ from tendonfmu.model import native
 from tendonfmu.model.description import FingerDescription, read_finger
 from tendonfmu.recordings.prepared import FitRecording, Held, prepare
 from tendonfmu.recordings.recording import Recording, read_recording
-from tendonfmu.statistics.gain_interval import blocks_of, gain_interval
+from tendonfmu.statistics.paired_gain import blocks_of, gain_interval
 
 Array = NDArray[Any]
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"

@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
-from tendonfmu.drawing.sheet import Band, Bars, Curve, Dots, Panel
+from tendonfmu.drawing.panel_data import Band, Bars, Curve, Dots, Panel
 from tendonfmu.drawing.svg import panel_svg
 
 X = np.linspace(0.0, 10.0, 5)

@@ -24,28 +24,16 @@ from numpy.typing import NDArray
 from tendonfmu.calibrate.fit import CalibratedFit, earlier_finger, fit_again, fit_all
 from tendonfmu.calibrate.parts import stretches_for_diagnosis
 from tendonfmu.calibrate.report import errors_of, record_next, recording_of, rms_of, structure_of, tuning_of
-from tendonfmu.detect.free_motion import require_no_contact
-from tendonfmu.detect.push_sizes import by_size
-from tendonfmu.detect.score_report import build_report as score_report
-from tendonfmu.detect.scoring import score_recordings
-from tendonfmu.detect.tuning import ContactTuning, TuneWarning
-from tendonfmu.diagnose.diagnosis import diagnose
-from tendonfmu.diagnose.extension_fit import FitSettings
-from tendonfmu.diagnose.result import Diagnosis
+from tendonfmu.detect import ContactTuning, TuneWarning, by_size, require_no_contact, score_recordings
+from tendonfmu.detect import score_report as detect_score_report
+from tendonfmu.diagnose import Diagnosis, FitSettings, diagnose
 from tendonfmu.errors import InputError
-from tendonfmu.estimate.files import check_given_once, check_unseen, description_text
-from tendonfmu.estimate.structure import described
-from tendonfmu.files.finite_numbers import finite
-from tendonfmu.files.whole_file import write_text
-from tendonfmu.model.description import FingerDescription, read_finger
-from tendonfmu.recordings.match import admit
-from tendonfmu.recordings.prepared import FitRecording, Held, prepare, require_noise
-from tendonfmu.recordings.recording import read_recording
-from tendonfmu.recordings.smoothing import Signals
-from tendonfmu.report.diagnosis_files import write_diagnosis
-from tendonfmu.report.diagnosis_page import PAGE
-from tendonfmu.tasks.phases import Phases, PhaseState
-from tendonfmu.tasks.steps import FOLDER, Steps, digest_of, digest_of_file
+from tendonfmu.estimate import check_given_once, check_unseen, described, description_text
+from tendonfmu.files import finite, write_text
+from tendonfmu.model import FingerDescription, read_finger
+from tendonfmu.recordings import FitRecording, Held, Signals, admit, prepare, read_recording, require_noise
+from tendonfmu.report import diagnosis_page, write_diagnosis
+from tendonfmu.tasks import FOLDER, Phases, PhaseState, Steps, digest_of, digest_of_file
 
 Numbers = NDArray[np.float64]
 Data = Mapping[str, Any]
@@ -227,7 +215,7 @@ class _Run:
         """And the calibrated description."""
         case, steps = self._case, self._steps
         if case.start.previous is None:
-            page = self._folder / DIAGNOSIS / PAGE
+            page = self._folder / DIAGNOSIS / diagnosis_page.PAGE
             lacks = self._step("what the model lacks", "diagnosis", {}, self._diagnosis, page)
             fitted = self._step("all its numbers", "fit", {}, lambda step: self._fit(lacks))
         else:
@@ -389,7 +377,7 @@ class _Run:
             seed=self._options.seed,
             progress=lambda done, total: step(done / max(total, 1)),
         )
-        report = score_report(scored)
+        report = detect_score_report.build_report(scored)
         keys = (
             "events",
             "found",

@@ -20,10 +20,10 @@ from tendonfmu.calibrate.text import (
     torque_rows,
     verdict,
 )
-from tendonfmu.estimate.files import description_text
-from tendonfmu.files.whole_file import check_output, check_output_folder, write_text
-from tendonfmu.fmu.packaging import build_fmu
-from tendonfmu.report.fit_page import render
+from tendonfmu.estimate import description_text
+from tendonfmu.files import check_output, check_output_folder, write_text
+from tendonfmu.fmu import build_fmu
+from tendonfmu.report import fit_page
 
 FINGER, FMU, PAGE, REPORT = "finger.json", "finger.fmu", "calibration.html", "calibration.json"
 _WHAT = {
@@ -64,7 +64,7 @@ def write_calibration(found: Calibration, folder: Path) -> dict[Path, str]:
 def calibration_page(report: Mapping[str, Any]) -> str:
     """HTML text of the page."""
     tone, sentence = verdict(report)
-    return render(
+    return fit_page.render(
         "calibration.html.jinja",
         report=report,
         tone=tone,

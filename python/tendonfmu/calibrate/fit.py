@@ -14,23 +14,32 @@ from typing import Any
 
 import numpy as np
 
-from tendonfmu.diagnose.cause_search import predicted_of, series_of
-from tendonfmu.diagnose.extension_fit import FitSettings, learn_numbers
-from tendonfmu.diagnose.result import Event
-from tendonfmu.diagnose.search import events_of, without_blocks
-from tendonfmu.diagnose.series import make_grid
-from tendonfmu.diagnose.signal_choice import estimation_recordings
-from tendonfmu.estimate.evaluation import evaluate
-from tendonfmu.estimate.files import with_uncertainty, with_values
-from tendonfmu.estimate.fitting import FitWarning, FrictionFit
-from tendonfmu.estimate.information import unknowns
-from tendonfmu.estimate.previous_fit import read_previous_fit, with_previous_values
-from tendonfmu.estimate.report import FORMAT as FIT_REPORT
-from tendonfmu.estimate.uncertainty import parameter_uncertainty
-from tendonfmu.files.json_node import read_json
-from tendonfmu.model.description import FingerDescription, read_finger
-from tendonfmu.recordings.prepared import FitRecording
-from tendonfmu.recordings.smoothing import Signals
+from tendonfmu.diagnose import (
+    Event,
+    FitSettings,
+    estimation_recordings,
+    events_of,
+    learn_numbers,
+    make_grid,
+    predicted_of,
+    series_of,
+    without_blocks,
+)
+from tendonfmu.estimate import (
+    FitWarning,
+    FrictionFit,
+    evaluate,
+    fit_report,
+    parameter_uncertainty,
+    read_previous_fit,
+    unknowns,
+    with_previous_values,
+    with_uncertainty,
+    with_values,
+)
+from tendonfmu.files import read_json
+from tendonfmu.model import FingerDescription, read_finger
+from tendonfmu.recordings import FitRecording, Signals
 
 Data = Mapping[str, Any]
 
@@ -81,7 +90,7 @@ def fit_all(
 
 def earlier_finger(given: FingerDescription, previous: Path) -> FingerDescription:
     """The description of an earlier calibration; of a fit's report the given one with its values. Raises InputError."""
-    if read_json(previous, "an earlier calibration").get("format") == FIT_REPORT:
+    if read_json(previous, "an earlier calibration").get("format") == fit_report.FORMAT:
         return with_previous_values(given, read_previous_fit(previous))
     return read_finger(previous)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tendonfmu.recordings.recording import Recording
+from tendonfmu.recordings import Recording
 
 DIAGNOSED = 90.0  # s of free motion, in all, that the structure is found in
 JUDGED = 45.0  # s, in all, that it is judged on

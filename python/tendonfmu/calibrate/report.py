@@ -9,16 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from tendonfmu.detect.contact_at_rest import LEFT_OUT
-from tendonfmu.detect.tune_report import build_report
-from tendonfmu.detect.tuning import ContactTuning
-from tendonfmu.diagnose.gain import residual_of
-from tendonfmu.diagnose.result import Diagnosis
-from tendonfmu.estimate.evaluation import residuals
-from tendonfmu.recordings.prepared import FitRecording
-from tendonfmu.recordings.residuals import rms
-from tendonfmu.report.diagnosis_page import cards_of
-from tendonfmu.report.diagnosis_text import names_of
+from tendonfmu.detect import ContactTuning, contact_at_rest, tune_report
+from tendonfmu.diagnose import Diagnosis, residual_of
+from tendonfmu.estimate import residuals
+from tendonfmu.recordings import FitRecording, rms
+from tendonfmu.report import cards_of, names_of
 
 Data = Mapping[str, Any]
 
@@ -74,10 +69,10 @@ def rms_of(values: Sequence[float]) -> float:
 
 def tuning_of(tuning: ContactTuning) -> dict[str, Any]:
     """What decides on contact, and what it is worth. That there were no rests to learn from is no warning here."""
-    report = build_report(tuning)
+    report = tune_report.build_report(tuning)
     return {
         "finger": tuning.description_.data,
-        "warnings": [text for text in report["warnings"] if not text.startswith(LEFT_OUT)],
+        "warnings": [text for text in report["warnings"] if not text.startswith(contact_at_rest.LEFT_OUT)],
         **{key: report[key] for key in OF_TUNING},
         "smallest_torque": smallest_torque(tuning),
     }

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from tendonfmu.calibrate.report import rms_of
-from tendonfmu.report.fit_summary import rounded
+from tendonfmu.report import rounded
 
 Report = Mapping[str, Any]
 Row = tuple[str, ...]

@@ -63,10 +63,8 @@ def calibrate(
     DIR gets the page calibration.html, finger.json, finger.fmu, calibration.json and the diagnosis. A call that is
     repeated with the same files goes on where the one before ended.
     """
-    from tendonfmu.calibrate.calibration import Options
-    from tendonfmu.calibrate.calibration import calibrate as run
-    from tendonfmu.calibrate.files import check_folder, write_calibration
-    from tendonfmu.calibrate.text import lines, tables
+    from tendonfmu.calibrate import Options, check_folder, text, write_calibration
+    from tendonfmu.calibrate import calibrate as run
 
     tests, labelled = test or [], pushes or []
     check_folder(output, [finger, *recordings, *tests, *labelled, *([] if previous is None else [previous])])
@@ -88,6 +86,6 @@ def calibrate(
         say(f"tendonfmu: warning: {sentence}")
     if found.report["steps"]["repeated"]:
         say(f"unchanged, not done again: {', '.join(found.report['steps']['repeated'])}")
-    print_tables(tables(found.report), lines(found.report), left="model")
+    print_tables(text.tables(found.report), text.lines(found.report), left="model")
     for path, what in written.items():
         say(f"{path}: {what}")

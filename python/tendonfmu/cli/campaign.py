@@ -43,11 +43,22 @@ def campaign(
     Each case writes its row as it ends; interrupted, the same command goes on where it was.
     The rows together are DIR/campaign.parquet; every rate has its number of cases and its 95 % interval.
     """
-    from tendonfmu.diagnose.campaign.campaign import How, collect, run_campaign, still_to_do
-    from tendonfmu.diagnose.campaign.cases import python_function, read_cases
-    from tendonfmu.diagnose.campaign.rates import EFFECT_HEADINGS, HEADINGS, by_effect, markdown, rates, rates_by_part
-    from tendonfmu.files.whole_file import check_output, check_output_folder, write_text
-    from tendonfmu.tasks.jobs import worker_count, workers_of
+    from tendonfmu.diagnose import (
+        EFFECT_HEADINGS,
+        HEADINGS,
+        How,
+        by_effect,
+        collect,
+        markdown,
+        python_function,
+        rates,
+        rates_by_part,
+        read_cases,
+        run_campaign,
+        still_to_do,
+    )
+    from tendonfmu.files import check_output, check_output_folder, write_text
+    from tendonfmu.tasks import worker_count, workers_of
 
     listed = read_cases(cases)
     check_output_folder(output)

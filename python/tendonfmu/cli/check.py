@@ -12,7 +12,7 @@ from tendonfmu.cli.options import Subject
 from tendonfmu.errors import InputError
 
 if TYPE_CHECKING:
-    from tendonfmu.model.description import FingerDescription
+    from tendonfmu.model import FingerDescription
 
 
 def register(app: typer.Typer) -> None:
@@ -31,12 +31,9 @@ def check(
     With recordings: whether they belong to the finger, and what to write into the map of columns where they do not.
     Exit 1 when one does not.
     """
-    from tendonfmu.files.tables import check_format
-    from tendonfmu.model.description import read_finger
-    from tendonfmu.model.plausibility import description_findings
-    from tendonfmu.simulate.plant import require_plant
-    from tendonfmu.simulate.rig import is_rig
-    from tendonfmu.simulate.rig_summary import describe_rig
+    from tendonfmu.files import check_format
+    from tendonfmu.model import description_findings, read_finger
+    from tendonfmu.simulate import describe_rig, is_rig, require_plant
 
     for recording in recordings or []:
         check_format(recording)
@@ -62,9 +59,7 @@ def check(
 
 def _check_recordings(finger: FingerDescription, files: list[Path]) -> None:
     """Says of each whether it belongs to the finger. Exit 1 when one does not."""
-    from tendonfmu.recordings.match import belongs
-    from tendonfmu.recordings.match_text import verdict
-    from tendonfmu.recordings.recording import read_recording
+    from tendonfmu.recordings import belongs, read_recording, verdict
 
     strangers = 0
     for file in files:

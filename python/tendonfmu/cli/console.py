@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 if TYPE_CHECKING:
     from rich.progress import Progress
 
-    from tendonfmu.tasks.phases import PhaseState
+    from tendonfmu.tasks import PhaseState
 
 
 def say(message: str) -> None:

@@ -69,9 +69,8 @@ def convert(
     for name, value in (("map", map_), ("finger", finger)):
         if value is not None:
             raise InputError(f"convert {source}: no option --{name} for this format; expected convert {TABLE}")
-    from tendonfmu.files.tables import check_format, write_table
-    from tendonfmu.files.whole_file import check_output
-    from tendonfmu.recordings.converters import convert_file
+    from tendonfmu.files import check_format, check_output, write_table
+    from tendonfmu.recordings import convert_file
 
     check_format(output)
     check_output(output, file)
@@ -84,10 +83,8 @@ def _convert_table(
     file: Path, output: Path, options: Mapping[str, float], map_file: Path | None, finger: Path | None
 ) -> None:
     """A log by its map, and the description of a one-joint machine."""
-    from tendonfmu.files.tables import check_format, write_table
-    from tendonfmu.files.whole_file import check_output, whole_file
-    from tendonfmu.recordings.converters.one_joint_description import describe_joint, description_text
-    from tendonfmu.recordings.converters.table import convert_table
+    from tendonfmu.files import check_format, check_output, whole_file, write_table
+    from tendonfmu.recordings import convert_table, describe_joint, description_text
 
     for name in options:
         raise InputError(f"convert {TABLE}: no option --{name} for this format; expected --map or --finger")

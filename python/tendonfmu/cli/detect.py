@@ -59,12 +59,10 @@ def tune(
     """
     import warnings
 
-    from tendonfmu.detect.support import NotEnough
-    from tendonfmu.detect.tune_report import build_report, report_text
-    from tendonfmu.detect.tuning import ContactTuning, TuneWarning
-    from tendonfmu.estimate.files import check_outputs
-    from tendonfmu.files.whole_file import write_text
-    from tendonfmu.report.tune_text import lines, tables
+    from tendonfmu.detect import ContactTuning, NotEnough, TuneWarning, tune_report
+    from tendonfmu.estimate import check_outputs
+    from tendonfmu.files import write_text
+    from tendonfmu.report import tune_files, tune_text
 
     check_outputs(output, report, figures, [finger, *recordings])
     with progress_bar(progress) as bar:
@@ -91,13 +89,11 @@ def tune(
         say(f"tendonfmu: warning: {sentence}")
     write_text(output, tuning.description_text())
     if report is not None:
-        write_text(report, report_text(build_report(tuning)))
-    print_tables(tables(tuning), lines(tuning), left="joint")
+        write_text(report, tune_report.report_text(tune_report.build_report(tuning)))
+    print_tables(tune_text.tables(tuning), tune_text.lines(tuning), left="joint")
     say(f"{output}: {tuning.method}, tuned on {60 * tuning.hours_:.1f} min of free motion")
     if figures is not None:
-        from tendonfmu.report.tune_files import write_figures
-
-        for path, what in write_figures(tuning, figures).items():
+        for path, what in tune_files.write_figures(tuning, figures).items():
             say(f"{path}: {what}")
 
 
@@ -123,10 +119,9 @@ def score(
     An alarm that begins in no event, nor in the 100 ms after one, is false.
     Everything has its 95 % interval; several recordings are pooled.
     """
-    from tendonfmu.detect.score_report import build_report, report_text
-    from tendonfmu.detect.scoring import check_outputs, score_recordings
-    from tendonfmu.files.whole_file import write_text
-    from tendonfmu.report.score_text import lines, tables
+    from tendonfmu.detect import check_outputs, score_recordings, score_report
+    from tendonfmu.files import write_text
+    from tendonfmu.report import score_text
 
     check_outputs(output, figures, [model, *recordings])
     with progress_bar(progress) as bar:
@@ -142,11 +137,11 @@ def score(
         )
     for sentence in scored.warnings:
         say(f"tendonfmu: warning: {sentence}")
-    write_text(output, report_text(build_report(scored)))
-    print_tables(tables(scored), lines(scored), left="")
+    write_text(output, score_report.report_text(score_report.build_report(scored)))
+    print_tables(score_text.tables(scored), score_text.lines(scored), left="")
     say(f"{output}: {scored.summary.events} events, {scored.summary.false_alarms} false alarms")
     if figures is not None:
-        from tendonfmu.report.score_files import write_figures
+        from tendonfmu.report import score_files
 
-        for path, what in write_figures(scored, figures).items():
+        for path, what in score_files.write_figures(scored, figures).items():
             say(f"{path}: {what}")

@@ -63,10 +63,9 @@ def diagnose(
     diagnosis.json, figures, and the model with its causes, extended.json and extended.fmu; with --history the page
     history.html, history.csv and history.png.
     """
-    from tendonfmu.diagnose.diagnosis import diagnose as find
-    from tendonfmu.estimate.files import check_given_once
-    from tendonfmu.report.diagnosis_files import check_folder, write_diagnosis
-    from tendonfmu.report.diagnosis_text import lines, tables
+    from tendonfmu.diagnose import diagnose as find
+    from tendonfmu.estimate import check_given_once
+    from tendonfmu.report import check_folder, diagnosis_text, write_diagnosis
 
     if not 0.0 <= least_gain <= 0.5:  # NaN passes the range
         raise InputError(f"--least-gain {least_gain:g}: expected 0 to 0.5")
@@ -97,7 +96,7 @@ def diagnose(
         written = write_diagnosis(found, output)
     for sentence in found.warnings:
         say(f"tendonfmu: warning: {sentence}")
-    print_tables(tables(found), lines(found), left="may also be")
+    print_tables(diagnosis_text.tables(found), diagnosis_text.lines(found), left="may also be")
     for path, what in written.items():
         say(f"{path}: {what}")
 
@@ -117,14 +116,12 @@ def _history(
     """`diagnose --history`."""
     from contextlib import nullcontext
 
-    from tendonfmu.diagnose.changes.history import diagnose_history
-    from tendonfmu.estimate.files import check_given_once
-    from tendonfmu.files.whole_file import check_output_folder
-    from tendonfmu.model.description import read_finger
-    from tendonfmu.report.diagnosis_text import Names
-    from tendonfmu.report.history_files import write_history
-    from tendonfmu.report.history_text import headline, rows_of_lines
-    from tendonfmu.tasks.jobs import workers_of
+    from tendonfmu.diagnose import diagnose_history
+    from tendonfmu.estimate import check_given_once
+    from tendonfmu.files import check_output_folder
+    from tendonfmu.model import read_finger
+    from tendonfmu.report import Names, history_text, write_history
+    from tendonfmu.tasks import workers_of
 
     check_given_once(recordings, reference, "the reference")
     check_output_folder(output)
@@ -146,8 +143,8 @@ def _history(
     names = Names(tuple(given.joint_names), tuple(given.tendon_names))
     written = write_history(found, names, output)
     headings = ("cause", "place", "reference", "last", "named in", "trend")
-    rows = list(rows_of_lines(found, names))
-    print_tables([(found.finger, headings, rows)] if rows else (), [headline(found)], left="trend")
+    rows = list(history_text.rows_of_lines(found, names))
+    print_tables([(found.finger, headings, rows)] if rows else (), [history_text.headline(found)], left="trend")
     for name, why in found.failed:
         say(f"tendonfmu: warning: {name} is left out: {why}")
     for path, what in written.items():
@@ -156,11 +153,10 @@ def _history(
 
 def discriminate(context: typer.Context, finger: Path, folder: Path, output: Path, rate: float) -> None:
     """`tendonfmu excite FINGER --discriminate DIR -o MOTION`: the motion that a diagnosis asked for."""
-    from tendonfmu.diagnose.experiments.discrimination import discriminating_motion
-    from tendonfmu.excite.training_motion import read_subject
-    from tendonfmu.files.tables import check_format, write_table
-    from tendonfmu.files.whole_file import check_output
-    from tendonfmu.simulate.rig import description_files, is_rig
+    from tendonfmu.diagnose import discriminating_motion
+    from tendonfmu.excite import read_subject
+    from tendonfmu.files import check_format, check_output, write_table
+    from tendonfmu.simulate import description_files, is_rig
 
     own = {"finger", "output", "rate", "discriminate"}
     for each in context.command.params:

@@ -13,7 +13,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from tendonfmu.errors import InputError
-from tendonfmu.files.whole_file import whole_file
+from tendonfmu.files import whole_file
 
 _PACKAGES = ("numpy", "scipy", "scikit-learn", "pyarrow", "fmpy", "typer", "rich")
 

@@ -24,7 +24,7 @@ from tendonfmu.cli.console import fit_bar, leave, phase_bar, print_tables, progr
 from tendonfmu.cli.fault_report import is_own_file, write_fault_report
 from tendonfmu.cli.options import FingerFile, FreeRecordings, Kinematics, Model, Progress, Report, Subject
 from tendonfmu.errors import InputError, line_of
-from tendonfmu.tasks.interruption import ended_by_signals
+from tendonfmu.tasks import ended_by_signals
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -119,10 +119,9 @@ def build(
 
     Needs no compiler; the same input gives the same bytes.
     """
-    from tendonfmu.files.whole_file import check_output
-    from tendonfmu.fmu.packaging import build_fmu
-    from tendonfmu.simulate.fmu_packaging import build_plant_fmu
-    from tendonfmu.simulate.rig import is_rig, read_rig
+    from tendonfmu.files import check_output
+    from tendonfmu.fmu import build_fmu
+    from tendonfmu.simulate import build_plant_fmu, is_rig, read_rig
 
     check_output(output, *(read_rig(file).files if is_rig(file) else [file]))
     (build_plant_fmu if is_rig(file) else build_fmu)(file, output, binaries=binaries)
@@ -137,10 +136,9 @@ def run(
     kinematics: Kinematics = 1,
 ) -> None:
     """Run the FMU over a recording: time and all outputs, one row per sample, each at its own sample's time."""
-    from tendonfmu.files.tables import check_format, write_table
-    from tendonfmu.files.whole_file import check_output
-    from tendonfmu.fmu.running import check_model, run_model, summary
-    from tendonfmu.recordings.recording import read_recording
+    from tendonfmu.files import check_format, check_output, write_table
+    from tendonfmu.fmu import check_model, run_model, summary
+    from tendonfmu.recordings import read_recording
 
     check_model(model)
     check_format(output)
@@ -166,11 +164,9 @@ def simulate(
     progress: Progress = None,
 ) -> None:
     """A recording of the simulated finger. The same rig gives the same numbers."""
-    from tendonfmu.files.tables import check_format, write_table
-    from tendonfmu.files.whole_file import check_output
-    from tendonfmu.simulate.plant import INTEGRATORS
-    from tendonfmu.simulate.rig import read_rig
-    from tendonfmu.simulate.simulation import simulate as simulate_rig
+    from tendonfmu.files import check_format, check_output, write_table
+    from tendonfmu.simulate import INTEGRATORS, read_rig
+    from tendonfmu.simulate import simulate as simulate_rig
 
     if integrator is not None and integrator not in INTEGRATORS:
         raise InputError(f"--integrator {integrator}: expected {' or '.join(INTEGRATORS)}")
@@ -240,12 +236,11 @@ def excite(
     import json
     import shlex
 
+    from tendonfmu.excite import Plan
     from tendonfmu.excite import training_motion as exciting
-    from tendonfmu.excite.excitation import Plan
-    from tendonfmu.files.tables import check_format, write_table
-    from tendonfmu.files.whole_file import check_output, whole_file
-    from tendonfmu.report.excite_text import lines, tables
-    from tendonfmu.simulate.rig import description_files, is_rig
+    from tendonfmu.files import check_format, check_output, whole_file, write_table
+    from tendonfmu.report import excite_text
+    from tendonfmu.simulate import description_files, is_rig
 
     check_format(output)
     for file in (output, *([report] if report is not None else [])):
@@ -268,7 +263,7 @@ def excite(
         everything = exciting.report(result, shlex.join(["tendonfmu", *sys.argv[1:]]))
         with whole_file(report) as temporary:
             temporary.write_text(json.dumps(everything, indent=1) + "\n", encoding="utf-8")
-    print_tables(tables(result), lines(result), left="cannot be identified")
+    print_tables(excite_text.tables(result), excite_text.lines(result), left="cannot be identified")
     say(f"{output}: {len(result.motion.time)} rows, {result.motion.time[-1]:g} s")
 
 
@@ -337,11 +332,9 @@ def fit(
     PATTERN is a path of the description, such as tendons[*].edge_friction[2]*.viscous; * stands for anything. Ctrl-C
     leaves the best so far in FITTED.unfinished.json.
     """
-    from tendonfmu.estimate.files import check_outputs, write_unfinished
-    from tendonfmu.estimate.fitting import FitWarning, FrictionFit
-    from tendonfmu.estimate.report import report_text
-    from tendonfmu.files.whole_file import write_text
-    from tendonfmu.report.fit_text import lines, tables
+    from tendonfmu.estimate import FitWarning, FrictionFit, check_outputs, fit_report, write_unfinished
+    from tendonfmu.files import write_text
+    from tendonfmu.report import fit_text
 
     inputs = [finger, *recordings, *(compare or []), *(each for each in (previous, resume) if each is not None)]
     check_outputs(output, report, figures, inputs)
@@ -383,11 +376,11 @@ def fit(
         say(f"tendonfmu: warning: {sentence}")
     write_text(output, fitting.description_text())
     if report is not None:
-        write_text(report, report_text(fitting.report_))
-    print_tables(tables(fitting), lines(fitting), left="joint")
+        write_text(report, fit_report.report_text(fitting.report_))
+    print_tables(fit_text.tables(fitting), fit_text.lines(fitting), left="joint")
     say(f"{output}: {len(fitting.parameters_)} numbers estimated")
     if figures is not None:
-        from tendonfmu.report.fit_page import write_fit_page
+        from tendonfmu.report import write_fit_page
 
         for path, what in write_fit_page(fitting.picture(), figures).items():
             say(f"{path}: {what}")
@@ -409,9 +402,7 @@ def demo(
 
     DIR gets story.html, which tells all of it, and all that it is made from.
     """
-    from tendonfmu.demo.demo import Story
-    from tendonfmu.demo.page import write_story
-    from tendonfmu.demo.text import chapter_lines, chapter_tables, file_lines
+    from tendonfmu.demo import Story, chapter_lines, chapter_tables, file_lines, write_story
 
     story = Story(output)
     if story.missing:

@@ -1,0 +1,5 @@
+"""The demo: five chapters on built-in data, one page at the end (`tendonfmu demo`)."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -17,14 +17,13 @@ from typing import TYPE_CHECKING
 
 from tendonfmu.demo.run import DATA, IndexFinger
 from tendonfmu.errors import InputError
-from tendonfmu.estimate.estimation import ESTIMATION_MISSING, HAS_ESTIMATION
-from tendonfmu.tasks.phases import PhaseState
+from tendonfmu.estimate import ESTIMATION_MISSING, HAS_ESTIMATION
+from tendonfmu.tasks import PhaseState
 
 if TYPE_CHECKING:
-    from tendonfmu.calibrate.calibration import Calibration
-    from tendonfmu.diagnose.result import Diagnosis
-    from tendonfmu.estimate.fitting import FrictionFit
-    from tendonfmu.estimate.methods import Progress
+    from tendonfmu.calibrate import Calibration
+    from tendonfmu.diagnose import Diagnosis
+    from tendonfmu.estimate import FitProgress, FrictionFit
 
 TWO_JOINTS, TRAINING, UNSEEN = "two_joints.json", "two_joints_training.parquet", "two_joints_unseen.parquet"
 CALIBRATION, FIT = "calibration", "fit"  # folders of the full pages
@@ -85,9 +84,8 @@ class Story:
         self._files = {page: "the whole story, to be read in a browser", **self._files}
 
     def _calibrate(self, phase: Phase) -> None:
-        from tendonfmu.calibrate.calibration import calibrate
-        from tendonfmu.calibrate.files import write_calibration
-        from tendonfmu.tasks.steps import forget_steps
+        from tendonfmu.calibrate import calibrate, write_calibration
+        from tendonfmu.tasks import forget_steps
 
         def show(state: PhaseState) -> None:
             phase(state.words, state.done, state.total)
@@ -108,11 +106,11 @@ class Story:
         """A closer look at what the calibration has found."""
 
     def _fit(self, phase: Phase) -> None:
-        from tendonfmu.estimate.fitting import FitWarning, FrictionFit
-        from tendonfmu.files.whole_file import write_text
-        from tendonfmu.report.fit_page import write_fit_page
+        from tendonfmu.estimate import FitWarning, FrictionFit
+        from tendonfmu.files import write_text
+        from tendonfmu.report import write_fit_page
 
-        def show(now: Progress) -> None:
+        def show(now: FitProgress) -> None:
             phase(f"fitting: {now.phase}", now.done, now.total)
 
         with as_file(DATA) as data, warnings.catch_warnings():

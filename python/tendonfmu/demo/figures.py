@@ -7,14 +7,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.calibrate.report import rms_of
+from tendonfmu.calibrate import rms_of
 from tendonfmu.demo.demo import Story
 from tendonfmu.demo.run import ABDUCTION, FLEXION, FREE, FREE_X4, PUSHES
-from tendonfmu.drawing.sheet import Bars, Curve, Dots, Interval, Panel, Sheet
-from tendonfmu.report.figure_data import CompensationFigure, JointCurves
-from tendonfmu.report.fit_figures import torque_sheets
-from tendonfmu.report.fit_law_figures import law_sheets
-from tendonfmu.report.fit_summary import residual_tables
+from tendonfmu.drawing import Bars, Curve, Dots, Interval, Panel, Sheet
+from tendonfmu.report import CompensationFigure, JointCurves, law_sheets, residual_tables, torque_sheets
 
 Numbers = NDArray[np.float64]
 

@@ -4,31 +4,33 @@ from __future__ import annotations
 
 from typing import Any
 
+from tendonfmu.calibrate import DIAGNOSIS
+from tendonfmu.calibrate import PAGE as CALIBRATION_PAGE
 from tendonfmu.calibrate import text as calibration_text
-from tendonfmu.calibrate.calibration import DIAGNOSIS
-from tendonfmu.calibrate.files import PAGE as CALIBRATION_PAGE
 from tendonfmu.demo.demo import CALIBRATION, FIT, TRAINING, TWO_JOINTS, UNSEEN, Story
 from tendonfmu.demo.figures import story_sheets
 from tendonfmu.demo.run import FLEXION, FREE, FREE_X4, MINUTES, PUSHES
 from tendonfmu.demo.text import alarms, chapter_tables, detection_sentence, fit_sentence
-from tendonfmu.diagnose.result import Diagnosis
-from tendonfmu.files.whole_file import whole_file
-from tendonfmu.report.diagnosis_page import PAGE as DIAGNOSIS_PAGE
-from tendonfmu.report.diagnosis_page import Tile, cards_of, drawn_sheets
-from tendonfmu.report.diagnosis_text import (
+from tendonfmu.diagnose import Diagnosis
+from tendonfmu.files import whole_file
+from tendonfmu.report import (
+    PageFigure,
+    Tile,
     at_place,
+    cards_of,
+    diagnosis_page,
+    diagnosis_text,
+    draw_sheet,
+    drawn_sheets,
     error_sentence,
-    headline,
+    fit_page,
     left_sentence,
     names_of,
-    percent,
-    together,
+    residual_tables,
+    rounded,
     unit_of,
+    waterfall_of,
 )
-from tendonfmu.report.diagnosis_waterfall import waterfall_of
-from tendonfmu.report.fit_page import PAGE as FIT_PAGE
-from tendonfmu.report.fit_page import PageFigure, draw_sheet, render
-from tendonfmu.report.fit_summary import residual_tables, rounded
 
 PAGE = "story.html"
 
@@ -47,7 +49,7 @@ def story_page(story: Story, figures: list[PageFigure]) -> str:
     by_section: dict[str, list[PageFigure]] = {}
     for figure in figures:
         by_section.setdefault(figure.sheet.section, []).append(figure)
-    return render(
+    return fit_page.render(
         "story.html.jinja",
         chapters=story.chapters,
         tiles=[(each.name, _tile(story, each.name)) for each in story.chapters],
@@ -56,7 +58,7 @@ def story_page(story: Story, figures: list[PageFigure]) -> str:
         calibrate=None if story.missing else _calibrate(story),
         detect=_detect(story),
         diagnosis=None if story.missing else _diagnosis(story),
-        fit=None if story.missing else {"sentence": fit_sentence(story), "page": f"{FIT}/{FIT_PAGE}"},
+        fit=None if story.missing else {"sentence": fit_sentence(story), "page": f"{FIT}/{fit_page.PAGE}"},
         run=_run(story),
         missing=story.missing,
         files=[(path.relative_to(story.folder).as_posix(), what) for path, what in story.files.items()],
@@ -87,12 +89,14 @@ def _tile(story: Story, chapter: str) -> Tile:
 
 def _tile_of_cause(found: Diagnosis) -> Tile:
     factor, unit = unit_of(found)
-    before, after = (rounded(factor * together(each.test_rms)) for each in (found.nominal, found.extended))
+    before, after = (
+        rounded(factor * diagnosis_text.together(each.test_rms)) for each in (found.nominal, found.extended)
+    )
     if not found.causes:
         return Tile(before, unit, "error on an unseen recording; no cause was found")
     first = found.causes[0]
     cause = f"{at_place(first.title, first.where, names_of(found))}, found and built in"
-    meaning = f"error on an unseen recording: {percent(found.gain.value)} less with {cause}"
+    meaning = f"error on an unseen recording: {diagnosis_text.percent(found.gain.value)} less with {cause}"
     return Tile(f"{before} → {after}", unit, meaning)
 
 
@@ -136,12 +140,12 @@ def _diagnosis(story: Story) -> dict[str, Any]:
     found = story.diagnosis
     names = names_of(found)
     return {
-        "headline": headline(found),
+        "headline": diagnosis_text.headline(found),
         "error": error_sentence(found),
         "left": left_sentence(found),
         "fall": waterfall_of(found, names),
         "cards": cards_of(found, names),
         "figures": drawn_sheets(found),
         "tested": found.tested,
-        "page": f"{CALIBRATION}/{DIAGNOSIS}/{DIAGNOSIS_PAGE}",
+        "page": f"{CALIBRATION}/{DIAGNOSIS}/{diagnosis_page.PAGE}",
     }

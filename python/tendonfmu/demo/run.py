@@ -17,15 +17,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.detect.counting import DetectionScore, score_detection
-from tendonfmu.files.tables import write_table
-from tendonfmu.fmu.fmpy_client import run_fmu
-from tendonfmu.fmu.packaging import build_fmu
-from tendonfmu.model.description import FingerDescription, read_finger
-from tendonfmu.model.native import Finger
-from tendonfmu.model.signals import NUMBERS
-from tendonfmu.recordings.recording import Recording, read_recording
-from tendonfmu.report.figure_data import CompensationFigure, StoryFigure, compensation_figure
+from tendonfmu.detect import DetectionScore, score_detection
+from tendonfmu.files import write_table
+from tendonfmu.fmu import build_fmu, run_fmu
+from tendonfmu.model import NUMBERS, Finger, FingerDescription, read_finger
+from tendonfmu.recordings import Recording, read_recording
+from tendonfmu.report import CompensationFigure, StoryFigure, compensation_figure
 
 FINGER, GIVEN = "index_finger_calibrated.json", "index_finger.json"  # and what it was calibrated from
 MINUTES = 27  # of free motion that it was calibrated on
@@ -128,7 +125,7 @@ def _draw(
     outputs: Mapping[str, Outputs],
     figure: Path,
 ) -> None:
-    from tendonfmu.report.plots import draw_story
+    from tendonfmu.report import draw_story
 
     def panel(name: str, title: str, joints: Sequence[str]) -> CompensationFigure:
         numbers = [description.joint_names.index(joint) for joint in joints]

@@ -9,9 +9,16 @@ import numpy as np
 from tendonfmu.calibrate import text as calibration_text
 from tendonfmu.demo.demo import Story
 from tendonfmu.demo.run import FREE, FREE_X4, PUSHES, RecordingResult
-from tendonfmu.detect.counting import DetectionScore
-from tendonfmu.report.diagnosis_text import confusion_sentence, error_sentence, headline, names_of
-from tendonfmu.report.fit_summary import ResidualTable, residual_tables, rounded
+from tendonfmu.detect import DetectionScore
+from tendonfmu.report import (
+    ResidualTable,
+    confusion_sentence,
+    diagnosis_text,
+    error_sentence,
+    names_of,
+    residual_tables,
+    rounded,
+)
 
 Row = tuple[str, ...]
 Table = tuple[str, Row, list[Row]]
@@ -132,7 +139,7 @@ def cause_lines(story: Story) -> Iterator[str]:
     """Verdict, each cause with its size, and the gain."""
     found = story.diagnosis
     names = names_of(found)
-    yield headline(found)
+    yield diagnosis_text.headline(found)
     for cause in found.causes:
         yield f"  {cause.where.effect} at {names.place(cause.where) or 'the whole finger'}: {cause.size}"
         if confusion := confusion_sentence(cause, names):

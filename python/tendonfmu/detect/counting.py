@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.recordings.faults import gaps
+from tendonfmu.recordings import gaps
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -12,10 +12,8 @@ from numpy.typing import NDArray
 
 from tendonfmu.detect.counting import sample_seconds
 from tendonfmu.errors import InputError
-from tendonfmu.model import native
-from tendonfmu.model.description import FingerDescription
-from tendonfmu.recordings.prepared import Held, prepare
-from tendonfmu.recordings.recording import Recording
+from tendonfmu.model import FingerDescription, native
+from tendonfmu.recordings import Held, Recording, prepare
 
 Numbers = NDArray[np.float64]
 Signal = NDArray[np.float32]  # of millions of samples; seven digits are enough to choose thresholds

@@ -14,7 +14,7 @@ from tendonfmu.detect.alarm_level import Cells, rows_of
 from tendonfmu.detect.bounds import Bound
 from tendonfmu.detect.free_motion import FreePart, FreeRun
 from tendonfmu.errors import InputError
-from tendonfmu.recordings.residuals import bias_settings
+from tendonfmu.recordings import bias_settings
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.detect.score_report import Scored
-from tendonfmu.statistics.intervals import share
+from tendonfmu.statistics import intervals
 
 SIZES = (1.5, 3.0, 6.0, math.inf)  # times the residual's rms of the joint, at the joint where it is the largest
 
@@ -32,7 +32,7 @@ def by_size(scored: Scored, left: Sequence[float]) -> list[dict[str, Any]] | Non
     for high in SIZES:
         own = [hit for size, hit in zip(sizes, found, strict=True) if low <= size < high]
         if own:
-            known = share(sum(own), len(own))
+            known = intervals.share(sum(own), len(own))
             rows.append(
                 {
                     "from": low,

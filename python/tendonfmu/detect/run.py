@@ -14,12 +14,9 @@ from numpy.typing import NDArray
 
 from tendonfmu.detect.counting import DetectionScore, Signals, pooled, score_detection
 from tendonfmu.errors import InputError
-from tendonfmu.fmu.running import check_model, run_model
-from tendonfmu.model import native
-from tendonfmu.model.description import FingerDescription, read_finger
-from tendonfmu.model.signals import inputs_used, watches_motors
-from tendonfmu.recordings.recording import Recording
-from tendonfmu.recordings.residuals import model_alone
+from tendonfmu.fmu import check_model, run_model
+from tendonfmu.model import FingerDescription, inputs_used, native, read_finger, watches_motors
+from tendonfmu.recordings import Recording, model_alone
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]

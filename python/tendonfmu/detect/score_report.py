@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from tendonfmu.detect.counting import GRACE, MERGED, SILENT, DetectionScore, Event
 from tendonfmu.detect.run import Subject, Track
 from tendonfmu.detect.summary import RocPoint, Summary
-from tendonfmu.files.finite_numbers import finite
-from tendonfmu.statistics.intervals import CONFIDENCE, Estimate
+from tendonfmu.files import finite
+from tendonfmu.statistics import Estimate, intervals
 
 FORMAT = "tendonfmu-score-1"
 
@@ -47,7 +47,7 @@ def build_report(scored: Scored) -> dict[str, Any]:
         "kinematics": scored.kinematics,
         "labels": scored.labels,
         "definitions": {"merged_s": MERGED, "silent_s": SILENT, "grace_s": GRACE},
-        "confidence": CONFIDENCE,
+        "confidence": intervals.CONFIDENCE,
         "seed": scored.seed,
         "warnings": list(scored.warnings),
         **_summary(scored.summary),

@@ -10,10 +10,9 @@ from tendonfmu.detect.run import Subject, Track, read_subject, run_track, score_
 from tendonfmu.detect.score_report import Scored
 from tendonfmu.detect.summary import FACTORS, RocPoint, roc, summarise
 from tendonfmu.errors import InputError
-from tendonfmu.estimate.files import check_given_once
-from tendonfmu.files.whole_file import check_output, check_output_folder
-from tendonfmu.recordings.faults import gaps
-from tendonfmu.recordings.recording import GROUP_PER, LABEL, Recording, read_recording
+from tendonfmu.estimate import check_given_once
+from tendonfmu.files import check_output, check_output_folder
+from tendonfmu.recordings import GROUP_PER, LABEL, Recording, gaps, read_recording
 
 Progress = Callable[[int, int], None]
 

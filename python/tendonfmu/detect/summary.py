@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.detect.counting import ContactSums, DetectionScore, Event, FreeBlocks
-from tendonfmu.statistics.intervals import Estimate, of_sums, quantile, rate, share
+from tendonfmu.statistics import Estimate, intervals
 
 Numbers = NDArray[np.float64]
 
@@ -77,11 +77,11 @@ def summarise(score: DetectionScore, seed: int = 0) -> Summary:
         held=held,
         false_alarms=alarms,
         free_minutes=minutes,
-        found_share=share(len(found), len(score.events)),
-        held_share=share(held, len(found)),
-        false_alarm_count=rate(alarms, 1.0),
-        false_alarms_per_minute=rate(alarms, minutes),
-        delay={name: quantile(score.delays, part, seed) for name, part in QUARTILES.items()},
+        found_share=intervals.share(len(found), len(score.events)),
+        held_share=intervals.share(held, len(found)),
+        false_alarm_count=intervals.rate(alarms, 1.0),
+        false_alarms_per_minute=intervals.rate(alarms, minutes),
+        delay={name: intervals.quantile(score.delays, part, seed) for name, part in QUARTILES.items()},
         force_at_alarm=_force(found, seed),
         compensated_at_alarm=_torques([event.compensated for event in found], seed),
         external_at_alarm=_torques([event.external for event in found], seed),
@@ -97,20 +97,20 @@ def summarise(score: DetectionScore, seed: int = 0) -> Summary:
 
 def _force(found: Sequence[Event], seed: int) -> Estimate | None:
     known = np.array([event.force for event in found if not math.isnan(event.force)], dtype=float)
-    return quantile(known, 0.5, seed) if len(known) else None
+    return intervals.quantile(known, 0.5, seed) if len(known) else None
 
 
 def _torques(values: Sequence[Numbers | None], seed: int) -> list[Estimate] | None:
     """Median magnitude of each joint."""
     known = [np.abs(value) for value in values if value is not None]
-    return [quantile(column, 0.5, seed) for column in np.array(known).T] if known else None
+    return [intervals.quantile(column, 0.5, seed) for column in np.array(known).T] if known else None
 
 
 def _mean(values: Numbers, seed: int) -> Estimate:
     """Where all are 0, resampling sees nothing else: no interval."""
     if not values.any():
         return Estimate(0.0 if len(values) else math.nan)
-    return of_sums(np.column_stack([np.ones(len(values)), values]), _ratio, seed)[0]
+    return intervals.of_sums(np.column_stack([np.ones(len(values)), values]), _ratio, seed)[0]
 
 
 def _alarm_share(free: FreeBlocks, seed: int) -> Estimate:
@@ -118,14 +118,14 @@ def _alarm_share(free: FreeBlocks, seed: int) -> Estimate:
     if not free.seconds.sum():
         return Estimate(math.nan)
     if not free.alarm_seconds.any():
-        return Estimate(0.0, 0.0, share(0, len(free.seconds)).high)
-    return of_sums(np.column_stack([free.seconds, free.alarm_seconds]), _ratio, seed)[0]
+        return Estimate(0.0, 0.0, intervals.share(0, len(free.seconds)).high)
+    return intervals.of_sums(np.column_stack([free.seconds, free.alarm_seconds]), _ratio, seed)[0]
 
 
 def _free_rms(free: FreeBlocks, seed: int) -> list[Estimate]:
     if not free.samples.sum():
         return [Estimate(math.nan)] * free.squares.shape[1]
-    return of_sums(np.column_stack([free.samples, free.squares]), _root_mean, seed)
+    return intervals.of_sums(np.column_stack([free.samples, free.squares]), _root_mean, seed)
 
 
 def _ratio(sums: Numbers) -> Numbers:
@@ -144,10 +144,10 @@ def _contact_error(sums: ContactSums | None, seed: int) -> ContactError | None:
     told = ~np.isnan(sums.within).any(axis=1)
     within = np.column_stack([sums.samples, sums.within])[told]
     return ContactError(
-        rms=of_sums(np.column_stack([sums.samples, sums.errors]), _root_mean, seed),
-        correlation=of_sums(moments, lambda drawn: _regression(drawn)[0], seed),
-        slope=of_sums(moments, lambda drawn: _regression(drawn)[1], seed),
-        within=of_sums(within, _ratio, seed) if len(within) else None,
+        rms=intervals.of_sums(np.column_stack([sums.samples, sums.errors]), _root_mean, seed),
+        correlation=intervals.of_sums(moments, lambda drawn: _regression(drawn)[0], seed),
+        slope=intervals.of_sums(moments, lambda drawn: _regression(drawn)[1], seed),
+        within=intervals.of_sums(within, _ratio, seed) if len(within) else None,
     )
 
 
@@ -201,8 +201,8 @@ def roc(score_at: Callable[[float], DetectionScore], factors: Sequence[float] = 
                 found=score.found,
                 masked=sum(not event.silent for event in score.events),
                 false_alarms=len(score.false_alarms),
-                found_share=share(score.found, len(score.events)),
-                false_alarms_per_hour=rate(len(score.false_alarms), score.free_seconds / 3600.0),
+                found_share=intervals.share(score.found, len(score.events)),
+                false_alarms_per_hour=intervals.rate(len(score.false_alarms), score.free_seconds / 3600.0),
                 free_alarm_share=score.free_alarm_share,
                 median_delay=float(np.median(score.delays)) if score.found else math.nan,
             )

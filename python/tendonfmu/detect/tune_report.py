@@ -12,8 +12,8 @@ import numpy as np
 from tendonfmu.detect.alarm_level import rate_limit
 from tendonfmu.detect.closed_loop import LoopAlarms
 from tendonfmu.detect.tuning import ContactTuning
-from tendonfmu.files.finite_numbers import finite
-from tendonfmu.statistics.intervals import rate
+from tendonfmu.files import finite
+from tendonfmu.statistics import intervals
 
 FORMAT = "tendonfmu-tune-1"
 FACTORS = np.round(np.geomspace(0.5, 2.0, 25), 6)  # on the chosen bases: the tail of the alarms
@@ -77,7 +77,7 @@ def _flat(value: Any) -> str:
 def _counted(tuning: ContactTuning, alarms: int, hours: float | None = None) -> dict[str, Any]:
     """alarms, their rate in 1/h with its two-sided 95 % interval, and the upper limit at the tuning's confidence."""
     span = tuning.hours_ if hours is None else hours
-    found = rate(alarms, span)
+    found = intervals.rate(alarms, span)
     return {
         "alarms": alarms,
         "minutes": 60.0 * span,

@@ -32,13 +32,9 @@ from tendonfmu.detect.noise import BiasNoise, Deviation, bias_noise, deviation, 
 from tendonfmu.detect.sensor_faults import SensorRule, learn_sensors
 from tendonfmu.detect.support import NotEnough, hours_by_pretension, supported
 from tendonfmu.errors import InputError
-from tendonfmu.estimate.constructor_arguments import ConstructorArguments
-from tendonfmu.estimate.files import check_given_once, description_text
-from tendonfmu.estimate.structure import own_copy
-from tendonfmu.model import native
-from tendonfmu.model.description import FingerDescription, read_finger
-from tendonfmu.recordings.match import admit
-from tendonfmu.recordings.recording import Recording, read_recording
+from tendonfmu.estimate import ConstructorArguments, check_given_once, description_text, own_copy
+from tendonfmu.model import FingerDescription, native, read_finger
+from tendonfmu.recordings import Recording, admit, read_recording
 
 Numbers = NDArray[np.float64]
 Source = str | os.PathLike[str] | Recording

@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.model import native
-from tendonfmu.model.balance import moment_arms
-from tendonfmu.recordings.prepared import FitRecording
-from tendonfmu.statistics.block_averages import Blocks
+from tendonfmu.model import moment_arms, native
+from tendonfmu.recordings import FitRecording
+from tendonfmu.statistics import SampleBlocks
 
 Numbers = NDArray[np.float64]
 
@@ -21,7 +20,7 @@ _NEVER = 1e9  # N·m; no contact threshold is ever passed
 _STRETCH = 4000  # samples of a run at a time: what a run returns stays near the processor
 
 
-def block_prediction(data: Mapping[str, Any], recordings: Sequence[FitRecording], blocks: Blocks) -> Numbers:
+def block_prediction(data: Mapping[str, Any], recordings: Sequence[FitRecording], blocks: SampleBlocks) -> Numbers:
     """[B, n] block means of G of a description, N·m, less the torque of the forces in use beyond the measured ones.
 
     The latter is 0 but for forces that the description delays (`time_delay` below 0).
@@ -61,7 +60,7 @@ def _learning_nothing(data: Mapping[str, Any]) -> dict[str, Any]:
 def block_late_forces(
     data: Mapping[str, Any],
     recordings: Sequence[FitRecording],
-    blocks: Blocks,
+    blocks: SampleBlocks,
     delay: float,
     prediction: Numbers,
 ) -> Numbers:
@@ -85,7 +84,7 @@ def _with_late_forces(recording: FitRecording, delay: float) -> FitRecording:
     return replace(recording, recording=replace(recording.recording, groups=groups))
 
 
-def _block_torque(data: Mapping[str, Any], recordings: Sequence[FitRecording], blocks: Blocks) -> Numbers:
+def _block_torque(data: Mapping[str, Any], recordings: Sequence[FitRecording], blocks: SampleBlocks) -> Numbers:
     """[B, n] block means of τ = Rᵀ f."""
     arms = moment_arms(data)
     sums = np.zeros((blocks.count, arms.shape[1]))

@@ -19,8 +19,8 @@ from tendonfmu.diagnose.derivative_passes import Direction, nominal_directions, 
 from tendonfmu.diagnose.effects import CANDIDATES, Candidate, Place, Variant
 from tendonfmu.diagnose.span import Span, span_of
 from tendonfmu.errors import InputError
-from tendonfmu.recordings.prepared import FitRecording
-from tendonfmu.statistics.block_averages import Blocks
+from tendonfmu.recordings import FitRecording
+from tendonfmu.statistics import SampleBlocks
 
 Numbers = NDArray[np.float64]
 Single = NDArray[np.float32]
@@ -82,7 +82,7 @@ class CandidateColumns:
 def candidate_columns(
     data: Mapping[str, Any],
     recordings: Sequence[FitRecording],
-    blocks: Blocks,
+    blocks: SampleBlocks,
     *,
     candidates: Sequence[Candidate] = CANDIDATES,
     span: Span | None = None,
@@ -121,7 +121,7 @@ class _Work:
         self,
         data: Mapping[str, Any],
         recordings: Sequence[FitRecording],
-        blocks: Blocks,
+        blocks: SampleBlocks,
         values: Single,
         progress: Progress | None,
     ) -> None:

@@ -19,10 +19,9 @@ from tendonfmu.diagnose.nominal_fit import fitted
 from tendonfmu.diagnose.online_error import OnlineError
 from tendonfmu.diagnose.search import NamedCause, Search
 from tendonfmu.diagnose.signal_choice import estimation_recordings
-from tendonfmu.model.description import FingerDescription
-from tendonfmu.recordings.prepared import FitRecording
-from tendonfmu.statistics.gain_interval import gain_interval
-from tendonfmu.statistics.interval import Interval
+from tendonfmu.model import FingerDescription
+from tendonfmu.recordings import FitRecording
+from tendonfmu.statistics import Interval, gain_interval
 
 Data = Mapping[str, Any]
 Numbers = NDArray[np.float64]

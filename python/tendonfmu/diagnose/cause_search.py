@@ -19,15 +19,21 @@ from tendonfmu.diagnose.hypotheses import Hypothesis, Key, hypotheses
 from tendonfmu.diagnose.least_sizes import LeastSizes
 from tendonfmu.diagnose.regressors import predicted_forces
 from tendonfmu.diagnose.series import Grid, Series, block_prediction, make_series
-from tendonfmu.estimate.estimation import Estimator
-from tendonfmu.model import native
-from tendonfmu.model.balance import moment_arms
-from tendonfmu.recordings.prepared import FitRecording
-from tendonfmu.recordings.residuals import bias_settings
-from tendonfmu.statistics.block_averages import Blocks
-from tendonfmu.statistics.block_grams import Grams
-from tendonfmu.statistics.folds import Folds, make_folds
-from tendonfmu.statistics.splines import KNOTS, TRENDS, Splines, bias_splines, constant_bias, residual_of
+from tendonfmu.estimate import Estimator
+from tendonfmu.model import moment_arms, native
+from tendonfmu.recordings import FitRecording, bias_settings
+from tendonfmu.statistics import (
+    KNOTS,
+    TRENDS,
+    Folds,
+    Grams,
+    SampleBlocks,
+    Splines,
+    bias_splines,
+    constant_bias,
+    make_folds,
+    residual_of,
+)
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -135,10 +141,10 @@ def bias_of(data: Mapping[str, Any], series: Series, knots: float = KNOTS) -> Sp
     return bias_splines(series, knots) if bias_settings(data).drift > 0 else constant_bias(series)
 
 
-def blocks_of(grid: Grid, recordings: Sequence[FitRecording]) -> Blocks:
+def blocks_of(grid: Grid, recordings: Sequence[FitRecording]) -> SampleBlocks:
     """The grid's blocks, as `candidate_columns` takes them."""
     found = [np.full(len(recording.time), -1, dtype=np.int64) for recording in recordings]
     for segment in grid.segments:
         numbers = np.repeat(np.arange(segment.first, segment.first + segment.count), segment.samples)
         found[segment.recording][segment.part.start : segment.part.start + len(numbers)] = numbers
-    return Blocks(tuple(found), grid.blocks)
+    return SampleBlocks(tuple(found), grid.blocks)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.diagnose.hypotheses import Hypothesis, Key
 from tendonfmu.diagnose.least_sizes import LeastSizes
-from tendonfmu.statistics.block_grams import Grams, standard_error
+from tendonfmu.statistics import Grams, standard_error
 
 Numbers = NDArray[np.float64]
 

@@ -16,9 +16,7 @@ from numpy.typing import NDArray
 from scipy.special import fdtrc
 
 from tendonfmu.diagnose.series import Series
-from tendonfmu.statistics.folds import Folds
-from tendonfmu.statistics.splines import Splines, basis, residual_of, without
-from tendonfmu.statistics.whitening import Whitener, whitener
+from tendonfmu.statistics import Folds, Splines, Whitener, basis, residual_of, whitener, without
 
 Numbers = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -17,17 +17,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.detect.alarm_level import least_hours
-from tendonfmu.detect.counting import DetectionScore, pooled
-from tendonfmu.detect.free_motion import SETTLING, free_parts
-from tendonfmu.detect.run import Subject, run_track
-from tendonfmu.detect.tuning import ContactTuning, TuneWarning
+from tendonfmu.detect import (
+    SETTLING,
+    ContactTuning,
+    DetectionScore,
+    Subject,
+    TuneWarning,
+    free_parts,
+    least_hours,
+    pooled,
+    run_track,
+)
 from tendonfmu.diagnose.result import DetectionGain
 from tendonfmu.errors import InputError
-from tendonfmu.model import native
-from tendonfmu.model.description import FingerDescription
-from tendonfmu.recordings.prepared import FitRecording
-from tendonfmu.recordings.recording import Recording
+from tendonfmu.model import FingerDescription, native
+from tendonfmu.recordings import FitRecording, Recording
 
 Data = Mapping[str, Any]
 Flags = NDArray[np.bool_]

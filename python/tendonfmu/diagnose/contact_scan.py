@@ -19,8 +19,7 @@ from scipy.ndimage import median_filter, uniform_filter1d
 from tendonfmu.diagnose.remainder_features import features
 from tendonfmu.diagnose.remainder_learner import Learner
 from tendonfmu.diagnose.result import Event
-from tendonfmu.statistics.folds import Folds, make_folds
-from tendonfmu.statistics.splines import Splines
+from tendonfmu.statistics import Folds, Splines, make_folds
 
 if TYPE_CHECKING:
     from tendonfmu.diagnose.series import Series

@@ -17,11 +17,10 @@ from scipy import sparse
 
 from tendonfmu.diagnose.effects.candidate import Variant
 from tendonfmu.diagnose.effects.description_edit import Edit, apply_edits, data_number, finer_paths, is_law_number
-from tendonfmu.estimate.estimation import Estimator
-from tendonfmu.estimate.methods import unknown_names
+from tendonfmu.estimate import Estimator, unknown_names
 from tendonfmu.model import native
-from tendonfmu.recordings.prepared import FitRecording
-from tendonfmu.statistics.block_averages import Blocks, BlockSums
+from tendonfmu.recordings import FitRecording
+from tendonfmu.statistics import BlockSums, SampleBlocks
 
 Numbers = NDArray[np.float64]
 Single = NDArray[np.float32]
@@ -113,7 +112,7 @@ def run_pass(
     data: Mapping[str, Any],
     columns: Sequence[tuple[int, Direction]],
     recordings: Sequence[FitRecording],
-    blocks: Blocks,
+    blocks: SampleBlocks,
     sums: Single,
     watch: Watch,
 ) -> None:

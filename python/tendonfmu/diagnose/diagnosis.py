@@ -42,14 +42,11 @@ from tendonfmu.diagnose.series import make_grid
 from tendonfmu.diagnose.signal_choice import choose
 from tendonfmu.diagnose.size import size_of
 from tendonfmu.errors import InputError, own_fault
-from tendonfmu.estimate.files import check_unseen
-from tendonfmu.model.description import FingerDescription, read_finger
-from tendonfmu.recordings.match import admit
-from tendonfmu.recordings.prepared import FitRecording, Held, prepare, require_noise
-from tendonfmu.recordings.recording import Recording, read_recording
-from tendonfmu.statistics.block_grams import standard_error
-from tendonfmu.statistics.interval import Interval
-from tendonfmu.tasks.phases import Phases, PhaseState
+from tendonfmu.estimate import check_unseen
+from tendonfmu.model import FingerDescription, read_finger
+from tendonfmu.recordings import FitRecording, Held, Recording, admit, prepare, read_recording, require_noise
+from tendonfmu.statistics import Interval, standard_error
+from tendonfmu.tasks import Phases, PhaseState
 
 Numbers = NDArray[np.float64]
 Finger = FingerDescription | str | os.PathLike[str]

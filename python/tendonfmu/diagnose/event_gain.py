@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from tendonfmu.diagnose.gain import residual_of
 from tendonfmu.diagnose.result import Event
-from tendonfmu.recordings.prepared import FitRecording
-from tendonfmu.statistics.gain_interval import FEWEST, blocks_of
-from tendonfmu.statistics.interval import Interval
+from tendonfmu.recordings import FitRecording
+from tendonfmu.statistics import Interval, blocks_of, paired_gain
 
 Numbers = NDArray[np.float64]
 
@@ -48,7 +47,7 @@ def event_gain(data: Mapping[str, Any], recordings: Sequence[FitRecording], even
 def _gain(within: float, samples: int, free: Numbers, free_samples: Numbers) -> Interval | None:
     """within: Σ r² in the events, of so many samples; free: [B] Σ r² of the blocks beside them, of so many samples."""
     rest, count = float(free.sum()), float(free_samples.sum())
-    if len(free) < FEWEST or not rest > 0.0:
+    if len(free) < paired_gain.FEWEST or not rest > 0.0:
         return None
     mean = rest / count
     # of a ratio of sums, by blocks

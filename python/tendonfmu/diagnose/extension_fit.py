@@ -17,14 +17,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.estimate.files import description_text, with_values
-from tendonfmu.estimate.methods import Interrupted, Learned, Settings, Watch, learn_batch
-from tendonfmu.estimate.structure import Choice, Structure, build_structure, get_number
-from tendonfmu.estimate.verdicts import slopes
-from tendonfmu.model import native
-from tendonfmu.model.balance import moment_arms
-from tendonfmu.model.description import FingerDescription
-from tendonfmu.recordings.prepared import FitRecording
+from tendonfmu.estimate import (
+    Choice,
+    Interrupted,
+    Learned,
+    Settings,
+    Structure,
+    Watch,
+    build_structure,
+    description_text,
+    get_number,
+    learn_batch,
+    verdicts,
+    with_values,
+)
+from tendonfmu.model import FingerDescription, moment_arms, native
+from tendonfmu.recordings import FitRecording
 
 if TYPE_CHECKING:
     from tendonfmu.diagnose.effects.candidate import Candidate, Place
@@ -285,7 +293,9 @@ def _leaves(data: Any, path: str = "") -> Iterator[tuple[str, float]]:
 
 def _standard_errors(structure: Structure, learned: Learned) -> dict[str, float]:
     """By path, from the covariance of the unknowns (delta method)."""
-    matrix = slopes(learned.estimator, learned.z)[[structure.index[number.path] for number in structure.numbers]]
+    matrix = verdicts.slopes(learned.estimator, learned.z)[
+        [structure.index[number.path] for number in structure.numbers]
+    ]
     variance = np.einsum("pu,uv,pv->p", matrix, learned.covariance, matrix)
     return {
         number.path: float(np.sqrt(max(part, 0.0))) for number, part in zip(structure.numbers, variance, strict=True)

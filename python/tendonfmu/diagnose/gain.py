@@ -21,16 +21,11 @@ from numpy.typing import NDArray
 
 from tendonfmu.diagnose.result import ModelErrors
 from tendonfmu.errors import InputError, InternalError
-from tendonfmu.estimate.evaluation import residuals
-from tendonfmu.estimate.files import description_text
-from tendonfmu.fmu.fmpy_client import run_fmu
-from tendonfmu.fmu.packaging import build_fmu
-from tendonfmu.model import native
-from tendonfmu.model.signals import NUMBERS
-from tendonfmu.recordings.prepared import FitRecording
-from tendonfmu.recordings.residuals import BiasSettings, Model, bias_settings, delayed_torque, rms
-from tendonfmu.statistics.gain_interval import Blocks, blocks_of, gain_interval
-from tendonfmu.statistics.interval import Interval
+from tendonfmu.estimate import description_text, residuals
+from tendonfmu.fmu import build_fmu, run_fmu
+from tendonfmu.model import NUMBERS, native
+from tendonfmu.recordings import BiasSettings, FitRecording, Model, bias_settings, delayed_torque, rms
+from tendonfmu.statistics import BlockIndex, Interval, blocks_of, gain_interval
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -212,7 +207,7 @@ class _Test:
     training: Sequence[FitRecording]
     recordings: Sequence[FitRecording]
     masks: Sequence[Flags]
-    blocks: Sequence[Blocks]
+    blocks: Sequence[BlockIndex]
     held_out: bool
 
     @classmethod

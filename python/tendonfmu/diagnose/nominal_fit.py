@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tendonfmu.diagnose.extension_fit import FitSettings, FittedModel, fit_numbers
-from tendonfmu.estimate.information import unknowns
-from tendonfmu.recordings.prepared import FitRecording
+from tendonfmu.estimate import unknowns
+from tendonfmu.recordings import FitRecording
 
 
 def fitted(

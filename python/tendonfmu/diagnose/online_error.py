@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from tendonfmu.diagnose.cause_search import bias_of, series_of
 from tendonfmu.diagnose.gain import residual_of
 from tendonfmu.diagnose.series import block_prediction, make_grid
-from tendonfmu.recordings.prepared import FitRecording
-from tendonfmu.statistics.folds import make_folds
-from tendonfmu.statistics.splines import Span
+from tendonfmu.recordings import FitRecording
+from tendonfmu.statistics import Span, make_folds
 
 Numbers = NDArray[np.float64]
 

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.diagnose.series import Grid, Series, exact_model
-from tendonfmu.model.balance import moment_arms
-from tendonfmu.recordings.prepared import FitRecording
+from tendonfmu.model import moment_arms
+from tendonfmu.recordings import FitRecording
 
 Numbers = NDArray[np.float64]
 

@@ -17,11 +17,7 @@ from scipy.stats import ttest_1samp
 from tendonfmu.diagnose.remainder_features import Finding, features
 from tendonfmu.diagnose.remainder_learner import Choice, Learner, choices
 from tendonfmu.diagnose.remainder_text import described
-from tendonfmu.statistics.block_grams import standard_error
-from tendonfmu.statistics.folds import make_folds
-from tendonfmu.statistics.spectral_line import find_lines
-from tendonfmu.statistics.splines import Splines
-from tendonfmu.statistics.whitening import Whitener, whitener
+from tendonfmu.statistics import Splines, Whitener, find_lines, make_folds, standard_error, whitener
 
 if TYPE_CHECKING:
     from tendonfmu.diagnose.series import Series

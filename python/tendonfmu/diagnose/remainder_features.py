@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 from sklearn.preprocessing import SplineTransformer  # type: ignore[import-untyped]
 
-from tendonfmu.statistics.spectral_line import Line
+from tendonfmu.statistics import Line
 
 if TYPE_CHECKING:
     from tendonfmu.diagnose.series import Series

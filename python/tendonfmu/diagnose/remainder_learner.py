@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve
 
 from tendonfmu.diagnose.remainder_features import Features
-from tendonfmu.statistics.folds import Folds
-from tendonfmu.statistics.splines import Span, Splines
+from tendonfmu.statistics import Folds, Span, Splines
 
 Numbers = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.signal import welch
 
 from tendonfmu.diagnose.result import ResidualView
-from tendonfmu.statistics.folds import make_folds
+from tendonfmu.statistics import make_folds
 
 if TYPE_CHECKING:
     from tendonfmu.diagnose.series import Series

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.recordings.smoothing import Signals
-from tendonfmu.statistics.interval import Interval
+from tendonfmu.recordings import Signals
+from tendonfmu.statistics import Interval
 
 Numbers = NDArray[np.float64]
 

@@ -35,10 +35,10 @@ from tendonfmu.diagnose.series import Grid
 from tendonfmu.diagnose.signal_choice import Estimation
 from tendonfmu.diagnose.span import span_of
 from tendonfmu.diagnose.starting_point import presliding_everywhere
-from tendonfmu.model.extensions import extended_row
-from tendonfmu.recordings.prepared import FitRecording
-from tendonfmu.statistics.interval import Interval
-from tendonfmu.tasks.phases import Phases, Step
+from tendonfmu.model import extended_row
+from tendonfmu.recordings import FitRecording
+from tendonfmu.statistics import Interval
+from tendonfmu.tasks import Phases, Step
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -15,12 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.model import native
-from tendonfmu.model.balance import moment_arms
-from tendonfmu.model.friction_places import DEFAULT_THRESHOLD
-from tendonfmu.recordings.prepared import FitRecording
-from tendonfmu.recordings.residuals import delayed_torque
-from tendonfmu.statistics.blocks import Blocks
+from tendonfmu.model import DEFAULT_THRESHOLD, moment_arms, native
+from tendonfmu.recordings import FitRecording, delayed_torque
+from tendonfmu.statistics import BlockSeries
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -67,7 +64,7 @@ class Grid:
 
 
 @dataclass(frozen=True)
-class Series(Blocks):
+class Series(BlockSeries):
     """All recordings one after another, block means; n joints, m tendons.
 
     target: [B, n] y − G, N·m. angle [B, n] rad, velocity [B, n] rad/s,

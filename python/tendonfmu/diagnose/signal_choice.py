@@ -23,14 +23,10 @@ from tendonfmu.diagnose.online_error import OnlineError
 from tendonfmu.diagnose.series import Grid, make_grid
 from tendonfmu.diagnose.span import span_of
 from tendonfmu.diagnose.starting_point import Start, scan
-from tendonfmu.model.balance import moment_arms
-from tendonfmu.model.description import FingerDescription
-from tendonfmu.recordings.prepared import FitRecording, Held, prepare
-from tendonfmu.recordings.signal_noise import FEWEST as FEWEST_SAMPLES
-from tendonfmu.recordings.signal_noise import joint_position_noise
-from tendonfmu.recordings.smoothing import Signals, smoothing_of, zero_phase
-from tendonfmu.statistics.block_grams import Grams
-from tendonfmu.statistics.folds import make_folds
+from tendonfmu.model import FingerDescription, moment_arms
+from tendonfmu.recordings import FEWEST as FEWEST_SAMPLES
+from tendonfmu.recordings import FitRecording, Held, Signals, joint_position_noise, prepare, smoothing_of, zero_phase
+from tendonfmu.statistics import Grams, make_folds
 
 Numbers = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 
 from tendonfmu.diagnose.result import FoundPlace
-from tendonfmu.model.extensions import LEFT_OUT
+from tendonfmu.model import LEFT_OUT
 
 Thresholds = tuple[float, float]
 Parameters = Mapping[str, tuple[float, str]]  # path -> (value, unit)

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.model.balance import moment_arms
-from tendonfmu.recordings.prepared import FitRecording
+from tendonfmu.model import moment_arms
+from tendonfmu.recordings import FitRecording
 
 Numbers = NDArray[np.float64]
 

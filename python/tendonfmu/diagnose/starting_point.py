@@ -21,10 +21,9 @@ from tendonfmu.diagnose.effects import CANDIDATES, Place
 from tendonfmu.diagnose.extension_fit import Accepted, extended_description
 from tendonfmu.diagnose.series import Grid
 from tendonfmu.diagnose.span import Span, span_of
-from tendonfmu.model.balance import moment_arms
-from tendonfmu.recordings.prepared import FitRecording
-from tendonfmu.statistics.block_grams import Grams
-from tendonfmu.statistics.folds import make_folds
+from tendonfmu.model import moment_arms
+from tendonfmu.recordings import FitRecording
+from tendonfmu.statistics import Grams, make_folds
 
 Numbers = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
 from tendonfmu.drawing.plot_style import BLUE, DARK, GREEN, GREY, LIGHT, ORANGE, PURPLE, SKIN, SKY, Target, save
-from tendonfmu.model.routing_geometry import DrawnTendon, FingerDrawing
+from tendonfmu.model import DrawnTendon, FingerDrawing
 
 EDGE_RED = "#CC1F1A"
 TENDON_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, "#5A5A5A", "#332288", "#999933")

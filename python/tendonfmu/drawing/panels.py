@@ -1,4 +1,4 @@
-"""Draws the panels of a fit (`sheet.py`). It computes nothing: what it draws comes ready-made.
+"""Draws the panels of a fit (`panel_data.py`). It computes nothing: what it draws comes ready-made.
 
 Panels have fixed margins, so that they align beside each other.
 """
@@ -21,10 +21,10 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
+from tendonfmu.drawing.panel_data import MatrixPanel, Panel, Sheet
 from tendonfmu.drawing.panel_styles import SIZES, STYLES, Style, size_of
 from tendonfmu.drawing.plot_style import DARK, GREY, LIGHT, any_names, clean
-from tendonfmu.drawing.sheet import MatrixPanel, Panel, Sheet
-from tendonfmu.files.whole_file import whole_file
+from tendonfmu.files import whole_file
 
 Pixels = NDArray[np.uint8]
 

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from tendonfmu.drawing.panel_styles import BLUE, DARK, GREEN, GREY, LIGHT, ORANGE, PURPLE, SKIN, SKY, VERMILION
-from tendonfmu.files.whole_file import whole_file
+from tendonfmu.files import whole_file
 
 __all__ = [
     "BLUE",

@@ -13,8 +13,8 @@ import numpy as np
 from markupsafe import Markup, escape
 from numpy.typing import NDArray
 
+from tendonfmu.drawing.panel_data import Panel
 from tendonfmu.drawing.panel_styles import STYLES, Style, size_of
-from tendonfmu.drawing.sheet import Panel
 
 Numbers = NDArray[np.float64]
 

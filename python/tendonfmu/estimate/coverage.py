@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.model.friction_places import Effect, effects, sliding_velocity, velocity_threshold, working_point_weights
+from tendonfmu.model import Effect, effects, sliding_velocity, velocity_threshold, working_point_weights
 
 Numbers = NDArray[np.float64]
 

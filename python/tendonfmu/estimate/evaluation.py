@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.recordings.prepared import FitRecording
-from tendonfmu.recordings.residuals import Model, Residuals, bias_settings, model_alone, rms, track
+from tendonfmu.recordings import FitRecording, Model, Residuals, bias_settings, model_alone, rms, track
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]

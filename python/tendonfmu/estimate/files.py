@@ -15,11 +15,9 @@ from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError, InternalError
 from tendonfmu.estimate.structure import Structure, own_copy, set_number
-from tendonfmu.files.json_node import read_json
-from tendonfmu.files.whole_file import check_output, check_output_folder, write_text
-from tendonfmu.model import native
-from tendonfmu.model.description import FingerDescription
-from tendonfmu.recordings.recording import Recording
+from tendonfmu.files import check_output, check_output_folder, read_json, write_text
+from tendonfmu.model import FingerDescription, native
+from tendonfmu.recordings import Recording
 
 Numbers = NDArray[np.float64]
 

@@ -34,27 +34,27 @@ from tendonfmu.estimate.files import (
     with_uncertainty,
     with_values,
 )
+from tendonfmu.estimate.fit_report import Outcome, Run, build_report
 from tendonfmu.estimate.methods import Interrupted, Learned, Settings, Watch, learn_batch, learn_ekf, unknown_names
 from tendonfmu.estimate.picture import FitPicture, FitSeries
 from tendonfmu.estimate.previous_fit import CHANGE, PreviousFit, read_previous_fit, with_previous_values
-from tendonfmu.estimate.report import Outcome, Run, build_report
 from tendonfmu.estimate.structure import Choice, build_structure
 from tendonfmu.estimate.uncertainty import parameter_uncertainty
 from tendonfmu.estimate.verdicts import Fitted, Knowledge, judge_numbers
-from tendonfmu.model import native
-from tendonfmu.model.description import FingerDescription, read_finger
-from tendonfmu.recordings.match import admit
-from tendonfmu.recordings.prepared import (
+from tendonfmu.model import FingerDescription, native, read_finger
+from tendonfmu.recordings import (
     FitRecording,
     Held,
+    Recording,
+    admit,
+    bias_settings,
     motion_of,
     prepare,
+    read_recording,
     refuse_stillness,
     require_noise,
     slack_sentences,
 )
-from tendonfmu.recordings.recording import Recording, read_recording
-from tendonfmu.recordings.residuals import bias_settings
 
 Numbers = NDArray[np.float64]
 Finger = FingerDescription | Mapping[str, Any] | str | os.PathLike[str]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.estimate.coverage import EffectCoverage
-from tendonfmu.estimate.information import Unknown
+from tendonfmu.estimate.fisher_information import Unknown
 
 Numbers = NDArray[np.float64]
 

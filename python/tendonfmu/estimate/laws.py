@@ -17,9 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.estimate.picture import FitPicture
-from tendonfmu.model.description import Law
-from tendonfmu.model.friction_places import Effect
-from tendonfmu.model.native import Finger
+from tendonfmu.model import Effect, Finger, Law
 
 Numbers = NDArray[np.float64]
 

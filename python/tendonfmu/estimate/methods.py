@@ -20,8 +20,8 @@ from tendonfmu.estimate.estimation import BatchResult, EstimationError, Estimato
 from tendonfmu.estimate.files import with_values
 from tendonfmu.estimate.previous_fit import PreviousFit, known_information
 from tendonfmu.estimate.structure import Structure
-from tendonfmu.recordings.prepared import FitRecording
-from tendonfmu.statistics.effective_number import sample_weights
+from tendonfmu.recordings import FitRecording
+from tendonfmu.statistics import sample_weights
 
 Numbers = NDArray[np.float64]
 Start = Callable[[Sequence[str]], Numbers]
@@ -45,7 +45,7 @@ class Settings:
 
 
 @dataclass(frozen=True)
-class Progress:
+class FitProgress:
     """Where a fit is. phase: in words. done, total: samples of this phase. cost: so far, NaN where not known."""
 
     phase: str
@@ -86,11 +86,11 @@ class Interrupted(Exception):
 class Watch:
     """Passes progress on, and remembers that somebody wants to stop: Ctrl-C while the library computes shows here."""
 
-    def __init__(self, progress: Callable[[Progress], bool | None] | None) -> None:
+    def __init__(self, progress: Callable[[FitProgress], bool | None] | None) -> None:
         self._progress = progress
         self.stopped, self.by_user = False, False
 
-    def __call__(self, progress: Progress) -> bool:
+    def __call__(self, progress: FitProgress) -> bool:
         """Whether to go on."""
         try:
             answer = self._progress(progress) if self._progress is not None else None
@@ -222,7 +222,7 @@ def _fitted(
         nonlocal best, best_cost
         best, best_cost = np.array(z, dtype=float), float(cost)
         phase = f"pass {number}" if stride == 1 else f"pass {number}, 1 of {stride} samples"
-        return watch(Progress(f"{phase}{what}", number, done, total, cost))
+        return watch(FitProgress(f"{phase}{what}", number, done, total, cost))
 
     try:
         found = estimator.fit(
@@ -317,7 +317,7 @@ def _filter_once(
     total, before = sum(len(recording.time) for recording in recordings), 0
 
     def show(done: int, _: int) -> bool:
-        return watch(Progress(f"filtering, pass {number}", number, before + done, total, float("nan")))
+        return watch(FitProgress(f"filtering, pass {number}", number, before + done, total, float("nan")))
 
     innovations = []
     for recording in recordings:

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.estimation import Estimator
-from tendonfmu.estimate.report import FORMAT
+from tendonfmu.estimate.fit_report import FORMAT
 from tendonfmu.estimate.structure import described, estimable_numbers, own_copy, set_number
-from tendonfmu.files.json_node import read_json
-from tendonfmu.model.description import FingerDescription, read_finger
+from tendonfmu.files import read_json
+from tendonfmu.model import FingerDescription, read_finger
 
 Numbers = NDArray[np.float64]
 

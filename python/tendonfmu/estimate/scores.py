@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.evaluation import Evaluation
-from tendonfmu.recordings.residuals import BiasSettings, bias_settings, track
+from tendonfmu.recordings import BiasSettings, bias_settings, track
 
 Numbers = NDArray[np.float64]
 

@@ -16,11 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.estimate.information import Unknown, unknowns
-from tendonfmu.model import native
-from tendonfmu.model.description import FingerDescription, sides
-from tendonfmu.model.extensions import LEFT_OUT
-from tendonfmu.model.friction_places import effects
+from tendonfmu.estimate.fisher_information import Unknown, unknowns
+from tendonfmu.model import LEFT_OUT, FingerDescription, effects, native, sides
 
 MAGNITUDES = ("static", "coulomb", "stribeck_velocity", "viscous")
 SHARED_BY_WORD = {

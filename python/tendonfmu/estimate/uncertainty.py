@@ -22,7 +22,7 @@ from tendonfmu.estimate.methods import Learned
 from tendonfmu.estimate.scores import block_scores, sampled
 from tendonfmu.estimate.structure import Structure
 from tendonfmu.model import native
-from tendonfmu.statistics.error_directions import few_directions, predicted, squares
+from tendonfmu.statistics import error_directions
 
 Numbers = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -119,17 +119,19 @@ def _of_joint(seen: Mapping[str, Seen], known: Known, scores: Numbers) -> JointU
     inflation = inflation_of(seen["train"].slopes, known, scores)
     growth = np.sqrt(known.growth(inflation))
     slopes = {which: each.slopes * growth for which, each in seen.items()}
-    std = {which: np.sqrt(squares(each)) for which, each in slopes.items()}
+    std = {which: np.sqrt(error_directions.squares(each)) for which, each in slopes.items()}
     # so that the larger torques under more load do not count for more
     size = {which: _rms(std[which]) or 1.0 for which in ("train", "loaded")}
-    directions, captured = few_directions(
+    directions, captured = error_directions.few_directions(
         np.concatenate([seen[which].parts / size[which] for which in size]),
         np.concatenate([slopes[which] / size[which] for which in size]),
     )
     written = [[float(f"{value:.{DIGITS}g}") for value in row] for row in directions.tolist()]
     stated = {}
     for which, each in seen.items():
-        error = np.abs(predicted(each.parts, np.array(written).reshape(-1, each.parts.shape[1])) - std[which])
+        error = np.abs(
+            error_directions.predicted(each.parts, np.array(written).reshape(-1, each.parts.shape[1])) - std[which]
+        )
         stated[which] = (_rms(std[which]), _rms(error), float(np.quantile(error, WORST)))
     return JointUncertainty(written, inflation, captured, stated)
 
@@ -162,7 +164,7 @@ def inflation_of(slopes: Numbers, known: Known, scores: Numbers) -> float:
     if len(scores) < 2:
         return 1.0
     found = float(np.sum((slopes @ scores.T) ** 2)) * len(scores) / (len(scores) - 1)
-    assumed = float(np.sum(squares(slopes * np.sqrt(known.share))))
+    assumed = float(np.sum(error_directions.squares(slopes * np.sqrt(known.share))))
     return found / assumed if assumed > 0 and found > 0 else 1.0
 
 

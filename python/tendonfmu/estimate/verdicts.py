@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.estimate.coverage import EffectCoverage
+from tendonfmu.estimate.fisher_information import Unknown
 from tendonfmu.estimate.identifiability import LIMIT, PRIOR, Verdict, explain, unvisited
-from tendonfmu.estimate.information import Unknown
 from tendonfmu.estimate.structure import Structure, values_of
-from tendonfmu.model.description import FingerDescription
+from tendonfmu.model import FingerDescription
 
 Numbers = NDArray[np.float64]
 

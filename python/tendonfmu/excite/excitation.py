@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
 from tendonfmu.excite.tension_plan import Variation, internal_tensions
-from tendonfmu.model.balance import moment_arms, pretension_vector
-from tendonfmu.statistics.quintic import evaluate
+from tendonfmu.model import moment_arms, pretension_vector
+from tendonfmu.statistics import quintic
 
 Numbers = NDArray[np.float64]
 
@@ -233,7 +233,7 @@ def _sample(
     blocks: list[tuple[int, int, float]],
 ) -> Excitation:
     time = np.arange(blocks[-1][1] + 1) / plan.rate
-    curves = [evaluate(path, time) for path in knots]
+    curves = [quintic.evaluate(path, time) for path in knots]
     position, velocity, acceleration = (np.column_stack([curve[k] for curve in curves]) for k in range(3))
     stiffness = np.array([tendon["stiffness"] for tendon in data["tendons"]], dtype=float)
     if plan.vary is not None:
@@ -264,5 +264,5 @@ def _pretension(plan: Plan, blocks: list[tuple[int, int, float]], time: Numbers)
         change = round(PRETENSION_CHANGE * plan.rate)
         level = np.vstack([level, [begin, before, 0.0, 0.0], [begin + change, now, 0.0, 0.0]])
     level[:, 0] /= plan.rate
-    pretension, _, _ = evaluate(level, time)
+    pretension, _, _ = quintic.evaluate(level, time)
     return pretension

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.model.balance import moment_arms, pretension_vector
-from tendonfmu.statistics.quintic import evaluate
+from tendonfmu.model import moment_arms, pretension_vector
+from tendonfmu.statistics import quintic
 
 Numbers = NDArray[np.float64]
 
@@ -58,7 +58,7 @@ def _series(values: Numbers, every: float, time: Numbers) -> Numbers:
     knots = np.zeros((2 * len(begin) + 1, 4))
     knots[1::2, 0], knots[2::2, 0] = begin, begin + CHANGE
     knots[0, 1], knots[1::2, 1], knots[2::2, 1] = values[0], values[:-1], values[1:]
-    tension, _, _ = evaluate(knots, time)
+    tension, _, _ = quintic.evaluate(knots, time)
     return tension
 
 

@@ -15,15 +15,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.estimate.coverage import EffectCoverage, coverage_of, durations
-from tendonfmu.estimate.identifiability import Judgement, as_json, judge
-from tendonfmu.estimate.information import Noise, Progress, information, noise_of, sensitivities, unknowns
+from tendonfmu.estimate import (
+    EffectCoverage,
+    Judgement,
+    Noise,
+    Progress,
+    coverage_of,
+    durations,
+    identifiability,
+    information,
+    judge,
+    noise_of,
+    sensitivities,
+    unknowns,
+)
 from tendonfmu.excite.excitation import Excitation, Plan, plan_excitation
 from tendonfmu.excite.joint_coverage import JointCoverage, joint_coverage
 from tendonfmu.excite.tension_plan import Variation
-from tendonfmu.model import native
-from tendonfmu.model.balance import balanced_forces, pretension_vector
-from tendonfmu.model.description import FingerDescription, read_finger
+from tendonfmu.model import FingerDescription, balanced_forces, native, pretension_vector, read_finger
 
 RIG_FORMAT = "tendonfmu-rig-1"
 DEFAULT_PRETENSION = 10.0  # N
@@ -250,7 +259,7 @@ def report(result: ExciteResult, command: str) -> dict[str, Any]:
         "slack": result.slack,
         "assumed_noise": asdict(result.noise),
         "biases": len(finger.joint_names),
-        **as_json(result.judgement),
+        **identifiability.as_json(result.judgement),
     }
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.files.whole_file import whole_file
+from tendonfmu.files.writing import whole_file
 
 FORMATS = (".csv", ".parquet")
 COMPRESSION = 12  # of Parquet, zstd: a minute of a quantised recording at 500 Hz takes about 1 MB and 1 s

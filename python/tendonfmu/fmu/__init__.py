@@ -1,0 +1,9 @@
+"""FMUs: packed without a compiler, described, and run.
+
+`packaging` puts the archive together from `model_variables` and `documentation`; `fmpy_client` runs one, sample by
+sample; `running` runs a description or an FMU over a recording.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from tendonfmu.model.description import FingerDescription, count
+from tendonfmu.model import FingerDescription, count
 
 
 def documentation_page(description: FingerDescription, model: Mapping[str, Any]) -> str:

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.model.signals import FLAGS, INPUTS, NUMBERS, OPTIONAL_NUMBERS, PLACE, REST, SENSORS, inputs_used
-from tendonfmu.recordings.recording import Recording
+from tendonfmu.model import FLAGS, INPUTS, NUMBERS, OPTIONAL_NUMBERS, PLACE, REST, SENSORS, inputs_used
+from tendonfmu.recordings import Recording
 
 Progress = Callable[[int], None]
 

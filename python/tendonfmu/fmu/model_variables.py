@@ -8,10 +8,15 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tendonfmu.model import native
-from tendonfmu.model.dependencies import Dependencies, dependencies, structure_of
-from tendonfmu.model.description import FingerDescription
-from tendonfmu.model.extensions import extension_rows, place_of
+from tendonfmu.model import (
+    Dependencies,
+    FingerDescription,
+    dependencies,
+    extension_rows,
+    native,
+    place_of,
+    structure_of,
+)
 
 # What XML 1.0 cannot hold, even escaped.
 NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")

@@ -17,10 +17,9 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from tendonfmu.errors import InputError, InternalError
-from tendonfmu.files.whole_file import whole_file
+from tendonfmu.files import whole_file
 from tendonfmu.fmu.model_variables import VariableTable, describe_model, read_table
-from tendonfmu.model import native
-from tendonfmu.model.description import FingerDescription, read_finger
+from tendonfmu.model import FingerDescription, native, read_finger
 
 if TYPE_CHECKING:
     from importlib.abc import Traversable
@@ -134,9 +133,9 @@ def members(
 
 
 def _for_readers(description: FingerDescription, context: Mapping[str, Any]) -> dict[str, bytes]:
-    from tendonfmu.drawing.finger_picture import draw_finger
+    from tendonfmu.drawing import draw_finger
     from tendonfmu.fmu.documentation import documentation_page
-    from tendonfmu.model.routing_geometry import finger_drawing
+    from tendonfmu.model import finger_drawing
 
     picture = io.BytesIO()
     draw_finger(finger_drawing(description), picture)

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.files.tables import FORMATS
+from tendonfmu.files import FORMATS
 from tendonfmu.fmu.fmpy_client import Progress, run_fmu
-from tendonfmu.recordings.recording import Recording
+from tendonfmu.recordings import Recording
 
 
 def check_model(model: Path) -> None:

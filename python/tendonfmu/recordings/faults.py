@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.model.description import FingerDescription
+from tendonfmu.model import FingerDescription
 from tendonfmu.recordings.recording import Recording
 
 Numbers = NDArray[np.float64]

@@ -14,7 +14,7 @@ from itertools import combinations, permutations
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.model.description import FingerDescription
+from tendonfmu.model import FingerDescription
 from tendonfmu.recordings.faults import TURNS
 
 Numbers = NDArray[np.float64]

@@ -14,9 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.model.description import FingerDescription
-from tendonfmu.model.findings import Finding
-from tendonfmu.model.plausibility import is_direct_drive
+from tendonfmu.model import Finding, FingerDescription, is_direct_drive
 from tendonfmu.recordings import match_text as text
 from tendonfmu.recordings.channels import (
     clipped_channels,

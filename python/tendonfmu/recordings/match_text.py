@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.model.findings import Finding
+from tendonfmu.model import Finding
 from tendonfmu.recordings.channels import JITTER, LOST_SHARE, Clipped, Clock, Coarse, Held
 from tendonfmu.recordings.kinematics import Balance, Correction, Repair
 from tendonfmu.recordings.recording import GROUP_PER, GROUPS, Recording

@@ -12,10 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.model.balance import moment_arms
-from tendonfmu.model.description import FingerDescription
-from tendonfmu.model.friction_places import DEFAULT_THRESHOLD
-from tendonfmu.model.signals import INPUTS_OF_SOURCE, inputs_used, watches_motors
+from tendonfmu.model import (
+    DEFAULT_THRESHOLD,
+    INPUTS_OF_SOURCE,
+    FingerDescription,
+    inputs_used,
+    moment_arms,
+    watches_motors,
+)
 from tendonfmu.recordings.faults import (
     SETTLING,
     StuckSensor,

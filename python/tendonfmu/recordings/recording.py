@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.files.tables import read_table
+from tendonfmu.files import read_table
 
 # group: unit, and whether every recording has it
 GROUPS: dict[str, tuple[str, bool]] = {

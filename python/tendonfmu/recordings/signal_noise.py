@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.model.balance import moment_arms
+from tendonfmu.model import moment_arms
 from tendonfmu.recordings.prepared import FitRecording
 from tendonfmu.recordings.recording import Recording
 

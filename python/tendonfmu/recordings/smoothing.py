@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt, welch
 
-from tendonfmu.model.balance import moment_arms
+from tendonfmu.model import moment_arms
 from tendonfmu.recordings.faults import gaps
 from tendonfmu.recordings.recording import Recording
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.model.description import FingerDescription
+from tendonfmu.model import FingerDescription
 from tendonfmu.recordings.faults import tendon_angles
 from tendonfmu.recordings.kinematics import FEWEST, Correction
 from tendonfmu.recordings.recording import Recording

@@ -1,4 +1,4 @@
-"""What the figures of a diagnosis show: sheets of panels (`drawing/sheet.py`), ready to be drawn."""
+"""What the figures of a diagnosis show: sheets of panels (`drawing/panel_data.py`), ready to be drawn."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.diagnose.result import Cause, Diagnosis, Evidence, ResidualView
-from tendonfmu.drawing.sheet import Band, Bars, Curve, Dots, Panel, Sheet
+from tendonfmu.diagnose import Cause, Diagnosis, Evidence, ResidualView
+from tendonfmu.drawing import Band, Bars, Curve, Dots, Panel, Sheet
 from tendonfmu.report.diagnosis_text import Names, at_place, names_of, unit_of
 from tendonfmu.report.diagnosis_words import Words, words_of
 

@@ -10,14 +10,14 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from tendonfmu.diagnose.result import Diagnosis
+from tendonfmu.diagnose import Diagnosis
 from tendonfmu.errors import InputError, own_fault
-from tendonfmu.estimate.files import description_text
-from tendonfmu.files.whole_file import check_output, check_output_folder, is_about, write_text
-from tendonfmu.fmu.packaging import build_fmu
+from tendonfmu.estimate import description_text
+from tendonfmu.files import check_output, check_output_folder, is_about, write_text
+from tendonfmu.fmu import build_fmu
 from tendonfmu.report.diagnosis_page import PAGE, write_diagnosis_page
 from tendonfmu.report.diagnosis_report import EXTENDED, EXTENDED_FMU, NOMINAL, REPORT, build_report, report_text
-from tendonfmu.tasks.interruption import uninterrupted
+from tendonfmu.tasks import uninterrupted
 
 _SUFFIXES = (".html", ".json", ".fmu", ".png")  # figures of the versions that wrote them beside the page
 _NAMED = (REPORT, EXTENDED, EXTENDED_FMU, PAGE, NOMINAL)

@@ -12,13 +12,19 @@ from typing import Any
 
 from markupsafe import Markup
 
-from tendonfmu.diagnose.effects.friction_law_places import thresholds
-from tendonfmu.diagnose.reported_causes import CONTACT, UNKNOWN, reported_causes
-from tendonfmu.diagnose.result import Cause, DetectionGain, Diagnosis
-from tendonfmu.diagnose.size import count_of, size_at
-from tendonfmu.drawing.sheet import Panel, Sheet
-from tendonfmu.drawing.svg import panel_svg
-from tendonfmu.files.whole_file import whole_file
+from tendonfmu.diagnose import (
+    CONTACT,
+    UNKNOWN,
+    Cause,
+    DetectionGain,
+    Diagnosis,
+    count_of,
+    reported_causes,
+    size_at,
+    thresholds,
+)
+from tendonfmu.drawing import Panel, Sheet, panel_svg
+from tendonfmu.files import whole_file
 from tendonfmu.report.diagnosis_figures import diagnosis_sheets
 from tendonfmu.report.diagnosis_text import (
     Names,

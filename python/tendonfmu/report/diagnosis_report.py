@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.diagnose.reported_causes import reported_causes
-from tendonfmu.diagnose.result import (
+from tendonfmu.diagnose import (
     Cause,
     ChangedSize,
     DetectionGain,
@@ -22,11 +21,12 @@ from tendonfmu.diagnose.result import (
     Invisible,
     ResidualView,
     Where,
+    reported_causes,
 )
-from tendonfmu.files.finite_numbers import finite
+from tendonfmu.files import finite
 from tendonfmu.report.diagnosis_text import at_place, names_of
 from tendonfmu.report.diagnosis_words import words_of
-from tendonfmu.statistics.interval import Interval
+from tendonfmu.statistics import Interval
 
 FORMAT = "tendonfmu-diagnosis-1"
 REPORT, NOMINAL, EXTENDED, EXTENDED_FMU = "diagnosis.json", "nominal.json", "extended.json", "extended.fmu"

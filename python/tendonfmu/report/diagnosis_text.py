@@ -7,12 +7,20 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from tendonfmu.diagnose.reported_causes import CONTACT, TITLES, reported_causes
-from tendonfmu.diagnose.result import Cause, Diagnosis, FoundPlace, Invisible, Where
-from tendonfmu.diagnose.size import quantity
+from tendonfmu.diagnose import (
+    CONTACT,
+    TITLES,
+    Cause,
+    Diagnosis,
+    FoundPlace,
+    Invisible,
+    Where,
+    quantity,
+    reported_causes,
+)
 from tendonfmu.report.diagnosis_words import words_of
 from tendonfmu.report.fit_summary import rounded
-from tendonfmu.statistics.interval import Interval
+from tendonfmu.statistics import Interval
 
 NBSP = "\u00a0"
 _NUMBERS = ("No", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine", "Ten")
@@ -61,7 +69,7 @@ _KINDS = ("joints", "tendons")
 
 def title_of(effect: str) -> str:
     """A few plain words for an effect of docs/diagnose.md."""
-    from tendonfmu.diagnose.effects import CANDIDATES
+    from tendonfmu.diagnose import CANDIDATES
 
     titles = {candidate.name: candidate.title for candidate in CANDIDATES} | TITLES
     return titles.get(effect, effect.replace("_", " "))

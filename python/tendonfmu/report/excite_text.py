@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import groupby
 
-from tendonfmu.estimate.coverage import EffectCoverage
-from tendonfmu.estimate.identifiability import CAUSES, LIMIT, Verdict, causes, counts_by_kind
-from tendonfmu.excite.training_motion import ExciteResult
+from tendonfmu.estimate import EffectCoverage, Verdict, counts_by_kind, identifiability
+from tendonfmu.excite import ExciteResult
 
 Row = tuple[str, ...]
 KEYS = ("static", "coulomb", "stribeck_velocity", "viscous")
@@ -37,7 +36,7 @@ def tables(result: ExciteResult) -> Iterator[tuple[str, Row, list[Row]]]:
         [_effect_row(cover, result.judgement.verdicts) for cover in result.effects],
     )
     yield (
-        f"numbers with a standard error of at most {LIMIT:.0%}",
+        f"numbers with a standard error of at most {identifiability.LIMIT:.0%}",
         ("kind", "numbers", "identified", "if all else were known"),
         [
             (f"{kind}.{key}", *map(str, counts))
@@ -95,10 +94,10 @@ def lines(result: ExciteResult) -> Iterator[str]:
         f"{known} of {len(verdicts)} numbers can be identified one by one, "
         f"{judgement.directions} independent combinations of them; each joint's bias is tracked besides"
     )
-    for cause, count in causes(verdicts).items():
-        yield f"  {count} not: {CAUSES[cause]}"
+    for cause, count in identifiability.causes(verdicts).items():
+        yield f"  {count} not: {identifiability.CAUSES[cause]}"
     tendons, joints = len(result.subject.finger.tendon_names), len(result.ranges)
-    if result.plan.vary is None and "combination" in causes(verdicts) and tendons > joints + 1:
+    if result.plan.vary is None and "combination" in identifiability.causes(verdicts) and tendons > joints + 1:
         yield "  --vary-tension LOW:HIGH loads the tendons in turn and tells more of those combinations apart"
     yield (
         f"assumed: white noise of {noise.std:g} N·m + {noise.per_force:g} N·m per N in each {1e3 * noise.time:g} ms, "

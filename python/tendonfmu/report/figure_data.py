@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.detect.counting import score_detection
-from tendonfmu.model.description import FingerDescription
+from tendonfmu.detect import score_detection
+from tendonfmu.model import FingerDescription
 
 Array = NDArray[Any]
 Interval = tuple[float, float]

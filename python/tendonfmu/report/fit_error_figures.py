@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.drawing.sheet import Dots, MatrixPanel, Panel, Sheet
-from tendonfmu.estimate.identifiability import LIMIT
-from tendonfmu.estimate.picture import FitPicture
+from tendonfmu.drawing import Dots, MatrixPanel, Panel, Sheet
+from tendonfmu.estimate import FitPicture, identifiability
 
 Numbers = NDArray[np.float64]
 
@@ -88,7 +87,7 @@ def error_sheet(picture: FitPicture) -> Sheet:
         x_limits=_SHOWN,
         ticks=_TICKS,
         rows=names,
-        line=LIMIT,
+        line=identifiability.LIMIT,
         height=90 + 24 * len(names),
     )
     return Sheet(
@@ -96,7 +95,7 @@ def error_sheet(picture: FitPicture) -> Sheet:
         name="standard_errors",
         title="How well each number is known",
         caption="Behind each kind: how many of its numbers are identified. The line is at "
-        f"{100 * LIMIT:.0f} % of the value; what lies beyond the axis is drawn at its end.",
+        f"{100 * identifiability.LIMIT:.0f} % of the value; what lies beyond the axis is drawn at its end.",
         keys=(("identified", "identified"), ("unidentified", "not identified")),
         panels=(panel,),
     )

@@ -11,8 +11,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.drawing.sheet import Band, Curve, Interval, Panel, Sheet
-from tendonfmu.estimate.picture import FitPicture, FitSeries
+from tendonfmu.drawing import Band, Curve, Interval, Panel, Sheet
+from tendonfmu.estimate import FitPicture, FitSeries
 from tendonfmu.report.figure_data import intervals
 from tendonfmu.report.fit_error_figures import correlation_sheet, error_sheet
 from tendonfmu.report.fit_law_figures import law_sheets

@@ -7,10 +7,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.drawing.sheet import Band, Curve, Panel, Sheet
-from tendonfmu.estimate.laws import LawBands, LawCurve, asymmetric, numbers_of
-from tendonfmu.estimate.picture import FitPicture
-from tendonfmu.model.friction_places import Effect, effects, sliding_velocity, velocity_threshold
+from tendonfmu.drawing import Band, Curve, Panel, Sheet
+from tendonfmu.estimate import FitPicture, LawBands, LawCurve, asymmetric, numbers_of
+from tendonfmu.model import Effect, effects, sliding_velocity, velocity_threshold
 
 Numbers = NDArray[np.float64]
 

@@ -11,11 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tendonfmu.drawing.panel_styles import STYLES, size_of
-from tendonfmu.drawing.sheet import MatrixPanel, Sheet
+from tendonfmu.drawing import STYLES, MatrixPanel, Sheet, size_of
 from tendonfmu.errors import InputError
-from tendonfmu.estimate.picture import FitPicture
-from tendonfmu.files.whole_file import whole_file
+from tendonfmu.estimate import FitPicture
+from tendonfmu.files import whole_file
 from tendonfmu.report.fit_error_figures import strongest_pairs
 from tendonfmu.report.fit_figures import fit_sheets
 from tendonfmu.report.fit_summary import Summary, rounded, summarise
@@ -67,7 +66,7 @@ def write_fit_page(picture: FitPicture, folder: Path) -> dict[Path, str]:
 
 def draw_sheet(sheet: Sheet, file: Path | None = None) -> PageFigure:
     """Its panels as the page shows them; with a file, the sheet is written there as PNG too."""
-    from tendonfmu.drawing.panels import draw_panel, png, write_sheet
+    from tendonfmu.drawing import draw_panel, png, write_sheet
 
     pixels = [draw_panel(panel) for panel in sheet.panels]
     if file is not None:

@@ -10,15 +10,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from tendonfmu.estimate.identifiability import LIMIT
-from tendonfmu.estimate.picture import FitPicture
-from tendonfmu.estimate.verdicts import CAUSES
+from tendonfmu.estimate import FitPicture, identifiability, verdicts
 
 _METHODS = {
     "batch": "Maximum likelihood over all samples at once (batch)",
     "ekf": "The extended Kalman filter of the paper (ekf), sample by sample",
 }
-_LIMIT = f"{100 * LIMIT:.0f}\u00a0%"
+_LIMIT = f"{100 * identifiability.LIMIT:.0f}\u00a0%"
 _COMPARED = "Not trained on: "
 _GROUP = re.compile(r"(joints|tendons)\[(\d+)\]\.?(.*)")
 
@@ -353,7 +351,7 @@ def _doubts(report: Mapping[str, Any]) -> list[Doubt]:
         if not entry["identified"]:
             by_reason.setdefault(entry.get("reason") or "unknown", []).append(entry)
     ordered = sorted(by_reason.items(), key=lambda item: -len(item[1]))
-    return [Doubt(CAUSES.get(reason, reason), numbers) for reason, numbers in ordered]
+    return [Doubt(verdicts.CAUSES.get(reason, reason), numbers) for reason, numbers in ordered]
 
 
 def _groups(picture: FitPicture) -> list[NumberGroup]:

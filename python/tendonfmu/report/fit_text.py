@@ -6,8 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from tendonfmu.estimate.fitting import FrictionFit
-from tendonfmu.estimate.verdicts import CAUSES, Fitted
+from tendonfmu.estimate import Fitted, FrictionFit, verdicts
 
 Row = tuple[str, ...]
 EXAMPLES = 3  # paths named for each reason
@@ -93,7 +92,7 @@ def lines(fit: FrictionFit) -> Iterator[str]:
     if report["uncertainty"]:
         yield _uncertainty(report["uncertainty"])
     for cause, count in Counter(number.cause for number in numbers if number.cause).most_common():
-        yield f"  {count} not identified: {CAUSES[cause]}"
+        yield f"  {count} not identified: {verdicts.CAUSES[cause]}"
         several = [number for number in numbers if number.cause == cause]
         for number in several[:EXAMPLES]:
             yield f"    {number.number.path}: {number.advice}"

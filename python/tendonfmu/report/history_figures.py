@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tendonfmu.diagnose.changes.history import History, Line
-from tendonfmu.diagnose.size import NBSP
-from tendonfmu.drawing.sheet import Bars, Curve, Dots, Panel, Sheet
+from tendonfmu.diagnose import NBSP, History, Line
+from tendonfmu.drawing import Bars, Curve, Dots, Panel, Sheet
 from tendonfmu.report.diagnosis_text import Names, at_place
 from tendonfmu.report.history_text import headline, trend_sentence
 

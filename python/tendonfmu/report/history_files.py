@@ -6,11 +6,9 @@ import csv
 from collections.abc import Iterator
 from pathlib import Path
 
-from tendonfmu.diagnose.changes.history import History
-from tendonfmu.drawing.panels import draw_panel, write_sheet
-from tendonfmu.drawing.sheet import Panel, Sheet
-from tendonfmu.drawing.svg import panel_svg
-from tendonfmu.files.whole_file import whole_file
+from tendonfmu.diagnose import History
+from tendonfmu.drawing import Panel, Sheet, draw_panel, panel_svg, write_sheet
+from tendonfmu.files import whole_file
 from tendonfmu.report.diagnosis_text import Names
 from tendonfmu.report.fit_page import keys_of, render
 from tendonfmu.report.history_figures import history_sheet

@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from tendonfmu.diagnose.changes.history import History, Line, share_of
-from tendonfmu.diagnose.size import count_of, quantity
+from tendonfmu.diagnose import History, Line, count_of, quantity, share_of
 from tendonfmu.report.diagnosis_text import Names, at_place, percent
 
 

@@ -12,11 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.model.native import Finger
+from tendonfmu.model import Finger
 from tendonfmu.report.figure_data import Interval, intervals
-from tendonfmu.simulate.plant import Array, Plant
-from tendonfmu.simulate.rig import Rig
-from tendonfmu.simulate.simulation import simulate
+from tendonfmu.simulate import Array, Plant, Rig, simulate
 
 Signals = Mapping[str, Array]
 WAYS = tuple[tuple[float, float], ...]

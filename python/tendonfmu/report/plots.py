@@ -7,10 +7,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyBboxPatch, Patch
 
-from tendonfmu.drawing.finger_picture import EDGE_RED
-from tendonfmu.drawing.plot_style import (
+from tendonfmu.drawing import (
     BLUE,
     DARK,
+    EDGE_RED,
     GREEN,
     GREY,
     LIGHT,
@@ -23,7 +23,7 @@ from tendonfmu.drawing.plot_style import (
     clean,
     save,
 )
-from tendonfmu.model.routing_geometry import Points
+from tendonfmu.model import Points
 from tendonfmu.report.figure_data import CompensationFigure, JointCurves, ReferenceCurves, ReferenceFigure, StoryFigure
 from tendonfmu.report.plant_figures import LoopFigure, PreslidingFigure, TruthFigure
 from tendonfmu.report.rig_drawing import DrawnBody, DrawnRoute, RigDrawing, View

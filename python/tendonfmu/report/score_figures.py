@@ -11,12 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.detect.counting import GRACE, DetectionScore, Event
-from tendonfmu.detect.run import Track
-from tendonfmu.detect.score_report import Scored
-from tendonfmu.detect.summary import RocPoint
+from tendonfmu.detect import GRACE, DetectionScore, Event, RocPoint, Scored, Track
 from tendonfmu.report.figure_data import Interval, intervals
-from tendonfmu.statistics.intervals import share
+from tendonfmu.statistics import intervals as statistics_intervals
 
 Numbers = NDArray[np.float64]
 
@@ -269,7 +266,7 @@ def delay_figure(scored: Scored) -> DelayFigure:
     end = float(delays[-1])
     if end > TAIL * known["ninety_percent"].value > 0:
         end = TAIL * known["ninety_percent"].value
-    within = [share(k, total) for k in range(1, len(delays) + 1)]
+    within = [statistics_intervals.share(k, total) for k in range(1, len(delays) + 1)]
     return DelayFigure(
         title=f"{scored.subject.finger.name}: {len(delays)} of {total} events found",
         delays=delays,

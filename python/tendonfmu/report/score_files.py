@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tendonfmu.detect.score_report import Scored
+from tendonfmu.detect import Scored
 from tendonfmu.errors import InputError
 from tendonfmu.report.score_figures import contact_figure, delay_figure, event_figure, roc_figure
 from tendonfmu.report.score_plots import draw_contacts, draw_delays, draw_events, draw_roc

@@ -13,20 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, MaxNLocator, NullLocator, PercentFormatter
 
-from tendonfmu.drawing.plot_style import (
-    BLUE,
-    DARK,
-    GREEN,
-    GREY,
-    LIGHT,
-    ORANGE,
-    PURPLE,
-    SKY,
-    VERMILION,
-    Target,
-    clean,
-    save,
-)
+from tendonfmu.drawing import BLUE, DARK, GREEN, GREY, LIGHT, ORANGE, PURPLE, SKY, VERMILION, Target, clean, save
 from tendonfmu.report.figure_data import Interval
 from tendonfmu.report.score_figures import ContactFigure, DelayFigure, EventFigure, RocFigure
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from tendonfmu.detect.score_report import Scored
-from tendonfmu.detect.summary import Summary
-from tendonfmu.statistics.intervals import Estimate
+from tendonfmu.detect import Scored, Summary
+from tendonfmu.statistics import Estimate
 
 Row = tuple[str, ...]
 SHOWN = (0.5, 1.0, 2.0)  # factors of the ROC that are told

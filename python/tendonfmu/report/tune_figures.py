@@ -9,11 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.detect.alarm_level import rate_limit
-from tendonfmu.detect.bounds import tail_levels
-from tendonfmu.detect.free_motion import FreeRun
-from tendonfmu.detect.tuning import ContactTuning
-from tendonfmu.statistics.intervals import rate
+from tendonfmu.detect import ContactTuning, FreeRun, rate_limit, tail_levels
+from tendonfmu.statistics import intervals
 
 Numbers = NDArray[np.float64]
 
@@ -85,7 +82,7 @@ class WorstFigure:
 
 def tail_figure(tuning: ContactTuning) -> TailFigure:
     found = tuning.tail(_FACTORS)
-    rates = [rate(held, tuning.hours_) for _, _, held in found]
+    rates = [intervals.rate(held, tuning.hours_) for _, _, held in found]
     return TailFigure(
         title=f"{tuning.description_.name}: {60 * tuning.hours_:.0f} min of free motion, {tuning.method}",
         factors=_FACTORS,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tendonfmu.detect.tuning import ContactTuning
+from tendonfmu.detect import ContactTuning
 from tendonfmu.errors import InputError
 from tendonfmu.report.tune_figures import bound_figure, tail_figure, worst_figure
 from tendonfmu.report.tune_plots import draw_bounds, draw_tail, draw_worst

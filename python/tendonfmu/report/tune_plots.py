@@ -5,7 +5,7 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
 
-from tendonfmu.drawing.plot_style import BLUE, DARK, GREEN, GREY, LIGHT, ORANGE, VERMILION, Target, clean, save
+from tendonfmu.drawing import BLUE, DARK, GREEN, GREY, LIGHT, ORANGE, VERMILION, Target, clean, save
 from tendonfmu.report.tune_figures import BoundFigure, TailFigure, WorstFigure
 
 _TITLE, _LABEL, _LEGEND = 14.0, 12.5, 11.5  # pt

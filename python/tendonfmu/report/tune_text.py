@@ -6,8 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tendonfmu.detect.alarm_level import rate_limit
-from tendonfmu.detect.tuning import ContactTuning
+from tendonfmu.detect import ContactTuning, rate_limit
 
 Row = tuple[str, ...]
 

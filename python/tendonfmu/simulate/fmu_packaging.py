@@ -10,11 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from tendonfmu.errors import InputError
-from tendonfmu.files.whole_file import whole_file
-from tendonfmu.fmu.model_variables import read_table
-from tendonfmu.fmu.packaging import find_binaries, guid, model_description, model_identifier, pack, package_file
-from tendonfmu.model import native
-from tendonfmu.model.description import count
+from tendonfmu.files import whole_file
+from tendonfmu.fmu import find_binaries, guid, model_description, model_identifier, pack, package_file, read_table
+from tendonfmu.model import count, native
 from tendonfmu.simulate.fmu_variables import describe_plant
 from tendonfmu.simulate.plant import Plant, Settings, refused_by
 from tendonfmu.simulate.rig import Rig, read_rig
@@ -38,9 +36,9 @@ def build_plant_fmu(rig_path: Path, output_path: Path, *, binaries: Path | None 
 
 def plant_members(rig: Rig, *, binaries: Path | None = None) -> dict[str, bytes]:
     """Path in the archive to content, for all files of the FMU. Raises InputError where the plant refuses the rig."""
-    from tendonfmu.drawing.finger_picture import draw_finger
-    from tendonfmu.fmu.documentation import render_documentation
-    from tendonfmu.model.routing_geometry import finger_drawing
+    from tendonfmu.drawing import draw_finger
+    from tendonfmu.fmu import render_documentation
+    from tendonfmu.model import finger_drawing
 
     text = rig.json().encode()
     table = read_table(package_file("model_description/plant_variables.json").read_text(encoding="utf-8"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from tendonfmu.fmu.model_variables import NOT_IN_XML, VariableTable, counted, elements, group_sizes, units_of
+from tendonfmu.fmu import NOT_IN_XML, VariableTable, counted, elements, group_sizes, units_of
 from tendonfmu.simulate.plant import INTEGRATORS, Settings
 from tendonfmu.simulate.rig import Rig
 

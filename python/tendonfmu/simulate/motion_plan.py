@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.files.json_node import Node
-from tendonfmu.files.tables import Table, read_table
-from tendonfmu.statistics.random_numbers import LARGEST_SEED, Draws
+from tendonfmu.files import Node, Table, read_table
+from tendonfmu.statistics import LARGEST_SEED, Draws
 
 Array = NDArray[np.float64]
 

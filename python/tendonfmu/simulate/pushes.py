@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from tendonfmu.files.json_node import Node
-from tendonfmu.statistics.random_numbers import LARGEST_SEED, Draws
+from tendonfmu.files import Node
+from tendonfmu.statistics import LARGEST_SEED, Draws
 
 Vector = Sequence[float]
 

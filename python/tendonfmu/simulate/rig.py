@@ -19,12 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.files.json_node import Node, Refusal, read_json
-from tendonfmu.model import native
-from tendonfmu.model.description import FingerDescription, read_finger
+from tendonfmu.files import Node, Refusal, read_json
+from tendonfmu.model import FingerDescription, native, read_finger
 from tendonfmu.simulate.motion_plan import Joints, Motion, expand_motion
 from tendonfmu.simulate.pushes import Segment, expand_pushes
-from tendonfmu.statistics.random_numbers import LARGEST_SEED
+from tendonfmu.statistics import LARGEST_SEED
 
 FORMAT = "tendonfmu-rig-1"
 WHAT = "a rig"

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from tendonfmu.model.description import count
+from tendonfmu.model import count
 from tendonfmu.simulate.plant import Plant
 from tendonfmu.simulate.rig import Rig, read_rig
 from tendonfmu.simulate.simulation import plant_of

@@ -12,10 +12,9 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from tendonfmu.files.whole_file import check_output, whole_file
-from tendonfmu.fmu.model_variables import NOT_IN_XML
-from tendonfmu.fmu.packaging import members, pack
-from tendonfmu.model.signals import INPUTS
+from tendonfmu.files import check_output, whole_file
+from tendonfmu.fmu import NOT_IN_XML, members, pack
+from tendonfmu.model import INPUTS
 from tendonfmu.simulate.fmu_packaging import plant_members
 from tendonfmu.simulate.plant import refused_by
 from tendonfmu.simulate.rig import Rig, read_rig

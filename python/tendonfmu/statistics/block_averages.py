@@ -18,7 +18,7 @@ NO_BLOCK = -1
 
 
 @dataclass(frozen=True)
-class Blocks:
+class SampleBlocks:
     """Which samples each block averages.
 
     of: for each recording [N] the number of each sample's block, from 0 over all recordings; −1: in none. The samples
@@ -36,7 +36,7 @@ class Blocks:
         return total
 
 
-def regular_blocks(times: Sequence[Numbers], parts: Sequence[Sequence[slice]], length: float) -> Blocks:
+def regular_blocks(times: Sequence[Numbers], parts: Sequence[Sequence[slice]], length: float) -> SampleBlocks:
     """Blocks of the same length.
 
     times: of each recording, [N] s. parts: its stretches without a gap; blocks count from the start of each. length: s.
@@ -54,7 +54,7 @@ def regular_blocks(times: Sequence[Numbers], parts: Sequence[Sequence[slice]], l
             block[part] = count + new
             count += int(new[-1]) + 1
         found.append(block)
-    return Blocks(tuple(found), count)
+    return SampleBlocks(tuple(found), count)
 
 
 class BlockSums:

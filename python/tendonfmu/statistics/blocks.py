@@ -11,7 +11,7 @@ Numbers = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Blocks:
+class BlockSeries:
     """Recordings one after another, block means; B blocks of n series each.
 
     time: [B] s, centre. recording: [B] from 0; segment: [B] stretch without a gap, from 0. target: [B, n] what is to be

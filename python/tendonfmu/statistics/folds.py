@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.statistics.blocks import Blocks
+from tendonfmu.statistics.blocks import BlockSeries
 
 Indices = NDArray[np.int64]
 
@@ -35,7 +35,7 @@ class Folds:
         return self.stretches >= FEWEST_STRETCHES
 
 
-def make_folds(series: Blocks) -> Folds:
+def make_folds(series: BlockSeries) -> Folds:
     """Stretches of about 2 s that no gap cuts, side by side in up to 8 folds of equally many."""
     rows = np.flatnonzero(series.used)
     length = max(1, round(STRETCH / series.step))

@@ -18,7 +18,7 @@ from scipy.stats import gamma
 from tendonfmu.statistics.whitening import Whitener
 
 if TYPE_CHECKING:
-    from tendonfmu.statistics.blocks import Blocks
+    from tendonfmu.statistics.blocks import BlockSeries
 
 Numbers = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ class Line:
 
 
 def find_lines(
-    series: Blocks, residual: Numbers, filters: Whitener, *, level: float
+    series: BlockSeries, residual: Numbers, filters: Whitener, *, level: float
 ) -> tuple[tuple[Line, ...], Numbers]:
     """Lines in the residual [B] of a joint with p-values up to the level, and their sum [B]; 0 in unused blocks.
 
@@ -61,7 +61,7 @@ def find_lines(
     return tuple(lines), total
 
 
-def _strongest(series: Blocks, flat: Numbers, used: NDArray[np.bool_]) -> tuple[float, float] | None:
+def _strongest(series: BlockSeries, flat: Numbers, used: NDArray[np.bool_]) -> tuple[float, float] | None:
     """Frequency, Hz, and family-wise p-value of the highest point of the periodogram over its background."""
     recordings = np.unique(series.recording)
     places = [np.flatnonzero(series.recording == each) for each in recordings]
@@ -98,7 +98,7 @@ def _background(power: Numbers) -> Numbers:
     return np.asarray(np.maximum(np.maximum(left, right), 1e-300))
 
 
-def _fitted(series: Blocks, left: Numbers, used: NDArray[np.bool_], near: float) -> tuple[Numbers, float]:
+def _fitted(series: BlockSeries, left: Numbers, used: NDArray[np.bool_], near: float) -> tuple[Numbers, float]:
     """Least-squares wave of each recording at the frequency, and the greatest amplitude."""
     wave, amplitude = np.zeros(len(left)), 0.0
     for each in np.unique(series.recording):

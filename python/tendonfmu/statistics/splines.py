@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.interpolate import BSpline
 
-from tendonfmu.statistics.blocks import Blocks
+from tendonfmu.statistics.blocks import BlockSeries
 
 Numbers = NDArray[np.float64]
 Array = NDArray[Any]
@@ -24,7 +24,7 @@ _LOST = 1e-9  # of a column's square, below which the projection left rounding o
 _RANK = 1e-10  # of the largest power, columns scaled to length 1 before: derivatives are exact, rounding is far below
 
 
-def bias_splines(series: Blocks, knots: float = KNOTS) -> Splines:
+def bias_splines(series: BlockSeries, knots: float = KNOTS) -> Splines:
     """[B, s] cubic B-splines in time, of each stretch without a gap its own, knots about `knots` s apart."""
     blocks = []
     for number in np.unique(series.segment):
@@ -39,7 +39,7 @@ def bias_splines(series: Blocks, knots: float = KNOTS) -> Splines:
     return sparse.csr_array(sparse.block_diag(blocks, format="csr"))
 
 
-def constant_bias(series: Blocks) -> Splines:
+def constant_bias(series: BlockSeries) -> Splines:
     """[B, s] a constant for every stretch without a gap."""
     return sparse.csr_array((series.segment[:, None] == np.unique(series.segment)).astype(np.float64))
 
@@ -85,7 +85,7 @@ def without(columns: Array, span: Numbers) -> Array:
     return np.asarray(columns - own @ (own.T @ columns))
 
 
-def residual_of(series: Blocks, splines: Splines, nominal: Array) -> Numbers:
+def residual_of(series: BlockSeries, splines: Splines, nominal: Array) -> Numbers:
     """[B, n] N·m: target less bias and all that `nominal` [B, n, u] explains by least squares; unused rows as found."""
     used = series.used
     span = Span(splines[used])

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.statistics.blocks import Blocks
+from tendonfmu.statistics.blocks import BlockSeries
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -58,7 +58,7 @@ def _mean(before: Numbers, first: int, last: int) -> Numbers:
     return np.asarray((before[last - first + 1 : rows - first + 1] - before[: rows - last]) / (last - first + 1))
 
 
-def valid_rows(series: Blocks, reach: int) -> Flags:
+def valid_rows(series: BlockSeries, reach: int) -> Flags:
     """[B] used rows with `reach` used ones before them in the same stretch without a gap."""
     run = np.ones(len(series.time), dtype=bool)
     run[1:] = series.used[1:] & series.used[:-1] & (series.segment[1:] == series.segment[:-1])
@@ -67,7 +67,7 @@ def valid_rows(series: Blocks, reach: int) -> Flags:
     return np.asarray(series.used & (np.arange(len(run)) - last_break >= reach))
 
 
-def whitener(series: Blocks, residual: Numbers) -> Whitener:
+def whitener(series: BlockSeries, residual: Numbers) -> Whitener:
     """residual: [B, n] N·m, model and bias taken off. All joints look back as far as the one that needs most."""
     most = _most_windows(series)
     valid = valid_rows(series, _reach(most))
@@ -87,7 +87,7 @@ def _reach(windows: int) -> int:
     return WINDOWS[windows - 1][1] if windows else 0
 
 
-def _most_windows(series: Blocks) -> int:
+def _most_windows(series: BlockSeries) -> int:
     """So many that nine of ten used rows stay, and that each has rows enough."""
     used = int(series.used.sum())
     for count in range(len(WINDOWS), 0, -1):

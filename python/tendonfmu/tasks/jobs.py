@@ -25,7 +25,7 @@ import numpy as np
 
 import tendonfmu
 from tendonfmu.errors import InputError
-from tendonfmu.files.whole_file import check_output_folder, whole_file
+from tendonfmu.files import check_output_folder, whole_file
 
 ROWS = "rows"
 SECONDS_TO_CONNECT = 20.0

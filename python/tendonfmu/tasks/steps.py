@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from tendonfmu.files.whole_file import write_text
+from tendonfmu.files import write_text
 
 FOLDER = ".steps"
 FORMAT = "tendonfmu-calibration-step-1"

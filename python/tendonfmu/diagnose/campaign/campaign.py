@@ -19,8 +19,8 @@ from tendonfmu.diagnose.campaign.cases import Case, made, python_function
 from tendonfmu.diagnose.campaign.judging import judge, judge_names
 from tendonfmu.diagnose.result import Diagnosis
 from tendonfmu.errors import InputError
-from tendonfmu.files.whole_file import whole_file
-from tendonfmu.tasks.jobs import ROWS, Job, Row, rows_of, run_jobs, waiting_jobs
+from tendonfmu.files import whole_file
+from tendonfmu.tasks import ROWS, Job, Row, rows_of, run_jobs, waiting_jobs
 
 TABLE = "campaign.parquet"
 
@@ -103,9 +103,8 @@ def _diagnosis(case: Case, recordings: Sequence[Path], how: How) -> Diagnosis:
 def true_gain(nominal: Mapping[str, Any], extended: Mapping[str, Any], case: Case) -> float:
     """1 − rms of the extended over that of the nominal model, over all joints of the case's gain recordings."""
     from tendonfmu.diagnose.gain import residual_of
-    from tendonfmu.model.description import read_finger
-    from tendonfmu.recordings.prepared import Held, prepare
-    from tendonfmu.recordings.recording import read_recording
+    from tendonfmu.model import read_finger
+    from tendonfmu.recordings import Held, prepare, read_recording
 
     assert case.finger is not None
     finger = read_finger(case.finger)

@@ -25,7 +25,7 @@ from types import ModuleType
 from typing import Any
 
 from tendonfmu.errors import InputError
-from tendonfmu.files.json_node import Node, Refusal, read_json
+from tendonfmu.files import Node, Refusal, read_json
 
 FORMAT = "tendonfmu-campaign-1"
 GROUPS = ("null", "single", "double", "absorbed", "unknown", "contact")

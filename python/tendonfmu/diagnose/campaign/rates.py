@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from tendonfmu.statistics.intervals import share
+from tendonfmu.statistics import intervals
 
 Row = Mapping[str, Any]
 STRENGTHS = (0.03, 0.1, 0.3, 1.0)
@@ -48,7 +48,7 @@ HEADINGS = ("rate", "goal", "found", "cases", "95 % interval")
 def rate(what: str, goal: str, rows: Iterable[Row], holds: Callable[[Row], Any]) -> Rate:
     """Share of the rows for which it holds; rows where the question does not arise (None) are left out."""
     answers = [bool(answer) for answer in (holds(row) for row in rows) if answer is not None]
-    found = share(sum(answers), len(answers))
+    found = intervals.share(sum(answers), len(answers))
     return Rate(what, goal, sum(answers), len(answers), found.value, found.low, found.high)
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tendonfmu.diagnose.candidate_columns import CandidateColumns
 from tendonfmu.diagnose.remainder_features import Features, features
 from tendonfmu.diagnose.series import Series
-from tendonfmu.model.balance import moment_arms
+from tendonfmu.model import moment_arms
 
 Numbers = NDArray[np.float64]
 Array = NDArray[Any]

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.model.description import FingerDescription
-from tendonfmu.recordings.prepared import FitRecording
+from tendonfmu.model import FingerDescription
+from tendonfmu.recordings import FitRecording
 
 Numbers = NDArray[np.float64]
 

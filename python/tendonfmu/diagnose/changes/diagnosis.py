@@ -43,11 +43,11 @@ from tendonfmu.diagnose.result import (
 from tendonfmu.diagnose.search import SIGNIFICANCE, events_of, without_events
 from tendonfmu.diagnose.series import Series, make_grid
 from tendonfmu.diagnose.signal_choice import Estimation, choose, estimation_recordings
-from tendonfmu.estimate.structure import Choice
-from tendonfmu.model.description import FingerDescription
-from tendonfmu.recordings.prepared import FitRecording
-from tendonfmu.statistics.interval import Interval
-from tendonfmu.tasks.phases import Phases
+from tendonfmu.estimate import Choice
+from tendonfmu.model import FingerDescription
+from tendonfmu.recordings import FitRecording
+from tendonfmu.statistics import Interval
+from tendonfmu.tasks import Phases
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from tendonfmu.statistics.interval import Interval
+from tendonfmu.statistics import Interval
 
 Numbers = NDArray[np.float64]
 

@@ -26,9 +26,9 @@ from tendonfmu.diagnose.changes.trend import slope
 from tendonfmu.diagnose.diagnosis import LEAST_GAIN, change_case, diagnose
 from tendonfmu.diagnose.result import ChangedSize, Where
 from tendonfmu.errors import InputError
-from tendonfmu.model.description import FingerDescription, read_finger
-from tendonfmu.statistics.interval import Interval
-from tendonfmu.tasks.jobs import Job, rows_of, run_jobs
+from tendonfmu.model import FingerDescription, read_finger
+from tendonfmu.statistics import Interval
+from tendonfmu.tasks import Job, rows_of, run_jobs
 
 Numbers = NDArray[np.float64]
 File = str | os.PathLike[str]

@@ -10,9 +10,7 @@ from scipy import stats
 
 from tendonfmu.diagnose.result import ChangedSize, SteadyLoad
 from tendonfmu.diagnose.series import Series
-from tendonfmu.statistics.folds import make_folds
-from tendonfmu.statistics.gain_interval import gain_interval
-from tendonfmu.statistics.interval import Interval
+from tendonfmu.statistics import Interval, gain_interval, make_folds
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.diagnose.effects import Place
 from tendonfmu.diagnose.hypotheses import EVERYWHERE, HERE, SHARED, SOMEWHERE, Hypothesis
-from tendonfmu.estimate.estimation import Estimator, Unknown
-from tendonfmu.estimate.structure import own_copy, set_number
+from tendonfmu.estimate import Estimator, Unknown, own_copy, set_number
 from tendonfmu.model import native
 
 Numbers = NDArray[np.float64]

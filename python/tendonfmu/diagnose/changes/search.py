@@ -27,11 +27,10 @@ from tendonfmu.diagnose.hypotheses import Hypothesis, Key, hypotheses
 from tendonfmu.diagnose.least_sizes import LeastSizes
 from tendonfmu.diagnose.search import SIGNIFICANCE, accepted_of
 from tendonfmu.diagnose.series import Grid, Series, block_prediction, exact_model
-from tendonfmu.model.balance import moment_arms
-from tendonfmu.recordings.prepared import FitRecording
-from tendonfmu.statistics.block_grams import Grams, Products
-from tendonfmu.statistics.folds import Folds, make_folds
-from tendonfmu.tasks.phases import Step
+from tendonfmu.model import moment_arms
+from tendonfmu.recordings import FitRecording
+from tendonfmu.statistics import Folds, Grams, Products, make_folds
+from tendonfmu.tasks import Step
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -18,7 +18,7 @@ from tendonfmu.diagnose.extension_fit import added_paths
 from tendonfmu.diagnose.result import ChangedSize, FoundPlace
 from tendonfmu.diagnose.size import NBSP, quantity, size_of
 from tendonfmu.model import native
-from tendonfmu.statistics.interval import Interval
+from tendonfmu.statistics import Interval
 
 Numbers = NDArray[np.float64]
 Data = Mapping[str, Any]

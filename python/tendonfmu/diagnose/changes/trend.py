@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from tendonfmu.diagnose.changes.search import Change, ChangeSearch
 from tendonfmu.diagnose.result import ChangedSize
-from tendonfmu.recordings.prepared import FitRecording
-from tendonfmu.statistics.interval import Interval
+from tendonfmu.recordings import FitRecording
+from tendonfmu.statistics import Interval
 
 Numbers = NDArray[np.float64]
 

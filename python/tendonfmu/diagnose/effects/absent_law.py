@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 from tendonfmu.diagnose.effects.candidate import Column, Data, Variant
 from tendonfmu.diagnose.effects.description_edit import ABSENT, Edit, magnitudes_of
-from tendonfmu.estimate.structure import get_number
-from tendonfmu.model.friction_places import DEFAULT_THRESHOLD
+from tendonfmu.estimate import get_number
+from tendonfmu.model import DEFAULT_THRESHOLD
 
 # ordinary Coulomb friction: share of the tendon force, N·m in a joint, N·m per N of load
 _ORDINARY = {"edge_friction": 0.02, "pulley_friction": 0.02, "friction": 0.005, "load_friction": 1e-4}

@@ -8,7 +8,7 @@ from tendonfmu.diagnose.effects.candidate import Candidate, Column, Data, Place,
 from tendonfmu.diagnose.effects.description_edit import SIDES, Edit, apply_edits, law_columns, magnitudes_of, sides_at
 from tendonfmu.diagnose.effects.friction_law_places import is_asymmetric, kind_shape, law_path, laws_at, places_with
 from tendonfmu.diagnose.span import Span
-from tendonfmu.model.friction_places import Effect
+from tendonfmu.model import Effect
 
 _EXPECTED = 0.2  # of the friction, from one direction to the other
 

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from tendonfmu.estimate.structure import MAGNITUDES, get_number, own_copy, set_number
+from tendonfmu.estimate import MAGNITUDES, get_number, own_copy, set_number
 
 Data = Mapping[str, Any]
 

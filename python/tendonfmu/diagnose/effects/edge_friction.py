@@ -11,7 +11,7 @@ from tendonfmu.diagnose.effects.candidate import Candidate, Column, Data, Place,
 from tendonfmu.diagnose.effects.description_edit import POINTS, Edit, apply_edits
 from tendonfmu.diagnose.effects.friction_law_places import law_path, passes
 from tendonfmu.diagnose.span import Span
-from tendonfmu.model.friction_places import effects
+from tendonfmu.model import effects
 
 _NARROW = 0.02  # rad; less motion of the joint before says nothing of an angle's influence
 _FARTHEST = 1e5  # rad; no joint turns as far

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from tendonfmu.diagnose.effects.candidate import Column, Data, Place, Variant
 from tendonfmu.diagnose.effects.friction_law_places import next_row, row
-from tendonfmu.model.extensions import MAGNITUDES
+from tendonfmu.model import MAGNITUDES
 
 
 def row_variant(

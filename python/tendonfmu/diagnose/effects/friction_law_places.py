@@ -9,8 +9,7 @@ import numpy as np
 
 from tendonfmu.diagnose.effects.candidate import Place
 from tendonfmu.diagnose.effects.description_edit import magnitudes_of, sides_at
-from tendonfmu.model.balance import moment_arms
-from tendonfmu.model.friction_places import DEFAULT_THRESHOLD, Effect, effects
+from tendonfmu.model import DEFAULT_THRESHOLD, Effect, effects, moment_arms
 
 Data = Mapping[str, Any]
 KINDS = ("friction", "load_friction", "edge_friction", "pulley_friction")

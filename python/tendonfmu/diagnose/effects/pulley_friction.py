@@ -8,7 +8,7 @@ from itertools import pairwise
 from tendonfmu.diagnose.effects.absent_law import absent_law
 from tendonfmu.diagnose.effects.candidate import Candidate, Data, Place, Variant, no_shape
 from tendonfmu.diagnose.effects.friction_law_places import law_path, passes
-from tendonfmu.model.friction_places import effects
+from tendonfmu.model import effects
 
 _PULLEY = {"pulley": 1.0}
 

@@ -20,7 +20,7 @@ from tendonfmu.diagnose.effects.friction_law_places import (
     row_places,
 )
 from tendonfmu.diagnose.span import Span
-from tendonfmu.model.friction_places import Effect, velocity_threshold
+from tendonfmu.model import Effect, velocity_threshold
 
 NAME = "stribeck"
 _OF_SPEED = (0.03, 0.1, 0.3)  # Stribeck velocities, of the 95 % speed

@@ -9,7 +9,7 @@ from tendonfmu.diagnose.effects.candidate import Candidate, Column, Data, Place,
 from tendonfmu.diagnose.effects.description_edit import law_columns
 from tendonfmu.diagnose.effects.friction_law_places import all_sides, kind_shape, law_path, laws_at, places_with
 from tendonfmu.diagnose.span import Span
-from tendonfmu.model.friction_places import Effect, velocity_threshold
+from tendonfmu.model import Effect, velocity_threshold
 
 _EXPECTED = 0.2  # of the Coulomb friction, at a speed of 100 times the threshold of motion
 

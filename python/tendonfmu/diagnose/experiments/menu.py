@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.diagnose.span import Span
 from tendonfmu.errors import InputError
-from tendonfmu.model.balance import moment_arms, pretension_vector
+from tendonfmu.model import moment_arms, pretension_vector
 
 Numbers = NDArray[np.float64]
 Data = Mapping[str, Any]

@@ -13,12 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.diagnose.experiments.menu import Entry, Section, own_tension
-from tendonfmu.excite.excitation import Excitation, Plan, plan_excitation
-from tendonfmu.model.balance import balanced_forces, moment_arms
-from tendonfmu.recordings.prepared import FitRecording
-from tendonfmu.recordings.recording import Recording
-from tendonfmu.recordings.residuals import model_alone
-from tendonfmu.statistics.quintic import evaluate
+from tendonfmu.excite import Excitation, Plan, plan_excitation
+from tendonfmu.model import balanced_forces, moment_arms
+from tendonfmu.recordings import FitRecording, Recording, model_alone
+from tendonfmu.statistics import quintic
 
 Numbers = NDArray[np.float64]
 Data = Mapping[str, Any]
@@ -155,7 +153,7 @@ def _tension(data: Data, section: Section, motion: Excitation) -> Numbers:
     size = float(np.min(room[reach > _CLOSE] / reach[reach > _CLOSE]))
     rates = section.swing * np.geomspace(*_SPREAD, ways.shape[1]) if ways.shape[1] > 1 else np.array([section.swing])
     # at rest at both ends
-    grow, _, _ = evaluate(np.array([[0.0, 0, 0, 0], [_CHANGE, 1, 0, 0]]), np.minimum(time, time[-1] - time))
+    grow, _, _ = quintic.evaluate(np.array([[0.0, 0, 0, 0], [_CHANGE, 1, 0, 0]]), np.minimum(time, time[-1] - time))
     waves = np.sin(2 * np.pi * time[:, None] * rates + np.arange(len(rates)))
     return np.asarray(even + size * (grow[:, None] * waves) @ ways.T)
 
@@ -185,7 +183,7 @@ def _passage(before: Performed, after: Performed, speed: float, rate: float) -> 
 
 def _stroke(start: Numbers, end: Numbers, seconds: float, time: Numbers) -> tuple[Numbers, Numbers, Numbers]:
     """[K, n] quintics from rest to rest, with their first and second derivatives."""
-    share, slope, bend = evaluate(np.array([[0.0, 0.0, 0.0, 0.0], [seconds, 1.0, 0.0, 0.0]]), time)
+    share, slope, bend = quintic.evaluate(np.array([[0.0, 0.0, 0.0, 0.0], [seconds, 1.0, 0.0, 0.0]]), time)
     way = (end - start)[None]
     return start[None] + share[:, None] * way, slope[:, None] * way, bend[:, None] * way
 

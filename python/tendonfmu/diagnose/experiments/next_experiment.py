@@ -28,14 +28,10 @@ from tendonfmu.diagnose.extension_fit import Accepted
 from tendonfmu.diagnose.result import Experiment, Where
 from tendonfmu.diagnose.span import Span, span_of
 from tendonfmu.errors import InputError, InternalError
-from tendonfmu.estimate.estimation import EstimationError
-from tendonfmu.model.balance import moment_arms
-from tendonfmu.model.native import NativeError
-from tendonfmu.recordings.prepared import FitRecording
-from tendonfmu.recordings.recording import Recording
-from tendonfmu.recordings.residuals import Model, bias_settings
-from tendonfmu.statistics.block_averages import regular_blocks
-from tendonfmu.statistics.splines import KNOTS
+from tendonfmu.estimate import EstimationError
+from tendonfmu.model import NativeError, moment_arms
+from tendonfmu.recordings import FitRecording, Model, Recording, bias_settings
+from tendonfmu.statistics import KNOTS, regular_blocks
 
 Numbers = NDArray[np.float64]
 Data = Mapping[str, Any]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.files.json_node import Node, Refusal, read_json
+from tendonfmu.files import Node, Refusal, read_json
 from tendonfmu.recordings.converters import units
 from tendonfmu.recordings.recording import GROUPS, LABEL
 

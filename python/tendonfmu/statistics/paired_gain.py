@@ -29,7 +29,7 @@ _LEAST_PLAIN = 12  # blocks; of fewer the resamples' own errors are too rough to
 
 
 @dataclass(frozen=True)
-class Blocks:
+class BlockIndex:
     """Which block each sample is in. index: [N] from 0, −1 outside the chosen samples. count: of blocks."""
 
     index: NDArray[np.intp]
@@ -41,7 +41,7 @@ class Blocks:
         return np.asarray(np.bincount(self.index[chosen], weights=values[chosen], minlength=self.count), dtype=float)
 
 
-def blocks_of(time: Numbers, chosen: Flags, length: float = BLOCK) -> Blocks:
+def blocks_of(time: Numbers, chosen: Flags, length: float = BLOCK) -> BlockIndex:
     """Cuts the chosen samples into blocks of about `length` s each, none across a stretch that is not chosen; of few
     seconds into shorter ones.
 
@@ -62,7 +62,7 @@ def blocks_of(time: Numbers, chosen: Flags, length: float = BLOCK) -> Blocks:
         share = (time[begin:end] - time[begin]) / span if span > 0 else np.zeros(end - begin)
         index[begin:end] = count + np.minimum((share * parts).astype(np.intp), parts - 1)
         count += parts
-    return Blocks(index, count)
+    return BlockIndex(index, count)
 
 
 def gain_interval(before: Numbers, after: Numbers, seed: int = 0) -> Interval:

@@ -15,10 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.model import native
-from tendonfmu.model.balance import friction_probe
-from tendonfmu.model.extensions import extension_numbers
-from tendonfmu.model.friction_places import Effect, effects, working_point_weights
+from tendonfmu.model import Effect, effects, extension_numbers, friction_probe, native, working_point_weights
 
 Numbers = NDArray[np.float64]
 Progress = Callable[[int, int], None]

@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 
 from tendonfmu.estimate.evaluation import Evaluation, residual_entry
 from tendonfmu.estimate.verdicts import Fitted
-from tendonfmu.files.finite_numbers import finite
-from tendonfmu.model import native
-from tendonfmu.model.description import FingerDescription
-from tendonfmu.recordings.residuals import consistency, whiteness
-from tendonfmu.statistics.effective_number import effective_samples
+from tendonfmu.files import finite
+from tendonfmu.model import FingerDescription, native
+from tendonfmu.recordings import consistency, whiteness
+from tendonfmu.statistics import effective_samples
 
 Numbers = NDArray[np.float64]
 

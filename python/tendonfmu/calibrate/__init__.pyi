@@ -1,0 +1,9 @@
+from . import text as text
+from .calibration import DIAGNOSIS as DIAGNOSIS
+from .calibration import Calibration as Calibration
+from .calibration import Options as Options
+from .calibration import calibrate as calibrate
+from .files import PAGE as PAGE
+from .files import check_folder as check_folder
+from .files import write_calibration as write_calibration
+from .report import rms_of as rms_of

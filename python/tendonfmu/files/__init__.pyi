@@ -1,0 +1,14 @@
+from .finite_numbers import finite as finite
+from .json_node import Node as Node
+from .json_node import Refusal as Refusal
+from .json_node import read_json as read_json
+from .tables import FORMATS as FORMATS
+from .tables import Table as Table
+from .tables import check_format as check_format
+from .tables import read_table as read_table
+from .tables import write_table as write_table
+from .writing import check_output as check_output
+from .writing import check_output_folder as check_output_folder
+from .writing import is_about as is_about
+from .writing import whole_file as whole_file
+from .writing import write_text as write_text

@@ -1,0 +1,11 @@
+from .fmu_packaging import build_plant_fmu as build_plant_fmu
+from .plant import INTEGRATORS as INTEGRATORS
+from .plant import Array as Array
+from .plant import Plant as Plant
+from .plant import require_plant as require_plant
+from .rig import Rig as Rig
+from .rig import description_files as description_files
+from .rig import is_rig as is_rig
+from .rig import read_rig as read_rig
+from .rig_summary import describe_rig as describe_rig
+from .simulation import simulate as simulate
