@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 from tendonfmu.errors import InputError
-from tendonfmu.files.whole_file import check_output, whole_file
+from tendonfmu.files.writing import check_output, whole_file
 from tendonfmu.fmu.packaging import members, pack
 from tendonfmu.model.description import read_finger
 from tendonfmu.simulate.rig import read_rig

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import BSpline
 from scipy.signal import lfilter
-from sklearn.preprocessing import SplineTransformer  # type: ignore[import-untyped]
 
 from tendonfmu.statistics import Line
 
@@ -189,8 +189,16 @@ def _spline(signal: Numbers, knots: int) -> Numbers:
     places = np.unique(np.quantile(signal, np.linspace(0.01, 0.99, knots)))
     if len(places) < 2:
         return signal[:, None]
-    basis = SplineTransformer(degree=min(3, len(places)), knots=places[:, None], extrapolation="linear")
-    return np.asarray(basis.fit_transform(signal[:, None]))
+    degree = min(3, len(places))
+    before, after = np.diff(places)[[0, -1]]
+    outer = np.arange(1, degree + 1)
+    knot = np.concatenate([places[0] - before * outer[::-1], places, places[-1] + after * outer])
+    curves = BSpline(knot, np.eye(len(places) + degree - 1), degree)
+    inside = np.clip(signal, places[0], places[-1])
+    values = curves(inside)
+    out = np.flatnonzero(signal != inside)
+    values[out] += (signal - inside)[out, None] * curves(inside[out], 1)
+    return np.asarray(values)
 
 
 def _bends(one: Numbers, two: Numbers) -> Numbers:

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
+from lxml import etree
+from lxml.builder import ElementMaker
 
 from tendonfmu.files import check_output, whole_file
 from tendonfmu.fmu import NOT_IN_XML, members, pack
@@ -28,6 +29,15 @@ DURATION = 10.0  # s, of the default experiment where the rig records nothing
 # beside the connected ones, to look at; fmpy knows no inputs that are left unconnected
 PLANT_OUTPUTS = ("truth.external_torque",)
 FRICTION_OUTPUTS = ("compensated_torque", "friction_torque")
+
+_SPACES = {
+    "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
+    "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
+    "ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues",
+}
+_SSC = ElementMaker(namespace=_SPACES["ssc"])
+_SSD = ElementMaker(namespace=_SPACES["ssd"], nsmap={key: _SPACES[key] for key in ("ssd", "ssc")})
+_SSV = ElementMaker(namespace=_SPACES["ssv"], nsmap={"ssv": _SPACES["ssv"]})
 
 
 def build_ssp(rig_path: Path, output_path: Path) -> Path:
@@ -47,14 +57,14 @@ def build_ssp(rig_path: Path, output_path: Path) -> Path:
 def ssp_members(rig: Rig) -> dict[str, bytes]:
     """Path in the archive to content."""
     return {
-        "SystemStructure.ssd": system_structure(rig).encode(),
+        "SystemStructure.ssd": system_structure(rig),
         f"resources/{PLANT_FMU}": pack(plant_members(rig)),
         f"resources/{FRICTION_FMU}": pack(members(rig.finger)),
-        START_VALUES: start_values(rig).encode(),
+        START_VALUES: start_values(rig),
     }
 
 
-def system_structure(rig: Rig) -> str:
+def system_structure(rig: Rig) -> bytes:
     """SystemStructure.ssd: every input of the friction FMU comes from the plant's output of the same name."""
     sizes = {"tendon_force": rig.tendons, "tendon_position": rig.tendons}
 
@@ -64,31 +74,29 @@ def system_structure(rig: Rig) -> str:
     coupled = names(INPUTS)
     plant = [(name, "output") for name in coupled + names(PLANT_OUTPUTS)]
     friction = [(name, "input") for name in coupled] + [(name, "output") for name in names(FRICTION_OUTPUTS)]
-    lines = [
-        '<?xml version="1.0" encoding="UTF-8"?>',
-        '<ssd:SystemStructureDescription xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription"',
-        '    xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon" version="1.0"',
-        f"    name={quoteattr(NOT_IN_XML.sub('?', rig.name))}>",
-        '  <ssd:System name="finger">',
-        "    <ssd:Elements>",
-        *_component(PLANT, PLANT_FMU, plant),
-        *_component(FRICTION, FRICTION_FMU, friction),
-        "    </ssd:Elements>",
-        "    <ssd:Connections>",
-        *(
-            f'      <ssd:Connection startElement="{PLANT}" startConnector="{name}"'
-            f' endElement="{FRICTION}" endConnector="{name}"/>'
-            for name in coupled
-        ),
-        "    </ssd:Connections>",
-        "  </ssd:System>",
-        f'  <ssd:DefaultExperiment startTime="0.0" stopTime="{DURATION if rig.duration is None else rig.duration}"/>',
-        "</ssd:SystemStructureDescription>",
-    ]
-    return "\n".join(lines) + "\n"
+    return _text(
+        _SSD.SystemStructureDescription(
+            _SSD.System(
+                _SSD.Elements(
+                    _component(PLANT, PLANT_FMU, plant),
+                    _component(FRICTION, FRICTION_FMU, friction),
+                ),
+                _SSD.Connections(
+                    *(
+                        _SSD.Connection(startElement=PLANT, startConnector=name, endElement=FRICTION, endConnector=name)
+                        for name in coupled
+                    )
+                ),
+                name="finger",
+            ),
+            _SSD.DefaultExperiment(startTime="0.0", stopTime=str(DURATION if rig.duration is None else rig.duration)),
+            version="1.0",
+            name=NOT_IN_XML.sub("?", rig.name),
+        )
+    )
 
 
-def start_values(rig: Rig) -> str:
+def start_values(rig: Rig) -> bytes:
     """An SSV parameter set: the friction FMU's inputs at time 0, as the settled finger's sensors give them."""
     plant = plant_of(rig)
     with refused_by(rig.path):
@@ -99,30 +107,19 @@ def start_values(rig: Rig) -> str:
         for group in INPUTS
         for i, value in enumerate(signals[f"measured_{group}"][0], start=1)
     }
-    lines = [
-        '<?xml version="1.0" encoding="UTF-8"?>',
-        '<ssv:ParameterSet xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues" version="1.0"',
-        '    name="start_values">',
-        "  <ssv:Parameters>",
-        *(
-            f'    <ssv:Parameter name="{name}"><ssv:Real value="{value!r}"/></ssv:Parameter>'
-            for name, value in values.items()
-        ),
-        "  </ssv:Parameters>",
-        "</ssv:ParameterSet>",
-    ]
-    return "\n".join(lines) + "\n"
+    parameters = (_SSV.Parameter(_SSV.Real(value=repr(value)), name=name) for name, value in values.items())
+    return _text(_SSV.ParameterSet(_SSV.Parameters(*parameters), version="1.0", name="start_values"))
 
 
-def _component(name: str, fmu: str, connectors: list[tuple[str, str]]) -> list[str]:
-    return [
-        f'      <ssd:Component name="{name}" type="application/x-fmu-sharedlibrary" source="resources/{fmu}"',
-        '          implementation="CoSimulation">',
-        "        <ssd:Connectors>",
-        *(
-            f'          <ssd:Connector name="{connector}" kind="{kind}"><ssc:Real/></ssd:Connector>'
-            for connector, kind in connectors
-        ),
-        "        </ssd:Connectors>",
-        "      </ssd:Component>",
-    ]
+def _component(name: str, fmu: str, connectors: list[tuple[str, str]]) -> Any:
+    return _SSD.Component(
+        _SSD.Connectors(*(_SSD.Connector(_SSC.Real(), name=connector, kind=kind) for connector, kind in connectors)),
+        name=name,
+        type="application/x-fmu-sharedlibrary",
+        source=f"resources/{fmu}",
+        implementation="CoSimulation",
+    )
+
+
+def _text(root: Any) -> bytes:
+    return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
