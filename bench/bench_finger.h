@@ -8,7 +8,7 @@
 
 namespace bench_finger {
 
-// Which keys of docs/contract-additions.md, or rows of docs/extensions.md, a description has: calibrated: all that
+// Which optional keys or extensions (docs/reference/semantics.md) a description has: calibrated: all that
 // `tendonfmu calibrate` writes, presliding apart; torques: three a joint
 // and one a tendon; presliding: one at every place; presliding_filtered: the same with a position filter.
 enum class Keys {

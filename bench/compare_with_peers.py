@@ -36,7 +36,7 @@ RECORDING = ROOT / "examples" / "demo_recording" / "index_finger_pushes.parquet"
 ROUNDS = 5
 FEW = 300  # samples for the slow ones
 
-# A slave with the variables of contract section 4 around the numpy model.
+# A slave with the FMU's variables (docs/reference/semantics.md#fmu-variables) around the numpy model.
 SLAVE = """
 import json, os, sys
 sys.path.insert(0, os.path.join(os.path.dirname(__file__)))

@@ -3,8 +3,8 @@
     python bench/diagnosis_models.py --cases 3
 
 Each case is a finger of the matched rig (python_tests/hidden_effects) with one hidden effect at strength 1: 60 s to
-learn from, 60 s of another motion to be judged on. All models predict the torque of every sample; r of contract
-section 5, step 5, is then what the same bias filter leaves (rms over all joints, mN·m).
+learn from, 60 s of another motion to be judged on. All models predict the torque of every sample; r of
+docs/reference/semantics.md#contact-detector is then what the same bias filter leaves (rms over all joints, mN·m).
 
 - nominal, extended: the description as refitted, and as `diagnose` extends it;
 - learner: gradient-boosted trees from angles, velocities, tendon forces, travel since the reversal and the side of the
@@ -54,7 +54,7 @@ def kinematics(data: Data, recording: FitRecording) -> tuple[Numbers, Numbers, N
 
 
 def filtered(data: Data, time: Numbers, error: Numbers) -> Numbers:
-    """[N, n] r of what a model leaves, by the bias filter of contract section 5, steps 5 and 6."""
+    """[N, n] r of what a model leaves, by the bias filter (docs/reference/semantics.md#bias-tracker)."""
     bias = data["bias"]
     noise, variance = float(bias["noise_std"]) ** 2, float(bias["initial_variance"])
     b, r = error[0].copy(), np.zeros_like(error)

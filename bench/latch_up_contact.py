@@ -113,7 +113,7 @@ def free_noise(seed: int, over_noise: float = 3.0, correlated: float = 0.0, dura
 # --- rules that have no key, tried outside the core ----------------------------------------------------------------
 
 Rule = Callable[[Numbers, Numbers], Callable[[int, int, float], str]]
-DRIFT, STANDARD = 1e-6, 0.01  # the contract's defaults of the bias filter
+DRIFT, STANDARD = 1e-6, 0.01  # defaults of the bias filter
 
 
 def follow(take: Take, rule: Rule) -> Flags:

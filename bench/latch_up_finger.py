@@ -31,7 +31,7 @@ ASLEEP = {"bias.drift_variance": 0.0, "bias.initial_variance": 0.0}  # the filte
 
 
 def finger(keys: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Its description. keys: `bias.forget_rate` and the like, beyond the defaults of the contract."""
+    """Its description. keys: `bias.forget_rate` and the like, beyond the defaults."""
     law = {"static": SHARE, "coulomb": SHARE, "stribeck_velocity": 0.005}
     description: dict[str, Any] = {
         "format": "tendonfmu-finger-1",

@@ -56,7 +56,7 @@ def model_torques(description: Mapping[str, Any], recording: Mapping[str, Array]
 
 
 def noise_scale(description: Mapping[str, Any], time: Array, force: Array) -> Array:
-    """[N, 1] standard deviation of e; that of the first sample is the root of initial_variance (contract section 2)."""
+    """[N, 1] standard deviation of e; that of the first sample is the root of bias.initial_variance."""
     bias = description.get("bias") or {}
     mean_force = np.abs(force).mean(axis=1)
     std = bias.get("noise_std", 0.01) + (bias.get("noise_std_per_force") or 0.0) * mean_force

@@ -1,4 +1,4 @@
-"""The oracle's detector: steps 4a to 7 of docs/contract-additions.md, and the contact rule of docs/model.md.
+"""The oracle's detector: docs/reference/semantics.md#friction-bounds, #contact-detector, #bias-tracker, #outputs.
 
 Part of the oracle (see oracle.py): naive, for tests alone, sharing no code with the runtime. Joints are counted from 0.
 """
@@ -20,7 +20,7 @@ from oracle_rest import RestWatch
 
 Array = NDArray[Any]
 
-NEAR = 1e-9  # docs/contract-additions.md: a decision closer than this to its threshold may go either way
+NEAR = 1e-9  # docs/reference/semantics.md#agreement: a decision closer than this to its threshold may go either way
 FASTEST = 10.0  # the evidence of `cusum` grows at most this many seconds a second
 
 

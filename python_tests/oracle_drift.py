@@ -1,4 +1,4 @@
-"""The oracle's slow contact: contact.drift of docs/contract-additions.md, steps 5 and 6.
+"""The oracle's slow contact: contact.drift of docs/reference/semantics.md#contact-detector and #bias-tracker.
 
 Part of the oracle (see oracle.py): naive, for tests alone, sharing no code with the runtime.
 """
@@ -22,7 +22,7 @@ OF_LATE = 0.1  # of T_q
 
 
 class DriftWatch:
-    """u, p, s and c [n]. `begin` at the first sample, then `take` once a sample and `follow` with each update."""
+    """o, p, s and c [n]. `begin` at the first sample, then `take` once a sample and `follow` with each update."""
 
     def __init__(self, drift: Mapping[str, Any], n: int, branches: Counter[str]) -> None:
         self.branches = branches

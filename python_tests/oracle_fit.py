@@ -241,7 +241,7 @@ def evaluate(parts: Sequence[Likelihood], z: Array) -> tuple[float, Array, Array
 
 
 def free_groups(paths: Sequence[str], values: Array) -> list[int]:
-    """[p] every number that is present is estimated on its own (contract section 7: what is absent stays absent)."""
+    """[p] every number that is present is estimated on its own (what is absent stays absent)."""
     number = dict(zip(paths, values, strict=True))
     group, used = [], 0
     for path in paths:

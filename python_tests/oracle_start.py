@@ -1,4 +1,4 @@
-"""The oracle's friction as it stood before the first sample: `bias.start_share` of docs/contract-additions.md.
+"""The oracle's friction as it stood before the first sample: docs/reference/semantics.md#unlearned-start.
 
 Part of the oracle (see oracle.py): naive, for tests alone, sharing no code with the runtime.
 """

@@ -32,7 +32,7 @@ from tendonfmu.statistics.block_averages import SampleBlocks, BlockSums, regular
 Numbers = NDArray[np.float64]
 Data = dict[str, Any]
 
-# contract section 7, without `contact` and `unknown`, which are no terms of a model
+# docs/reference/semantics.md#names-of-effects, without `contact` and `unknown`, which are no terms of a model
 CONTRACT = (
     "viscous_friction", "stribeck", "asymmetric_friction", "edge_friction", "pulley_friction", "joint_friction",
     "joint_load_friction", "preload_friction", "load_friction", "cover_stiffness", "cover_hardening", "gravity",

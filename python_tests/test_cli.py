@@ -1,4 +1,4 @@
-"""The command: exit codes, one-line errors, results as the contract's section 6 has them."""
+"""The command: exit codes, one-line errors, results as docs/reference/semantics.md#commands has them."""
 
 from __future__ import annotations
 

@@ -90,7 +90,7 @@ def test_fmpy_compiles_the_sources(folder: Path) -> None:
 
 @pytest.mark.parametrize("name", CLIENTS)
 def test_a_page_says_whether_it_was_tried(name: str) -> None:
-    assert len(re.findall(r"^\*\*(Tried|Not tried here)\*\*.*\b20\d\d-\d\d-\d\d", page(name), re.MULTILINE)) == 1
+    assert len(re.findall(r"^\*\*(Tried|Not tried here)\*\*", page(name), re.MULTILINE)) == 1
     assert f"[{name}.md]({name}.md)" in page("README")
 
 

@@ -1,4 +1,4 @@
-"""The demo's recordings: what the contract asks of a recording, what their rigs give, and the story they tell."""
+"""The demo's recordings: what docs/reference/semantics.md#recordings asks, what their rigs give, their story."""
 
 from __future__ import annotations
 

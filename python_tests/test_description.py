@@ -217,7 +217,7 @@ def test_index_finger_counts() -> None:
 
 
 def test_absent_friction_is_not_estimated(tmp_path: Path) -> None:
-    """Contract section 7: viscous 0 and static = coulomb are absent friction; each side of a law counts."""
+    """viscous 0 and static = coulomb are docs/reference/semantics.md#absent-structure; each side counts."""
     description = with_everything()
     description["joints"][0]["friction"] = {"static": 0.1, "coulomb": 0.1, "stribeck_velocity": 1.0, "viscous": 0.0}
     (tmp_path / "finger.json").write_text(json.dumps(description))

@@ -1,4 +1,4 @@
-"""Each key of docs/contract-additions.md where its effect can be written on paper, on the oracle and on the C core.
+"""Each optional key of the detection where its effect can be written on paper, on the oracle and on the C core.
 
 One joint, one tendon of arm 0.01 m unless a case says otherwise: τ = 0.01 m · f0. Speeds come as given (source 3).
 Times are multiples of 1/8 s, so that their differences are exact. Nothing here calls a law of the oracle.

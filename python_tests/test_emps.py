@@ -233,7 +233,7 @@ def test_the_published_numbers_explain_the_force(file: Path) -> None:
 
 @measured
 def test_it_moves_from_the_first_sample_on() -> None:
-    """So that the constant bias is the offset alone: nothing departs from rest (contract section 5, fig. 5)."""
+    """So that the constant bias is the offset: nothing leaves rest (docs/reference/semantics.md#friction-effects)."""
     for file in MEASURED:
         velocity = convert_file("emps", file, {})["joint_velocity[1]"]
         assert velocity[0] > 0.02 and np.abs(velocity).min() > 0.0

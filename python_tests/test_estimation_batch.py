@@ -241,7 +241,7 @@ def test_a_coarse_pass_knows_about_as_much() -> None:
 
 @pytest.mark.parametrize("seed", range(9))
 def test_innovations_are_the_contracts_residuals(seed: int) -> None:
-    """r of contract section 5, step 5, and b_eff of step 6, with contact detection out of reach."""
+    """r and b_eff of docs/reference/semantics.md#bias-tracker, with contact detection out of reach."""
     description, recording, source = random_fit_case(seed, 200)
     group = groups(description)
     estimator = estimation.Estimator(image_of(description), group)

@@ -1,4 +1,4 @@
-"""The refit with causes and the gain: the FMUs' residuals are the contract's, the gain and its interval are true."""
+"""The refit with causes and the gain: the FMUs' residuals are those of step 5, the gain and its interval are true."""
 
 from __future__ import annotations
 

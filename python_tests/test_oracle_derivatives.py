@@ -71,7 +71,7 @@ def test_random_fingers_have_derivatives_that_predict() -> None:
 
 
 def test_the_core_has_the_oracles_derivatives() -> None:
-    """Fingers with the keys of docs/contract-additions.md, while they rest, stop and leave, in and out of contact."""
+    """Fingers with the the optional keys of the detection, while they rest, stop and leave, in and out of contact."""
     compared = 0
     for seed in range(500, 510):
         description, inputs = random_case(seed, samples=80, detection=True)

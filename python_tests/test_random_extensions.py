@@ -1,4 +1,4 @@
-"""Random fingers with random `extensions` (docs/extensions.md): every implementation agrees with the oracle."""
+"""Random fingers with random `extensions` (docs/reference/semantics.md#extensions): all implementations agree."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SAMPLES = 130
 FMU_STRIDE = 4  # packing takes its time
 CLOSED = ("presliding", "friction_drift", "stribeck", "backlash")  # at a joint or at a tendon
 
-# What the oracle counts of the extensions beyond the branches of the contract.
+# What the oracle counts of the extensions beyond the branches of the model.
 BRANCHES = {
     "friction_drift",
     "stribeck",
@@ -50,7 +50,7 @@ def source_of(seed: int) -> int:
 
 @functools.cache
 def case(seed: int) -> tuple[Description, Recording]:
-    """Every other finger has keys of docs/contract-additions.md too, entry_load and hysteresis among them."""
+    """Every other finger has optional keys of the detection too, entry_load and hysteresis among them."""
     return random_case(seed, SAMPLES, detection=seed % 2 == 0, extensions=True)
 
 

@@ -1,4 +1,4 @@
-"""The random fingers take every branch of docs/model.md and its additions; every runner agrees with the oracle."""
+"""The random fingers take every branch of docs/reference/semantics.md; every runner agrees with the oracle."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from runners import ORACLE, RUNNERS, Runner
 
 FINGERS = 50
 SOURCES = (1, 2, 3)
-DETECTION_FINGERS = range(100, 136)  # with a subset of the keys of docs/contract-additions.md each
+DETECTION_FINGERS = range(100, 136)  # with a subset of the optional keys of the detection each
 DETECTION_SAMPLES = 250
 
 # Every branch of section 5 as the oracle counts them; a new one there must be added here.
@@ -56,7 +56,7 @@ BRANCHES = {
     "gain_zero_of_zero",
 }
 
-# The same of docs/contract-additions.md.
+# The same of the optional keys of the detection.
 DETECTION_BRANCHES = {
     "gate_open",
     "gate_held",
@@ -178,7 +178,7 @@ def test_agrees_with_the_oracle_on_fifty_fingers(runner: Runner) -> None:
     print(f"{runner.name}: {samples} samples, {left_out} left out, worst {max(each.worst for each in results):.3g}")
 
 
-# --- the keys of docs/contract-additions.md
+# --- the optional keys of the detection
 
 
 def test_detection_fingers_take_every_branch() -> None:

@@ -46,7 +46,7 @@ def test_the_index_rigs_tell_one_story() -> None:
 
 
 def test_the_numbers_of_version_1_are_frozen() -> None:
-    """Later issues compare against these: a change is a version 2, not another digest here."""
+    """Later figures are compared with these: a change is a version 2, not another digest here."""
     digests = [
         hashlib.sha256(json.dumps(json.loads((RIGS / name).read_text()), sort_keys=True).encode()).hexdigest()[:16]
         for name in INDEX_RIGS

@@ -1,6 +1,6 @@
 """Model and simulated finger speak of the same finger: the model has the rig's static friction, nothing is fitted.
 
-The test of issue 3: on free motion the friction model leaves less than a third of every joint torque's rms.
+On free motion the friction model leaves less than a third of every joint torque's rms.
 """
 
 from __future__ import annotations

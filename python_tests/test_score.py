@@ -31,7 +31,7 @@ ROOT = Path(__file__).resolve().parents[1]
 INDEX = ROOT / "examples" / "fingers" / "index_finger.json"
 DEMO = ROOT / "examples" / "demo_recording"
 PUSHES, FREE_X4 = DEMO / "index_finger_pushes.parquet", DEMO / "index_finger_free_x4.parquet"
-# contract, section 6
+# docs/reference/semantics.md#score-report
 LITERAL = {"format", "events", "found", "false_alarms", "free_minutes", "median_delay_s", "free_rms"}
 LITERAL |= {"contact_torque_rms_error"}
 
@@ -127,7 +127,7 @@ def delays_by_hand(time: NDArray[Any], label: NDArray[Any], contact: NDArray[Any
 
 @pytest.mark.parametrize("path", [PUSHES, FREE_X4])
 def test_the_residual_is_what_the_decision_was_made_of(path: Path) -> None:
-    """joint_contact is |r| > threshold (docs/model.md, contact), so r is right to within what decides."""
+    """joint_contact is |r| > threshold (docs/reference/semantics.md#contact-detector), so r is right."""
     subject = read_subject(INDEX)
     track = run_track(subject, read_recording(path), 1, None)
     contact, force = subject.finger.data["contact"], np.abs(track.recording.groups["tendon_force"]).mean(axis=1)

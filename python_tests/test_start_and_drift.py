@@ -1,4 +1,4 @@
-"""`bias.start_share` and `contact.drift` (docs/contract-additions.md) where their effect can be written on paper.
+"""`bias.start_share` and `contact.drift` where their effect can be written on paper.
 
 One joint, one tendon of arm 0.01 m: τ = 0.01 m · f0. Speeds come as given (source 3). On the oracle and on the C core.
 """

@@ -97,5 +97,5 @@ def test_random_free_motion_is_tuned_or_refused(method: str) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("method", METHODS)
 def test_all_random_free_motion_is_tuned_or_refused(method: str) -> None:
-    """10 s to 5 min, as the issue asks for."""
+    """10 s to 5 min."""
     assert sum(check(seed, method, 300.0) for seed in MANY) >= (1 - REFUSED_AT_MOST) * len(MANY)

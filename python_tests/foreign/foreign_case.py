@@ -24,7 +24,7 @@ TEST_SECONDS = 30.0
 class Truth:
     """What a case hides, and where.
 
-    hidden: name of an effect of the contract, `none`, or `unknown_*` for what is on no list.
+    hidden: one of docs/reference/semantics.md#names-of-effects, `none`, or `unknown_*` for what is on no list.
     joint, tendon: its place, counted from 1; None: the whole finger, or it has no such place.
     joints: number of joints of the finger.
     also: effects that the simulator has as well although the description lacks them: naming them is not false.

@@ -35,7 +35,7 @@ class Truth:
 
     number: of the case in its bed; its parity is the half. bed: hidden (known effects in measured recordings), real
     (other load or speed), simulated. machine: or the simulator. model: diagnosed, plain, or as the simulator's is.
-    hidden: name of the effect as its bed calls it, or `nothing`. effects: names of the contract that count as the
+    hidden: name of the effect as its bed calls it, or `nothing`. effects: names of the list that count as the
     truth. also: names that are not false either. joint, tendon: place, from 1; None: any. signs: by effect, of now less
     then; an effect without one is not judged. conditions: how `now` was recorded, against `then`: repeat, part, motion,
     load, speed, excitation, pretension, length.

@@ -126,7 +126,7 @@ def longer_arm(machine: Machine, columns: Columns, magnitude: float) -> Columns:
 
 @dataclass(frozen=True)
 class Change:
-    """names: of the contract that are the truth. also: not false either, and not the truth. signs: by name, of a
+    """names: of effects that are the truth. also: not false either, and not the truth. signs: by name, of a
     positive magnitude. first: where the search for the strength starts, as a share of `scale`."""
 
     put: Put

@@ -50,7 +50,7 @@ SIMULATORS: Mapping[str, ModuleType | None] = {
 
 @dataclass(frozen=True)
 class Plan:
-    """One case. effect: of the contract, nothing where none changes. size: of the change, in unit. others: names that
+    """One case. effect: its name, nothing where none changes. size: of the change, in unit. others: names that
     are the truth as well."""
 
     simulator: str

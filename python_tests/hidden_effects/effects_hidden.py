@@ -1,4 +1,4 @@
-"""What the matched rig can hide: every effect of contract section 7 and three kinds that the list does not have.
+"""What the matched rig can hide: every effect that `diagnose` may name, and three kinds it may not.
 
 Each builder takes a hand and a random generator, chooses a place, removes the effect from both descriptions where it
 stands there, and says how the true finger differs by one magnitude. `hide` scales the magnitude to a strength.

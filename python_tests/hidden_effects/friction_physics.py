@@ -1,6 +1,6 @@
 """Friction of a tendon finger in numpy, over all samples at once: what the matched rig is made of.
 
-Written from the texts alone (the paper's equations, contract section 5, docs/extensions.md); it shares no code with
+Written from the texts alone (the paper's equations, docs/reference/semantics.md); it shares no code with
 the runtime, the package or the oracle. Indices start at 0 here. A description is read as plain JSON data.
 
 Where the oracle walks from sample to sample, this file works on whole series: what moves and what sticks follows from
@@ -91,7 +91,7 @@ def contacts_of(velocity: Array, threshold: float) -> Contacts:
 
 
 def build_up(velocity: Array, time: Array, distance: float) -> Array:
-    """ζ of docs/extensions.md, closed over every stretch of one direction.
+    """ζ of docs/reference/semantics.md#friction-of-extensions, closed over every stretch of one direction.
 
     1 - s·ζ decays by exp(-travel/distance) within such a stretch, so only the turns need a loop.
     """
@@ -198,7 +198,7 @@ class Values:
 
 
 def values_of(effect: Effect, motion: Motion, finger: Finger) -> Values:
-    """Step 2 of contract section 5 (with `entry_load`) over the whole series, and docs/extensions.md, presliding."""
+    """Friction over the whole series by docs/reference/semantics.md#friction-effects (`entry_load`), or presliding."""
     v = velocity_seen(effect, motion)
     threshold = finger.tendon_threshold if effect.kind in ("edge", "pulley") else finger.joint_threshold
     found = contacts_of(v, threshold)
@@ -221,7 +221,7 @@ def values_of(effect: Effect, motion: Motion, finger: Finger) -> Values:
 
 
 def jumps(values: Values, load: Array) -> Array:
-    """[N] cumulated Δb of one effect, its loads [N] multiplied in (contract-additions, `entry_load`)."""
+    """[N] cumulated Δb of one effect, its loads [N] multiplied in (docs/reference/semantics.md#entry-load)."""
     found, total = values.contacts, np.zeros(len(load))
     if found is None:
         return total
@@ -269,7 +269,7 @@ def torque_of(finger: Finger, motion: Motion, force: Array) -> Array:
 
 
 def filtered_velocity(angle: Array, step: float, cutoff: float) -> Array:
-    """[N, n] step 1 of contract section 5: backward difference through a first-order filter, 0 at the first sample."""
+    """[N, n] by docs/reference/semantics.md#velocity-filter; 0 at the first sample."""
     from scipy.signal import lfilter
 
     raw = np.zeros_like(angle)

@@ -1,4 +1,4 @@
-"""Hidden effects that are not in the list of contract section 7: the right answer is `unknown`."""
+"""Hidden effects that are not in docs/reference/semantics.md#names-of-effects: the right answer is `unknown`."""
 
 from __future__ import annotations
 

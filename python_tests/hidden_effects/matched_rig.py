@@ -10,8 +10,8 @@ forces are found by fixed-point iteration over the whole series at once. Bias wa
 that act on the finger; encoders are quantised, force sensors have a little white noise of their own.
 
 "Matched": friction follows the velocity of the true angle (the nominal has no velocity filter, whose lag would be a
-delay of every recording), at rest the torque stays what it was (contract-additions, `entry_load`, forget_rate 0), or
-every effect has presliding in the form of docs/extensions.md. What remains to the tool is noise, wander, quantisation
+delay of every recording), at rest the torque stays what it was (`entry_load`, forget_rate 0), or
+every effect has presliding in the form of its extension. What remains to the tool is noise, wander, quantisation
 and what was hidden.
 """
 
@@ -307,7 +307,7 @@ def measure(rng: np.random.Generator, signals: dict[str, Array], noise: Noise) -
 
 
 def columns_of(signals: dict[str, Array], source: int) -> dict[str, Array]:
-    """Columns of contract section 3; joint sensors only where these kinematics use them."""
+    """Columns of docs/reference/semantics.md#recordings; joint sensors only where these kinematics use them."""
     groups = ["tendon_force", "tendon_position"]
     groups += ["joint_position"] * (source >= 2) + ["joint_velocity"] * (source == 3)
     found = {"time": signals["time"]}

@@ -116,7 +116,7 @@ def growing(machine: Machine, columns: Columns, magnitude: float) -> Columns:
 
 @dataclass(frozen=True)
 class Effect:
-    """names: of the contract that are the truth (one joint: some are one and the same). usual: a first magnitude, as a
+    """names: of effects that are the truth (one joint: some are one and the same). usual: a first magnitude, as a
     share of the largest torque where it is one. both: whether either sign can be. most: the largest that makes
     sense. free: takes it off a machine that has it already."""
 
@@ -139,7 +139,7 @@ def rows_of(model: Description, effect: str) -> list[Description]:
 
 
 def law_torque(law: Description, speed: Array, side: Array) -> Array:
-    """A law's F(v), the side given (contract section 1)."""
+    """A law's F(v), the side given (docs/reference/semantics.md#friction-laws)."""
 
     def one(half: Description) -> Array:
         drop, slow = half["static"] - half["coulomb"], half["stribeck_velocity"]

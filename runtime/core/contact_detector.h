@@ -1,5 +1,5 @@
 /* Contact: a joint whose residual exceeds its threshold (paper VI), or whose innovation exceeds what noise and friction
- * can make of it (docs/contract-additions.md, steps 5 to 7). */
+ * can make of it (docs/reference/semantics.md#contact-detector). */
 #ifndef TENDONFMU_CONTACT_DETECTOR_H
 #define TENDONFMU_CONTACT_DETECTOR_H
 

@@ -1,13 +1,13 @@
 /* Contact that rises slowly: what the modelled friction leaves drifts away from where it was
- * (docs/contract-additions.md, contact.drift). */
+ * (docs/reference/semantics.md#contact-detector). */
 #ifndef TENDONFMU_CONTACT_DRIFT_H
 #define TENDONFMU_CONTACT_DRIFT_H
 
 #include "bias_tracker.h"
 
-#define DRIFT_OF_LATE 0.1 /* of T_q: the time of the mean u */
+#define DRIFT_OF_LATE 0.1 /* of T_q: the time of the mean o */
 
-/* what u, p and s go of the way to e: 1 − exp(−Δt/min(T, time since the start)), into scratch */
+/* what o, p and s go of the way to e: 1 − exp(−Δt/min(T, time since the start)), into scratch */
 HOT_INLINE void find_drift_shares(tendonfmu_finger* f, double time, double step) {
   const finger_settings* settings = &f->derived.settings;
   const double quick = settings->drift_quick_time;
@@ -38,7 +38,7 @@ HOT_INLINE quad common_part(quad a, quad b) {
   return quad_keep(same, quad_with_sign(quad_min(quad_abs(a), quad_abs(b)), a));
 }
 
-/* u and p follow e; d is what p − s and u − s have in common: it ends as the load does, and single samples are no load.
+/* o and p follow e; d is what p − s and o − s have in common: it ends as the load does, and single samples are no load.
  * Before contact is decided. */
 HOT_INLINE void watch_drift(tendonfmu_finger* f, double time, double step) {
   const finger_state* s = &f->remembered;

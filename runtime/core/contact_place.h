@@ -1,5 +1,5 @@
 /* Where a finger is touched, as far as torques tell: the force at the tip and the least link that explains them
- * (docs/contract-additions.md, Link geometry). */
+ * (docs/reference/semantics.md#link-geometry). */
 #ifndef TENDONFMU_CONTACT_PLACE_H
 #define TENDONFMU_CONTACT_PLACE_H
 

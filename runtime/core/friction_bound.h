@@ -1,5 +1,5 @@
 /* How far the friction may be from what is modelled: what stiction can hold, and what the errors of the parameters make
- * (docs/contract-additions.md, step 4a). */
+ * (docs/reference/semantics.md#friction-bounds). */
 #ifndef TENDONFMU_FRICTION_BOUND_H
 #define TENDONFMU_FRICTION_BOUND_H
 

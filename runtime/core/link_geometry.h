@@ -1,5 +1,5 @@
-/* Where the links of a finger are: a chain of joints that turn about axes (docs/contract-additions.md, Link geometry).
- */
+/* Where the links of a finger are: a chain of joints that turn about axes
+ * (docs/reference/semantics.md#link-geometry). */
 #ifndef TENDONFMU_LINK_GEOMETRY_H
 #define TENDONFMU_LINK_GEOMETRY_H
 
@@ -14,7 +14,8 @@ typedef struct link_geometry {
 /* Scales a vector that is not zero to length 1, however long or short it is. */
 void make_unit(double vector[3]);
 
-/* The levers of a force at the tip, J of docs/contract-additions.md: a force F turns joint j with lever_j · F.
+/* The levers of a force at the tip, J of docs/reference/semantics.md#force-at-the-fingertip:
+ * a force F turns joint j with lever_j · F.
  *   angle   [joints] rad
  *   lever   [joints × 3] m, base frame */
 void find_tip_levers(const link_geometry* geometry, size_t joints, const double* angle, double* lever);

@@ -103,7 +103,7 @@ static void walk_finger(walk* w) {
   emit_all(w, items, sizeof items / sizeof items[0]);
 }
 
-/* what docs/contract-additions.md adds */
+/* the optional keys of the detection */
 static void walk_detection(walk* w) {
   const uint32_t n = w->shape->joints, options = w->shape->options;
   const uint32_t innovation = options & MODEL_DETECTS_BY_INNOVATION ? 1 : 0;

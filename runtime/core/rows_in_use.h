@@ -1,5 +1,5 @@
-/* The rows of R whose tendons tell the joint angles: all but those of failing sensors (docs/contract-additions.md,
- * Sensor faults). */
+/* The rows of R whose tendons tell the joint angles: all but those of failing sensors
+ * (docs/reference/semantics.md#sensor-faults). */
 #ifndef TENDONFMU_ROWS_IN_USE_H
 #define TENDONFMU_ROWS_IN_USE_H
 

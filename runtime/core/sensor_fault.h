@@ -1,5 +1,5 @@
 /* Sensors that fail: a tendon force or position that contradicts the spring between them, as the other tendons (or the
- * measured angles) have it (docs/contract-additions.md, Sensor faults). */
+ * measured angles) have it (docs/reference/semantics.md#sensor-faults). */
 #ifndef TENDONFMU_SENSOR_FAULT_H
 #define TENDONFMU_SENSOR_FAULT_H
 

@@ -1,5 +1,5 @@
 /* What the bias has not learned yet: how friction stood before the first sample shows in the residual as motion turns
- * it over (docs/contract-additions.md, bias.start_share). */
+ * it over (docs/reference/semantics.md#unlearned-start). */
 #ifndef TENDONFMU_UNLEARNED_FRICTION_H
 #define TENDONFMU_UNLEARNED_FRICTION_H
 

@@ -37,8 +37,7 @@ std::optional<double> default_value(const model_item& item, std::uint32_t offset
     case ITEM_REST_CREEP:
     case ITEM_UNCERTAINTY: return 0.0; /* joints with fewer directions than others */
     case ITEM_JUMP_TIME: return 0.06;
-    case ITEM_JERK_DENSITY:
-      return 1.0; /* a hand: least friction error on two families of fingers, docs/contract-additions.md */
+    case ITEM_JERK_DENSITY: return 1.0; /* a hand: least friction error on two families of fingers */
     case ITEM_UNCERTAINTY_LEVEL: return 3.0;
     case ITEM_RELEASE_RATIO: return 1.0;
     case ITEM_DRIFT_QUICK_TIME: return 0.3;     /* longer than a stroke's edge, shorter than a slow load */

@@ -1,7 +1,7 @@
 /* Cost, gradient and information of the model over recordings: one pass over all samples, on all cores, without ever
  * holding the Jacobian.
  *
- * The bias is a random walk seen through white noise, so the innovations of its filter (docs/model.md, step 6) are
+ * The bias is a random walk seen through white noise, so the innovations of its filter (step 6) are
  * white, and they are linear in the sensitivities: ν = ∂T/∂z − s, s what the bias holds of it. A row of ν has nearly
  * all unknowns in it, a row of ∂T/∂z few. Over a block of samples
  *

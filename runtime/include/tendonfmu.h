@@ -17,8 +17,7 @@
  *              says why in one line in tendonfmu_last_error().
  *   Host       Floating-point mode, locale, signals and working directory are neither changed nor relied on.
  *
- * The equations are those of the paper; the sample semantics those of docs/model.md and, where a description has keys
- * for detection, docs/contract-additions.md. */
+ * The equations are those of the paper; the rules of a sample are docs/reference/semantics.md. */
 #ifndef TENDONFMU_H
 #define TENDONFMU_H
 
@@ -122,7 +121,7 @@ typedef struct tendonfmu_outputs {
   unsigned char* joint_contact; /* [n] */
   unsigned char* contact;       /* [1] any of joint_contact */
   unsigned char* slack;         /* [m] a modelled tendon force came out negative */
-  /* docs/contract-additions.md */
+  /* docs/reference/semantics.md#outputs */
   double* compensated_torque_std; /* [n] N·m   standard deviation of compensated_torque */
   double* residual;               /* [n] N·m   τ − T_eff before the bias is updated */
   double* innovation;             /* [n] N·m   what the residual has of late beyond its slow part; 0 by "threshold" */

@@ -1,4 +1,4 @@
-// A finger with every key of docs/contract-additions.md: kernels, states, refused samples, parameters in contact.
+// A finger with every optional key of the detection: kernels, states, refused samples, parameters in contact.
 #include <gtest/gtest.h>
 
 #include <algorithm>

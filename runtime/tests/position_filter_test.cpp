@@ -1,4 +1,4 @@
-// The position filter of docs/contract-additions.md, step 1: what it estimates, its gate, its memory, its derivatives.
+// docs/reference/semantics.md#position-filter: what it estimates, its gate, its memory, its derivatives.
 #include <gtest/gtest.h>
 
 #include <cmath>

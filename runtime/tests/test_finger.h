@@ -35,7 +35,7 @@ inline const char* const json = R"({
   "contact": {"threshold": [0.04, 0.04], "threshold_per_force": [1e-4, 1e-4]},
   "extensions": [{"effect": "cover_hardening", "joint": 1, "stiffness": 0.01}]})";
 
-// The same with every key of docs/contract-additions.md. Two joints in contact by turns, released after a while; what
+// The same with every optional key of the detection. Two joints in contact by turns, released after a while; what
 // is not known of the friction differs between them.
 inline std::string every_key() {
   std::string text = json;
@@ -64,7 +64,7 @@ inline std::string watched_sensors() {
   return text;
 }
 
-// And with a position filter and every effect of docs/extensions.md, at every kind of place.
+// And with a position filter and every effect of `extensions`, at every kind of place.
 inline std::string every_effect() {
   std::string text = every_key();
   const std::string name = "\"name\": \"test\",";

@@ -1,7 +1,8 @@
 """Bounds of contact detection that free motion stays within: their shape by tails, their level by a number of alarms.
 
-A bound of joint j is base_j + per_force_j·f + c_H·H_j + c_J·J_j (contract-additions, step 5). Of all that let no more
-alarms through than allowed, the one that the lightest push passes is the most sensitive (`least_load`).
+A bound of joint j is base_j + per_force_j·f + c_H·H_j + c_J·J_j (docs/reference/semantics.md#contact-detector).
+Of all that let no more alarms through than allowed, the one that the lightest push passes is the most sensitive
+(`least_load`).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The rule for contact at rest, learned from the rests in free motion (docs/contract-additions.md, contact.rest).
+"""The rule for contact at rest, learned from the rests in free motion (docs/reference/semantics.md#contact-at-rest).
 
 How far a standing motor moves comes from its positions; how much the torques change at rest from the runtime, which
 decides what a rest is. Bounds are fitted to some of the rests and scaled until the others keep the rate.

@@ -22,7 +22,7 @@ Flags = NDArray[np.bool_]
 
 SECOND_SHARE = 4  # the residual, as second line, has every so many'th of the allowed alarms
 _SCALES = np.geomspace(0.15, 3.0, 48)  # of a bound, at which evidence is looked at
-_FASTEST = 10.0  # contract-additions, step 5: growth of g
+_FASTEST = 10.0  # growth of g: docs/reference/semantics.md#contact-detector
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ def _sample_steps(cells: Cells, parts: Sequence[FreePart]) -> tuple[Numbers, Num
 
 
 def _evidence(search: Search, bound: Bound, step: Numbers, force: Numbers, start: Index) -> Signal:
-    """[c] largest g of each cell over all joints, s (contract-additions, step 5)."""
+    """[c] largest g of each cell over all joints, s (docs/reference/semantics.md#contact-detector)."""
     largest = np.zeros(len(search.cells.order))
     for j in range(len(search.signal)):
         whole = bound.base[j] + bound.per_force[j] * force

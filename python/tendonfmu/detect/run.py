@@ -177,8 +177,8 @@ def scaled_detection(data: Mapping[str, Any], factor: float) -> dict[str, Any]:
     """The description with every bound that decides on contact times a factor, as far as its range goes.
 
     These are the thresholds of the torque and of the innovation, with the parts that friction and its uncertainty add,
-    and of the change at rest (docs/contract-additions.md, steps 5a and 5): the whole right side of |r| > threshold, of
-    |y| > B and of |c| > D.
+    and of the change at rest (docs/reference/semantics.md#contact-detector): the whole right side of |r| > threshold,
+    of |y| > B and of |c| > D.
     """
     contact = dict(data["contact"])
     _scale(contact, THRESHOLDS, factor)

@@ -1,4 +1,4 @@
-"""The rule for failing sensors, learned from free motion (docs/contract-additions.md, sensor_fault).
+"""The rule for failing sensors, learned from free motion (docs/reference/semantics.md#sensor-faults).
 
 Resolutions are those of the sensors; the margin is what noise, sampling and springs that are not as described make of
 the difference between each force and its spring, with as much again. The finger as it runs must find no fault.

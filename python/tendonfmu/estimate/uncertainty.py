@@ -1,6 +1,6 @@
 """What a fit does not know of the modelled friction torque, as `contact.uncertainty` has it: at most four directions
 per joint, each a relative error of every part of the joint's friction (tendons, joint friction, joint load friction,
-cover; docs/contract-additions.md, step 4a).
+cover; docs/reference/semantics.md#uncertainty).
 
 With g the derivative of T_j by the unknowns and C their covariance, T_j has the variance gᵀ C g. C is the fit's, with
 the information of the data shrunk by as much as the residuals vary more than white noise (`fit_scores`).

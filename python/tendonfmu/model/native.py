@@ -165,12 +165,12 @@ class Finger:
         recording: `time` [N] (s), `tendon_force` and `tendon_position` [N, m], `joint_position` and `joint_velocity`
             [N, n]; those that the kinematics source does not use may be left out.
         parts: with `friction_parts` [N, n, m + 3], N·m, what makes each joint's friction (needs contact.uncertainty).
-        Returns [N, n], `slack` [N, m], `contact` [N]; flags are bool. Beyond these, as docs/contract-additions.md
-        has them: `compensated_torque_std`, `residual`, `innovation`, `stuck_friction`, `friction_jump`, `drift`,
-        N·m. With links also `fingertip_force` and `fingertip_force_std` [N, 3] (N, base frame), and [N]
-        `fingertip_force_observable`, `fingertip_force_misfit`, `contact_link`. With contact.rest also `contact_change`
-        [N, n] (N·m) and `contact_at_rest` [N]. With sensor_fault also `sensor_fault` [N, m] and `contact_observable`
-        [N].
+        Returns [N, n], `slack` [N, m], `contact` [N]; flags are bool. Beyond these
+        `compensated_torque_std`, `residual`, `innovation`, `stuck_friction`, `friction_jump`, `drift`,
+        N·m (docs/reference/semantics.md#outputs). With links also `fingertip_force` and `fingertip_force_std` [N, 3]
+        (N, base frame), and [N] `fingertip_force_observable`, `fingertip_force_misfit`, `contact_link`. With
+        contact.rest also `contact_change` [N, n] (N·m) and `contact_at_rest` [N]. With sensor_fault also
+        `sensor_fault` [N, m] and `contact_observable` [N].
         A later call goes on where this one ended.
         """
         inputs = [

@@ -9,7 +9,7 @@ INPUTS = ("tendon_force", "tendon_position", "joint_position", "joint_velocity")
 NUMBERS = ("compensated_torque", "joint_torque", "friction_torque", "bias_torque", "joint_angle", "joint_speed")
 FLAGS = ("joint_contact", "contact", "slack")
 
-# beyond the contract (docs/contract-additions.md); the FMU has the first one only
+# for those who tune (docs/reference/semantics.md#outputs); the FMU has the first one only
 OPTIONAL_NUMBERS = ("compensated_torque_std",)  # older FMUs have none
 DETECTION = ("compensated_torque_std", "residual", "innovation", "stuck_friction", "friction_jump", "drift")
 

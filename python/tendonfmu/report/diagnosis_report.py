@@ -34,7 +34,7 @@ DIGITS = 6  # of what is drawn
 
 
 def build_report(found: Diagnosis, files: Sequence[str] = ()) -> dict[str, Any]:
-    """The whole report: the contract's keys first. files: names of what stands beside it."""
+    """The whole report: the keys of docs/reference/semantics.md#diagnosis-report first. files: names of other files."""
     report = {
         "format": FORMAT,
         "kind": found.kind,

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 Numbers = NDArray[np.float64]
 
-MOST = 4  # directions; docs/contract-additions.md
+MOST = 4  # directions; docs/reference/semantics.md#uncertainty
 _UNSEEN = 1e-12  # of the largest second moment: a combination of parts that the motion does not show
 _NOTHING = 1e-12  # of the variance: a direction that says no more is left out
 _ROUNDS = 40  # of the least squares

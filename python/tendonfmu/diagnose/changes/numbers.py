@@ -32,7 +32,7 @@ _OF_NUMBER = {"viscous": "viscous_friction", "static": "stribeck", "stribeck_vel
 
 @dataclass(frozen=True)
 class Number:
-    """One unknown of a description's fit. effect: of the contract. side: of its law, 0 where both are one. index: among
+    """One unknown of a description's fit. effect: its name. side: of its law, 0 where both are one. index: among
     the unknowns. value: in the unit of the unknown."""
 
     effect: str

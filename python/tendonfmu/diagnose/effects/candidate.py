@@ -139,7 +139,7 @@ def _present(column: Column, magnitude: float) -> float:
 class Candidate:
     """One effect of docs/diagnose.md.
 
-    name: of the contract. title: a few plain words. explanation: what it is physically, and what to look at on the
+    name: of the effect. title: a few plain words. explanation: what it is physically, and what to look at on the
     hand. sign: expected one of its magnitudes, +1, −1 or 0 for either. excited_by: the motion or load that shows it.
     confused_with: effects that look alike in many recordings. coordinate: what its evidence is drawn over: "velocity",
     "angle", "force", "time", "travel", "acceleration" or "load". unit: of its main number. number: what that is called.

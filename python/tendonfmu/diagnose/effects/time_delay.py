@@ -11,8 +11,8 @@ from tendonfmu.diagnose.effects.friction_law_places import without_rows
 from tendonfmu.diagnose.span import Span
 
 NAME = "time_delay"
-_DELAYS = (0.002, 0.01)  # s; larger ones are scanned for (diagnose/starting_point.py)
-_LONGEST = 0.05  # s; docs/extensions.md
+_DELAYS = (0.002, 0.01)  # s; larger ones are scanned for (starting_point.py)
+_LONGEST = 0.05  # s; docs/reference/semantics.md#extensions
 _LEAST_STEPS, _MOST_STEPS = 0.5, 60.0  # samples: what can be told, and what the model remembers
 
 
