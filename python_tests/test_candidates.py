@@ -27,7 +27,7 @@ from tendonfmu.model.balance import balanced_forces, moment_arms
 from tendonfmu.model.description import FingerDescription
 from tendonfmu.recordings.prepared import FitRecording, Held, prepare
 from tendonfmu.recordings.recording import Recording
-from tendonfmu.statistics.block_averages import SampleBlocks, BlockSums, regular_blocks
+from tendonfmu.statistics.block_averages import BlockSums, SampleBlocks, regular_blocks
 
 Numbers = NDArray[np.float64]
 Data = dict[str, Any]
@@ -118,7 +118,8 @@ class Case:
         shortened[1][400:500] = -1
         kept = np.unique(np.concatenate(shortened))
         number = {int(old): new for new, old in enumerate(kept[kept >= 0])} | {-1: -1}
-        self.blocks = SampleBlocks(tuple(np.array([number[int(b)] for b in each]) for each in shortened), len(number) - 1)
+        numbered = tuple(np.array([number[int(b)] for b in each]) for each in shortened)
+        self.blocks = SampleBlocks(numbered, len(number) - 1)
         self.span: Span = span_of(self.data, self.recordings)
         self.columns: CandidateColumns = candidate_columns(self.data, self.recordings, self.blocks, span=self.span)
 

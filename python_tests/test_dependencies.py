@@ -16,9 +16,9 @@ import pytest
 
 from fmu_binary import FINGER
 from random_fingers import random_case
-from tendonfmu.model.output_dependencies import Dependencies, dependencies, structure_of
 from tendonfmu.model.description import read_finger
 from tendonfmu.model.native import FLAGS, INPUTS, NUMBERS, Finger
+from tendonfmu.model.output_dependencies import Dependencies, dependencies, structure_of
 
 SEEDS = range(30)
 INDEX_FINGER = Path(__file__).parents[1] / "examples" / "fingers" / "index_finger.json"

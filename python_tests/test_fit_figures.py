@@ -14,9 +14,9 @@ from matplotlib.image import imread
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
 from fit_pictures import index_finger, internal_values, made_up_picture, made_up_unknowns
+from tendonfmu.drawing.panel_data import Curve, MatrixPanel, Panel, Sheet
 from tendonfmu.drawing.panel_styles import STYLES, size_of
 from tendonfmu.drawing.panels import draw_panel, png, write_sheet
-from tendonfmu.drawing.panel_data import Curve, MatrixPanel, Panel, Sheet
 from tendonfmu.estimate.laws import CONFIDENCE, LawBands
 from tendonfmu.estimate.picture import FitPicture
 from tendonfmu.model import native

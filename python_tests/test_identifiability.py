@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from excite_fingers import INDEX, SMALL, SMALL_RANGES
-from tendonfmu.estimate.identifiability import LIMIT
 from tendonfmu.estimate.fisher_information import information, noise_of, sensitivities, unknowns
+from tendonfmu.estimate.identifiability import LIMIT
 from tendonfmu.excite.excitation import Plan, plan_excitation
 from tendonfmu.excite.tension_plan import Variation
 from tendonfmu.excite.training_motion import as_array, excite, find_ranges, read_subject, report

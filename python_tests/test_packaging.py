@@ -25,8 +25,8 @@ from random_fingers import random_case, random_finger
 from tendonfmu.errors import InputError
 from tendonfmu.fmu.packaging import build_fmu, model_identifier
 from tendonfmu.model import native
-from tendonfmu.model.output_dependencies import dependencies, structure_of
 from tendonfmu.model.description import read_finger
+from tendonfmu.model.output_dependencies import dependencies, structure_of
 
 INDEX_FINGER = Path(__file__).parents[1] / "examples" / "fingers" / "index_finger.json"
 LAW = {"static": 0.03, "coulomb": 0.02, "stribeck_velocity": 0.005}

@@ -16,7 +16,7 @@ from tendonfmu.diagnose.experiments.discrimination import performed_of
 
 
 def perform_experiment(hand: Hand, motion: Mapping[str, Any], seed: int) -> Made:
-    """A recording of this hand that carries out a motion of `diagnosis_result.Experiment` or `Invisible`."""
+    """A recording of this hand that carries out a motion of `diagnose.result.Experiment` or `Invisible`."""
     finger = read_finger(hand.truth)
     _, plan = performed_of(hand.nominal, motion, hand.rate)
     encoders = plan.position

@@ -1,7 +1,7 @@
 """What the extended model means for contact detection: both models tuned alike on free motion, both scored on labels.
 
 The thresholds of each are the lowest that keep the same rate of false alarms in the same free motion
-(`detection_tuning.ContactTuning`); events, false alarms and delays are counted by `detection_score`.
+(`detect.tuning.ContactTuning`); events, false alarms and delays are counted by `detect.counting`.
 """
 
 from __future__ import annotations

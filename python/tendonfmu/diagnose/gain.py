@@ -3,8 +3,8 @@
 The residual r is τ less T of eq. (10) and less the bias before it has seen the sample. It is no output of an FMU:
 compensated_torque = (1 − K)·r is what the update leaves of it. So the core runs over the same samples beside it: where
 all outputs of both agree, its r is that of the FMU, and tells how the bias jumped. A known external torque, labelled
-contact and gaps need the bias filter once more, over y − T (`fit_residuals.track`), with the T that the FMU put out; in
-a recording without them that is r of the core again, and both are compared.
+contact and gaps need the bias filter once more, over y − T (`track`), with the T that the FMU put out;
+in a recording without them that is r of the core again, and both are compared.
 """
 
 from __future__ import annotations

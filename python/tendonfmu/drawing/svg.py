@@ -1,4 +1,4 @@
-"""Draws a panel (`fit_sheet.Panel`) as SVG: sharp at any size, and without a plotting library.
+"""Draws a panel (`drawing.panel_data.Panel`) as SVG: sharp at any size, and without a plotting library.
 
 It draws curves, bands, dots and upright bars on linear, logarithmic or stretched axes.
 """

@@ -79,7 +79,7 @@ class FrictionFit(ConstructorArguments):
     holdout: share of time not trained on, evenly spread blocks of `holdout_block` s or less.
     sides: "given", "symmetric" (both sides of every law equal) or "asymmetric" (each on its own).
     only, fix: patterns of the numbers to estimate, or not to; share: "tendons", "pulleys" or patterns of what
-        shares its values. Patterns are those of `fit_structure`; a single one may be a string.
+        shares its values. Patterns are those of `estimate.structure`; a single one may be a string.
     prior: standard deviation known beforehand, in units of each number's expected magnitude; scale: "PATTERN=VALUE",
         expected magnitudes other than the description's own values.
     max_passes: over the data, at most; None: 60 of "batch", 2 of "ekf". tolerance (length of the last step in standard
@@ -91,7 +91,7 @@ class FrictionFit(ConstructorArguments):
     previous: report of an earlier fit, or the description that it wrote: its numbers and their errors are start and
         prior (`previous_fit`), and `prior` is for what it does not have. change: relative standard deviation of what
         may have changed since.
-    start: file of an interrupted fit to go on from. progress: called with a `fit_methods.Progress`; False stops.
+    start: file of an interrupted fit to go on from. progress: called with a `estimate.methods.Progress`; False stops.
 
     After `fit`: description_ (fitted), parameters_ and standard_errors_ (by path), covariance_ [p, p] in their order,
     report_ (JSON of `tendonfmu fit --report`), warnings_, finished_, converged_, n_iter_, cost_, z_, unknowns_.

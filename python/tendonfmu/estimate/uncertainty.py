@@ -3,7 +3,7 @@ per joint, each a relative error of every part of the joint's friction (tendons,
 cover; docs/reference/semantics.md#uncertainty).
 
 With g the derivative of T_j by the unknowns and C their covariance, T_j has the variance gᵀ C g. C is the fit's, with
-the information of the data shrunk by as much as the residuals vary more than white noise (`fit_scores`).
+the information of the data shrunk by as much as the residuals vary more than white noise (`estimate.scores`).
 """
 
 from __future__ import annotations

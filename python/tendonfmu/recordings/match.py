@@ -69,7 +69,7 @@ def belongs(finger: FingerDescription, recordings: Sequence[Recording]) -> list[
 def admit(finger: FingerDescription, recordings: Sequence[Recording]) -> list[str]:
     """Before a fit: raises InputError for a recording that does not belong to the finger, returns the warnings' lines.
 
-    Gaps and stuck sensors are left to `fit_recordings.prepare`, which knows which columns are used, and says what
+    Gaps and stuck sensors are left to `recordings.prepared.prepare`, which knows which columns are used, and says what
     becomes of the samples.
     """
     for recording in recordings:

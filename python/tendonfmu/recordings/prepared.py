@@ -125,7 +125,7 @@ class FitRecording:
 def prepare(finger: FingerDescription, recording: Recording, kinematics: int, held: Held) -> FitRecording:
     """Makes a recording ready, and says what of it is left out. Raises InputError where nothing sound can come of it.
 
-    Whether it belongs to the finger, `recording_match.admit` has to say before.
+    Whether it belongs to the finger, `recordings.match.admit` has to say before.
     """
     joints, tendons = len(finger.joint_names), len(finger.tendon_names)
     recording.require(joints, tendons, inputs_used(kinematics, watches_motors(finger.data)))

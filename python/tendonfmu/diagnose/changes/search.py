@@ -1,7 +1,7 @@
 """What is different now: the changes that, put on the model of the reference, lower the error on new recordings.
 
 All recordings together; shared by them: the model's numbers, what it lacks in both, and a background of the motion
-(`change_background`). A hypothesis is free in the new recordings alone: a number that the description has, or a term
+(`background.py`). A hypothesis is free in the new recordings alone: a number that the description has, or a term
 that it lacks. The error is that of held-out parts of the new recordings.
 """
 
