@@ -1,4 +1,5 @@
-// The finger of the figures in docs/performance.md: joints × tendons × working points, every friction term present.
+// The finger of the figures in docs/evidence/performance.md: joints × tendons × working points, every friction term
+// present.
 #pragma once
 
 #include <string>
@@ -8,9 +9,9 @@
 
 namespace bench_finger {
 
-// Which keys of docs/contract-additions.md, or rows of docs/extensions.md, a description has: calibrated: all that
-// `tendonfmu calibrate` writes, presliding apart; torques: three a joint
-// and one a tendon; presliding: one at every place; presliding_filtered: the same with a position filter.
+// Which keys of docs/contract-additions.md, or rows of docs/reference/extensions.md, a description has: calibrated: all
+// that `tendonfmu calibrate` writes, presliding apart; torques: three a joint and one a tendon; presliding: one at
+// every place; presliding_filtered: the same with a position filter.
 enum class Keys {
   paper,
   innovation,

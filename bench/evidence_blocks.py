@@ -1,4 +1,4 @@
-"""Which commands make which table of docs/evidence.md and docs/evidence/: read from the pages themselves.
+"""Which commands make which table of docs/evidence/fit.md and docs/evidence/: read from the pages themselves.
 
 A table is made by the shell block (```sh) of its section: the nearest one above it, else the first one below; a section
 is what a heading of the second level holds. A section without one says "By the commands of [Heading](#heading)"; else
@@ -59,7 +59,7 @@ class _Section:
 
 
 def pages(root: Path = ROOT) -> list[Path]:
-    return [root / "docs" / "evidence.md", *sorted((root / "docs" / "evidence").glob("*.md"))]
+    return [root / "docs" / "evidence" / "fit.md", *sorted((root / "docs" / "evidence").glob("*.md"))]
 
 
 def blocks_of(page: Path) -> list[Block]:

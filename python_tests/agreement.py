@@ -1,4 +1,4 @@
-"""The agreement rule of docs/model.md, taken literally.
+"""The agreement rule of docs/reference/semantics.md, taken literally.
 
 Two implementations agree when, sample by sample and for every output, the difference is at most
 1e-9 * (largest value of that output's series) + 1e-12; for `compensated_torque[j]` the largest value is

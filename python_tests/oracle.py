@@ -1,7 +1,8 @@
-"""Naive numpy implementation of the sample semantics (docs/model.md), used by tests alone.
+"""Naive numpy implementation of the sample semantics (docs/reference/semantics.md), used by tests alone.
 
-Written from the texts (the contract, docs/contract-additions.md, docs/extensions.md, the paper), sharing no code with
-the runtime. It favours reading over speed: one plain loop over samples, and one small object per friction effect.
+Written from the texts (the contract, docs/contract-additions.md, docs/reference/extensions.md, the paper), sharing no
+code with the runtime. It favours reading over speed: one plain loop over samples, and one small object per friction
+effect.
 Indices in this file start at 0; joint 0 is the first joint, so the edge before joint 0 sees the angle q_0 = 0.
 """
 

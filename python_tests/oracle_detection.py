@@ -1,4 +1,4 @@
-"""The oracle's detector: steps 4a to 7 of docs/contract-additions.md, and the contact rule of docs/model.md.
+"""The oracle's detector: steps 4a to 7 of docs/contract-additions.md, and contact by docs/reference/semantics.md.
 
 Part of the oracle (see oracle.py): naive, for tests alone, sharing no code with the runtime. Joints are counted from 0.
 """

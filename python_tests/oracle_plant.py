@@ -1,7 +1,8 @@
 """Naive numpy twin of the simulated finger's right-hand side, used by tests alone.
 
-Written from the equations (issue 3's design, docs/rig.md), sharing no code with runtime/plant: the mass matrix comes
-from the Jacobians of the centres of mass, the velocity terms from Christoffel symbols whose derivatives are complex
+Written from the equations (issue 3's design, docs/reference/rig.md), sharing no code with runtime/plant: the mass
+matrix comes from the Jacobians of the centres of mass, the velocity terms from Christoffel symbols whose derivatives
+are complex
 steps, and every friction contact is one plain object. It favours reading over speed. Indices in this file start at 0.
 
 State: q[n], q'[n], motor x[m], motor x'[m], bristles, heat, motor work, friction work, damping work, push work.

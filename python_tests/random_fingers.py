@@ -1,4 +1,4 @@
-"""Seeded random fingers and recordings that take every branch of docs/model.md and of its additions for detection.
+"""Seeded random fingers and recordings that take every branch of docs/reference/semantics.md.
 
 The recordings are not a simulation: motions and forces are chosen so that the rules are exercised
 (jumps, slow reversals, rests held to the last bit, pushes, slack), and they share no code with any law.
@@ -126,7 +126,7 @@ def random_bias(rng: np.random.Generator) -> Description:
 
 
 def random_finger(seed: int) -> Description:
-    """A valid description (docs/finger_description.md) with 1-4 joints and up to 8 tendons."""
+    """A valid description (docs/reference/finger_description.md) with 1-4 joints and up to 8 tendons."""
     rng = np.random.default_rng([seed, 1])
     n = int(rng.integers(1, 5))
     m = int(rng.integers(n, 9))
@@ -366,7 +366,7 @@ def random_detection(seed: int, finger: Description) -> Description:
 
 
 def random_extended(seed: int, finger: Description) -> Description:
-    """The finger with any of the extensions of docs/extensions.md, a few of them with axes of the joints."""
+    """The finger with any of the extensions of docs/reference/extensions.md, a few of them with axes of the joints."""
     rng = np.random.default_rng([seed, 7])
     joints, tendons = len(finger["joints"]), len(finger["tendons"])
     thresholds = all(finger.get("velocity_threshold", {}).get(key) != 0.0 for key in ("tendon", "joint"))
@@ -390,7 +390,8 @@ def random_case(
 ) -> tuple[Description, Recording]:
     """A finger and its recording; about a third begin under load, with `bias.initial_torque` near it.
 
-    detection: with any subset of the keys of docs/contract-additions.md. extensions: with rows of docs/extensions.md.
+    detection: with any subset of the keys of docs/contract-additions.md. extensions: with rows of
+    docs/reference/extensions.md.
     """
     rng = np.random.default_rng([seed, 3])
     description = random_finger(seed)

@@ -1,4 +1,4 @@
-"""Every table of docs/evidence.md and docs/evidence/ has a command that makes it, and one command runs them all."""
+"""Every table of docs/evidence/fit.md and docs/evidence/ has a command that makes it, and one command runs them all."""
 
 from __future__ import annotations
 

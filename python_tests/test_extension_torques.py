@@ -1,4 +1,4 @@
-"""Torques of `extensions` in a running finger, against the text of docs/extensions.md in numpy (step 4)."""
+"""Torques of `extensions` in a running finger, against the text of docs/reference/extensions.md in numpy (step 4)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Machines with one joint: what `convert table` makes of their logs; the example and docs/one_joint.md to the end."""
+"""Machines with one joint: what `convert table` makes of their logs; docs/reference/commands/convert.md to the end."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from tendonfmu.tables import read_table, write_table
 
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLE = ROOT / "examples" / "one_joint"
-PAGE = (ROOT / "docs" / "one_joint.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "reference" / "commands" / "convert.md").read_text(encoding="utf-8")
 DATA = Path(os.environ.get("TENDONFMU_DATA", ROOT.parent / "shared" / "data")) / "emps"
 
 COULOMB, VISCOUS, INERTIA, OFFSET = 0.8, 0.3, 0.05, 0.1

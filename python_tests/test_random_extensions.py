@@ -1,4 +1,4 @@
-"""Random fingers with random `extensions` (docs/extensions.md): every implementation agrees with the oracle."""
+"""Random fingers with random `extensions` (docs/reference/extensions.md): all agree with the oracle."""
 
 from __future__ import annotations
 

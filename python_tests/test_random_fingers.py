@@ -1,4 +1,4 @@
-"""The random fingers take every branch of docs/model.md and its additions; every runner agrees with the oracle."""
+"""The random fingers take every branch of docs/reference/semantics.md; every runner agrees with the oracle."""
 
 from __future__ import annotations
 

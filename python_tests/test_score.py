@@ -127,7 +127,7 @@ def delays_by_hand(time: NDArray[Any], label: NDArray[Any], contact: NDArray[Any
 
 @pytest.mark.parametrize("path", [PUSHES, FREE_X4])
 def test_the_residual_is_what_the_decision_was_made_of(path: Path) -> None:
-    """joint_contact is |r| > threshold (docs/model.md, contact), so r is right to within what decides."""
+    """joint_contact is |r| > threshold (docs/reference/semantics.md, contact), so r is right to within what decides."""
     subject = read_subject(INDEX)
     track = run_track(subject, read_recording(path), 1, None)
     contact, force = subject.finger.data["contact"], np.abs(track.recording.groups["tendon_force"]).mean(axis=1)
@@ -307,7 +307,7 @@ def test_files_that_cannot_be(call: Call, pushes: Table) -> None:
 
 
 def test_every_option_is_on_the_page_and_its_example_is_what_comes_out(call: Call, demo: tuple[Path, str, str]) -> None:
-    page = (ROOT / "docs" / "score.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "reference" / "commands" / "score.md").read_text(encoding="utf-8")
     options = set(re.findall(r"--[a-z][a-z-]+", call("score", "--help").out)) - {"--help"}
     assert len(options) >= 6 and {option for option in options if option not in page} == {"--output"}
     report = read_report(demo[0] / "s.json")

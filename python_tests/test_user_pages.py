@@ -1,4 +1,4 @@
-"""docs/finger_description.md and docs/recording.md: their examples run, and their tables say what the schema says."""
+"""The guide and the reference pages of formats: their examples run, their tables say what the schema says."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from tendonfmu.description import read_finger
 from tendonfmu.recording import GROUPS, read_recording
 from tendonfmu.tables import read_table
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
+DOCS = Path(__file__).resolve().parent.parent / "docs" / "reference"
 FINGER_PAGE = (DOCS / "finger_description.md").read_text(encoding="utf-8")
-RECORDING_PAGE = (DOCS / "recording.md").read_text(encoding="utf-8")
+RECORDING_PAGE = (DOCS / "recordings.md").read_text(encoding="utf-8")
 EXTENSIONS_PAGE = (DOCS / "extensions.md").read_text(encoding="utf-8")
 SCHEMA = json.loads((files("tendonfmu") / "schema" / "finger.schema.json").read_text(encoding="utf-8"))
 EFFECTS = {row["$ref"].rsplit("/", 1)[1] for row in SCHEMA["properties"]["extensions"]["items"]["oneOf"]}

@@ -27,7 +27,7 @@ Single = NDArray[np.float32]
 Progress = Callable[[int, int], None]
 Worth = Callable[[Candidate, Place, Mapping[str, float]], bool]
 
-_LARGEST = 1e9  # of a non-linear number in any unit: docs/extensions.md
+_LARGEST = 1e9  # of a non-linear number in any unit: docs/reference/extensions.md
 _MOST_MEMORY = 8.0  # GB, of all columns
 
 

@@ -29,7 +29,7 @@ Stretch = tuple[int, Numbers, Numbers]  # first sample; derivatives of T and of 
 Direction = Mapping[str, float]  # path -> how much of it; of a description that may be coarser than the merged one
 Watch = Callable[[int], None]  # samples that were looked at since the last call
 
-MOST_ROWS = 1024  # of `extensions`; docs/extensions.md
+MOST_ROWS = 1024  # of `extensions`; docs/reference/extensions.md
 _MOST_NUMBERS = 1500  # of a pass: its derivatives of a stretch of samples stay in tens of megabytes
 _BYTES = 3e7  # of derivatives at a time: more does not stay near the processor
 _STRETCH, _LONGEST = 400, 2500  # samples at a time

@@ -1,4 +1,4 @@
-"""The numbers of `extensions` (docs/extensions.md): their names, and how large each is expected to be."""
+"""The numbers of `extensions` (docs/reference/extensions.md): their names, and how large each is expected to be."""
 
 from __future__ import annotations
 

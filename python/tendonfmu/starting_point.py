@@ -28,7 +28,7 @@ from tendonfmu.held_out_folds import make_folds
 
 Numbers = NDArray[np.float64]
 
-LONGEST_DELAY = 0.05  # s either way; docs/extensions.md
+LONGEST_DELAY = 0.05  # s either way; docs/reference/extensions.md
 FINE = 0.001  # s
 LARGE = 0.008  # s: smaller ones compete with other causes, by their derivative
 CLEAR_GAIN = 0.1  # of the rms that a delay has to take away, to be a start: what else is missing looks like some delay

@@ -1,7 +1,7 @@
 """Friction of a tendon finger in numpy, over all samples at once: what the matched rig is made of.
 
-Written from the texts alone (the paper's equations, contract section 5, docs/extensions.md); it shares no code with
-the runtime, the package or the oracle. Indices start at 0 here. A description is read as plain JSON data.
+Written from the texts alone (the paper's equations, contract section 5, docs/reference/extensions.md); it shares no
+code with the runtime, the package or the oracle. Indices start at 0 here. A description is read as plain JSON data.
 
 Where the oracle walks from sample to sample, this file works on whole series: what moves and what sticks follows from
 the velocities alone, so that every bias jump can be placed at once.
@@ -91,7 +91,7 @@ def contacts_of(velocity: Array, threshold: float) -> Contacts:
 
 
 def build_up(velocity: Array, time: Array, distance: float) -> Array:
-    """ζ of docs/extensions.md, closed over every stretch of one direction.
+    """ζ of docs/reference/extensions.md, closed over every stretch of one direction.
 
     1 - s·ζ decays by exp(-travel/distance) within such a stretch, so only the turns need a loop.
     """
@@ -198,7 +198,7 @@ class Values:
 
 
 def values_of(effect: Effect, motion: Motion, finger: Finger) -> Values:
-    """Step 2 of contract section 5 (with `entry_load`) over the whole series, and docs/extensions.md, presliding."""
+    """Step 2 of contract section 5 (with `entry_load`) over the series, presliding (docs/reference/extensions.md)."""
     v = velocity_seen(effect, motion)
     threshold = finger.tendon_threshold if effect.kind in ("edge", "pulley") else finger.joint_threshold
     found = contacts_of(v, threshold)

@@ -11,7 +11,8 @@ that act on the finger; encoders are quantised, force sensors have a little whit
 
 "Matched": friction follows the velocity of the true angle (the nominal has no velocity filter, whose lag would be a
 delay of every recording), at rest the torque stays what it was (contract-additions, `entry_load`, forget_rate 0), or
-every effect has presliding in the form of docs/extensions.md. What remains to the tool is noise, wander, quantisation
+every effect has presliding in the form of docs/reference/extensions.md. What remains to the tool is noise, wander,
+quantisation
 and what was hidden.
 """
 

@@ -38,7 +38,7 @@ def group(columns: dict[str, Array], name: str) -> Array:
 
 
 def kinematics(hand: Hand, finger: Finger, columns: dict[str, Array]) -> tuple[Motion, Array]:
-    """Joint angles and velocities (docs/model.md) by the sensors of this hand, and the measured forces [N, m]."""
+    """Joint angles and velocities by the sensors of this hand, measured forces [N, m] (docs/reference/semantics.md)."""
     force, time = group(columns, "tendon_force"), columns["time"]
     if hand.source == 1:
         positions = group(columns, "tendon_position") - force / finger.stiffness

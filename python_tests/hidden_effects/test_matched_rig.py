@@ -71,7 +71,7 @@ ROWS = {
 
 @pytest.mark.parametrize("effect", ROWS)
 def test_the_row_of_the_extension_explains_the_effect(effect: str) -> None:
-    """docs/extensions.md and the rig's own physics mean the same: the row takes the hidden torque away."""
+    """docs/reference/extensions.md and the rig's own physics mean the same: the row takes the hidden torque away."""
     number, rest = ROWS[effect]
     hand = replace(random_hand(21, 2, rate=500.0), source=3)  # velocities as they are: no sample between two decisions
     hand, label = hide(hand, effect, None, seed=3, motion=4, seconds=10.0)

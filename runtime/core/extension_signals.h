@@ -1,5 +1,5 @@
 /* What the effects beyond the paper do to the signals of a sample, and the derivatives of all that follows by their
- * numbers (docs/extensions.md). */
+ * numbers (docs/reference/extensions.md). */
 #ifndef TENDONFMU_EXTENSION_SIGNALS_H
 #define TENDONFMU_EXTENSION_SIGNALS_H
 

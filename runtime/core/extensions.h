@@ -1,5 +1,5 @@
 /* The effects beyond the paper that a finger carries: what they remember, what they do to signals, friction and torques
- * of a sample (docs/extensions.md). */
+ * of a sample (docs/reference/extensions.md). */
 #ifndef TENDONFMU_EXTENSIONS_H
 #define TENDONFMU_EXTENSIONS_H
 

@@ -205,7 +205,7 @@ HOT_INLINE void begin_tracking(tendonfmu_finger* f, double time, double mean_for
   s->scalar[STATE_CONTACT] = 0.0;
 }
 
-/* steps 4 to 6 (docs/model.md) for every later sample */
+/* steps 4 to 6 (docs/reference/semantics.md) for every later sample */
 HOT_INLINE void track_sample(tendonfmu_finger* f, double time, double step, double mean_force) {
   const finger_state* s = &f->remembered;
   const finger_settings* settings = &f->derived.settings;

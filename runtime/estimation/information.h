@@ -1,9 +1,9 @@
 /* Cost, gradient and information of the model over recordings: one pass over all samples, on all cores, without ever
  * holding the Jacobian.
  *
- * The bias is a random walk seen through white noise, so the innovations of its filter (docs/model.md, step 6) are
- * white, and they are linear in the sensitivities: ν = ∂T/∂z − s, s what the bias holds of it. A row of ν has nearly
- * all unknowns in it, a row of ∂T/∂z few. Over a block of samples
+ * The bias is a random walk seen through white noise, so the innovations of its filter (docs/reference/semantics.md,
+ * step 6) are white, and they are linear in the sensitivities: ν = ∂T/∂z − s, s what the bias holds of it. A row of ν
+ * has nearly all unknowns in it, a row of ∂T/∂z few. Over a block of samples
  *
  *   ν_i = ν⁰_i − c_i·s,   ν⁰ the same with s = 0 at the block's start,   c_i = Π (1 − K)/√S,
  *   Σ ν_i ν_iᵀ = Σ ν'_i ν'_iᵀ + z zᵀ,   u = Σ c_i ν⁰_i, C = Σ c_i², ν'_i = ν⁰_i − c_i·u/C, z = √C·s − u/√C,

@@ -90,7 +90,8 @@ Learner::Learner(const void* image, std::size_t image_size, const std::int32_t* 
   jump_ = measured_ = torque_;
 }
 
-/* R of the bias filter (docs/model.md, step 6); a first sample has no time step, its noise is that of one sample */
+/* R of the bias filter (docs/reference/semantics.md, step 6); a first sample has no time step, its noise is that of one
+ * sample */
 double Learner::noise_of(const tendonfmu_inputs& inputs, double step) const {
   const finger_settings& s = finger_.get()->derived.settings;
   const std::size_t m = finger_.get()->tendons;

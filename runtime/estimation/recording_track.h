@@ -97,7 +97,8 @@ class Recording {
   int source_;
 };
 
-/* What the bias filter (docs/model.md, step 6) does at every sample; the same for all joints and all parameters.
+/* What the bias filter (docs/reference/semantics.md, step 6) does at every sample; the same for all joints and all
+ * parameters.
  */
 struct BiasGains {
   /* stride: only every stride-th sample is looked at, for `stride` of them */

@@ -17,8 +17,8 @@
  *              says why in one line in tendonfmu_last_error().
  *   Host       Floating-point mode, locale, signals and working directory are neither changed nor relied on.
  *
- * The equations are those of the paper; the sample semantics those of docs/model.md and, where a description has keys
- * for detection, docs/contract-additions.md. */
+ * The equations are those of the paper; the sample semantics those of docs/reference/semantics.md and, where a
+ * description has keys for detection, docs/contract-additions.md. */
 #ifndef TENDONFMU_H
 #define TENDONFMU_H
 

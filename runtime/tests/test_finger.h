@@ -64,7 +64,7 @@ inline std::string watched_sensors() {
   return text;
 }
 
-// And with a position filter and every effect of docs/extensions.md, at every kind of place.
+// And with a position filter and every effect of docs/reference/extensions.md, at every kind of place.
 inline std::string every_effect() {
   std::string text = every_key();
   const std::string name = "\"name\": \"test\",";

@@ -1,4 +1,4 @@
-"""A row of the description's `extensions` as a variant: docs/extensions.md has its numbers and what they mean."""
+"""A row of the description's `extensions` as a variant (its numbers: docs/reference/extensions.md)."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from tendonfmu.effects.friction_law_places import without_rows
 
 NAME = "time_delay"
 _DELAYS = (0.002, 0.01)  # s; larger ones are scanned for (starting_point.py)
-_LONGEST = 0.05  # s; docs/extensions.md
+_LONGEST = 0.05  # s; docs/reference/extensions.md
 _LEAST_STEPS, _MOST_STEPS = 0.5, 60.0  # samples: what can be told, and what the model remembers
 
 

@@ -1,4 +1,5 @@
-/* A term beyond the paper: one file each, one row each in effect_table.c (docs/extensions.md has the text they follow).
+/* A term beyond the paper: one file each, one row each in effect_table.c (docs/reference/extensions.md has the text
+ * they follow).
  *
  * A term acts in one of three ways: on the signals before the joint angles are known, on the friction values of some
  * places, or as a torque. It says what it remembers and which numbers it has; the finger does the rest.
@@ -99,7 +100,7 @@ typedef struct effect_grip {
 typedef enum effect_kind { EFFECT_TORQUE, EFFECT_FRICTION, EFFECT_SIGNAL } effect_kind;
 
 typedef struct effect_type {
-  const char* name; /* as in docs/extensions.md */
+  const char* name; /* as in docs/reference/extensions.md */
   uint32_t id;      /* in the model image; never reused */
   effect_kind kind;
   int order; /* of signals: rows act in the order of these, whatever theirs */
