@@ -1,4 +1,5 @@
-// The finger of the figures in docs/performance.md: joints × tendons × working points, every friction term present.
+// The finger of the figures in docs/evidence/performance.md: joints × tendons × working points, every friction term
+// present.
 #pragma once
 
 #include <string>

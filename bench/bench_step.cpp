@@ -1,4 +1,5 @@
-// Time of a step of the C interface, by kernel and size. Counter per_step is the figure of docs/performance.md.
+// Time of a step of the C interface, by kernel and size. Counter per_step is the figure of
+// docs/evidence/performance.md.
 #include <benchmark/benchmark.h>
 
 #include <vector>

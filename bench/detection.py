@@ -1,4 +1,4 @@
-"""How well contact is detected: the campaign on the virtual hand (docs/evidence.md).
+"""How well contact is detected: the campaign on the virtual hand (docs/evidence/fit.md).
 
 300 pushes of 0.1 to 2 N in 30 min at 10, 20 and 40 N of pretension (detection_cases.py), a fit on free motion at low
 pretension, simpler models with the best thresholds each (detection_rivals.py), and the best that could be done with the

@@ -1,4 +1,4 @@
-"""Where detection ends and how it recovers: slow pushes, pushes in stiction, disturbances (docs/evidence.md).
+"""Where detection ends and how it recovers: slow pushes, pushes in stiction, disturbances (docs/evidence/fit.md).
 
 On the virtual index finger (detection_limit_cases.py), any number of descriptions beside one another:
 

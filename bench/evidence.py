@@ -1,4 +1,4 @@
-"""Makes every table of docs/evidence.md and docs/evidence/ again: python bench/evidence.py -o FOLDER
+"""Makes every table of docs/evidence/ again: python bench/evidence.py -o FOLDER
 
 The commands are those of the pages (evidence_blocks.py finds them), run as they stand there; their seeds are in them
 and in the programs that they call. What each prints and writes as Markdown goes to FOLDER/NAME.md, what else it says to
@@ -33,6 +33,7 @@ PACKAGES = {
     "requirements-foreign.lock": ("mujoco",),
     "requirements-diagnosis-peers.lock": ("pysindy", "knockpy"),
     "requirements-fit-peers.lock": ("filterpy",),
+    "requirements-peers.lock": ("pythonfmu",),
 }
 LINKED = ("bench", "docs", "examples", "python_tests")  # that commands of the pages name
 TIMES = "times.json"

@@ -1,4 +1,4 @@
-"""Which commands make which table of docs/evidence.md and docs/evidence/: read from the pages themselves.
+"""Which commands make which table of docs/evidence/: read from the pages themselves.
 
 A table is made by the shell block (```sh) of its section: the nearest one above it, else the first one below; a section
 is what a heading of the second level holds. A section without one says "By the commands of [Heading](#heading)"; else
@@ -21,7 +21,7 @@ UNITS = {"s": 1.0 / 60.0, "min": 1.0, "h": 60.0}
 
 _KNOWN = re.compile(r"# (?:(?P<time>[\d.]+) (?P<unit>s|min|h) of one core|time not measured)(?:; needs (?P<needs>.+))?")
 _HEADING = re.compile(r"(?P<level>#+) (?P<text>.+)")
-_ELSEWHERE = re.compile(r"By the commands of \[(?P<heading>[^\]]+)\]\(#")
+_ELSEWHERE = re.compile(r"[Bb]y the commands of \[(?P<heading>[^\]]+)\]\(#")
 _RULE = re.compile(r"\|[\s:|-]+\|")
 
 
@@ -59,7 +59,8 @@ class _Section:
 
 
 def pages(root: Path = ROOT) -> list[Path]:
-    return [root / "docs" / "evidence.md", *sorted((root / "docs" / "evidence").glob("*.md"))]
+    found = sorted((root / "docs" / "evidence").glob("*.md"))
+    return [page for page in found if page.name != "README.md"]  # README.md is the index
 
 
 def blocks_of(page: Path) -> list[Block]:
@@ -82,10 +83,9 @@ def blocks_of(page: Path) -> list[Block]:
 
 def _block(page: Path, heading: str, line: int, commands: str) -> Block:
     known = _KNOWN.fullmatch(commands.splitlines()[0])
-    own = "" if page.stem == "evidence" else page.stem
     short = re.sub(r"\W+", "_", re.split(r"[:,]", heading)[0].lower())
     return Block(
-        name="_".join(part for part in (own, short) if part),
+        name="_".join(part for part in (page.stem, short.strip("_")) if part),
         page=page,
         section=heading,
         line=line,

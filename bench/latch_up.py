@@ -2,7 +2,7 @@
 
     python bench/latch_up.py
 
-Prints the tables of docs/detection.md, "Each key, tried alone": means over seeds with their 95 % intervals (bootstrap
+Prints the tables of docs/evidence/detection_keys.md: means over seeds with their 95 % intervals (bootstrap
 over the seeds). latch_up_finger.py has the finger, latch_up_contact.py and latch_up_bias.py the simulations; takes two
 minutes.
 """

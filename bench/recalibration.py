@@ -35,7 +35,7 @@ STRUCTURE = Path(__file__).resolve().parents[1] / "examples" / "davinci" / "jaw_
 EVEN = ("00", "02", "04", "06", "08")
 PLANTED = (1.0, 1.3, 0.7)  # times the joint's Coulomb friction
 COULOMB = "joints[1].friction.coulomb"
-PRETENSION = 13.0  # N; as in docs/davinci.md
+PRETENSION = 13.0  # N; as in docs/evidence/davinci.md
 
 
 @dataclass(frozen=True)

@@ -126,7 +126,7 @@ def random_bias(rng: np.random.Generator) -> Description:
 
 
 def random_finger(seed: int) -> Description:
-    """A valid description (docs/finger_description.md) with 1-4 joints and up to 8 tendons."""
+    """A valid description (docs/reference/finger_description.md) with 1-4 joints and up to 8 tendons."""
     rng = np.random.default_rng([seed, 1])
     n = int(rng.integers(1, 5))
     m = int(rng.integers(n, 9))

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = ROOT / "docs" / "clients"
+PAGES = ROOT / "docs" / "reference" / "clients"
 REFERENCE = Path(__file__).resolve().parent / "reference"
 CLIENTS = ["fmpy", "omsimulator", "simulink", "dymola"]
 

@@ -1,4 +1,4 @@
-"""examples/davinci against the recordings, by the commands of docs/davinci.md.
+"""examples/davinci against the recordings, by the commands of docs/evidence/davinci.md.
 
 Needs the recordings in ../shared/data or $TENDONFMU_DATA.
 """

@@ -1,4 +1,4 @@
-"""`tendonfmu fit` on the da Vinci recordings, by the commands of docs/evidence.md: even loads train, odd ones test.
+"""`tendonfmu fit` on the da Vinci recordings, by the commands of docs/evidence/fit.md: even loads train, odd ones test.
 
 Needs the recordings in ../shared/data or $TENDONFMU_DATA.
 """

@@ -31,7 +31,8 @@ from tendonfmu.recordings.recording import Recording
 from tendonfmu.report.diagnosis_files import write_diagnosis
 from tendonfmu.tasks.phases import PhaseState
 
-PAGE = (Path(__file__).resolve().parents[1] / "docs" / "diagnose.md").read_text(encoding="utf-8")
+COMMANDS = Path(__file__).resolve().parents[1] / "docs" / "reference" / "commands"
+PAGE = (COMMANDS / "diagnose.md").read_text(encoding="utf-8")
 NAMED = {"diagnosis.html", "diagnosis.json", "extended.json", "extended.fmu", "nominal.json"}
 
 Called = list[tuple[Any, ...]]
@@ -198,7 +199,7 @@ def test_options_and_effects_are_on_the_page(call: Call) -> None:
     assert {option for option in options if option not in PAGE} == {"--output"}
     rows = [f"| `{each.name}` | {each.title} | {each.excited_by} |" for each in CANDIDATES]
     missing = [row for row in rows if row not in PAGE]
-    assert missing == [], "docs/diagnose.md, The effects: \n" + "\n".join(rows)
+    assert missing == [], "docs/reference/commands/diagnose.md, The effects: \n" + "\n".join(rows)
 
 
 # --- the next experiment ----------------------------------------------------------------------------------------------

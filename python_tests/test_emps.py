@@ -295,7 +295,7 @@ def test_the_script_finds_the_mass_too() -> None:
     script = [sys.executable, str(EXAMPLE / "fit_emps.py")]
     done = subprocess.run(script, capture_output=True, text=True, env=environment)
     assert done.returncode == 0, done.stderr
-    page = (ROOT / "docs" / "evidence.md").read_text(encoding="utf-8").replace("**", "")
+    page = (ROOT / "docs" / "evidence" / "fit.md").read_text(encoding="utf-8").replace("**", "")
     rows = [line for line in done.stdout.splitlines() if line.startswith(("| all fitted |", "| at 1 kHz |"))]
     assert len(rows) == 4 and [row for row in rows if row not in page] == []
     symmetric, asymmetric = (

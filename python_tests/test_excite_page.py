@@ -1,4 +1,4 @@
-"""docs/excite.md: its commands exist as it says, and its example gives the motion."""
+"""docs/reference/commands/excite.md: its commands exist as it says, and its example gives the motion."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tendonfmu.excite.training_motion import as_array, find_ranges, read_subject
 from tendonfmu.statistics.quintic import evaluate
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = (ROOT / "docs" / "excite.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "reference" / "commands" / "excite.md").read_text(encoding="utf-8")
 INDEX = ROOT / "examples" / "fingers" / "index_finger.json"
 
 

@@ -66,7 +66,7 @@ def test_the_report_is_as_its_schema_says(call: Call, files: tuple[Path, Path]) 
 
 
 def test_every_option_is_on_the_page(call: Call) -> None:
-    page = (ROOT / "docs" / "fit.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "reference" / "commands" / "fit.md").read_text(encoding="utf-8")
     shown = call("fit", "--help").out
     options = set(re.findall(r"--[a-z][a-z-]+", shown)) - {"--help"}
     assert len(options) > 15

@@ -1,4 +1,4 @@
-"""A loose guard of the fit's speed: a tenth of what docs/performance.md says, in CPU time: a busy machine passes.
+"""A loose guard of the fit's speed: a tenth of what docs/evidence/performance.md says, in CPU time.
 
 The figures themselves, beside peers: bench/compare_fit.py.
 """

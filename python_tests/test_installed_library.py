@@ -236,7 +236,7 @@ def test_the_program_of_the_page_learns_what_the_command_does(prefix: Path, tmp_
     pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: the package is built without Eigen")
     from tendonfmu.estimate.fitting import FrictionFit
 
-    page = (ROOT / "docs" / "fit.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "reference" / "commands" / "fit.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"```c\n(.*?)```", page, re.DOTALL)
     (tmp_path / "learn.c").write_text(code, encoding="utf-8")
     (tmp_path / "finger.json").write_text(json.dumps(moved_start()), encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Each key against latch-up does what docs/detection.md says it gains, and costs what it says (bench/latch_up.py).
+"""Each key against latch-up gains and costs what docs/evidence/detection_keys.md says (bench/latch_up.py).
 
 A few seeds and short recordings; the margins are several times the spread over the seeds.
 """

@@ -1,4 +1,4 @@
-"""Machines with one joint: what `convert table` makes of their logs; the example and docs/one_joint.md to the end."""
+"""Machines with one joint: what `convert table` makes of their logs; docs/reference/commands/convert.md to the end."""
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ from tendonfmu.recordings.converters.table import convert_table
 
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLE = ROOT / "examples" / "one_joint"
-PAGE = (ROOT / "docs" / "one_joint.md").read_text(encoding="utf-8")
+MEASURED = (ROOT / "docs" / "evidence" / "one_joint.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "reference" / "commands" / "convert.md").read_text(encoding="utf-8")
 DATA = Path(os.environ.get("TENDONFMU_DATA", ROOT.parent / "shared" / "data")) / "emps"
 
 COULOMB, VISCOUS, INERTIA, OFFSET = 0.8, 0.3, 0.05, 0.1
@@ -214,11 +215,12 @@ def test_the_page_names_every_key_and_unit() -> None:
 @pytest.mark.skipif(not DATA.is_dir(), reason="SKIPPED: no EMPS data")
 def test_the_measured_machine_of_the_page(call: Call, tmp_path: Path) -> None:
     """Its own lines: half against half nothing has changed; 2 N put in by hand are found, to 10 %."""
-    script = blocks("python")[0].replace("../shared/data/emps", DATA.as_posix())
-    subprocess.run([sys.executable, "-c", script], cwd=tmp_path, check=True)
-    (tmp_path / "carriage_map.json").write_text(blocks("json")[1], encoding="utf-8")
-    for line in blocks("sh")[1].splitlines():
-        assert call(*line.split()[1:]).status == 0, line
+    script = EXAMPLE / "make_carriage.py"
+    subprocess.run([sys.executable, script, DATA], cwd=tmp_path, check=True)
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    for line in MEASURED.splitlines():
+        if line.startswith("tendonfmu "):
+            assert call(*line.split()[1:]).status == 0, line
     found = {}
     for name in ("now", "worn"):
         found[name] = json.loads((tmp_path / name / "diagnosis.json").read_text(encoding="utf-8"))["causes"]

@@ -1,4 +1,4 @@
-"""The figures of docs/simulated_finger.md: drawn to the rig's numbers, computed from what the plant does."""
+"""The figures of docs/reference/simulated_finger.md: drawn to the rig's numbers, computed from what the plant does."""
 
 from __future__ import annotations
 
@@ -138,9 +138,9 @@ def test_the_truth_of_a_part_of_a_recording() -> None:
 @needs_plant
 def test_the_script_makes_the_figures_of_the_page(tmp_path: Path) -> None:
     subprocess.run([sys.executable, RIGS / "make_figures.py", "-o", tmp_path], check=True)
-    page = (RIGS.parents[1] / "docs" / "simulated_finger.md").read_text(encoding="utf-8")
+    page = (RIGS.parents[1] / "docs" / "reference" / "simulated_finger.md").read_text(encoding="utf-8")
     made = sorted(path.name for path in tmp_path.iterdir())
-    assert made and all(f"](figures/{name})" in page for name in made)
+    assert made and all(f"](../figures/{name})" in page for name in made)
     for name in made:
         assert 20_000 < (tmp_path / name).stat().st_size < 200_000
         assert (RIGS.parents[1] / "docs" / "figures" / name).is_file()

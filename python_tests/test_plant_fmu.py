@@ -97,7 +97,7 @@ def test_fmpy_finds_nothing(rig: str, plant_fmu_path: Path, tmp_path: Path) -> N
 
 
 def test_the_binary_is_small_and_needs_the_system_alone(plant_fmu: UnpackedFmu, record_testsuite_property: Any) -> None:
-    """docs/simulated_finger_fmu.md names size and GLIBC floor."""
+    """docs/reference/simulated_finger_fmu.md names size and GLIBC floor."""
     binary = plant_binary(plant_fmu.folder)
     contents = read_contents(binary.read_bytes())
     assert binary.stat().st_size < LARGEST_BINARY
@@ -366,7 +366,7 @@ def test_fmpy_simulates(plant_fmu_path: Path) -> None:
 
 # --- its page ---------------------------------------------------------------------------------------------------------
 
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "simulated_finger_fmu.md"
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "reference" / "simulated_finger_fmu.md"
 
 
 def test_the_page_names_every_variable_and_the_floor(plant_fmu: UnpackedFmu) -> None:

@@ -27,7 +27,8 @@ pytestmark = needs_plant
 
 NAN, INF = math.nan, math.inf
 COMMAND, FORCE = "tendon_position_command[1]", "push_force[3]"
-# docs/simulated_finger_fmu.md: a restored run differs from the uninterrupted one by less than this many times the
+# docs/reference/simulated_finger_fmu.md: a restored run differs from the uninterrupted one by less than this many
+# times the
 # relative tolerance: largest difference of a joint or tendon over the largest absolute value of that same one
 RESTART_ERROR = {"truth.joint_position": 100.0, "truth.tendon_force": 500.0, "truth.friction_torque": 1000.0}
 INDEX_FINGER = Path(__file__).resolve().parent.parent / "examples" / "rigs" / "index_finger.json"
@@ -278,7 +279,7 @@ def restart_errors(
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-5, 1e-6, 1e-7, 1e-8])
 def test_the_bound_on_restored_runs_of_the_index_finger(tolerance: float, tmp_path: Path) -> None:
-    """Five cuts, a second each, as docs/simulated_finger_fmu.md says."""
+    """Five cuts, a second each, as docs/reference/simulated_finger_fmu.md says."""
     fmu = unpack(build_plant_fmu(INDEX_FINGER, tmp_path / "index.fmu"), tmp_path / "index")
 
     def second(instance: Instance, begin: int) -> NDArray[np.float64]:

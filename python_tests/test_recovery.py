@@ -2,7 +2,7 @@
 
 Here one seed, 400 s at 25 Hz: as much noise per second as in the campaign at 1 kHz, so nearly the same errors, at a
 fortieth of the time. The campaign itself, 20 seeds at 1 kHz, takes an hour on two cores: `./test -m campaign
-python_tests/test_recovery.py`. docs/evidence.md has its figures.
+python_tests/test_recovery.py`. docs/evidence/fit.md has its figures.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""docs/rig.md: its example runs, and its tables say what the schema says."""
+"""docs/reference/rig.md: its example runs, and its tables say what the schema says."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rig_cases import written
 from tendonfmu.simulate.rig import read_rig
 from tendonfmu.simulate.simulation import simulate
 
-PAGE = (Path(__file__).parents[1] / "docs" / "rig.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[1] / "docs" / "reference" / "rig.md").read_text(encoding="utf-8")
 SCHEMA = json.loads((files("tendonfmu") / "schema" / "rig.schema.json").read_text(encoding="utf-8"))
 ROW = re.compile(r"^\| `([^`]+)` \| (.*?) \| (.*?) \| (.*) \|$", flags=re.MULTILINE)
 ROWS = {match[1]: match.groups()[1:] for match in ROW.finditer(PAGE)}

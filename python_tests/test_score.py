@@ -307,7 +307,7 @@ def test_files_that_cannot_be(call: Call, pushes: Table) -> None:
 
 
 def test_every_option_is_on_the_page_and_its_example_is_what_comes_out(call: Call, demo: tuple[Path, str, str]) -> None:
-    page = (ROOT / "docs" / "score.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "reference" / "commands" / "score.md").read_text(encoding="utf-8")
     options = set(re.findall(r"--[a-z][a-z-]+", call("score", "--help").out)) - {"--help"}
     assert len(options) >= 6 and {option for option in options if option not in page} == {"--output"}
     report = read_report(demo[0] / "s.json")

@@ -1,4 +1,4 @@
-"""docs/simulated_finger.md: its tables name every switch of a rig, and tests that are there; its command runs."""
+"""docs/reference/simulated_finger.md: its tables name every switch of a rig and existing tests; its command runs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tendonfmu.files.tables import read_table
 from test_rig_page import properties
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = (ROOT / "docs" / "simulated_finger.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "reference" / "simulated_finger.md").read_text(encoding="utf-8")
 KEYS = set(dict(properties(json.loads((files("tendonfmu") / "schema" / "rig.schema.json").read_text("utf-8")))))
 SWITCHES = PAGE.split("## Everything that can be switched on")[1].split("\n## ")[0]
 LINES = re.findall(r"^\|(.*)\|$", SWITCHES, flags=re.MULTILINE)
@@ -79,7 +79,7 @@ def test_every_test_on_the_page_is_there() -> None:
 
 
 def test_every_figure_is_there() -> None:
-    figures = re.findall(r"\]\((figures/[^)]+)\)", PAGE)
+    figures = re.findall(r"\]\(\.\./(figures/[^)]+)\)", PAGE)
     assert len(figures) == 4 and all((ROOT / "docs" / figure).is_file() for figure in figures)
 
 

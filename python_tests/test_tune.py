@@ -419,6 +419,6 @@ def test_parameters_in_the_manner_of_scikit_learn() -> None:
 
 
 def test_every_option_is_on_the_page(call: Call) -> None:
-    page = (ROOT / "docs" / "tune.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "reference" / "commands" / "tune.md").read_text(encoding="utf-8")
     options = set(re.findall(r"--[a-z][a-z-]+", call("tune", "--help").out)) - {"--help", "--output"}
     assert len(options) >= 7 and {option for option in options if option not in page} == set()

@@ -1,4 +1,4 @@
-"""docs/finger_description.md and docs/recording.md: their examples run, and their tables say what the schema says."""
+"""The guide and the reference pages of formats: their examples run, their tables say what the schema says."""
 
 from __future__ import annotations
 
@@ -21,9 +21,12 @@ from tendonfmu.files.tables import read_table
 from tendonfmu.model.description import read_finger
 from tendonfmu.recordings.recording import GROUPS, read_recording
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
+DOCS = Path(__file__).resolve().parent.parent / "docs" / "reference"
+GUIDE = DOCS.parent / "guide"
+YOUR_FINGER = (GUIDE / "your_finger.md").read_text(encoding="utf-8")
+YOUR_RECORDING = (GUIDE / "your_recording.md").read_text(encoding="utf-8")
 FINGER_PAGE = (DOCS / "finger_description.md").read_text(encoding="utf-8")
-RECORDING_PAGE = (DOCS / "recording.md").read_text(encoding="utf-8")
+RECORDING_PAGE = (DOCS / "recordings.md").read_text(encoding="utf-8")
 EXTENSIONS_PAGE = (DOCS / "extensions.md").read_text(encoding="utf-8")
 SCHEMA = json.loads((files("tendonfmu") / "schema" / "finger.schema.json").read_text(encoding="utf-8"))
 EFFECTS = {row["$ref"].rsplit("/", 1)[1] for row in SCHEMA["properties"]["extensions"]["items"]["oneOf"]}
@@ -47,7 +50,7 @@ def shell(script: str, folder: Path) -> str:
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """A folder with the finger of the page."""
-    (tmp_path / "two_joints.json").write_text(blocks(FINGER_PAGE, "json")[0], encoding="utf-8")
+    (tmp_path / "two_joints.json").write_text(blocks(YOUR_FINGER, "json")[0], encoding="utf-8")
     return tmp_path
 
 
@@ -56,16 +59,16 @@ def test_the_small_finger_is_sound_and_can_be_pretensioned(folder: Path) -> None
     assert (len(finger.joint_names), len(finger.tendon_names)) == (2, 3)
     arms = np.array(finger.moment_arms)
     assert np.allclose(arms.T @ [10.0, 10.0, 5.0], 0.0, atol=1e-15)
-    shell(blocks(FINGER_PAGE, "sh")[0], folder)
+    shell(blocks(YOUR_FINGER, "sh")[1], folder)
     assert (folder / "two_joints.fmu").is_file()
 
 
 def test_the_small_recording_gives_the_angles_it_was_made_of(folder: Path) -> None:
-    subprocess.run([sys.executable, "-c", blocks(RECORDING_PAGE, "python")[0]], cwd=folder, check=True)
+    subprocess.run([sys.executable, "-c", blocks(YOUR_RECORDING, "python")[0]], cwd=folder, check=True)
     recording = read_recording(folder / "two_joints.csv")
-    said = shell(blocks(RECORDING_PAGE, "sh")[0], folder)
+    said = shell(blocks(YOUR_RECORDING, "sh")[1], folder)
     assert "1000 samples in 1.998 s" in said and "-0.3 to 0.3 rad" in said
-    shell(f"{blocks(RECORDING_PAGE, 'sh')[1].strip()} > answer.txt", folder)
+    shell(f"{blocks(YOUR_RECORDING, 'sh')[2].strip()} > answer.txt", folder)
     answer = (folder / "answer.txt").read_text(encoding="utf-8")
     assert "two_joints.csv: belongs to this finger" in answer and "nothing found" in answer
     found = read_table(folder / "two_joints_out.csv", lambda *_: None)
@@ -76,7 +79,7 @@ def test_the_small_recording_gives_the_angles_it_was_made_of(folder: Path) -> No
 def test_the_schema_is_where_the_page_says(folder: Path) -> None:
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     told = subprocess.run(
-        ["sh", "-c", blocks(FINGER_PAGE, "sh")[1]],
+        ["sh", "-c", blocks(FINGER_PAGE, "sh")[0]],
         cwd=folder,
         env=dict(os.environ, PATH=path),
         capture_output=True,

@@ -58,7 +58,7 @@ class How:
 
 
 def record(worn: Worn = WELL, how: How | None = None, **other: Any) -> Columns:
-    """Columns as docs/recording.md has them. other: of `How`."""
+    """Columns as docs/reference/recordings.md has them. other: of `How`."""
     how = replace(how or How(), **other)
     time = np.arange(round(how.seconds * RATE)) / RATE
     angle, speed = _motion(how, time)

@@ -18,3 +18,4 @@ compile requirements-fit-peers.lock --group fit-peers --constraints requirements
 compile requirements-coupling.lock --group coupling --constraints requirements.lock
 compile requirements-foreign.lock --group foreign --constraints requirements.lock
 compile requirements-diagnosis-peers.lock --group diagnosis-peers --constraints requirements.lock
+compile requirements-site.lock --group site

@@ -3,7 +3,8 @@
     python tools/portable_binaries.py OUTDIR [--only PLATFORM ...]
     tendonfmu build FINGER.json -o FINGER.fmu --binaries OUTDIR/binaries
 
-OUTDIR/binaries holds one folder per FMI platform (docs/portable_binaries.md). The folder appears whole or not at all.
+OUTDIR/binaries holds one folder per FMI platform (docs/reference/portable_binaries.md).
+The folder appears whole or not at all.
 Exit status: 0 done, 1 a binary is not portable, 2 bad usage, or it cannot be built here.
 """
 

@@ -2,7 +2,7 @@
 
     python examples/davinci/fit_jaw.py [-o examples/davinci/jaw.json] [--train 00 02 04 06 08]
 
-Everything else in jaw.json (thresholds, filter, stiffness) is chosen by hand, see docs/davinci.md.
+Everything else in jaw.json (thresholds, filter, stiffness) is chosen by hand, see docs/evidence/davinci.md.
 """
 
 from __future__ import annotations

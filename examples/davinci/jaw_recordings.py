@@ -30,7 +30,7 @@ def data_folder() -> Path:
     data = Path(os.environ.get("TENDONFMU_DATA") or root.parent / "shared" / "data")
     folder = data / "davinci_tool" / "Tool_4_Maryland_L_4"
     if not folder.is_dir():
-        raise InputError(f"{folder}: no such folder; expected the da Vinci recordings there (see docs/davinci.md)")
+        raise InputError(f"{folder}: no such folder; expected the da Vinci recordings (docs/evidence/davinci.md)")
     return folder
 
 

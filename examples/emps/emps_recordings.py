@@ -34,7 +34,7 @@ def data_folder() -> Path:
     root = Path(__file__).resolve().parents[2]
     folder = Path(os.environ.get("TENDONFMU_DATA") or root.parent / "shared" / "data") / "emps"
     if not folder.is_dir():
-        raise InputError(f"{folder}: no such folder; expected the EMPS files there (see docs/evidence.md)")
+        raise InputError(f"{folder}: no such folder; expected the EMPS files there (see docs/evidence/fit.md)")
     return folder
 
 

@@ -1,4 +1,4 @@
-"""Friction, offset and mass of EMPS by `tendonfmu fit`: the tables of docs/evidence.md.
+"""Friction, offset and mass of EMPS by `tendonfmu fit`: the tables of docs/evidence/fit.md.
 
     python examples/emps/fit_emps.py [--phases]
 

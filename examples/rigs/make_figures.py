@@ -1,4 +1,4 @@
-"""Make the figures of docs/simulated_finger.md from the rigs of the index finger.
+"""Make the figures of docs/reference/simulated_finger.md from the rigs of the index finger.
 
 Usage: python make_figures.py [-o ../../docs/figures]      (needs tendonfmu installed, with the simulated finger)
 """

@@ -1,4 +1,4 @@
-"""What a fit makes of the simulated finger (docs/evidence.md, "Virtual hand").
+"""What a fit makes of the simulated finger (docs/evidence/fit.md, "Virtual hand").
 
 Plays excite's motion on the rig at low pretension, fits the description to it, and judges it on motions that it has not
 seen, at the same pretension and at four times as much: rms of the residual before the bias learns from it, as a share

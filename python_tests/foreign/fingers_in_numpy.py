@@ -17,7 +17,7 @@ from foreign_case import TEST_SECONDS, TRAIN_SECONDS, Array, Case, Inside, Truth
 FAMILY = "numpy"
 
 # What a simulator has although no description can say it in its laws; naming that is not false. Presliding is never
-# false, in any case (estimate/identifiability.py).
+# false, in any case (judgement.py).
 ALSO = {
     # Friction that fades in with tanh(v / vs) is the Stribeck effect of a negative amplitude.
     numpy_tanh: ("stribeck",),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-Row = dict[str, Any]  # of recordings/converters/table.py: case, truth, run, report (or None), judgement (or None)
+Row = dict[str, Any]  # of table.py: case, truth, run, report (or None), judgement (or None)
 
 HEAD = (
     "| case | hidden, N·m rms | exit | verdict | causes in order, gain | in the set | first | at its place | false |"

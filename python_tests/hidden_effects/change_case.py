@@ -80,7 +80,7 @@ class Truth:
 
 @dataclass(frozen=True)
 class Case:
-    """finger: description. then, now: recordings by column, as docs/recording.md has them."""
+    """finger: description. then, now: recordings by column, as docs/reference/recordings.md has them."""
 
     truth: Truth
     finger: Mapping[str, Any]

@@ -8,7 +8,7 @@
 namespace tendonfmu {
 namespace {
 
-/* Names of effects (docs/diagnose.md) that are no extensions, and where what they name stands. */
+/* Names of effects (docs/reference/commands/diagnose.md) that are no extensions, and where what they name stands. */
 struct elsewhere {
   const char *name, *where;
 };

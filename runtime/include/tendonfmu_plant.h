@@ -1,6 +1,6 @@
 /* The simulated finger: rigid links moved by elastic tendons with dynamic (LuGre) friction, with sensors and truth.
  *
- *   plant = tendonfmu_plant_create(rig_json, size, ...)     the text of an expanded rig (docs/rig.md)
+ *   plant = tendonfmu_plant_create(rig_json, size, ...)     the text of an expanded rig (docs/reference/rig.md)
  *   tendonfmu_plant_initialise(plant)                       settles the finger, then stands at time 0
  *   tendonfmu_plant_set_inputs(plant, &inputs)              held until they are set again
  *   tendonfmu_plant_advance(plant, t)                       integrates up to t

@@ -1,4 +1,4 @@
-/* From the text of an expanded rig (docs/rig.md) to its numbers. */
+/* From the text of an expanded rig (docs/reference/rig.md) to its numbers. */
 #ifndef TENDONFMU_PLANT_RIG_READER_H
 #define TENDONFMU_PLANT_RIG_READER_H
 

@@ -22,7 +22,8 @@ from tendonfmu.detect.free_motion import FreeRun, Signal
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-# (c_H, c_J) that are tried. A push makes the model jump and ends stiction, and hides behind large shares: docs/tune.md
+# (c_H, c_J) that are tried. A push makes the model jump and ends stiction, and hides behind large shares:
+# docs/reference/commands/tune.md
 SHARES = ((0.4, 0.4),)
 TAILS = (4.0, 16.0)  # times the wished rate: how far out the tails are that shape a bound
 COMPARED = 12  # alarms at which bounds are compared, if fewer are allowed: single extremes say little of a shape

@@ -1,4 +1,4 @@
-"""The report of a score, "tendonfmu-score-1" (docs/score.md), as JSON with null for what is not known."""
+"""The report of a score, "tendonfmu-score-1", as JSON: docs/reference/commands/score.md."""
 
 from __future__ import annotations
 

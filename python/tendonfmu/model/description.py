@@ -1,4 +1,4 @@
-"""The finger description (docs/finger_description.md): read from a file, and counted.
+"""The finger description (docs/reference/finger_description.md): read from a file, and counted.
 
 What a description may hold is decided by the native reader alone; `schema/finger.schema.json` says the same to editors.
 """

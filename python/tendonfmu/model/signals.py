@@ -1,4 +1,4 @@
-"""Names of the FMU's inputs and outputs (docs/recording.md), in the order in which they are passed."""
+"""Names of the FMU's inputs and outputs (docs/reference/recordings.md), in the order in which they are passed."""
 
 from __future__ import annotations
 

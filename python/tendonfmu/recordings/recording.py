@@ -1,4 +1,4 @@
-"""Recordings: columns, units and checks of docs/recording.md.
+"""Recordings: columns, units and checks of docs/reference/recordings.md.
 
 A column is `time` (s) or one of the groups below with an index from 1, such as `tendon_force[3]`.
 """

@@ -104,7 +104,7 @@ class Residuals:
 
 @dataclass(frozen=True)
 class BiasSettings:
-    """Of a description, with the defaults: see docs/finger_description.md. initial_torque: [n] N·m or None."""
+    """Of a description, with the defaults (docs/reference/finger_description.md). initial_torque: [n] N·m or None."""
 
     drift: float
     noise: float

@@ -1,4 +1,4 @@
-"""The report of a diagnosis, "tendonfmu-diagnosis-1" (docs/diagnose.md), as JSON with null for what is not known."""
+"""The report of a diagnosis, "tendonfmu-diagnosis-1", as JSON: docs/reference/commands/diagnose.md."""
 
 from __future__ import annotations
 

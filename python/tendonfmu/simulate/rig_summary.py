@@ -49,7 +49,7 @@ def _lines(rig: Rig, plant: Plant) -> list[str]:
 
 
 def effects(physics: Data) -> Iterator[str]:
-    """Effects of the physics that are switched on, in words; all of docs/rig.md but the base model."""
+    """Effects of the physics that are switched on, in words; all of docs/reference/rig.md but the base model."""
     links, tendons = physics["links"], physics.get("tendons") or []
     friction: Data = physics.get("friction") or {}
     if any(_vector(physics.get("gravity"), [0.0, 0.0, -9.81])):

@@ -21,7 +21,7 @@ ENERGIES = ("kinetic_energy", "potential_energy", "motor_work", "friction_work",
 
 @dataclass(frozen=True)
 class Simulation:
-    """recording: columns of docs/recording.md. truth: true signals at the same times, None unless asked for.
+    """recording: columns of docs/reference/recordings.md. truth: true signals at the same times, None unless asked for.
 
     contact_seconds: with a force above the rig's `contact_force`. integrator: that was used. work: what it did.
     """

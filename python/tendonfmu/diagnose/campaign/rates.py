@@ -67,7 +67,7 @@ def of_strength(rows: Iterable[Row], strength: float) -> list[Row]:
 
 
 def rates(rows: Sequence[Row]) -> list[Rate]:
-    """The lines of the table of docs/evidence.md, for rows without an error."""
+    """The lines of the table of docs/evidence/fit.md, for rows without an error."""
     good = [row for row in rows if not row.get("error")]
 
     def group(name: str) -> list[Row]:

@@ -1,4 +1,4 @@
-"""The effects that a diagnosis knows, one module each, in the order of docs/diagnose.md.
+"""The effects that a diagnosis knows, one module each, in the order of docs/reference/commands/diagnose.md.
 
 `contact` and `unknown` are no terms of a model: an event of the recording, and what is left.
 """
@@ -68,7 +68,7 @@ __all__ = ["CANDIDATES", "Candidate", "Column", "Place", "Variant", "by_name"]
 
 
 def by_name(name: str) -> Candidate:
-    """The candidate of an effect of docs/diagnose.md. Raises InputError."""
+    """The candidate of an effect of docs/reference/commands/diagnose.md. Raises InputError."""
     for candidate in CANDIDATES:
         if candidate.name == name:
             return candidate

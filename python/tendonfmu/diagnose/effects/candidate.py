@@ -137,7 +137,7 @@ def _present(column: Column, magnitude: float) -> float:
 
 @dataclass(frozen=True)
 class Candidate:
-    """One effect of docs/diagnose.md.
+    """One effect of docs/reference/commands/diagnose.md.
 
     name: of the effect. title: a few plain words. explanation: what it is physically, and what to look at on the
     hand. sign: expected one of its magnitudes, +1, −1 or 0 for either. excited_by: the motion or load that shows it.

@@ -1,6 +1,7 @@
 """Third-party recordings to ours: one foreign format a file.
 
-A converter is a function (file, its own options) -> columns of a recording (docs/recording.md). To add one, write a
+A converter is a function (file, its own options) -> columns of a recording
+(docs/reference/recordings.md). To add one, write a
 module beside this and name it in `CONVERTERS`. Logs without a format of their own are read by a map of columns
 (`table`).
 """

@@ -1,6 +1,7 @@
 """MAP.json of `tendonfmu convert table`: which column of a log is which of ours, in which unit, sign and zero.
 
-Each of our columns is  sign · scale · factor of the unit · (reading − offset).  docs/one_joint.md explains the keys;
+Each of our columns is  sign · scale · factor of the unit · (reading − offset).
+docs/reference/commands/convert.md explains the keys;
 `schema/map.schema.json` says the same to editors.
 """
 

@@ -1,4 +1,4 @@
-"""Anybody's log to a recording, by a map of columns: docs/one_joint.md."""
+"""Anybody's log to a recording, by a map of columns: docs/reference/commands/convert.md."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def convert_table(file: Path, map_file: Path) -> ConvertedLog:
 
     Returns
     -------
-    ConvertedLog : its columns are those of docs/recording.md, [N] each
+    ConvertedLog : its columns are those of docs/reference/recordings.md, [N] each
 
     Raises
     ------

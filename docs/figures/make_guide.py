@@ -1,0 +1,96 @@
+"""Makes the pictures of docs/guide by the commands of its pages, on the recordings of examples/.
+
+    python docs/figures/make_guide.py [-o FOLDER]      some 4 min of one core; needs tendonfmu, Pillow and Chromium
+
+Pages are photographed in a headless Chromium, figures are those that the commands write; both become small PNGs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from PIL import Image
+
+HERE = Path(__file__).resolve().parent
+EXAMPLES = HERE.parents[1] / "examples"
+RECORDED = EXAMPLES / "demo_recording"
+SERVO = EXAMPLES / "one_joint"
+WIDTH = 1100  # pixels; twice what a phone shows, sharp on a desk
+COLOURS = 256
+
+CALIBRATE = ["calibrate", RECORDED / "two_joints.json", RECORDED / "two_joints_training.parquet", "-o", "calibrated"]
+DIAGNOSE = [
+    *("diagnose", RECORDED / "two_joints.json", RECORDED / "two_joints_training.parquet"),
+    *("--test", RECORDED / "two_joints_unseen.parquet", "-o", "diagnosis"),
+]
+FIT = [
+    *("fit", EXAMPLES / "fingers" / "index_finger.json", RECORDED / "index_finger_free.parquet", "--holdout", "0.2"),
+    *("-o", "fitted.json", "--figures", "fitted"),
+]
+SCORE = [
+    *("score", RECORDED / "index_finger_calibrated.json", RECORDED / "index_finger_pushes.parquet"),
+    *("-o", "score.json", "--figures", "score"),
+]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("-o", "--output", type=Path, default=HERE, help="folder")
+    output = parser.parse_args().output.resolve()
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        tendonfmu(folder, *CALIBRATE)
+        keep(photograph(folder / "calibrated" / "calibration.html", 880), output / "calibrate.png")
+        tendonfmu(folder, *DIAGNOSE)
+        keep(photograph(folder / "diagnosis" / "diagnosis.html", 1130), output / "diagnose.png")
+        tendonfmu(folder, *FIT)
+        keep(folder / "fitted" / "torque_2.png", output / "fit.png")
+        tendonfmu(folder, *SCORE)
+        keep(folder / "score" / "contacts.png", output / "detect.png")
+        servo_history(folder)
+        keep(folder / "history" / "history.png", output / "change.png")
+
+
+def servo_history(folder: Path) -> None:
+    """The servo of examples/one_joint: two weeks held against the first one."""
+    subprocess.run([sys.executable, SERVO / "make_logs.py", "-o", "logs"], cwd=folder, check=True)
+    for week, finger in ((1, ["--finger", "servo.json"]), (3, []), (5, [])):
+        log = f"logs/week_{week}.csv"
+        table = ["convert", "table", log, "--map", SERVO / "map.json", "-o", f"week_{week}.parquet"]
+        tendonfmu(folder, *table, *finger)
+    weeks = ["week_3.parquet", "week_5.parquet", "--reference", "week_1.parquet"]
+    tendonfmu(folder, "diagnose", "servo.json", *weeks, "--history", "--kinematics", "3", "-o", "history")
+
+
+def tendonfmu(folder: Path, *words: str | Path) -> None:
+    command = [sys.executable, "-m", "tendonfmu.cli", *map(str, words)]
+    subprocess.run(command, cwd=folder, check=True, stdout=subprocess.DEVNULL)
+
+
+def photograph(page: Path, height: int) -> Path:
+    """The first `height` pixels of a page, 1280 pixels wide."""
+    picture = page.with_suffix(".png")
+    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if browser is None:
+        raise SystemExit("make_guide.py: no Chromium found; expected chromium or google-chrome on the PATH")
+    options = ["--headless", "--no-sandbox", "--hide-scrollbars", f"--window-size=1280,{height}"]
+    subprocess.run([browser, *options, f"--screenshot={picture}", page.as_uri()], check=True, stderr=subprocess.DEVNULL)
+    return picture
+
+
+def keep(picture: Path, target: Path) -> None:
+    """Shrunk to WIDTH and COLOURS."""
+    with Image.open(picture) as image:
+        small = image.convert("RGB")
+        if small.width > WIDTH:
+            small = small.resize((WIDTH, round(small.height * WIDTH / small.width)), Image.Resampling.LANCZOS)
+        small.quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(target, optimize=True)
+
+
+if __name__ == "__main__":
+    main()

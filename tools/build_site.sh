@@ -1,0 +1,17 @@
+#!/usr/bin/env bash
+# Builds the documentation site with MkDocs into FOLDER (default build/site): tools/build_site.sh [FOLDER]
+# Broken links, anchors and references are errors. MkDocs has an environment of its own, build/site-venv.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+output=$(realpath -m "${1:-build/site}")
+environment=build/site-venv
+
+if [ "$(cat "$environment/requirements" 2>/dev/null)" != "$(cat requirements-site.lock)" ]; then
+  "${PYTHON:-python3}" -m venv --clear "$environment"
+  "$environment/bin/python" -m pip install --disable-pip-version-check --no-input --quiet --require-hashes -r requirements-site.lock
+  cp requirements-site.lock "$environment/requirements"
+fi
+# A notice of the theme about other software is no finding of this build.
+export NO_MKDOCS_2_WARNING=1
+"$environment/bin/mkdocs" build --strict --quiet --site-dir "$output"
+echo "$output/index.html"

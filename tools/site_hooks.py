@@ -1,0 +1,41 @@
+"""What mkdocs.yml adds to MkDocs: links that leave docs/ are checked, and the C headers become a page."""
+
+from __future__ import annotations
+
+import logging
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from c_reference import header_markdown
+
+ROOT = Path(__file__).resolve().parent.parent
+DOCS = ROOT / "docs"
+HEADERS = ("tendonfmu", "tendonfmu_description", "tendonfmu_estimation", "tendonfmu_learner", "tendonfmu_plant")
+_MARK = re.compile(r"<!-- headers: .*? -->")
+_LINK = re.compile(r"(?<!!)\[((?:[^\[\]]|\[[^\]]*\])+)\]\(([^)\s#:]+)(#[^)\s]*)?\)")
+log = logging.getLogger("mkdocs.hooks.site")  # a warning ends a strict build
+
+
+def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
+    markdown = _MARK.sub(lambda _: headers(), markdown)
+    return _LINK.sub(lambda match: shown(match, page), markdown)
+
+
+def headers() -> str:
+    return "\n".join(header_markdown(ROOT / "runtime" / "include" / f"{name}.h") for name in HEADERS)
+
+
+def shown(link: re.Match[str], page: Any) -> str:
+    """A link to a page of the site as it is; to a file of the repository its path, if it is there."""
+    target = (DOCS / page.file.src_uri).parent / link[2]
+    resolved = target.resolve()
+    if resolved.is_relative_to(DOCS):
+        return link[0]
+    if not resolved.exists():
+        log.warning("%s: %s: no such file in the repository", page.file.src_uri, link[2])
+    text, path = link[1], resolved.relative_to(ROOT).as_posix()
+    return text if path in text or text.strip("`") == Path(path).name else f"{text} (`{path}`)"
