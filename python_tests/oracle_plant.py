@@ -1,6 +1,6 @@
 """Naive numpy twin of the simulated finger's right-hand side, used by tests alone.
 
-Written from the equations (docs/simulated_finger.md), sharing no code with runtime/plant: the mass matrix comes
+Written from the equations (docs/reference/simulated_finger.md), sharing no code with runtime/plant: the mass matrix comes
 from the Jacobians of the centres of mass, the velocity terms from Christoffel symbols whose derivatives are complex
 steps, and every friction contact is one plain object. It favours reading over speed. Indices in this file start at 0.
 

@@ -68,7 +68,7 @@ _KINDS = ("joints", "tendons")
 
 
 def title_of(effect: str) -> str:
-    """A few plain words for an effect of docs/diagnose.md."""
+    """A few plain words for an effect of docs/reference/commands/diagnose.md."""
     from tendonfmu.diagnose import CANDIDATES
 
     titles = {candidate.name: candidate.title for candidate in CANDIDATES} | TITLES
