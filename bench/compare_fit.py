@@ -43,7 +43,7 @@ WAYS: dict[str, tuple[str, int, str | None]] = {
     "filterpy": ("filterpy ExtendedKalmanFilter", 150, "ekf_sample_by_sample"),
 }
 # Of the peers' linear algebra: how their threads share a busy machine would be measured instead.
-TESTS = str(Path(__file__).resolve().parent.parent / "python_tests")
+TESTS = str(Path(__file__).resolve().parent.parent / "python_tests" / "support")
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONPATH": TESTS}
 GOALS = {"batch": 20.0, "ekf": 60.0}  # s
 MOST_MEMORY = 1e9  # bytes, of the product's ways

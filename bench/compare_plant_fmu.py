@@ -20,7 +20,7 @@ from rich.console import Console
 from rich.table import Table
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "python_tests"))
+sys.path.insert(0, str(ROOT / "python_tests" / "support"))
 
 from fmu_binary import Instance, UnpackedFmu, unpack  # noqa: E402
 from tendonfmu.simulate.fmu_packaging import build_plant_fmu  # noqa: E402

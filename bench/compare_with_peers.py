@@ -30,7 +30,7 @@ from tendonfmu.model import native
 from tendonfmu.recordings.recording import Recording, read_recording
 
 ROOT = Path(__file__).resolve().parent.parent
-TESTS = ROOT / "python_tests"
+TESTS = ROOT / "python_tests" / "support"
 FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
 RECORDING = ROOT / "examples" / "demo_recording" / "index_finger_pushes.parquet"
 ROUNDS = 5

@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from detection_limit_cases import ROOT, Case, cut, made, slots
 from numpy.typing import NDArray
 
+from detection_limit_cases import ROOT, Case, cut, made, slots
 from tendonfmu.detect.contact_at_rest import count_alarms, find_rests, learn_rest
 from tendonfmu.detect.free_motion import free_parts
 from tendonfmu.model.description import FingerDescription

@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from detection_cases import PRETENSIONS, RIG, Numbers, Take, read_truth, recording_file, takes, write_rig
 
+from detection_cases import PRETENSIONS, RIG, Numbers, Take, read_truth, recording_file, takes, write_rig
 from tendonfmu.files.writing import whole_file
 from tendonfmu.model import native
 from tendonfmu.recordings.recording import read_recording

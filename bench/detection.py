@@ -22,8 +22,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import matched_detector as matched
 import numpy as np
+from numpy.typing import NDArray
+
+import matched_detector as matched
 from detection_cases import (
     FINGER,
     PARTS,
@@ -42,8 +44,6 @@ from detection_cases import (
 )
 from detection_rivals import Detector, HighPass, best_thresholds, from_json, make_rivals, to_json
 from detection_table import Campaign, Free, Outcome, report
-from numpy.typing import NDArray
-
 from tendonfmu.files.writing import whole_file
 from tendonfmu.recordings.recording import Recording, read_recording
 

@@ -8,8 +8,8 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from detection_limit_cases import AFTER, FORCES, LEAD, MOVE, RISES, STUCK_RISES
 
+from detection_limit_cases import AFTER, FORCES, LEAD, MOVE, RISES, STUCK_RISES
 from tendonfmu.statistics.intervals import Estimate, quantile, rate, share
 
 Row = dict[str, Any]

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from detection_cases import tendon_velocity
 from detection_limit_cases import (
     AFTER,
@@ -40,7 +41,6 @@ from detection_limit_cases import (
     slots,
 )
 from detection_limit_table import ramp_tables, recovery_table, stuck_tables
-
 from tendonfmu.detect.counting import Event, score_detection, stretches
 from tendonfmu.files.writing import whole_file
 from tendonfmu.model.balance import moment_arms

@@ -21,8 +21,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from mujoco_pushes import FREE, PRETENSIONS, PUSHED, description_file, make, place
 
+from mujoco_pushes import FREE, PRETENSIONS, PUSHED, description_file, make, place
 from tendonfmu.files.writing import whole_file
 
 FINGERS = (1, 3, 19, 4, 6)

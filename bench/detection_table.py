@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from detection_cases import TWINS, Push
 from numpy.typing import NDArray
 
+from detection_cases import TWINS, Push
 from tendonfmu.statistics.intervals import Estimate, quantile, rate, share
 
 Numbers = NDArray[np.float64]

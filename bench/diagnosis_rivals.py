@@ -19,7 +19,6 @@ from rival_discrepancy import gain_of_discrepancy
 from rival_knockoffs import by_knockoffs
 from rival_parity import by_parity
 from rival_selection import by_bic, by_correlation, by_random_cv, by_sindy, stepwise
-
 from tendonfmu.diagnose.campaign.cases import Case
 from tendonfmu.diagnose.campaign.judging import Answer
 from tendonfmu.diagnose.cause_search import View, look

@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from fit_peers import Task, Watch, least_squares_fit, outer_products, run_filter
 from numpy.typing import NDArray
 
 from fit_data import model_torques, noise_scale
+from fit_peers import Task, Watch, least_squares_fit, outer_products, run_filter
 from tendonfmu.estimate.estimation import Estimator, Learner
 from tendonfmu.estimate.fitting import FrictionFit
 from tendonfmu.estimate.structure import Choice, Structure, build_structure

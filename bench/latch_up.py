@@ -14,11 +14,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 import latch_up_bias as bias
 import latch_up_contact as contact
-import numpy as np
 from latch_up_finger import Numbers, longest
-
 from tendonfmu.statistics.intervals import of_sums
 
 Keys = Mapping[str, Any]

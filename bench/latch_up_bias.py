@@ -7,6 +7,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+
 from latch_up_finger import (
     ASLEEP,
     NOISE,

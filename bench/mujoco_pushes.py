@@ -28,7 +28,6 @@ from fingers_in_mujoco import ALSO, PLANS, Plan, describe, finger  # noqa: E402
 from foreign_case import Truth, frame, noisy, quantised  # noqa: E402
 from mujoco_model import LINK, Physics  # noqa: E402
 from mujoco_run import SETTLE, STEP, Motion, Runner, random_motion  # noqa: E402
-
 from tendonfmu.files.writing import whole_file  # noqa: E402
 
 Numbers = NDArray[np.float64]

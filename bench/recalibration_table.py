@@ -11,8 +11,8 @@ import argparse
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
-from recalibration import EVEN, PLANTED, Outcome, SampleCount, campaign, sample_counts, ways
 
+from recalibration import EVEN, PLANTED, Outcome, SampleCount, campaign, sample_counts, ways
 from tendonfmu.estimate.previous_fit import CHANGE
 
 LIMIT = 1.05  # of the error before

@@ -20,10 +20,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from recovery_case import DURATION, RATE, Case, Scale, identifiable, image, make_case
 from rich.console import Console
 from rich.table import Table
 
+from recovery_case import DURATION, RATE, Case, Scale, identifiable, image, make_case
 from tendonfmu.estimate.estimation import Estimator, Learner
 from tendonfmu.files.writing import whole_file
 

@@ -37,7 +37,7 @@ from tendonfmu.model.balance import balanced_forces, moment_arms
 from tendonfmu.model.description import read_finger
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "python_tests"))
+sys.path.insert(0, str(ROOT / "python_tests" / "support"))
 from fit_data import model_alone, noise_scale  # noqa: E402
 
 Numbers = NDArray[np.float64]

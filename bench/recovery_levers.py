@@ -12,10 +12,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import recovery_case as case
 from rich.console import Console
 from rich.table import Table
 
+import recovery_case as case
 from tendonfmu.excite.excitation import Plan, plan_excitation
 from tendonfmu.excite.training_motion import as_array, find_ranges, read_subject
 from tendonfmu.model.balance import balanced_forces, moment_arms

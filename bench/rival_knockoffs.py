@@ -13,6 +13,7 @@ from __future__ import annotations
 import warnings
 
 import numpy as np
+
 from rival_columns import MOST_CAUSES, Numbers, Plain, Trial, least_power
 
 FALSE_SHARE = 0.1

@@ -21,9 +21,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from rival_columns import Numbers, Plain, least_power
 from scipy.stats import chi2
 
+from rival_columns import Numbers, Plain, least_power
 from tendonfmu.diagnose.result import Where
 
 Flags = NDArray[np.bool_]

@@ -12,9 +12,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from rival_columns import MOST_CAUSES, Numbers, Plain, Trial, least_power
 from scipy.stats import t as student
 
+from rival_columns import MOST_CAUSES, Numbers, Plain, Trial, least_power
 from tendonfmu.statistics.splines import basis, without
 
 SIGNIFICANCE = 0.01

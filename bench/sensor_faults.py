@@ -24,9 +24,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+
 from detection_mujoco import calibrated
 from mujoco_pushes import PRETENSIONS, make, place
-from numpy.typing import NDArray
 from sensor_fault_cases import (
     FINGER,
     KINDS,
@@ -39,7 +40,6 @@ from sensor_fault_cases import (
     simulated,
     with_faults,
 )
-
 from tendonfmu.detect.free_motion import FreePart
 from tendonfmu.detect.sensor_faults import learn_sensors
 from tendonfmu.detect.tuning import ContactTuning, TuneWarning

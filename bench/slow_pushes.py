@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from detection_mujoco import calibrated
 from mujoco_pushes import PRETENSIONS, Push, make, place, pushes_of
-
 from tendonfmu.detect.counting import score_detection
 from tendonfmu.model.description import read_finger
 from tendonfmu.model.native import run_recording

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+
 from foreign_case import (
     TEST_SECONDS,
     TRAIN_SECONDS,

@@ -6,12 +6,13 @@ import dataclasses
 from types import ModuleType
 
 import numpy as np
+import pandas as pd
+
 import numpy_boucwen
 import numpy_capstan
 import numpy_karnopp
 import numpy_maxwell
 import numpy_tanh
-import pandas as pd
 from foreign_case import TEST_SECONDS, TRAIN_SECONDS, Array, Case, Inside, Truth, frame, rms
 
 FAMILY = "numpy"

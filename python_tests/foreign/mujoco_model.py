@@ -13,6 +13,7 @@ import dataclasses
 
 import mujoco
 import numpy as np
+
 from foreign_case import Array
 
 LINK = 0.04  # m, length of a link

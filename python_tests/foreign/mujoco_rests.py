@@ -11,6 +11,7 @@ import dataclasses
 import mujoco
 import numpy as np
 import pandas as pd
+
 from fingers_in_mujoco import PLANS, describe, finger
 from foreign_case import Array, Nominal, Truth, frame, noisy, quantised
 from mujoco_model import LINK, Physics

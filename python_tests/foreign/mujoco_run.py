@@ -7,6 +7,7 @@ import math
 
 import mujoco
 import numpy as np
+
 from foreign_case import Array, Truth
 from mujoco_model import Physics, compiled
 

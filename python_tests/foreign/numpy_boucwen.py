@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from foreign_case import Array, Nominal, description, noisy, quantised
 
 ARMS = np.array([[0.0092, 0.0], [-0.0092, 0.0], [-0.0075, 0.0075], [0.0075, -0.0075]])  # m

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from foreign_case import Array, Nominal, description, noisy, quantised
 
 ARMS = np.array([[0.0088, 0.0], [-0.0090, 0.0], [-0.0070, 0.0080], [0.0073, -0.0077]])  # m

@@ -11,8 +11,9 @@ import json
 from pathlib import Path
 from typing import Any
 
-import fingers_in_numpy
 import numpy as np
+
+import fingers_in_numpy
 from foreign_case import Case, Nominal, Truth, rough
 
 FRICTION = ("friction", "load_friction")

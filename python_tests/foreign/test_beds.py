@@ -10,10 +10,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 
-import fingers_in_numpy
 import numpy as np
 import pandas as pd
 import pytest
+
+import fingers_in_numpy
 import recorded
 from foreign_case import Array, Case, Truth
 

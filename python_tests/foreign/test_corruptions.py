@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
+
 from corruptions import Corruption, applicable, columns_of, corrupt, corruptions
 from foreign_case import frame
 

@@ -6,6 +6,7 @@ import dataclasses
 from typing import Any
 
 import pytest
+
 from foreign_case import Truth
 from judgement import ABSORBED, SYNONYMS, judge, visibility
 from table_text import markdown, summary

@@ -8,8 +8,9 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import fingers_in_numpy
 import pytest
+
+import fingers_in_numpy
 import table
 from table_text import markdown
 

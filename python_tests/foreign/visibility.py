@@ -13,10 +13,10 @@ import sys
 import tempfile
 from pathlib import Path
 
-import fingers_in_numpy
 import numpy as np
-from foreign_case import Array, Case
 
+import fingers_in_numpy
+from foreign_case import Array, Case
 from tendonfmu.diagnose.cause_search import look
 from tendonfmu.diagnose.extension_fit import FitSettings
 from tendonfmu.diagnose.signal_choice import Estimation, choose

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
 from effects_hidden import placed, scaled
 from experiments import perform_experiment
 from hidden_unknown import UNKNOWN
 from joint_strength import shown_strength
 from matched_rig import Hand, Made, Unreachable, random_hand, record
-from numpy.typing import NDArray
 
 Array = NDArray[Any]
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+
 from change_case import BY_SPEED, HALVES, NOTHING, Case, Columns, Truth
 from change_effects import CHANGES, hide
 from change_machines import KINEMATICS, MODELS, Stretch, cut, diagnosed_model, model_of, seen, thinned

@@ -15,7 +15,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from change_fingers import NO_CHANGE, How, record_numpy
 from change_simulated import Plan, described, fitted, numpy_maxwell, scaled
-
 from tendonfmu.files.tables import write_table
 
 DAYS = ("2026-03-01", "2026-03-08", "2026-03-15", "2026-03-22", "2026-04-05", "2026-04-12")

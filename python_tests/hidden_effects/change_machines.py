@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from change_case import Columns
-from measured import FORCE, LOAD, Description, Machine
 from scipy import io, signal
 
+from change_case import Columns
+from measured import FORCE, LOAD, Description, Machine
 from tendonfmu.estimate.fitting import FitWarning, FrictionFit
 from tendonfmu.files.tables import write_table
 from tendonfmu.recordings.converters import convert_file

@@ -20,8 +20,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import change_fingers as fingers
 import numpy as np
+
+import change_fingers as fingers
 import numpy_boucwen
 import numpy_capstan
 import numpy_karnopp
@@ -30,7 +31,6 @@ import numpy_tanh
 from change_case import NOTHING, Case, Columns, Truth
 from change_fingers import NO_CHANGE, Change, How, Recorded
 from change_visibility import visible
-
 from tendonfmu.estimate.fitting import FitWarning, FrictionFit
 from tendonfmu.files.tables import write_table
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
+from scipy.stats import binomtest
+
 from change_case import NOTHING
 from change_judgement import LOAD
-from scipy.stats import binomtest
 
 Row = Mapping[str, str]
 Is = Callable[[Row], bool]

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from change_case import Array, Columns
 
+from change_case import Array, Columns
 from tendonfmu.diagnose.cause_search import look
 from tendonfmu.diagnose.extension_fit import FitSettings
 from tendonfmu.diagnose.signal_choice import choose

@@ -14,11 +14,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+
 from friction_physics import Effect, Finger, Motion, last_true
 from hidden_sensors import SENSORS
 from hidden_unknown import UNKNOWN
 from matched_rig import Description, Hand, Hidden, Unreachable, record
-from numpy.typing import NDArray
 from strength import look, residual, surviving
 
 Array = NDArray[Any]

@@ -9,9 +9,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+
 from friction_physics import filtered_velocity, motion_of, read_finger
 from matched_rig import Hand, Made, balanced_forces, coloured, columns_of, measure
-
 from tendonfmu.diagnose.experiments.discrimination import performed_of
 
 

@@ -6,9 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+
 from friction_physics import Finger, Motion
 from matched_rig import Hand, Hidden
-from numpy.typing import NDArray
 
 Array = NDArray[Any]
 Random = np.random.Generator

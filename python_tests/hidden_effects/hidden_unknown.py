@@ -6,10 +6,11 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from friction_physics import Finger, Motion, last_true
-from matched_rig import Hand, Hidden, Unreachable
 from numpy.typing import NDArray
 from scipy.signal import lfilter
+
+from friction_physics import Finger, Motion, last_true
+from matched_rig import Hand, Hidden, Unreachable
 
 Array = NDArray[Any]
 Random = np.random.Generator

@@ -12,8 +12,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from matched_rig import Hand, Made, record
 from numpy.typing import NDArray
+
+from matched_rig import Hand, Made, record
 from strength import BLOCK, averaged, bias_columns, number_columns, orthonormal, residual
 
 Array = NDArray[Any]

@@ -14,13 +14,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matched_rig import off_start
 
+from matched_rig import off_start
 from tendonfmu.files.tables import write_table
 from tendonfmu.simulate.rig import read_rig
 from tendonfmu.simulate.simulation import simulate
 
-sys.path.append(str(Path(__file__).resolve().parent.parent))  # also where a campaign's worker is the caller
+sys.path.append(str(Path(__file__).resolve().parent.parent / "support"))  # also where a campaign's worker is the caller
 from random_rigs import random_rig
 
 Rig = dict[str, Any]

@@ -25,8 +25,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from friction_physics import Finger, Motion, filtered_velocity, motion_of, read_finger, torque_of
 from numpy.typing import NDArray
+
+from friction_physics import Finger, Motion, filtered_velocity, motion_of, read_finger, torque_of
 from rig_motion import pretension, pulling_null_vector, strokes
 
 Array = NDArray[Any]

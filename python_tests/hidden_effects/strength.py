@@ -12,10 +12,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from friction_physics import Finger, Motion, filtered_velocity, friction_torque, motion_of, read_finger, values_of
-from matched_rig import Hand, Made, record
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
+
+from friction_physics import Finger, Motion, filtered_velocity, friction_torque, motion_of, read_finger, values_of
+from matched_rig import Hand, Made, record
 
 Array = NDArray[Any]
 BLOCK = 0.01  # s, over which series are averaged

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
 from campaign_plan import FOREIGN, STRENGTHS, planned
 from effects_hidden import placed, scaled
 from joint_strength import shown_strength
 from matched_rig import random_hand
-
 from tendonfmu.diagnose.campaign.cases import Case, made, read_cases
 
 ALL = argparse.Namespace(

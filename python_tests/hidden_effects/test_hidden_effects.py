@@ -10,10 +10,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import cases
 import numpy as np
 import pytest
 
+import cases
 from tendonfmu.diagnose.diagnosis import diagnose
 from tendonfmu.diagnose.result import Cause, Diagnosis
 

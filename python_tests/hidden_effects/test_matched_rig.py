@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
+
 from effects_hidden import BUILDERS, hide
 from friction_physics import contacts_of, motion_of, read_finger, torque_of, values_of, velocity_seen
 from hidden_unknown import UNKNOWN
 from matched_rig import Hand, Made, Noise, coloured, random_hand, record
-from numpy.typing import NDArray
 from strength import group, kinematics, residual, strength_of
-
 from tendonfmu.model import native
 
 Array = NDArray[Any]

@@ -1,0 +1,330 @@
+"""The command `tendonfmu score` as a user calls it, on the demo's recordings."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import sys
+from contextlib import redirect_stderr, redirect_stdout
+from importlib.resources import files as files_of
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
+
+from command import Answer, Call
+from repository_paths import ROOT
+from tendonfmu.cli import main
+from tendonfmu.detect.run import read_subject, residual_of, run_track, scaled_detection
+from tendonfmu.detect.scoring import score_recordings
+from tendonfmu.files.tables import read_table, write_table
+from tendonfmu.model.native import Finger
+from tendonfmu.recordings.recording import read_recording
+from tendonfmu.report.score_figures import contact_figure, delay_figure, event_figure, roc_figure
+
+INDEX = ROOT / "examples" / "fingers" / "index_finger.json"
+DEMO = ROOT / "examples" / "demo_recording"
+PUSHES, FREE_X4 = DEMO / "index_finger_pushes.parquet", DEMO / "index_finger_free_x4.parquet"
+# docs/reference/semantics.md#score-report
+LITERAL = {"format", "events", "found", "false_alarms", "free_minutes", "median_delay_s", "free_rms"}
+LITERAL |= {"contact_torque_rms_error"}
+
+Table = dict[str, NDArray[np.float64]]
+
+
+def report_of(answer: Answer, path: str = "s.json") -> dict[str, Any]:
+    assert answer.status == 0, answer
+    return read_report(Path(path))
+
+
+def read_report(path: Path) -> dict[str, Any]:
+    report: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    schema = json.loads(files_of("tendonfmu").joinpath("schema", "score_report.schema.json").read_text())
+    jsonschema.validate(report, schema, cls=jsonschema.Draft202012Validator)
+    return report
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, str]:
+    """The demo scored and drawn in a folder of its own: that, and both streams."""
+    folder = tmp_path_factory.mktemp("scored")
+    out, err = io.StringIO(), io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
+        arguments = ["score", INDEX, PUSHES, FREE_X4, "-o", folder / "s.json", "--figures", folder / "fig"]
+        patch.setattr(sys, "argv", ["tendonfmu", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+    assert not ended.value.code, err.getvalue()
+    return folder, out.getvalue(), err.getvalue()
+
+
+@pytest.fixture(scope="session")
+def pushes() -> Table:
+    """8 to 23 s of the demo's pushes: four of them, three found."""
+    whole = read_table(PUSHES, lambda _file, _names: None)
+    rows = slice(4000, 11500)
+    return {name: np.array(column[rows]) for name, column in whole.items()}
+
+
+def written(table: Table, name: str, **changes: NDArray[Any] | None) -> Path:
+    """As a file in the test's folder; None leaves a column out."""
+    changed = {**table, **changes}
+    write_table(Path(name), {key: column for key, column in changed.items() if column is not None})
+    return Path(name)
+
+
+# --- what comes out ---------------------------------------------------------------------------------------------------
+
+
+def test_the_demo_scored_and_drawn(demo: tuple[Path, str, str]) -> None:
+    """Counted again by hand: a loop over samples, nothing of the product's."""
+    folder, out, err = demo
+    report = read_report(folder / "s.json")
+    assert set(report) > LITERAL
+    assert (report["format"], report["events"], report["found"]) == ("tendonfmu-score-1", 11, 8)
+    recording = read_recording(PUSHES)
+    contact = Finger.from_description(json.loads(INDEX.read_text())).run(recording.arrays())["contact"].ravel()
+    assert recording.contact is not None
+    delays = delays_by_hand(recording.time, recording.contact, contact)
+    assert [each["delay_s"] for each in report["recordings"][0]["event_list"]] == [
+        None if delay is None else pytest.approx(delay) for delay in delays
+    ]
+    known = [delay for delay in delays if delay is not None]
+    assert report["median_delay_s"] == report["delay_s"]["median"]["value"] == pytest.approx(np.median(known))
+    for key in ("events", "found", "missed", "false_alarms", "free_minutes", "held"):
+        assert report[key] == pytest.approx(sum(each[key] for each in report["recordings"]))
+    assert 0.8 < report["recordings"][0]["free_minutes"] < 0.83 and len(report["free_rms"]) == 4
+    assert "8 of 11 found" in out and "no column contact" in err
+    own = [point for point in report["roc"]["points"] if point["factor"] == 1.0]
+    assert [(each["found"], each["false_alarms"]) for each in own] == [(8, report["false_alarms"])]
+    # thresholds in a range of 32, from latched up for good to nothing found
+    factors = [point["factor"] for point in report["roc"]["points"]]
+    assert factors == sorted(factors) and factors[-1] / factors[0] == 32.0
+    assert report["roc"]["points"][-1]["found"] == report["roc"]["points"][-1]["false_alarms"] == 0
+    drawn = {file.name: file.read_bytes() for file in (folder / "fig").iterdir()}
+    assert set(drawn) == {"contacts.png", "events.png", "roc.png", "delays.png"}
+    assert all(content.startswith(b"\x89PNG") and len(content) > 10_000 for content in drawn.values())
+
+
+def delays_by_hand(time: NDArray[Any], label: NDArray[Any], contact: NDArray[Any]) -> list[float | None]:
+    """Of labels that are further apart than 100 ms."""
+    time, label, contact = time.tolist(), label.tolist(), contact.tolist()
+    found: list[float | None] = []
+    for k in range(1, len(time)):
+        if not label[k] or label[k - 1]:
+            continue
+        quiet = not any(on for t, on in zip(time[:k], contact[:k], strict=True) if t >= time[k] - 0.2 - 1e-9)
+        inside = next((i for i in range(k, len(time)) if contact[i] or not label[i]), k)
+        found.append(time[inside] - time[k] if quiet and contact[inside] and label[inside] else None)
+    return found
+
+
+@pytest.mark.parametrize("path", [PUSHES, FREE_X4])
+def test_the_residual_is_what_the_decision_was_made_of(path: Path) -> None:
+    """joint_contact is |r| > threshold (docs/reference/semantics.md#contact-detector), so r is right."""
+    subject = read_subject(INDEX)
+    track = run_track(subject, read_recording(path), 1, None)
+    contact, force = subject.finger.data["contact"], np.abs(track.recording.groups["tendon_force"]).mean(axis=1)
+    threshold = np.array(contact["threshold"]) + force[:, None] * np.array(contact["threshold_per_force"])
+    from_outputs = residual_of(subject.finger.data, track.recording, track.outputs, 1)  # as of an FMU
+    for residual in (track.residual, from_outputs):
+        known = ~np.isnan(residual)
+        assert known[1:].all() and not known[0].any()
+        above = np.abs(residual)[known] > threshold[known]
+        assert (above != track.outputs["joint_contact"][known]).mean() < 1e-5 < above.mean()
+
+
+def test_labels_force_and_recordings_without_a_reference(call: Call, pushes: Table) -> None:
+    load = {name: None for name in pushes if name.startswith("external")}
+    force = np.linspace(0.0, 2.0, len(pushes["time"]))
+    labelled = written(pushes, "a.parquet", contact=None, touched=pushes["contact"], newton=force)
+    plain = written(pushes, "b.parquet", touched=pushes["contact"], contact=None, **load)
+    report = report_of(
+        call("score", INDEX, labelled, plain, "-o", "s.json", "--labels", "touched", "--force", "newton")
+    )
+    first, second = report["recordings"]
+    assert (report["labels"], report["events"], first["events"], second["events"]) == ("touched", 8, 4, 4)
+    assert (first["external_torque"], second["external_torque"]) == (True, False)
+    assert second["contact_torque_rms_error"] is second["contact_torque_slope"] is None
+    assert report["contact_torque_rms_error"] == first["contact_torque_rms_error"]
+    assert second["at_alarm"]["external_torque"] is second["at_alarm"]["force"] is None
+    for event in first["event_list"]:
+        assert event["found"] == (event["force"] is not None)
+        if event["found"]:
+            k = int(np.argmin(np.abs(pushes["time"] - event["alarm_s"])))
+            assert event["force"] == pytest.approx(force[k])
+            assert event["external_torque"] == pytest.approx([pushes[f"external_torque[{j}]"][k] for j in range(1, 5)])
+
+
+def test_without_an_event_false_alarms_are_all(call: Call, pushes: Table) -> None:
+    alarms = report_of(call("score", INDEX, written(pushes, "all.parquet"), "-o", "s.json"))["found"]
+    answer = call("score", INDEX, written(pushes, "free.parquet", contact=None), "-o", "s.json", "--figures", "fig")
+    report = report_of(answer)
+    assert "no event in column contact: false alarms only" in answer.err
+    assert (report["events"], report["median_delay_s"], report["found_share"]["value"]) == (0, None, None)
+    assert report["contact_torque_rms_error"] is None
+    # what found a push is false without the label
+    assert report["false_alarms"] >= alarms > 0
+    assert report["false_alarms_per_minute"]["value"] == pytest.approx(report["false_alarms"] / 0.25, rel=1e-3)
+    assert [file.name for file in Path("fig").iterdir()] == ["contacts.png"]
+
+
+def test_an_fmu_scores_the_same_without_a_roc(call: Call, pushes: Table) -> None:
+    recording = written(pushes, "rec.parquet")
+    assert call("build", INDEX, "-o", "finger.fmu").status == 0
+    packed = report_of(call("score", "finger.fmu", recording, "-o", "fmu.json"), "fmu.json")
+    plain = report_of(call("score", INDEX, recording, "-o", "s.json"))
+    assert packed["roc"]["points"] is None and "FINGER.json" in packed["roc"]["absent"]
+    assert plain["roc"]["absent"] is None
+    if packed["contact_torque_within_two_std"] is None:  # not all that an FMU puts out is read of it
+        for report in (plain, *plain["recordings"]):
+            report["contact_torque_within_two_std"] = None
+    # the residual of an FMU is got from its outputs
+    for key in set(plain) - {"model", "roc"}:
+        close_to(packed[key], plain[key], key, tolerance=1e-3 if key.startswith(("free_rms", "recordings")) else 0.0)
+
+
+def test_the_same_seed_gives_the_same_bytes(call: Call, pushes: Table) -> None:
+    """Four events are too few to resample: the intervals that a seed moves are those of the free time."""
+    recording = written(pushes, "rec.parquet")
+    texts = []
+    for seed in ("3", "3", "4"):
+        report = report_of(call("score", INDEX, recording, "-o", "s.json", "--seed", seed))
+        assert report["delay_s"]["median"]["interval"] is None
+        texts.append(Path("s.json").read_text().replace('"seed": 4', '"seed": 3'))
+    assert texts[0] == texts[1] != texts[2]
+
+
+def test_scaled_detection_scales_all_that_decides() -> None:
+    data = {"contact": {"threshold": [0.1, 0.2], "threshold_per_force": [None, 0.01], "hold_time": 0.05}}
+    scaled = scaled_detection(data, 2.0)["contact"]
+    assert scaled == {"threshold": [0.2, 0.4], "threshold_per_force": [None, 0.02], "hold_time": 0.05}
+    assert data["contact"]["threshold"] == [0.1, 0.2]
+    more = {
+        "threshold": [0.1],
+        "method": "cusum",
+        "innovation": {"time": 0.1, "threshold": [0.2], "threshold_per_force": None, "evidence_time": 0.02},
+        "friction_bound": {"stuck_share": 0.3, "jump_share": 4.0, "jump_time": 0.06},
+        "uncertainty": [None],
+    }
+    assert scaled_detection({"contact": more}, 4.0)["contact"] == {
+        "threshold": [0.4],
+        "method": "cusum",
+        "innovation": {"time": 0.1, "threshold": [0.8], "threshold_per_force": None, "evidence_time": 0.02},
+        "friction_bound": {"stuck_share": 1.2, "jump_share": 10.0, "jump_time": 0.06},
+        "uncertainty": [None],
+        "uncertainty_level": 12.0,
+    }
+
+
+def test_figures_show_what_was_counted(pushes: Table, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    scored = score_recordings(INDEX, [written(pushes, "rec.parquet")])
+    track, events = scored.tracks[0], scored.scores[0].events
+    drawn = event_figure(scored)
+    assert drawn.groups == [("found", 3), ("missed", 1)]
+    assert drawn.delay[:3].tolist() == sorted(event.delay for event in events if event.found)
+    first = min((event for event in events if event.found), key=lambda event: event.delay)
+    size = np.linalg.norm(track.outputs["compensated_torque"], axis=1)
+    at = np.linspace(drawn.begin, drawn.end, drawn.torque.shape[1])
+    k = int(np.argmin(np.abs(at - drawn.delay[0])))
+    row = int(np.searchsorted(track.recording.time, first.onset + at[k] + 1e-9) - 1)
+    assert drawn.torque[0, k] == size[row]
+    assert np.isnan(drawn.torque).any(axis=1).sum() == 1  # the last event is close to the end
+    over_time = contact_figure(scored)
+    assert len(over_time.labelled) == 4 and len(over_time.found) == 3
+    assert over_time.masked == over_time.outside == [] and over_time.force is None
+    assert [begin for begin, _ in over_time.found] == [event.alarm for event in events if event.found]
+    assert [joint.name for joint in over_time.joints] == scored.subject.finger.joint_names
+    assert scored.roc is not None
+    curve = roc_figure(scored, scored.roc)
+    assert curve.factors[curve.own] == 1.0 and curve.found[curve.own] == 0.75 and curve.rate[curve.own] == 0.0
+    assert np.all(curve.found_low <= curve.found) and np.all(curve.rate <= curve.rate_high)
+    late = delay_figure(scored)
+    assert late.share.tolist() == [0.25, 0.5, 0.75] and late.delays.tolist() == drawn.delay[:3].tolist()
+
+
+# --- bad input --------------------------------------------------------------------------------------------------------
+
+
+def halves(table: Table) -> Path:
+    return written(table, "half.csv", contact=0.5 * table["contact"])
+
+
+def two_tendons(table: Table) -> Path:
+    names = [name for name in table if not re.match(r"tendon_\w+\[[3-8]\]", name)]
+    return written({name: table[name] for name in names}, "small.csv")
+
+
+@pytest.mark.parametrize(
+    ("make", "options", "words"),
+    [
+        (halves, (), ("half.csv", "column contact, row 509", "0.5", "expected 0 or 1")),
+        (lambda table: written(table, "r.csv"), ("--labels", "touch"), ("r.csv", "no column touch")),
+        (lambda table: written(table, "r.csv"), ("--labels", "tendon_force[1]"), ("tendon_force[1]", "signal")),
+        (lambda table: written(table, "r.csv"), ("--force", "newton"), ("r.csv", "no column newton", "(N)")),
+        (lambda table: written(table, "r.csv"), ("--kinematics", "3"), ("r.csv", "no column joint_velocity[1]")),
+        (lambda table: written(table, "r.csv", touch=table["contact"]), (), ("r.csv", "unknown column 'touch'")),
+        (two_tendons, (), ("small.csv", "2 columns tendon_force[...], expected 8")),
+        (
+            lambda table: written({name: column[:1] for name, column in table.items()}, "r.csv"),
+            (),
+            ("r.csv: one sample",),
+        ),
+        (lambda table: Path("no.csv"), (), ("no.csv", "no such file")),
+    ],
+)
+def test_bad_input_is_named_and_leaves_nothing(
+    call: Call, pushes: Table, make: Any, options: tuple[str, ...], words: tuple[str, ...]
+) -> None:
+    short = {name: column[:600] for name, column in pushes.items()}
+    answer = call("score", INDEX, make(short), "-o", "s.json", *options)
+    assert answer.status == 2 and answer.out == "" and len(answer.err.splitlines()) == 1, answer
+    assert all(word in answer.err for word in words), answer.err
+    assert not Path("s.json").exists()
+
+
+def test_files_that_cannot_be(call: Call, pushes: Table) -> None:
+    recording = written({name: column[:600] for name, column in pushes.items()}, "r.csv")
+    Path("broken.fmu").write_text("no archive")
+    for arguments, words in (
+        ((INDEX, recording, recording, "-o", "s.json"), "given twice"),
+        ((INDEX, recording, "-o", "s.txt"), "ends in .json"),
+        ((INDEX, recording, "-o", INDEX), "same file as the input"),
+        ((INDEX, recording, "-o", "s.json", "--figures", recording), "r.csv: a file; expected a folder"),
+        ((recording, recording, "-o", "s.json"), "a recording; expected FINGER.json"),
+        (("broken.fmu", recording, "-o", "s.json"), "broken.fmu: not an FMU"),
+    ):
+        answer = call("score", *arguments)
+        assert answer.status == 2 and words in answer.err, answer
+    assert not Path("s.json").exists()
+
+
+def test_every_option_is_on_the_page_and_its_example_is_what_comes_out(call: Call, demo: tuple[Path, str, str]) -> None:
+    page = (ROOT / "docs" / "reference" / "commands" / "score.md").read_text(encoding="utf-8")
+    options = set(re.findall(r"--[a-z][a-z-]+", call("score", "--help").out)) - {"--help"}
+    assert len(options) >= 6 and {option for option in options if option not in page} == {"--output"}
+    report = read_report(demo[0] / "s.json")
+    shown = json.loads(re.findall(r"```json\n(.*?)```", page, re.DOTALL)[0])
+    for key, value in shown.items():
+        close_to(report[key], value, key)
+
+
+def close_to(found: Any, shown: Any, key: str, tolerance: float = 6e-3) -> None:
+    """By default within what the page rounds to three digits."""
+    if isinstance(shown, dict):
+        for name, value in shown.items():
+            close_to(found[name], value, f"{key}.{name}", tolerance)
+    elif isinstance(shown, list):
+        for each, value in zip(found, shown, strict=True):
+            close_to(each, value, key, tolerance)
+    elif isinstance(shown, float):
+        assert found == pytest.approx(shown, rel=tolerance, abs=1e-12), key
+    else:
+        assert found == shown, key

@@ -1,0 +1,247 @@
+"""Fits whose residuals are coloured, and fits that begin from an earlier one."""
+
+from __future__ import annotations
+
+import copy
+import json
+import os
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from fit_cases import small_finger
+from fit_finger import made_recording, moved_start
+from repository_paths import ROOT
+from tendonfmu.errors import InputError
+from tendonfmu.estimate.fit_report import report_text
+from tendonfmu.estimate.fitting import FitWarning, FrictionFit
+from tendonfmu.estimate.previous_fit import read_previous_fit
+from tendonfmu.recordings.recording import Recording
+
+pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
+
+Numbers = NDArray[np.float64]
+SHARED = {"share": ["tendons"], "kinematics": 3, "tolerance": 0.05, "uncertainty": False}
+TRUTH = small_finger()
+
+
+def fitted(finger: Any, *recordings: Recording, **options: Any) -> FrictionFit:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FitWarning)
+        return FrictionFit(finger, **(SHARED | options)).fit(list(recordings))
+
+
+def held_noise(seed: int, duration: float, size: float) -> Recording:
+    """The model's own recording with a further error of this size (N·m), each value of it held for 0.1 s."""
+    recording = made_recording(seed=seed, duration=duration)
+    noise = size * np.random.default_rng(1000 + seed).standard_normal((len(recording) // 20 + 1, 2))
+    recording.groups["external_torque"] -= np.repeat(noise, 20, axis=0)[: len(recording)]
+    return recording
+
+
+# --- white residuals --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", ["batch", "ekf"])
+def test_a_model_that_is_right_is_fitted_as_before_bit_for_bit(method: str) -> None:
+    recording = made_recording(duration=20.0)
+    found, plain = (fitted(moved_start(), recording, method=method, effective_samples=each) for each in (True, False))
+    effective = found.report_["innovations"]["effective"]
+    assert effective["worth"] == effective["samples"]
+    assert np.array_equal(found.z_, plain.z_) and np.array_equal(found.z_covariance_, plain.z_covariance_)
+    assert found.report_["innovations"] == plain.report_["innovations"]
+
+
+# --- coloured residuals -----------------------------------------------------------------------------------------------
+
+
+def scores(found: FrictionFit) -> Numbers:
+    """(estimate − truth)/standard error of the Coulomb friction, which all of the motion tells."""
+    known = fitted_truth()
+    paths = [path for path in found.parameters_ if path.endswith(".coulomb")]
+    return np.array([(found.parameters_[path] - known[path]) / found.standard_errors_[path] for path in paths])
+
+
+def fitted_truth() -> dict[str, float]:
+    from tendonfmu.estimate.structure import estimable_numbers
+
+    return {number.path: number.value for number in estimable_numbers(TRUTH)}
+
+
+@pytest.fixture(scope="module")
+def coloured_fits() -> dict[tuple[str, bool], list[FrictionFit]]:
+    recordings = [held_noise(seed, 20.0, 0.006) for seed in (1, 2, *range(4, 12))]  # in 3 a tendon goes slack
+    passes: dict[str, dict[str, Any]] = {"batch": {}, "ekf": {"max_passes": 6}}  # as many as settle it
+    cases = [("batch", True), ("batch", False), ("ekf", True), ("ekf", False)]
+    return {
+        (method, effective): [
+            fitted(TRUTH, recording, method=method, effective_samples=effective, **passes[method])
+            for recording in recordings
+        ]
+        for method, effective in cases
+    }
+
+
+@pytest.mark.parametrize("method", ["batch", "ekf"])
+def test_standard_errors_cover_the_truth(coloured_fits: dict[Any, list[FrictionFit]], method: str) -> None:
+    """rms of the scores: 1 where the standard errors are right. Every sample counted, it is far above."""
+    spread = {
+        effective: float(
+            np.sqrt(np.mean(np.concatenate([scores(each) for each in coloured_fits[method, effective]]) ** 2))
+        )
+        for effective in (True, False)
+    }
+    assert 0.6 < spread[True] < 1.5
+    assert spread[False] > 2.2
+
+
+def test_the_interval_of_the_nis_knows_of_the_colour(coloured_fits: dict[Any, list[FrictionFit]]) -> None:
+    wide, narrow = (
+        np.diff(coloured_fits["batch", effective][0].report_["innovations"]["nis"]["interval"])[0]
+        for effective in (True, False)
+    )
+    effective = coloured_fits["batch", True][0].report_["innovations"]["effective"]
+    share = sum(effective["worth"]) / sum(effective["samples"])
+    assert share < 0.3
+    assert wide == pytest.approx(narrow / np.sqrt(share), rel=0.05)
+
+
+def test_what_coloured_residuals_do_not_tell_stays_where_it_was() -> None:
+    """A start that is right and a prior of 5 %: with every sample counted, colour alone moves the numbers far more."""
+    recording = held_noise(21, 10.0, 0.02)
+    moved = {}
+    for effective in (True, False):
+        found = fitted(TRUTH, recording, prior=0.05, effective_samples=effective)
+        known = fitted_truth()
+        moved[effective] = np.array([found.parameters_[path] / known[path] - 1 for path in found.parameters_])
+    rms = {effective: float(np.sqrt(np.mean(each**2))) for effective, each in moved.items()}
+    assert rms[True] < 0.05
+    assert rms[False] > 1.5 * rms[True]
+
+
+# --- from a previous fit ----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def previous(tmp_path_factory: pytest.TempPathFactory) -> tuple[FrictionFit, Path, Path]:
+    """A fit, its report and its description."""
+    folder = tmp_path_factory.mktemp("previous")
+    found = fitted(moved_start(), made_recording(duration=20.0), tolerance=1e-3)
+    report, description = folder / "report.json", folder / "finger.json"
+    report.write_text(report_text(found.report_), encoding="utf-8")
+    description.write_text(found.description_text(), encoding="utf-8")
+    return found, report, description
+
+
+@pytest.mark.parametrize("method", ["batch", "ekf"])
+def test_a_second_fit_from_the_first_is_a_fit_to_both(previous: tuple[FrictionFit, Path, Path], method: str) -> None:
+    """Where nothing can have changed, the previous fit stands for its recording."""
+    first, report, _ = previous
+    other = made_recording(seed=5, duration=20.0)
+    exact = {"tolerance": 1e-3} if method == "batch" else {}
+    second = fitted(moved_start(), other, previous=report, change=1e-6, method=method, **exact)
+    both = fitted(moved_start(), made_recording(duration=20.0), other, tolerance=1e-3)
+    # beyond a tenth of a number the laws are not linear within its error, and the previous fit is no Gaussian
+    paths = [path for path, value in both.parameters_.items() if both.standard_errors_[path] < 0.1 * abs(value)]
+    error = np.array([both.standard_errors_[path] for path in paths])
+    far = {
+        name: np.array([found.parameters_[path] - both.parameters_[path] for path in paths]) / error
+        for name, found in (("first", first), ("second", second))
+    }
+    assert len(paths) > 10 and np.sqrt(np.mean(far["first"] ** 2)) > 0.8
+    assert np.sqrt(np.mean(far["second"] ** 2)) < 0.4
+    known = np.array([second.standard_errors_[path] for path in paths]) / error
+    assert np.median(known) == pytest.approx(1.0, abs=0.1) and known.max() < 1.5
+
+
+def test_from_a_description_numbers_count_as_known_to_within_the_change(
+    previous: tuple[FrictionFit, Path, Path],
+) -> None:
+    first, _, description = previous
+    still = made_recording(seed=5, still=1)
+    found = fitted(moved_start(), still, previous=description, change=0.03)
+    for path, value in first.parameters_.items():
+        if path.startswith("joints[2].load_friction"):  # that joint never moves
+            assert found.parameters_[path] == pytest.approx(value, rel=1e-3)
+    coulomb = "joints[2].load_friction.coulomb"
+    if coulomb in found.parameters_:
+        assert found.standard_errors_[coulomb] == pytest.approx(0.03 * found.parameters_[coulomb], rel=0.02)
+
+
+def test_what_may_have_changed_more_moves_more(previous: tuple[FrictionFit, Path, Path]) -> None:
+    _, report, _ = previous
+    changed = copy.deepcopy(TRUTH)
+    path = "joints[1].friction.coulomb"
+    before = read_previous_fit(report).values[path]
+    assert changed["joints"][0]["friction"]["coulomb"] == pytest.approx(before, rel=0.5)
+    recording = held_noise(7, 10.0, 0.01)
+    shifts = [
+        abs(fitted(moved_start(), recording, previous=report, change=change).parameters_[path] - before)
+        for change in (1e-4, 0.5)
+    ]
+    assert shifts[0] < 0.5 * shifts[1]
+
+
+def test_a_previous_fit_is_read_with_its_covariance(previous: tuple[FrictionFit, Path, Path]) -> None:
+    first, report, description = previous
+    found = read_previous_fit(report)
+    assert found.values == first.parameters_ and found.share == 1.0
+    root = np.sqrt(np.diag(first.z_covariance_))
+    assert found.covariance / np.outer(root, root) == pytest.approx(
+        first.z_covariance_ / np.outer(root, root), abs=1e-3
+    )
+    bare = read_previous_fit(description)
+    assert bare.covariance.shape == (0, 0) and set(first.parameters_) <= set(bare.values)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ({"format": "tendonfmu-fit-1"}, "expected a whole report"),
+        ({"format": "tendonfmu-score-1"}, "format"),
+        ([1, 2], "expected"),
+    ],
+)
+def test_what_is_no_previous_fit_is_refused(tmp_path: Path, content: Any, words: str) -> None:
+    file = tmp_path / "previous.json"
+    file.write_text(json.dumps(content), encoding="utf-8")
+    with pytest.raises(InputError, match=words) as refused:
+        fitted(TRUTH, made_recording(), previous=file)
+    assert "previous.json" in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_a_previous_fit_of_another_finger_is_refused(previous: tuple[FrictionFit, Path, Path], tmp_path: Path) -> None:
+    report = json.loads(previous[1].read_text(encoding="utf-8"))
+    for entry in report["parameters"]:
+        entry["path"] = f"extensions[9].{entry['path']}"
+    file = tmp_path / "other.json"
+    file.write_text(json.dumps(report), encoding="utf-8")
+    with pytest.raises(InputError, match=r"other.json: none of its \d+ numbers"):
+        fitted(TRUTH, made_recording(), previous=file)
+
+
+# --- measured ---------------------------------------------------------------------------------------------------------
+
+DATA = Path(os.environ.get("TENDONFMU_DATA") or ROOT.parent / "shared" / "data")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not (DATA / "davinci_tool").is_dir(), reason=f"SKIPPED: no da Vinci recordings in {DATA}")
+def test_one_light_load_leaves_a_jaw_fit_for_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """bench/recalibration.py on the lightest and the heaviest load; docs/evidence/recalibration.md has all of them."""
+    monkeypatch.syspath_prepend(str(ROOT / "bench"))
+    recalibration = pytest.importorskip("recalibration")
+    found = recalibration.campaign(
+        [way for way in recalibration.ways([0.02]) if "description" not in way.name and "0.1" not in way.name],
+        planted=(1.0, 1.3),
+        only=("00", "09"),
+    )
+    ratio = {(each.way.split(",")[0], each.planted, each.run): each.ratio for each in found}
+    assert ratio["each sample counts", 1.0, "00"] > 2.0
+    for run in ("00", "09"):
+        assert ratio["from the report", 1.0, run] <= 1.06
+        assert ratio["from the report", 1.3, run] < 1.0

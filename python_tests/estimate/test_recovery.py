@@ -1,0 +1,120 @@
+"""A fit finds the 472 numbers of a finger that made its recording itself (bench/recovery.py).
+
+Here one seed, 400 s at 25 Hz: as much noise per second as in the campaign at 1 kHz, so nearly the same errors, at a
+fortieth of the time. The campaign itself, 20 seeds at 1 kHz, takes an hour on two cores: `./test -m campaign
+python_tests/estimate/test_recovery.py`. docs/evidence/fit.md has its figures.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from repository_paths import ROOT
+from tendonfmu.estimate.estimation import ESTIMATION_MISSING, HAS_ESTIMATION
+
+sys.path.insert(0, str(ROOT / "bench"))
+
+pytestmark = pytest.mark.skipif(not HAS_ESTIMATION, reason=ESTIMATION_MISSING)
+
+SEED, DURATION, RATE = 1, 400.0, 25.0
+
+
+@pytest.fixture(scope="module")
+def case() -> Any:
+    from recovery_case import make_case
+
+    return make_case(SEED, DURATION, RATE)
+
+
+@pytest.fixture(scope="module")
+def row() -> dict[str, float]:
+    """Of one seed, fitted both ways."""
+    from recovery import run_seed
+
+    return run_seed(SEED, DURATION, RATE)
+
+
+def test_the_recording_is_the_models_own(case: Any) -> None:
+    """At the truth nothing is left but the noise: ½ Σ e²/S has the mean and the spread of so many unit normals."""
+    from recovery_case import image
+    from tendonfmu.estimate.estimation import Estimator
+
+    known = Estimator(image(case.truth))
+    known.add_recording(case.recording, external_torque=case.recording["external_torque"])
+    cost, gradient, information = known.evaluate(known.start)
+    count = len(case.recording["time"]) * known.joints
+    assert abs(2 * cost - count) < 5 * np.sqrt(2 * count)
+    pull = gradient @ np.linalg.solve(information + np.diag((10 * known.scale) ** -2.0), gradient)
+    assert abs(pull - len(gradient)) < 5 * np.sqrt(2 * len(gradient))
+    assert case.least_force > 1.0
+
+
+def test_the_fit_starts_off_the_truth(case: Any) -> None:
+    from recovery_case import START_SPREAD, image
+    from tendonfmu.estimate.estimation import Estimator
+
+    true, start = (Estimator(image(case.truth)).start, Estimator(image(case.start)).start)
+    off = np.log(start / true)
+    assert len(off) == 472
+    assert abs(np.std(off) / START_SPREAD - 1) < 5 / np.sqrt(2 * 472)
+    assert json.dumps(case.truth) != json.dumps(case.start)
+
+
+def test_an_excite_motion_tells_most_of_the_numbers(row: dict[str, float]) -> None:
+    assert row["numbers"] == 472
+    assert row["identifiable"] >= 0.7 * 472
+
+
+@pytest.mark.parametrize("method", ["batch", "ekf"])
+def test_they_are_found_within_their_errors(row: dict[str, float], method: str) -> None:
+    """One seed; the errors of neighbours go along with one another, so the campaign's limits are too narrow here."""
+    assert row[f"{method}_far"] <= 0.03 * row["identifiable"]
+    assert 0.6 < row[f"{method}_variance"] < 1.6
+
+
+def test_both_methods_agree(row: dict[str, float]) -> None:
+    assert row["converged"] == 1
+    assert row["apart_rms"] < 1.0
+
+
+def test_a_campaign_goes_on_where_it_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import recovery
+
+    ran: list[int] = []
+
+    def short(seed: int, *_: object) -> dict[str, float]:
+        ran.append(seed)
+        counts = {f"identifiable_{kind}": 1.0 for kind in recovery.KINDS}
+        squares = {f"squares_{kind}": 1.0 for kind in recovery.KINDS}
+        plain = {"seed": seed, "numbers": 10, "identifiable": 6, "converged": 1, "batch_s": 2.0}
+        return {**plain, "batch_far": seed, "batch_variance": 1.0 + seed, **counts, **squares}
+
+    monkeypatch.setattr(recovery, "run_seed", short)
+    file = tmp_path / "rows.csv"
+    recovery.campaign(1, file, 1.0, 1.0, False)
+    rows = recovery.campaign(2, file, 1.0, 1.0, False)
+    assert ran == [0, 1] and recovery.read_rows(file) == rows
+    found = recovery.summary(rows)
+    assert found["identifiable"] == 0.6
+    assert found["batch: within 3 standard errors"] == pytest.approx(1 - 1 / 12)
+    assert found["batch: variance"] == pytest.approx(1.5)
+
+
+@pytest.mark.campaign
+def test_campaign(tmp_path: Path) -> None:
+    """20 seeds of 400 s at 1 kHz."""
+    import recovery
+
+    found = recovery.summary(recovery.campaign(20, tmp_path / "rows.csv"))
+    assert found["least identifiable"] >= 0.7
+    assert found["not converged"] == 0
+    for method in ("batch", "ekf"):
+        assert found[f"{method}: within 3 standard errors"] >= 0.99
+        assert 0.8 <= found[f"{method}: variance"] <= 1.25
+    assert found["ekf − batch, rms in standard errors"] < 1.0

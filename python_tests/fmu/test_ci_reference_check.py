@@ -1,0 +1,223 @@
+"""examples/ci_reference_check: real traces agree, a changed parameter does not, bad files are named."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from reference import make_reference_traces as traces
+
+from repository_paths import ROOT, TESTS
+
+EXAMPLE = ROOT / "examples" / "ci_reference_check"
+REFERENCE = TESTS / "reference"
+NAMES = list(traces.TRACES)
+# of each finger: a tunable parameter and another value
+CHANGED = {
+    "index_finger": ("tendons[1].pulley_friction[1].coulomb", 1.01),
+    "asymmetric_pair": ("bias.forget_rate", 1.1),
+    "cable_loop": ("bias.forget_rate", 1.1),
+}
+Trace = Callable[[], Path]
+
+
+def check(fmu: Path, trace: Path, *more: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, str(EXAMPLE / "check_reference.py"), str(fmu), str(trace), *more]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def number_at(description: dict[str, Any], path: str) -> float:
+    """The value of a parameter path in a description: indices count from 1."""
+    found: Any = description
+    for key in re.findall(r"[a-z_]+|\d+", path):
+        found = found[int(key) - 1 if key.isdigit() else key]
+    return float(found)
+
+
+@pytest.fixture(scope="module")
+def fmus(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the FMU of each trace."""
+    from tendonfmu.fmu.packaging import build_fmu
+
+    folder = tmp_path_factory.mktemp("fmus")
+    for name in NAMES:
+        build_fmu(traces.TRACES[name][0], folder / f"{name}.fmu")
+    return folder
+
+
+@pytest.fixture
+def copied(tmp_path: Path) -> Path:
+    """A copy of the trace of the cable loop, to be spoiled."""
+    for file in REFERENCE.glob("cable_loop_*"):
+        shutil.copy(file, tmp_path)
+    return tmp_path / "cable_loop"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_fmu_agrees_with_its_trace(fmus: Path, name: str) -> None:
+    done = check(fmus / f"{name}.fmu", REFERENCE / name)
+    assert done.returncode == 0, done.stdout + done.stderr
+    header = (REFERENCE / f"{name}_ref.csv").read_text(encoding="utf-8").split("\n", 1)[0].replace('"', "").split(",")
+    rows = [line.split() for line in done.stdout.splitlines()]
+    assert [row[0] for row in rows[1:-1]] == header[1:]
+    assert {row[-1] for row in rows[1:-1]} == {"agrees"}
+    assert all(float(row[1]) <= float(row[2]) for row in rows[1:-1])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_changed_start_value_fails(fmus: Path, name: str) -> None:
+    path, factor = CHANGED[name]
+    value = factor * number_at(traces.read_description(name) | {"bias": {"forget_rate": 5.0}}, path)
+    done = check(fmus / f"{name}.fmu", REFERENCE / name, "--set", f"{path}={value!r}")
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert re.search(r"^compensated_torque\[\d\] .* DIFFERS$", done.stdout, re.MULTILINE)
+    assert re.search(r"^joint_torque\[1\] .* agrees$", done.stdout, re.MULTILINE)
+
+
+def test_a_rebuilt_fmu_of_another_finger_fails(tmp_path: Path) -> None:
+    from tendonfmu.fmu.packaging import build_fmu
+
+    description = traces.read_description("asymmetric_pair")
+    description["tendons"][0]["stiffness"] *= 1.001
+    (tmp_path / "other.json").write_text(json.dumps(description))
+    build_fmu(tmp_path / "other.json", tmp_path / "other.fmu")
+    done = check(tmp_path / "other.fmu", REFERENCE / "asymmetric_pair")
+    assert done.returncode == 1, done.stderr
+    assert "DIFFERS" in done.stdout
+
+
+def test_a_value_that_the_fmu_refuses_is_a_failed_run(fmus: Path) -> None:
+    done = check(fmus / "cable_loop.fmu", REFERENCE / "cable_loop", "--set", "bias.forget_rate=-1")
+    assert done.returncode == 1
+    assert done.stderr.startswith("check_reference: ") and done.stderr.count("\n") == 1
+    assert "bias.forget_rate" in done.stderr
+
+
+def spoil(trace: Path, end: str, pattern: str, replacement: str) -> None:
+    file = trace.with_name(trace.name + end)
+    text, count = re.subn(pattern, replacement, file.read_text(encoding="utf-8"), count=1)
+    assert count == 1
+    file.write_text(text, encoding="utf-8")
+
+
+SPOILED = {
+    "renamed input": ("_in.csv", r"tendon_force\[1\]", "force", "force is not a numeric variable of the FMU"),
+    "output as input": ("_in.csv", r"tendon_force\[1\]", "slack[1]", r"causality output; expected input"),
+    "missing output": ("_ref.csv", r'"bias_torque\[1\]"', '"bias.forget_rate"', r"no column bias_torque\[1\]"),
+    "unknown output": ("_ref.csv", r'"bias_torque\[1\]"', '"bias"', "bias is not a numeric variable"),
+    "same name twice": ("_ref.csv", r'"bias_torque\[1\]"', '"joint_torque[1]"', "no name twice"),
+    "no time": ("_ref.csv", r'"time"', '"t"', "expected `time` first"),
+    "text": ("_ref.csv", r"\n0\.0078125,[^,]*", "\n0.0078125,high", r"line 3, column compensated_torque\[1\]: 'high'"),
+    "NaN": ("_in.csv", r"\n0\.0078125,[^,]*", "\n0.0078125,nan", r"line 3, column tendon_force\[1\]: 'nan'; expected"),
+    "time goes back": ("_in.csv", r"\n0\.0078125,", "\n-1,", "column time: expected"),
+    "short row": ("_in.csv", r"\n0\.0078125,[^,]*", "\n0.0078125", "line 3: 2 columns; expected 3"),
+    "no stop time": ("_ref.opt", "StopTime", "Stop", "StopTime missing"),
+    "step of 0": ("_ref.opt", r"StepSize,\S*", "StepSize,0", "StepSize above 0"),
+    "tolerance that is no number": ("_ref.opt", r"RelTol,\S*", "RelTol,small", "RelTol: 'small'"),
+}
+
+
+@pytest.mark.parametrize("spoiled", SPOILED)
+def test_a_bad_file_is_named(fmus: Path, copied: Path, spoiled: str) -> None:
+    end, pattern, replacement, message = SPOILED[spoiled]
+    spoil(copied, end, pattern, replacement)
+    done = check(fmus / "cable_loop.fmu", copied)
+    assert done.returncode == 2, done.stdout
+    assert re.search(re.escape(f"cable_loop{end}") + ".*" + message, done.stderr), done.stderr
+    assert done.stderr.count("\n") == 1 and done.stdout == ""
+
+
+@pytest.mark.parametrize("end", ["_in.csv", "_ref.csv", "_ref.opt"])
+def test_a_missing_file_is_named(fmus: Path, copied: Path, end: str) -> None:
+    copied.with_name(copied.name + end).unlink()
+    done = check(fmus / "cable_loop.fmu", copied)
+    assert done.returncode == 2
+    assert f"cable_loop{end}: cannot be read; expected" in done.stderr
+
+
+def test_an_empty_file_is_named(fmus: Path, copied: Path) -> None:
+    copied.with_name("cable_loop_in.csv").write_text("")
+    done = check(fmus / "cable_loop.fmu", copied)
+    assert done.returncode == 2
+    assert "cable_loop_in.csv" in done.stderr
+
+
+def test_what_is_no_fmu_is_named(tmp_path: Path) -> None:
+    for content in (b"", b"PK no archive"):
+        (tmp_path / "bad.fmu").write_bytes(content)
+        done = check(tmp_path / "bad.fmu", REFERENCE / "cable_loop")
+        assert done.returncode == 2 and "bad.fmu: " in done.stderr and done.stderr.count("\n") == 1
+    assert check(tmp_path / "none.fmu", REFERENCE / "cable_loop").returncode == 2
+
+
+def test_an_fmu_without_binaries_is_named(fmus: Path, tmp_path: Path) -> None:
+    target = tmp_path / "sources.fmu"
+    with zipfile.ZipFile(fmus / "cable_loop.fmu") as source, zipfile.ZipFile(target, "w") as archive:
+        for name in source.namelist():
+            if not name.startswith("binaries/"):
+                archive.writestr(name, source.read(name))
+    done = check(target, REFERENCE / "cable_loop")
+    assert done.returncode == 2 and "binaries for c-code; expected" in done.stderr
+
+
+@pytest.mark.parametrize("setting", ["bias.forget_rate", "=1", "forget=1"])
+def test_a_bad_setting_is_refused(fmus: Path, setting: str) -> None:
+    done = check(fmus / "cable_loop.fmu", REFERENCE / "cable_loop", "--set", setting)
+    assert done.returncode == 2 and done.stdout == ""
+
+
+def test_every_fmu_of_a_folder(fmus: Path, tmp_path: Path) -> None:
+    """The shell variant: the worst answer of all is its own."""
+
+    def run_all(folder: Path, traces_folder: Path = REFERENCE) -> subprocess.CompletedProcess[str]:
+        environment = dict(os.environ, PYTHON=sys.executable)
+        command = ["sh", str(EXAMPLE / "reference_check.sh"), str(folder), str(traces_folder)]
+        return subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+
+    done = run_all(fmus)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert re.findall(r"0 of \d+ variables differ from (\w+)", done.stdout) == sorted(NAMES)
+    for name in NAMES:
+        shutil.copy(fmus / f"{name}.fmu", tmp_path)
+    shutil.copytree(REFERENCE, tmp_path / "traces")
+    spoil(tmp_path / "traces" / "cable_loop", "_ref.csv", r"\n0\.0,[^,]*", "\n0.0,1.0")
+    assert run_all(tmp_path, tmp_path / "traces").returncode == 1
+    (tmp_path / "asymmetric_pair.fmu").unlink()
+    assert run_all(tmp_path, tmp_path / "traces").returncode == 2
+    assert run_all(tmp_path, tmp_path).returncode == 2
+
+
+def test_the_workflow_runs_the_script() -> None:
+    text = (EXAMPLE / "reference_check.yml").read_text(encoding="utf-8")
+    (command,) = re.findall(r"run: (.*reference_check\.sh .*)", text)
+    assert command == "PYTHON=python sh ci_reference_check/reference_check.sh fmus traces"
+    assert "python -m pip install fmpy numpy\n" in text  # what the script imports
+    imported = re.findall(r"^import (\w+)", (EXAMPLE / "check_reference.py").read_text(encoding="utf-8"), re.MULTILINE)
+    assert set(imported) - set(sys.stdlib_module_names) == {"fmpy", "numpy"}
+
+
+def test_the_commands_and_the_table_of_the_page(tmp_path: Path) -> None:
+    """README.md: first the commands that agree and their table, then the one that does not."""
+    text = (EXAMPLE / "README.md").read_text(encoding="utf-8")
+    agreeing, differing = re.findall(r"```sh\n(.*?)```", text, re.DOTALL)
+    (table,) = re.findall(r"```\n(variable.*?)```", text, re.DOTALL)
+
+    def run(script: str) -> subprocess.CompletedProcess[str]:
+        bin_folder = str(Path(sys.executable).parent)
+        script = script.replace(".venv/bin", bin_folder).replace("build/fmus", str(tmp_path))
+        return subprocess.run(["sh", "-e", "-c", script], cwd=ROOT, capture_output=True, text=True, check=False)
+
+    done = run(agreeing)
+    assert done.returncode == 0, done.stderr
+    assert [line.split()[0] for line in done.stdout.splitlines()] == [line.split()[0] for line in table.splitlines()]
+    assert table.splitlines()[-1] == done.stdout.splitlines()[-1]
+    assert run(differing).returncode == 1

@@ -1,0 +1,277 @@
+"""The FMU as a file: what its binary exports and needs, where it may lie, how it behaves in a host and in fmpy."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from fmu_binary import ERROR, FINGER, OK, Instance, UnpackedFmu, motion, unpack
+from leak_count import least_growth, needs_count
+from repository_paths import SUPPORT
+
+linux = pytest.mark.skipif(sys.platform != "linux", reason="SKIPPED: nm, objdump and /proc are those of Linux")
+
+
+def run(*command: str | Path) -> str:
+    return subprocess.run([str(word) for word in command], check=True, capture_output=True, text=True).stdout
+
+
+def tool(name: str) -> str:
+    path = shutil.which(name)
+    if path is None:
+        pytest.skip(f"SKIPPED: {name} is not installed")
+    return path
+
+
+# --- the binary -------------------------------------------------------------------------------------------------------
+
+
+@linux
+def test_exports_the_fmi_functions_only(small_fmu: UnpackedFmu) -> None:
+    lines = run(tool("nm"), "-D", "--defined-only", small_fmu.binary).splitlines()
+    names = {line.split()[-1] for line in lines}
+    header = next(path for path in (small_fmu.folder / "sources").iterdir() if path.name == "fmi2Functions.h")
+    assert names == set(re.findall(r"fmi2FullName\((fmi2\w+)\)", header.read_text()))
+    assert len(names) == 44
+
+
+@linux
+def test_needs_libc_and_libm_only(small_fmu: UnpackedFmu) -> None:
+    headers = run(tool("objdump"), "-p", small_fmu.binary)
+    needed = set(re.findall(r"NEEDED\s+(\S+)", headers))
+    assert needed <= {"libc.so.6", "libm.so.6"} and "libc.so.6" in needed
+    assert "SYMBOLIC" in headers
+    versions = {tuple(map(int, v.split("."))) for v in re.findall(r"GLIBC_([\d.]+)", headers)}
+    assert max(versions) <= (2, 35)  # Ubuntu 22.04, the oldest system that ./run is for; release builds ask for less
+
+
+@linux
+def test_no_executable_stack_and_no_text_relocations(small_fmu: UnpackedFmu) -> None:
+    headers = run(tool("objdump"), "-p", small_fmu.binary)
+    assert "TEXTREL" not in headers
+    stack = re.search(r"STACK.*\n.*flags (\S+)", headers)
+    assert stack and "x" not in stack[1]
+
+
+# --- where it lies ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["späce and ümlaut", "100% sure", "a%20b", "q?#[x]", "日本"])
+def test_any_folder_name(small_fmu_path: Path, tmp_path: Path, name: str) -> None:
+    fmu = unpack(small_fmu_path, tmp_path / name)
+    with Instance(fmu) as instance:
+        assert instance.component, instance.messages
+    spellings = [
+        fmu.location.replace(b"file:///", b"file:/"),
+        fmu.location.replace(b"file:///", b"file://localhost/"),
+        fmu.location.replace(b"file:", b"FILE:") + b"/",
+        b"file://" + os.fsencode(fmu.folder / "resources"),  # not encoded, as some importers have it
+        os.fsencode(fmu.folder / "resources"),
+    ]
+    for location in spellings:
+        with Instance(fmu, location=location) as instance:
+            assert instance.component, (location, instance.messages)
+
+
+def test_lower_case_percent_encoding(small_fmu_path: Path, tmp_path: Path) -> None:
+    fmu = unpack(small_fmu_path, tmp_path / "ü")
+    assert b"%C3%BC" in fmu.location
+    with Instance(fmu, location=fmu.location.replace(b"%C3%BC", b"%c3%bc")) as instance:
+        assert instance.component
+
+
+# --- in a host --------------------------------------------------------------------------------------------------------
+
+
+@needs_count
+@pytest.mark.parametrize(("cycle", "count"), [("bare", 500), ("whole", 1000)])
+def test_instances_leave_nothing(small_fmu: UnpackedFmu, cycle: str, count: int) -> None:
+    """Created and stepped; or saved, in error and refused as well: no handle, less than a byte each."""
+    used, opened = least_growth(small_fmu, cycle, count)
+    assert used < count and opened == 0
+
+
+@needs_count
+def test_the_count_finds_what_one_instance_in_ten_leaves(small_fmu: UnpackedFmu) -> None:
+    count = 200
+    used, opened = least_growth(small_fmu, "losing", count)
+    assert used >= count and opened == count // 10
+
+
+SECOND = {**FINGER, "name": "other finger", "tendons": FINGER["tendons"][:2]}
+
+GLOBAL_HOST = """
+import ctypes, json, sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+from fmu_binary import OK, Instance, UnpackedFmu, motion
+
+def play(instances):
+    rows = [[] for _ in instances]
+    for instance in instances:
+        instance.initialise(motion(instance.fmu, 0.0))
+    for k in range(1, 50):
+        for row, instance in zip(rows, instances):
+            assert instance.set_real(motion(instance.fmu, 0.01 * k)) == OK and instance.step(0.01 * k) == OK
+            row.append(instance.outputs())
+    return rows
+
+folders = [Path(name) for name in sys.argv[3:]]
+fmus = [UnpackedFmu(folder, getattr(ctypes, sys.argv[2])) for folder in folders]
+print(json.dumps(play([Instance(fmu) for fmu in fmus])))
+"""
+
+
+@pytest.fixture(scope="session")
+def other_fmu(tmp_path_factory: pytest.TempPathFactory) -> UnpackedFmu:
+    from tendonfmu.fmu.packaging import build_fmu
+
+    folder = tmp_path_factory.mktemp("other_fmu")
+    (folder / "finger.json").write_text(json.dumps(SECOND))
+    build_fmu(folder / "finger.json", folder / "other.fmu")
+    return unpack(folder / "other.fmu", folder / "unpacked")
+
+
+def test_two_fmus_in_a_process_that_shares_all_symbols(small_fmu: UnpackedFmu, other_fmu: UnpackedFmu) -> None:
+    assert small_fmu.binary.name != other_fmu.binary.name
+
+    def play(mode: str, *fmus: UnpackedFmu) -> list[object]:
+        here = SUPPORT
+        rows = json.loads(run(sys.executable, "-c", GLOBAL_HOST, here, mode, *(fmu.folder for fmu in fmus)))
+        assert isinstance(rows, list)
+        return rows
+
+    alone = play("RTLD_LOCAL", small_fmu) + play("RTLD_LOCAL", other_fmu)
+    assert play("RTLD_GLOBAL", small_fmu, other_fmu) == alone
+    assert play("RTLD_GLOBAL", other_fmu, small_fmu) == alone[::-1]
+
+
+def test_state_of_another_fmu_is_refused(small_fmu: UnpackedFmu, other_fmu: UnpackedFmu) -> None:
+    with Instance(small_fmu) as mine, Instance(other_fmu) as other:
+        assert other.restore(mine.save()) == ERROR
+        assert "fmi2DeSerializeFMUstate: size" in other.last_message
+
+
+def test_the_hosts_floating_point_stays(small_fmu: UnpackedFmu) -> None:
+    """Subnormal numbers are still there, and rounding is to nearest."""
+    with Instance(small_fmu) as instance:
+        instance.initialise(motion(small_fmu, 0.0))
+        assert instance.step(0.5) == OK
+    assert np.float64(5e-324) / 1 > 0 and np.float64(2.3e-308) / 4 > 0
+    assert np.float64(1) + np.float64(2) ** -53 == 1 and np.float64(-1) - np.float64(2) ** -53 == -1
+
+
+LOCALE_HOST = """
+import locale, sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+from fmu_binary import ERROR, Instance, UnpackedFmu
+locale.setlocale(locale.LC_ALL, sys.argv[3])
+assert locale.localeconv()["decimal_point"] == ","
+with Instance(UnpackedFmu(Path(sys.argv[2]))) as instance:
+    instance.initialise({"tendon_force[1]": 1.5})
+    assert instance.get_real(["joint_torque[1]"]) == [1.5 * 0.009]
+    assert instance.set_real({"contact.threshold[1]": -0.25}) == ERROR
+    print(instance.last_message)
+assert locale.localeconv()["decimal_point"] == ","
+"""
+
+
+@pytest.fixture
+def comma_locale(tmp_path: Path) -> Iterator[tuple[str, dict[str, str]]]:
+    """Name of a locale with a decimal comma, made here when none is installed, and the environment to find it in."""
+    if shutil.which("localedef") and Path("/usr/share/i18n/locales/de_DE").exists():
+        subprocess.run(["localedef", "-i", "de_DE", "-f", "UTF-8", tmp_path / "de_DE.UTF-8"], capture_output=True)
+        yield "de_DE.UTF-8", {**os.environ, "LOCPATH": str(tmp_path)}
+        return
+    listed = subprocess.run(["locale", "-a"], capture_output=True, text=True).stdout.split()
+    found = [name for name in listed if re.match(r"(de|fr|es|it|nl)_.*utf-?8", name, re.IGNORECASE)]
+    if not found:
+        pytest.skip("SKIPPED: no locale with a decimal comma is installed (Debian: locales)")
+    yield found[0], dict(os.environ)
+
+
+def test_decimal_comma(small_fmu: UnpackedFmu, comma_locale: tuple[str, dict[str, str]]) -> None:
+    name, environment = comma_locale
+    command = [sys.executable, "-c", LOCALE_HOST, str(SUPPORT), str(small_fmu.folder), name]
+    answer = subprocess.run(command, capture_output=True, text=True, env=environment)
+    assert answer.returncode == 0, answer.stderr
+    assert answer.stdout.startswith("fmi2SetReal: contact.threshold[1] = -0.25: expected 0 to")
+
+
+# --- in fmpy ----------------------------------------------------------------------------------------------------------
+
+
+def attributes_of_co_simulation(fmu: UnpackedFmu) -> dict[str, str]:
+    element = ElementTree.parse(fmu.folder / "modelDescription.xml").getroot().find("CoSimulation")
+    assert element is not None
+    return element.attrib
+
+
+def test_capabilities_are_declared(small_fmu: UnpackedFmu) -> None:
+    declared = attributes_of_co_simulation(small_fmu)
+    for name in (
+        "canHandleVariableCommunicationStepSize",
+        "canGetAndSetFMUstate",
+        "canSerializeFMUstate",
+        "providesDirectionalDerivative",
+        "canNotUseMemoryManagementFunctions",
+    ):
+        assert declared[name] == "true"
+    assert declared["needsExecutionTool"] == declared["canBeInstantiatedOnlyOncePerProcess"] == "false"
+    assert "time" not in small_fmu.variables
+
+
+def test_fmpy_finds_nothing(small_fmu_path: Path) -> None:
+    from fmpy.validation import validate_fmu
+
+    assert validate_fmu(str(small_fmu_path)) == []
+
+
+def simulated(fmu_path: Path) -> np.ndarray:
+    import fmpy
+
+    signals = np.zeros(50, dtype=[("time", float), ("tendon_force[1]", float), ("tendon_position[1]", float)])
+    signals["time"] = np.arange(50) / 60
+    signals["tendon_force[1]"] = 5 + np.sin(signals["time"] * 9)
+    signals["tendon_position[1]"] = 0.002 * np.sin(signals["time"] * 7)
+    return fmpy.simulate_fmu(
+        str(fmu_path),
+        input=signals,
+        start_time=0.0,
+        stop_time=0.8,
+        output_interval=1 / 60,
+        start_values={"tendon_force[2]": 2.0, "contact.threshold[1]": 0.01},
+        output=["compensated_torque[1]", "joint_torque[2]", "friction_torque[1]", "bias_torque[2]", "contact"],
+    )
+
+
+def test_fmpy_row_carries_the_sample_before(small_fmu_path: Path) -> None:
+    rows = simulated(small_fmu_path)
+    torque = 0.007 * (5 + np.sin(rows["time"] * 9)) - 0.006 * 2.0
+    assert rows["joint_torque[2]"][0] == rows["joint_torque[2]"][1]  # the first sample, and the step at its time
+    np.testing.assert_allclose(rows["joint_torque[2]"][1:], torque[:-1], atol=1e-12)
+
+
+@pytest.mark.slow
+def test_source_fmu_compiled_by_fmpy_gives_the_same_results(small_fmu_path: Path, tmp_path: Path) -> None:
+    """Flat sources, fmpy's own flags; the results may not differ by a bit."""
+    from fmpy.build import build_platform_binary
+
+    tool("cmake")
+    with zipfile.ZipFile(small_fmu_path) as archive:
+        archive.extractall(tmp_path / "fmu")
+    shutil.rmtree(tmp_path / "fmu" / "binaries")
+    build_platform_binary(tmp_path / "fmu")
+    assert simulated(tmp_path / "fmu").tobytes() == simulated(small_fmu_path).tobytes()

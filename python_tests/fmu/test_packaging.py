@@ -1,0 +1,294 @@
+"""FMUs as they are packed: what is in them, the same bytes again, clean before fmpy, the same results when compiled."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.model_description import ModelDescription
+from fmpy.validation import validate_fmu
+
+from fmu_binary import FINGER, Instance, fmi_platform, unpack
+from random_fingers import random_case, random_finger
+from repository_paths import ROOT
+from tendonfmu.errors import InputError
+from tendonfmu.fmu.packaging import build_fmu, model_identifier
+from tendonfmu.model import native
+from tendonfmu.model.description import read_finger
+from tendonfmu.model.output_dependencies import dependencies, structure_of
+
+INDEX_FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
+LAW = {"static": 0.03, "coulomb": 0.02, "stribeck_velocity": 0.005}
+# Fewest parameters with something of each kind: fmpy's validation takes its time per variable.
+TINY: dict[str, Any] = {
+    "format": "tendonfmu-finger-1",
+    "name": 'tiny <finger> & "son"',
+    "joints": [{"name": "mcp", "cover": {"stiffness": 0.02}, "friction": LAW}],
+    "tendons": [{"stiffness": 4e3, "moment_arms": [0.009], "edge_friction": [{"angles": [0.0], "laws": [LAW]}]}],
+    "contact": {"threshold": [0.03]},
+    "bias": {"initial_torque": [0.01], "initial_variance": 1e-4, "noise_time": 0.002},
+    "extensions": [{"effect": "cover_hardening", "joint": 1, "stiffness": 0.1}],
+}
+
+BUILD = "import sys, pathlib, tendonfmu.fmu.packaging as p; p.build_fmu(*map(pathlib.Path, sys.argv[1:]))"
+
+Pack = Callable[[dict[str, Any]], Path]
+
+
+@pytest.fixture
+def packed(tmp_path: Path) -> Pack:
+    def pack(description: dict[str, Any]) -> Path:
+        (tmp_path / "finger.json").write_text(json.dumps(description))
+        return build_fmu(tmp_path / "finger.json", tmp_path / "finger.fmu")
+
+    return pack
+
+
+def members(fmu: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(fmu) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+# --- contents ---------------------------------------------------------------------------------------------------------
+
+
+def test_everything_is_in(packed: Pack) -> None:
+    files = members(packed(FINGER))
+    assert files["resources/finger.json"] == json.dumps(FINGER).encode()
+    assert files["resources/model.image"] == native.image_from_json(json.dumps(FINGER))
+    suffix = {"linux": "so", "win32": "dll", "darwin": "dylib"}[sys.platform]
+    assert f"binaries/{fmi_platform()}/small_finger.{suffix}" in files
+    assert files["model.png"][:8] == b"\x89PNG\r\n\x1a\n"
+    page = files["documentation/index.html"].decode()
+    finger = native.Finger(files["resources/model.image"])
+    for parameter in finger.parameters():
+        assert f'<code>{parameter.path}</code></td><td class="number">{parameter.start}</td>' in page
+    root = ElementTree.fromstring(files["modelDescription.xml"])
+    listed = [file.attrib["name"] for file in root.iter("File")]
+    in_archive = {name.removeprefix("sources/") for name in files if name.startswith("sources/")}
+    assert set(listed) <= in_archive and len(listed) > 20
+    # every include of a listed source is there
+    for name in listed:
+        for header in re.findall(rb'#include "([^"]+)"', files[f"sources/{name}"]):
+            assert header.decode() in in_archive, name
+
+
+def test_start_values_and_names_are_those_of_the_image(packed: Pack) -> None:
+    fmu = packed(FINGER)
+    finger = native.Finger(native.image_from_json(json.dumps(FINGER)))
+    root = ElementTree.fromstring(members(fmu)["modelDescription.xml"])
+    found = {
+        scalar.attrib["name"]: scalar
+        for scalar in root.iter("ScalarVariable")
+        if scalar.attrib["causality"] == "parameter"
+    }
+    parameters = finger.parameters()
+    assert list(found) == ["kinematics_source", *(parameter.path for parameter in parameters)]
+    for parameter in parameters:
+        scalar = found[parameter.path]
+        assert float(scalar[0].attrib["start"]) == parameter.start
+        assert scalar.attrib["variability"] == ("tunable" if parameter.tunable else "fixed")
+        assert scalar[0].attrib["unit"] == parameter.unit
+    for scalar in root.iter("ScalarVariable"):
+        assert scalar.attrib["description"]
+        assert "unit" in scalar[0].attrib or scalar[0].tag in ("Boolean", "Integer")
+
+
+def test_model_structure_is_that_of_the_finger(packed: Pack, tmp_path: Path) -> None:
+    description = random_finger(4)
+    root = ElementTree.fromstring(members(packed(description))["modelDescription.xml"])
+    names = [scalar.attrib["name"] for scalar in root.iter("ScalarVariable")]
+    outputs = root.find("ModelStructure/Outputs")
+    assert outputs is not None
+    found = {
+        names[int(unknown.attrib["index"]) - 1]: {names[int(k) - 1] for k in unknown.attrib["dependencies"].split()}
+        for unknown in outputs
+    }
+    wanted = {}
+    for output, elements in dependencies(structure_of(read_finger(tmp_path / "finger.json"))).items():
+        for k, inputs in enumerate(elements):
+            name = output if output == "contact" else f"{output}[{k + 1}]"
+            wanted[name] = {f"{source}[{i + 1}]" for source, indices in inputs.items() for i in indices}
+    assert found == wanted
+
+
+@pytest.mark.parametrize(
+    ("name", "identifier"),
+    [
+        ("index_finger", "index_finger"),
+        ("Zeigefinger (rechts)", "Zeigefinger_rechts"),
+        ("Müller's 3. Finger", "Muller_s_3_Finger"),
+        ("3 fingers", "finger_3_fingers"),
+        ("人差し指", "finger"),
+        ("../../etc/passwd", "etc_passwd"),
+        ("double", "finger_double"),
+        ("CON", "finger_CON"),
+    ],
+)
+def test_model_identifier(name: str, identifier: str) -> None:
+    assert model_identifier(name) == identifier
+    assert re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", identifier)
+
+
+@pytest.mark.filterwarnings("error")
+def test_names_of_any_text_survive(packed: Pack) -> None:
+    joint = TINY["joints"][0] | {"name": "$\\frac{$ 関節 <i>"}
+    fmu = packed(TINY | {"name": "für <b>&\"';\ufffe", "joints": [joint]})
+    description = fmpy.read_model_description(str(fmu))
+    assert description.modelName == "für <b>&\"';?"
+    assert b"<title>f\xc3\xbcr &lt;b&gt;" in members(fmu)["documentation/index.html"]
+
+
+# --- the archive ------------------------------------------------------------------------------------------------------
+
+
+def test_same_input_same_bytes(tmp_path: Path) -> None:
+    """Also in another process, with another hash seed and name of the output."""
+    first = build_fmu(INDEX_FINGER, tmp_path / "first.fmu").read_bytes()
+    other = tmp_path / "other.fmu"
+    subprocess.run(
+        [sys.executable, "-c", BUILD, str(INDEX_FINGER), str(other)], check=True, env={"PYTHONHASHSEED": "7"}
+    )
+    assert other.read_bytes() == first
+    with zipfile.ZipFile(io.BytesIO(first)) as archive:
+        infos = archive.infolist()
+    assert [info.filename for info in infos] == sorted(info.filename for info in infos)
+    assert {info.date_time for info in infos} == {(1980, 1, 1, 0, 0, 0)}
+
+
+def test_the_index_finger_is_packed_fast(tmp_path: Path) -> None:
+    """Under 2 s on an idle machine; processor time is counted since tests share theirs, doubled for slow machines."""
+    look = (
+        "; import time; print(time.process_time());"
+        "assert not {'fmpy', 'pandas', 'matplotlib.pyplot', 'typer'} & set(sys.modules)"
+    )
+    arguments = [sys.executable, "-c", BUILD + look, str(INDEX_FINGER), str(tmp_path / "index.fmu")]
+    done = subprocess.run(arguments, check=True, capture_output=True, text=True)
+    assert float(done.stdout) < 4.0
+
+
+def test_no_compiler_is_needed(tmp_path: Path) -> None:
+    """No program is started, and PATH leads nowhere; but for fc-list, which matplotlib asks for fonts once."""
+    forbid = (
+        "import sys; events = ('subprocess.Popen', 'os.system', 'os.exec', 'os.posix_spawn', 'os.fork');"
+        "sys.addaudithook(lambda event, of: sys.exit(event) if event in events and 'fc-list' not in str(of)"
+        " else None);"
+    )
+    arguments = [sys.executable, "-c", forbid + BUILD, str(INDEX_FINGER), str(tmp_path / "index.fmu")]
+    done = subprocess.run(arguments, env={"PATH": "", "HOME": str(tmp_path)}, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_binaries_of_a_folder_take_the_place_of_the_installed_ones(tmp_path: Path) -> None:
+    for platform, suffix in (("win64", "dll"), ("darwin64", "dylib")):
+        (tmp_path / "cross" / platform).mkdir(parents=True)
+        (tmp_path / "cross" / platform / f"tendonfmu.{suffix}").write_bytes(platform.encode())
+    (tmp_path / "finger.json").write_text(json.dumps(FINGER))
+    files = members(build_fmu(tmp_path / "finger.json", tmp_path / "out.fmu", binaries=tmp_path / "cross"))
+    assert {name: data for name, data in files.items() if name.startswith("binaries/")} == {
+        "binaries/win64/small_finger.dll": b"win64",
+        "binaries/darwin64/small_finger.dylib": b"darwin64",
+    }
+
+
+@pytest.mark.parametrize("problem", ["finger", "folder", "binaries", "directory"])
+def test_a_failure_is_one_line_and_leaves_nothing(problem: str, tmp_path: Path) -> None:
+    (tmp_path / "finger.json").write_text(json.dumps(FINGER | ({"tendons": []} if problem == "finger" else {})))
+    output = tmp_path / {"folder": "missing/out.fmu", "directory": "taken"}.get(problem, "out.fmu")
+    if problem == "directory":
+        output.mkdir()
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(InputError) as refused:
+        build_fmu(tmp_path / "finger.json", output, binaries=tmp_path / "none" if problem == "binaries" else None)
+    named = {"finger": "finger.json: tendons", "binaries": "none"}.get(problem, output.name)
+    assert named in str(refused.value) and "\n" not in str(refused.value)
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_failure_keeps_the_file_that_was_there(tmp_path: Path) -> None:
+    (tmp_path / "finger.json").write_text("{}")
+    (tmp_path / "out.fmu").write_text("before")
+    with pytest.raises(InputError):
+        build_fmu(tmp_path / "finger.json", tmp_path / "out.fmu")
+    assert (tmp_path / "out.fmu").read_text() == "before"
+
+
+# --- before fmpy ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("description", [TINY, FINGER], ids=["tiny", "small"])
+def test_fmpy_finds_nothing(description: dict[str, Any], packed: Pack) -> None:
+    assert validate_fmu(str(packed(description))) == []
+
+
+@pytest.mark.slow
+def test_fmpy_finds_nothing_in_the_index_finger(tmp_path: Path) -> None:
+    assert validate_fmu(str(build_fmu(INDEX_FINGER, tmp_path / "index.fmu"))) == []
+
+
+def test_fmpy_simulates(packed: Pack) -> None:
+    fmu = packed(TINY)
+    result = fmpy.simulate_fmu(str(fmu), stop_time=0.1, output_interval=0.01)
+    assert np.all(np.isfinite(result["compensated_torque[1]"]))
+
+
+def test_another_guid_is_refused(packed: Pack, tmp_path: Path) -> None:
+    """Of another image, or of a binary compiled with another table of variables."""
+    fmu = unpack(packed(FINGER), tmp_path / "unpacked")
+    other = native.image_guid(native.image_from_json(json.dumps(TINY)), 1)
+    refused = Instance(fmu, guid=other.encode())
+    assert refused.component is None and "guid" in refused.last_message.lower()
+    shutil.copy(fmu.folder / "resources" / "model.image", tmp_path / "kept")
+    (fmu.folder / "resources" / "model.image").write_bytes(native.image_from_json(json.dumps(TINY)))
+    assert Instance(fmu).component is None
+    shutil.copy(tmp_path / "kept", fmu.folder / "resources" / "model.image")
+    assert Instance(fmu).component is not None
+
+
+def simulate(fmu: Path, recording: dict[str, Any]) -> Any:
+    columns = {"time": recording["time"]}
+    for name in native.INPUTS:
+        columns |= {f"{name}[{i + 1}]": column for i, column in enumerate(recording[name].T)}
+    signals = np.empty(len(recording["time"]), dtype=[(name, float) for name in columns])
+    for name, column in columns.items():
+        signals[name] = column
+    model: ModelDescription = fmpy.read_model_description(str(fmu))
+    outputs = [variable.name for variable in model.modelVariables if variable.causality == "output"]
+    return fmpy.simulate_fmu(
+        str(fmu),
+        input=signals,
+        output=outputs,
+        output_interval=0.002,
+        start_time=float(signals["time"][0]),
+        stop_time=float(signals["time"][-1]),
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("cmake") is None, reason="SKIPPED: fmpy compiles by cmake, which is not there")
+def test_the_compiled_source_fmu_gives_the_same_bits(tmp_path: Path) -> None:
+    description, recording = random_case(6)
+    (tmp_path / "finger.json").write_text(json.dumps(description))
+    given = build_fmu(tmp_path / "finger.json", tmp_path / "given.fmu")
+    compiled = tmp_path / "compiled.fmu"
+    with zipfile.ZipFile(compiled, "w") as archive:
+        for name, data in members(given).items():
+            if not name.startswith("binaries/"):
+                archive.writestr(name, data)
+    subprocess.run([sys.executable, "-m", "fmpy", "compile", str(compiled)], check=True, capture_output=True)
+    assert any(name.startswith(f"binaries/{fmi_platform()}/") for name in members(compiled))
+    ours, theirs = simulate(given, recording), simulate(compiled, recording)
+    assert ours.tobytes() == theirs.tobytes()
+    assert np.abs(ours["friction_torque[1]"]).max() > 0.0

@@ -1,0 +1,261 @@
+"""The ModelStructure's dependencies, by perturbing and looking.
+
+Nothing influences that is not declared, and whatever is declared does influence in some situation: one of the three
+kinematics sources, some values of the tunable parameters.
+"""
+
+from __future__ import annotations
+
+import json
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fmu_binary import FINGER
+from random_fingers import random_case
+from repository_paths import ROOT
+from tendonfmu.model.description import read_finger
+from tendonfmu.model.native import FLAGS, INPUTS, NUMBERS, Finger
+from tendonfmu.model.output_dependencies import Dependencies, dependencies, structure_of
+
+SEEDS = range(30)
+INDEX_FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
+
+Influence = set[tuple[str, int, str, int]]  # output, element, input, element; 0-based
+Sample = dict[str, Any]
+
+
+def declared(description: dict[str, Any], folder: Path) -> Dependencies:
+    (folder / "finger.json").write_text(json.dumps(description))
+    return dependencies(structure_of(read_finger(folder / "finger.json")))
+
+
+def pairs(found: Dependencies) -> Influence:
+    return {
+        (output, k, name, i)
+        for output, elements in found.items()
+        for k, inputs in enumerate(elements)
+        for name, indices in inputs.items()
+        for i in indices
+    }
+
+
+def with_extension(description: dict[str, Any], seed: int) -> dict[str, Any]:
+    """Every third finger gets a term beyond the paper."""
+    if seed % 3 == 0:
+        joint = seed % len(description["joints"]) + 1
+        description["extensions"] = [{"effect": "cover_hardening", "joint": joint, "stiffness": 0.05}]
+    return description
+
+
+# --- nothing that is not declared -------------------------------------------------------------------------------------
+
+
+def outputs_of(finger: Finger, state: bytes, sample: Sample) -> dict[str, Any]:
+    finger.restore_state(state)
+    return finger.run(sample)
+
+
+def steps_apart(finger: Finger, state: bytes, sample: Sample) -> Influence:
+    """Outputs whose bits change when one input of the next sample does, by little and by much.
+
+    Branch decisions are frozen (docs/reference/semantics.md#directional-derivatives): where contact itself turns, and
+    with it the bias of every joint stays or moves, only the decisions are looked at.
+    """
+    found: Influence = set()
+    plain = outputs_of(finger, state, sample)
+    for name in INPUTS:
+        for i in range(sample[name].shape[1]):
+            for change in (1e-9, -1e-4, 0.5):
+                moved = {**sample, name: sample[name].copy()}
+                moved[name][0, i] += change * (10.0 if name == "tendon_force" else 1.0)
+                after = outputs_of(finger, state, moved)
+                turned = after["contact"][0] != plain["contact"][0]
+                for output in FLAGS if turned else (*NUMBERS, *FLAGS):
+                    differ = np.flatnonzero(np.atleast_1d(after[output][0] != plain[output][0]))
+                    found |= {(output, int(k), name, i) for k in differ}
+    return found
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_nothing_undeclared_influences(seed: int, tmp_path: Path) -> None:
+    description, recording = random_case(seed, samples=160)
+    allowed = pairs(declared(with_extension(description, seed), tmp_path))
+    seen: Influence = set()
+    for source in (1, 2, 3):
+        finger = Finger.from_description(description, source)
+        begin = 0
+        for k in (1, 40, 80, 120, 159):
+            finger.run({name: values[begin:k] for name, values in recording.items()})
+            state, begin = finger.save_state(), k
+            seen |= steps_apart(finger, state, {name: values[k : k + 1] for name, values in recording.items()})
+            finger.restore_state(state)
+    assert seen - allowed == set()
+    assert len(seen) > 0.3 * len(allowed)
+
+
+# --- everything that is declared --------------------------------------------------------------------------------------
+
+
+def enliven(finger: Finger) -> None:
+    """Tunable values with which all that exists acts: nothing sticks, no value is 0, no two laws are alike."""
+    values = {}
+    for k, parameter in enumerate(p for p in finger.parameters() if p.tunable):
+        name = parameter.path.rsplit(".", 1)[-1]
+        scale = 1.0 + 0.01 * (k % 89)
+        law = {"static": 0.03, "coulomb": 0.01, "stribeck_velocity": 0.05, "viscous": 0.02}
+        if name in law:
+            values[parameter.path] = law[name] * scale
+        elif parameter.path.startswith("velocity_threshold"):
+            values[parameter.path] = 0.0
+        elif name.startswith("threshold"):
+            values[parameter.path] = 1e6
+        elif name in ("stiffness", "noise_std", "noise_std_per_force", "drift_variance", "velocity_filter_cutoff"):
+            values[parameter.path] = 0.01 * scale
+    finger.set(values)
+
+
+def angles_to_try(description: dict[str, Any], rng: np.random.Generator) -> Sample:
+    """[60, n] joint angles, most of them between working points of the edges behind."""
+    n = len(description["joints"])
+    angles = rng.uniform(-0.8, 0.8, (60, n))
+    for j in range(n - 1):
+        edges = [(tendon.get("edge_friction") or [])[j + 1 : j + 2] for tendon in description["tendons"]]
+        points = [edge[0]["angles"] for edge in edges if edge and edge[0] and edge[0].get("angles")]
+        between = [0.5 * (a + b) for angle in points for a, b in pairwise(angle)]
+        if between:
+            angles[:, j] = rng.choice(between, 60) + rng.uniform(-1e-3, 1e-3, 60)
+    return angles
+
+
+def lively_recording(description: dict[str, Any], seed: int) -> Sample:
+    rng = np.random.default_rng([seed, 7])
+    R = np.array([tendon["moment_arms"] for tendon in description["tendons"]])
+    stiffness = np.array([tendon["stiffness"] for tendon in description["tendons"]])
+    angles = angles_to_try(description, rng)
+    force = rng.uniform(5.0, 15.0, (60, len(R)))
+    return {
+        "time": np.cumsum(rng.uniform(0.5, 1.5, 60)),
+        "tendon_force": force,
+        "tendon_position": angles @ R.T + force / stiffness,
+        "joint_position": angles,
+        "joint_velocity": rng.uniform(0.1, 1.0, angles.shape) * rng.choice([-1.0, 1.0], angles.shape),
+    }
+
+
+def slopes(finger: Finger, recording: Sample) -> Influence:
+    """Outputs with a slope other than 0 at some sample of a recording."""
+    found: Influence = set()
+    for k in range(len(recording["time"])):
+        finger.run({name: values[k : k + 1] for name, values in recording.items()})
+        for name in INPUTS:
+            for i, unit in enumerate(np.eye(recording[name].shape[1])):
+                for output, slope in finger.directional_derivative({name: unit}).items():
+                    found |= {(output, int(j), name, i) for j in np.flatnonzero(slope)}
+    return found
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_each_declared_number_influences(seed: int, tmp_path: Path) -> None:
+    description = with_extension(random_case(seed)[0], seed)
+    recording = lively_recording(description, seed)
+    wanted = {pair for pair in pairs(declared(description, tmp_path)) if pair[0] in NUMBERS}
+    seen: Influence = set()
+    for source in (1, 2, 3):
+        finger = Finger.from_description(description, source)
+        enliven(finger)
+        seen |= slopes(finger, recording)
+    assert seen == wanted
+
+
+def test_contact_depends_as_the_torques_do(tmp_path: Path) -> None:
+    """Its decision compares the compensated torque; that the mean force enters the threshold adds nothing to it."""
+    for seed in SEEDS:
+        found = declared(random_case(seed)[0], tmp_path)
+        assert found["joint_contact"] == found["compensated_torque"]
+        for name in INPUTS:
+            together = {i for element in found["compensated_torque"] for i in element[name]}
+            assert set(found["contact"][0][name]) == together
+
+
+def slack_by_hand(finger: Finger, sample: Sample, name: str, i: int, tendon: int) -> bool:
+    """Whether some small change of one input of a first sample flips a tendon's slack."""
+    flags = set()
+    for change in (-1e-6, 0.0, 1e-6):
+        moved = {**sample, name: sample[name].copy()}
+        moved[name][0, i] += change
+        finger.reset()
+        finger.set_kinematics_source(3)
+        finger.set(sample["parameters"])
+        flags.add(bool(finger.run(moved)["slack"][0, tendon]))
+    return len(flags) == 2
+
+
+@pytest.mark.parametrize(
+    ("path", "passes", "angles", "velocities"),
+    [
+        ("tendons[1].edge_friction[1]", 1.0, [], [0, 1]),
+        ("tendons[1].edge_friction[2]", 1.0, [0], [1]),
+        ("tendons[1].pulley_friction[1]", 1.0, [], [1]),
+    ],
+)
+def test_slack_follows_every_effect(
+    path: str, passes: float, angles: list[int], velocities: list[int], tmp_path: Path
+) -> None:
+    """A loss of just the whole force: the smallest change of what the effect depends on decides on slack."""
+    found = declared(FINGER, tmp_path)["slack"]
+    assert found[0]["joint_velocity"] == [0, 1] and found[0]["joint_position"] == [0, 1]
+    assert found[2] == {}  # a cable loop
+    finger = Finger.from_description(FINGER, 3)
+    velocity = np.array([[0.3, 0.4]])
+    arms = np.array(FINGER["tendons"][0]["moment_arms"])
+    speed = float(arms[min(velocities) :] @ velocity[0, min(velocities) :])
+    values = {}
+    for parameter in finger.parameters():
+        law, name = parameter.path.rsplit(".", 1)[0], parameter.path.rsplit(".", 1)[-1]
+        if name in ("static", "coulomb", "viscous"):
+            values[parameter.path] = 0.0
+        if name == "viscous" and law.startswith(path):
+            # at angle 0, half way between the working points, the mean of the two laws holds
+            values[parameter.path] = passes / speed * (1.5 if "laws[2]" in law else 0.5 if "laws[1]" in law else 1.0)
+    sample = {
+        "time": np.zeros(1),
+        "tendon_force": np.full((1, 3), 5.0),
+        "tendon_position": np.zeros((1, 3)),
+        "joint_position": np.zeros((1, 2)),
+        "joint_velocity": velocity,
+        "parameters": values,
+    }
+    assert [i for i in range(2) if slack_by_hand(finger, sample, "joint_position", i, 0)] == angles
+    assert [i for i in range(2) if slack_by_hand(finger, sample, "joint_velocity", i, 0)] == velocities
+
+
+# --- one finger by hand -----------------------------------------------------------------------------------------------
+
+
+def test_index_finger_torques_follow_the_routing() -> None:
+    found = dependencies(structure_of(read_finger(INDEX_FINGER)))
+    passing = [element["tendon_force"] for element in found["joint_torque"]]
+    assert passing == [list(range(8)), list(range(8)), [4, 5, 6, 7], [6, 7]]
+    for k in range(4):
+        assert found["joint_speed"][k]["joint_velocity"] == [k]
+        assert found["joint_angle"][k]["joint_position"] == [k]
+        assert found["joint_angle"][k]["joint_velocity"] == []
+        assert found["friction_torque"][k]["tendon_force"] == list(range(8))
+
+
+def test_a_rigid_finger_without_friction_depends_on_forces_alone(tmp_path: Path) -> None:
+    description = {
+        "format": "tendonfmu-finger-1",
+        "name": "bare",
+        "joints": [{}],
+        "tendons": [{"stiffness": 1e3, "moment_arms": [0.01]}, {"stiffness": 1e3, "moment_arms": [-0.01]}],
+        "contact": {"threshold": [0.1]},
+    }
+    found = declared(description, tmp_path)
+    only_forces = {"tendon_force": [0, 1], "tendon_position": [], "joint_position": [], "joint_velocity": []}
+    assert found["friction_torque"] == found["joint_contact"] == [only_forces]
+    assert found["slack"][1] == {**only_forces, "tendon_force": [1]}

@@ -1,0 +1,293 @@
+"""The published JSON Schema says what the native reader says; the counts are those of the file."""
+
+from __future__ import annotations
+
+import copy
+import json
+import re
+from collections.abc import Iterator
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+
+import extension_cases
+from fmu_binary import FINGER
+from random_fingers import random_finger
+from repository_paths import ROOT
+from tendonfmu.errors import InputError
+from tendonfmu.estimate.fisher_information import unknowns
+from tendonfmu.model.description import count, read_finger
+from tendonfmu.model.extensions import MAGNITUDES, extension_numbers
+from tendonfmu.model.native import Finger, NativeError, image_from_json
+
+INDEX_FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
+SCHEMA = json.loads((files("tendonfmu") / "schema" / "finger.schema.json").read_text(encoding="utf-8"))
+Validator = jsonschema.Draft202012Validator
+VALIDATOR = Validator(SCHEMA)
+
+# What the reader refuses and a schema cannot express: relations between values in different places.
+BEYOND_THE_SCHEMA = {
+    "lengths of lists and the number of joints": r"one per (joint|angle)|list of \d+",
+    "a law at the last pulley": r"since no joint comes after",
+    "static below coulomb": r"expected at (least|most) .*(coulomb|static)",
+    "angles that do not increase": r"above the angle before it",
+    "routing without full column rank": r"rank",
+    "an extension at a joint that is not there": r"expected a joint (from 1 to|with another one)",
+    "an extension at a tendon that is not there": r"expected a tendon from 1 to",
+    "a coupling at the last joint": r"since the last one has none after it",
+    "an effect twice at a place": r"expected once",
+}
+
+
+def accepted(description: Any) -> str | None:
+    """The reader's line where it refuses, None where it accepts."""
+    try:
+        image_from_json(json.dumps(description))
+    except NativeError as refused:
+        return str(refused)
+    return None
+
+
+def with_everything() -> dict[str, Any]:
+    """A valid description that uses every key."""
+    description = copy.deepcopy(FINGER)
+    description["bias"] = {
+        "drift_variance": 1e-6,
+        "noise_std": 0.01,
+        "noise_std_per_force": 0.0,
+        "initial_variance": 1e-4,
+        "forget_rate": 5.0,
+        "initial_torque": [0.0, 0.01],
+        "noise_time": 0.002,
+    }
+    description["velocity_threshold"] = {"tendon": 0.0005, "joint": 0.01}
+    description["velocity_filter_cutoff"] = 20.0
+    description["extensions"] = [{"effect": "cover_hardening", "joint": 2, "stiffness": 0.1}]
+    description["links"] = [{"axis": [0.0, 0.0, 2.0]}, {"axis": [0.0, 1.0, 0.0], "offset": [0.04, 0.0, 0.0]}]
+    description["tip"] = [0.02, 0.0, 0.0]
+    description["joints"][0]["load_friction"] = {"static": 1e-4, "coulomb": 8e-5, "stribeck_velocity": 0.1}
+    return description
+
+
+def places(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Paths of all values within."""
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, inner in items:
+        yield (*path, key)
+        yield from places(inner, (*path, key))
+
+
+def changed(description: dict[str, Any], path: tuple[Any, ...], change: Any) -> dict[str, Any]:
+    """A copy with the value at `path` replaced; DELETE and ADD take away, and add an unknown key or an element."""
+    result = copy.deepcopy(description)
+    place: Any = result
+    for key in path[:-1]:
+        place = place[key]
+    if change == "DELETE":
+        del place[path[-1]]
+    elif change == "ADD":
+        inner = place[path[-1]]
+        if isinstance(inner, dict):
+            inner["unknown"] = None
+        elif isinstance(inner, list):
+            inner.append(copy.deepcopy(inner[-1]) if inner else None)
+        else:
+            place[path[-1]] = [inner]
+    else:
+        place[path[-1]] = change
+    return result
+
+
+CHANGES: list[Any] = ["DELETE", "ADD", None, True, "text", "", [], {}, -1, 0, 0.25, 1, 1e6, 2e9, 1e13, [0.0, 1.0]]
+
+
+def assert_agreement(description: Any, what: str, part: Any = None, schema: Validator = VALIDATOR) -> None:
+    """part, schema: the only part that may be at fault, and its schema; None: the whole."""
+    refused = accepted(description)
+    errors = [error.message for error in schema.iter_errors(description if part is None else part)]
+    if refused is None:
+        assert errors == [], what
+    elif not errors:
+        assert any(re.search(pattern, refused) for pattern in BEYOND_THE_SCHEMA.values()), f"{what}: {refused}"
+
+
+def test_schema_is_valid_and_describes_every_number() -> None:
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+    properties = [*SCHEMA["properties"].values(), *SCHEMA["$defs"]["joint"]["properties"].values()]
+    properties += SCHEMA["properties"]["bias"]["properties"].values()
+    for each in properties:
+        assert "description" in each or "const" in each or each == {"$ref": "#/$defs/optional_name"} or "items" in each
+
+
+@pytest.mark.parametrize("description", [with_everything(), json.loads(INDEX_FINGER.read_text())], ids=["all", "index"])
+def test_schema_takes_valid_fingers(description: dict[str, Any]) -> None:
+    assert accepted(description) is None
+    VALIDATOR.validate(description)
+
+
+def test_schema_takes_random_fingers() -> None:
+    for seed in range(50):
+        description = random_finger(seed)
+        assert accepted(description) is None
+        VALIDATOR.validate(description)
+
+
+def test_schema_agrees_with_the_reader_on_every_changed_value() -> None:
+    description = with_everything()
+    agreed = 0
+    for path in places(description):
+        for change in CHANGES:
+            assert_agreement(changed(description, path, change), f"{path} = {change!r}")
+            agreed += 1
+    assert agreed > 1500
+
+
+def test_schema_agrees_with_the_reader_on_every_changed_extension() -> None:
+    """Each row alone, with every key changed, left out or added."""
+    agreed = 0
+    by_effect = {
+        row["effect"]: Validator({"$ref": f"#/$defs/{row['effect']}", "$defs": SCHEMA["$defs"]})
+        for row in extension_cases.ROWS
+    }
+    for row in extension_cases.ROWS:
+        keys = {"joint": row.get("joint"), "tendon": row.get("tendon")} | row
+        for key in keys:
+            for change in [*CHANGES, -0.95, 0.05, 1e300]:
+                changed_row = {k: v for k, v in row.items() if k != key}
+                if change != "DELETE":
+                    changed_row[key] = change
+                description = FINGER | {"extensions": [changed_row]}
+                assert_agreement(description, f"{row} with {key} = {change!r}", changed_row, by_effect[row["effect"]])
+                agreed += 1
+    assert agreed > 1000
+
+
+def test_schema_agrees_with_the_reader_on_random_changes() -> None:
+    for seed in range(50):
+        rng = np.random.default_rng([seed, 9])
+        description = random_finger(seed)
+        for _ in range(2):
+            paths = list(places(description))
+            path, change = paths[rng.integers(len(paths))], CHANGES[rng.integers(len(CHANGES))]
+            description = changed(description, path, change)
+            assert_agreement(description, f"random finger {seed}: {path} = {change!r}")
+
+
+@pytest.mark.parametrize(
+    ("what", "path", "change"),
+    [
+        ("lengths of lists and the number of joints", ("contact", "threshold"), [0.1]),
+        ("a law at the last pulley", ("tendons", 0, "pulley_friction", 1), FINGER["tendons"][1]["edge_friction"][0]),
+        ("static below coulomb", ("joints", 0, "friction", "static"), 0.001),
+        ("angles that do not increase", ("tendons", 0, "edge_friction", 1, "angles"), [0.5, 0.5]),
+        ("routing without full column rank", ("tendons",), [FINGER["tendons"][1]]),
+        ("an extension at a joint that is not there", ("extensions", 0, "joint"), 3),
+        (
+            "an extension at a tendon that is not there",
+            ("extensions", 0),
+            {"effect": "force_gain", "tendon": 4, "correction": 0},
+        ),
+        (
+            "a coupling at the last joint",
+            ("extensions", 0),
+            {"effect": "joint_coupling", "joint": 2, "stiffness": 1},
+        ),
+        ("an effect twice at a place", ("extensions",), [{"effect": "time_delay", "delay": 0}] * 2),
+    ],
+)
+def test_the_reader_alone_refuses(what: str, path: tuple[Any, ...], change: Any) -> None:
+    description = changed(with_everything(), path, change)
+    VALIDATOR.validate(description)
+    refused = accepted(description)
+    assert refused and re.search(BEYOND_THE_SCHEMA[what], refused)
+
+
+# --- reading and counting ---------------------------------------------------------------------------------------------
+
+
+def test_index_finger_counts() -> None:
+    counts = count(read_finger(INDEX_FINGER))
+    assert (counts.joints, counts.tendons, counts.pulleys, counts.edges) == (4, 8, 14, 22)
+    assert counts.laws == {"friction": 4, "load_friction": 4, "pulley_friction": 14, "edge_friction": 94}
+    assert sum(counts.estimated_numbers.values()) == 472
+    assert counts.asymmetric_laws == 0 and counts.extensions == []
+
+
+def test_absent_friction_is_not_estimated(tmp_path: Path) -> None:
+    """viscous 0 and static = coulomb are docs/reference/semantics.md#absent-structure; each side counts."""
+    description = with_everything()
+    description["joints"][0]["friction"] = {"static": 0.1, "coulomb": 0.1, "stribeck_velocity": 1.0, "viscous": 0.0}
+    (tmp_path / "finger.json").write_text(json.dumps(description))
+    counts = count(read_finger(tmp_path / "finger.json"))
+    # one number of the changed law, three of load_friction (no viscous), four of each other side
+    assert counts.estimated_numbers == {
+        "friction": 1,
+        "load_friction": 3,
+        "pulley_friction": 4,
+        "edge_friction": 4 * 5,
+        "cover": 1,
+        "extensions": 1,
+        "bias": 2,
+    }
+    assert counts.asymmetric_laws == 1 and counts.bidirectional_tendons == 1 and counts.working_points == 2
+
+
+def test_numbers_of_extensions_are_those_of_the_runtime() -> None:
+    """In order, with those that are left out."""
+    description = with_everything() | {"extensions": extension_cases.ROWS}
+    known = {parameter.path: parameter.start for parameter in Finger.from_description(description).parameters()}
+    listed = {number.path: number.value for number in extension_numbers(description)}
+    assert list(listed.items()) == [(path, value) for path, value in known.items() if path.startswith("extensions[")]
+    assert {row["effect"] for row in extension_cases.ROWS} == set(MAGNITUDES)
+    fitted = [number.path for number in extension_numbers(description) if not number.left_out]
+    assert len(listed) - len(fitted) == 4  # turns, reaction, and beyond twice: of the mechanism, and not given
+    assert [number.path for number in unknowns(description)][-len(fitted) :] == fitted
+
+
+def test_summary_counts_extensions(tmp_path: Path) -> None:
+    (tmp_path / "finger.json").write_text(json.dumps(FINGER | {"extensions": extension_cases.ROWS}))
+    lines = read_finger(tmp_path / "finger.json").summary()
+    found = next(line for line in lines if line.startswith("extensions "))
+    assert found.split()[:4] == ["extensions", str(len(extension_cases.ROWS)) + ":", "1", "cover_hardening,"]
+    assert "3 friction_drift" in found
+
+
+def test_summary_says_what_the_finger_is() -> None:
+    text = "\n".join(read_finger(INDEX_FINGER).summary())
+    for part in ("index_finger", "mcp_abduction", "dip_extensor", "472", "116"):
+        assert part in text
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        (None, "No such file"),
+        (b"", "finger.json: "),
+        (b'{"format": "tendonfmu-finger-1"', "finger.json: "),
+        (json.dumps(FINGER | {"gravity": 9.81}).encode(), "gravity"),
+        (json.dumps(FINGER | {"velocity_filter_cutoff": -1}).encode(), "velocity_filter_cutoff = -1"),
+    ],
+)
+def test_a_refusal_is_one_line_with_file_and_key(tmp_path: Path, content: bytes | None, expected: str) -> None:
+    path = tmp_path / "finger.json"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(InputError) as refused:
+        read_finger(path)
+    message = str(refused.value)
+    assert message.startswith(f"{path}: ") and expected in message and "\n" not in message
+
+
+def test_numbers_are_named_after_what_they_belong_to() -> None:
+    found = {number.path: f"{number.kind}.{number.key}" for number in unknowns(with_everything())}
+    assert found["joints[1].friction.coulomb"] == "friction.coulomb"
+    assert {kind for path, kind in found.items() if "edge_friction" in path and path.endswith("coulomb")} == {
+        "edge_friction.coulomb"
+    }
+    assert found["joints[1].load_friction.coulomb"] == "load_friction.coulomb"
+    assert found["joints[2].cover.stiffness"] == "cover.stiffness"
+    assert found["extensions[1].stiffness"] == "extensions.cover_hardening.stiffness"

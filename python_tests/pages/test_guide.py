@@ -1,0 +1,104 @@
+"""docs/guide: ten short pages, each with a command that works and a picture; a reader can follow them word by word."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
+
+from plant_rigs import needs_plant
+from repository_paths import ROOT
+
+GUIDE = ROOT / "docs" / "guide"
+PAGES = sorted(path.stem for path in GUIDE.glob("*.md"))
+IN_ORDER = [
+    *("your_finger", "your_recording", "calibrate", "fit", "diagnose", "change", "detect"),
+    *("in_your_loop", "in_your_simulator", "simulated_finger"),
+]
+MOST_WORDS = 900
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+START = re.compile(
+    r"# .+\n\n```sh\n(?:tendonfmu|python) (?:.*\n)+?```\n\n" r"!\[[^\]]{20,}\]\(\.\./(figures/\w+\.png)\)\n"
+)
+SAVED = {"your_finger": "two_joints.json", "simulated_finger": "harder.json"}  # what the page has the reader save
+FITS = [pytest.param(name, marks=pytest.mark.long) for name in ("calibrate", "fit", "diagnose", "change")]
+
+
+def text(name: str) -> str:
+    return (GUIDE / f"{name}.md").read_text(encoding="utf-8")
+
+
+def test_the_pages_are_those_of_a_day() -> None:
+    assert sorted(IN_ORDER) == PAGES and len(PAGES) <= 10
+    index = (ROOT / "docs" / "README.md").read_text(encoding="utf-8")
+    places = [index.index(f"(guide/{name}.md)") for name in IN_ORDER]
+    assert places == sorted(places)
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_a_page_is_short_and_begins_with_a_command_and_a_picture(name: str) -> None:
+    page = text(name)
+    assert len(page.split()) <= MOST_WORDS
+    start = START.match(page)
+    assert start, "expected: a heading, a block of commands, a picture with a description"
+    assert (ROOT / "docs" / start[1]).stat().st_size < 400_000
+
+
+def follow(name: str, folder: Path) -> None:
+    """Does what the page says, from its first line to its last."""
+    (folder / "examples").symlink_to(ROOT / "examples")
+    environment = os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+    for language, code in BLOCK.findall(text(name)):
+        if language == "json" and name in SAVED:
+            (folder / SAVED[name]).write_text(code, encoding="utf-8")
+        command = {"sh": ["sh", "-e", "-c", code], "python": [sys.executable, "-c", code]}.get(language)
+        if command:
+            done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+            assert done.returncode == 0, f"{code}\n{done.stderr}"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["your_finger", "detect", "in_your_loop", "in_your_simulator", *FITS])
+def test_a_reader_can_follow(name: str, tmp_path: Path) -> None:
+    if name in ("calibrate", "fit", "diagnose", "change"):
+        pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not installed with its estimation")
+    follow(name, tmp_path)
+
+
+def test_a_reader_can_follow_from_the_finger_to_the_recording(tmp_path: Path) -> None:
+    """your_recording uses the finger of the page before."""
+    finger = next(code for language, code in BLOCK.findall(text("your_finger")) if language == "json")
+    (tmp_path / "two_joints.json").write_text(finger, encoding="utf-8")
+    follow("your_recording", tmp_path)
+
+
+@needs_plant
+@pytest.mark.slow
+def test_a_reader_can_simulate(tmp_path: Path) -> None:
+    follow("simulated_finger", tmp_path)
+    assert (tmp_path / "harder.parquet").is_file()
+
+
+def test_the_loop_is_c(tmp_path: Path) -> None:
+    compiler = shutil.which("cc")
+    if compiler is None:
+        pytest.skip("SKIPPED: no C compiler")
+    (code,) = (code for language, code in BLOCK.findall(text("in_your_loop")) if language == "c")
+    (tmp_path / "loop.c").write_text(code, encoding="utf-8")
+    command = [
+        compiler,
+        "-std=c11",
+        "-Wall",
+        "-Wextra",
+        "-Werror",
+        "-fsyntax-only",
+        f"-I{ROOT / 'runtime' / 'include'}",
+    ]
+    subprocess.run([*command, "loop.c"], cwd=tmp_path, check=True)

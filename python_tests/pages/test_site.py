@@ -1,0 +1,41 @@
+"""The documentation site: every page is in its menu, and the C reference has every declaration of the headers."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+from repository_paths import ROOT
+
+DOCS = ROOT / "docs"
+sys.path.append(str(ROOT / "tools"))
+
+from c_reference import header_markdown  # noqa: E402
+
+HEADERS = sorted((ROOT / "runtime" / "include").glob("*.h"))
+
+
+def test_every_page_is_in_the_menu() -> None:
+    menu = set(re.findall(r"[\w/]+\.md", (ROOT / "mkdocs.yml").read_text(encoding="utf-8")))
+    assert menu == {path.relative_to(DOCS).as_posix() for path in DOCS.rglob("*.md")}
+
+
+@pytest.mark.parametrize("header", HEADERS, ids=lambda header: header.stem)
+def test_the_c_reference_has_every_declaration(header: Path) -> None:
+    code = re.sub(r"/\*.*?\*/", "", header.read_text(encoding="utf-8"), flags=re.DOTALL)
+    names = set(re.findall(r"\b(tendonfmu_\w+)\(", code)) | set(re.findall(r"^} (\w+);", code, re.MULTILINE))
+    text = header_markdown(header)
+    shown = "".join(re.findall(r"```c\n(.*?)```", text, re.DOTALL))
+    assert len(names) > 1
+    assert {name for name in names if name not in shown} == set()
+    headings = re.findall(r"^#### `(\w+)`", text, re.MULTILINE)
+    assert len(set(headings)) == len(headings)
+
+
+def test_every_header_is_on_the_page() -> None:
+    page = (DOCS / "reference" / "c.md").read_text(encoding="utf-8")
+    hooks = (ROOT / "tools" / "site_hooks.py").read_text(encoding="utf-8")
+    assert all(f"`{header.name}`" in page and f'"{header.stem}"' in hooks for header in HEADERS)

@@ -1,0 +1,341 @@
+"""`tendonfmu check FINGER.json RECORDING`: signs, order and units of columns, clocks and sensors.
+
+The systematic table is `bench/recording_check.py`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from command import Call
+from repository_paths import ROOT
+from tendonfmu.errors import InputError
+from tendonfmu.files.tables import write_table
+from tendonfmu.model.description import FingerDescription, read_finger
+from tendonfmu.recordings.match import admit, belongs, refuse_errors
+from tendonfmu.recordings.prepared import Held, prepare
+from tendonfmu.recordings.recording import Recording, read_recording
+
+EXAMPLES = ROOT / "examples"
+INDEX = EXAMPLES / "fingers" / "index_finger.json"
+DEMO = EXAMPLES / "demo_recording"
+FREE = DEMO / "index_finger_free.parquet"
+SECONDS = 20
+Numbers = NDArray[np.float64]
+
+
+@pytest.fixture(scope="module")
+def finger() -> FingerDescription:
+    return read_finger(INDEX)
+
+
+@pytest.fixture(scope="module")
+def sound() -> Recording:
+    """20 s of the simulated index finger, 4 joints and 8 tendons, joint angles measured."""
+    return part_of(read_recording(FREE), slice(0, 500 * SECONDS))
+
+
+def part_of(recording: Recording, rows: slice | Numbers) -> Recording:
+    groups = {name: values[rows] for name, values in recording.groups.items()}
+    return dataclasses.replace(recording, time=recording.time[rows], groups=groups)
+
+
+def with_group(recording: Recording, name: str, values: Numbers) -> Recording:
+    return dataclasses.replace(recording, groups={**recording.groups, name: values})
+
+
+def scaled(recording: Recording, name: str, factors: Numbers | float) -> Recording:
+    return with_group(recording, name, recording.groups[name] * factors)
+
+
+def at(size: int, *elements: int, value: float = -1.0) -> Numbers:
+    """Ones, but for some elements (from 1)."""
+    factors = np.ones(size)
+    factors[[k - 1 for k in elements]] = value
+    return factors
+
+
+def without_angles(recording: Recording) -> Recording:
+    groups = {name: values for name, values in recording.groups.items() if name != "joint_position"}
+    return dataclasses.replace(recording, groups=groups)
+
+
+# --- sound recordings -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("description", "name"),
+    [
+        (INDEX, "index_finger_free"),
+        (INDEX, "index_finger_free_x4"),
+        (INDEX, "index_finger_pushes"),
+        (DEMO / "two_joints.json", "two_joints_training"),
+        (DEMO / "two_joints.json", "two_joints_unseen"),
+    ],
+)
+def test_sound_recordings_have_no_findings(description: Path, name: str) -> None:
+    recording = read_recording(DEMO / f"{name}.parquet")
+    assert belongs(read_finger(description), [recording, without_angles(recording)]) == []
+
+
+def test_rest_and_few_samples_have_no_findings(finger: FingerDescription, sound: Recording) -> None:
+    """Noise alone, and too little of anything, says nothing of signs and units."""
+    rng = np.random.default_rng(3)
+    groups = {name: np.tile(values[:1], (len(sound), 1)) for name, values in sound.groups.items()}
+    groups["tendon_force"] = groups["tendon_force"] + 0.02 * rng.standard_normal(groups["tendon_force"].shape)
+    rest = dataclasses.replace(sound, groups=groups)
+    assert belongs(finger, [rest, part_of(sound, slice(0, 30)), part_of(sound, slice(0, 1))]) == []
+
+
+def test_slack_tendons_are_no_misfit(finger: FingerDescription, sound: Recording) -> None:
+    """A slack tendon does not follow its joints."""
+    force, position = (sound.groups[name].copy() for name in ("tendon_force", "tendon_position"))
+    slack = (sound.time > 4.0) & (sound.time < 7.0)
+    force[slack, 0] = 0.0
+    position[slack, 0] += 0.005 * np.sin(3.0 * sound.time[slack]) ** 2
+    spoilt = with_group(with_group(sound, "tendon_force", force), "tendon_position", position)
+    assert belongs(finger, [spoilt]) == []
+
+
+# --- signs, order, units ----------------------------------------------------------------------------------------------
+
+Spoil = Callable[[Recording], Recording]
+
+
+def exchanged(name: str, order: list[int]) -> Spoil:
+    return lambda recording: with_group(recording, name, recording.groups[name][:, order])
+
+
+SPOILT: dict[str, tuple[Spoil, dict[str, dict[str, float | str]]]] = {
+    "force sign": (
+        lambda recording: scaled(recording, "tendon_force", at(8, 2)),
+        {"tendon_force[2]": {"sign": -1.0}},
+    ),
+    "position signs": (
+        lambda recording: scaled(recording, "tendon_position", at(8, 3, 6)),
+        {"tendon_position[3]": {"sign": -1.0}, "tendon_position[6]": {"sign": -1.0}},
+    ),
+    "angle sign": (
+        lambda recording: scaled(recording, "joint_position", at(4, 4)),
+        {"joint_position[4]": {"sign": -1.0}},
+    ),
+    "forces exchanged": (
+        exchanged("tendon_force", [0, 2, 1, 3, 4, 5, 6, 7]),
+        {"tendon_force[2]": {"exchange": "tendon_force[3]"}, "tendon_force[3]": {"exchange": "tendon_force[2]"}},
+    ),
+    "positions in mm": (
+        lambda recording: scaled(recording, "tendon_position", 1e3),
+        {f"tendon_position[{i}]": {"scale": 1e-3} for i in range(1, 9)},
+    ),
+    "forces in mN": (
+        lambda recording: scaled(recording, "tendon_force", 1e3),
+        {f"tendon_force[{i}]": {"scale": 1e-3} for i in range(1, 9)},
+    ),
+    "one force in kgf": (
+        lambda recording: scaled(recording, "tendon_force", at(8, 5, value=1 / 9.80665)),
+        {"tendon_force[5]": {"scale": 9.80665}},
+    ),
+    "angles in degrees": (
+        lambda recording: scaled(recording, "joint_position", 180 / np.pi),
+        {f"joint_position[{j}]": {"scale": np.pi / 180} for j in range(1, 5)},
+    ),
+    "time in ms": (
+        lambda recording: dataclasses.replace(recording, time=recording.time * 1e3),
+        {"time": {"scale": 1e-3}},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SPOILT)
+def test_what_to_write_into_the_map(finger: FingerDescription, sound: Recording, name: str) -> None:
+    spoil, expected = SPOILT[name]
+    findings = belongs(finger, [spoil(sound)])
+    entries = {column: dict(entry) for finding in findings for column, entry in finding.entries.items()}
+    assert entries == expected
+    assert {finding.severity for finding in findings} == {"error"}
+    with pytest.raises(InputError) as refused:
+        refuse_errors(findings)
+    assert "\n" not in str(refused.value) and str(sound.path) in str(refused.value)
+
+
+def test_units_without_any_redundancy() -> None:
+    """One tendon, one joint, no measured angle: nothing to compare with, but no joint turns by 500 rad."""
+    finger = read_finger(EXAMPLES / "davinci" / "jaw_start.json")
+    time = np.arange(5000) / 500
+    angle = 0.5 * np.sin(time)
+    force = 20.0 * np.tanh(5.0 * np.cos(time)) + 0.02 * np.random.default_rng(1).standard_normal(len(time))
+    groups = {"tendon_force": force[:, None], "tendon_position": (0.005 * angle + force / 4e6)[:, None]}
+    recording = Recording(Path("jaw.csv"), time, groups)
+    assert belongs(finger, [recording]) == []
+    [finding] = belongs(finger, [scaled(recording, "tendon_position", 1e3)])
+    assert finding.entries == {"tendon_position[1]": {"scale": 1e-3}}
+    [finding] = belongs(finger, [scaled(recording, "tendon_force", -1.0)])
+    assert finding.kind == "sign" and "against the pull" in finding.line()
+
+
+def test_velocities(finger: FingerDescription, sound: Recording) -> None:
+    velocity = np.gradient(sound.groups["joint_position"], sound.time, axis=0)
+    assert belongs(finger, [with_group(sound, "joint_velocity", velocity)]) == []
+    spoilt = with_group(sound, "joint_velocity", velocity * at(4, 2, value=-180 / np.pi))
+    entries = [finding.entries for finding in belongs(finger, [spoilt])]
+    assert entries == [
+        {"joint_velocity[2]": {"sign": -1.0}},
+        {"joint_velocity[2]": {"scale": np.pi / 180}},
+    ]
+
+
+def test_a_recording_of_another_finger(sound: Recording) -> None:
+    [finding, *others] = belongs(read_finger(DEMO / "two_joints.json"), [sound])
+    assert finding.severity == "error" and finding.kind == "columns"
+    assert "8 columns tendon_force[...], expected 4" in finding.line()
+    assert {other.kind for other in others} == {"columns"}
+
+
+def test_arms_of_another_finger(finger: FingerDescription, sound: Recording) -> None:
+    """What no map of columns mends is said without a guess."""
+    mixed = sound.groups["tendon_position"] @ np.random.default_rng(1).standard_normal((8, 8))
+    findings = belongs(finger, [with_group(sound, "tendon_position", mixed)])
+    assert [finding.kind for finding in findings if finding.severity == "error"] == ["unfit"]
+    assert all(not finding.entries for finding in findings)
+
+
+# --- clock and sensors ------------------------------------------------------------------------------------------------
+
+
+def test_clock(finger: FingerDescription, sound: Recording) -> None:
+    rng = np.random.default_rng(1)
+    lost = part_of(sound, rng.random(len(sound)) > 0.02)
+    assert [finding.kind for finding in belongs(finger, [lost])] == ["lost"]
+    gap = part_of(sound, (sound.time < 8.0) | (sound.time > 9.5))
+    assert [finding.kind for finding in belongs(finger, [gap])] == ["gaps"]
+    uneven = dataclasses.replace(sound, time=sound.time + rng.uniform(-4e-4, 4e-4, len(sound)))
+    assert [finding.kind for finding in belongs(finger, [uneven])] == ["jitter"]
+
+
+def test_saturated_force(finger: FingerDescription, sound: Recording) -> None:
+    force = sound.groups["tendon_force"].copy()
+    limit = np.quantile(force[:, 4], 0.97)
+    force[:, 4] = np.minimum(force[:, 4], limit)
+    [finding] = belongs(finger, [with_group(sound, "tendon_force", force)])
+    assert (finding.severity, finding.kind, finding.columns) == ("warning", "clipped", ("tendon_force[5]",))
+    assert f"{limit:.6g}" in finding.seen
+
+
+@pytest.mark.parametrize("group", ["tendon_force", "tendon_position", "joint_position"])
+def test_held_sensor(finger: FingerDescription, sound: Recording, group: str) -> None:
+    for until, severity in ((9.0, "warning"), (1e9, "error")):
+        values = sound.groups[group].copy()
+        held = (sound.time > 3.0) & (sound.time < until)
+        values[held, 1] = values[held.argmax(), 1]
+        findings = belongs(finger, [with_group(sound, group, values)])
+        assert [(each.severity, each.kind, each.columns) for each in findings] == [(severity, "held", (f"{group}[2]",))]
+
+
+def test_coarse_sensor(finger: FingerDescription, sound: Recording) -> None:
+    position = sound.groups["tendon_position"].copy()
+    step = np.ptp(position[:, 7]) / 20
+    position[:, 7] = np.round(position[:, 7] / step) * step
+    findings = belongs(finger, [with_group(sound, "tendon_position", position)])
+    assert ("warning", "coarse", ("tendon_position[8]",)) in [
+        (each.severity, each.kind, each.columns) for each in findings
+    ]
+    assert all(each.severity == "warning" for each in findings)
+
+
+def test_pushing_tendon_and_zero_of_a_sensor(finger: FingerDescription, sound: Recording) -> None:
+    force = sound.groups["tendon_force"].copy()
+    force[:, 2] -= force[:, 2].mean()
+    [finding] = belongs(finger, [with_group(sound, "tendon_force", force)])
+    assert finding.kind == "pushing" and "zeroed under load" in finding.line() and not finding.entries
+
+
+# --- the command ------------------------------------------------------------------------------------------------------
+
+
+def written(recording: Recording, file: Path) -> Path:
+    columns = {
+        f"{name}[{k + 1}]": column for name, values in recording.groups.items() for k, column in enumerate(values.T)
+    }
+    write_table(file, {"time": recording.time, **columns})
+    return file
+
+
+def test_check_says_that_a_recording_belongs(call: Call) -> None:
+    answer = call("check", INDEX, FREE)
+    assert answer.status == 0 and answer.err == ""
+    assert f"{FREE}: belongs to this finger: 30000 samples, 60 s; nothing found" in answer.out
+
+
+def test_check_says_what_to_write(call: Call, tmp_path: Path, sound: Recording) -> None:
+    spoilt = written(scaled(sound, "tendon_force", at(8, 2)), tmp_path / "spoilt.parquet")
+    answer = call("check", INDEX, spoilt, FREE)
+    assert answer.status == 1
+    assert f"error: {spoilt}: tendon_force[2]: " in answer.out and "tendon_force[2]: sign -1" in answer.out
+    assert f"{FREE}: belongs" in answer.out
+    assert answer.err.count("\n") == 1 and "1 of 2 recordings" in answer.err
+
+
+def test_check_of_warnings_alone_is_sound(call: Call, tmp_path: Path, sound: Recording) -> None:
+    gap = written(part_of(sound, (sound.time < 8.0) | (sound.time > 9.5)), tmp_path / "gap.parquet")
+    answer = call("check", INDEX, gap)
+    assert answer.status == 0 and f"warning: {gap}: time: 1 gaps" in answer.out
+
+
+def test_check_refuses_bad_recordings(call: Call, tmp_path: Path) -> None:
+    answer = call("check", INDEX, "absent.csv")
+    assert answer.status == 2 and "absent.csv" in answer.err
+    answer = call("check", EXAMPLES / "rigs" / "index_finger.json", FREE)
+    assert answer.status == 2 and "a rig" in answer.err
+
+
+# --- the commands that fit --------------------------------------------------------------------------------------------
+
+STRANGERS: dict[str, tuple[Spoil, str]] = {
+    "exchanged": (exchanged("tendon_position", [0, 2, 1, 3, 4, 5, 6, 7]), "tendon_position[2] exchanged with"),
+    "degrees": (SPOILT["angles in degrees"][0], "joint_position[1..4]: scale 0.0174533"),
+    "milliseconds": (SPOILT["time in ms"][0], "time: scale 0.001"),
+}
+
+
+@pytest.mark.parametrize("stranger", STRANGERS)
+@pytest.mark.parametrize(
+    ("command", "output"), [("fit", "f.json"), ("diagnose", "out"), ("tune", "t.json"), ("calibrate", "out")]
+)
+def test_a_stranger_is_refused_by_name_before_any_fit(
+    call: Call, tmp_path: Path, sound: Recording, stranger: str, command: str, output: str
+) -> None:
+    """Also beside a recording that belongs."""
+    spoil, words = STRANGERS[stranger]
+    file = written(spoil(sound), tmp_path / "stranger.parquet")
+    answer = call(command, INDEX, FREE, file, "-o", output)
+    assert answer.status == 2 and len(answer.err.splitlines()) == 1, answer
+    assert f"{file}: " in answer.err and words in answer.err
+    assert not (tmp_path / output).exists()
+
+
+@pytest.mark.parametrize("command", ["fit", "diagnose"])
+def test_a_stranger_is_refused_where_it_only_judges(call: Call, tmp_path: Path, sound: Recording, command: str) -> None:
+    file = written(scaled(sound, "tendon_force", at(8, 2)), tmp_path / "stranger.parquet")
+    output = "f.json" if command == "fit" else "out"
+    answer = call(command, INDEX, FREE, "--compare" if command == "fit" else "--test", file, "-o", output)
+    assert answer.status == 2 and f"{file}: tendon_force[2]: " in answer.err, answer
+    assert not (tmp_path / output).exists()
+
+
+def test_a_fit_says_itself_what_becomes_of_gaps_and_stuck_sensors(finger: FingerDescription, sound: Recording) -> None:
+    """Each of them once: `belongs` sees them, `admit` leaves them to `prepare`."""
+    gap = part_of(sound, (sound.time < 8.0) | (sound.time > 9.5))
+    position = sound.groups["joint_position"].copy()
+    position[2000:4000, 1] = position[2000, 1]
+    stuck = with_group(sound, "joint_position", position)
+    assert [finding.kind for finding in belongs(finger, [gap, stuck])] == ["gaps", "held"]
+    assert admit(finger, [gap, stuck]) == []
+    sentences = [sentence for each in (gap, stuck) for sentence in prepare(finger, each, 1, Held()).warnings]
+    assert len(sentences) == 2 and "a gap or a jump of the clock" in sentences[0]
+    assert "joint_position[2] stands still" in sentences[1]

@@ -1,0 +1,327 @@
+"""The SSP package of both FMUs (examples/ssp): the same numbers from every master that can be run here."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import json
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from plant_fmu_rig import fmu_rig
+from plant_rigs import needs_plant
+from repository_paths import ROOT
+
+pytestmark = needs_plant
+
+Table = dict[str, NDArray[Any]]
+EXAMPLE = ROOT / "examples" / "ssp"
+STEPS = 400
+STEP = 0.001  # s
+OUTPUTS = [
+    *(f"plant.{name}[{i}]" for name in ("tendon_force", "tendon_position") for i in range(1, 5)),
+    *(f"plant.{name}[{j}]" for name in ("joint_position", "joint_velocity", "truth.external_torque") for j in (1, 2)),
+    *(f"friction.{name}[{j}]" for name in ("compensated_torque", "friction_torque") for j in (1, 2)),
+]
+
+
+@pytest.fixture(scope="module")
+def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from tendonfmu.simulate.ssp import build_ssp
+
+    folder = tmp_path_factory.mktemp("ssp")
+    (folder / "rig.json").write_text(json.dumps(fmu_rig()))
+    return build_ssp(folder / "rig.json", folder / "finger.ssp")
+
+
+@pytest.fixture(scope="module")
+def unpacked(package: Path) -> Path:
+    with zipfile.ZipFile(package) as archive:
+        archive.extractall(package.parent / "unpacked")
+    return package.parent / "unpacked"
+
+
+def example() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("step_by_hand", EXAMPLE / "step_by_hand.py")
+    assert spec and spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def by_hand(package: Path) -> Table:
+    table: Table = example().run(package, STEPS)
+    return table
+
+
+# --- masters: outputs after each step ---------------------------------------------------------------------------------
+
+
+def run_ecos(package: Path, unpacked: Path) -> Table:
+    try:
+        from ecospy import EcosSimulation
+    except (ImportError, OSError) as missing:
+        pytest.skip(f"ECOS NOT TESTED: {missing}; it wants the packages ecospy (PyPI) and libtbb12")
+    rows = []
+    with EcosSimulation(ssp_path=str(package), step_size=STEP) as simulation:
+        simulation.init()
+        for _ in range(STEPS):
+            simulation.step()
+            rows.append([simulation.get_real(name.replace(".", "::", 1)) for name in OUTPUTS])
+        simulation.terminate()
+    return dict(zip(OUTPUTS, np.array(rows).T, strict=True))
+
+
+def run_libcosim(package: Path, unpacked: Path) -> Table:
+    try:
+        from libcosimpy.CosimExecution import CosimExecution
+        from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
+        from libcosimpy.CosimObserver import CosimObserver
+    except (ImportError, OSError) as missing:
+        pytest.skip(f"LIBCOSIM NOT TESTED: {missing}; it wants the package libcosimpy (PyPI)")
+    log_output_level(CosimLogLevel.FATAL)
+    execution = CosimExecution.from_ssp_file(str(unpacked), step_size=round(STEP * 1e9))
+    observer = CosimObserver.create_last_value()
+    execution.add_observer(observer)
+    wanted = {}
+    for component in ("plant", "friction"):
+        index = execution.slave_index_from_instance_name(component)
+        references = {v.name.decode(): v.reference for v in execution.slave_variables(index)}
+        names = [name.partition(".")[2] for name in OUTPUTS if name.startswith(f"{component}.")]
+        wanted[index] = [references[name] for name in names]
+    rows = []
+    for _ in range(STEPS):
+        assert execution.step()
+        rows.append([x for index, references in wanted.items() for x in observer.last_real_values(index, references)])
+    return dict(zip(OUTPUTS, np.array(rows).T, strict=True))
+
+
+@pytest.mark.parametrize("master", [run_ecos, run_libcosim])
+def test_masters_agree(master: Callable[[Path, Path], Table], package: Path, unpacked: Path, by_hand: Table) -> None:
+    """The plant to the bit; the friction FMU but for the last digit of the masters' clocks."""
+    found = master(package, unpacked)
+    for name in OUTPUTS:
+        if name.startswith("plant."):
+            np.testing.assert_array_equal(found[name], by_hand[name], name)
+        else:
+            np.testing.assert_allclose(found[name], by_hand[name], rtol=0, atol=1e-14, err_msg=name)
+
+
+def run_fmpy(package: Path, start_values: Any = None) -> NDArray[Any]:
+    from fmpy.ssp.simulation import simulate_ssp
+
+    found: NDArray[Any] = simulate_ssp(
+        str(package), stop_time=(STEPS - 0.5) * STEP, step_size=STEP, parameter_set=start_values
+    )
+    return found
+
+
+def test_fmpy_agrees_to_the_bit(package: Path, by_hand: Table) -> None:
+    """Its rows carry the time at the beginning of the step. The start values are those of the package."""
+    from fmpy.ssp.ssd import read_ssv
+
+    found = run_fmpy(package, read_ssv(str(package), "resources/start_values.ssv"))
+    np.testing.assert_allclose(found["time"] + STEP, by_hand["time"], rtol=0, atol=1e-12)
+    for name in OUTPUTS:
+        np.testing.assert_array_equal(found[name], by_hand[name], name)
+
+
+def test_fmpy_without_start_values_starts_blind(package: Path, by_hand: Table) -> None:
+    """It hands nothing over before the first step: the friction FMU takes a first sample of zeros."""
+    found, blind = run_fmpy(package), example().run(package, STEPS, blind_start=True)
+    for name in OUTPUTS:
+        np.testing.assert_array_equal(found[name], blind[name], name)
+    assert np.abs(found["friction.compensated_torque[1]"] - by_hand["friction.compensated_torque[1]"]).max() > 1e-4
+
+
+# --- delay ------------------------------------------------------------------------------------------------------------
+
+
+def test_the_coupling_delays_the_friction_fmu_by_one_step(package: Path, by_hand: Table) -> None:
+    """Row k carries the sample that the plant had at its beginning; stepped in sequence, there is no delay."""
+    sequential = example().run(package, STEPS, sequential=True)
+    for name in OUTPUTS:
+        ours, there = by_hand[name], sequential[name]
+        if name.startswith("friction."):
+            assert np.ptp(ours) > 0.0
+            np.testing.assert_array_equal(ours[1:], there[:-1], name)
+        else:
+            np.testing.assert_array_equal(ours, there, name)
+
+
+def test_the_finger_feels_the_push(by_hand: Table) -> None:
+    """The push of 0.5 N bends both joints; the friction FMU feels it, a step later."""
+    true = by_hand["plant.truth.external_torque[2]"]
+    felt = by_hand["friction.compensated_torque[2]"]
+    pushed, free = (by_hand["time"] > 0.24) & (by_hand["time"] < 0.31), by_hand["time"] < 0.19
+    assert true[pushed].mean() > 0.01 and np.all(true[free] == 0.0)
+    assert felt[pushed].mean() - felt[free].mean() == pytest.approx(true[pushed].mean(), rel=0.5)
+
+
+# --- the package ------------------------------------------------------------------------------------------------------
+
+
+def test_what_is_in_the_package(package: Path, tmp_path: Path) -> None:
+    from tendonfmu.simulate.ssp import build_ssp
+
+    with zipfile.ZipFile(package) as archive:
+        assert archive.namelist() == [
+            "SystemStructure.ssd",
+            "resources/TendonFinger.fmu",
+            "resources/friction.fmu",
+            "resources/start_values.ssv",
+        ]
+        root = ElementTree.fromstring(archive.read("SystemStructure.ssd"))
+    ssd = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"
+    connections = [each.attrib for each in root.iter(f"{ssd}Connection")]
+    assert len(connections) == 2 * 4 + 2 * 2
+    assert all(each["startConnector"] == each["endConnector"] for each in connections)
+    inputs = [each for each in root.iter(f"{ssd}Connector") if each.attrib["kind"] == "input"]
+    assert len(inputs) == len(connections)
+    assert build_ssp(package.parent / "rig.json", tmp_path / "again.ssp").read_bytes() == package.read_bytes()
+
+
+def test_the_package_never_takes_the_place_of_its_rig(tmp_path: Path) -> None:
+    from tendonfmu.errors import InputError
+    from tendonfmu.simulate.ssp import build_ssp
+
+    base, rig = tmp_path / "base.json", tmp_path / "rig.json"
+    base.write_text(json.dumps(fmu_rig()))
+    rig.write_text(json.dumps({"format": fmu_rig()["format"], "name": "small", "base": "base.json"}))
+    before = base.read_bytes(), rig.read_bytes()
+    for output in (rig, base):
+        with pytest.raises(InputError, match="the same file as the input"):
+            build_ssp(rig, output)
+    assert (base.read_bytes(), rig.read_bytes()) == before
+
+
+def test_the_scripts_of_the_example(tmp_path: Path) -> None:
+    def script(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, str(EXAMPLE / name), *arguments]
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+
+    made = script("make_ssp.py")
+    assert made.returncode == 0 and made.stdout.startswith("finger.ssp: "), made.stderr
+    shown = script("step_by_hand.py", "finger.ssp", "0.3")
+    assert shown.returncode == 0 and len(shown.stdout.splitlines()) == 4, shown.stderr
+    refused = script("make_ssp.py", "missing.json")
+    assert refused.returncode == 2 and "missing.json" in refused.stderr and not refused.stdout
+    for arguments, named in (
+        (("missing.ssp",), "missing.ssp: no such file"),
+        (("not.ssp",), "not.ssp: no SSP package"),
+        (("finger.ssp", "abc"), "SECONDS = abc: expected a number"),
+        (("finger.ssp", "nan"), "SECONDS = nan: expected a number"),
+        (("finger.ssp", "-1"), "SECONDS = -1: expected a number"),
+    ):
+        (tmp_path / "not.ssp").write_text("{}")
+        refused = script("step_by_hand.py", *arguments)
+        assert refused.returncode == 2 and named in refused.stderr and len(refused.stderr.splitlines()) == 1
+        assert not refused.stdout
+
+
+# --- README.md --------------------------------------------------------------------------------------------------------
+
+PAGE = (EXAMPLE / "README.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("module", ["fmpy", "ecospy", "libcosimpy"])
+def test_the_snippets_of_the_page(module: str, package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    snippets = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    (code,) = [code for code in snippets if f"from {module}" in code]
+    if module != "fmpy":
+        try:
+            importlib.import_module(module)
+        except (ImportError, OSError) as missing:
+            pytest.skip(f"{module.upper()} NOT TESTED: {missing}")
+    shutil.copy(package, tmp_path / "finger.ssp")
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {}
+    exec(compile(code, f"README.md, {module}", "exec"), names)
+    expected = example().run(package, 2000)["friction.compensated_torque[2]"]
+    np.testing.assert_allclose(names["torque"], expected, rtol=0, atol=1e-12)
+
+
+@pytest.fixture(scope="module")
+def index_finger(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from tendonfmu.simulate.ssp import build_ssp
+
+    rig = EXAMPLE.parent / "rigs" / "index_finger_pushes.json"
+    return build_ssp(rig, tmp_path_factory.mktemp("index") / "finger.ssp")
+
+
+def table_of_page(heading: str) -> list[list[str]]:
+    """Cells of the rows of the table whose first heading this is."""
+    rows = PAGE[PAGE.index(f"| {heading} |") :].partition("\n\n")[0].splitlines()[2:]
+    return [[cell.strip() for cell in row.replace("−", "-").strip("|").split("|")] for row in rows]
+
+
+def test_the_tables_of_the_page(index_finger: Path) -> None:
+    """Torques at the begin of a push within 0.05 mN·m; false contacts within 20 ms; largest errors within 2 mN·m."""
+    runs = {
+        name: example().run(index_finger, 9040, **{name: True} if name else {})
+        for name in ("", "sequential", "blind_start")
+    }
+    ours, there, blind = runs.values()
+    rows = table_of_page("time s")
+    assert len(rows) == 5
+    for time, *shown in rows:
+        k = round(float(time) / STEP) - 1
+        found = [
+            ours["plant.truth.joint_torque[2]"][k],
+            *(table["friction.joint_torque[2]"][k] for table in (ours, there)),
+            ours["plant.truth.external_torque[2]"][k],
+            *(table["friction.compensated_torque[2]"][k] for table in (ours, there)),
+        ]
+        np.testing.assert_allclose([float(x) for x in shown], 1e3 * np.array(found), rtol=0, atol=0.05, err_msg=time)
+
+    free = ours["time"] < 9.0
+    starts = table_of_page("first sample of the friction FMU")
+    for (_, contact, largest), table in zip(starts, (ours, blind), strict=False):
+        wrong = table["time"][free][table["friction.contact"][free] > 0.0]
+        begin, end = re.findall(r"[\d.]+", contact)[:2]
+        assert (wrong[0], wrong[-1]) == pytest.approx((float(begin), float(end)), abs=0.02)
+        error = 1e3 * np.abs(table["friction.compensated_torque[2]"][free]).max()
+        assert error == pytest.approx(float(largest), abs=2.0)
+    assert not ours["plant.truth.contact"][free].any()
+    late = (ours["time"] > 8.0) & free
+    for j in range(1, 5):
+        name = f"friction.compensated_torque[{j}]"
+        assert 1e3 * np.abs(ours[name] - blind[name])[late].max() < 0.3
+
+
+def test_a_friction_fmu_that_starts_in_motion_has_no_false_contact(index_finger: Path) -> None:
+    """As the page says: it takes its first sample at 1.5 s."""
+    hand = example()
+    with zipfile.ZipFile(index_finger) as archive:
+        archive.extractall(index_finger.parent)
+    resources = index_finger.parent / "resources"
+    plant, friction = (hand.Component(name, resources / fmu) for name, fmu in hand.COMPONENTS.items())
+    plant.fmu.exitInitializationMode()
+    plant.fmu.doStep(0.0, 1.5)
+    friction.set(friction.inputs, plant.get(friction.inputs))
+    friction.fmu.exitInitializationMode()
+    results = []
+    for k in range(7400):
+        friction.set(friction.inputs, plant.get(friction.inputs))
+        friction.fmu.doStep(k * STEP, STEP)
+        plant.fmu.doStep(1.5 + k * STEP, STEP)
+        results.append(friction.results())
+    found = dict(zip(friction.outputs + friction.flags, np.array(results).T, strict=True))
+    for component in (plant, friction):
+        component.close()
+    assert not found["contact"].any()
+    largest = float(table_of_page("first sample of the friction FMU")[2][2])
+    assert 1e3 * np.abs(found["compensated_torque[2]"]).max() == pytest.approx(largest, abs=2.0)

@@ -1,0 +1,290 @@
+"""Ctrl-C and SIGTERM at any moment of a command: one line, its status, and results as they were or whole."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import Future
+from importlib.resources import as_file, files
+from pathlib import Path
+
+import pytest
+
+from repository_paths import SUPPORT
+
+pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
+if os.name != "posix":
+    pytest.skip("SKIPPED: signals as POSIX has them", allow_module_level=True)
+
+import diagnosis_examples as examples
+from tendonfmu.errors import InputError
+from tendonfmu.report.diagnosis_files import write_diagnosis
+from tendonfmu.report.diagnosis_report import REPORT
+from tendonfmu.tasks.interruption import ended_by_signals, uninterrupted, worker_threads
+
+HERE = SUPPORT
+PROMPT = 10.0  # s; on a busy machine
+SAID = "tendonfmu: interrupted; no file was left half written"
+STATUS = {signal.SIGINT: 130, signal.SIGTERM: 143}
+
+# `tendonfmu diagnose` with another computation; "ready" says that its moment has come
+PROGRAM = """
+import os, sys, time
+sys.path.insert(0, {here!r})
+import numpy as np
+from dataclasses import replace
+import diagnosis_examples as examples
+from tendonfmu.diagnose import diagnosis
+from tendonfmu.report import diagnosis_files
+from tendonfmu.report import diagnosis_page
+from tendonfmu.tasks.interruption import worker_threads
+def ready(): os.write(1, b"ready\\n")
+def brief(): return replace(examples.one_cause(), views=examples.one_cause().views[:1])
+{body}
+diagnosis.diagnose = compute
+sys.argv = ["tendonfmu", "diagnose", "finger.json", "a.csv", "-o", "out"]
+from tendonfmu.cli import main
+main()
+"""
+
+MOMENTS = {
+    "python": """
+def compute(*_, **__):
+    ready()
+    while True: sum(range(1000))
+""",
+    "numpy": """
+def compute(*_, **__):
+    matrix = np.ones((400, 400)); ready()
+    while True: matrix = np.linalg.svd(matrix)[0]
+""",
+    "threads that compute": """
+def compute(*_, **__):
+    matrix = np.ones((300, 300))
+    def work(_):
+        while True: np.linalg.svd(matrix)
+    with worker_threads(2) as pool:
+        for future in [pool.submit(work, k) for k in range(8)]:
+            ready(); future.result()
+""",
+    "a swallowed exception": """
+def compute(*_, **__):
+    ready()
+    while True:
+        try: time.sleep(0.01)
+        except Exception: pass
+""",
+    "the files are made": """
+def compute(*_, **__): return brief()
+whole = diagnosis_files.build_fmu
+def slow(*arguments, **options): ready(); time.sleep(60)
+diagnosis_files.build_fmu = slow
+""",
+}
+MOVING = """
+def compute(*_, **__): return brief()
+whole = os.replace
+def slow(source, target):
+    whole(source, target)
+    if os.path.basename(os.path.dirname(target)) in ("old", "out"):
+        ready(); time.sleep(0.1)
+os.replace = slow
+"""
+
+
+def foreground() -> None:
+    """A job in the background of a shell inherits that SIGINT is ignored."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def started(folder: Path, body: str) -> subprocess.Popen[str]:
+    """A process that stands where it has to be interrupted; `out` holds an earlier diagnosis."""
+    (folder / "finger.json").write_text("{}")
+    (folder / "a.csv").write_text("")
+    code = PROGRAM.format(here=str(HERE), body=body)
+    process = subprocess.Popen(
+        [sys.executable, "-c", code],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=foreground,
+    )
+    assert process.stdout is not None
+    if process.stdout.readline() != "ready\n":
+        raise AssertionError(process.communicate())
+    return process
+
+
+def ended(process: subprocess.Popen[str], number: signal.Signals) -> tuple[int, str, float]:
+    """Status, standard error and seconds until it had gone."""
+    begin = time.perf_counter()
+    process.send_signal(number)
+    try:
+        _, err = process.communicate(timeout=60)
+    finally:
+        process.kill()
+    return process.returncode, err, time.perf_counter() - begin
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    return {str(file.relative_to(folder)): file.read_bytes() for file in folder.rglob("*") if file.is_file()}
+
+
+@pytest.fixture(scope="module")
+def earlier(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a diagnosis."""
+    folder = tmp_path_factory.mktemp("earlier") / "out"
+    write_diagnosis(examples.adequate(), folder)
+    return folder
+
+
+def copied(earlier: Path, folder: Path) -> None:
+    (folder / "out").mkdir()
+    for name, text in content(earlier).items():
+        (folder / "out" / name).write_bytes(text)
+
+
+@pytest.mark.parametrize("moment", MOMENTS)
+@pytest.mark.parametrize("number", STATUS, ids=lambda number: number.name)
+def test_nothing_is_left_and_nothing_is_lost(
+    tmp_path: Path, earlier: Path, moment: str, number: signal.Signals
+) -> None:
+    copied(earlier, tmp_path)
+    process = started(tmp_path, MOMENTS[moment])
+    before = content(earlier)
+    status, err, seconds = ended(process, number)
+    assert (status, err.splitlines()) == (STATUS[number], [SAID])
+    assert seconds < PROMPT
+    assert content(tmp_path / "out") == before
+    assert {file.name for file in tmp_path.iterdir()} == {"finger.json", "a.csv", "out"}
+
+
+def test_the_folder_changes_at_once(tmp_path: Path, earlier: Path) -> None:
+    """Interrupted while the files take their places: all of them do, and then the command ends."""
+    copied(earlier, tmp_path)
+    (tmp_path / "out" / "notes.txt").write_text("mine")
+    status, err, _ = ended(started(tmp_path, MOVING), signal.SIGINT)
+    assert (status, err.splitlines()) == (130, [SAID])
+    report = json.loads((tmp_path / "out" / REPORT).read_text())
+    assert report["verdict"] == examples.one_cause().verdict
+    assert set(content(tmp_path / "out")) == {*report["files"], "notes.txt"}
+    assert {file.name for file in tmp_path.iterdir()} == {"finger.json", "a.csv", "out"}
+
+
+def test_a_disk_that_fails_in_between_changes_nothing(
+    tmp_path: Path, earlier: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    copied(earlier, tmp_path)
+    whole, calls = os.replace, 0
+
+    def failing(source: Path, target: Path) -> None:
+        nonlocal calls
+        calls += Path(target).parent in (tmp_path / "out", tmp_path / "new")
+        if calls == 4:
+            calls += 1  # only once: what is moved back is
+            raise OSError(28, "No space left on device", str(target))
+        whole(source, target)
+
+    monkeypatch.setattr(os, "replace", failing)
+    with pytest.raises(InputError, match="cannot be written"):
+        write_diagnosis(examples.one_cause(), tmp_path / "out")
+    assert calls > 4 and content(tmp_path / "out") == content(earlier)
+    calls = 0
+    with pytest.raises(InputError, match="cannot be written"):
+        write_diagnosis(examples.one_cause(), tmp_path / "new")
+    assert {file.name for file in tmp_path.iterdir()} == {"out"}
+
+
+# --- for real ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seconds", [1.0, 3.0, 8.0])
+def test_a_real_diagnosis_is_interrupted(tmp_path: Path, seconds: float) -> None:
+    """Wherever it is then."""
+    with as_file(files("tendonfmu") / "data") as data:
+        names = ("two_joints.json", "two_joints_training.parquet", "two_joints_unseen.parquet")
+        finger, training, unseen = (str(data / name) for name in names)
+        words = ["diagnose", finger, training, "--test", unseen, "-o", "out"]
+        code = "import sys; from tendonfmu.cli import main; print('ready', flush=True); main()"
+        process = subprocess.Popen(
+            [sys.executable, "-c", code, *words],
+            cwd=tmp_path,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            preexec_fn=foreground,
+        )
+        assert process.stdout is not None and process.stdout.readline() == "ready\n"
+        time.sleep(seconds)
+        status, err, took = ended(process, signal.SIGINT)
+    assert (status, err.splitlines()) == (130, [SAID])
+    assert took < PROMPT and list(tmp_path.iterdir()) == []
+
+
+# --- parts ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_signal_waits_for_the_end() -> None:
+    done = False
+
+    def wait() -> None:
+        nonlocal done
+        with uninterrupted():
+            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
+            done = True
+
+    before = signal.signal(
+        signal.SIGINT, signal.default_int_handler
+    )  # ignored where a shell has put us in its background
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            wait()
+        assert done and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_sigterm_has_its_own_status() -> None:
+    before = signal.getsignal(signal.SIGTERM)
+    with ended_by_signals() as ending:
+        assert ending.status == 130
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGTERM)
+    assert ending.status == 143 and signal.getsignal(signal.SIGTERM) == before
+
+
+def test_other_threads_are_left_alone() -> None:
+    found: list[int] = []
+
+    def work() -> None:
+        with ended_by_signals() as ending, uninterrupted():
+            found.append(ending.status)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert found == [130]
+
+
+def test_a_pool_gives_results_and_drops_the_rest_on_an_error() -> None:
+    with worker_threads(2) as pool:
+        assert list(pool.map(abs, range(-3, 0))) == [3, 2, 1]
+    release = threading.Event()
+
+    def fail() -> None:
+        with worker_threads(1) as pool:
+            waiting.extend(pool.submit(release.wait, 60.0) for _ in range(3))
+            raise KeyError
+
+    waiting: list[Future[bool]] = []
+    with pytest.raises(KeyError):
+        fail()
+    assert [future.cancelled() for future in waiting[1:]] == [True, True]
+    release.set()

@@ -1,0 +1,190 @@
+"""Jobs here and on dask workers: each has one row, whatever fails or dies on the way."""
+
+from __future__ import annotations
+
+import importlib
+import signal
+import sys
+import time
+from pathlib import Path
+from threading import Thread
+
+import pytest
+
+import some_jobs
+from dask_on_loopback import dask_processes
+from repository_paths import ROOT
+from tendonfmu.errors import InputError
+from tendonfmu.tasks import jobs as engine
+from tendonfmu.tasks.jobs import Job, rows_of, run_jobs, waiting_jobs, workers_of
+
+sys.path.insert(0, str(ROOT / "bench"))
+
+
+def noting(count: int, seconds: float, log: Path) -> list[Job]:
+    return [Job(f"job_{k}", (k, seconds, str(log))) for k in range(count)]
+
+
+def begun(log: Path) -> list[int]:
+    return [int(line.split()[0]) for line in log.read_text(encoding="utf-8").splitlines()] if log.is_file() else []
+
+
+def test_jobs_are_resumed_and_a_failure_is_a_row(tmp_path: Path) -> None:
+    some = [Job(str(k), (k,)) for k in range(4)]
+    assert run_jobs(some_jobs.fail, some[:3], tmp_path) == 3
+    assert [job.name for job in waiting_jobs(some, tmp_path)] == ["3"]
+    assert [job.name for job in waiting_jobs(some, tmp_path, failed_again=True)] == ["2", "3"]
+    assert run_jobs(some_jobs.fail, some, tmp_path) == 1
+    assert run_jobs(some_jobs.fail, some, tmp_path) == 0
+    rows = rows_of(some, tmp_path)
+    assert [row["name"] for row in rows] == ["0", "1", "2", "3"]
+    assert rows[2]["error"] == "ValueError: two is refused" and rows[0]["error"] == ""
+    assert rows[0]["bad"] is None and rows[0]["run_seconds"] >= 0.0
+
+
+def test_a_name_that_stands_twice_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="the name a stands twice; expected"):
+        run_jobs(some_jobs.fail, [Job("a", (1,)), Job("a", (2,))], tmp_path)
+    assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["", "../a", "a/b", ".a", "a\\b"])
+def test_a_name_that_no_file_can_have_is_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(InputError, match="expected one that a file can have"):
+        run_jobs(some_jobs.fail, [Job(name, (1,))], tmp_path)
+
+
+def test_what_no_row_can_hold_is_an_error_of_the_job(tmp_path: Path) -> None:
+    some = [Job("a", ({"list": [float("nan")]},)), Job("b", ({"object": Path()},)), Job("c", ({"name": "a", "x": 1},))]
+    assert run_jobs(dict, some, tmp_path) == 3
+    rows = rows_of(some, tmp_path)
+    assert rows[0]["error"].startswith("ValueError") and rows[1]["error"].startswith("TypeError")
+    assert (rows[2]["name"], rows[2]["x"], rows[2]["error"]) == ("c", 1, "")
+
+
+def test_no_job_begins_after_the_time(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    assert run_jobs(some_jobs.note, noting(5, 0.2, log), tmp_path / "out", stop_after=0.5) == 3
+    assert begun(log) == [0, 1, 2]
+
+
+def test_a_scheduler_that_is_not_there_is_refused_by_its_address(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")
+    monkeypatch.setattr(engine, "SECONDS_TO_CONNECT", 1.0)
+    with (
+        pytest.raises(InputError, match=r"--scheduler tcp://127.0.0.1:1: .*expected the address"),
+        workers_of("tcp://127.0.0.1:1"),
+    ):
+        pass
+
+
+def test_a_scheduler_without_workers_and_workers_of_another_version_are_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")
+    with dask_processes(0) as processes:
+        with monkeypatch.context() as patched:
+            patched.setattr(engine, "SECONDS_TO_CONNECT", 10.0)
+            with pytest.raises(InputError, match="no workers; expected at least one"), workers_of(processes.address):
+                pass
+        processes.add_worker()
+        with workers_of(processes.address):
+            pass
+        monkeypatch.setattr("tendonfmu.__version__", "0.0.0")  # in this process only
+        with pytest.raises(InputError, match=r"has tendonfmu .*; expected 0\.0\.0"), workers_of(processes.address):
+            pass
+
+
+def test_a_worker_killed_on_the_way_costs_no_row_and_adds_none(tmp_path: Path) -> None:
+    """A scheduler and two workers, processes of their own on the loopback. One is killed with a job in its hands: that
+    job begins twice and has one row, all others begin once."""
+    pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")
+    log, output, count = tmp_path / "log", tmp_path / "out", 16
+    jobs = noting(count, 0.4, log)
+    reported: list[tuple[int, int]] = []
+    with dask_processes(2) as processes, workers_of(processes.address) as client:
+        client.wait_for_workers(2, timeout=30)
+        victim = processes.workers[0]
+
+        def kill_amid_a_job() -> None:
+            while sum(line.endswith(f" {victim.pid}") for line in log_lines(log)) < 3:
+                time.sleep(0.01)
+            victim.send_signal(signal.SIGKILL)
+
+        killer = Thread(target=kill_amid_a_job)
+        killer.start()
+        ran = run_jobs(some_jobs.note, jobs, output, client, progress=lambda *state: reported.append(state))
+        killer.join()
+        assert victim.wait(10) == -signal.SIGKILL
+    rows = rows_of(jobs, output)
+    assert ran == count
+    assert [row["number"] for row in rows] == list(range(count)) and not any(row["error"] for row in rows)
+    assert reported == [(k, count) for k in range(count + 1)]
+    assert sorted(path.stem for path in (output / "rows").iterdir()) == sorted(job.name for job in jobs)
+    starts = begun(log)
+    assert set(starts) == set(range(count)) and len(starts) == count + 1
+    assert {row["process"] for row in rows} == {each.pid for each in processes.workers}
+
+
+def log_lines(log: Path) -> list[str]:
+    return log.read_text(encoding="utf-8").splitlines() if log.is_file() else []
+
+
+def test_a_job_that_kills_every_worker_is_an_error_of_its_own(tmp_path: Path) -> None:
+    """Nannies start the workers again; after the fourth death the job is given up, and the others have their rows."""
+    pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")
+    some = [Job(str(k), (k,)) for k in range(3)]
+    with workers_of(count=1) as client:
+        assert run_jobs(some_jobs.end_its_worker, some, tmp_path, client) == 3
+    rows = {row["name"]: row["error"] for row in rows_of(some, tmp_path)}
+    assert rows["1"].startswith("KilledWorker") and rows["0"] == "" and rows["2"] == ""
+
+
+def test_a_function_that_workers_cannot_import_is_an_error_of_each_job(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")
+    (tmp_path / "only_here.py").write_text("def nothing():\n    return {}\n", encoding="utf-8")
+    with dask_processes(1) as processes, workers_of(processes.address) as client:
+        monkeypatch.syspath_prepend(tmp_path)
+        function = importlib.import_module("only_here").nothing
+        some = [Job("a"), Job("b")]
+        assert run_jobs(function, some, tmp_path, client) == 2
+    assert ["only_here" in row["error"] for row in rows_of(some, tmp_path)] == [True, True], rows_of(some, tmp_path)
+
+
+def test_a_scheduler_that_dies_is_an_error_and_the_rest_is_resumed(tmp_path: Path) -> None:
+    pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")
+    jobs = noting(8, 0.2, tmp_path / "log")
+    output = tmp_path / "out"
+    with dask_processes(1) as processes, workers_of(processes.address) as client:
+
+        def kill_after_two(done: int, total: int) -> None:
+            if done == 2:
+                processes.scheduler.kill()
+
+        with pytest.raises(InputError, match="the dask scheduler was lost"):
+            run_jobs(some_jobs.note, jobs, output, client, progress=kill_after_two)
+    left = len(waiting_jobs(jobs, output))
+    assert 1 <= left <= 6
+    assert run_jobs(some_jobs.note, jobs, output) == left
+    assert [row["number"] for row in rows_of(jobs, output)] == list(range(8))
+
+
+def test_two_workers_take_half_the_time_of_one() -> None:
+    """Jobs that only wait, so that a busy machine does not matter much: what is left is what the engine costs."""
+    pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")
+    import job_scaling
+
+    one, two = (job_scaling.run(workers, 8, 1.0, some_jobs.wait) for workers in (1, 2))
+    assert one.wall / two.wall > 1.5
+
+
+@pytest.mark.long
+def test_two_workers_compute_faster_than_one() -> None:
+    """A soft bound, for the machine may be busy. bench/job_scaling.py measures it on a quiet one."""
+    pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")
+    import job_scaling
+
+    one, two = (job_scaling.run(workers, 12, 1.0) for workers in (1, 2))
+    assert one.wall / two.wall > 1.2
