@@ -13,5 +13,9 @@ if [ "$(cat "$environment/requirements" 2>/dev/null)" != "$(cat requirements-sit
 fi
 # A notice of the theme about other software is no finding of this build.
 export NO_MKDOCS_2_WARNING=1
-"$environment/bin/mkdocs" build --strict --quiet --site-dir "$output"
+# Without --quiet: that would hide the warnings from --strict, too.
+if ! "$environment/bin/mkdocs" build --strict --site-dir "$output" >build/site.log 2>&1; then
+  grep -v '^INFO' build/site.log >&2
+  exit 1
+fi
 echo "$output/index.html"

@@ -27,7 +27,7 @@ BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 START = re.compile(
     r"# .+\n\n```sh\n(?:tendonfmu|python) (?:.*\n)+?```\n\n" r"!\[[^\]]{20,}\]\(\.\./(figures/\w+\.png)\)\n"
 )
-SAVED = {"your_finger": "two_joints.json", "simulated_finger": "harder.json"}  # what the page has the reader save
+SAVED = {"your_finger": "two_joints.json", "simulated_finger": "softer.json"}  # what the page has the reader save
 FITS = [pytest.param(name, marks=pytest.mark.long) for name in ("calibrate", "fit", "diagnose", "change")]
 
 
@@ -83,7 +83,7 @@ def test_a_reader_can_follow_from_the_finger_to_the_recording(tmp_path: Path) ->
 @pytest.mark.slow
 def test_a_reader_can_simulate(tmp_path: Path) -> None:
     follow("simulated_finger", tmp_path)
-    assert (tmp_path / "harder.parquet").is_file()
+    assert (tmp_path / "softer.parquet").is_file()
 
 
 def test_the_loop_is_c(tmp_path: Path) -> None:

@@ -28,7 +28,7 @@ YOUR_FINGER = (GUIDE / "your_finger.md").read_text(encoding="utf-8")
 YOUR_RECORDING = (GUIDE / "your_recording.md").read_text(encoding="utf-8")
 FINGER_PAGE = (DOCS / "finger_description.md").read_text(encoding="utf-8")
 RECORDING_PAGE = (DOCS / "recordings.md").read_text(encoding="utf-8")
-EXTENSIONS_PAGE = (DOCS / "semantics.md").read_text(encoding="utf-8")
+EXTENSIONS_PAGE = (ROOT / "docs/reference/semantics.md").read_text(encoding="utf-8")
 SCHEMA = json.loads((files("tendonfmu") / "schema" / "finger.schema.json").read_text(encoding="utf-8"))
 EFFECTS = {row["$ref"].rsplit("/", 1)[1] for row in SCHEMA["properties"]["extensions"]["items"]["oneOf"]}
 WITHOUT_EFFECTS = {**SCHEMA, "$defs": {name: part for name, part in SCHEMA["$defs"].items() if name not in EFFECTS}}
