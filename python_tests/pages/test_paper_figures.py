@@ -12,8 +12,8 @@ import pytest
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
 from plant_rigs import needs_plant
+from repository_paths import ROOT
 
-ROOT = Path(__file__).resolve().parent.parent
 PAGE = (ROOT / "docs" / "reference" / "paper.md").read_text(encoding="utf-8")
 sys.path.append(str(ROOT / "bench"))
 
