@@ -26,7 +26,9 @@ nb::bytes image_from_json(const nb::bytes& json) {
   char message[600] = "";
   const tendonfmu_status status = tendonfmu_image_from_json(static_cast<const char*>(json.data()), json.size(), &image,
                                                             &size, message, sizeof message);
-  if (status != TENDONFMU_OK) throw nb::value_error(message);
+  if (status != TENDONFMU_OK) {
+    throw nb::value_error(message);
+  }
   nb::bytes result(image, size);
   tendonfmu_free_image(image);
   return result;
@@ -57,9 +59,15 @@ struct OutputRows {
 
   OutputRows(std::size_t samples, std::size_t n, std::size_t m, bool with_parts, bool with_place, bool with_rest,
              bool with_sensors) {
-    for (auto& row : numbers) row.resize(samples * n);
-    for (auto& row : detection) row.resize(samples * n);
-    if (with_parts) parts.resize(samples * n * (m + 3));
+    for (auto& row : numbers) {
+      row.resize(samples * n);
+    }
+    for (auto& row : detection) {
+      row.resize(samples * n);
+    }
+    if (with_parts) {
+      parts.resize(samples * n * (m + 3));
+    }
     flags[0].resize(samples * n);
     flags[1].resize(samples);
     flags[2].resize(samples * m);
@@ -117,7 +125,9 @@ class Finger {
   explicit Finger(const nb::bytes& image) {
     char message[600] = "";
     handle_ = tendonfmu_create(image.data(), image.size(), message, sizeof message);
-    if (handle_ == nullptr) throw nb::value_error(message);
+    if (handle_ == nullptr) {
+      throw nb::value_error(message);
+    }
   }
   ~Finger() { tendonfmu_destroy(handle_); }
   Finger(const Finger&) = delete;
@@ -152,7 +162,9 @@ class Finger {
     return values;
   }
   void set_parameters(const std::vector<std::size_t>& indices, const std::vector<double>& values) {
-    if (indices.size() != values.size()) throw nb::value_error("as many values as indices expected");
+    if (indices.size() != values.size()) {
+      throw nb::value_error("as many values as indices expected");
+    }
     check(tendonfmu_set_parameters(handle_, indices.size(), indices.data(), values.data()));
   }
 
@@ -177,15 +189,22 @@ class Finger {
       nb::gil_scoped_release released;
       status = tendonfmu_run(handle_, samples, time.data(), &inputs, &view, &done);
     }
-    if (status != TENDONFMU_OK)
+    if (status != TENDONFMU_OK) {
       throw nb::value_error(("row " + std::to_string(done + 1) + ": " + tendonfmu_last_error(handle_)).c_str());
+    }
     nb::list arrays;
-    for (auto& row : outputs.numbers) arrays.append(as_array(std::move(row), {samples, n}));
+    for (auto& row : outputs.numbers) {
+      arrays.append(as_array(std::move(row), {samples, n}));
+    }
     arrays.append(as_array(std::move(outputs.flags[0]), {samples, n}));
     arrays.append(as_array(std::move(outputs.flags[1]), {samples}));
     arrays.append(as_array(std::move(outputs.flags[2]), {samples, m}));
-    for (auto& row : outputs.detection) arrays.append(as_array(std::move(row), {samples, n}));
-    if (with_parts) arrays.append(as_array(std::move(outputs.parts), {samples, n, m + 3}));
+    for (auto& row : outputs.detection) {
+      arrays.append(as_array(std::move(row), {samples, n}));
+    }
+    if (with_parts) {
+      arrays.append(as_array(std::move(outputs.parts), {samples, n, m + 3}));
+    }
     if (has_links()) {
       arrays.append(as_array(std::move(outputs.tip_force), {samples, std::size_t{3}}));
       arrays.append(as_array(std::move(outputs.tip_std), {samples, std::size_t{3}}));
@@ -216,7 +235,9 @@ class Finger {
     tendonfmu_outputs derivative = {};
     double** const rows[] = {&derivative.compensated_torque, &derivative.joint_torque, &derivative.friction_torque,
                              &derivative.bias_torque,        &derivative.joint_angle,  &derivative.joint_speed};
-    for (std::size_t k = 0; k < 6; ++k) *rows[k] = slopes[k].data();
+    for (std::size_t k = 0; k < 6; ++k) {
+      *rows[k] = slopes[k].data();
+    }
     const tendonfmu_inputs direction = {force.data(), position.data(), angle.data(), velocity.data()};
     check(tendonfmu_get_directional_derivative(handle_, &direction, &derivative));
     return slopes;
@@ -226,14 +247,18 @@ class Finger {
   tendonfmu_finger* handle_ = nullptr;
 
   void check(tendonfmu_status status) const {
-    if (status == TENDONFMU_OK) return;
+    if (status == TENDONFMU_OK) {
+      return;
+    }
     const std::string reason = tendonfmu_last_error(handle_);
     throw nb::value_error(reason.empty() ? "bad argument" : reason.c_str());
   }
 
   static const double* rows(const std::optional<Rows>& array, std::size_t samples, std::size_t columns,
                             const char* name) {
-    if (!array) return nullptr;
+    if (!array) {
+      return nullptr;
+    }
     if (array->shape(0) != samples || array->shape(1) != columns) {
       throw nb::value_error(
           (std::string(name) + ": expected " + std::to_string(samples) + " x " + std::to_string(columns) + " numbers")

@@ -66,7 +66,9 @@ constexpr Flag flags[] = {
 template <typename Entry, std::size_t count>
 const Entry* find(const Entry (&entries)[count], const std::string& name) {
   for (const Entry& entry : entries) {
-    if (name == entry.name) return &entry;
+    if (name == entry.name) {
+      return &entry;
+    }
   }
   return nullptr;
 }
@@ -85,7 +87,9 @@ class Plant {
   explicit Plant(const nb::bytes& json) {
     char message[600] = "";
     handle_ = tendonfmu_plant_create(static_cast<const char*>(json.data()), json.size(), message, sizeof message);
-    if (handle_ == nullptr) throw nb::value_error(message);
+    if (handle_ == nullptr) {
+      throw nb::value_error(message);
+    }
   }
   ~Plant() { tendonfmu_plant_destroy(handle_); }
   Plant(const Plant&) = delete;
@@ -112,7 +116,9 @@ class Plant {
   }
   void set_inputs(const std::optional<std::vector<double>>& command, double pretension,
                   const std::array<double, 3>& push) {
-    if (command && command->size() != tendons()) throw nb::value_error("set_inputs: expected one command per tendon");
+    if (command && command->size() != tendons()) {
+      throw nb::value_error("set_inputs: expected one command per tendon");
+    }
     const tendonfmu_plant_inputs inputs = {
         command ? command->data() : nullptr, pretension, {push[0], push[1], push[2]}};
     check(tendonfmu_plant_set_inputs(handle_, &inputs));
@@ -197,10 +203,16 @@ class Plant {
 
   // ValueError for what was asked, RuntimeError for what the integrator could not do.
   void check(tendonfmu_plant_status status) const {
-    if (status == TENDONFMU_PLANT_OK) return;
+    if (status == TENDONFMU_PLANT_OK) {
+      return;
+    }
     std::string reason = tendonfmu_plant_last_error(handle_);
-    if (reason.empty()) reason = "bad argument";
-    if (status == TENDONFMU_PLANT_SOLVER) throw std::runtime_error(reason);
+    if (reason.empty()) {
+      reason = "bad argument";
+    }
+    if (status == TENDONFMU_PLANT_SOLVER) {
+      throw std::runtime_error(reason);
+    }
     throw nb::value_error(reason.c_str());
   }
 

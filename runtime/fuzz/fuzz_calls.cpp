@@ -77,7 +77,9 @@ class Session {
 
   std::vector<double> row(std::size_t count, double scale) {
     std::vector<double> values(count);
-    for (double& x : values) x = scale * number();
+    for (double& x : values) {
+      x = scale * number();
+    }
     return values;
   }
 
@@ -110,7 +112,9 @@ class Session {
     const std::size_t samples = data_.ConsumeIntegralInRange<std::size_t>(0, 5);
     const tendonfmu_inputs all = inputs(samples);
     std::vector<double> time(samples + 1, later());
-    for (std::size_t k = 1; k <= samples; ++k) time[k] = time[k - 1] + 0.01 * number();
+    for (std::size_t k = 1; k <= samples; ++k) {
+      time[k] = time[k - 1] + 0.01 * number();
+    }
     promises::Outputs outputs(finger_, samples);
     const tendonfmu_outputs view = outputs.view();
     const tendonfmu_status status = tendonfmu_run(finger_, samples, time.data(), &all, &view, &rows_taken_);
@@ -193,6 +197,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t siz
                                  test_finger::image(test_finger::every_effect())};
   FuzzedDataProvider data(bytes, size);
   Session session(data, data.PickValueInArray({&images[0], &images[1], &images[2], &images[3]})[0]);
-  while (data.remaining_bytes() > 0) session.call();
+  while (data.remaining_bytes() > 0) {
+    session.call();
+  }
   return 0;
 }

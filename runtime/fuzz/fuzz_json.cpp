@@ -14,7 +14,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       tendonfmu_image_from_json(text.data(), size, &block, &block_size, message, sizeof message);
   PROMISE((status == TENDONFMU_OK) == (block != nullptr));
   PROMISE((status == TENDONFMU_OK) == (std::strlen(message) == 0));
-  for (const char* c = message; *c; ++c) PROMISE(static_cast<unsigned char>(*c) >= 0x20);
+  for (const char* c = message; *c; ++c) {
+    PROMISE(static_cast<unsigned char>(*c) >= 0x20);
+  }
   if (block) {
     const auto* bytes = static_cast<const unsigned char*>(block);
     const promises::Bytes image(bytes, bytes + block_size);

@@ -25,13 +25,17 @@ constexpr std::size_t most_joints = 6, most_tendons = 12;  // larger fingers are
 
 void one_line(const char* text) {
   PROMISE(std::strlen(text) > 0);
-  for (const char* c = text; *c; ++c) PROMISE(static_cast<unsigned char>(*c) >= 0x20);
+  for (const char* c = text; *c; ++c) {
+    PROMISE(static_cast<unsigned char>(*c) >= 0x20);
+  }
 }
 
 /* OK, or the solver gave up and says so. Nothing else may come of a rig that was accepted. */
 bool moved(const tendonfmu_plant* plant, tendonfmu_plant_status status) {
   PROMISE(status == TENDONFMU_PLANT_OK || status == TENDONFMU_PLANT_SOLVER);
-  if (status != TENDONFMU_PLANT_OK) one_line(tendonfmu_plant_last_error(plant));
+  if (status != TENDONFMU_PLANT_OK) {
+    one_line(tendonfmu_plant_last_error(plant));
+  }
   return status == TENDONFMU_PLANT_OK;
 }
 
@@ -54,18 +58,28 @@ void signals_are_finite(const tendonfmu_plant* plant) {
   wanted.slack = slack.data();
   PROMISE(tendonfmu_plant_get_signals(plant, &wanted) == TENDONFMU_PLANT_OK);
   for (const auto* values : {&force, &friction, &inertial, &energy, &point}) {
-    for (const double x : *values) PROMISE(std::isfinite(x));
+    for (const double x : *values) {
+      PROMISE(std::isfinite(x));
+    }
   }
-  for (const double x : force) PROMISE(x >= 0.0);
-  for (const unsigned char flag : slack) PROMISE(flag <= 1);
+  for (const double x : force) {
+    PROMISE(x >= 0.0);
+  }
+  for (const unsigned char flag : slack) {
+    PROMISE(flag <= 1);
+  }
 }
 
 /* A few samples with a push; a failed call changes nothing, a restored state goes the same way. */
 void can_be_moved(tendonfmu_plant* plant, Clock::time_point begin) {
   const tendonfmu_plant_inputs push = {nullptr, 0.5, {0.1, -0.2, 0.3}};
   for (int k = 1; k <= 4; ++k) {
-    if (Clock::now() - begin > patience) return;
-    if (k == 2) PROMISE(tendonfmu_plant_set_inputs(plant, &push) == TENDONFMU_PLANT_OK);
+    if (Clock::now() - begin > patience) {
+      return;
+    }
+    if (k == 2) {
+      PROMISE(tendonfmu_plant_set_inputs(plant, &push) == TENDONFMU_PLANT_OK);
+    }
     const promises::Bytes before = saved_plant(plant);
     const double time = tendonfmu_plant_get_time(plant);
     const Clock::time_point call = Clock::now();
@@ -81,7 +95,9 @@ void can_be_moved(tendonfmu_plant* plant, Clock::time_point begin) {
   const promises::Bytes here = saved_plant(plant);
   promises::Bytes ends[2];
   for (promises::Bytes& end : ends) {
-    if (Clock::now() - begin > patience) return;
+    if (Clock::now() - begin > patience) {
+      return;
+    }
     PROMISE(tendonfmu_plant_restore_state(plant, here.data(), here.size()) == TENDONFMU_PLANT_OK);
     PROMISE(saved_plant(plant) == here);
     moved(plant, tendonfmu_plant_advance(plant, 5e-3));
@@ -107,7 +123,9 @@ void can_be_used(const std::string& text) {
     const bool good = moved(plant, tendonfmu_plant_initialise(plant));
     PROMISE(Clock::now() - begin < longest_call);
     PROMISE(tendonfmu_plant_is_initialised(plant) == good);
-    if (!good) continue;
+    if (!good) {
+      continue;
+    }
     signals_are_finite(plant);
     can_be_moved(plant, begin);
   }
@@ -140,7 +158,9 @@ void change_number(Json* value, std::mt19937& random) {
 }
 
 void change(Json* value, std::mt19937& random) {
-  if (value->is_number() && random() % 8) return change_number(value, random);
+  if (value->is_number() && random() % 8) {
+    return change_number(value, random);
+  }
   if (value->is_object() && !value->empty() && random() % 2) {
     auto item = value->begin();
     std::advance(item, static_cast<std::ptrdiff_t>(random() % value->size()));
@@ -168,10 +188,16 @@ extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t s
                                                unsigned seed) {
   std::mt19937 random(seed);
   Json rig = Json::parse(data, data + size, nullptr, false);
-  if (rig.is_discarded() || !rig.is_structured() || random() % 20 == 0) return LLVMFuzzerMutate(data, size, max_size);
-  for (unsigned k = 1 + random() % 3; k > 0; --k) change(anywhere(&rig, random), random);
+  if (rig.is_discarded() || !rig.is_structured() || random() % 20 == 0) {
+    return LLVMFuzzerMutate(data, size, max_size);
+  }
+  for (unsigned k = 1 + random() % 3; k > 0; --k) {
+    change(anywhere(&rig, random), random);
+  }
   const std::string text = rig.dump(-1, ' ', false, Json::error_handler_t::replace);
-  if (text.size() > max_size) return LLVMFuzzerMutate(data, size, max_size);
+  if (text.size() > max_size) {
+    return LLVMFuzzerMutate(data, size, max_size);
+  }
   std::memcpy(data, text.data(), text.size());
   return text.size();
 }
@@ -188,7 +214,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const bool is_small =
       tendonfmu_plant_joint_count(plant) <= most_joints && tendonfmu_plant_tendon_count(plant) <= most_tendons;
   tendonfmu_plant_destroy(plant);
-  if (!is_small) return 0;
+  if (!is_small) {
+    return 0;
+  }
   Json rig = Json::parse(text);
   rig["settle"] = std::min(rig.value("settle", Json()).is_number() ? rig["settle"].get<double>() : 1.0, longest_settle);
   can_be_used(rig.dump());

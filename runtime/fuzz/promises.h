@@ -67,9 +67,15 @@ struct Outputs {
   }
 
   void check() const {
-    for (const double x : real) PROMISE(std::isfinite(x));
-    for (const unsigned char f : flags) PROMISE(f <= 1);
-    for (const int link : links) PROMISE(link >= -1 && link <= last_link);
+    for (const double x : real) {
+      PROMISE(std::isfinite(x));
+    }
+    for (const unsigned char f : flags) {
+      PROMISE(f <= 1);
+    }
+    for (const int link : links) {
+      PROMISE(link >= -1 && link <= last_link);
+    }
   }
 };
 

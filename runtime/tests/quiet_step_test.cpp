@@ -120,7 +120,9 @@ TEST(QuietStep, AllocatesNothing) {
   for (int k = 0; k < 3 * FINGERS; ++k) {
     const char* const kernel = kernels[k / FINGERS];
     Finger finger(image_of(k % FINGERS));
-    if (tendonfmu_set_kernel(finger, kernel) != TENDONFMU_OK) continue;
+    if (tendonfmu_set_kernel(finger, kernel) != TENDONFMU_OK) {
+      continue;
+    }
     Outputs outputs(motion.time.size());
     std::vector<unsigned char> state(tendonfmu_state_size(finger));
     allocations = 0;
@@ -143,7 +145,9 @@ template <typename Action>
 int exit_status_without_system_calls(Action action) {
   const pid_t child = fork();
   if (child == 0) {
-    if (prctl(PR_SET_SECCOMP, SECCOMP_MODE_STRICT) != 0) _exit(77);
+    if (prctl(PR_SET_SECCOMP, SECCOMP_MODE_STRICT) != 0) {
+      _exit(77);
+    }
     const int result = action();
     syscall(SYS_exit, result);
   }
@@ -155,7 +159,9 @@ int exit_status_without_system_calls(Action action) {
 TEST(QuietStep, MakesNoSystemCall) {
   const Motion motion = failing_motion(20000);
   const int caught = exit_status_without_system_calls([] { return getppid() > 0 ? 0 : 1; });
-  if (caught == 77) GTEST_SKIP() << "SKIPPED: this kernel has no seccomp";
+  if (caught == 77) {
+    GTEST_SKIP() << "SKIPPED: this kernel has no seccomp";
+  }
   ASSERT_EQ(caught, -SIGKILL) << "a system call went unnoticed";
   for (int which = 0; which < FINGERS; ++which) {
     Finger finger(image_of(which));

@@ -86,7 +86,9 @@ TEST(SensorFault, AllKernelsGiveTheSameBits) {
   const Watched expected = run(plain.handle, failing());
   for (const char* kernel : {"sse2", "avx2"}) {
     Finger other(image());
-    if (tendonfmu_set_kernel(other.handle, kernel) != TENDONFMU_OK) continue;
+    if (tendonfmu_set_kernel(other.handle, kernel) != TENDONFMU_OK) {
+      continue;
+    }
     EXPECT_TRUE(run(other.handle, failing()) == expected) << kernel;
   }
 }
