@@ -17,8 +17,8 @@ namespace nb = nanobind;
 
 namespace {
 
-using Rows = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Times = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using number_rows = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using time_row = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
 nb::bytes image_from_json(const nb::bytes& json) {
   void* image = nullptr;
@@ -26,7 +26,9 @@ nb::bytes image_from_json(const nb::bytes& json) {
   char message[600] = "";
   const tendonfmu_status status = tendonfmu_image_from_json(static_cast<const char*>(json.data()), json.size(), &image,
                                                             &size, message, sizeof message);
-  if (status != TENDONFMU_OK) throw nb::value_error(message);
+  if (status != TENDONFMU_OK) {
+    throw nb::value_error(message);
+  }
   nb::bytes result(image, size);
   tendonfmu_free_image(image);
   return result;
@@ -46,7 +48,7 @@ nb::object as_array(std::vector<Number> values, std::vector<std::size_t> shape) 
   return nb::cast(nb::ndarray<nb::numpy, Number>(kept->data(), shape.size(), shape.data(), owner));
 }
 
-struct OutputRows {
+struct output_rows {
   std::vector<double> numbers[6], detection[6], parts;
   std::vector<unsigned char> flags[3], observable;
   std::vector<double> tip_force, tip_std, misfit; /* these and what follows: of fingers with links */
@@ -55,11 +57,17 @@ struct OutputRows {
   std::vector<unsigned char> at_rest;
   std::vector<unsigned char> sensor_fault, contact_observable; /* of fingers with sensor_fault */
 
-  OutputRows(std::size_t samples, std::size_t n, std::size_t m, bool with_parts, bool with_place, bool with_rest,
-             bool with_sensors) {
-    for (auto& row : numbers) row.resize(samples * n);
-    for (auto& row : detection) row.resize(samples * n);
-    if (with_parts) parts.resize(samples * n * (m + 3));
+  output_rows(std::size_t samples, std::size_t n, std::size_t m, bool with_parts, bool with_place, bool with_rest,
+              bool with_sensors) {
+    for (auto& row : numbers) {
+      row.resize(samples * n);
+    }
+    for (auto& row : detection) {
+      row.resize(samples * n);
+    }
+    if (with_parts) {
+      parts.resize(samples * n * (m + 3));
+    }
     flags[0].resize(samples * n);
     flags[1].resize(samples);
     flags[2].resize(samples * m);
@@ -112,16 +120,18 @@ struct OutputRows {
   }
 };
 
-class Finger {
+class bound_finger {
  public:
-  explicit Finger(const nb::bytes& image) {
+  explicit bound_finger(const nb::bytes& image) {
     char message[600] = "";
     handle_ = tendonfmu_create(image.data(), image.size(), message, sizeof message);
-    if (handle_ == nullptr) throw nb::value_error(message);
+    if (handle_ == nullptr) {
+      throw nb::value_error(message);
+    }
   }
-  ~Finger() { tendonfmu_destroy(handle_); }
-  Finger(const Finger&) = delete;
-  Finger& operator=(const Finger&) = delete;
+  ~bound_finger() { tendonfmu_destroy(handle_); }
+  bound_finger(const bound_finger&) = delete;
+  bound_finger& operator=(const bound_finger&) = delete;
 
   std::size_t joints() const { return tendonfmu_joint_count(handle_); }
   std::size_t tendons() const { return tendonfmu_tendon_count(handle_); }
@@ -152,7 +162,9 @@ class Finger {
     return values;
   }
   void set_parameters(const std::vector<std::size_t>& indices, const std::vector<double>& values) {
-    if (indices.size() != values.size()) throw nb::value_error("as many values as indices expected");
+    if (indices.size() != values.size()) {
+      throw nb::value_error("as many values as indices expected");
+    }
     check(tendonfmu_set_parameters(handle_, indices.size(), indices.data(), values.data()));
   }
 
@@ -163,13 +175,14 @@ class Finger {
   }
   void restore_state(const nb::bytes& bytes) { check(tendonfmu_restore_state(handle_, bytes.data(), bytes.size())); }
 
-  nb::tuple run(const Times& time, const std::optional<Rows>& force, const std::optional<Rows>& position,
-                const std::optional<Rows>& angle, const std::optional<Rows>& velocity, bool with_parts) {
+  nb::tuple run(const time_row& time, const std::optional<number_rows>& force,
+                const std::optional<number_rows>& position, const std::optional<number_rows>& angle,
+                const std::optional<number_rows>& velocity, bool with_parts) {
     const std::size_t samples = time.shape(0), n = joints(), m = tendons();
     const tendonfmu_inputs inputs = {
         rows(force, samples, m, "tendon_force"), rows(position, samples, m, "tendon_position"),
         rows(angle, samples, n, "joint_position"), rows(velocity, samples, n, "joint_velocity")};
-    OutputRows outputs(samples, n, m, with_parts, has_links(), watches_rest(), watches_sensors());
+    output_rows outputs(samples, n, m, with_parts, has_links(), watches_rest(), watches_sensors());
     const tendonfmu_outputs view = outputs.view();
     std::size_t done = 0;
     tendonfmu_status status;
@@ -177,15 +190,22 @@ class Finger {
       nb::gil_scoped_release released;
       status = tendonfmu_run(handle_, samples, time.data(), &inputs, &view, &done);
     }
-    if (status != TENDONFMU_OK)
+    if (status != TENDONFMU_OK) {
       throw nb::value_error(("row " + std::to_string(done + 1) + ": " + tendonfmu_last_error(handle_)).c_str());
+    }
     nb::list arrays;
-    for (auto& row : outputs.numbers) arrays.append(as_array(std::move(row), {samples, n}));
+    for (auto& row : outputs.numbers) {
+      arrays.append(as_array(std::move(row), {samples, n}));
+    }
     arrays.append(as_array(std::move(outputs.flags[0]), {samples, n}));
     arrays.append(as_array(std::move(outputs.flags[1]), {samples}));
     arrays.append(as_array(std::move(outputs.flags[2]), {samples, m}));
-    for (auto& row : outputs.detection) arrays.append(as_array(std::move(row), {samples, n}));
-    if (with_parts) arrays.append(as_array(std::move(outputs.parts), {samples, n, m + 3}));
+    for (auto& row : outputs.detection) {
+      arrays.append(as_array(std::move(row), {samples, n}));
+    }
+    if (with_parts) {
+      arrays.append(as_array(std::move(outputs.parts), {samples, n, m + 3}));
+    }
     if (has_links()) {
       arrays.append(as_array(std::move(outputs.tip_force), {samples, std::size_t{3}}));
       arrays.append(as_array(std::move(outputs.tip_std), {samples, std::size_t{3}}));
@@ -216,7 +236,9 @@ class Finger {
     tendonfmu_outputs derivative = {};
     double** const rows[] = {&derivative.compensated_torque, &derivative.joint_torque, &derivative.friction_torque,
                              &derivative.bias_torque,        &derivative.joint_angle,  &derivative.joint_speed};
-    for (std::size_t k = 0; k < 6; ++k) *rows[k] = slopes[k].data();
+    for (std::size_t k = 0; k < 6; ++k) {
+      *rows[k] = slopes[k].data();
+    }
     const tendonfmu_inputs direction = {force.data(), position.data(), angle.data(), velocity.data()};
     check(tendonfmu_get_directional_derivative(handle_, &direction, &derivative));
     return slopes;
@@ -226,14 +248,18 @@ class Finger {
   tendonfmu_finger* handle_ = nullptr;
 
   void check(tendonfmu_status status) const {
-    if (status == TENDONFMU_OK) return;
+    if (status == TENDONFMU_OK) {
+      return;
+    }
     const std::string reason = tendonfmu_last_error(handle_);
     throw nb::value_error(reason.empty() ? "bad argument" : reason.c_str());
   }
 
-  static const double* rows(const std::optional<Rows>& array, std::size_t samples, std::size_t columns,
+  static const double* rows(const std::optional<number_rows>& array, std::size_t samples, std::size_t columns,
                             const char* name) {
-    if (!array) return nullptr;
+    if (!array) {
+      return nullptr;
+    }
     if (array->shape(0) != samples || array->shape(1) != columns) {
       throw nb::value_error(
           (std::string(name) + ": expected " + std::to_string(samples) + " x " + std::to_string(columns) + " numbers")
@@ -249,25 +275,26 @@ NB_MODULE(_native, m) {
   m.def("version", &tendonfmu_version);
   m.def("image_from_json", &image_from_json);
   m.def("image_guid", &image_guid);
-  nb::class_<Finger>(m, "Finger")
+  nb::class_<bound_finger>(m, "Finger")
       .def(nb::init<const nb::bytes&>())
-      .def_prop_ro("joints", &Finger::joints)
-      .def_prop_ro("tendons", &Finger::tendons)
-      .def_prop_ro("has_links", &Finger::has_links)
-      .def_prop_ro("watches_rest", &Finger::watches_rest)
-      .def_prop_ro("watches_sensors", &Finger::watches_sensors)
-      .def_prop_ro("parameter_count", &Finger::parameter_count)
-      .def_prop_rw("kernel", &Finger::kernel, &Finger::set_kernel)
-      .def_prop_rw("kinematics_source", &Finger::source, &Finger::set_source)
-      .def("reset", &Finger::reset)
-      .def("parameter_path", &Finger::parameter_path)
-      .def("parameter_info", &Finger::parameter_info)
-      .def("find_parameter", &Finger::find_parameter)
-      .def("get_parameters", &Finger::get_parameters)
-      .def("set_parameters", &Finger::set_parameters)
-      .def("save_state", &Finger::save_state)
-      .def("restore_state", &Finger::restore_state)
-      .def("run", &Finger::run, nb::arg("time"), nb::arg("tendon_force").none(), nb::arg("tendon_position").none(),
-           nb::arg("joint_position").none(), nb::arg("joint_velocity").none(), nb::arg("with_parts"))
-      .def("directional_derivative", &Finger::directional_derivative);
+      .def_prop_ro("joints", &bound_finger::joints)
+      .def_prop_ro("tendons", &bound_finger::tendons)
+      .def_prop_ro("has_links", &bound_finger::has_links)
+      .def_prop_ro("watches_rest", &bound_finger::watches_rest)
+      .def_prop_ro("watches_sensors", &bound_finger::watches_sensors)
+      .def_prop_ro("parameter_count", &bound_finger::parameter_count)
+      .def_prop_rw("kernel", &bound_finger::kernel, &bound_finger::set_kernel)
+      .def_prop_rw("kinematics_source", &bound_finger::source, &bound_finger::set_source)
+      .def("reset", &bound_finger::reset)
+      .def("parameter_path", &bound_finger::parameter_path)
+      .def("parameter_info", &bound_finger::parameter_info)
+      .def("find_parameter", &bound_finger::find_parameter)
+      .def("get_parameters", &bound_finger::get_parameters)
+      .def("set_parameters", &bound_finger::set_parameters)
+      .def("save_state", &bound_finger::save_state)
+      .def("restore_state", &bound_finger::restore_state)
+      .def("run", &bound_finger::run, nb::arg("time"), nb::arg("tendon_force").none(),
+           nb::arg("tendon_position").none(), nb::arg("joint_position").none(), nb::arg("joint_velocity").none(),
+           nb::arg("with_parts"))
+      .def("directional_derivative", &bound_finger::directional_derivative);
 }

@@ -40,7 +40,9 @@ extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t s
                                                unsigned seed) {
   std::mt19937 random(seed);
   if (size >= MODEL_HEADER_BYTES + 8 && random() % 4) {
-    for (unsigned i = 0; i < 1 + random() % 4; ++i) change_a_word(data, size, random);
+    for (unsigned i = 0; i < 1 + random() % 4; ++i) {
+      change_a_word(data, size, random);
+    }
   } else {
     size = LLVMFuzzerMutate(data, size, max_size);
   }
@@ -54,7 +56,7 @@ extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t s
 }
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  const promises::Bytes image(data, data + size);
+  const promises::byte_list image(data, data + size);
   char message[400] = "";
   const std::size_t memory = tendonfmu_memory_size(image.data(), size);
   if (size == 0) {

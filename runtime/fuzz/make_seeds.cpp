@@ -47,7 +47,9 @@ std::vector<std::string> extended_fingers() {
     nlohmann::json alone = nlohmann::json::parse(test_finger::json);
     alone["extensions"] = nlohmann::json::array({row});
     fingers.push_back(alone.dump());
-    if (row.contains("delay")) row["delay"] = -0.004;
+    if (row.contains("delay")) {
+      row["delay"] = -0.004;
+    }
   }
   fingers.push_back(late.dump());
   return fingers;
@@ -91,7 +93,9 @@ void write_rigs(const std::filesystem::path& folder, const nlohmann::json& rig) 
 std::string any_bytes(unsigned seed, std::size_t size) {
   std::mt19937 random(seed);
   std::string bytes(size, 0);
-  for (char& c : bytes) c = static_cast<char>(random());
+  for (char& c : bytes) {
+    c = static_cast<char>(random());
+  }
   return bytes;
 }
 
@@ -103,7 +107,9 @@ int main(int count, char** arguments) {
     return 2;
   }
   std::vector<std::string> fingers = {test_finger::json, least_finger, placed_finger(), test_finger::every_key()};
-  for (const std::string& finger : extended_fingers()) fingers.push_back(finger);
+  for (const std::string& finger : extended_fingers()) {
+    fingers.push_back(finger);
+  }
   for (int i = 2; i < count; ++i) {
     std::ifstream file(arguments[i], std::ios::binary);
     fingers.emplace_back(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
@@ -132,6 +138,8 @@ int main(int count, char** arguments) {
     collect(document, words);
   }
   std::string dictionary;
-  for (const std::string& word : words) dictionary += quoted(word);
+  for (const std::string& word : words) {
+    dictionary += quoted(word);
+  }
   write(folder / "keys.dict", dictionary);
 }

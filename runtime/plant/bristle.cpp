@@ -78,7 +78,9 @@ inline __attribute__((always_inline)) void respond_two(const law_columns& law, c
   const double frequency = with_span ? 1.0 / with.span : 0.0;
   store(with_span ? (w - start) * frequency : v * inverse_length - per_second * bent, k, &r->rate);
   store(rest, k, &r->kept);
-  if (!with_slopes) return;
+  if (!with_slopes) {
+    return;
+  }
 
   const pair g_by_velocity =
       rubs ? sign * (load(law.sliding_by_speed, k) - excess * left * load(law.argument_by_speed, k)) * inverse_c : zero;

@@ -74,7 +74,9 @@ contact_torque<T> contact_torques(const rig& rig, const chain_motion<T>& motion,
   if (scheduled) {
     for (const push& push : rig.pushes) {
       const double strength = push_strength(push, time);
-      if (strength == 0.0) continue;
+      if (strength == 0.0) {
+        continue;
+      }
       const vector3<T> along = constant<T>(push.direction);
       push_on(push.link, push.point,
               T(strength) * (push.in_link_frame ? motion.links[push.link].frame * along : along));
@@ -89,7 +91,9 @@ contact_torque<T> contact_torques(const rig& rig, const chain_motion<T>& motion,
     const penetration<T> found = penetrate(sphere, motion);
     const T spring = T(sphere.stiffness) * found.depth;
     T strength = spring * (T(1.0) + T(sphere.damping) * found.growth);
-    if (value_of(strength) < 0.0) strength = T(0.0);
+    if (value_of(strength) < 0.0) {
+      strength = T(0.0);
+    }
     act(motion, sphere.link, found.point, strength * found.normal, &total);
     total.obstacle_loss = (strength - spring) * found.growth;
   }

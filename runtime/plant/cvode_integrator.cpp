@@ -20,11 +20,18 @@
 /* The linker gives this to CVODE for pow() (cmake/Sundials.cmake), which takes its step sizes by it: the same bits on
  * every machine of one architecture. CVODE's bases are not negative. It stands here, and in no file of its own, so that
  * it is there before the archives of SUNDIALS ask for it. */
+// NOLINTNEXTLINE(readability-identifier-naming): the name that the linker asks for
 extern "C" double __wrap_pow(double base, double exponent);
 extern "C" double __wrap_pow(double base, double exponent) {
-  if (base != base) return base;
-  if (base <= 0.0) return exponent == 0.0 ? 1.0 : 0.0;
-  if (std::isinf(base)) return exponent > 0.0 ? base : 0.0;
+  if (base != base) {
+    return base;
+  }
+  if (base <= 0.0) {
+    return exponent == 0.0 ? 1.0 : 0.0;
+  }
+  if (std::isinf(base)) {
+    return exponent > 0.0 ? base : 0.0;
+  }
   return tendonfmu::plant::exponential(exponent * tendonfmu::plant::logarithm(base));
 }
 
@@ -48,7 +55,9 @@ class cvode_integrator : public integrator {
         linearisation_(equations->the_rig()),
         tolerance_(relative_tolerance),
         stops_(push_times(equations->the_rig())) {
-    if (create_context(&context_) != 0) throw std::bad_alloc();
+    if (create_context(&context_) != 0) {
+      throw std::bad_alloc();
+    }
     const auto size = static_cast<sunindextype>(equations->layout().size());
     state_ = N_VNew_Serial(size, context_);
     tolerances_ = N_VNew_Serial(size, context_);
@@ -70,7 +79,9 @@ class cvode_integrator : public integrator {
   void forget() override { fresh_ = true; }
 
   void advance(const commands& inputs, double until, moment* now) override {
-    if (until <= now->time) return;
+    if (until <= now->time) {
+      return;
+    }
     inputs_ = &inputs;
     modes_ = now->modes;
     if (fresh_) {
@@ -84,7 +95,9 @@ class cvode_integrator : public integrator {
     double reached = now->time;
     double left = least_steps + most_frequent * (until - now->time);
     for (int found = 0;;) {
-      if (inputs.scheduled_pushes) stop_at_next_push();
+      if (inputs.scheduled_pushes) {
+        stop_at_next_push();
+      }
       CVodeSetMaxNumSteps(cvode_, static_cast<long>(std::clamp(left, 1.0, 2e9)));
       const unsigned long long steps_before = work_.steps;
       const int flag = CVode(cvode_, until, state_, &reached, CV_NORMAL);
@@ -94,16 +107,26 @@ class cvode_integrator : public integrator {
         fresh_ = true;
         std::rethrow_exception(std::exchange(thrown_, nullptr));
       }
-      if (flag == CV_TSTOP_RETURN && reached < until) continue;
-      if (flag == CV_SUCCESS || flag == CV_TSTOP_RETURN) break;
-      if (flag != CV_ROOT_RETURN) fail(flag, reached);
-      if (found++ == most_roots_at_once) fail(CV_TOO_MUCH_WORK, reached);
+      if (flag == CV_TSTOP_RETURN && reached < until) {
+        continue;
+      }
+      if (flag == CV_SUCCESS || flag == CV_TSTOP_RETURN) {
+        break;
+      }
+      if (flag != CV_ROOT_RETURN) {
+        fail(flag, reached);
+      }
+      if (found++ == most_roots_at_once) {
+        fail(CV_TOO_MUCH_WORK, reached);
+      }
       int signs[max_roots];
       CVodeGetRootInfo(cvode_, signs);
       equations_.switch_modes(signs, &modes_);
       work_.roots += 1;
       start(reached);
-      if (same_moment(reached, until)) break;
+      if (same_moment(reached, until)) {
+        break;
+      }
     }
     std::copy(data(), data() + now->state.size(), now->state.begin());
     now->modes = modes_;
@@ -140,10 +163,14 @@ class cvode_integrator : public integrator {
       good = good && CVodeSetMaxStep(cvode_, longest_step) == CV_SUCCESS;
       good = good && CVodeSetMaxErrTestFails(cvode_, 15) == CV_SUCCESS;
       CVodeSetNoInactiveRootWarn(cvode_);
-      if (!good) throw std::bad_alloc();
+      if (!good) {
+        throw std::bad_alloc();
+      }
       created_ = true;
     } else {
-      if (CVodeReInit(cvode_, time, state_) != CV_SUCCESS) throw std::bad_alloc();
+      if (CVodeReInit(cvode_, time, state_) != CV_SUCCESS) {
+        throw std::bad_alloc();
+      }
       work_.restarts += 1;
     }
     counted_ = {};
@@ -155,7 +182,9 @@ class cvode_integrator : public integrator {
     double internal = 0.0;
     CVodeGetCurrentTime(cvode_, &internal);
     const auto next = std::upper_bound(stops_.begin(), stops_.end(), internal + 1e-12 * (1.0 + std::fabs(internal)));
-    if (next != stops_.end()) CVodeSetStopTime(cvode_, *next);
+    if (next != stops_.end()) {
+      CVodeSetStopTime(cvode_, *next);
+    }
   }
 
   /* Messages come with the exception; nothing is printed. */
@@ -200,12 +229,24 @@ class cvode_integrator : public integrator {
   }
 
   void release() {
-    if (cvode_) CVodeFree(&cvode_);
-    if (solver_) SUNLinSolFree(solver_);
-    if (matrix_) SUNMatDestroy(matrix_);
-    if (tolerances_) N_VDestroy(tolerances_);
-    if (state_) N_VDestroy(state_);
-    if (context_) SUNContext_Free(&context_);
+    if (cvode_) {
+      CVodeFree(&cvode_);
+    }
+    if (solver_) {
+      SUNLinSolFree(solver_);
+    }
+    if (matrix_) {
+      SUNMatDestroy(matrix_);
+    }
+    if (tolerances_) {
+      N_VDestroy(tolerances_);
+    }
+    if (state_) {
+      N_VDestroy(state_);
+    }
+    if (context_) {
+      SUNContext_Free(&context_);
+    }
   }
 
   // --- what CVODE calls: C, which no exception may pass ---
@@ -245,16 +286,22 @@ class cvode_integrator : public integrator {
    * stands for the side that holds. */
   void avoid_zeros(double* root) const {
     const auto hold = [&root](bool positive) {
-      if (*root == 0.0) *root = positive ? 1e-100 : -1e-100;
+      if (*root == 0.0) {
+        *root = positive ? 1e-100 : -1e-100;
+      }
       ++root;
     };
     const state_layout& at = equations_.layout();
-    for (std::size_t i = 0; i < at.tendons; ++i) hold(!modes_.slack[i]);
+    for (std::size_t i = 0; i < at.tendons; ++i) {
+      hold(!modes_.slack[i]);
+    }
     for (std::size_t j = 0; j < at.joints; ++j) {
       hold(modes_.below[j]);
       hold(modes_.above[j]);
     }
-    if (equations_.the_rig().obstacle.present) hold(modes_.touching);
+    if (equations_.the_rig().obstacle.present) {
+      hold(modes_.touching);
+    }
   }
 
   static int prepare(solver_number time, N_Vector state, N_Vector, SUNMatrix, solver_flag old_will_do,

@@ -26,14 +26,18 @@ struct dual {
 template <int N>
 dual<N> combine(double value, double a, const dual<N>& x, double b, const dual<N>& y) {
   dual<N> result(value);
-  for (int i = 0; i < N; ++i) result.slope[i] = a * x.slope[i] + b * y.slope[i];
+  for (int i = 0; i < N; ++i) {
+    result.slope[i] = a * x.slope[i] + b * y.slope[i];
+  }
   return result;
 }
 
 template <int N>
 dual<N> chain(double value, double a, const dual<N>& x) {
   dual<N> result(value);
-  for (int i = 0; i < N; ++i) result.slope[i] = a * x.slope[i];
+  for (int i = 0; i < N; ++i) {
+    result.slope[i] = a * x.slope[i];
+  }
   return result;
 }
 

@@ -19,7 +19,9 @@ struct preload {
 };
 
 preload preload_at(double preload_force, double tension) {
-  if (preload_force == 0.0) return {0.0, 0.0};
+  if (preload_force == 0.0) {
+    return {0.0, 0.0};
+  }
   const double rest = exponential(-tension / preload_force);
   return {preload_force * (1.0 - rest), rest};
 }
@@ -34,7 +36,9 @@ dynamics::dynamics(const rig& rig) : rig_(rig), layout_(rig), values_(rig.bristl
   values_.tension.resize(rig.sites.size());
   values_.loss_by_share.resize(rig.sites.size());
   values_.loss_by_force.resize(rig.sites.size());
-  for (std::size_t s = 0; s < rig.sites.size(); ++s) values_.laws.inverse_length[s] = rig.sites[s].inverse_length;
+  for (std::size_t s = 0; s < rig.sites.size(); ++s) {
+    values_.laws.inverse_length[s] = rig.sites[s].inverse_length;
+  }
   for (std::size_t s = 0; s < rig.joint_sites.size(); ++s) {
     values_.laws.inverse_length[rig.sites.size() + s] = rig.joint_sites[s].inverse_length;
   }
@@ -62,7 +66,9 @@ void dynamics::move_tendons(const double* state, bool own_modes) {
     const double stretch = state[layout_.motor() + i] - path, stretching = motor_speed - path_speed;
     e.elongation[i] = stretch;
     e.elongation_speed[i] = stretching;
-    if (own_modes) e.modes.slack[i] = !(stretch > 0.0);
+    if (own_modes) {
+      e.modes.slack[i] = !(stretch > 0.0);
+    }
     const bool slack = e.modes.slack[i];
     const double elastic = stretch * (tendon.stiffness + tendon.hardening * stretch);
     const double total = elastic + tendon.damping * stretching;
@@ -72,9 +78,13 @@ void dynamics::move_tendons(const double* state, bool own_modes) {
     e.force[i] = pulls ? total : 0.0;
     e.force_by_elongation[i] = pulling * (tendon.stiffness + 2.0 * tendon.hardening * stretch);
     e.force_by_speed[i] = pulling * tendon.damping;
-    if (!slack) e.spring_loss += (e.force[i] - elastic) * stretching;
+    if (!slack) {
+      e.spring_loss += (e.force[i] - elastic) * stretching;
+    }
     e.motor_power += e.force[i] * motor_speed;
-    for (std::size_t j = 0; j < n; ++j) e.spring_torque[j] += arm[j] * e.force[i];
+    for (std::size_t j = 0; j < n; ++j) {
+      e.spring_torque[j] += arm[j] * e.force[i];
+    }
   }
 }
 
@@ -95,11 +105,15 @@ void dynamics::bend_bristles(const double* state) {
     // eq. (5) for every link: sum of the joints from there on
     double sliding[max_joints + 1];
     sliding[n] = 0.0;
-    for (std::size_t j = n; j-- > 0;) sliding[j] = sliding[j + 1] + arm[j] * speed[j];
+    for (std::size_t j = n; j-- > 0;) {
+      sliding[j] = sliding[j + 1] + arm[j] * speed[j];
+    }
     for (std::size_t s = tendon.first_site; s < tendon.first_site + tendon.site_count; ++s) {
       const friction_site& site = rig_.sites[s];
       double v = sliding[site.first_mover];
-      if (site.where == friction_site::place::wrist) v += rig_.wrist.arms[i] * e.wrist_speed;
+      if (site.where == friction_site::place::wrist) {
+        v += rig_.wrist.arms[i] * e.wrist_speed;
+      }
       set_site_law(site, site.bends ? q[site.angle_joint] : 0.0, v, settings.stribeck_exponent, s, &e.laws);
     }
   }
@@ -111,7 +125,9 @@ void dynamics::bend_bristles(const double* state) {
   std::copy(state + layout_.bristle(), state + layout_.heat(), e.bristles.begin());
   respond(e.laws, {e.level, settings.bristle_damping, span_, slopes_}, e.bristles.data(), &e.responses);
   for (std::size_t s = 0; slopes_ && s < first; ++s) {
-    if (!rig_.sites[s].bends) e.responses.share_by_angle[s] = e.responses.rate_by_angle[s] = 0.0;
+    if (!rig_.sites[s].bends) {
+      e.responses.share_by_angle[s] = e.responses.rate_by_angle[s] = 0.0;
+    }
   }
 }
 
@@ -143,7 +159,9 @@ void dynamics::rub_tendons() {
       e.loss_by_force[s] = passed - extra.by_force * share[s];
       tension = tension * passed - extra.force * share[s];
       // friction beyond the tension takes all of it: a tendon never pushes
-      if (tension < 0.0) tension = e.loss_by_share[s] = e.loss_by_force[s] = 0.0;
+      if (tension < 0.0) {
+        tension = e.loss_by_share[s] = e.loss_by_force[s] = 0.0;
+      }
       e.tension[s] = tension;
     }
     // what moves the wrist works against the friction there, beside the finger
@@ -155,7 +173,9 @@ void dynamics::rub_tendons() {
     };
     for (std::size_t j = 0; j < n; ++j) {
       e.passed_torque[j] += arm[j] * after(tendon.sites_before_torque[j]);
-      if (tendon.loads[j]) e.load[j] += after(tendon.sites_before_load[j]);
+      if (tendon.loads[j]) {
+        e.load[j] += after(tendon.sites_before_load[j]);
+      }
     }
   }
   for (std::size_t s = 0; s < rig_.joint_sites.size(); ++s) {
@@ -179,7 +199,9 @@ void dynamics::press_stops(const double* state, bool own_modes) {
       const double spring = link.stop_stiffness * ((modes.below[j] ? link.lower : link.upper) - q);
       torque = spring - link.stop_damping * speed;
       // a stop never pulls
-      if (modes.below[j] ? torque < 0.0 : torque > 0.0) torque = 0.0;
+      if (modes.below[j] ? torque < 0.0 : torque > 0.0) {
+        torque = 0.0;
+      }
       values_.stop_loss -= (torque - spring) * speed;
     }
     values_.stop_torque[j] = torque;
@@ -190,7 +212,9 @@ void dynamics::command_motors(double time, const commands& inputs, double* comma
   const std::size_t m = layout_.tendons;
   if (inputs.scheduled_motion) {
     scheduled_command(rig_, time, inputs.pretension, command);
-    for (std::size_t i = 0; i < m; ++i) command[i] += inputs.command[i];
+    for (std::size_t i = 0; i < m; ++i) {
+      command[i] += inputs.command[i];
+    }
     return;
   }
   if (inputs.given) {
@@ -198,7 +222,9 @@ void dynamics::command_motors(double time, const commands& inputs, double* comma
   } else {
     hold_command(rig_, command);
   }
-  if (inputs.pretension == 0.0) return;
+  if (inputs.pretension == 0.0) {
+    return;
+  }
   // on top of the rig's own: a hardening spring gives way less then
   const double own = at_time(rig_.pretension, 0.0), both = own + inputs.pretension;
   for (std::size_t i = 0; i < m; ++i) {
@@ -226,8 +252,12 @@ void dynamics::evaluate(double time, const double* state, const contact_modes* m
   mass_matrix(rig_, e.motion, e.mass);
   const double no_acceleration[max_joints] = {};
   inverse_dynamics(rig_, e.motion, speed, no_acceleration, e.rigid_torque);
-  if (modes) e.modes = *modes;
-  if (!modes) e.modes.touching = rig_.obstacle.present && penetrate(rig_.obstacle, e.motion).depth > 0.0;
+  if (modes) {
+    e.modes = *modes;
+  }
+  if (!modes) {
+    e.modes.touching = rig_.obstacle.present && penetrate(rig_.obstacle, e.motion).depth > 0.0;
+  }
   e.contact = contact_torques(rig_, e.motion, time, inputs.scheduled_pushes, inputs.push, e.modes.touching);
 
   // tendons, friction, stops
@@ -263,7 +293,9 @@ void dynamics::evaluate(double time, const double* state, const contact_modes* m
   std::copy(speed, speed + n, derivative);
   std::copy(e.acceleration, e.acceleration + n, derivative + layout_.speed());
   double command[max_tendons];
-  if (span_ == 0.0) command_motors(time, inputs, command);
+  if (span_ == 0.0) {
+    command_motors(time, inputs, command);
+  }
   const double omega = 2.0 * pi * rig_.servo_frequency;
   // evaluate_after(): the motors have been moved already
   for (std::size_t i = 0; i < m && span_ == 0.0; ++i) {
@@ -272,7 +304,9 @@ void dynamics::evaluate(double time, const double* state, const contact_modes* m
     derivative[layout_.motor_speed() + i] =
         omega * (omega * (command[i] - state[layout_.motor() + i]) - 2.0 * rig_.servo_damping * motor_speed);
   }
-  for (std::size_t s = 0; s < layout_.bristles; ++s) derivative[layout_.bristle() + s] = e.responses.rate[s];
+  for (std::size_t s = 0; s < layout_.bristles; ++s) {
+    derivative[layout_.bristle() + s] = e.responses.rate[s];
+  }
   derivative[layout_.heat()] = e.friction_power - heat / friction.heat_time;
   derivative[layout_.motor_work()] = e.motor_power + e.wrist_power;
   derivative[layout_.friction_work()] = e.friction_power;
@@ -295,7 +329,9 @@ void dynamics::roots(const double* state, double* root) const {
   const std::size_t n = layout_.joints, m = layout_.tendons;
   for (std::size_t i = 0; i < m; ++i) {
     double path = 0.0;
-    for (std::size_t j = 0; j < n; ++j) path += path_of(rig_.tendons[i].arms[j], state[j]);
+    for (std::size_t j = 0; j < n; ++j) {
+      path += path_of(rig_.tendons[i].arms[j], state[j]);
+    }
     root[i] = state[layout_.motor() + i] - path;
   }
   for (std::size_t j = 0; j < n; ++j) {
@@ -313,7 +349,9 @@ contact_modes dynamics::modes_at(const double* state) const {
   double root[max_roots];
   roots(state, root);
   int found[max_roots];
-  for (std::size_t k = 0; k < root_count(); ++k) found[k] = root[k] > 0.0 ? 1 : -1;
+  for (std::size_t k = 0; k < root_count(); ++k) {
+    found[k] = root[k] > 0.0 ? 1 : -1;
+  }
   contact_modes modes;
   switch_modes(found, &modes);
   return modes;
@@ -322,13 +360,21 @@ contact_modes dynamics::modes_at(const double* state) const {
 void dynamics::switch_modes(const int* found, contact_modes* modes) const {
   const std::size_t n = layout_.joints, m = layout_.tendons;
   for (std::size_t i = 0; i < m; ++i) {
-    if (found[i] != 0) modes->slack[i] = found[i] < 0;
+    if (found[i] != 0) {
+      modes->slack[i] = found[i] < 0;
+    }
   }
   for (std::size_t j = 0; j < n; ++j) {
-    if (found[m + 2 * j] != 0) modes->below[j] = found[m + 2 * j] > 0;
-    if (found[m + 2 * j + 1] != 0) modes->above[j] = found[m + 2 * j + 1] > 0;
+    if (found[m + 2 * j] != 0) {
+      modes->below[j] = found[m + 2 * j] > 0;
+    }
+    if (found[m + 2 * j + 1] != 0) {
+      modes->above[j] = found[m + 2 * j + 1] > 0;
+    }
   }
-  if (rig_.obstacle.present && found[m + 2 * n] != 0) modes->touching = found[m + 2 * n] > 0;
+  if (rig_.obstacle.present && found[m + 2 * n] != 0) {
+    modes->touching = found[m + 2 * n] > 0;
+  }
 }
 
 }  // namespace tendonfmu::plant

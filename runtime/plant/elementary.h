@@ -70,7 +70,9 @@ inline double logarithm(double x) {
   }
   const double s = (mantissa - 1.0) / (mantissa + 1.0), s2 = s * s;
   double series = 0.0;
-  for (int k = 23; k >= 3; k -= 2) series = s2 * (1.0 / k + series);
+  for (int k = 23; k >= 3; k -= 2) {
+    series = s2 * (1.0 / k + series);
+  }
   return exponent * 6.93147180369123816490e-01 + (exponent * 1.90821492927058770002e-10 + 2.0 * (s + s * series));
 }
 

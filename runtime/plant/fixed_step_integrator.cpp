@@ -23,7 +23,9 @@ fixed_step_integrator::fixed_step_integrator(dynamics* equations, double step)
       step_(step),
       stops_(push_times(equations->the_rig())) {
   change_.resize(equations->layout().joints);
-  for (std::vector<double>* one : {&state_, &middle_, &rate_}) one->resize(equations->layout().size());
+  for (std::vector<double>* one : {&state_, &middle_, &rate_}) {
+    one->resize(equations->layout().size());
+  }
   acceleration_.assign(equations->layout().joints, 0.0);
 }
 
@@ -61,7 +63,9 @@ bool fixed_step_integrator::find_middle(const commands& inputs, double middle, d
   const state_layout& at = equations_.layout();
   const std::size_t n = at.joints;
   double speed[max_joints];
-  for (std::size_t j = 0; j < n; ++j) speed[j] = state_[at.speed() + j] + half * acceleration_[j];
+  for (std::size_t j = 0; j < n; ++j) {
+    speed[j] = state_[at.speed() + j] + half * acceleration_[j];
+  }
   double before = 0.0;
   for (int iteration = 0; iteration < most_iterations; ++iteration) {
     place_middle(half, speed);
@@ -74,7 +78,9 @@ bool fixed_step_integrator::find_middle(const commands& inputs, double middle, d
     evaluate(fresh);
     // the matrix of an earlier step does while it still leads quickly to the end
     double largest = 0.0;
-    if (!fresh) largest = change_of_speed(half, speed);
+    if (!fresh) {
+      largest = change_of_speed(half, speed);
+    }
     if (!fresh && iteration > 0 && largest > good_progress * before && largest > close_enough) {
       fresh = true;
       evaluate(true);
@@ -83,17 +89,25 @@ bool fixed_step_integrator::find_middle(const commands& inputs, double middle, d
       linearisation_.take(equations_, middle_.data(), inputs, rigid_slopes::contact_only);
       work_.jacobians += 1;
       factored_for_ = linearisation_.factor(half) ? half : 0.0;
-      if (factored_for_ == 0.0) return false;
+      if (factored_for_ == 0.0) {
+        return false;
+      }
       largest = change_of_speed(half, speed);
     }
-    if (!(largest < beyond_reason)) return false;
+    if (!(largest < beyond_reason)) {
+      return false;
+    }
     if (largest < close_enough) {
-      if (iteration > 1) factored_for_ = 0.0;  // the next step is better off with its own matrix
+      if (iteration > 1) {
+        factored_for_ = 0.0;  // the next step is better off with its own matrix
+      }
       return true;
     }
     before = largest;
     const double scale = std::min(1.0, longest_change / largest);
-    for (std::size_t j = 0; j < n; ++j) speed[j] += scale * change_[j];
+    for (std::size_t j = 0; j < n; ++j) {
+      speed[j] += scale * change_[j];
+    }
   }
   return false;
 }
@@ -106,7 +120,9 @@ double fixed_step_integrator::change_of_speed(double half, const double* speed) 
   }
   linearisation_.solve_speeds(change_.data());
   double largest = 0.0;
-  for (std::size_t j = 0; j < at.joints; ++j) largest = std::max(largest, std::fabs(change_[j]));
+  for (std::size_t j = 0; j < at.joints; ++j) {
+    largest = std::max(largest, std::fabs(change_[j]));
+  }
   return largest;
 }
 
@@ -132,7 +148,9 @@ void fixed_step_integrator::step(const commands& inputs, double time, double siz
     state_[at.angle() + j] += size * middle_[at.speed() + j];
     state_[at.speed() + j] += size * acceleration_[j];
   }
-  for (std::size_t i = at.motor(); i < at.bristle(); ++i) state_[i] += 2.0 * (middle_[i] - state_[i]);
+  for (std::size_t i = at.motor(); i < at.bristle(); ++i) {
+    state_[i] += 2.0 * (middle_[i] - state_[i]);
+  }
   // as much time again: the rest of the way shrinks by the same factor
   const response_columns& bent = equations_.last().responses;
   for (std::size_t s = 0; s < at.bristles; ++s) {
@@ -141,20 +159,26 @@ void fixed_step_integrator::step(const commands& inputs, double time, double siz
   // heat fades by itself, implicitly: it may be gone within a step
   const double fading = half / equations_.the_rig().friction.heat_time, heat = state_[at.heat()];
   state_[at.heat()] = heat + size * rate_[at.heat()] / (1.0 + fading);
-  for (std::size_t i = at.motor_work(); i < at.size(); ++i) state_[i] += size * rate_[i];
+  for (std::size_t i = at.motor_work(); i < at.size(); ++i) {
+    state_[i] += size * rate_[i];
+  }
   work_.steps += 1;
 }
 
 void fixed_step_integrator::take_steps(const commands& inputs, double from, double to) {
   const double count = std::max(1.0, std::ceil((to - from) / step_ - 1e-9));
   const double size = (to - from) / count;
-  for (double k = 0.0; k < count; ++k) step(inputs, from + k * size, size, 0);
+  for (double k = 0.0; k < count; ++k) {
+    step(inputs, from + k * size, size, 0);
+  }
   last_step_ = size;
 }
 
 void fixed_step_integrator::advance(const commands& inputs, double until, moment* now) {
   const double span = until - now->time;
-  if (span <= 0.0) return;
+  if (span <= 0.0) {
+    return;
+  }
   if (same_moment(now->time, until)) {  // 1/span would overflow in the end
     now->time = until;
     return;
@@ -165,8 +189,12 @@ void fixed_step_integrator::advance(const commands& inputs, double until, moment
   while (from < until) {
     // equal steps up to where a push begins, is full, lets go or ends
     double to = until;
-    if (inputs.scheduled_pushes && stop != stops_.end() && *stop < until) to = *stop++;
-    if (!same_moment(from, to)) take_steps(inputs, from, to);
+    if (inputs.scheduled_pushes && stop != stops_.end() && *stop < until) {
+      to = *stop++;
+    }
+    if (!same_moment(from, to)) {
+      take_steps(inputs, from, to);
+    }
     from = to;
   }
   if (!std::all_of(state_.begin(), state_.end(), [](double x) { return std::isfinite(x); })) {

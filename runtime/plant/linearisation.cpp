@@ -61,14 +61,20 @@ void linearisation::take(const dynamics& equations, const double* state, const c
   bristle_by_speed_.setZero();
 
   // torque that tendons and joint friction pass on
-  for (std::size_t i = 0; i < m_; ++i) tendon_slopes(e, speed, i);
+  for (std::size_t i = 0; i < m_; ++i) {
+    tendon_slopes(e, speed, i);
+  }
   joint_slopes(e);
   power_row(e, speed);
   // the rest of the torque
   diagonal_slopes(e, state);
   work_rows(e, state);
-  if (e.wrist_speed != 0.0) wrist_slopes(e, speed);
-  if (rigid == rigid_slopes::exact || e.modes.touching) body_slopes(e, state, inputs, rigid == rigid_slopes::exact);
+  if (e.wrist_speed != 0.0) {
+    wrist_slopes(e, speed);
+  }
+  if (rigid == rigid_slopes::exact || e.modes.touching) {
+    body_slopes(e, state, inputs, rigid == rigid_slopes::exact);
+  }
 }
 
 /* Slopes of the passed torque by what one tendon does. Backward along the tendon: `weight` is the slope of the torque
@@ -80,16 +86,26 @@ void linearisation::tendon_slopes(const evaluation& e, const double* speed, std:
   double by_load[max_joints] = {};
   for (std::size_t s = 0; s < rig_.joint_sites.size(); ++s) {
     const joint_site& site = rig_.joint_sites[s];
-    if (site.by_load && tendon.loads[site.joint]) by_load[site.joint] = e.responses.share[rig_.sites.size() + s];
+    if (site.by_load && tendon.loads[site.joint]) {
+      by_load[site.joint] = e.responses.share[rig_.sites.size() + s];
+    }
   }
   for (std::size_t j = 0; j < n_; ++j) {
     double by_velocity[max_joints] = {};  // by the sliding velocity in link k, sites that start to slide there
     double weight = 0.0;
     for (std::size_t passed = tendon.site_count;; --passed) {
-      if (tendon.sites_before_torque[j] == passed) weight += arm[j];
-      if (tendon.sites_before_load[j] == passed) weight -= by_load[j];
-      if (passed == 0) break;
-      if (weight == 0.0) continue;
+      if (tendon.sites_before_torque[j] == passed) {
+        weight += arm[j];
+      }
+      if (tendon.sites_before_load[j] == passed) {
+        weight -= by_load[j];
+      }
+      if (passed == 0) {
+        break;
+      }
+      if (weight == 0.0) {
+        continue;
+      }
       const std::size_t s = tendon.first_site + passed - 1;
       const friction_site& site = rig_.sites[s];
       const double by_share = weight * e.loss_by_share[s];
@@ -146,11 +162,15 @@ void linearisation::power_row(const evaluation& e, const double* speed) {
   by_motor_speed_.row(n_) = -v.transpose() * by_motor_speed_.topRows(n_);
   by_bristle_.row(n_) = -v.transpose() * by_bristle_.topRows(n_);
   by_heat_[n_] = -v.dot(by_heat_.head(n_));
-  for (std::size_t j = 0; j < n_; ++j) by_speed_(n_, j) += e.spring_torque[j] - e.passed_torque[j];
+  for (std::size_t j = 0; j < n_; ++j) {
+    by_speed_(n_, j) += e.spring_torque[j] - e.passed_torque[j];
+  }
   for (std::size_t i = 0; i < m_; ++i) {
     const double *arm = &e.arm[i * n_], *arm_slope = &e.arm_slope[i * n_];
     double path_speed = 0.0;
-    for (std::size_t j = 0; j < n_; ++j) path_speed += arm[j] * speed[j];
+    for (std::size_t j = 0; j < n_; ++j) {
+      path_speed += arm[j] * speed[j];
+    }
     for (std::size_t k = 0; k < n_; ++k) {
       by_angle_(n_, k) += arm_slope[k] * speed[k] * (e.force[i] - path_speed * e.force_by_speed[i]) -
                           path_speed * e.force_by_elongation[i] * arm[k];
@@ -183,7 +203,9 @@ void linearisation::diagonal_slopes(const evaluation& e, const double* state) {
 
 /* Power of the motors and of the dampers; the pushes' and the obstacle's come with the bodies. */
 void linearisation::work_rows(const evaluation& e, const double* state) {
-  for (gradient* one : {&motor_power_, &loss_, &push_power_}) one->set_zero();
+  for (gradient* one : {&motor_power_, &loss_, &push_power_}) {
+    one->set_zero();
+  }
   const double* speed = state + layout_.speed();
   for (std::size_t i = 0; i < m_; ++i) {
     const double *arm = &e.arm[i * n_], *arm_slope = &e.arm_slope[i * n_];
@@ -210,7 +232,9 @@ void linearisation::work_rows(const evaluation& e, const double* state) {
   for (std::size_t j = 0; j < n_; ++j) {
     const link& link = rig_.links[j];
     loss_.by_speed[j] += 2.0 * link.damping * speed[j];
-    if (!e.modes.below[j] && !e.modes.above[j]) continue;
+    if (!e.modes.below[j] && !e.modes.above[j]) {
+      continue;
+    }
     const double spring = link.stop_stiffness * ((e.modes.below[j] ? link.lower : link.upper) - state[j]);
     if (e.stop_torque[j] != 0.0) {
       loss_.by_speed[j] += 2.0 * link.stop_damping * speed[j];
@@ -254,14 +278,20 @@ void linearisation::body_slopes(const evaluation& e, const double* state, const 
     for (std::size_t j = 0; j < n_; ++j) {
       angle[j] = slopes(state[j]);
       speed[j] = slopes(state[layout_.speed() + j]);
-      if (j >= first && j < first + lanes) angle[j].slope[j - first] = 1.0;
-      if (n_ + j >= first && n_ + j < first + lanes) speed[j].slope[n_ + j - first] = 1.0;
+      if (j >= first && j < first + lanes) {
+        angle[j].slope[j - first] = 1.0;
+      }
+      if (n_ + j >= first && n_ + j < first + lanes) {
+        speed[j].slope[n_ + j - first] = 1.0;
+      }
     }
     chain_motion<slopes> motion;
     move_chain(rig_, angle, speed, &motion);
     const contact_torque<slopes> contact =
         contact_torques(rig_, motion, e.time, inputs.scheduled_pushes, inputs.push, e.modes.touching);
-    if (with_inertia) inverse_dynamics(rig_, motion, speed, e.acceleration, needed);
+    if (with_inertia) {
+      inverse_dynamics(rig_, motion, speed, e.acceleration, needed);
+    }
     for (std::size_t d = first; d < std::min(first + lanes, directions); ++d) {
       const bool is_angle = d < n_;
       const std::size_t column = is_angle ? d : d - n_, lane = d - first;
@@ -288,11 +318,17 @@ bool linearisation::factor(double gamma) {
     const double scale = gamma * gamma * factor;
     for (std::size_t k = 0; k < n_; ++k) {
       const double moved = scale * (bristle_by_speed_(s, k) + gamma * bristle_by_angle_(s, k));
-      if (moved == 0.0) continue;
-      for (std::size_t j = 0; j <= n_; ++j) reduced(j, k) -= by_bristle_(j, s) * moved;
+      if (moved == 0.0) {
+        continue;
+      }
+      for (std::size_t j = 0; j <= n_; ++j) {
+        reduced(j, k) -= by_bristle_(j, s) * moved;
+      }
     }
   }
-  if (!reduced.allFinite()) return false;
+  if (!reduced.allFinite()) {
+    return false;
+  }
   reduced_.compute(reduced);
   return reduced_.matrixLU().diagonal().cwiseAbs().minCoeff() > 0.0;
 }
@@ -365,7 +401,9 @@ void linearisation::dense(double* jacobian) const {
   }
   j.block(bristle, 0, k_, n_) = bristle_by_angle_;
   j.block(bristle, n_, k_, n_) = bristle_by_speed_;
-  for (std::size_t s = 0; s < k_; ++s) j(bristle + s, bristle + s) = bristle_own_[s];
+  for (std::size_t s = 0; s < k_; ++s) {
+    j(bristle + s, bristle + s) = bristle_own_[s];
+  }
   for (const std::size_t row : {layout_.heat(), layout_.friction_work()}) {
     j.block(row, 0, 1, n_) = by_angle_.row(n_);
     j.block(row, n_, 1, n_) = by_speed_.row(n_);

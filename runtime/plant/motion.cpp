@@ -17,8 +17,12 @@ double smooth_step(double u) {
 
 double at_time(const knots& knots, double time) {
   const std::vector<double>& t = knots.time;
-  if (time <= t.front()) return knots.position.front();
-  if (time >= t.back()) return knots.position.back();
+  if (time <= t.front()) {
+    return knots.position.front();
+  }
+  if (time >= t.back()) {
+    return knots.position.back();
+  }
   const std::size_t k = static_cast<std::size_t>(std::upper_bound(t.begin(), t.end(), time) - t.begin()) - 1;
   const double h = t[k + 1] - t[k], u = (time - t[k]) / h;
   const double x0 = knots.position[k], x1 = knots.position[k + 1];
@@ -41,7 +45,9 @@ double elongation_of(const tendon& tendon, double force) {
 void desired_angles(const rig& rig, double time, double* angle) {
   for (std::size_t j = 0; j < rig.joint_count(); ++j) {
     angle[j] = at_time(rig.motion[j], std::max(time, 0.0));
-    if (time >= 0.0) continue;
+    if (time >= 0.0) {
+      continue;
+    }
     const double since = (time + rig.settle) / (aside_share * rig.settle);
     const double away = since <= 0.0 ? 1.0 : since >= 1.0 ? 0.0 : 1.0 - smooth_step(since);
     const double lower = rig.links[j].lower, upper = rig.links[j].upper;
@@ -56,7 +62,9 @@ void command_of(const rig& rig, const double* angle, double pretension, double* 
   for (std::size_t i = 0; i < rig.tendon_count(); ++i) {
     const tendon& tendon = rig.tendons[i];
     double path = 0.0;
-    for (std::size_t j = 0; j < rig.joint_count(); ++j) path += path_of(tendon.arms[j], angle[j]);
+    for (std::size_t j = 0; j < rig.joint_count(); ++j) {
+      path += path_of(tendon.arms[j], angle[j]);
+    }
     command[i] = path + elongation_of(tendon, pretension * rig.null_vector[i]);
   }
 }

@@ -13,19 +13,25 @@ double at_time(const knots& knots, double time);
 /* Path of a tendon for one joint, ∫ r dq from 0, its moment arm and the arm's slope by the angle. */
 inline double path_of(const moment_arm& arm, double angle) {
   double path = angle * (arm.mean + 0.5 * arm.slope * angle);
-  if (arm.eccentricity != 0.0) path += arm.eccentricity * (cosine(arm.phase) - cosine(angle + arm.phase));
+  if (arm.eccentricity != 0.0) {
+    path += arm.eccentricity * (cosine(arm.phase) - cosine(angle + arm.phase));
+  }
   return path;
 }
 
 inline double arm_at(const moment_arm& arm, double angle) {
   double r = arm.mean + arm.slope * angle;
-  if (arm.eccentricity != 0.0) r += arm.eccentricity * sine(angle + arm.phase);
+  if (arm.eccentricity != 0.0) {
+    r += arm.eccentricity * sine(angle + arm.phase);
+  }
   return r;
 }
 
 inline double arm_slope_at(const moment_arm& arm, double angle) {
   double slope = arm.slope;
-  if (arm.eccentricity != 0.0) slope += arm.eccentricity * cosine(angle + arm.phase);
+  if (arm.eccentricity != 0.0) {
+    slope += arm.eccentricity * cosine(angle + arm.phase);
+  }
   return slope;
 }
 

@@ -34,7 +34,9 @@ int solve(SUNLinearSolver solver, SUNMatrix, N_Vector x, N_Vector b, solver_numb
   const auto* blocks = static_cast<const linearisation*>(solver->content);
   double* unknown = N_VGetArrayPointer(x);
   const double* right = N_VGetArrayPointer(b);
-  if (unknown != right) std::copy(right, right + N_VGetLength(b), unknown);
+  if (unknown != right) {
+    std::copy(right, right + N_VGetLength(b), unknown);
+  }
   blocks->solve(unknown);
   return 0;
 }
@@ -48,7 +50,9 @@ int free_solver(SUNLinearSolver solver) {
 
 SUNMatrix newton_matrix(linearisation* blocks, SUNContext context) {
   SUNMatrix matrix = SUNMatNewEmpty(context);
-  if (matrix == nullptr) return nullptr;
+  if (matrix == nullptr) {
+    return nullptr;
+  }
   matrix->content = blocks;
   matrix->ops->getid = custom_matrix;
   matrix->ops->destroy = free_matrix;
@@ -58,7 +62,9 @@ SUNMatrix newton_matrix(linearisation* blocks, SUNContext context) {
 
 SUNLinearSolver newton_solver(linearisation* blocks, SUNContext context) {
   SUNLinearSolver solver = SUNLinSolNewEmpty(context);
-  if (solver == nullptr) return nullptr;
+  if (solver == nullptr) {
+    return nullptr;
+  }
   solver->content = blocks;
   solver->ops->gettype = direct;
   solver->ops->getid = custom_solver;

@@ -16,7 +16,9 @@ constexpr double largest_input = 1e6;  // m, N: beyond it only a mistake
 constexpr std::uint64_t state_mark = 0x31746e616c704654;  // "TFplant1"
 
 void need(bool good, const char* line) {
-  if (!good) throw refusal(TENDONFMU_PLANT_BAD_ARGUMENT, line);
+  if (!good) {
+    throw refusal(TENDONFMU_PLANT_BAD_ARGUMENT, line);
+  }
 }
 
 tendonfmu_plant_settings settings_of(const rig& rig) {
@@ -51,7 +53,9 @@ plant::plant(rig numbers, std::uint64_t identity)
 }
 
 void plant::set_settings(const tendonfmu_plant_settings& settings) {
-  if (initialised_) throw refusal(TENDONFMU_PLANT_WRONG_ORDER, "settings: expected before the initialisation only");
+  if (initialised_) {
+    throw refusal(TENDONFMU_PLANT_WRONG_ORDER, "settings: expected before the initialisation only");
+  }
   const auto within = [](double x, double low, double high) { return x >= low && x <= high; };
   need(settings.integrator == TENDONFMU_PLANT_CVODE || settings.integrator == TENDONFMU_PLANT_FIXED_STEP,
        "integrator: expected 1 (CVODE) or 2 (fixed step)");
@@ -59,8 +63,9 @@ void plant::set_settings(const tendonfmu_plant_settings& settings) {
   need(within(settings.step, 1e-6, 1e-2), "step: expected a number from 1e-6 to 1e-2 s");
   need(settings.push_link >= 1 && settings.push_link <= static_cast<int>(rig_.joint_count()),
        "push_link: expected the number of a link");
-  for (const double x : settings.push_point)
+  for (const double x : settings.push_point) {
     need(within(x, -10.0, 10.0), "push_point: expected numbers from -10 to 10 m");
+  }
   settings_ = settings;
   integrator_.reset();
 }
@@ -74,7 +79,9 @@ void plant::set_inputs(const tendonfmu_plant_inputs& inputs) {
     }
   }
   need(sane(inputs.pretension), "pretension: expected a finite number within 1e6 N");
-  for (const double x : inputs.push_force) need(sane(x), "push_force: expected finite numbers within 1e6 N");
+  for (const double x : inputs.push_force) {
+    need(sane(x), "push_force: expected finite numbers within 1e6 N");
+  }
 
   commands next = inputs_;
   if (inputs.tendon_position_command) {
@@ -86,12 +93,18 @@ void plant::set_inputs(const tendonfmu_plant_inputs& inputs) {
   const bool changed = next.given != inputs_.given || !std::equal(next.command, next.command + m, inputs_.command) ||
                        next.pretension != inputs_.pretension || next.push.force != inputs_.push.force;
   inputs_ = next;
-  if (changed) evaluated_ = false;
-  if (changed && integrator_) integrator_->forget();
+  if (changed) {
+    evaluated_ = false;
+  }
+  if (changed && integrator_) {
+    integrator_->forget();
+  }
 }
 
 void plant::make_integrator() {
-  if (integrator_) return;
+  if (integrator_) {
+    return;
+  }
   if (settings_.integrator == TENDONFMU_PLANT_CVODE) {
     integrator_ = make_cvode_integrator(&equations_, settings_.relative_tolerance);
   } else {
@@ -116,7 +129,9 @@ void plant::reset() {
 }
 
 void plant::initialise() {
-  if (initialised_) throw refusal(TENDONFMU_PLANT_WRONG_ORDER, "initialise: expected once only");
+  if (initialised_) {
+    throw refusal(TENDONFMU_PLANT_WRONG_ORDER, "initialise: expected once only");
+  }
   make_integrator();
   const state_layout& at = equations_.layout();
   evaluated_ = false;
@@ -127,38 +142,52 @@ void plant::initialise() {
   equations_.command_motors(start.time, inputs_, start.state.data() + at.motor());
   start.modes = equations_.modes_at(start.state.data());
   integrator_->forget();
-  if (rig_.settle > 0.0) integrator_->advance(inputs_, 0.0, &start);
+  if (rig_.settle > 0.0) {
+    integrator_->advance(inputs_, 0.0, &start);
+  }
   start.time = 0.0;
   std::fill(start.state.begin() + static_cast<std::ptrdiff_t>(at.heat()), start.state.end(), 0.0);
   integrator_->forget();
   integrator_->clear_work();
   now_ = start;
   initialised_ = true;
-  if (settings_.sensors) sample(now_);
+  if (settings_.sensors) {
+    sample(now_);
+  }
 }
 
 void plant::need_initialised() const {
-  if (!initialised_) throw refusal(TENDONFMU_PLANT_WRONG_ORDER, "expected after the initialisation only");
+  if (!initialised_) {
+    throw refusal(TENDONFMU_PLANT_WRONG_ORDER, "expected after the initialisation only");
+  }
 }
 
 /* Through every sample of the sensors on the way. */
 void plant::move_on(double until, moment* now) {
   while (settings_.sensors) {
     const double next = samples_ / rig_.sensors.rate;
-    if (next > until + same_time) break;
+    if (next > until + same_time) {
+      break;
+    }
     evaluated_ = false;
     integrator_->advance(inputs_, std::min(next, until), now);
     sample(*now);
   }
-  if (now->time < until) evaluated_ = false;
+  if (now->time < until) {
+    evaluated_ = false;
+  }
   integrator_->advance(inputs_, until, now);
 }
 
 void plant::advance(double until) {
   need_initialised();
   need(std::isfinite(until) && until < 1e9, "time: expected a finite number of seconds below 1e9");
-  if (until < now_.time) throw refusal(TENDONFMU_PLANT_WRONG_ORDER, "time: expected not to go back");
-  if (until == now_.time) return;
+  if (until < now_.time) {
+    throw refusal(TENDONFMU_PLANT_WRONG_ORDER, "time: expected not to go back");
+  }
+  if (until == now_.time) {
+    return;
+  }
   evaluated_ = false;
   moment ahead = now_;
   sensor_bank sensors_before = sensors_;
@@ -179,7 +208,9 @@ void plant::advance(double until) {
 
 /* Once for each moment: what the sensors have looked at, the signals show. */
 void plant::evaluate(const moment& now) const {
-  if (evaluated_) return;
+  if (evaluated_) {
+    return;
+  }
   equations_.want_slopes(false);
   equations_.evaluate(now.time, now.state.data(), &now.modes, inputs_, scratch_.data());
   evaluated_ = true;
@@ -209,7 +240,9 @@ double potential_energy(const rig& rig, const evaluation& e, const double* angle
   double energy = gravity_energy(rig, e.motion);
   for (std::size_t i = 0; i < rig.tendon_count(); ++i) {
     const double x = e.elongation[i];
-    if (!modes.slack[i]) energy += x * x * (0.5 * rig.tendons[i].stiffness + rig.tendons[i].hardening * x / 3.0);
+    if (!modes.slack[i]) {
+      energy += x * x * (0.5 * rig.tendons[i].stiffness + rig.tendons[i].hardening * x / 3.0);
+    }
   }
   const std::size_t n = rig.joint_count();
   for (std::size_t j = 0; j < n; ++j) {
@@ -231,7 +264,9 @@ double potential_energy(const rig& rig, const evaluation& e, const double* angle
 }
 
 void put(double* array, std::size_t row, const double* values, std::size_t count) {
-  if (array) std::copy(values, values + count, array + row * count);
+  if (array) {
+    std::copy(values, values + count, array + row * count);
+  }
 }
 
 void put(double* array, std::size_t row, const vector3<double>& v) {
@@ -255,7 +290,9 @@ void plant::write_signals(const tendonfmu_plant_signals& s, std::size_t row) con
     external[j] = -e.contact.torque[j];
     stop[j] = -e.stop_torque[j];
     inertial[j] = e.rigid_torque[j];
-    for (std::size_t k = 0; k < n; ++k) inertial[j] += e.mass[j * n + k] * e.acceleration[k];
+    for (std::size_t k = 0; k < n; ++k) {
+      inertial[j] += e.mass[j * n + k] * e.acceleration[k];
+    }
     friction[j] = e.spring_torque[j] - external[j] - stop[j] - inertial[j];
   }
   put(s.tendon_force, row, e.force, m);
@@ -286,8 +323,12 @@ void plant::write_signals(const tendonfmu_plant_signals& s, std::size_t row) con
                             state[at.motor_work()],         state[at.friction_work()],
                             state[at.damping_work()],       state[at.push_work()]};
   put(s.energy, row, energy, 6);
-  if (s.contact) s.contact[row] = e.contact.largest > rig_.contact_force;
-  if (s.slack) std::copy(now_.modes.slack, now_.modes.slack + m, s.slack + row * m);
+  if (s.contact) {
+    s.contact[row] = e.contact.largest > rig_.contact_force;
+  }
+  if (s.slack) {
+    std::copy(now_.modes.slack, now_.modes.slack + m, s.slack + row * m);
+  }
 }
 
 // --- saved states ----------------------------------------------------------------------------------------
@@ -342,13 +383,23 @@ void plant::restore(const void* bytes, std::size_t size) {
   const auto bad = [](const char* line) { throw refusal(TENDONFMU_PLANT_BAD_STATE, line); };
   std::vector<double> numbers = state_numbers();
   state_header header;
-  if (size != sizeof header + sizeof(double) * numbers.size()) bad("state: of another size");
+  if (size != sizeof header + sizeof(double) * numbers.size()) {
+    bad("state: of another size");
+  }
   std::memcpy(&header, bytes, sizeof header);
-  if (header.mark != state_mark) bad("state: not that of a simulated finger");
-  if (header.identity != identity_) bad("state: of another rig");
-  if (header.settings != digest_of(settings_)) bad("state: taken with other settings");
+  if (header.mark != state_mark) {
+    bad("state: not that of a simulated finger");
+  }
+  if (header.identity != identity_) {
+    bad("state: of another rig");
+  }
+  if (header.settings != digest_of(settings_)) {
+    bad("state: taken with other settings");
+  }
   std::memcpy(numbers.data(), static_cast<const char*>(bytes) + sizeof header, sizeof(double) * numbers.size());
-  if (header.count != numbers.size() || header.digest != digest(numbers)) bad("state: damaged");
+  if (header.count != numbers.size() || header.digest != digest(numbers)) {
+    bad("state: damaged");
+  }
 
   const std::size_t n = rig_.joint_count(), m = rig_.tendon_count();
   evaluated_ = false;
@@ -360,7 +411,9 @@ void plant::restore(const void* bytes, std::size_t size) {
   inputs_.given = *next++ != 0.0;
   inputs_.pretension = *next++;
   const auto take = [&](auto* to, std::size_t count) {
-    for (std::size_t k = 0; k < count; ++k) to[k] = static_cast<std::decay_t<decltype(to[0])>>(*next++);
+    for (std::size_t k = 0; k < count; ++k) {
+      to[k] = static_cast<std::decay_t<decltype(to[0])>>(*next++);
+    }
   };
   take(inputs_.command, m);
   take(inputs_.push.force.data(), 3);
@@ -381,11 +434,15 @@ void plant::derivative(double time, const double* state, double* result, double*
   inputs.scheduled_pushes = settings_.scheduled_pushes != 0;
   // laws and motions are looked up by them: what is no number has no place there
   need(std::isfinite(time), "time: expected a finite number");
-  for (std::size_t k = 0; k < rig_.order(); ++k) need(std::isfinite(state[k]), "state: expected finite numbers");
+  for (std::size_t k = 0; k < rig_.order(); ++k) {
+    need(std::isfinite(state[k]), "state: expected finite numbers");
+  }
   evaluated_ = false;
   equations_.want_slopes(true);
   equations_.evaluate(time, state, nullptr, inputs, result);
-  if (!jacobian) return;
+  if (!jacobian) {
+    return;
+  }
   linearisation blocks(rig_);
   blocks.take(equations_, state, inputs, rigid_slopes::exact);
   blocks.dense(jacobian);

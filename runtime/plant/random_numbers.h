@@ -18,7 +18,9 @@ inline void philox(std::uint32_t counter[4], const std::uint32_t key[2]) {
     const std::uint32_t next[4] = {static_cast<std::uint32_t>(b >> 32) ^ counter[1] ^ k0, static_cast<std::uint32_t>(b),
                                    static_cast<std::uint32_t>(a >> 32) ^ counter[3] ^ k1,
                                    static_cast<std::uint32_t>(a)};
-    for (int i = 0; i < 4; ++i) counter[i] = next[i];
+    for (int i = 0; i < 4; ++i) {
+      counter[i] = next[i];
+    }
     k0 += 0x9E3779B9;
     k1 += 0xBB67AE85;
   }

@@ -27,7 +27,9 @@ void read_limits(const json_node& node, link* link) {
     limits.expect_keys({"lower", "upper", "stiffness", "damping"});
     link->lower = number_in(limits, "lower", any_angle);
     link->upper = number_in(limits, "upper", any_angle);
-    if (!(link->upper > link->lower)) limits.member("upper").refuse("an angle above `lower`, rad");
+    if (!(link->upper > link->lower)) {
+      limits.member("upper").refuse("an angle above `lower`, rad");
+    }
   }
   link->stop_stiffness = number_in(limits, "stiffness", {0.0, 1e6, "N·m/rad", true}, 5.0);
   link->stop_damping = number_in(limits, "damping", {0.0, 1e3, "N·m·s/rad"}, 0.01);
@@ -61,7 +63,9 @@ void read_links(const json_node& finger, const json_node& physics, rig* rig) {
   rig->tip = three_in(physics, "tip", any_length, three{});
   rig->coupling = numbers_in(physics, "joint_coupling", n - 1, {0.0, 1e6, "N·m/rad"});
   const json_node servo = physics.member("servo");
-  if (!servo.absent()) servo.expect_keys({"frequency", "damping_ratio"});
+  if (!servo.absent()) {
+    servo.expect_keys({"frequency", "damping_ratio"});
+  }
   rig->servo_frequency = number_in(servo, "frequency", {0.01, 1e4, "Hz"}, 15.0);
   rig->servo_damping = number_in(servo, "damping_ratio", {0.01, 100.0, ""}, 1.0);
 }
@@ -69,7 +73,9 @@ void read_links(const json_node& finger, const json_node& physics, rig* rig) {
 void read_tendons(const json_node& finger, const json_node& physics, rig* rig) {
   const json_node described = finger.member("tendons"), list = physics.member("tendons");
   const std::size_t n = rig->joint_count(), m = described.size();
-  if (!list.absent()) list.expect_list(0, m, "tendons");
+  if (!list.absent()) {
+    list.expect_list(0, m, "tendons");
+  }
   rig->tendons.resize(m);
   for (std::size_t i = 0; i < m; ++i) {
     const json_node node = list.element(i);
@@ -85,7 +91,9 @@ void read_tendons(const json_node& finger, const json_node& physics, rig* rig) {
     const std::vector<double> slope = numbers_in(node, "moment_arm_slope", n, {-1.0, 1.0, "m/rad"});
     const std::vector<double> eccentricity = numbers_in(node, "eccentricity", n, {-1.0, 1.0, "m"});
     const std::vector<double> phase = numbers_in(node, "phase", n, any_angle);
-    for (std::size_t j = 0; j < n; ++j) tendon.arms.push_back({scale * mean[j], slope[j], eccentricity[j], phase[j]});
+    for (std::size_t j = 0; j < n; ++j) {
+      tendon.arms.push_back({scale * mean[j], slope[j], eccentricity[j], phase[j]});
+    }
   }
 }
 

@@ -20,7 +20,9 @@ using matrix = Eigen::MatrixXd;
 matrix arms_at(const rig& rig, const double* angle) {
   matrix arms(rig.tendon_count(), rig.joint_count());
   for (std::size_t i = 0; i < rig.tendon_count(); ++i) {
-    for (std::size_t j = 0; j < rig.joint_count(); ++j) arms(i, j) = arm_at(rig.tendons[i].arms[j], angle[j]);
+    for (std::size_t j = 0; j < rig.joint_count(); ++j) {
+      arms(i, j) = arm_at(rig.tendons[i].arms[j], angle[j]);
+    }
   }
   return arms;
 }
@@ -39,7 +41,9 @@ void find_null_vector(rig* rig) {
   const Eigen::VectorXd null = ones - arms * split.solve(ones);
   const double mean = null.mean();
   for (Eigen::Index i = 0; i < null.size(); ++i) {
-    if (mean > 1e-9 && null[i] > 1e-6 * mean) continue;
+    if (mean > 1e-9 && null[i] > 1e-6 * mean) {
+      continue;
+    }
     throw description_error(
         "finger.tendons[" + std::to_string(i + 1) +
         "].moment_arms: expected arms with a positive null vector of Rᵀ, forces > 0 of all tendons that turn "
@@ -52,7 +56,9 @@ void find_null_vector(rig* rig) {
 void check_start(const json_node& motion, const rig& rig) {
   for (std::size_t j = 0; j < rig.joint_count(); ++j) {
     const double start = rig.motion[j].position.front();
-    if (start >= rig.links[j].lower && start <= rig.links[j].upper) continue;
+    if (start >= rig.links[j].lower && start <= rig.links[j].upper) {
+      continue;
+    }
     const std::string range =
         sentence("a start within the joint's limits, ", rig.links[j].lower, " to ", rig.links[j].upper, " rad");
     motion.member("joints").element(j).member("position").element(0).refuse(range);
@@ -65,7 +71,9 @@ double most_of(const rig& rig, const friction_site& site) {
   for (const law& law : site.friction.laws) {
     most = std::max({most, law.positive.break_away, law.negative.break_away});
   }
-  if (site.turn.shape == diversion::form::none) return most;
+  if (site.turn.shape == diversion::form::none) {
+    return most;
+  }
   const link& bent = rig.links[site.angle_joint];
   law_columns column(1);
   double diverted = 0.0;
@@ -99,21 +107,29 @@ double stiffness_of(const rig& rig, const matrix& arms, std::size_t j) {
   const double pretension = at_time(rig.pretension, 0.0);
   const double bent = std::max(std::fabs(link.lower - link.cover_rest), std::fabs(link.upper - link.cover_rest));
   double stiffness = link.stop_stiffness + link.cover_stiffness + 3.0 * link.cover_hardening * bent * bent;
-  if (j > 0) stiffness += rig.coupling[j - 1];
-  if (j + 1 < rig.joint_count()) stiffness += rig.coupling[j];
+  if (j > 0) {
+    stiffness += rig.coupling[j - 1];
+  }
+  if (j + 1 < rig.joint_count()) {
+    stiffness += rig.coupling[j];
+  }
   for (std::size_t i = 0; i < rig.tendon_count(); ++i) {
     const tendon& tendon = rig.tendons[i];
     const double force = pretension * rig.null_vector[i], arm = arms(i, j);
     double along = tendon.stiffness + 2.0 * tendon.hardening * elongation_of(tendon, force);
     for (std::size_t s = tendon.first_site; s < tendon.first_site + tendon.site_count; ++s) {
       const friction_site& site = rig.sites[s];
-      if (site.first_mover <= j) along += force * site.friction.laws.front().break_away * site.inverse_length;
+      if (site.first_mover <= j) {
+        along += force * site.friction.laws.front().break_away * site.inverse_length;
+      }
     }
     stiffness += along * arm * arm;
   }
   for (const joint_site& site : rig.joint_sites) {
     const double load = site.by_load ? pretension * static_cast<double>(rig.tendon_count()) : 1.0;
-    if (site.joint == j) stiffness += load * site.friction.break_away * site.inverse_length;
+    if (site.joint == j) {
+      stiffness += load * site.friction.break_away * site.inverse_length;
+    }
   }
   return stiffness;
 }
@@ -136,7 +152,9 @@ void check_stiffness(const json_node& physics, const rig& rig) {
   for (std::size_t j = 0; j < n; ++j) {
     const double stiffness = stiffness_of(rig, arms, j);
     const double rate = std::sqrt(stiffness * least[j]);
-    if (rate <= fastest_rate) continue;
+    if (rate <= fastest_rate) {
+      continue;
+    }
     const std::string said =
         sentence("a body that its springs (", stiffness,
                  " N·m/rad with tendons, presliding, cover, coupling and stops) swing at less than ", fastest_rate,

@@ -38,9 +38,13 @@ void read_contact(const json_node& physics, const json_node& pushes, rig* rig) {
     sphere.link = index_in(node, "link", 1, rig->joint_count(), rig->joint_count()) - 1;
     sphere.point = three_in(node, "point", any_length, rig->tip);
   }
-  if (pushes.absent()) return;
+  if (pushes.absent()) {
+    return;
+  }
   pushes.expect_list(0, most_pushes, "pushes");
-  for (std::size_t k = 0; k < pushes.size(); ++k) rig->pushes.push_back(read_push(pushes.element(k), *rig));
+  for (std::size_t k = 0; k < pushes.size(); ++k) {
+    rig->pushes.push_back(read_push(pushes.element(k), *rig));
+  }
 }
 
 }  // namespace tendonfmu::plant

@@ -32,7 +32,9 @@ law read_law(const json_node& node, double asymmetry) {
   // the bristle is measured by the mean of both sides: it must have a level to slide at on either
   for (const bool negative_side : {false, true}) {
     const law_side& side = negative_side ? found.negative : found.positive;
-    if (side.sliding >= 1e-6 * found.break_away && side.break_away >= 1e-6 * found.break_away) continue;
+    if (side.sliding >= 1e-6 * found.break_away && side.break_away >= 1e-6 * found.break_away) {
+      continue;
+    }
     (negative_side ? negative : positive)
         .member("coulomb")
         .refuse("a positive number where the other side's `static` is one: bristles need sliding friction");
@@ -49,7 +51,9 @@ law_by_angle read_laws(const json_node& node, double asymmetry) {
   }
   laws.expect_list(1, most_working_points, "laws");
   found.angles = numbers_in(node, "angles", laws.size(), any_angle, false);
-  for (std::size_t k = 0; k < laws.size(); ++k) found.laws.push_back(read_law(laws.element(k), asymmetry));
+  for (std::size_t k = 0; k < laws.size(); ++k) {
+    found.laws.push_back(read_law(laws.element(k), asymmetry));
+  }
   return found;
 }
 
@@ -59,7 +63,9 @@ struct presliding {
 
 presliding read_presliding(const json_node& friction) {
   const json_node node = friction.member("presliding");
-  if (!node.absent()) node.expect_keys({"pulley", "edge", "joint"});
+  if (!node.absent()) {
+    node.expect_keys({"pulley", "edge", "joint"});
+  }
   return {number_in(node, "pulley", {0.0, 1.0, "m", true}, 25e-6),
           number_in(node, "edge", {0.0, 1.0, "m", true}, 40e-6),
           number_in(node, "joint", {0.0, 10.0, "rad", true}, 0.004)};
@@ -68,7 +74,9 @@ presliding read_presliding(const json_node& friction) {
 /* Edges that the rig gives another shape than working points. */
 void read_diversions(const json_node& friction, double asymmetry, rig* rig) {
   const json_node list = friction.member("edges");
-  if (list.absent()) return;
+  if (list.absent()) {
+    return;
+  }
   list.expect_list(0, max_joints * max_tendons, "edges");
   for (std::size_t k = 0; k < list.size(); ++k) {
     const json_node node = list.element(k);
@@ -78,8 +86,12 @@ void read_diversions(const json_node& friction, double asymmetry, rig* rig) {
     const auto site = std::find_if(rig->sites.begin(), rig->sites.end(), [&](const friction_site& one) {
       return one.where == friction_site::place::edge && one.tendon == tendon && one.first_mover == joint;
     });
-    if (site == rig->sites.end()) node.member("joint").refuse("a joint where the finger's tendon has an edge_friction");
-    if (node.member("shape").absent()) node.member("shape").refuse("\"sine\" or \"capstan\"");
+    if (site == rig->sites.end()) {
+      node.member("joint").refuse("a joint where the finger's tendon has an edge_friction");
+    }
+    if (node.member("shape").absent()) {
+      node.member("shape").refuse("\"sine\" or \"capstan\"");
+    }
     diversion turn;
     const bool sine = choice_in(node, "shape", {"sine", "capstan"}) == 0;
     turn.shape = sine                                         ? diversion::form::sine
@@ -103,7 +115,9 @@ void read_diversions(const json_node& friction, double asymmetry, rig* rig) {
 /* Slowly moving wrist: every tendon rubs there before it reaches the finger. */
 void read_wrist(const json_node& physics, double asymmetry, rig* rig) {
   const json_node node = physics.member("wrist");
-  if (node.absent()) return;
+  if (node.absent()) {
+    return;
+  }
   node.expect_keys({"amplitude", "period", "arms", "friction", "presliding"});
   rig->wrist.amplitude = number_in(node, "amplitude", {0.0, 10.0, "rad"});
   rig->wrist.period = number_in(node, "period", {0.01, 1e6, "s"});
@@ -127,12 +141,16 @@ void read_tendon_sites(const json_node& tendon_node, std::size_t i, const presli
   const json_node edges = tendon_node.member("edge_friction"), pulleys = tendon_node.member("pulley_friction");
   tendon.first_site = sites->size();
   for (const friction_site& wrist : rig->sites) {
-    if (wrist.tendon == i) sites->push_back(wrist);
+    if (wrist.tendon == i) {
+      sites->push_back(wrist);
+    }
   }
   std::size_t last_moved = 0;
   for (std::size_t j = 0; j < n; ++j) {
     const moment_arm& arm = tendon.arms[j];
-    if (arm.mean != 0.0 || arm.slope != 0.0 || arm.eccentricity != 0.0) last_moved = j;
+    if (arm.mean != 0.0 || arm.slope != 0.0 || arm.eccentricity != 0.0) {
+      last_moved = j;
+    }
   }
   for (std::size_t j = 0; j < n; ++j) {
     if (!edges.element(j).absent()) {
@@ -169,7 +187,9 @@ void read_joint_sites(const json_node& joints, double distance, double asymmetry
   for (std::size_t j = 0; j < rig->joint_count(); ++j) {
     for (const bool by_load : {false, true}) {
       const json_node node = joints.element(j).member(by_load ? "load_friction" : "friction");
-      if (!node.absent()) rig->joint_sites.push_back({j, by_load, read_law(node, asymmetry), 1.0 / distance});
+      if (!node.absent()) {
+        rig->joint_sites.push_back({j, by_load, read_law(node, asymmetry), 1.0 / distance});
+      }
     }
   }
 }
@@ -194,8 +214,12 @@ void read_friction(const json_node& finger, const json_node& physics, rig* rig) 
   const double asymmetry = number_in(node, "asymmetry", {-0.9, 0.9, ""}, 0.0);
 
   const json_node drift = node.member("drift"), heat = node.member("heat");
-  if (!drift.absent()) drift.expect_keys({"amplitude", "time_constant"});
-  if (!heat.absent()) heat.expect_keys({"coefficient", "time_constant"});
+  if (!drift.absent()) {
+    drift.expect_keys({"amplitude", "time_constant"});
+  }
+  if (!heat.absent()) {
+    heat.expect_keys({"coefficient", "time_constant"});
+  }
   settings.drift_amplitude = number_in(drift, "amplitude", {-0.9, 10.0, ""}, 0.0);
   settings.drift_time = number_in(drift, "time_constant", {0.0, 1e9, "s", true}, 300.0);
   settings.heat_coefficient = number_in(heat, "coefficient", {-10.0, 10.0, "1/J"}, 0.0);

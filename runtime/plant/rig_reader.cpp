@@ -24,7 +24,9 @@ void check_finger(const json_node& finger) {
   const tendonfmu_status status =
       tendonfmu_image_from_json(text.data(), text.size(), &image, &size, message, sizeof message);
   tendonfmu_free_image(image);
-  if (status != TENDONFMU_OK) throw description_error("finger." + std::string(message));
+  if (status != TENDONFMU_OK) {
+    throw description_error("finger." + std::string(message));
+  }
 
   const json_node extensions = finger.member("extensions");
   if (!extensions.absent() && extensions.size() > 0) {
@@ -33,7 +35,9 @@ void check_finger(const json_node& finger) {
   const json_node tendons = finger.member("tendons");
   for (std::size_t i = 0; i < tendons.size(); ++i) {
     const json_node loop = tendons.element(i).member("bidirectional");
-    if (!loop.absent() && loop.boolean()) loop.refuse("false: simulated tendons pull only");
+    if (!loop.absent() && loop.boolean()) {
+      loop.refuse("false: simulated tendons pull only");
+    }
   }
 }
 
@@ -45,7 +49,9 @@ json_node physics_of(const json_node& document) {
 }
 
 void read_integration(const json_node& node, rig* rig) {
-  if (!node.absent()) node.expect_keys({"method", "relative_tolerance", "step"});
+  if (!node.absent()) {
+    node.expect_keys({"method", "relative_tolerance", "step"});
+  }
   rig->integration.method = static_cast<int>(choice_in(node, "method", {"cvode", "fixed_step"})) + 1;
   rig->integration.relative_tolerance = number_in(node, "relative_tolerance", {1e-10, 1e-2, ""}, 1e-6);
   rig->integration.step = number_in(node, "step", {1e-6, 1e-2, "s"}, 1e-3);

@@ -17,7 +17,9 @@ std::vector<double> read_times(const json_node& node) {
   list.expect_list(1, most_knots, "times");
   const std::vector<double> time = numbers_in(node, "time", list.size(), {0.0, 1e9, "s"}, false);
   for (std::size_t k = 1; k < time.size(); ++k) {
-    if (!(time[k] > time[k - 1])) list.element(k).refuse("a time after the knot before, s");
+    if (!(time[k] > time[k - 1])) {
+      list.element(k).refuse("a time after the knot before, s");
+    }
   }
   return time;
 }
@@ -36,7 +38,9 @@ knots read_joint_knots(const json_node& node) {
 /* One value for all channels, or one for each. */
 std::vector<double> read_channels(const json_node& node, const char* key, std::size_t count, const range& allowed,
                                   double otherwise) {
-  if (node.member(key).value().is_array()) return numbers_in(node, key, count, allowed, false);
+  if (node.member(key).value().is_array()) {
+    return numbers_in(node, key, count, allowed, false);
+  }
   return std::vector<double>(count, number_in(node, key, allowed, otherwise));
 }
 
@@ -44,7 +48,9 @@ sensor read_sensor(const json_node& parent, const char* name, std::size_t channe
   const json_node node = parent.member(name);
   if (!node.absent()) {
     std::vector<std::string> keys = {"noise", "resolution", "gain", "offset", "delay"};
-    if (has_play) keys.push_back("backlash");
+    if (has_play) {
+      keys.push_back("backlash");
+    }
     node.expect_keys(keys);
   }
   sensor sensor;
@@ -63,7 +69,9 @@ void read_motion(const json_node& motion, rig* rig) {
   motion.expect_keys({"joints", "pretension"});
   const json_node joints = motion.member("joints"), pretension = motion.member("pretension");
   joints.expect_list(rig->joint_count(), rig->joint_count(), "joints' knots");
-  for (std::size_t j = 0; j < rig->joint_count(); ++j) rig->motion.push_back(read_joint_knots(joints.element(j)));
+  for (std::size_t j = 0; j < rig->joint_count(); ++j) {
+    rig->motion.push_back(read_joint_knots(joints.element(j)));
+  }
   pretension.expect_keys({"time", "value"});
   knots& knots = rig->pretension;
   knots.time = read_times(pretension);

@@ -89,7 +89,9 @@ void inverse_dynamics(const rig& rig, const chain_motion<T>& motion, const T* sp
   }
   for (std::size_t j = n; j-- > 0;) {
     torque[j] = dot(motion.links[j].axis, moment[j]);
-    if (j == 0) break;
+    if (j == 0) {
+      break;
+    }
     const vector3<T> from_parent = motion.links[j].origin - motion.links[j - 1].origin;
     moment[j - 1] = moment[j - 1] + moment[j] + cross(from_parent, force[j]);
     force[j - 1] = force[j - 1] + force[j];

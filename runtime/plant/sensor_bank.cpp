@@ -64,7 +64,9 @@ void sensor_bank::take(line* line, std::uint64_t number, std::uint64_t seed, con
       x = line->play[c];
     }
     (*shown)[c] = x;
-    if (late) line->past[row + c] = x;
+    if (late) {
+      line->past[row + c] = x;
+    }
   }
   line->taken += 1.0;
   for (std::size_t c = 0; c < line->channels; ++c) {
@@ -72,7 +74,9 @@ void sensor_bank::take(line* line, std::uint64_t number, std::uint64_t seed, con
     if (with.noise > 0.0) {
       x += with.noise * normal_number(seed, line->first_channel + static_cast<std::uint32_t>(c), number);
     }
-    if (with.resolution > 0.0) x = with.resolution * std::floor(x / with.resolution + 0.5);
+    if (with.resolution > 0.0) {
+      x = with.resolution * std::floor(x / with.resolution + 0.5);
+    }
     (*shown)[c] = x;
   }
 }

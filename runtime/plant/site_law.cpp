@@ -49,10 +49,16 @@ void set_between(const law& low, const law& high, const blend& at, double v, int
 void set_interpolated(const law_by_angle& points, double angle, double v, int exponent, std::size_t k,
                       law_columns* laws) {
   const std::vector<double>& angles = points.angles;
-  if (angles.size() < 2 || angle <= angles.front()) return set_law(points.laws.front(), v, exponent, k, laws);
-  if (angle >= angles.back()) return set_law(points.laws.back(), v, exponent, k, laws);
+  if (angles.size() < 2 || angle <= angles.front()) {
+    return set_law(points.laws.front(), v, exponent, k, laws);
+  }
+  if (angle >= angles.back()) {
+    return set_law(points.laws.back(), v, exponent, k, laws);
+  }
   std::size_t upper = 1;
-  while (angles[upper] <= angle) ++upper;  // few points: a search would take longer
+  while (angles[upper] <= angle) {
+    ++upper;  // few points: a search would take longer
+  }
   const double per_angle = 1.0 / (angles[upper] - angles[upper - 1]);
   const blend at = {(angle - angles[upper - 1]) * per_angle, per_angle};
   set_between(points.laws[upper - 1], points.laws[upper], at, v, exponent, k, laws);

@@ -24,7 +24,9 @@ using tendonfmu::plant::refusal;
 
 std::uint64_t identity_of(const char* text, std::size_t size) {
   std::uint64_t hash = 0xcbf29ce484222325;
-  for (std::size_t i = 0; i < size; ++i) hash = (hash ^ static_cast<unsigned char>(text[i])) * 0x100000001b3;
+  for (std::size_t i = 0; i < size; ++i) {
+    hash = (hash ^ static_cast<unsigned char>(text[i])) * 0x100000001b3;
+  }
   return hash;
 }
 
@@ -40,7 +42,9 @@ void note(const tendonfmu_plant* plant, const char* line) noexcept {
 /* Runs a call and turns what it throws into a status and a line. */
 template <class Call>
 tendonfmu_plant_status guarded(const tendonfmu_plant* plant, Call call) noexcept {
-  if (!plant) return TENDONFMU_PLANT_BAD_ARGUMENT;
+  if (!plant) {
+    return TENDONFMU_PLANT_BAD_ARGUMENT;
+  }
   try {
     call();
     return TENDONFMU_PLANT_OK;
@@ -58,15 +62,21 @@ tendonfmu_plant_status guarded(const tendonfmu_plant* plant, Call call) noexcept
 }
 
 void need_pointer(const void* pointer, const char* name) {
-  if (!pointer) throw refusal(TENDONFMU_PLANT_BAD_ARGUMENT, std::string(name) + ": expected a pointer, not NULL");
+  if (!pointer) {
+    throw refusal(TENDONFMU_PLANT_BAD_ARGUMENT, std::string(name) + ": expected a pointer, not NULL");
+  }
 }
 
 }  // namespace
 
 tendonfmu_plant* tendonfmu_plant_create(const char* rig_json, size_t size, char* message, size_t message_size) {
-  if (!message) message_size = 0;
+  if (!message) {
+    message_size = 0;
+  }
   try {
-    if (!rig_json) throw tendonfmu::description_error("rig: expected a text, not NULL");
+    if (!rig_json) {
+      throw tendonfmu::description_error("rig: expected a text, not NULL");
+    }
     return new tendonfmu_plant(tendonfmu::plant::read_rig(rig_json, size), identity_of(rig_json, size));
   } catch (const std::bad_alloc&) {
     tendonfmu::copy_line("rig: out of memory", message, message_size);
@@ -157,7 +167,9 @@ tendonfmu_plant_status tendonfmu_plant_run(tendonfmu_plant* plant, size_t sample
       plant->finger.write_signals(*signals, row);
     }
   });
-  if (done) *done = row;
+  if (done) {
+    *done = row;
+  }
   return status;
 }
 

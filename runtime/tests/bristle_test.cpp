@@ -135,7 +135,9 @@ TEST(Bristle, KnowsItsSlopes) {
     weaker.level -= h;
     check(r.share_by_level, respond_once(one, v, exponent, stronger, w).share,
           respond_once(one, v, exponent, weaker, w).share, h, 0.05);
-    if (with.span > 0.0) continue;  // there the bristle has been eliminated
+    if (with.span > 0.0) {
+      continue;  // there the bristle has been eliminated
+    }
     const Response more = respond_once(one, v, exponent, with, w + h),
                    less = respond_once(one, v, exponent, with, w - h);
     check(r.share_by_bristle, more.share, less.share, h, 0.05);
@@ -192,7 +194,9 @@ TEST(SiteLaw, IsInterpolatedBetweenWorkingPointsAndConstantOutside) {
     };
     for (const double v : {-0.01, 0.002}) {
       const double low = of(site.friction.laws[0], v), high = of(site.friction.laws[1], v);
-      for (const double angle : {-9.0, -0.5, 0.7, 1.0}) EXPECT_DOUBLE_EQ(sliding_at(site, angle, v), low) << angle;
+      for (const double angle : {-9.0, -0.5, 0.7, 1.0}) {
+        EXPECT_DOUBLE_EQ(sliding_at(site, angle, v), low) << angle;
+      }
       EXPECT_DOUBLE_EQ(sliding_at(site, 0.2, v), high);
       EXPECT_NEAR(sliding_at(site, -0.15, v), 0.5 * (low + high), 1e-15);
       EXPECT_NEAR(sliding_at(site, 0.45, v), 0.5 * (low + high), 1e-15);

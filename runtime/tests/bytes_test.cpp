@@ -7,9 +7,7 @@
 #include <set>
 #include <vector>
 
-extern "C" {
 #include "bytes.h"
-}
 
 namespace {
 
@@ -58,27 +56,35 @@ TEST(Hash, IsTheSameOnEveryMachine) {
 
 TEST(Hash, SeesEverySingleBitAndEveryLength) {
   std::vector<unsigned char> block(77);
-  for (std::size_t i = 0; i < block.size(); ++i) block[i] = static_cast<unsigned char>(37 * i);
+  for (std::size_t i = 0; i < block.size(); ++i) {
+    block[i] = static_cast<unsigned char>(37 * i);
+  }
   std::set<std::uint64_t> seen = {hash_bytes(block.data(), block.size(), 0)};
   for (std::size_t bit = 0; bit < 8 * block.size(); ++bit) {
     block[bit / 8] = static_cast<unsigned char>(block[bit / 8] ^ (1u << (bit % 8)));
     seen.insert(hash_bytes(block.data(), block.size(), 0));
     block[bit / 8] = static_cast<unsigned char>(block[bit / 8] ^ (1u << (bit % 8)));
   }
-  for (std::size_t size = 0; size < block.size(); ++size) seen.insert(hash_bytes(block.data(), size, 0));
+  for (std::size_t size = 0; size < block.size(); ++size) {
+    seen.insert(hash_bytes(block.data(), size, 0));
+  }
   EXPECT_EQ(seen.size(), 1 + 8 * block.size() + block.size());
 }
 
 TEST(Hash, DependsOnItsSeed) {
   std::set<std::uint64_t> seen;
-  for (std::uint64_t seed = 0; seed < 1000; ++seed) seen.insert(hash_bytes("tendon", 6, seed * seed));
+  for (std::uint64_t seed = 0; seed < 1000; ++seed) {
+    seen.insert(hash_bytes("tendon", 6, seed * seed));
+  }
   EXPECT_EQ(seen.size(), 1000u);
 }
 
 TEST(Hash, SeesZerosAppended) {
   const unsigned char zeros[64] = {};
   std::set<std::uint64_t> seen;
-  for (std::size_t size = 0; size <= sizeof zeros; ++size) seen.insert(hash_bytes(zeros, size, 0));
+  for (std::size_t size = 0; size <= sizeof zeros; ++size) {
+    seen.insert(hash_bytes(zeros, size, 0));
+  }
   EXPECT_EQ(seen.size(), sizeof zeros + 1);
 }
 

@@ -6,10 +6,8 @@
 #include <random>
 #include <vector>
 
-extern "C" {
 #include "contact_place.h"
 #include "link_geometry.h"
-}
 
 namespace {
 
@@ -101,7 +99,9 @@ class Draws {
   Three vector(double scale = 1.0) { return {number(scale), number(scale), number(scale)}; }
   std::vector<double> numbers(std::size_t count, double scale = 1.0) {
     std::vector<double> drawn(count);
-    for (double& x : drawn) x = number(scale);
+    for (double& x : drawn) {
+      x = number(scale);
+    }
     return drawn;
   }
   Chain chain(std::size_t joints) {
@@ -115,7 +115,9 @@ class Draws {
   }
   std::vector<double> deviations(std::size_t count) {
     std::vector<double> drawn(count);
-    for (double& x : drawn) x = 0.003 * std::exp(number(0.5));
+    for (double& x : drawn) {
+      x = 0.003 * std::exp(number(0.5));
+    }
     return drawn;
   }
 
@@ -146,7 +148,9 @@ TEST(LinkGeometry, LeversAreTheSlopesOfTheTipsPlace) {
       Three unit{};
       unit[k] = 1.0;
       const std::vector<double> torque = chain.torques(last, chain.tip, unit, angle);
-      for (std::size_t j = 0; j <= last; ++j) EXPECT_NEAR(lever[3 * j + k], -torque[j], 1e-9) << trial;
+      for (std::size_t j = 0; j <= last; ++j) {
+        EXPECT_NEAR(lever[3 * j + k], -torque[j], 1e-9) << trial;
+      }
     }
   }
 }
@@ -179,14 +183,19 @@ TEST(TipForce, IsFoundExactlyWithoutNoise) {
     const std::vector<double> angle = draws.numbers(chain.joints()), lever = Placed(chain).levers(angle);
     const Three force = draws.vector();
     std::vector<double> torque;
-    for (std::size_t j = 0; j < chain.joints(); ++j)
+    for (std::size_t j = 0; j < chain.joints(); ++j) {
       torque.push_back(-dot({lever[3 * j], lever[3 * j + 1], lever[3 * j + 2]}, force));
+    }
     const std::vector<double> deviation = draws.deviations(chain.joints());
     const tip_force found =
         find_tip_force(chain.joints(), lever.data(), torque.data(), trial % 2 ? deviation.data() : nullptr);
     observable += found.observable;
-    if (!found.observable) continue;
-    for (int k = 0; k < 3; ++k) EXPECT_NEAR(found.force[k], force[k], 1e-11 * length(force)) << trial;
+    if (!found.observable) {
+      continue;
+    }
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_NEAR(found.force[k], force[k], 1e-11 * length(force)) << trial;
+    }
     EXPECT_LT(found.misfit, 1e-15) << trial;
   }
   EXPECT_GT(observable, 300);
@@ -207,10 +216,14 @@ TEST(TipForce, NoForceFitsBetter) {
       return total;
     };
     const tip_force found = find_tip_force(n, lever.data(), torque.data(), deviation.data());
-    if (!found.observable) continue;
+    if (!found.observable) {
+      continue;
+    }
     const Three force = {found.force[0], found.force[1], found.force[2]};
     EXPECT_NEAR(found.misfit, sum(force) / static_cast<double>(n - 3), 1e-9 * found.misfit);
-    for (int k = 0; k < 20; ++k) EXPECT_GE(sum(force + draws.vector(1e-3)), sum(force) * (1 - 1e-12)) << trial;
+    for (int k = 0; k < 20; ++k) {
+      EXPECT_GE(sum(force + draws.vector(1e-3)), sum(force) * (1 - 1e-12)) << trial;
+    }
   }
 }
 
@@ -221,7 +234,9 @@ TEST(TipForce, MisfitIsOneOfTorquesWithTheirOwnNoise) {
   const int trials = 20000;
   for (int trial = 0; trial < trials; ++trial) {
     std::vector<double> torque;
-    for (std::size_t j = 0; j < 6; ++j) torque.push_back(draws.number(deviation[j]) - lever[3 * j] * 0.7);
+    for (std::size_t j = 0; j < 6; ++j) {
+      torque.push_back(draws.number(deviation[j]) - lever[3 * j] * 0.7);
+    }
     sum += find_tip_force(6, lever.data(), torque.data(), deviation.data()).misfit;
   }
   EXPECT_NEAR(sum / trials, 1.0, 4 * std::sqrt(2.0 / 3.0 / trials)); /* χ² of three degrees over three */
@@ -248,7 +263,9 @@ TEST(TipForce, AlongAStretchedFingerIsNotObservable) {
   for (const double bend : {0.0, 0.02, 0.1, 0.4, 0.8}) {
     const std::vector<double> lever = finger.levers({0.1, bend, bend, bend});
     std::vector<double> torque;
-    for (std::size_t j = 0; j < 4; ++j) torque.push_back(-lever[3 * j]); /* 1 N along x */
+    for (std::size_t j = 0; j < 4; ++j) {
+      torque.push_back(-lever[3 * j]); /* 1 N along x */
+    }
     const tip_force found = find_tip_force(4, lever.data(), torque.data(), deviation.data());
     EXPECT_FALSE(before && !found.observable) << bend;
     before = found.observable;
@@ -276,11 +293,17 @@ TEST(TipForce, StaysFiniteAtTheEdgesOfDoubles) {
       for (const double deviation_scale : {1e-160, 1e-3, 1e9}) {
         const std::vector<double> lever = draws.numbers(12, lever_scale), torque = draws.numbers(4, torque_scale);
         std::vector<double> deviation = draws.deviations(4);
-        for (double& x : deviation) x *= deviation_scale;
+        for (double& x : deviation) {
+          x *= deviation_scale;
+        }
         deviation[1] *= 1e12;
         const tip_force found = find_tip_force(4, lever.data(), torque.data(), deviation.data());
-        for (const double x : found.force) EXPECT_TRUE(std::isfinite(x));
-        for (const double x : found.deviation) EXPECT_TRUE(std::isfinite(x));
+        for (const double x : found.force) {
+          EXPECT_TRUE(std::isfinite(x));
+        }
+        for (const double x : found.deviation) {
+          EXPECT_TRUE(std::isfinite(x));
+        }
         EXPECT_TRUE(std::isfinite(found.misfit));
         EXPECT_LE(found.misfit, 1e12);
       }
@@ -306,8 +329,9 @@ TEST(TipForce, SpreadsAsItsDeviationSays) {
       said[k] = found.deviation[k];
     }
   }
-  for (int k = 0; k < 3; ++k)
+  for (int k = 0; k < 3; ++k) {
     EXPECT_NEAR(std::sqrt(squares[k]) / said[k], 1.0, 0.02); /* four of its own 1/√(2·trials) */
+  }
 }
 
 /* What is claimed: contact is on the link that is named, or beyond. */

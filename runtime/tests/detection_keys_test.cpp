@@ -8,12 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "model_inside.h"
-
-extern "C" {
 #include "bytes.h"
 #include "finger_memory.h"
-}
+#include "model_inside.h"
 
 using test_finger::Finger;
 using test_finger::joints;
@@ -81,7 +78,9 @@ TEST(DetectionKeys, AllOfThemActInTheMotion) {
   EXPECT_GT(largest(o.misfit) + largest(o.tip_std), 0.0);
   EXPECT_GT(std::count(o.link.begin(), o.link.end(), 0), 1000);
   EXPECT_GT(*std::max_element(o.link.begin(), o.link.end()), 0);
-  for (const double deviation : o.deviation) ASSERT_GE(deviation, 0.002);
+  for (const double deviation : o.deviation) {
+    ASSERT_GE(deviation, 0.002);
+  }
 }
 
 TEST(DetectionKeys, AllKernelsGiveTheSameBits) {
@@ -93,7 +92,9 @@ TEST(DetectionKeys, AllKernelsGiveTheSameBits) {
     int compared = 0;
     for (const char* name : {"sse2", "avx2", "auto"}) {
       Finger other(image());
-      if (tendonfmu_set_kernel(other, name) != TENDONFMU_OK) continue;
+      if (tendonfmu_set_kernel(other, name) != TENDONFMU_OK) {
+        continue;
+      }
       tendonfmu_set_kinematics_source(other, source);
       EXPECT_TRUE(run(other) == expected) << name << ", source " << source;
       EXPECT_EQ(other.saved(), plain.saved()) << name;
@@ -108,8 +109,12 @@ std::vector<std::size_t> cuts() {
   const Outputs& o = whole_run();
   std::vector<std::size_t> at = {1, 1300, samples - 1};
   for (std::size_t k = 1; k < samples; ++k) {
-    if (o.contact[k] && !o.contact[k - 1]) at.push_back(k + 3);
-    if (!o.contact[k] && o.contact[k - 1]) at.push_back(k - 5);
+    if (o.contact[k] && !o.contact[k - 1]) {
+      at.push_back(k + 3);
+    }
+    if (!o.contact[k] && o.contact[k - 1]) {
+      at.push_back(k - 5);
+    }
   }
   return at;
 }
@@ -155,7 +160,9 @@ TEST(DetectionKeys, ResetGivesTheFingerOfTheImage) {
 TEST(DetectionKeys, ReleaseTimeWrittenInContactCountsFromItsBeginning) {
   const Outputs& o = whole_run();
   std::size_t start = 1;
-  while (start + 60 < samples && !(o.contact[start] && o.contact[start + 59] && !o.contact[start - 1])) ++start;
+  while (start + 60 < samples && !(o.contact[start] && o.contact[start + 59] && !o.contact[start - 1])) {
+    ++start;
+  }
   ASSERT_LT(start + 60, samples);
   Finger finger(image());
   run(finger, 0, start + 40);
@@ -227,7 +234,9 @@ TEST(DetectionKeys, NoVarianceOverflows) {
     const tendonfmu_outputs view = o.view();
     ASSERT_EQ(tendonfmu_get_outputs(finger, &view), TENDONFMU_OK);
     for (const auto* row : {&o.compensated, &o.deviation, &o.jump, &o.stuck, &o.tip_force, &o.tip_std, &o.misfit}) {
-      for (const double x : *row) ASSERT_TRUE(std::isfinite(x)) << exponent;
+      for (const double x : *row) {
+        ASSERT_TRUE(std::isfinite(x)) << exponent;
+      }
     }
     const auto bytes = finger.saved();
     EXPECT_EQ(tendonfmu_restore_state(finger, bytes.data(), bytes.size()), TENDONFMU_OK) << exponent;
@@ -322,7 +331,9 @@ TEST(DetectionKeys, OptionBitsFlippedAreRefusedWhereNumbersDoNotFit) {
     tendonfmu_finger* finger = tendonfmu_create(damaged.data(), damaged.size(), nullptr, 0);
     const bool only_a_word = bit == 4 || bit == 5 || bit == 22; /* forgetting, entry_load, stuck_presliding */
     EXPECT_EQ(finger != nullptr, only_a_word) << bit;
-    if (finger) run(finger, 0, 1500);
+    if (finger) {
+      run(finger, 0, 1500);
+    }
     tendonfmu_destroy(finger);
   }
 }

@@ -12,9 +12,7 @@
 
 #include "model_inside.h"
 
-extern "C" {
 #include "floating_point.h"
-}
 
 namespace {
 
@@ -344,7 +342,9 @@ TEST(Torque, IsLinearInItsNumbers) {
   before.first = 1;
   before.velocity = {0.1, 0.4, -0.3};
   for (Effect& effect : all_torques()) {
-    if (effect.type->by_parameter) continue;
+    if (effect.type->by_parameter) {
+      continue;
+    }
     effect.accept(before);
     const std::vector<double> after = effect.advanced(Sample{});
     PerJoint sum{};

@@ -44,7 +44,9 @@ TEST(Exponential, EndsAtTheEndsOfItsRange) {
     EXPECT_GE(exponential(x), 0.0) << x;
     EXPECT_LE(exponential(x), 3.4e-308) << x;
   }
-  for (const double x : {708.1, 709.0, 1e4, 1e300, HUGE_VAL}) EXPECT_EQ(exponential(x), exponential(708.0)) << x;
+  for (const double x : {708.1, 709.0, 1e4, 1e300, HUGE_VAL}) {
+    EXPECT_EQ(exponential(x), exponential(708.0)) << x;
+  }
   EXPECT_TRUE(std::isnan(exponential(std::numeric_limits<double>::quiet_NaN())));
 }
 

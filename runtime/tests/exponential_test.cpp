@@ -8,12 +8,9 @@
 #include <random>
 #include <vector>
 
-#include "test_finger.h"
-
-extern "C" {
 #include "exponential_kernels.h"
 #include "friction_law.h"
-}
+#include "test_finger.h"
 
 namespace {
 
@@ -33,15 +30,23 @@ std::vector<Four> arguments(int count) {
                            709.0,         745.0,
                            1e300,         HUGE_VAL,
                            std::log(2.0), 0.5 * std::log(2.0)};
-  for (int i = 0; i < count; ++i) x.push_back(std::uniform_real_distribution<>(0.0, 2.0)(random));
-  for (int i = 0; i < count; ++i) x.push_back(std::uniform_real_distribution<>(0.0, 708.0)(random));
-  for (int i = 0; i < count / 2; ++i) x.push_back(std::exp2(std::uniform_real_distribution<>(-60.0, 9.4)(random)));
+  for (int i = 0; i < count; ++i) {
+    x.push_back(std::uniform_real_distribution<>(0.0, 2.0)(random));
+  }
+  for (int i = 0; i < count; ++i) {
+    x.push_back(std::uniform_real_distribution<>(0.0, 708.0)(random));
+  }
+  for (int i = 0; i < count / 2; ++i) {
+    x.push_back(std::exp2(std::uniform_real_distribution<>(-60.0, 9.4)(random)));
+  }
   for (int k = 0; k < 1021; ++k) {
     for (int i = 0; i < 100; ++i) {
       x.push_back((k + 0.5 + 1e-6 * std::uniform_real_distribution<>(-1.0, 1.0)(random)) * std::log(2.0));
     }
   }
-  while (x.size() % 4) x.push_back(1.0);
+  while (x.size() % 4) {
+    x.push_back(1.0);
+  }
   std::vector<Four> quads(x.size() / 4);
   std::memcpy(quads.data(), x.data(), x.size() * sizeof(double));
   return quads;
@@ -64,7 +69,9 @@ TEST(Exponential, IsWithinOneAndAHalfUlp) {
   double worst = 0.0, worst_argument = 0.0;
   for (std::size_t i = 0; i < 4 * x.size(); ++i) {
     const double argument = x[i / 4].lane[i % 4];
-    if (argument > 708.0) continue;
+    if (argument > 708.0) {
+      continue;
+    }
     const long double exact = expl(-static_cast<long double>(argument));
     const double error = static_cast<double>(fabsl(y[i / 4].lane[i % 4] - exact)) / ulp(static_cast<double>(exact));
     if (error > worst) {
@@ -129,7 +136,9 @@ TEST(ExponentialKernels, OneLaneIsTheScalarFunction) {
 }
 
 TEST(ExponentialKernels, Sse2HasTheBitsOfPlain) {
-  if (!runs_here("sse2")) GTEST_SKIP() << "this machine has no sse2 kernel";
+  if (!runs_here("sse2")) {
+    GTEST_SKIP() << "this machine has no sse2 kernel";
+  }
 #if defined(__x86_64__) || defined(_M_X64)
   const std::vector<Four> x = arguments(100000);
   expect_same_bits(results(exponential_sse2, x), results(exponential_plain, x));
@@ -137,7 +146,9 @@ TEST(ExponentialKernels, Sse2HasTheBitsOfPlain) {
 }
 
 TEST(ExponentialKernels, Avx2HasTheBitsOfPlain) {
-  if (!runs_here("avx2")) GTEST_SKIP() << "this machine has no avx2 kernel";
+  if (!runs_here("avx2")) {
+    GTEST_SKIP() << "this machine has no avx2 kernel";
+  }
 #if defined(__x86_64__) || defined(_M_X64)
   const std::vector<Four> x = arguments(100000);
   expect_same_bits(results(exponential_avx2, x), results(exponential_plain, x));

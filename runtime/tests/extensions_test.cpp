@@ -10,12 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "test_finger.h"
-
-extern "C" {
 #include "bytes.h"
 #include "extension_signals.h"
-}
+#include "test_finger.h"
 
 namespace {
 
@@ -151,7 +148,9 @@ TEST(Memory, FromOutsideMayHoldAnyFiniteNumber) {
 TEST(RefusedSample, LeavesEverything) {
   const auto image = test_finger::image(test_finger::every_effect());
   Motion motion(700);
-  for (double& t : motion.time) t -= motion.time[400];  // sample 400 at time 0
+  for (double& t : motion.time) {
+    t -= motion.time[400];  // sample 400 at time 0
+  }
   for (int source = 1; source <= 3; ++source) {
     SCOPED_TRACE(source);
     Finger disturbed(image), quiet(image);

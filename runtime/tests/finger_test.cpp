@@ -60,7 +60,9 @@ TEST(Finger, AllKernelsGiveTheSameBits) {
     int compared = 0;
     for (const char* name : {"sse2", "avx2", "auto"}) {
       Finger other;
-      if (tendonfmu_set_kernel(other, name) != TENDONFMU_OK) continue;
+      if (tendonfmu_set_kernel(other, name) != TENDONFMU_OK) {
+        continue;
+      }
       tendonfmu_set_kinematics_source(other, source);
       EXPECT_TRUE(run(other) == expected) << name << ", source " << source;
       EXPECT_EQ(other.saved(), plain.saved()) << name;

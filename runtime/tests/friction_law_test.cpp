@@ -4,9 +4,7 @@
 #include <cmath>
 #include <random>
 
-extern "C" {
 #include "friction_law.h"
-}
 
 namespace {
 
@@ -67,7 +65,9 @@ TEST(FrictionLaw, NeverDrives) {
 
 TEST(FrictionLaw, WithoutStribeckEffectIsFreeOfTheExponential) {
   const Side side(0.02, 0.02, 1e-300, 0.1);
-  for (const double v : {0.0, 1e-12, 1e-3, 10.0}) EXPECT_EQ(side.at(v).value, 0.02 + 0.1 * v);
+  for (const double v : {0.0, 1e-12, 1e-3, 10.0}) {
+    EXPECT_EQ(side.at(v).value, 0.02 + 0.1 * v);
+  }
 }
 
 TEST(FrictionLaw, StaysFiniteAtTheSmallestStribeckVelocity) {
@@ -90,7 +90,9 @@ TEST(FrictionLaw, SlopesAreThoseOfCentralDifferences) {
     const double h = 1e-5, tolerance = 3e-7;
     const auto difference = [&](int number, double sign_of_drop) {
       double up[LAW_SIDE_NUMBERS], down[LAW_SIDE_NUMBERS];
-      for (int k = 0; k < LAW_SIDE_NUMBERS; ++k) up[k] = down[k] = side[k];
+      for (int k = 0; k < LAW_SIDE_NUMBERS; ++k) {
+        up[k] = down[k] = side[k];
+      }
       up[number] += h;
       down[number] -= h;
       up[LAW_DROP] += sign_of_drop * h;

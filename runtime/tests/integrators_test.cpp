@@ -19,7 +19,9 @@ struct Case {
 
   explicit Case(const Json& text) : numbers(test_plant::read(text)) {
     now.state.assign(numbers.order(), 0.0);
-    for (std::size_t j = 0; j < numbers.joint_count(); ++j) now.state[j] = numbers.motion[j].position.front();
+    for (std::size_t j = 0; j < numbers.joint_count(); ++j) {
+      now.state[j] = numbers.motion[j].position.front();
+    }
     equations.command_motors(0.0, inputs, now.state.data() + equations.layout().motor());
     now.modes = equations.modes_at(now.state.data());
   }
@@ -28,7 +30,9 @@ struct Case {
 
 double largest_difference(const std::vector<double>& a, const std::vector<double>& b, std::size_t count) {
   double most = 0.0;
-  for (std::size_t k = 0; k < count; ++k) most = std::max(most, std::fabs(a[k] - b[k]));
+  for (std::size_t k = 0; k < count; ++k) {
+    most = std::max(most, std::fabs(a[k] - b[k]));
+  }
   return most;
 }
 
@@ -73,8 +77,10 @@ TEST(Cvode, SeesATendonThatStartsWithoutTension) {
   const std::size_t motor = one.equations.layout().motor();
   one.inputs.scheduled_motion = false;
   one.inputs.given = true;
-  for (std::size_t i = 0; i < 2; ++i) one.now.state[motor + i] = one.inputs.command[i] = 0.0;  // elongation 0, both
-  one.now.modes = {};                                                                          // taut, by its sign
+  for (std::size_t i = 0; i < 2; ++i) {
+    one.now.state[motor + i] = one.inputs.command[i] = 0.0;  // elongation 0, both
+  }
+  one.now.modes = {};  // taut, by its sign
   one.inputs.push.force = {0, 0, 1.0};
   one.inputs.push.point = {0.04, 0, 0};
   one.cvode()->advance(one.inputs, 0.01, &one.now);
@@ -117,7 +123,9 @@ TEST(Cvode, TakesTheSmallestOfSteps) {
     double time = start;
     for (int k = 0; k < 20; ++k) {
       time = std::nextafter(time, 1.0);
-      if (k % 3 == 0) with->forget();
+      if (k % 3 == 0) {
+        with->forget();
+      }
       ASSERT_NO_THROW(with->advance(one.inputs, time, &one.now)) << time << " of " << start;
       EXPECT_EQ(one.now.time, time);
     }
@@ -210,7 +218,9 @@ TEST(FixedSteps, TakeTheSmallestOfSteps) {
     for (int k = 0; k < 5; ++k) {
       time = std::nextafter(time, 1.0);
       ASSERT_NO_THROW(with.advance(one.inputs, time, &one.now)) << time;
-      for (const double x : one.now.state) ASSERT_TRUE(std::isfinite(x)) << time;
+      for (const double x : one.now.state) {
+        ASSERT_TRUE(std::isfinite(x)) << time;
+      }
     }
   }
 }

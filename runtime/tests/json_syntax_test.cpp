@@ -12,7 +12,9 @@ std::string refusal(const std::string& text) {
   const Reading reading = read(text);
   EXPECT_EQ(reading.status, TENDONFMU_BAD_IMAGE);
   EXPECT_EQ(reading.message.find('\n'), std::string::npos);
-  for (const char c : reading.message) EXPECT_GE(static_cast<unsigned char>(c), 0x20u) << reading.message;
+  for (const char c : reading.message) {
+    EXPECT_GE(static_cast<unsigned char>(c), 0x20u) << reading.message;
+  }
   return reading.message;
 }
 
@@ -35,7 +37,9 @@ TEST(JsonSyntax, ErrorsSayWhatIsWrong) {
 
 TEST(JsonSyntax, EveryBeginningOfADescriptionIsRefused) {
   const std::string text = small_finger().dump();
-  for (std::size_t size = 0; size < text.size(); ++size) expect_start(text.substr(0, size), "JSON, line 1, column ");
+  for (std::size_t size = 0; size < text.size(); ++size) {
+    expect_start(text.substr(0, size), "JSON, line 1, column ");
+  }
 }
 
 TEST(JsonSyntax, NumbersThatAreNotFiniteAreRefused) {
@@ -80,7 +84,9 @@ TEST(JsonSyntax, DeepNestingIsRefusedWhateverItsDepth) {
   for (const std::size_t depth : {33u, 1000u, 1000000u}) {
     expect_start(std::string(depth, '['), "JSON nested too deeply: expected at most 32 levels");
     std::string objects;
-    for (std::size_t i = 0; i < depth; ++i) objects += "{\"a\":";
+    for (std::size_t i = 0; i < depth; ++i) {
+      objects += "{\"a\":";
+    }
     expect_start(objects, "JSON nested too deeply: expected at most 32 levels");
   }
   expect_start(std::string(32, '[') + std::string(32, ']'), "description = [...]: expected an object");
@@ -107,7 +113,9 @@ TEST(JsonSyntax, NumbersAreReadTheSameInEveryLocale) {
   int tried = 0;
   for (const char* name : {"de_DE.UTF-8", "de_DE.utf8", "fr_FR.UTF-8", "fa_IR.UTF-8"}) {
     const locale_t locale = newlocale(LC_ALL_MASK, name, nullptr);
-    if (!locale) continue;
+    if (!locale) {
+      continue;
+    }
     const locale_t before = uselocale(locale);
     const Reading reading = read(text);
     uselocale(before);
@@ -115,7 +123,9 @@ TEST(JsonSyntax, NumbersAreReadTheSameInEveryLocale) {
     EXPECT_EQ(reading.image, expected.image) << name;
     ++tried;
   }
-  if (!tried) GTEST_SKIP() << "no locale with a decimal comma is installed";
+  if (!tried) {
+    GTEST_SKIP() << "no locale with a decimal comma is installed";
+  }
 }
 
 }  // namespace

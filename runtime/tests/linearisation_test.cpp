@@ -39,10 +39,16 @@ struct Case {
       state[at.speed() + j] = pace * between(-1.0, 1.0);
     }
     scheduled_motors();
-    for (std::size_t i = 0; i < at.tendons; ++i) state[at.motor_speed() + i] = 0.02 * between(-1.0, 1.0);
-    for (std::size_t s = 0; s < at.bristles; ++s) state[at.bristle() + s] = between(-0.9, 0.9);
+    for (std::size_t i = 0; i < at.tendons; ++i) {
+      state[at.motor_speed() + i] = 0.02 * between(-1.0, 1.0);
+    }
+    for (std::size_t s = 0; s < at.bristles; ++s) {
+      state[at.bristle() + s] = between(-0.9, 0.9);
+    }
     state[at.heat()] = between(0.0, 2.0);
-    for (std::size_t k = at.motor_work(); k < at.size(); ++k) state[k] = between(-1.0, 1.0);
+    for (std::size_t k = at.motor_work(); k < at.size(); ++k) {
+      state[k] = between(-1.0, 1.0);
+    }
   }
 
   /* Motors where the tendons pull with -2..20 N, none on the kink at 0. */
@@ -52,7 +58,9 @@ struct Case {
     equations.roots(state.data(), root);
     for (std::size_t i = 0; i < at.tendons; ++i) {
       double force = between(-2.0, 20.0);
-      if (std::fabs(force) < 0.2) force = 1.0;
+      if (std::fabs(force) < 0.2) {
+        force = 1.0;
+      }
       state[at.motor() + i] += force / numbers.tendons[i].stiffness - root[i];
     }
   }
@@ -93,7 +101,9 @@ TEST(Linearisation, SolvesAsTheDenseMatrixDoes) {
       // backward error: what is left of the right side, beside what went into it
       const Eigen::VectorXd left = newton * found - right;
       const Eigen::VectorXd weight = newton.cwiseAbs() * found.cwiseAbs() + right.cwiseAbs();
-      for (Eigen::Index k = 0; k < size; ++k) EXPECT_LT(std::fabs(left[k]), 1e-10 * weight[k]) << k << " " << gamma;
+      for (Eigen::Index k = 0; k < size; ++k) {
+        EXPECT_LT(std::fabs(left[k]), 1e-10 * weight[k]) << k << " " << gamma;
+      }
     }
   }
 }
@@ -110,7 +120,9 @@ TEST(Linearisation, SolvesForSpeedsAlone) {
       blocks.take(one.equations, one.state.data(), one.inputs, rigid_slopes::exact);
       ASSERT_TRUE(blocks.factor(std::pow(10.0, one.between(-6.0, -3.0))));
       Eigen::VectorXd all = Eigen::VectorXd::Zero(size), speeds(n);
-      for (Eigen::Index j = 0; j < n; ++j) all[n + j] = speeds[j] = one.between(-1.0, 1.0);
+      for (Eigen::Index j = 0; j < n; ++j) {
+        all[n + j] = speeds[j] = one.between(-1.0, 1.0);
+      }
       blocks.solve(all.data());
       blocks.solve_speeds(speeds.data());
       EXPECT_LT((all.segment(n, n) - speeds).norm(), 1e-12 * speeds.norm());

@@ -7,9 +7,7 @@
 #include <limits>
 #include <string>
 
-extern "C" {
 #include "message.h"
-}
 
 namespace {
 
@@ -83,7 +81,9 @@ TEST(MessageNumber, HasADecimalPointInEveryLocale) {
   int tried = 0;
   for (const char* name : {"de_DE.UTF-8", "de_DE.utf8", "fr_FR.UTF-8", "fa_IR.UTF-8", "ps_AF.UTF-8"}) {
     const locale_t locale = newlocale(LC_ALL_MASK, name, nullptr);
-    if (!locale) continue;
+    if (!locale) {
+      continue;
+    }
     const locale_t before = uselocale(locale);
     const std::string text = number(0.125), small = number(1.0 / 3.0);
     uselocale(before);
@@ -92,7 +92,9 @@ TEST(MessageNumber, HasADecimalPointInEveryLocale) {
     EXPECT_EQ(small, number(1.0 / 3.0)) << name;
     ++tried;
   }
-  if (!tried) GTEST_SKIP() << "no locale with a decimal comma is installed";
+  if (!tried) {
+    GTEST_SKIP() << "no locale with a decimal comma is installed";
+  }
 }
 
 }  // namespace

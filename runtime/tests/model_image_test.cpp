@@ -14,7 +14,9 @@ bool is_refused(const std::vector<unsigned char>& image, std::string* reason = n
   const bool refused = tendonfmu_check_image(image.data(), image.size(), message, sizeof message) != TENDONFMU_OK;
   EXPECT_EQ(refused, std::strlen(message) > 0);
   EXPECT_EQ(refused, tendonfmu_memory_size(image.data(), image.size()) == 0);
-  if (reason) *reason = message;
+  if (reason) {
+    *reason = message;
+  }
   return refused;
 }
 
@@ -118,7 +120,9 @@ TEST(DamagedImage, ResealedIsRefusedOrASoundFinger) {
     tendonfmu_destroy(finger);
   };
   for (std::size_t byte = 32; byte < image.size(); ++byte) {
-    for (const int value : {0, 1, 2, 3, 4, 127, 128, 255}) attempt(byte, static_cast<unsigned char>(value));
+    for (const int value : {0, 1, 2, 3, 4, 127, 128, 255}) {
+      attempt(byte, static_cast<unsigned char>(value));
+    }
   }
   EXPECT_GT(accepted, 100);
   EXPECT_GT(refused, 100);

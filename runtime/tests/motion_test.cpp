@@ -32,9 +32,15 @@ TEST(Knots, PassThroughPositionVelocityAndAcceleration) {
 
 TEST(Knots, AreConstantOutside) {
   const knots two = {{1.0, 2.0}, {0.1, 0.4}, {5.0, 5.0}, {0.0, 0.0}}, one = {{0.0}, {7.0}, {0.0}, {0.0}};
-  for (const double time : {-HUGE_VAL, -1.0, 0.0, std::nextafter(1.0, 0.0)}) EXPECT_EQ(at_time(two, time), 0.1);
-  for (const double time : {std::nextafter(2.0, 3.0), 1e300, HUGE_VAL}) EXPECT_EQ(at_time(two, time), 0.4);
-  for (const double time : {-1.0, 0.0, 1.0}) EXPECT_EQ(at_time(one, time), 7.0);
+  for (const double time : {-HUGE_VAL, -1.0, 0.0, std::nextafter(1.0, 0.0)}) {
+    EXPECT_EQ(at_time(two, time), 0.1);
+  }
+  for (const double time : {std::nextafter(2.0, 3.0), 1e300, HUGE_VAL}) {
+    EXPECT_EQ(at_time(two, time), 0.4);
+  }
+  for (const double time : {-1.0, 0.0, 1.0}) {
+    EXPECT_EQ(at_time(one, time), 7.0);
+  }
 }
 
 // A polynomial of degree 5 is its own interpolation.
@@ -43,7 +49,9 @@ TEST(Knots, AreExactForDegreeFive) {
   const auto v = [](double t) { return 2.0 + t * (-2.0 + t * (1.5 + t * (-1.2 + t * 0.5))); };
   const auto a = [](double t) { return -2.0 + t * (3.0 + t * (-3.6 + t * 2.0)); };
   const knots two = {{0.2, 1.7}, {p(0.2), p(1.7)}, {v(0.2), v(1.7)}, {a(0.2), a(1.7)}};
-  for (double t = 0.2; t < 1.7; t += 0.1) EXPECT_NEAR(at_time(two, t), p(t), 1e-14) << t;
+  for (double t = 0.2; t < 1.7; t += 0.1) {
+    EXPECT_NEAR(at_time(two, t), p(t), 1e-14) << t;
+  }
 }
 
 TEST(MomentArm, IsTheSlopeOfThePath) {
@@ -101,7 +109,9 @@ TEST(Push, RisesHoldsAndFalls) {
   one.start = 1.0, one.rise = 0.2, one.hold = 0.5, one.fall = 0.4, one.force = 3.0;
   const std::pair<double, double> profile[] = {{0.0, 0.0}, {1.0, 0.0}, {1.1, 1.5}, {1.2, 3.0}, {1.5, 3.0},
                                                {1.7, 3.0}, {1.9, 1.5}, {2.1, 0.0}, {9.0, 0.0}};
-  for (const auto& [time, force] : profile) EXPECT_NEAR(push_strength(one, time), force, 1e-9) << time;
+  for (const auto& [time, force] : profile) {
+    EXPECT_NEAR(push_strength(one, time), force, 1e-9) << time;
+  }
   one.hold = 0.0;
   EXPECT_NEAR(push_strength(one, 1.2), 3.0, 1e-9);
 }

@@ -40,7 +40,9 @@ TEST(PlantCalls, TakeNoPlant) {
       tendonfmu_plant_derivative(nullptr, 0.0, &number, &number, nullptr),
       tendonfmu_plant_get_continuous_state(nullptr, &number),
   };
-  for (const tendonfmu_plant_status each : all) EXPECT_EQ(each, TENDONFMU_PLANT_BAD_ARGUMENT);
+  for (const tendonfmu_plant_status each : all) {
+    EXPECT_EQ(each, TENDONFMU_PLANT_BAD_ARGUMENT);
+  }
   EXPECT_EQ(done, 0u);
 }
 
@@ -114,7 +116,9 @@ TEST(PlantCalls, TakeTheLargestFinger) {
   for (Json& tendon : rig["finger"]["tendons"]) {
     for (int j = 0; j < 16; ++j) {
       tendon["edge_friction"].push_back(law);
-      if (j < 15) tendon["pulley_friction"].push_back(law);
+      if (j < 15) {
+        tendon["pulley_friction"].push_back(law);
+      }
     }
   }
   for (Json& joint : rig["finger"]["joints"]) {
@@ -138,7 +142,9 @@ TEST(PlantCalls, TakeTheLargestFinger) {
     // what matters is that nothing is written beside its place: this many links need not come to rest
     const tendonfmu_plant_status started = tendonfmu_plant_initialise(one);
     ASSERT_TRUE(started == TENDONFMU_PLANT_OK || started == TENDONFMU_PLANT_SOLVER);
-    if (started != TENDONFMU_PLANT_OK) continue;
+    if (started != TENDONFMU_PLANT_OK) {
+      continue;
+    }
     EXPECT_EQ(tendonfmu_plant_advance(one, 0.002), TENDONFMU_PLANT_OK) << one.error();
     Signals signals(one);
     EXPECT_EQ(tendonfmu_plant_get_signals(one, &signals.view), TENDONFMU_PLANT_OK);

@@ -64,7 +64,9 @@ TEST_P(PlantOf, TwoRestoresAreTheSameToTheBit) {
   EXPECT_TRUE(same(past, fresh));
   EXPECT_TRUE(same(past, again));
   const std::vector<double> straight = one.state(), restored = past.state();
-  for (std::size_t j = 0; j < one.joints(); ++j) EXPECT_NEAR(restored[j], straight[j], 1e-4);
+  for (std::size_t j = 0; j < one.joints(); ++j) {
+    EXPECT_NEAR(restored[j], straight[j], 1e-4);
+  }
   ASSERT_EQ(one.restore(saved), TENDONFMU_PLANT_OK);
   ASSERT_EQ(tendonfmu_plant_advance(one, 0.4), TENDONFMU_PLANT_OK);
   EXPECT_TRUE(same(one, past));
@@ -116,7 +118,9 @@ TEST_P(PlantOf, StatesOfOtherRigsAndSettingsAreRefused) {
   EXPECT_EQ(other.error(), "state: of another rig");
 
   tendonfmu_plant_settings changed[6];
-  for (auto& each : changed) each = one.settings();
+  for (auto& each : changed) {
+    each = one.settings();
+  }
   changed[0].relative_tolerance *= 2;
   changed[1].step *= 2;
   changed[2].seed += 1;
@@ -166,7 +170,9 @@ TEST_P(PlantOf, FailedAdvanceLeavesEverythingAsItWas) {
   push(untouched, 0.1);  // begins anew as well
   push(untouched, 0.0);
   EXPECT_EQ(one.saved(), before);
-  for (Plant* each : {&one, &untouched}) ASSERT_EQ(tendonfmu_plant_advance(*each, 0.05), TENDONFMU_PLANT_OK);
+  for (Plant* each : {&one, &untouched}) {
+    ASSERT_EQ(tendonfmu_plant_advance(*each, 0.05), TENDONFMU_PLANT_OK);
+  }
   EXPECT_TRUE(same(one, untouched));
 }
 
@@ -185,7 +191,9 @@ TEST_P(PlantOf, RunIsAdvanceAndGetSignals) {
     ASSERT_EQ(tendonfmu_plant_get_signals(other, &row.view), TENDONFMU_PLANT_OK);
     for (std::size_t a = 0; a < row.real.size(); ++a) {
       const std::size_t size = row.real[a].size();
-      for (std::size_t i = 0; i < size; ++i) EXPECT_EQ(table.real[a][k * size + i], row.real[a][i]) << a;
+      for (std::size_t i = 0; i < size; ++i) {
+        EXPECT_EQ(table.real[a][k * size + i], row.real[a][i]) << a;
+      }
     }
     EXPECT_EQ(table.contact[k], row.contact[0]);
   }
@@ -233,7 +241,9 @@ TEST_P(PlantOf, TimesNextToEachOtherAreTimes) {
     time = std::nextafter(time, 1.0);
     ASSERT_EQ(tendonfmu_plant_advance(one, time), TENDONFMU_PLANT_OK) << next << ": " << one.error();
     EXPECT_EQ(one.time(), time);
-    for (const double x : one.state()) ASSERT_TRUE(std::isfinite(x)) << next;
+    for (const double x : one.state()) {
+      ASSERT_TRUE(std::isfinite(x)) << next;
+    }
   }
 }
 
@@ -323,7 +333,9 @@ TEST_P(PlantOf, ResetBeginsAgain) {
   EXPECT_EQ(one.time(), 0.0);
   ASSERT_EQ(tendonfmu_plant_initialise(one), TENDONFMU_PLANT_OK);
   start(fresh);
-  for (Plant* each : {&one, &fresh}) ASSERT_EQ(tendonfmu_plant_advance(*each, 0.05), TENDONFMU_PLANT_OK);
+  for (Plant* each : {&one, &fresh}) {
+    ASSERT_EQ(tendonfmu_plant_advance(*each, 0.05), TENDONFMU_PLANT_OK);
+  }
   EXPECT_TRUE(same(one, fresh));
 }
 
@@ -349,8 +361,12 @@ TEST(Plant, DerivativeWantsFiniteTimeAndState) {
   std::vector<double> derivative(order), jacobian(order * order);
   const std::vector<double> state = one.state();
   ASSERT_EQ(tendonfmu_plant_derivative(one, 0.0, state.data(), derivative.data(), jacobian.data()), TENDONFMU_PLANT_OK);
-  for (const double x : derivative) EXPECT_TRUE(std::isfinite(x));
-  for (const double x : jacobian) EXPECT_TRUE(std::isfinite(x));
+  for (const double x : derivative) {
+    EXPECT_TRUE(std::isfinite(x));
+  }
+  for (const double x : jacobian) {
+    EXPECT_TRUE(std::isfinite(x));
+  }
   for (const double bad : {nan, HUGE_VAL, -HUGE_VAL}) {
     EXPECT_EQ(tendonfmu_plant_derivative(one, bad, state.data(), derivative.data(), nullptr),
               TENDONFMU_PLANT_BAD_ARGUMENT);

@@ -6,9 +6,7 @@
 #include <random>
 #include <vector>
 
-extern "C" {
 #include "pseudo_inverse.h"
-}
 
 namespace {
 
@@ -22,7 +20,9 @@ struct Matrix {
   double operator()(std::size_t i, std::size_t j) const { return a[i * columns + j]; }
   double largest() const {
     double most = 0.0;
-    for (const double x : a) most = std::max(most, std::abs(x));
+    for (const double x : a) {
+      most = std::max(most, std::abs(x));
+    }
     return most;
   }
 };
@@ -31,7 +31,9 @@ Matrix operator*(const Matrix& a, const Matrix& b) {
   Matrix c(a.rows, b.columns);
   for (std::size_t i = 0; i < a.rows; ++i) {
     for (std::size_t j = 0; j < b.columns; ++j) {
-      for (std::size_t k = 0; k < a.columns; ++k) c(i, j) += a(i, k) * b(k, j);
+      for (std::size_t k = 0; k < a.columns; ++k) {
+        c(i, j) += a(i, k) * b(k, j);
+      }
     }
   }
   return c;
@@ -40,7 +42,9 @@ Matrix operator*(const Matrix& a, const Matrix& b) {
 Matrix transposed(const Matrix& a) {
   Matrix t(a.columns, a.rows);
   for (std::size_t i = 0; i < a.rows; ++i) {
-    for (std::size_t j = 0; j < a.columns; ++j) t(j, i) = a(i, j);
+    for (std::size_t j = 0; j < a.columns; ++j) {
+      t(j, i) = a(i, j);
+    }
   }
   return t;
 }
@@ -48,19 +52,25 @@ Matrix transposed(const Matrix& a) {
 Matrix inverse(const Matrix& a, std::size_t* rank = nullptr) {
   Matrix b(a.columns, a.rows);
   const std::size_t found = pseudo_inverse(a.rows, a.columns, a.a.data(), b.a.data());
-  if (rank) *rank = found;
+  if (rank) {
+    *rank = found;
+  }
   return b;
 }
 
 double distance(const Matrix& a, const Matrix& b) {
   double most = 0.0;
-  for (std::size_t i = 0; i < a.a.size(); ++i) most = std::max(most, std::abs(a.a[i] - b.a[i]));
+  for (std::size_t i = 0; i < a.a.size(); ++i) {
+    most = std::max(most, std::abs(a.a[i] - b.a[i]));
+  }
   return most;
 }
 
 Matrix random_matrix(std::size_t rows, std::size_t columns, std::mt19937_64& random) {
   Matrix a(rows, columns);
-  for (double& x : a.a) x = std::normal_distribution<>()(random);
+  for (double& x : a.a) {
+    x = std::normal_distribution<>()(random);
+  }
   return a;
 }
 
@@ -112,9 +122,13 @@ TEST(PseudoInverse, IsIndifferentToUnits) {
   for (const double unit : {1e-9, 1e-3, 1e3}) {
     Matrix a = random_matrix(8, 4, random);
     const Matrix expected = inverse(a);
-    for (double& x : a.a) x *= unit;
+    for (double& x : a.a) {
+      x *= unit;
+    }
     Matrix b = inverse(a);
-    for (double& x : b.a) x *= unit;
+    for (double& x : b.a) {
+      x *= unit;
+    }
     EXPECT_LT(distance(b, expected), 1e-13 * expected.largest());
   }
 }
@@ -126,13 +140,17 @@ TEST(PseudoInverse, OfColumnsOfDifferentScaleStaysAccurate) {
   const double scale[3] = {1.0, 1e-5, 1e-10};
   Matrix scaled = a;
   for (std::size_t i = 0; i < 12; ++i) {
-    for (std::size_t j = 0; j < 3; ++j) scaled(i, j) *= scale[j];
+    for (std::size_t j = 0; j < 3; ++j) {
+      scaled(i, j) *= scale[j];
+    }
   }
   std::size_t rank = 0;
   const Matrix c = inverse(scaled, &rank);
   EXPECT_EQ(rank, 3u);
   for (std::size_t j = 0; j < 3; ++j) {
-    for (std::size_t i = 0; i < 12; ++i) EXPECT_NEAR(c(j, i) * scale[j], b(j, i), 1e-12 * b.largest());
+    for (std::size_t i = 0; i < 12; ++i) {
+      EXPECT_NEAR(c(j, i) * scale[j], b(j, i), 1e-12 * b.largest());
+    }
   }
 }
 
@@ -140,13 +158,17 @@ TEST(PseudoInverse, OfAnIllConditionedMatrixStillMapsBack) {
   // Vandermonde matrix of 6 columns, condition about 1e5
   Matrix a(10, 6);
   for (std::size_t i = 0; i < 10; ++i) {
-    for (std::size_t j = 0; j < 6; ++j) a(i, j) = std::pow(0.1 * static_cast<double>(i + 1), static_cast<double>(j));
+    for (std::size_t j = 0; j < 6; ++j) {
+      a(i, j) = std::pow(0.1 * static_cast<double>(i + 1), static_cast<double>(j));
+    }
   }
   std::size_t rank = 0;
   const Matrix b = inverse(a, &rank);
   EXPECT_EQ(rank, 6u);
   Matrix identity(6, 6);
-  for (std::size_t j = 0; j < 6; ++j) identity(j, j) = 1.0;
+  for (std::size_t j = 0; j < 6; ++j) {
+    identity(j, j) = 1.0;
+  }
   EXPECT_LT(distance(b * a, identity), 1e-9);
   EXPECT_LT(distance(a * b * a, a), 1e-10);
 }
@@ -155,7 +177,9 @@ TEST(PseudoInverse, CountsExactlyDependentColumnsOut) {
   std::mt19937_64 random(14);
   for (int trial = 0; trial < 50; ++trial) {
     Matrix a = random_matrix(8, 4, random);
-    for (std::size_t i = 0; i < 8; ++i) a(i, 3) = 2.0 * a(i, 1); /* exact in binary */
+    for (std::size_t i = 0; i < 8; ++i) {
+      a(i, 3) = 2.0 * a(i, 1); /* exact in binary */
+    }
     std::size_t rank = 0;
     const Matrix b = inverse(a, &rank);
     EXPECT_EQ(rank, 3u);
@@ -166,8 +190,12 @@ TEST(PseudoInverse, CountsExactlyDependentColumnsOut) {
 TEST(PseudoInverse, OfATallProductOfLowRankKeepsPenrosesConditions) {
   std::mt19937_64 random(15);
   Matrix left = random_matrix(8, 2, random), right = random_matrix(2, 4, random);
-  for (double& x : left.a) x = std::round(4.0 * x); /* small integers: the product is exact */
-  for (double& x : right.a) x = std::round(4.0 * x);
+  for (double& x : left.a) {
+    x = std::round(4.0 * x); /* small integers: the product is exact */
+  }
+  for (double& x : right.a) {
+    x = std::round(4.0 * x);
+  }
   const Matrix a = left * right;
   expect_penrose(a, inverse(a), 1e-10);
 }

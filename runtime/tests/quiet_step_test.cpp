@@ -8,6 +8,7 @@
 #include <cstring>
 #include <vector>
 
+#include "allocation_count.h"
 #include "test_finger.h"
 
 #if defined(__linux__)
@@ -18,54 +19,9 @@
 #include <unistd.h>
 #endif
 
-#if defined(__has_feature)
-#if __has_feature(address_sanitizer)
-#define UNDER_SANITIZER 1
-#endif
-#endif
-#if defined(__SANITIZE_ADDRESS__)
-#define UNDER_SANITIZER 1
-#endif
-
 using test_finger::Finger;
 using test_finger::Motion;
 using test_finger::Outputs;
-
-namespace {
-[[maybe_unused]] long allocations =
-    0; /* calls of malloc, calloc, realloc, aligned_alloc and free since it was set to 0 */
-}
-
-#if defined(__GLIBC__) && !defined(UNDER_SANITIZER)
-#define COUNTS_ALLOCATIONS 1
-extern "C" {
-void* __libc_malloc(size_t);
-void* __libc_calloc(size_t, size_t);
-void* __libc_realloc(void*, size_t);
-void* __libc_memalign(size_t, size_t);
-void __libc_free(void*);
-void* malloc(size_t size) {
-  ++allocations;
-  return __libc_malloc(size);
-}
-void* calloc(size_t count, size_t size) {
-  ++allocations;
-  return __libc_calloc(count, size);
-}
-void* realloc(void* block, size_t size) {
-  ++allocations;
-  return __libc_realloc(block, size);
-}
-void* aligned_alloc(size_t alignment, size_t size) {
-  ++allocations;
-  return __libc_memalign(alignment, size);
-}
-void free(void* block) {
-  ++allocations;
-  __libc_free(block);
-}
-}
-#endif
 
 namespace {
 
@@ -120,7 +76,9 @@ TEST(QuietStep, AllocatesNothing) {
   for (int k = 0; k < 3 * FINGERS; ++k) {
     const char* const kernel = kernels[k / FINGERS];
     Finger finger(image_of(k % FINGERS));
-    if (tendonfmu_set_kernel(finger, kernel) != TENDONFMU_OK) continue;
+    if (tendonfmu_set_kernel(finger, kernel) != TENDONFMU_OK) {
+      continue;
+    }
     Outputs outputs(motion.time.size());
     std::vector<unsigned char> state(tendonfmu_state_size(finger));
     allocations = 0;
@@ -143,7 +101,9 @@ template <typename Action>
 int exit_status_without_system_calls(Action action) {
   const pid_t child = fork();
   if (child == 0) {
-    if (prctl(PR_SET_SECCOMP, SECCOMP_MODE_STRICT) != 0) _exit(77);
+    if (prctl(PR_SET_SECCOMP, SECCOMP_MODE_STRICT) != 0) {
+      _exit(77);
+    }
     const int result = action();
     syscall(SYS_exit, result);
   }
@@ -155,7 +115,9 @@ int exit_status_without_system_calls(Action action) {
 TEST(QuietStep, MakesNoSystemCall) {
   const Motion motion = failing_motion(20000);
   const int caught = exit_status_without_system_calls([] { return getppid() > 0 ? 0 : 1; });
-  if (caught == 77) GTEST_SKIP() << "SKIPPED: this kernel has no seccomp";
+  if (caught == 77) {
+    GTEST_SKIP() << "SKIPPED: this kernel has no seccomp";
+  }
   ASSERT_EQ(caught, -SIGKILL) << "a system call went unnoticed";
   for (int which = 0; which < FINGERS; ++which) {
     Finger finger(image_of(which));

@@ -21,12 +21,20 @@ std::string refusal(const Json& rig) {
 
 /* Pointers to all values of a document, those of the finger left out: the description's own tests judge it. */
 void collect(const Json& value, const std::string& pointer, std::vector<std::string>* all) {
-  if (pointer == "/finger" || pointer == "/recording") return;
-  if (!pointer.empty()) all->push_back(pointer);
+  if (pointer == "/finger" || pointer == "/recording") {
+    return;
+  }
+  if (!pointer.empty()) {
+    all->push_back(pointer);
+  }
   if (value.is_object()) {
-    for (auto item = value.begin(); item != value.end(); ++item) collect(*item, pointer + "/" + item.key(), all);
+    for (auto item = value.begin(); item != value.end(); ++item) {
+      collect(*item, pointer + "/" + item.key(), all);
+    }
   } else if (value.is_array()) {
-    for (std::size_t k = 0; k < value.size(); ++k) collect(value[k], pointer + "/" + std::to_string(k), all);
+    for (std::size_t k = 0; k < value.size(); ++k) {
+      collect(value[k], pointer + "/" + std::to_string(k), all);
+    }
   }
 }
 
@@ -67,17 +75,25 @@ TEST(RigReader, RefusesWrongTypesEverywhere) {
   ASSERT_GT(pointers.size(), 200u);
   const std::vector<Json> wrong = {"text", true, Json::object(), Json::array(), {{"x", 1}}, {1, 2}};
   for (const std::string& pointer : pointers) {
-    if (pointer == "/version") continue;  // for those who run the rig
+    if (pointer == "/version") {
+      continue;  // for those who run the rig
+    }
     for (const Json& value : wrong) {
       Json rig = test_plant::small();
       Json& place = rig[Json::json_pointer(pointer)];
-      if (place.type() == value.type()) continue;
+      if (place.type() == value.type()) {
+        continue;
+      }
       // one value for all channels; a list is one for each
-      if (value.is_array() && (pointer.find("gain") != std::string::npos)) continue;
+      if (value.is_array() && (pointer.find("gain") != std::string::npos)) {
+        continue;
+      }
       place = value;
       const std::string line = refusal(rig);
       const bool empty_object = value.is_object() && value.empty();
-      if (line.empty() && (pointer == "/name" || empty_object)) continue;
+      if (line.empty() && (pointer == "/name" || empty_object)) {
+        continue;
+      }
       EXPECT_TRUE(is_plain(line)) << pointer << " = " << value;
       const std::string path = path_of(pointer);
       EXPECT_EQ(line.substr(0, path.size()), path) << pointer << " = " << value << ": " << line;
@@ -95,7 +111,9 @@ TEST(RigReader, RefusesUnknownKeysEverywhere) {
   for (const std::string& pointer : pointers) {
     Json rig = test_plant::small();
     Json& place = rig[Json::json_pointer(pointer)];
-    if (!place.is_object()) continue;
+    if (!place.is_object()) {
+      continue;
+    }
     place["tpyo"] = 1;
     const std::string line = refusal(rig);
     EXPECT_NE(line.find(path_of(pointer) + ".tpyo: unknown key"), std::string::npos) << pointer << ": " << line;
@@ -106,9 +124,13 @@ TEST(RigReader, RefusesNumbersOutOfRange) {
   std::vector<std::string> pointers;
   collect(test_plant::small(), "", &pointers);
   for (const std::string& pointer : pointers) {
-    if (pointer == "/version" || !test_plant::small()[Json::json_pointer(pointer)].is_number()) continue;
+    if (pointer == "/version" || !test_plant::small()[Json::json_pointer(pointer)].is_number()) {
+      continue;
+    }
     for (const double value : {1e300, -1e300}) {
-      if (pointer.find("direction") != std::string::npos) continue;
+      if (pointer.find("direction") != std::string::npos) {
+        continue;
+      }
       const std::string line = refusal(test_plant::changed({{pointer, value}}));
       EXPECT_EQ(line.substr(0, path_of(pointer).size()), path_of(pointer)) << pointer << " = " << value << ": " << line;
     }
@@ -151,7 +173,9 @@ TEST(RigReader, RefusesFingersThatCannotBePretensioned) {
   Json rig = test_plant::plain(1, 2);
   rig["finger"]["tendons"][1]["moment_arms"] = {0.004};
   EXPECT_NE(refusal(rig).find("positive null vector"), std::string::npos) << refusal(rig);
-  for (std::size_t i = 0; i < 2; ++i) rig["finger"]["tendons"][i]["moment_arms"] = {0.0};
+  for (std::size_t i = 0; i < 2; ++i) {
+    rig["finger"]["tendons"][i]["moment_arms"] = {0.0};
+  }
   EXPECT_NE(refusal(rig).find("full column rank"), std::string::npos) << refusal(rig);
   EXPECT_NE(refusal(test_plant::plain(2, 2)).find("finger.tendons"), std::string::npos);
 }
@@ -215,10 +239,14 @@ TEST(RigReader, TakesTheLargestOfFingers) {
   for (Json& tendon : rig["finger"]["tendons"]) {
     for (int j = 0; j < 16; ++j) {
       tendon["edge_friction"].push_back(law);
-      if (j < 15) tendon["pulley_friction"].push_back(law);
+      if (j < 15) {
+        tendon["pulley_friction"].push_back(law);
+      }
     }
   }
-  for (Json& joint : rig["finger"]["joints"]) joint = {{"friction", law}, {"load_friction", law}};
+  for (Json& joint : rig["finger"]["joints"]) {
+    joint = {{"friction", law}, {"load_friction", law}};
+  }
   EXPECT_EQ(refusal(rig), "");
   const auto numbers = test_plant::read(rig);
   EXPECT_EQ(numbers.bristle_count(), 64u * 31u + 32u);

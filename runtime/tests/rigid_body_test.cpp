@@ -68,7 +68,9 @@ TEST_F(RigidBody, InverseDynamicsHasTheMassMatrix) {
       double unit[max_joints] = {}, with[max_joints];
       unit[k] = 1.0;
       inverse_dynamics(small, motion, speed, unit, with);
-      for (std::size_t j = 0; j < n; ++j) EXPECT_NEAR(with[j] - without[j], mass[j * n + k], 1e-15);
+      for (std::size_t j = 0; j < n; ++j) {
+        EXPECT_NEAR(with[j] - without[j], mass[j * n + k], 1e-15);
+      }
     }
   }
 }
@@ -79,9 +81,13 @@ TEST_F(RigidBody, PowerOfTheTorquesIsTheGrowthOfEnergy) {
   for (int trial = 0; trial < 50; ++trial) {
     draw();
     double acceleration[max_joints], torque[max_joints], power = 0.0;
-    for (std::size_t j = 0; j < n; ++j) acceleration[j] = any(random);
+    for (std::size_t j = 0; j < n; ++j) {
+      acceleration[j] = any(random);
+    }
     inverse_dynamics(small, moved(), speed, acceleration, torque);
-    for (std::size_t j = 0; j < n; ++j) power += torque[j] * speed[j];
+    for (std::size_t j = 0; j < n; ++j) {
+      power += torque[j] * speed[j];
+    }
     const double h = 1e-5;
     const double growth = (energy_after(h, acceleration) - energy_after(-h, acceleration)) / (2 * h);
     EXPECT_NEAR(power, growth, 1e-6 * (1.0 + std::fabs(power)));
@@ -99,9 +105,13 @@ TEST_F(RigidBody, ForceAtAPointTurnsTheJointsByTheJacobian) {
       const point_motion<double> at = move_point(motion.links[link], point);
       double torque[max_joints] = {}, power = 0.0;
       add_torque_of_force(motion, link, at.place, force, torque);
-      for (std::size_t j = 0; j < n; ++j) power += torque[j] * speed[j];
+      for (std::size_t j = 0; j < n; ++j) {
+        power += torque[j] * speed[j];
+      }
       EXPECT_NEAR(power, dot(force, at.velocity), 1e-14);
-      for (std::size_t j = link + 1; j < n; ++j) EXPECT_EQ(torque[j], 0.0);
+      for (std::size_t j = link + 1; j < n; ++j) {
+        EXPECT_EQ(torque[j], 0.0);
+      }
     }
   }
 }
@@ -115,7 +125,9 @@ TEST_F(RigidBody, VelocitiesAreTheGrowthOfPlaces) {
     vector3<double> place[2];
     for (const int side : {0, 1}) {
       double angle[max_joints];
-      for (std::size_t j = 0; j < n; ++j) angle[j] = q[j] + (side ? h : -h) * speed[j];
+      for (std::size_t j = 0; j < n; ++j) {
+        angle[j] = q[j] + (side ? h : -h) * speed[j];
+      }
       chain_motion<double> motion;
       move_chain(small, angle, none, &motion);
       place[side] = move_point(motion.links[n - 1], point).place;

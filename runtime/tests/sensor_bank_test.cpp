@@ -42,7 +42,9 @@ TEST(SensorBank, DelaysByWholeAndPartSamples) {
   };
   EXPECT_EQ(delayed(0.02), (std::vector<double>{1, 1, 1, 2, 4, 8, 16}));
   const std::vector<double> between = delayed(0.025), expected = {1, 1, 1, 1.5, 3, 6, 12};
-  for (std::size_t k = 0; k < truth.size(); ++k) EXPECT_NEAR(between[k], expected[k], 1e-12) << k;
+  for (std::size_t k = 0; k < truth.size(); ++k) {
+    EXPECT_NEAR(between[k], expected[k], 1e-12) << k;
+  }
   const std::vector<double> little = delayed(0.001);
   EXPECT_NEAR(little[1], 1.9, 1e-12);
 }
@@ -61,7 +63,9 @@ TEST(SensorBank, AppliesGainOffsetAndResolutionInThisOrder) {
 TEST(SensorBank, NoiseIsThatOfSeedChannelAndSample) {
   const rig one = with_sensors({{"tendon_position", {{"noise", 0.5}}}});
   const std::vector<double> found = shown(one, {1.0, 1.0});
-  for (std::size_t k = 0; k < 2; ++k) EXPECT_DOUBLE_EQ(found[k], 1.0 + 0.5 * normal_number(5, 256, k));
+  for (std::size_t k = 0; k < 2; ++k) {
+    EXPECT_DOUBLE_EQ(found[k], 1.0 + 0.5 * normal_number(5, 256, k));
+  }
 }
 
 TEST(SensorBank, ContinuesFromWhatItRemembered) {

@@ -6,12 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "model_inside.h"
-
-extern "C" {
 #include "finger_memory.h"
+#include "model_inside.h"
 #include "rows_in_use.h"
-}
 
 using test_finger::Finger;
 using test_finger::joints;
@@ -86,7 +83,9 @@ TEST(SensorFault, AllKernelsGiveTheSameBits) {
   const Watched expected = run(plain.handle, failing());
   for (const char* kernel : {"sse2", "avx2"}) {
     Finger other(image());
-    if (tendonfmu_set_kernel(other.handle, kernel) != TENDONFMU_OK) continue;
+    if (tendonfmu_set_kernel(other.handle, kernel) != TENDONFMU_OK) {
+      continue;
+    }
     EXPECT_TRUE(run(other.handle, failing()) == expected) << kernel;
   }
 }

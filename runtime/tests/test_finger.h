@@ -139,7 +139,9 @@ struct Motion {
   // The force of a tendon reads 0 for 0.3 s of every 2 s.
   void let_force_fail(std::size_t tendon) {
     for (std::size_t k = 0; k < time.size(); ++k) {
-      if (std::fmod(time[k], 2.0) > 1.0 && std::fmod(time[k], 2.0) < 1.3) force[k * tendons + tendon] = 0.0;
+      if (std::fmod(time[k], 2.0) > 1.0 && std::fmod(time[k], 2.0) < 1.3) {
+        force[k * tendons + tendon] = 0.0;
+      }
     }
   }
 
@@ -162,7 +164,9 @@ struct Outputs {
       row->assign(samples * joints, NAN);
     }
     parts.assign(samples * joints * (tendons + 3), NAN);
-    for (auto* row : {&tip_force, &tip_std}) row->assign(samples * 3, NAN);
+    for (auto* row : {&tip_force, &tip_std}) {
+      row->assign(samples * 3, NAN);
+    }
     misfit.assign(samples, NAN);
     observable.assign(samples, 9);
     link.assign(samples, -9);

@@ -29,7 +29,9 @@ inline Json small() {
 /* The small rig with values replaced: {"/physics/friction/preload", 0.0}, ... */
 inline Json changed(const std::vector<std::pair<std::string, Json>>& changes) {
   Json rig = small();
-  for (const auto& [pointer, value] : changes) rig[Json::json_pointer(pointer)] = value;
+  for (const auto& [pointer, value] : changes) {
+    rig[Json::json_pointer(pointer)] = value;
+  }
   return rig;
 }
 
@@ -98,7 +100,9 @@ struct Plant {
   }
   Bytes saved() const {
     Bytes bytes(tendonfmu_plant_state_size(handle));
-    if (tendonfmu_plant_save_state(handle, bytes.data(), bytes.size()) != TENDONFMU_PLANT_OK) bytes.clear();
+    if (tendonfmu_plant_save_state(handle, bytes.data(), bytes.size()) != TENDONFMU_PLANT_OK) {
+      bytes.clear();
+    }
     return bytes;
   }
   tendonfmu_plant_status restore(const Bytes& bytes) {
