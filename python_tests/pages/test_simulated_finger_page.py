@@ -65,7 +65,9 @@ def test_every_switch_is_on_the_page() -> None:
 def test_every_test_on_the_page_is_there() -> None:
     marks = {"": "test_plant_switches", "P": "test_plant_physics", "S": "test_plant_sensors"}
     tests = {
-        mark: re.findall(r"^def test_(\w+)", (ROOT / "python_tests" / f"{name}.py").read_text("utf-8"), re.MULTILINE)
+        mark: re.findall(
+            r"^def test_(\w+)", (ROOT / "python_tests" / "simulate" / f"{name}.py").read_text("utf-8"), re.MULTILINE
+        )
         for mark, name in marks.items()
     }
     checked = 0
