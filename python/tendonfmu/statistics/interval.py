@@ -7,7 +7,15 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Interval:
-    """A value with its 95 % interval [low, high]."""
+    """A value with its 95 % interval.
+
+    Attributes
+    ----------
+    value
+        The value.
+    low, high
+        Ends of the interval.
+    """
 
     value: float
     low: float

@@ -25,7 +25,15 @@ _MOST = 500  # blocks; more are joined with their neighbours, so that memory sta
 
 @dataclass(frozen=True)
 class Estimate:
-    """A value and the interval [low, high] of the true value."""
+    """A value and the 95 % interval of the true value.
+
+    Attributes
+    ----------
+    value
+        The value.
+    low, high
+        Ends of the interval; NaN if unknown.
+    """
 
     value: float
     low: float = math.nan
