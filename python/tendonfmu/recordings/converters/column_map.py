@@ -207,7 +207,7 @@ def _read_joint(node: Node) -> tuple[dict[str, MappedColumn], Joint]:
             node.member(word).refuse(f"the log's column of it, in one of {', '.join(parts[word])}")
     name, cutoff = node.member("name"), node.member("velocity_cutoff")
     if not cutoff.absent and not node.member("velocity").absent:
-        cutoff.refuse("no cut-off beside a column of velocity: it is taken as it is")
+        cutoff.refuse("no cut-off together with a column of velocity, which is not filtered")
     joint = Joint(
         kind,
         "joint" if name.absent else name.text("a name"),

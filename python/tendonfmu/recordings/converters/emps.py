@@ -144,6 +144,6 @@ def _scipy(part: str) -> Any:
         return importlib.import_module(f"scipy.{part}")
     except ImportError:
         raise InputError(
-            "convert emps: the Python package scipy is not installed; expected it beside tendonfmu "
+            "convert emps: the Python package scipy is not installed; expected it in the environment of tendonfmu "
             "(python -m pip install scipy)"
         ) from None
