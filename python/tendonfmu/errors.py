@@ -1,4 +1,4 @@
-"""Two kinds of error: what the user gave is wrong, or tendonfmu itself is."""
+"""Which errors tendonfmu raises: the user's input is wrong, or tendonfmu itself has a fault."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from contextlib import contextmanager
 
 
 class InputError(ValueError):
-    """Something the user gave is refused. The message is one line that begins with the file."""
+    """Input from the user is refused. The message is one line that starts with the file."""
 
 
 class InternalError(Exception):
-    """A fault of tendonfmu: what one part of it gave another is refused. Never the fault of a file or an option."""
+    """A fault of tendonfmu: one part of it gave another an invalid value. Never caused by a file or an option."""
 
 
 @contextmanager
 def own_fault(what: str) -> Iterator[None]:
-    """Inside, everything that came from the user has been checked: an InputError is then an InternalError.
+    """Turn an InputError inside the block into an InternalError, since all input has been checked before.
 
     what: the computation or the result that fails, in a few words.
     """
@@ -28,7 +28,7 @@ def own_fault(what: str) -> Iterator[None]:
 
 
 def line_of(error: InputError | OSError) -> str:
-    """What a user reads of it: an OSError without its number."""
+    """Return the line that a user reads. An OSError is shown without its number."""
     if not isinstance(error, OSError):
         return str(error)
     reason = error.strerror or str(error)

@@ -246,7 +246,7 @@ def test_an_unfinished_file_is_no_finger(call: Call, files: tuple[Path, Path]) -
     )
     answer = call("check", "left.unfinished.json")
     assert answer.status == 1
-    expected = 'format = "tendonfmu-fit-unfinished-1": of a fit; expected a finger description'
+    expected = 'format = "tendonfmu-fit-unfinished-1": file of a fit; expected a finger description'
     assert f"left.unfinished.json: {expected}" in answer.err
     answer = call("fit", *files, "-o", "f.json", "--resume", "left.unfinished.json", *FIT)
     assert answer.status == 2 and "an interrupted fit of 1 unknowns, 25 are asked for now" in answer.err

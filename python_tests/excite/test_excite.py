@@ -196,7 +196,7 @@ def test_cable_loops_refuse_a_pretension(tmp_path: Path) -> None:
     loops = [{**tendon, "bidirectional": True} for tendon in SMALL["tendons"][:2]]
     path.write_text(json.dumps({**SMALL, "tendons": loops}))
     assert find_pretensions(read_subject(path), []) == [0.0]
-    with pytest.raises(InputError, match="--pretension 10: a finger of cable loops alone"):
+    with pytest.raises(InputError, match="--pretension 10: the finger has only cable loops"):
         find_pretensions(read_subject(path), [10.0])
 
 

@@ -156,7 +156,7 @@ def test_errors_of_a_base_name_its_file(tmp_path: Path) -> None:
     [
         ("", r"line 1, column 1: .*; expected a rig \(JSON\)"),
         ('{"format": }', r"line 1, column 12: "),
-        ('{"seed": 1, "seed": 2}', r'key "seed" is there twice in one object; expected once'),
+        ('{"seed": 1, "seed": 2}', r'key "seed" occurs twice in one object; expected once'),
         ('{"seed": NaN}', r"NaN: not a number in JSON"),
         ('{"seed": -Infinity}', r"-Infinity: not a number in JSON"),
         ('{"seed": 1e999}', r"1e999: beyond the range of a double"),

@@ -43,7 +43,7 @@ def test_jobs_are_resumed_and_a_failure_is_a_row(tmp_path: Path) -> None:
 
 
 def test_a_name_that_stands_twice_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="the name a stands twice; expected"):
+    with pytest.raises(InputError, match="the name a occurs twice; expected"):
         run_jobs(some_jobs.fail, [Job("a", (1,)), Job("a", (2,))], tmp_path)
     assert not any(tmp_path.iterdir())
 

@@ -1,7 +1,7 @@
-"""Training motions, and what they tell about each number (`tendonfmu excite`).
+"""Which training motion shows the friction of a finger, and what it tells about each number (`tendonfmu excite`).
 
-`excitation` plans strokes of all joints, `tension_plan` the internal tensions, `training_motion` puts them together
-and judges the result.
+`excitation` plans strokes of all joints, `tension_plan` plans the internal tensions, and `training_motion` combines
+them and judges the result.
 """
 
 import lazy_loader

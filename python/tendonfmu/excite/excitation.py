@@ -1,9 +1,9 @@
-"""Training motions: all joints at once, each with strokes of its own, over ranges of angle and velocity, with slow
-reversals and rests (paper, section VII; 400 s there).
+"""Which strokes a training motion has: all joints move at once, with slow reversals and rests (paper, section VII).
 
-Strokes are stratified: their speeds and lengths follow a low-discrepancy sequence, most of them fast, and every few
-strokes one runs to an end of the range, so that each working point is passed in both directions. A stroke speeds up,
-keeps its speed and slows down, in quintic pieces whose ends lie on rows.
+The paper's motion takes 400 s. Each joint has its own strokes over ranges of angle and velocity. The strokes are
+stratified: their speeds and lengths follow a low-discrepancy sequence, and most of them are fast. Every few strokes one
+runs to an end of the range, so that each working point is passed in both directions. A stroke speeds up, keeps its
+speed and slows down, in quintic pieces whose ends lie on rows.
 """
 
 from __future__ import annotations
@@ -23,26 +23,36 @@ from tendonfmu.statistics import quintic
 
 Numbers = NDArray[np.float64]
 
-START = 2.0  # s; all joints at rest at the beginning of a block, while the pretension changes
-END = 1.0  # s; and at its end
+START = 2.0  # s; all joints are at rest at the beginning of a block, while the pretension changes
+END = 1.0  # s; all joints are at rest at the end of a block
 PRETENSION_CHANGE = 1.5  # s
 ACCELERATION = 10.0  # rad/s², never exceeded unless the plan allows more
-SPEED_UP = 0.15  # s, or as long as the greatest acceleration asks for
+SPEED_UP = 0.15  # s, or longer if the greatest acceleration requires it
 SLOWEST = 0.05  # share of the greatest speed
 SLOW = 0.25  # share of the greatest speed; a reversal between two strokes up to it counts as slow
 SHORTEST, LONGEST = 0.3, 2.0  # s; of a stroke as drawn
 REST = 0.2, 1.5  # s; of a joint between two strokes
-REST_SHARE = 0.1
-ONWARD_SHARE = 0.1  # strokes that go on in the direction of the one before
-SWEEP_EVERY = 6  # strokes; that one runs to an end of the range
-SLOW_EVERY, SLOW_RUN = 10, 3  # of so many strokes so many in a row are slow, so that they turn round slowly too
+REST_SHARE = 0.1  # strokes followed by a rest
+ONWARD_SHARE = 0.1  # strokes that continue in the direction of the one before
+SWEEP_EVERY = 6  # one of this many strokes runs to an end of the range
+SLOW_EVERY, SLOW_RUN = 10, 3  # of 10 strokes 3 in a row are slow, so that there are slow reversals
 HOME_SPEED = 0.5  # share of the greatest speed
 _GOLDEN = (0.7548776662466927, 0.5698402909980532)  # Roberts' R2 sequence: even in the plane
 
 
 @dataclass(frozen=True)
 class Stroke:
-    """One stroke of a joint. begin, end: s. start, target: rad. speed: rad/s, in its middle."""
+    """One stroke of a joint.
+
+    Attributes
+    ----------
+    begin, end
+        Times (s).
+    start, target
+        Angles (rad).
+    speed
+        Speed in its middle (rad/s).
+    """
 
     begin: float
     end: float
@@ -53,12 +63,26 @@ class Stroke:
 
 @dataclass(frozen=True)
 class Excitation:
-    """A training motion, a row each 1/rate s.
+    """A training motion, one row every 1/rate s.
 
-    time [N] s; joint_position, joint_velocity, joint_acceleration [N, n]; tension [N, m] N, that hold themselves;
-    pretension [N] N, their mean; tendon_position [N, m] m, motor side x0 that holds the posture at that tension without
-    friction.
-    knots: per joint [k, 4] of time, position, velocity, acceleration; strokes: per joint; blocks: (begin, end, N).
+    Attributes
+    ----------
+    time
+        [N] (s).
+    joint_position, joint_velocity, joint_acceleration
+        [N, n] (rad, rad/s, rad/s²).
+    tension
+        Tensions [N, m] (N) that balance each other.
+    pretension
+        Their mean [N] (N).
+    tendon_position
+        Motor side x0 [N, m] (m) that holds the posture at that tension without friction.
+    knots
+        For each joint [k, 4]: time, position, velocity, acceleration.
+    strokes
+        Strokes of each joint.
+    blocks
+        Begin (s), end (s) and pretension (N) of each block.
     """
 
     time: Numbers
@@ -73,7 +97,13 @@ class Excitation:
     blocks: list[tuple[float, float, float]]
 
     def columns(self) -> dict[str, Numbers]:
-        """Name -> [N], as in the file."""
+        """Return the columns of the motion's file.
+
+        Returns
+        -------
+        dict of Numbers
+            Name -> [N].
+        """
         table = {"time": self.time}
         for name in ("joint_position", "joint_velocity", "joint_acceleration", "tendon_position"):
             values: Numbers = getattr(self, name)
@@ -83,9 +113,28 @@ class Excitation:
 
 @dataclass(frozen=True)
 class Plan:
-    """What is asked for. ranges: [n, 2] rad. max_speed: rad/s. duration: s, of the whole motion at each pretension, or
-    with `alternate` (s, how long at a time) of all together. pretensions: N. rate: rows per second. vary: the tensions
-    change by this instead of standing at a pretension. max_acceleration: rad/s².
+    """What a motion should be like.
+
+    Attributes
+    ----------
+    ranges
+        Lowest and highest angle of each joint [n, 2] (rad).
+    max_speed
+        rad/s.
+    duration
+        Duration (s) of the whole motion at each pretension, or with `alternate` of all together.
+    pretensions
+        N.
+    alternate
+        Duration at one pretension before the next (s). None: one after the other.
+    rate
+        Rows per second.
+    seed
+        Of the random numbers.
+    vary
+        How the tensions change. None: constant at each pretension.
+    max_acceleration
+        rad/s².
     """
 
     ranges: Numbers
@@ -100,7 +149,25 @@ class Plan:
 
 
 def plan_excitation(data: Mapping[str, Any], plan: Plan) -> Excitation:
-    """The motion for a valid finger description. Raises InputError where it cannot be."""
+    """Plan the motion of a finger.
+
+    Parameters
+    ----------
+    data
+        A valid finger description.
+    plan
+        What the motion should be like.
+
+    Returns
+    -------
+    Excitation
+        The motion.
+
+    Raises
+    ------
+    InputError
+        The duration is too short, or no such tensions exist.
+    """
     blocks = _blocks(plan)
     home = plan.ranges.mean(axis=1)
     knots, strokes = [], []
@@ -110,7 +177,7 @@ def plan_excitation(data: Mapping[str, Any], plan: Plan) -> Excitation:
             for part, (begin, end) in _parts(plan, blocks)
         ]
         path = np.array([knot for points, _ in drawn for knot in points])
-        # a row number is exact, a time is not: knots are told apart by their row
+        # knots are compared by their row, which is exact; times are not
         path = path[np.concatenate([[True], np.diff(path[:, 0]) > 0])]
         path[:, 0] /= plan.rate
         knots.append(path)
@@ -119,12 +186,12 @@ def plan_excitation(data: Mapping[str, Any], plan: Plan) -> Excitation:
 
 
 def _parts(plan: Plan, blocks: list[tuple[int, int, float]]) -> list[tuple[int, tuple[int, int]]]:
-    """(number of the drawing, rows) of each block: the same motion at each pretension, unless they alternate."""
+    """Return (number of the drawing, rows) of each block: the same motion at each pretension, unless they alternate."""
     return [(0 if plan.alternate is None else part, (begin, end)) for part, (begin, end, _) in enumerate(blocks)]
 
 
 def _blocks(plan: Plan) -> list[tuple[int, int, float]]:
-    """(first row, last row, pretension) of each block."""
+    """Return (first row, last row, pretension) of each block."""
     rows = round(plan.duration * plan.rate)
     levels = list(plan.pretensions)
     if plan.alternate is None:
@@ -146,12 +213,15 @@ def _blocks(plan: Plan) -> list[tuple[int, int, float]]:
 
 
 def _speed_up(plan: Plan) -> float:
-    """s; a quintic piece from rest to v in time T has its greatest acceleration 1.5 v/T in the middle."""
+    """Return the time to speed up (s).
+
+    A quintic piece from rest to v in time T has its greatest acceleration, 1.5 v/T, in the middle.
+    """
     return max(SPEED_UP, 1.5 * plan.max_speed / plan.max_acceleration, 1 / plan.rate)
 
 
 class _JointBlock:
-    """Draws the strokes of one joint in one block; counts time in rows."""
+    """Draws the strokes of one joint in one block. Time is counted in rows."""
 
     def __init__(self, plan: Plan, joint: int, part: int, home: float) -> None:
         self._random = np.random.default_rng([plan.seed, joint, part])
@@ -163,8 +233,9 @@ class _JointBlock:
         self._strokes: list[Stroke] = []
 
     def draw(self, first: int, last: int) -> tuple[list[tuple[float, float, float, float]], list[Stroke]]:
-        """Knots (row, position, velocity, acceleration) and strokes from one row to another, at home and at rest at
-        both.
+        """Return knots (row, position, velocity, acceleration) and strokes from one row to another.
+
+        The joint is at home and at rest at both.
         """
         rate, position, direction = self._plan.rate, self._home, 1 if self._random.random() < 0.5 else -1
         row = first + round((START + self._random.random() * SHORTEST) * rate)
@@ -189,9 +260,9 @@ class _JointBlock:
         return self._knots, self._strokes
 
     def _next(self, number: int, position: float, direction: int) -> tuple[float, float, int]:
-        """Target, speed and direction of a stroke; turns round where there is no room."""
+        """Return target, speed and direction of a stroke. It reverses if there is no room."""
         first, second = (float((phase + number * step) % 1.0) for phase, step in zip(self._phase, _GOLDEN, strict=True))
-        # evenly over the logarithm of the speed when slow; with the square when not, so that most are fast
+        # slow speeds are even in their logarithm; for the others the exponent is squared, so that most are fast
         slow = number % SLOW_EVERY < SLOW_RUN
         speed = self._plan.max_speed * (SLOW * (SLOWEST / SLOW) ** first if slow else SLOWEST ** (first * first))
         time = SHORTEST * (LONGEST / SHORTEST) ** second
@@ -208,11 +279,11 @@ class _JointBlock:
         return 2 * self._ramp + self._cruise(way, speed)
 
     def _cruise(self, way: float, speed: float) -> int:
-        """Rows at full speed; speeding up and slowing down take the way of one ramp at full speed."""
+        """Return the rows at full speed. Speeding up and slowing down cover the distance of one ramp at full speed."""
         return max(int(np.ceil(abs(way) / speed * self._plan.rate - self._ramp - 1e-9)), 0)
 
     def _stroke(self, row: int, start: float, target: float, speed: float) -> int:
-        """Adds a stroke at most as fast as `speed`; returns the row at its end."""
+        """Add a stroke at most as fast as `speed`, and return the row at its end."""
         way, cruise = target - start, self._cruise(target - start, speed)
         velocity = way / (self._ramp + cruise) * self._plan.rate
         part = velocity * self._ramp / self._plan.rate / 2
@@ -258,7 +329,7 @@ def _sample(
 
 
 def _pretension(plan: Plan, blocks: list[tuple[int, int, float]], time: Numbers) -> Numbers:
-    """[N] N, constant in each block but for the change at its beginning."""
+    """Return the pretension [N] (N), constant in each block except for the change at its beginning."""
     level = np.array([[blocks[0][0], blocks[0][2], 0.0, 0.0]])
     for (_, _, before), (begin, _, now) in pairwise(blocks):
         change = round(PRETENSION_CHANGE * plan.rate)

@@ -1,4 +1,4 @@
-"""How each joint moves in a training motion: strokes, reversals, rests."""
+"""How each joint moves in a training motion: strokes, reversals and rests."""
 
 from __future__ import annotations
 
@@ -15,8 +15,22 @@ Numbers = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class JointCoverage:
-    """Of one joint. lowest, highest: rad. fastest: rad/s. slow_reversals: between two strokes of at most `SLOW` of the
-    greatest speed. rests: between strokes, s in resting. moving: s.
+    """How one joint moves.
+
+    Attributes
+    ----------
+    lowest, highest
+        Angles (rad).
+    fastest
+        Greatest speed (rad/s).
+    strokes, reversals
+        Their numbers.
+    slow_reversals
+        Number of reversals between two strokes of at most `SLOW` of the greatest speed.
+    rests
+        Number of rests between strokes.
+    resting
+        Time at rest between strokes (s).
     """
 
     lowest: float
@@ -30,7 +44,7 @@ class JointCoverage:
 
 
 def joint_coverage(motion: Excitation, max_speed: float) -> list[JointCoverage]:
-    """Of every joint. max_speed: rad/s, of the plan."""
+    """Return the coverage of every joint. max_speed: rad/s, of the plan."""
     return [
         _joint(strokes, motion.joint_position[:, j], motion.joint_velocity[:, j], max_speed)
         for j, strokes in enumerate(motion.strokes)

@@ -1,8 +1,8 @@
-"""Internal tensions of a training motion: patterns that hold themselves (Rᵀ f = 0), each tendon tight in some and loose
-in others, one after the other.
+"""Which internal tensions a training motion has: balanced patterns (Rᵀ f = 0), one after the other.
 
-With one constant pattern a flexor and its extensor, or two tendons that slide together, are seen as sums. The tensions
-of a finger of m tendons and n joints can change in m − n ways without turning a joint, so a fit can tell more apart.
+Each tendon is tight in some patterns and loose in others. With one constant pattern a fit sees only the sum of a flexor
+and its extensor, or of two tendons that slide together. The tensions of a finger of m tendons and n joints can change
+in m − n ways without turning a joint, so changing patterns let a fit distinguish more.
 """
 
 from __future__ import annotations
@@ -24,13 +24,21 @@ Numbers = NDArray[np.float64]
 CHANGE = 1.5  # s; from one pattern to the next, while the joints move on
 SHORTEST = 2.0  # s; of a pattern, its change included
 _SWEEPS = 5000
-_CLOSE = 1e-6  # of the highest tension; what is left is made good by shrinking towards the even pattern
+_CLOSE = 1e-6  # of the highest tension; the remaining error is removed by shrinking towards the even pattern
 _STREAM = 0x7E17  # of random numbers; joints have 0 to 15
 
 
 @dataclass(frozen=True)
 class Variation:
-    """lowest, highest: N, of every tendon that only pulls; cable loops go from −highest to highest. every: s."""
+    """How the tensions change.
+
+    Attributes
+    ----------
+    lowest, highest
+        Limits (N) of every tendon that only pulls. Cable loops vary from −highest to highest.
+    every
+        Duration of a pattern (s).
+    """
 
     lowest: float
     highest: float
@@ -38,10 +46,10 @@ class Variation:
 
 
 def internal_tensions(data: Mapping[str, Any], variation: Variation, time: Numbers, seed: int) -> Numbers:
-    """[N, m] tensions at `time` [N] (s), N. Raises InputError where the finger has none within the limits.
+    """Return tensions [N, m] (N) at `time` [N] (s). Raise InputError if the finger has none within the limits.
 
-    Each pattern is the nearest one that holds itself to tendons drawn tight and loose at random, every tendon as often
-    the one as the other.
+    For each pattern tendons are drawn tight or loose at random, every tendon equally often. The pattern is the nearest
+    balanced one.
     """
     count = max(2, math.ceil(float(time[-1]) / variation.every))
     random = np.random.default_rng([seed, _STREAM])
@@ -53,7 +61,7 @@ def internal_tensions(data: Mapping[str, Any], variation: Variation, time: Numbe
 
 
 def _series(values: Numbers, every: float, time: Numbers) -> Numbers:
-    """[N] one tendon's tension: constant, and changing for `CHANGE` at the beginning of each pattern but the first."""
+    """Return one tendon's tension [N]: constant, but changing for `CHANGE` at the beginning of each later pattern."""
     begin = every * np.arange(1, len(values))
     knots = np.zeros((2 * len(begin) + 1, 4))
     knots[1::2, 0], knots[2::2, 0] = begin, begin + CHANGE
@@ -63,7 +71,7 @@ def _series(values: Numbers, every: float, time: Numbers) -> Numbers:
 
 
 class _Patterns:
-    """The tensions of a finger that hold themselves within limits."""
+    """The balanced tensions of a finger within limits."""
 
     def __init__(self, data: Mapping[str, Any], variation: Variation) -> None:
         arms = moment_arms(data)
@@ -79,20 +87,22 @@ class _Patterns:
         self._even = self._even_pattern(pretension_vector(data), pulls, variation)
 
     def _even_pattern(self, shares: Numbers, pulls: NDArray[np.bool_], variation: Variation) -> Numbers:
-        """The pretension in the middle of those within the limits."""
+        """Return the pretension in the middle of those within the limits."""
         low, high = variation.lowest, variation.highest
         least = low / float(shares[pulls].min()) if pulls.any() else 0.0
         most = high / float(np.abs(shares).max()) if shares.any() else 0.0
         if least > most:
             raise InputError(
-                f"--vary-tension {low:g}:{high:g}: no pretension that holds itself lies within; expected HIGH at least "
+                f"--vary-tension {low:g}:{high:g}: no balanced pretension lies within; expected HIGH at least "
                 f"{least * high / (most * low):.3g} times LOW for these moment arms"
             )
         return 0.5 * (least + most) * shares
 
     def nearest(self, tight: NDArray[np.bool_]) -> Numbers:
-        """[m] the tensions nearest to the highest where `tight` [m], the lowest elsewhere, by Dykstra's alternating
-        projections; shrunk towards the even pattern by what these leave, so that the limits hold.
+        """Return the balanced tensions [m] nearest to the highest where `tight` [m], and to the lowest elsewhere.
+
+        Method: Dykstra's alternating projections. The result is shrunk towards the even pattern by the remaining error,
+        so that the limits hold.
         """
         found, correction = self._project @ np.where(tight, self._high, self._low), np.zeros(len(tight))
         for _ in range(_SWEEPS):

@@ -1,5 +1,6 @@
-"""From a finger or a rig to a training motion and to what it excites (command `tendonfmu excite`). Computes, prints
-nothing.
+"""Which training motion a finger or a rig gets, and what it excites (command `tendonfmu excite`).
+
+This module computes and does not print.
 """
 
 from __future__ import annotations
@@ -37,14 +38,26 @@ from tendonfmu.model import FingerDescription, balanced_forces, native, pretensi
 RIG_FORMAT = "tendonfmu-rig-1"
 DEFAULT_PRETENSION = 10.0  # N
 STRONGEST = 1e6  # N
-MARGIN = 0.05  # of a rig's range between limits, kept free at either end
+MARGIN = 0.05  # of a rig's range between limits, left out at either end
 UNKNOWN_RANGE = 0.5  # rad, either side of the rest angle
 ANALYSIS_RATE = 25.0  # 1/s; 100 gives the same count for the index finger, and standard errors within 1 %
 
 
 @dataclass(frozen=True)
 class Range:
-    """Of one joint, rad. source: where it comes from, in words; guessed: nothing was known."""
+    """Range of one joint.
+
+    Attributes
+    ----------
+    name
+        Name of the joint.
+    low, high
+        Lowest and highest angle (rad).
+    source
+        Where the range comes from, in words.
+    guessed
+        Whether nothing was known about it.
+    """
 
     name: str
     low: float
@@ -55,7 +68,15 @@ class Range:
 
 @dataclass(frozen=True)
 class Subject:
-    """What is to be moved: a finger, and the limits of its joints where a rig gives them, [n] of (low, high) rad."""
+    """The finger that is moved.
+
+    Attributes
+    ----------
+    finger
+        Its description.
+    limits
+        Lowest and highest angle of each joint [n] (rad), if a rig gives them.
+    """
 
     finger: FingerDescription
     limits: list[tuple[float, float]] | None
@@ -63,7 +84,23 @@ class Subject:
 
 @dataclass(frozen=True)
 class ExciteResult:
-    """A motion and what it excites. slack: [m] s during which a tendon would have to push."""
+    """A motion and what it excites.
+
+    Attributes
+    ----------
+    subject, plan, ranges
+        What was asked for.
+    motion
+        The motion.
+    joints, effects
+        How each joint moves and each friction effect slides.
+    noise
+        The assumed noise.
+    slack
+        Time during which each tendon would have to push [m] (s).
+    judgement
+        What the motion tells about each number.
+    """
 
     subject: Subject
     plan: Plan
@@ -77,11 +114,27 @@ class ExciteResult:
 
 
 def read_subject(path: Path) -> Subject:
-    """A finger description or a rig. Raises InputError."""
+    """Read a finger description or a rig.
+
+    Parameters
+    ----------
+    path
+        A JSON file.
+
+    Returns
+    -------
+    Subject
+        With limits if a rig gives them for all joints.
+
+    Raises
+    ------
+    InputError
+        The description or the rig is refused.
+    """
     try:
         data = json.loads(path.read_bytes())
     except (OSError, ValueError):
-        return Subject(read_finger(path), None)  # says what is wrong
+        return Subject(read_finger(path), None)  # raises the error
     if not isinstance(data, dict) or data.get("format") != RIG_FORMAT:
         return Subject(read_finger(path), None)
     finger: Any = data.get("finger")
@@ -105,7 +158,7 @@ def _limits(path: Path, data: Mapping[str, Any], joints: int) -> list[tuple[floa
         try:
             low, high = float(link["limits"]["lower"]), float(link["limits"]["upper"])
         except (KeyError, TypeError, ValueError):
-            return None  # a rig may leave them out
+            return None  # limits are optional in a rig
         if not low < high:
             raise InputError(f"{path}: physics.links[{k}].limits: {low:g} to {high:g} rad; expected lower < upper")
         limits.append((low, high))
@@ -116,7 +169,25 @@ def _limits(path: Path, data: Mapping[str, Any], joints: int) -> list[tuple[floa
 
 
 def find_ranges(subject: Subject, given: Sequence[str]) -> list[Range]:
-    """[n] range of each joint. given: "JOINT=LOW:HIGH", joint by number or name, rad. Raises InputError."""
+    """Return the range of each joint.
+
+    Parameters
+    ----------
+    subject
+        The finger.
+    given
+        "JOINT=LOW:HIGH" (rad), joint by number or name.
+
+    Returns
+    -------
+    list of Range
+        [n]. Ranges that are not given come from the rig's limits, from working points, or are guessed.
+
+    Raises
+    ------
+    InputError
+        A range is malformed, or beyond the joint's limits.
+    """
     names = subject.finger.joint_names
     asked = dict(_parse_range(text, names) for text in given)
     ranges = []
@@ -136,19 +207,55 @@ def find_ranges(subject: Subject, given: Sequence[str]) -> list[Range]:
 
 
 def find_pretensions(subject: Subject, given: Sequence[float]) -> list[float]:
-    """N; 10 where none is given, 0 where cable loops alone can hold none. Raises InputError."""
+    """Return the pretensions of the motion.
+
+    Parameters
+    ----------
+    subject
+        The finger.
+    given
+        As asked for (N).
+
+    Returns
+    -------
+    list of float
+        N. 10 if none is given; 0 for a finger of cable loops that can hold no pretension.
+
+    Raises
+    ------
+    InputError
+        A pretension is given for a finger that can hold none.
+    """
     if pretension_vector(subject.finger.data).any():
         return list(given) or [DEFAULT_PRETENSION]
     if any(given):
-        raise InputError(f"--pretension {max(given):g}: a finger of cable loops alone that holds none; expected 0")
+        raise InputError(f"--pretension {max(given):g}: the finger has only cable loops and holds none; expected 0")
     return [0.0] * max(len(given), 1)
 
 
 def find_variation(
     given: str | None, every: float, pretension: Sequence[float] | None = None, alternate: float | None = None
 ) -> Variation | None:
-    """given: "LOW:HIGH" in N; every: s. pretension, alternate: as asked for beside it, which has no sense. Raises
-    InputError.
+    """Return how the tensions change.
+
+    Parameters
+    ----------
+    given
+        "LOW:HIGH" (N), or None.
+    every
+        Duration of a pattern (s).
+    pretension, alternate
+        Other options that were given. They exclude this one.
+
+    Returns
+    -------
+    Variation or None
+        None if `given` is None.
+
+    Raises
+    ------
+    InputError
+        The text is malformed, or given together with one of the other options.
     """
     if given is None:
         return None
@@ -166,7 +273,7 @@ def find_variation(
 
 
 def as_array(ranges: Sequence[Range]) -> NDArray[np.float64]:
-    """[n, 2] low and high, rad."""
+    """Return low and high of the ranges [n, 2] (rad)."""
     return np.array([[span.low, span.high] for span in ranges])
 
 
@@ -207,7 +314,29 @@ def _default_range(data: Mapping[str, Any], j: int, name: str, limits: tuple[flo
 
 
 def excite(subject: Subject, ranges: list[Range], plan: Plan, progress: Progress | None = None) -> ExciteResult:
-    """Plans the motion and judges it. progress: called with (done, total) parts of the judgement."""
+    """Plan the motion and judge it.
+
+    Parameters
+    ----------
+    subject
+        The finger.
+    ranges
+        Range of each joint [n].
+    plan
+        What the motion should be like.
+    progress
+        Called with (done, total) parts of the judgement.
+
+    Returns
+    -------
+    ExciteResult
+        The motion and what it excites.
+
+    Raises
+    ------
+    InputError
+        No such motion exists.
+    """
     data = subject.finger.data
     motion = plan_excitation(data, plan)
     every = max(1, round(plan.rate / ANALYSIS_RATE))
@@ -237,7 +366,7 @@ def excite(subject: Subject, ranges: list[Range], plan: Plan, progress: Progress
 
 
 def report(result: ExciteResult, command: str) -> dict[str, Any]:
-    """Everything, for `--report`. command: as it was called."""
+    """Return the whole result for `--report`. command: the command line as called."""
     plan, finger = result.plan, result.subject.finger
     return {
         "format": "tendonfmu-excitation-1",

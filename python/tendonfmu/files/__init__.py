@@ -1,7 +1,7 @@
-"""Files in and out: whole or not at all.
+"""How files are read and written: whole or not at all.
 
-`writing` writes files whole, `tables` reads and writes tables of numbers (CSV, Parquet), `json_node` reads JSON with
-the path of each value for error messages, `finite_numbers` turns what JSON cannot hold into null.
+`writing` writes whole files, `tables` reads and writes tables of numbers (CSV, Parquet), `json_node` reads JSON and
+keeps the path of each value for error messages, and `finite_numbers` replaces numbers that JSON does not allow by null.
 """
 
 import lazy_loader

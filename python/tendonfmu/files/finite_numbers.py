@@ -1,4 +1,4 @@
-"""JSON has no infinity and no NaN: null stands for both."""
+"""How infinity and NaN are written to JSON, which does not allow them: as null."""
 
 from __future__ import annotations
 
@@ -8,7 +8,18 @@ from typing import Any
 
 
 def finite(value: Any) -> Any:
-    """A report's value with None in place of every number that is not finite, however deep."""
+    """Replace every number that is not finite by None.
+
+    Parameters
+    ----------
+    value
+        A value of a report, nested to any depth.
+
+    Returns
+    -------
+    Any
+        A copy.
+    """
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, Mapping):

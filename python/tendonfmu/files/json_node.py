@@ -1,6 +1,6 @@
-"""JSON files read with care, and their values with their paths: whoever finds fault can say where.
+"""How JSON files are read so that every error message can give the path of the value.
 
-The same lines of refusal as the native reader's: `motion.speed[1] = -1: expected ...`; lists count from 1.
+The messages are like those of the native reader: `motion.speed[1] = -1: expected ...`. Lists count from 1.
 """
 
 from __future__ import annotations
@@ -17,13 +17,28 @@ LARGEST_FILE = 64 << 20  # bytes, as the native reader's
 
 
 class Refusal(ValueError):
-    """What a JSON text or value is refused for, without the file."""
+    """Why a JSON text or value is refused, without the file."""
 
 
 def read_json(path: Path, what: str) -> Any:
-    """The content of a JSON file. Raises InputError: syntax with line and column, a key given twice, NaN, infinity.
+    """Read a JSON file.
 
-    what: what the file should have been, for messages.
+    Parameters
+    ----------
+    path
+        The file.
+    what
+        What the file should be, for messages.
+
+    Returns
+    -------
+    Any
+        The content.
+
+    Raises
+    ------
+    InputError
+        Invalid syntax with line and column, a key that occurs twice, NaN, infinity, or a file that cannot be read.
     """
     try:
         size = path.stat().st_size
@@ -55,7 +70,7 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for key, value in pairs:
         if key in found:
-            raise Refusal(f"key {shown(key)} is there twice in one object; expected once")
+            raise Refusal(f"key {shown(key)} occurs twice in one object; expected once")
         found[key] = value
     return found
 
@@ -77,13 +92,23 @@ def _integer(text: str) -> int:
 
 
 def shown(value: Any) -> str:
-    """A value as it may stand in a message: JSON on one line, at most 60 characters."""
+    """Return a value for a message: JSON on one line, at most 60 characters."""
     text = json.dumps(value, ensure_ascii=True)
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 class Node:
-    """A value of a JSON document together with its path. null counts as absent."""
+    """A value of a JSON document with its path. null counts as absent.
+
+    Methods that check a value raise Refusal.
+
+    Parameters
+    ----------
+    value
+        The value.
+    path
+        Its path in the document.
+    """
 
     def __init__(self, value: Any, path: str = "") -> None:
         self.value = value
@@ -91,26 +116,67 @@ class Node:
 
     @property
     def absent(self) -> bool:
+        """Whether the value is missing or null."""
         return self.value is None
 
     def refuse(self, expectation: str) -> NoReturn:
-        """Raises Refusal: "<path> = <value>: expected ...", or "<path>: missing; expected ..."."""
+        """Refuse the value.
+
+        Parameters
+        ----------
+        expectation
+            What was expected.
+
+        Raises
+        ------
+        Refusal
+            "<path> = <value>: expected ...", or "<path>: missing; expected ...".
+        """
         place = self.path or "the document"
         if self.absent:
             raise Refusal(f"{place}: missing; expected {expectation}")
         raise Refusal(f"{place} = {shown(self.value)}: expected {expectation}")
 
     def member(self, key: str) -> Node:
-        """Value of a key; absent where there is none."""
+        """Return the value of a key.
+
+        Parameters
+        ----------
+        key
+            Name of the key.
+
+        Returns
+        -------
+        Node
+            Absent if there is no such key.
+        """
         inner = self.value.get(key) if isinstance(self.value, dict) else None
         return Node(inner, f"{self.path}.{key}" if self.path else key)
 
     def elements(self) -> list[Node]:
+        """Return the elements of a list.
+
+        Returns
+        -------
+        list of Node
+            Empty if the value is no list.
+        """
         items = self.value if isinstance(self.value, list) else []
         return [Node(item, f"{self.path}[{k}]") for k, item in enumerate(items, start=1)]
 
     def keys(self, known: Collection[str]) -> Node:
-        """Refuses what is no object, and the first key that is not known."""
+        """Refuse a value that is no object, and the first unknown key.
+
+        Parameters
+        ----------
+        known
+            Names of the keys.
+
+        Returns
+        -------
+        Node
+            This node.
+        """
         if not isinstance(self.value, dict):
             self.refuse("an object")
         for key, value in self.value.items():
@@ -120,12 +186,35 @@ class Node:
         return self
 
     def text(self, expectation: str) -> str:
-        """A string of at least one character, none of them a control character."""
+        """Return a string of at least one character without control characters.
+
+        Parameters
+        ----------
+        expectation
+            What was expected, for the message.
+
+        Returns
+        -------
+        str
+            The string.
+        """
         if not isinstance(self.value, str) or not self.value or any(ord(letter) < 32 for letter in self.value):
             self.refuse(expectation)
         return self.value
 
     def choice(self, *choices: str) -> str:
+        """Return a string that is one of some choices.
+
+        Parameters
+        ----------
+        *choices
+            Allowed strings.
+
+        Returns
+        -------
+        str
+            The string.
+        """
         if self.value not in choices or not isinstance(self.value, str):
             self.refuse(" or ".join(f'"{choice}"' for choice in choices))
         return self.value
@@ -134,7 +223,20 @@ class Node:
         return isinstance(self.value, kinds) and not isinstance(self.value, bool)
 
     def integer(self, least: int, most: int, default: int | None = None) -> int:
-        """A whole number from least to most; 3.0 is one."""
+        """Return a whole number; 3.0 is one.
+
+        Parameters
+        ----------
+        least, most
+            Bounds, both allowed.
+        default
+            Returned if the value is absent. None: absent values are refused.
+
+        Returns
+        -------
+        int
+            The number.
+        """
         if self.absent and default is not None:
             return default
         whole = self._numeric((int, float)) and float(self.value) == math.floor(self.value)
@@ -143,7 +245,24 @@ class Node:
         return int(self.value)
 
     def number(self, least: float, most: float, unit: str, default: float | None = None, above: bool = False) -> float:
-        """A number from least (above: not least itself) to most."""
+        """Return a number.
+
+        Parameters
+        ----------
+        least, most
+            Bounds.
+        unit
+            For the message.
+        default
+            Returned if the value is absent. None: absent values are refused.
+        above
+            Whether `least` itself is refused.
+
+        Returns
+        -------
+        float
+            The number.
+        """
         if self.absent and default is not None:
             return default
         inside = self._numeric((int, float)) and (least < self.value <= most if above else least <= self.value <= most)
@@ -153,7 +272,22 @@ class Node:
         return float(self.value)
 
     def list_of(self, count: int | None, meaning: str, read: Callable[[Node], float]) -> list[float]:
-        """A list of numbers, each read by `read`; count None: any length from 1 on."""
+        """Return a list of numbers.
+
+        Parameters
+        ----------
+        count
+            Number of elements. None: any number from 1 on.
+        meaning
+            What the list is, for the message.
+        read
+            Reads each element.
+
+        Returns
+        -------
+        list of float
+            The numbers.
+        """
         wrong = not isinstance(self.value, list) or not self.value
         if wrong or (count is not None and len(self.value) != count):
             self.refuse(f"a list of {count if count is not None else 'numbers'}, {meaning}")
@@ -162,7 +296,18 @@ class Node:
     def span(
         self, least: float, most: float, unit: str, default: tuple[float, float] | None = None, above: bool = False
     ) -> tuple[float, float]:
-        """Two numbers [lowest, highest], not falling."""
+        """Return two numbers [lowest, highest], the second not below the first.
+
+        Parameters
+        ----------
+        least, most, unit, default, above
+            As for `number`.
+
+        Returns
+        -------
+        tuple of float
+            The two numbers.
+        """
         if self.absent and default is not None:
             return default
         low, high = self.list_of(

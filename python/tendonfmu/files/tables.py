@@ -1,6 +1,6 @@
-"""Tables of finite numbers, CSV and Parquet, in and out: exact, whole, and refused by column and row.
+"""How tables of finite numbers are read and written, CSV and Parquet: exact, whole, with errors by column and row.
 
-Rows count from 1 and do not include the line of names.
+Rows count from 1, without the line of names.
 """
 
 from __future__ import annotations
@@ -20,22 +20,37 @@ from tendonfmu.errors import InputError
 from tendonfmu.files.writing import whole_file
 
 FORMATS = (".csv", ".parquet")
-COMPRESSION = 12  # of Parquet, zstd: a minute of a quantised recording at 500 Hz takes about 1 MB and 1 s
+COMPRESSION = 12  # of Parquet, zstd; a minute of a quantised recording at 500 Hz takes about 1 MB and 1 s
 
 Table = dict[str, NDArray[np.float64]]
 CheckNames = Callable[[Path, list[str]], None]
 
-# What float() takes beyond this (1_000, nan, infinity) is no measurement.
+# float() accepts more (1_000, nan, infinity), but such text is no measurement.
 _NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*")
 _FLAGS = {"true": 1.0, "false": 0.0}
 
 
 def read_table(path: str | os.PathLike[str], check_names: CheckNames, flags: Collection[str] = ()) -> Table:
-    """All columns of a file as finite numbers, in order.
+    """Read all columns of a file as finite numbers.
 
-    check_names: called with the file and its column names before any number is read; raises InputError.
-    flags: columns that may also hold true and false.
-    Raises InputError: file, column, row, what was expected.
+    Parameters
+    ----------
+    path
+        A .csv or .parquet file.
+    check_names
+        Called with the file and its column names before any number is read; raises InputError.
+    flags
+        Columns that may also contain true and false.
+
+    Returns
+    -------
+    dict of ndarray
+        Columns [N] in their order.
+
+    Raises
+    ------
+    InputError
+        File, column, row and what was expected.
     """
     file = Path(path)
     check_format(file)
@@ -55,7 +70,18 @@ def read_table(path: str | os.PathLike[str], check_names: CheckNames, flags: Col
 
 
 def check_format(file: Path) -> None:
-    """Raises InputError unless the suffix is one of `FORMATS`."""
+    """Check the suffix of a table's file.
+
+    Parameters
+    ----------
+    file
+        A file, which need not exist.
+
+    Raises
+    ------
+    InputError
+        The suffix is none of `FORMATS`.
+    """
     if file.suffix.lower() not in FORMATS:
         raise InputError(f"{file}: unknown format {file.suffix!r}; expected .csv or .parquet")
 
@@ -63,7 +89,7 @@ def check_format(file: Path) -> None:
 def _check_duplicates(file: Path, names: list[str]) -> None:
     for name in names:
         if names.count(name) > 1:
-            raise InputError(f"{file}: column {name!r} is there {names.count(name)} times; expected once")
+            raise InputError(f"{file}: column {name!r} occurs {names.count(name)} times; expected once")
 
 
 # --- Parquet ----------------------------------------------------------------------------------------------------------
@@ -85,7 +111,7 @@ def _read_parquet(file: Path, check_names: CheckNames, flags: Collection[str]) -
 
 
 def _numbers(file: Path, name: str, column: Any, flags: Collection[str]) -> NDArray[np.float64]:
-    """One Arrow column; a missing value becomes NaN."""
+    """Return one Arrow column. A missing value becomes NaN."""
     import pyarrow as pa
 
     kind = column.type
@@ -118,9 +144,9 @@ def _read_csv(file: Path, check_names: CheckNames, flags: Collection[str]) -> Ta
 
 
 def _lines(file: Path) -> tuple[str, list[str], str]:
-    """Line of names, whole lines of numbers, and what stands after the last line end ("" in a whole file).
+    """Return the line of names, the whole lines of numbers, and the text after the last line end ("" in a whole file).
 
-    A number without a line end may have lost digits, so a line without one is never taken as whole.
+    A line without a line end may have lost digits, so it never counts as whole.
     """
     try:
         text = file.read_bytes().decode("utf-8-sig")
@@ -134,7 +160,7 @@ def _lines(file: Path) -> tuple[str, list[str], str]:
 
 
 def _parse_fast(rows: list[str], columns: int) -> NDArray[np.float64] | None:
-    """[rows, columns], or None where a field needs a closer look."""
+    """Return the numbers [rows, columns], or None if a field needs a closer look."""
     if any(row.count(",") != columns - 1 for row in rows):
         return None
     try:
@@ -146,7 +172,7 @@ def _parse_fast(rows: list[str], columns: int) -> NDArray[np.float64] | None:
 def _parse_by_field(
     file: Path, names: list[str], rows: Iterable[str], flags: Collection[str], cut_off: str
 ) -> NDArray[np.float64]:
-    """The same one by one: refuses the first bad field by name."""
+    """Return the same, field by field, and refuse the first invalid field by name."""
     parsed = []
     lines = list(rows)
     for row, fields in enumerate(csv.reader(lines), start=1):
@@ -173,9 +199,19 @@ def _parse_field(file: Path, name: str, row: int, field: str, flags: Collection[
 
 
 def write_table(path: str | os.PathLike[str], table: Mapping[str, NDArray[Any]]) -> None:
-    """Writes columns of equal length as CSV or Parquet, by the suffix: whole or not at all.
+    """Write columns of equal length as CSV or Parquet, by the suffix: whole or not at all.
 
-    Numbers are written so that they read back the same; flags as 0 and 1. Raises InputError.
+    Parameters
+    ----------
+    path
+        A .csv or .parquet file.
+    table
+        Columns [N]. Numbers read back the same; flags become 0 and 1.
+
+    Raises
+    ------
+    InputError
+        The format is unknown, or the file cannot be written.
     """
     file = Path(path)
     check_format(file)
@@ -183,7 +219,7 @@ def write_table(path: str | os.PathLike[str], table: Mapping[str, NDArray[Any]])
     columns = {name: column.astype(np.uint8) if column.dtype == bool else column for name, column in columns.items()}
     with whole_file(file) as temporary:
         if file.suffix.lower() == ".csv":
-            # repr: the shortest digits that read back as the same number
+            # repr gives the shortest digits that read back as the same number
             rows = zip(*(map(repr, column.tolist()) for column in columns.values()), strict=True)
             with open(temporary, "w", encoding="utf-8", newline="\n") as out:
                 out.write(",".join(columns) + "\n")

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all."""
+"""How files are written so that they appear whole or not at all."""
 
 from __future__ import annotations
 
@@ -12,7 +12,20 @@ from tendonfmu.errors import InputError
 
 
 def check_output(output: Path, *inputs: Path) -> None:
-    """Raises InputError where no file can be, and where a result would take the place of what it is made from."""
+    """Check that an output can be written and replaces none of its inputs.
+
+    Parameters
+    ----------
+    output
+        The file that will be written.
+    *inputs
+        Files from which it is made.
+
+    Raises
+    ------
+    InputError
+        The output cannot be written, or is one of the inputs.
+    """
     _check_place(output)
     _check_writable(output, output.parent)
     for file in inputs:
@@ -25,7 +38,7 @@ def _check_place(file: Path) -> None:
         raise InputError(f"{file}: no folder {file.parent}; expected one that exists")
     if file.is_dir():
         raise InputError(f"{file}: a folder; expected the name of a file to write")
-    # a result takes the place of what is there: that must be a file, and one that may be written
+    # a result replaces an existing file, which must therefore be a regular and writable one
     if file.exists() and not file.is_file():
         raise InputError(f"{file}: a device or pipe; expected the name of a file to write")
     if file.exists() and not file.stat().st_mode & 0o222:
@@ -33,7 +46,18 @@ def _check_place(file: Path) -> None:
 
 
 def check_output_folder(folder: Path) -> None:
-    """Raises InputError where a folder that need not exist yet could not be made, or not be written into."""
+    """Check that a folder can be made, if it does not exist, and be written to.
+
+    Parameters
+    ----------
+    folder
+        The folder.
+
+    Raises
+    ------
+    InputError
+        It is a file, lies in a file, or cannot be written to.
+    """
     there = next(each for each in (folder, *folder.absolute().parents) if each.exists())
     if not there.is_dir():
         what = "a file" if there == folder else f"{there} is a file"
@@ -42,7 +66,7 @@ def check_output_folder(folder: Path) -> None:
 
 
 def _check_writable(output: Path, folder: Path) -> None:
-    """By writing: permissions alone do not tell of read-only disks. What takes minutes is not computed in vain."""
+    """Check by writing, since permissions do not show read-only disks. Call this before a long computation."""
     try:
         with tempfile.TemporaryFile(dir=folder):
             pass
@@ -52,7 +76,23 @@ def _check_writable(output: Path, folder: Path) -> None:
 
 @contextmanager
 def whole_file(file: Path) -> Iterator[Path]:
-    """A temporary file beside `file` that takes its place at the end, or vanishes when an error ends it."""
+    """Write a file whole or not at all.
+
+    Parameters
+    ----------
+    file
+        The file.
+
+    Yields
+    ------
+    Path
+        A temporary file in the same folder. It replaces `file` at the end, and is deleted after an error.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written.
+    """
     _check_place(file)
     try:
         handle, name = tempfile.mkstemp(dir=file.parent, prefix=f".{file.name}-", suffix=file.suffix)
@@ -62,7 +102,7 @@ def whole_file(file: Path) -> Iterator[Path]:
     temporary = Path(name)
     try:
         yield temporary
-        # mkstemp's files are private; a result is as readable as any other file
+        # mkstemp's files are private; a result gets the permissions of any other new file
         mask = os.umask(0)
         os.umask(mask)
         temporary.chmod(0o666 & ~mask)
@@ -76,8 +116,21 @@ def whole_file(file: Path) -> Iterator[Path]:
 
 
 def is_about(error: OSError, folder: Path) -> bool:
-    """Whether an error in writing concerns a folder: it names no file, such as that of a full disk, or one in there."""
-    if error.errno is None:  # not of the operating system
+    """Return whether an error in writing concerns a folder.
+
+    Parameters
+    ----------
+    error
+        The error.
+    folder
+        The folder.
+
+    Returns
+    -------
+    bool
+        True if the error names a file in the folder, or no file, such as that of a full disk.
+    """
+    if error.errno is None:  # not an error of the operating system
         return False
     if not isinstance(error.filename, str | bytes):
         return True
@@ -85,6 +138,19 @@ def is_about(error: OSError, folder: Path) -> bool:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Whole or not at all."""
+    """Write a text file whole or not at all.
+
+    Parameters
+    ----------
+    path
+        The file.
+    text
+        Its content, written as UTF-8.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written.
+    """
     with whole_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")

@@ -1,7 +1,7 @@
-"""FMUs: packed without a compiler, described, and run.
+"""How FMUs are packaged without a compiler, described, and run.
 
-`packaging` puts the archive together from `model_variables` and `documentation`; `fmpy_client` runs one, sample by
-sample; `running` runs a description or an FMU over a recording.
+`packaging` makes the archive from `model_variables` and `documentation`. `fmpy_client` runs an FMU sample by sample.
+`running` runs a description or an FMU over a recording.
 """
 
 import lazy_loader

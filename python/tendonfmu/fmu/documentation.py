@@ -1,4 +1,4 @@
-"""The pages that come with FMUs: a drawing of the finger, what it is, and all variables."""
+"""What the page of an FMU says: a drawing of the finger, its properties, and all variables."""
 
 from __future__ import annotations
 
@@ -9,12 +9,27 @@ from tendonfmu.model import FingerDescription, count
 
 
 def documentation_page(description: FingerDescription, model: Mapping[str, Any]) -> str:
-    """HTML text of a friction FMU. model: the context of the FMU's XML (modelDescription/README.md)."""
+    """Return the HTML page of a friction FMU. model: the context of the FMU's XML (modelDescription/README.md)."""
     return render_documentation("documentation.html.jinja", model, summary=count(description))
 
 
 def render_documentation(template: str, model: Mapping[str, Any], **context: Any) -> str:
-    """HTML text of a template of such a page, with the variables of the model by causality."""
+    """Render the HTML page of an FMU.
+
+    Parameters
+    ----------
+    template
+        Name of the template.
+    model
+        The context of the FMU's XML (modelDescription/README.md). The template gets its variables by causality.
+    **context
+        Other variables of the template.
+
+    Returns
+    -------
+    str
+        HTML.
+    """
     import jinja2
 
     environment = jinja2.Environment(

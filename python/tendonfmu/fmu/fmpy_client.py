@@ -1,4 +1,4 @@
-"""FMUs through fmpy, and only here: runs one over a recording, sample by sample."""
+"""How an FMU is run over a recording, sample by sample. No other module uses fmpy."""
 
 from __future__ import annotations
 
@@ -24,16 +24,21 @@ Progress = Callable[[int], None]
 
 @dataclass(frozen=True)
 class Variables:
-    """Variables of one FMU: group -> name -> value reference, in the order of their index.
+    """Variables of one FMU.
 
-    types: group -> FMI type.
+    Attributes
+    ----------
+    references
+        Group -> name -> value reference, in the order of their index.
+    types
+        Group -> FMI type.
     """
 
     references: Mapping[str, Mapping[str, int]]
     types: Mapping[str, str]
 
     def of_type(self, kind: str) -> dict[str, int]:
-        """Name -> value reference of all groups of an FMI type."""
+        """Return name -> value reference of all groups of an FMI type."""
         return {
             name: reference
             for group, names in self.references.items()
@@ -58,13 +63,33 @@ def run_fmu(
     parameters: Mapping[str, float] | None = None,
     progress: Progress | None = None,
 ) -> dict[str, NDArray[Any]]:
-    """Runs a friction FMU over a recording and returns one row per sample, each at its own sample's time.
+    """Run a friction FMU over a recording.
 
-    The FMU is stepped by hand: the inputs of sample k are set, fmi2DoStep takes it at t_k, and the outputs after it
-    belong to t_k; the last step goes one sample beyond the recording.
+    For sample k the inputs are set, fmi2DoStep takes the sample at t_k, and the outputs after it belong to t_k. The
+    last step goes one sample beyond the recording.
 
-    parameters: start values by path, beside `kinematics_source`.
-    Returns column name -> [N], `time` first. Raises InputError, with the FMU's own words where it refuses something.
+    Parameters
+    ----------
+    path
+        The FMU.
+    recording
+        Signals of the same finger.
+    kinematics_source
+        1, 2 or 3.
+    parameters
+        Start values by path, in addition to `kinematics_source`.
+    progress
+        Called with the number of samples done.
+
+    Returns
+    -------
+    dict of arrays
+        Column name -> [N], `time` first. Each row belongs to the time of its own sample.
+
+    Raises
+    ------
+    InputError
+        The file is no friction FMU, the recording does not fit it, or the FMU refuses something, in its own words.
     """
     with _unpacked(path) as folder:
         run = _Run(path, folder, parameters or {})
@@ -97,14 +122,14 @@ def _unpacked(path: Path) -> Iterator[Path]:
 
 
 class _Run:
-    """One instance of an FMU with arrays laid out once, so that a step is three calls."""
+    """One instance of an FMU. Its arrays are laid out once, so that a step is three calls."""
 
     def __init__(self, path: Path, folder: Path, parameters: Mapping[str, float]) -> None:
         from fmpy import read_model_description
         from fmpy.fmi2 import FMU2Slave
 
         self.path = path
-        self._at = str(path)  # what a refusal is about: the FMU, then the recording's row
+        self._at = str(path)  # place in error messages: the FMU, later the recording's row
         self._parameters = parameters
         self._messages: list[str] = []
         description = read_model_description(str(folder), validate=False)
@@ -127,7 +152,7 @@ class _Run:
         )
 
     def inputs(self, source: int) -> tuple[str, ...]:
-        """Groups of inputs that the FMU uses."""
+        """Return the groups of inputs that the FMU uses."""
         return inputs_used(source, self._has(REST[-1]) or self._has(SENSORS[-1]))
 
     def _has(self, group: str) -> bool:
@@ -146,7 +171,7 @@ class _Run:
 
     @contextmanager
     def _refusals(self) -> Iterator[None]:
-        """Turns fmpy's exceptions into one line with the FMU's own words."""
+        """Turn fmpy's exceptions into one line with the FMU's own words."""
         try:
             yield
         except (InputError, TypeError, AttributeError, NameError, AssertionError, ArithmeticError, MemoryError):
@@ -244,7 +269,7 @@ def _references(values: list[int]) -> Any:
 
 
 def _rows(rows: NDArray[Any]) -> Callable[[int], Any]:
-    """k -> row k where it stands, as FMI's array of numbers."""
+    """Return a function from k to row k in place, as FMI's array of numbers."""
     row = (ctypes.c_double if rows.dtype == np.float64 else ctypes.c_int) * rows.shape[1]
     first, stride = rows.ctypes.data, rows.strides[0]
     return lambda k: row.from_address(first + k * stride)

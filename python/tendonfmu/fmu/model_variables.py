@@ -1,4 +1,4 @@
-"""The FMU's variables, units and structure of one finger, from the table in modelDescription/variables.json."""
+"""Which variables, units and dependencies the FMU of a finger has, from the table modelDescription/variables.json."""
 
 from __future__ import annotations
 
@@ -18,26 +18,46 @@ from tendonfmu.model import (
     structure_of,
 )
 
-# What XML 1.0 cannot hold, even escaped.
+# Characters that XML 1.0 does not allow, even escaped.
 NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 @dataclass(frozen=True)
 class VariableTable:
-    """variables.json. patterns: those of parameter descriptions, compiled."""
+    """The content of variables.json.
+
+    Attributes
+    ----------
+    data
+        The parsed JSON.
+    patterns
+        Compiled patterns of parameter paths, each with its description.
+    """
 
     data: Mapping[str, Any]
     patterns: list[tuple[re.Pattern[str], str]]
 
 
 def read_table(text: str) -> VariableTable:
+    """Read a table of variables.
+
+    Parameters
+    ----------
+    text
+        Content of variables.json or plant_variables.json.
+
+    Returns
+    -------
+    VariableTable
+        With compiled patterns.
+    """
     data = json.loads(text)
     patterns = [(re.compile(pattern), wording) for pattern, wording in data["parameters"]["descriptions"]]
     return VariableTable(data, patterns)
 
 
 def describe_model(description: FingerDescription, table: VariableTable) -> dict[str, Any]:
-    """The template's context, but for what belongs to the package: identifier, GUID, version, sources.
+    """Return the template's context, except what belongs to the package: identifier, GUID, version, sources.
 
     See modelDescription/README.md.
     """
@@ -65,21 +85,59 @@ def describe_model(description: FingerDescription, table: VariableTable) -> dict
 
 
 def counted(number: int, noun: str) -> str:
+    """Write a number with its noun.
+
+    Parameters
+    ----------
+    number
+        How many.
+    noun
+        In the singular.
+
+    Returns
+    -------
+    str
+        Such as `1 joint` or `2 joints`.
+    """
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def group_sizes(joints: int, tendons: int) -> dict[str, int]:
-    """Elements of a group by its `size` in the table."""
+    """Return the number of elements of a group by its `size` in the table.
+
+    Parameters
+    ----------
+    joints, tendons
+        Numbers of joints and tendons of the finger.
+
+    Returns
+    -------
+    dict of int
+        By "scalar", "joints", "tendons" and "vector".
+    """
     return {"scalar": 1, "joints": joints, "tendons": tendons, "vector": 3}
 
 
 def present_groups(table: VariableTable, has: set[str]) -> list[Mapping[str, Any]]:
-    """The table's groups that a model has, given what it `has` of what they need."""
+    """Return the table's groups that a model has. has: what the model has of the groups' needs."""
     return [group for group in table.data["groups"] if group.get("needs") is None or group["needs"] in has]
 
 
 def units_of(variables: list[dict[str, Any]], table: VariableTable) -> dict[str, Any]:
-    """The table's units that the variables use."""
+    """Return the table's units that the variables use.
+
+    Parameters
+    ----------
+    variables
+        Variables, as `elements` gives them.
+    table
+        The table of variables.
+
+    Returns
+    -------
+    dict
+        Unit -> its base units.
+    """
     used = {variable.get("unit") for variable in variables}
     return {unit: base for unit, base in table.data["units"].items() if unit in used}
 
@@ -90,7 +148,20 @@ def _names(group: Mapping[str, Any], sizes: Mapping[str, int]) -> list[str]:
 
 
 def elements(group: Mapping[str, Any], sizes: Mapping[str, int]) -> Iterator[dict[str, Any]]:
-    """The variables of a group, as the template wants them."""
+    """Yield the variables of a group, as the template needs them.
+
+    Parameters
+    ----------
+    group
+        A group of the table.
+    sizes
+        From `group_sizes`.
+
+    Yields
+    ------
+    dict
+        Name, value reference, type, causality, variability, description and, where given, limits, unit and start.
+    """
     given = {key: group[key] for key in ("type", "causality", "variability")}
     where = {key: group[key] for key in ("initial", "unit", "min", "max", "start") if key in group}
     for i, name in enumerate(_names(group, sizes)):
@@ -121,7 +192,7 @@ def _parameters(
 
 
 def parameter_description(path: str, table: VariableTable) -> str:
-    """Wording of the first pattern that matches the whole path."""
+    """Return the description of the first pattern that matches the whole path."""
     for pattern, wording in table.patterns:
         match = pattern.fullmatch(path)
         if match:
@@ -136,7 +207,10 @@ def _outputs(
     structure: Dependencies,
     late: bool,
 ) -> Iterator[dict[str, Any]]:
-    """late: forces may be those of earlier samples, so that no dependency is by a fixed factor."""
+    """Yield index and dependencies of the outputs.
+
+    late: forces may be those of earlier samples, so that no dependency has a fixed factor.
+    """
     groups = {group["name"]: group for group in present}
     for group in present:
         if group["causality"] != "output":

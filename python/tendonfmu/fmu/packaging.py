@@ -1,6 +1,6 @@
-"""From a finger description to an FMU: an archive put together from parts that stand ready, without a compiler.
+"""How a finger description becomes an FMU: an archive of prepared parts, made without a compiler.
 
-Same input, same bytes: members are sorted, their times and permissions fixed.
+The same input gives the same bytes: members are sorted, and their times and permissions are fixed.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 BINARY_SUFFIXES = (".so", ".dll", ".dylib")
 BINARIES, BINARY_STEM = "binaries", "tendonfmu"
 
-# A model identifier names files and C functions: no words that a compiler or a file system keeps to itself.
+# A model identifier names files and C functions, so words reserved by C or by a file system are excluded.
 RESERVED = frozenset(
     [
         "auto",
@@ -75,11 +75,28 @@ RESERVED = frozenset(
 def build_fmu(
     description_path: Path, output_path: Path, *, binaries: Path | None = None, illustrated: bool = True
 ) -> Path:
-    """Packs the FMU of a finger description and returns its path.
+    """Package the FMU of a finger description.
 
-    binaries: a folder of <FMI platform>/tendonfmu.<so, dll or dylib> in place of the installed ones. illustrated: with
-    pictures and a page for readers; without, it is packed sooner.
-    Raises InputError. output_path appears whole or not at all.
+    Parameters
+    ----------
+    description_path
+        The finger description.
+    output_path
+        The FMU. It is written whole or not at all.
+    binaries
+        A folder of <FMI platform>/tendonfmu.<so, dll or dylib>, used instead of the installed ones.
+    illustrated
+        Whether to add pictures and a page for readers. Packaging is faster without them.
+
+    Returns
+    -------
+    Path
+        `output_path`.
+
+    Raises
+    ------
+    InputError
+        The description is refused, binaries are missing, or the output cannot be written.
     """
     description = read_finger(description_path)
     archive = pack(members(description, binaries=binaries, illustrated=illustrated))
@@ -89,7 +106,18 @@ def build_fmu(
 
 
 def model_identifier(name: str) -> str:
-    """The name as a C identifier: `Zeigefinger, rechts` becomes `Zeigefinger_rechts`."""
+    """Return a name as a C identifier.
+
+    Parameters
+    ----------
+    name
+        Any name.
+
+    Returns
+    -------
+    str
+        `Zeigefinger, rechts` becomes `Zeigefinger_rechts`.
+    """
     plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode("ascii")
     identifier = re.sub(r"[^A-Za-z0-9]+", "_", plain).strip("_")
     if not identifier:
@@ -100,14 +128,45 @@ def model_identifier(name: str) -> str:
 
 
 def guid(resource: bytes, table: VariableTable) -> str:
-    """Identifier that the binary expects: of the model image, or rig, and of the table that it was compiled with."""
+    """Return the identifier that the binary expects.
+
+    Parameters
+    ----------
+    resource
+        The model image, or the rig.
+    table
+        The table of variables that the binary was compiled with.
+
+    Returns
+    -------
+    str
+        "{xxxxxxxx-...}", from the resource and the table.
+    """
     return native.image_guid(resource, variable_generator().salt(table.data))
 
 
 def members(
     description: FingerDescription, *, binaries: Path | None = None, illustrated: bool = True
 ) -> dict[str, bytes]:
-    """Path in the archive to content, for all files of the FMU. illustrated: see `build_fmu`."""
+    """Return all files of the FMU.
+
+    Parameters
+    ----------
+    description
+        A valid description.
+    binaries, illustrated
+        See `build_fmu`.
+
+    Returns
+    -------
+    dict of bytes
+        Path in the archive -> content.
+
+    Raises
+    ------
+    InputError
+        Binaries are missing.
+    """
     table = read_table(package_file("model_description/variables.json").read_text(encoding="utf-8"))
     identifier = model_identifier(description.name)
     sources = _sources()
@@ -150,11 +209,23 @@ def _for_readers(description: FingerDescription, context: Mapping[str, Any]) -> 
 
 
 def package_file(path: str) -> Traversable:
+    """Return a file of the installed package.
+
+    Parameters
+    ----------
+    path
+        Path in the package.
+
+    Returns
+    -------
+    Traversable
+        The file, which need not exist.
+    """
     return files("tendonfmu") / path
 
 
 def variable_generator() -> ModuleType:
-    """generate_variables.py, which wrote the table's salt into the C header."""
+    """Load generate_variables.py, which wrote the table's salt into the C header."""
     path = Path(str(package_file("model_description/generate_variables.py")))
     spec = importlib.util.spec_from_file_location("tendonfmu_generate_variables", path)
     if spec is None or spec.loader is None:
@@ -169,9 +240,28 @@ def _sources() -> dict[str, bytes]:
 
 
 def find_binaries(folder: Path | None, installed: str, stem: str, identifier: str) -> dict[str, bytes]:
-    """<platform>/<identifier>.<suffix> to content, from <platform>/<stem>.<suffix> of the folder.
+    """Read the binaries of all platforms.
 
-    installed: folder of the package that takes its place where it is None. Raises InputError where there is none.
+    Parameters
+    ----------
+    folder
+        Folder of <platform>/<stem>.<suffix>, or None.
+    installed
+        Folder of the package that is used if `folder` is None.
+    stem
+        Name of the binaries without suffix.
+    identifier
+        Model identifier of the FMU.
+
+    Returns
+    -------
+    dict of bytes
+        <platform>/<identifier>.<suffix> -> content.
+
+    Raises
+    ------
+    InputError
+        The folder has no binary.
     """
     root: Traversable = package_file(installed) if folder is None else folder
     found = {}
@@ -186,7 +276,23 @@ def find_binaries(folder: Path | None, installed: str, stem: str, identifier: st
 
 
 def model_description(context: Mapping[str, Any]) -> bytes:
-    """The XML of a context (modelDescription/README.md), once FMI's schema accepts it."""
+    """Render the XML of an FMU, and check it with FMI's schema.
+
+    Parameters
+    ----------
+    context
+        Context of the template (modelDescription/README.md).
+
+    Returns
+    -------
+    bytes
+        modelDescription.xml.
+
+    Raises
+    ------
+    InternalError
+        FMI's schema refuses the XML, or is not found.
+    """
     return _checked(_render_xml(context))
 
 
@@ -199,7 +305,10 @@ def _render_xml(context: Mapping[str, Any]) -> bytes:
 
 
 def _checked(xml: bytes) -> bytes:
-    """The same XML, once FMI's schema accepts it. The schema comes with fmpy, whose import would take half a second."""
+    """Return the XML if FMI's schema accepts it.
+
+    The schema comes with fmpy, but fmpy is not imported, which would take half a second.
+    """
     from lxml import etree
 
     spec = importlib.util.find_spec("fmpy")
@@ -217,7 +326,18 @@ def _checked(xml: bytes) -> bytes:
 
 
 def pack(content: Mapping[str, bytes]) -> bytes:
-    """Zip archive with the members sorted by path, all of 1980-01-01 and readable by everyone."""
+    """Make a zip archive with fixed order, times and permissions.
+
+    Parameters
+    ----------
+    content
+        Path in the archive -> content.
+
+    Returns
+    -------
+    bytes
+        Members sorted by path, all of 1980-01-01 and readable by everyone.
+    """
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as archive:
         for path in sorted(content):

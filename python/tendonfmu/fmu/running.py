@@ -1,4 +1,4 @@
-"""Runs a finger, given as a description or as an FMU, over a recording."""
+"""How a finger, given as a description or as an FMU, is run over a recording."""
 
 from __future__ import annotations
 
@@ -17,7 +17,18 @@ from tendonfmu.recordings import Recording
 
 
 def check_model(model: Path) -> None:
-    """Raises InputError unless the file is there and may be a description or an FMU."""
+    """Check that a file exists and may be a description or an FMU.
+
+    Parameters
+    ----------
+    model
+        FINGER.json or FINGER.fmu.
+
+    Raises
+    ------
+    InputError
+        The file is missing, or is a recording.
+    """
     if model.suffix.lower() in FORMATS:
         raise InputError(f"{model}: a recording; expected FINGER.json or FINGER.fmu here, and the recording after it")
     if not model.is_file():
@@ -25,7 +36,18 @@ def check_model(model: Path) -> None:
 
 
 def summary(table: Mapping[str, NDArray[Any]]) -> str:
-    """The outputs in a line whose figures show a wrong unit: how long, which angles, how much contact."""
+    """Describe the outputs in a line whose figures reveal a wrong unit.
+
+    Parameters
+    ----------
+    table
+        Outputs by column, from `run_model`.
+
+    Returns
+    -------
+    str
+        Number of samples, duration, range of the joint angles, and samples in contact.
+    """
     time = table["time"]
     angles = np.concatenate([column for name, column in table.items() if name.startswith("joint_angle[")])
     return (
@@ -37,7 +59,31 @@ def summary(table: Mapping[str, NDArray[Any]]) -> str:
 def run_model(
     model: Path, recording: Recording, *, kinematics_source: int = 1, progress: Progress | None = None
 ) -> dict[str, NDArray[Any]]:
-    """Outputs by column, `time` first; a description is packed into a temporary FMU. See `fmu.run_fmu`."""
+    """Run a description or an FMU over a recording.
+
+    A description is packaged into a temporary FMU.
+
+    Parameters
+    ----------
+    model
+        FINGER.json or FINGER.fmu.
+    recording
+        Signals of the same finger.
+    kinematics_source
+        1, 2 or 3.
+    progress
+        Called with the number of samples done.
+
+    Returns
+    -------
+    dict of arrays
+        Outputs by column [N], `time` first. See `run_fmu`.
+
+    Raises
+    ------
+    InputError
+        As `check_model` and `run_fmu`; or the description is refused.
+    """
     check_model(model)
     if model.suffix.lower() != ".json":
         return run_fmu(model, recording, kinematics_source=kinematics_source, progress=progress)

@@ -1,8 +1,8 @@
-"""The finger: its description and the compiled model.
+"""What a finger is: its description and the compiled model.
 
-`description` reads a finger description, `native` is the binding of the C runtime, through which every call of the
-model goes. Beside them: the places of friction (`friction_places`), extensions, quasi-static balance, the geometry of
-the routing, and what a valid description says that no finger has (`plausibility`).
+`description` reads a finger description. `native` is the binding of the C runtime; every call of the model goes through
+it. Other modules hold the places of friction (`friction_places`), extensions, quasi-static balance, the geometry of the
+routing, and checks for implausible but valid descriptions (`plausibility`).
 """
 
 import lazy_loader

@@ -1,5 +1,6 @@
-"""Tendon forces of a finger in quasi-static balance: the pretension that holds itself, and the forces that carry the
-friction of a motion (eq. 12: Rᵀ f0 = T).
+"""Which tendon forces keep a finger in quasi-static balance, with and without motion (eq. 12: Rᵀ f0 = T).
+
+These are the pretension that balances itself, and the forces that carry the friction of a motion.
 """
 
 from __future__ import annotations
@@ -16,23 +17,49 @@ from tendonfmu.model import native
 
 Numbers = NDArray[np.float64]
 
-LEAST_SHARE = 0.05  # of the mean: every pulling tendon stays taut
+LEAST_SHARE = 0.05  # of the mean; keeps every pulling tendon taut
 _SWEEPS = 20000
-_ITERATIONS = 8  # each gains the share of the force that friction takes, some percent
+_ITERATIONS = 8  # each reduces the error to the share of the force that friction takes, some percent
 _NEVER = 1e9  # N·m; no contact threshold is ever passed
 
 
 def moment_arms(data: Mapping[str, Any]) -> Numbers:
-    """[m, n] routing matrix R of a valid description, m."""
+    """Return the routing matrix R of a description.
+
+    Parameters
+    ----------
+    data
+        A valid finger description.
+
+    Returns
+    -------
+    Numbers
+        [m, n] (m).
+    """
     return np.array([tendon["moment_arms"] for tendon in data["tendons"]], dtype=float)
 
 
 def pretension_vector(data: Mapping[str, Any]) -> Numbers:
-    """[m] tendon forces per newton of pretension: Rᵀ ν = 0, mean 1, as even as that allows (nearest to ones).
+    """Return the tendon forces per newton of pretension.
 
-    Every tendon that only pulls gets at least `LEAST_SHARE` of the mean. All zeros for a finger of cable loops alone
-    that cannot be pretensioned. Raises InputError where pulling tendons cannot hold each other.
-    Method: Dykstra's alternating projections onto the null space and the allowed shares.
+    The forces solve Rᵀ ν = 0, have mean 1, and are as equal as this allows (nearest to ones). Every tendon that only
+    pulls gets at least `LEAST_SHARE` of the mean. Method: Dykstra's alternating projections onto the null space and the
+    allowed shares.
+
+    Parameters
+    ----------
+    data
+        A valid finger description.
+
+    Returns
+    -------
+    Numbers
+        ν [m]. All zeros for a finger that has only cable loops and cannot be pretensioned.
+
+    Raises
+    ------
+    InputError
+        The pulling tendons cannot hold each other in balance.
     """
     arms = moment_arms(data)
     pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
@@ -48,7 +75,7 @@ def pretension_vector(data: Mapping[str, Any]) -> Numbers:
         shares = project @ allowed
     else:
         raise InputError(
-            "tendons: no pretension holds itself in balance; expected moment arms with a solution of "
+            "tendons: no pretension is in balance; expected moment arms with a solution of "
             "Rᵀ f = 0 in which every tendon pulls"
         )
     mean = float(np.mean(shares))
@@ -56,8 +83,20 @@ def pretension_vector(data: Mapping[str, Any]) -> Numbers:
 
 
 def friction_probe(data: Mapping[str, Any]) -> native.Finger:
-    """A finger whose `friction_torque` and `bias_torque` hold the model alone: no tracking, no contact, q and q̇ as
-    given. The bias then moves by the jumps of fig. 5 only.
+    """Make a finger that computes the friction model only.
+
+    It does not track the bias and detects no contact; q and q̇ are inputs. Its `friction_torque` and `bias_torque`
+    contain the model alone: the bias moves only by the jumps of fig. 5.
+
+    Parameters
+    ----------
+    data
+        A valid finger description.
+
+    Returns
+    -------
+    native.Finger
+        With kinematics source 3.
     """
     bias = {"drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": [0.0] * len(data["joints"])}
     for key in ("noise_std", "noise_std_per_force", "forget_rate", "noise_time"):
@@ -69,11 +108,23 @@ def friction_probe(data: Mapping[str, Any]) -> native.Finger:
 
 
 def balanced_forces(data: Mapping[str, Any], motion: Mapping[str, Numbers], pretension: Numbers) -> Numbers:
-    """[N, m] tendon forces that carry the friction of a motion: f0 = pretension·ν + (Rᵀ)⁺ T(f0), N.
+    """Return the tendon forces that carry the friction of a motion: f0 = pretension·ν + (Rᵀ)⁺ T(f0).
 
-    motion: `time` [N], `joint_position` and `joint_velocity` [N, n]. pretension: [N] mean tendon force, N; or [N, m]
-    tensions that hold themselves, in place of pretension·ν.
-    T is eq. (10) of what slides, cover included; what sticks adds nothing, since its share is not known.
+    T is eq. (10) of everything that slides, cover included. Sticking places add nothing, since their share is unknown.
+
+    Parameters
+    ----------
+    data
+        A valid finger description.
+    motion
+        `time` [N] (s), `joint_position` [N, n] (rad) and `joint_velocity` [N, n] (rad/s).
+    pretension
+        Mean tendon force [N] (N), or balanced tensions [N, m] (N) to use instead of pretension·ν.
+
+    Returns
+    -------
+    Numbers
+        Tendon forces [N, m] (N).
     """
     finger = friction_probe(data)
     start = finger.save_state()

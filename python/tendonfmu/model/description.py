@@ -1,6 +1,6 @@
-"""The finger description (docs/reference/finger_description.md): read from a file, and counted.
+"""What a finger description holds: it is read from a file, and counted (docs/reference/finger_description.md).
 
-What a description may hold is decided by the native reader alone; `schema/finger.schema.json` says the same to editors.
+The native reader alone decides what a description may hold. `schema/finger.schema.json` defines the same for editors.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from tendonfmu.model.extensions import extension_numbers, extension_rows
 FORMAT = "tendonfmu-finger-1"
 _OTHER_FORMATS = {
     "tendonfmu-rig-": "a rig",
-    "tendonfmu-fit-": "of a fit",
+    "tendonfmu-fit-": "file of a fit",
     "tendonfmu-tune-": "report of a tuning",
     "tendonfmu-score-": "report of a score",
     "tendonfmu-excitation-": "report of a plan",
@@ -31,7 +31,16 @@ Law = Mapping[str, Any]
 class FingerDescription:
     """A description that the native reader has accepted.
 
-    path: where it was read. text: the file's bytes. data: the parsed JSON. image: the model image made of it.
+    Attributes
+    ----------
+    path
+        The file that it was read from.
+    text
+        Content of the file.
+    data
+        The parsed JSON.
+    image
+        The model image made from it.
     """
 
     path: Path
@@ -41,36 +50,51 @@ class FingerDescription:
 
     @property
     def name(self) -> str:
+        """Name of the finger."""
         return str(self.data["name"])
 
     @property
     def joint_names(self) -> list[str]:
-        """[n] names, `joint 2` where there is none."""
+        """Names of the joints [n]; `joint 2` where there is none."""
         return [joint.get("name") or f"joint {j}" for j, joint in enumerate(self.data["joints"], start=1)]
 
     @property
     def tendon_names(self) -> list[str]:
-        """[m] names, `tendon 2` where there is none."""
+        """Names of the tendons [m]; `tendon 2` where there is none."""
         return [tendon.get("name") or f"tendon {i}" for i, tendon in enumerate(self.data["tendons"], start=1)]
 
     @property
     def moment_arms(self) -> list[list[float]]:
-        """[m][n] routing matrix R, m."""
+        """Routing matrix R [m][n] (m)."""
         return [[float(arm) for arm in tendon["moment_arms"]] for tendon in self.data["tendons"]]
 
     def summary(self) -> list[str]:
-        """What the finger is, in lines of text."""
+        """Describe the finger in lines of text.
+
+        Returns
+        -------
+        list of str
+            One line each for joints, tendons, moment arms, stiffness, friction and numbers.
+        """
         return _summary_lines(count(self))
 
 
 @dataclass(frozen=True)
 class Counts:
-    """What a finger is, in numbers.
+    """What a finger has, in numbers.
 
-    moment_arms, stiffness: least and largest magnitude in m and N/m, moment arms of 0 left out.
-    laws: by kind, each working point counted; an asymmetric law counts once. extensions: their effects, in order.
-    parameters: all numbers of the FMU.
-    estimated_numbers: those that a fit estimates, the biases included (see `estimated_numbers()`).
+    Attributes
+    ----------
+    moment_arms, stiffness
+        Least and largest magnitude (m; N/m), without moment arms of 0.
+    laws
+        Number of laws by kind. Each working point counts; an asymmetric law counts once.
+    extensions
+        Their effects, in order.
+    parameters, tunable_parameters
+        Numbers of parameters of the FMU.
+    estimated_numbers
+        Counts of the numbers that a fit estimates, biases included (see `estimated_numbers()`).
     """
 
     name: str
@@ -100,7 +124,23 @@ class Counts:
 
 
 def read_finger(path: Path) -> FingerDescription:
-    """Reads a finger description. Raises InputError, one line that begins with the path."""
+    """Read a finger description.
+
+    Parameters
+    ----------
+    path
+        A JSON file.
+
+    Returns
+    -------
+    FingerDescription
+        A description that the native reader has accepted.
+
+    Raises
+    ------
+    InputError
+        One line that starts with the path.
+    """
     try:
         text = path.read_bytes()
     except OSError as failed:
@@ -116,11 +156,11 @@ def read_finger(path: Path) -> FingerDescription:
 
 
 def _check_format(path: Path, text: bytes) -> None:
-    """Fingers, rigs and reports are easily mixed up: say so before any other fault of the content."""
+    """Refuse other files of tendonfmu first: fingers, rigs and reports are easily mixed up."""
     try:
         data = json.loads(text)
     except (ValueError, RecursionError):
-        return  # the runtime says where
+        return  # the runtime reports the place of the error
     if isinstance(data, dict):
         found = data.get("format")
         if found is None:
@@ -131,7 +171,7 @@ def _check_format(path: Path, text: bytes) -> None:
 
 
 def laws(data: Mapping[str, Any]) -> Iterator[tuple[str, Law]]:
-    """(kind, law) of every law of a valid description; kind is its key, each working point is a law of its own."""
+    """Yield (kind, law) of every law of a valid description. Each working point is a separate law; kind is its key."""
     for joint in data["joints"]:
         for kind in ("friction", "load_friction"):
             if joint.get(kind) is not None:
@@ -147,11 +187,10 @@ def laws(data: Mapping[str, Any]) -> Iterator[tuple[str, Law]]:
 
 
 def estimated_numbers(data: Mapping[str, Any]) -> dict[str, int]:
-    """How many numbers a fit estimates, by kind.
+    """Count the numbers that a fit estimates, by kind.
 
-    What is absent stays absent: viscous 0 is no viscous friction, static equal to coulomb no
-    Stribeck effect. So a side has up to four numbers; a cover has its stiffness, an extension all it has, and every
-    joint a bias.
+    Absent terms stay absent: viscous 0 means no viscous friction, static equal to coulomb means no Stribeck effect. So
+    a side has up to four numbers. A cover has its stiffness, an extension all its numbers, and every joint a bias.
     """
     counts = dict.fromkeys(("friction", "load_friction", "pulley_friction", "edge_friction"), 0)
     for kind, law in laws(data):
@@ -163,7 +202,18 @@ def estimated_numbers(data: Mapping[str, Any]) -> dict[str, int]:
 
 
 def sides(law: Law) -> list[Law]:
-    """The sides of a law: one that serves both directions, or the positive and the negative one."""
+    """Return the sides of a law.
+
+    Parameters
+    ----------
+    law
+        A law of a valid description.
+
+    Returns
+    -------
+    list of Law
+        One side that holds for both directions, or the positive and the negative side.
+    """
     return [law] if law.get("positive") is None else [law["positive"], law["negative"]]
 
 
@@ -182,7 +232,18 @@ def _range(values: Iterable[float]) -> tuple[float, float]:
 
 
 def count(description: FingerDescription) -> Counts:
-    """Counts what a description holds."""
+    """Count what a description holds.
+
+    Parameters
+    ----------
+    description
+        A valid description.
+
+    Returns
+    -------
+    Counts
+        Numbers of joints, tendons, laws, extensions and parameters.
+    """
     data = description.data
     found = list(laws(data))
     parameters = native.Finger(description.image).parameters()

@@ -1,4 +1,4 @@
-"""The numbers of `extensions` (docs/reference/semantics.md#extensions): their names and expected sizes."""
+"""Which numbers `extensions` have (docs/reference/semantics.md#extensions): their names and expected sizes."""
 
 from __future__ import annotations
 
@@ -34,8 +34,21 @@ LEFT_OUT: Mapping[str, float] = {"turns": 1.0, "reaction": 1.0, "beyond": 1.0}
 
 @dataclass(frozen=True)
 class ExtensionNumber:
-    """A number of an extension. path: as in the description. value: SI. magnitude: expected of such a number. left_out:
-    the description leaves it out, or might."""
+    """A number of an extension.
+
+    Attributes
+    ----------
+    effect
+        Effect of the extension.
+    path
+        Path as in the description.
+    value
+        In SI units.
+    magnitude
+        Expected size of such a number.
+    left_out
+        Whether the description leaves it out, or has the value that stands for leaving it out.
+    """
 
     effect: str
     path: str
@@ -45,12 +58,34 @@ class ExtensionNumber:
 
 
 def extension_rows(data: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """The extensions of a valid description; [] without the key."""
+    """Return the extensions of a description.
+
+    Parameters
+    ----------
+    data
+        A valid finger description.
+
+    Returns
+    -------
+    list of dict
+        The rows, [] if the key is missing.
+    """
     return list(data.get("extensions") or [])
 
 
 def extension_numbers(data: Mapping[str, Any]) -> Iterator[ExtensionNumber]:
-    """All numbers of the extensions of a valid description, in the order of the FMU's parameters."""
+    """Yield all numbers of the extensions of a description.
+
+    Parameters
+    ----------
+    data
+        A valid finger description.
+
+    Yields
+    ------
+    ExtensionNumber
+        In the order of the FMU's parameters.
+    """
     for k, row in enumerate(extension_rows(data), start=1):
         for name, magnitude in MAGNITUDES[row["effect"]].items():
             missing = LEFT_OUT.get(name, 0.0)
@@ -60,13 +95,39 @@ def extension_numbers(data: Mapping[str, Any]) -> Iterator[ExtensionNumber]:
 
 
 def place_of(row: Mapping[str, Any]) -> str:
-    """`, of load_friction at joint 2, tendon 1`: which effect an extension is, as an appendix to a text."""
+    """Describe an extension as an appendix to a text.
+
+    Parameters
+    ----------
+    row
+        A row of `extensions`.
+
+    Returns
+    -------
+    str
+        Such as `, of load_friction at joint 2, tendon 1`.
+    """
     where = ", ".join(f"{key} {row[key]}" for key in ("joint", "tendon") if row.get(key) is not None)
     return f", of {row['effect']}" + (f" at {where}" if where else "")
 
 
 def extended_row(data: Mapping[str, Any], effect: str, place: Any) -> Mapping[str, Any] | None:
-    """The last extension of an effect at a place (joint, tendon from 1 or None); None where there is none."""
+    """Return the last extension of an effect at a place.
+
+    Parameters
+    ----------
+    data
+        A valid finger description.
+    effect
+        Effect of the extension.
+    place
+        Has `joint` and `tendon`, each from 1 or None.
+
+    Returns
+    -------
+    dict or None
+        The row, or None if there is none.
+    """
     own = [row for row in extension_rows(data) if row["effect"] == effect]
     at = [row for row in own if (row.get("joint"), row.get("tendon")) == (place.joint, place.tendon)]
     return at[-1] if at else None

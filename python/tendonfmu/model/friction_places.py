@@ -1,4 +1,4 @@
-"""The friction effects of a finger, each with where it acts, what drives it and which numbers it has."""
+"""Where a finger has friction: each effect with its place, the motion that drives it, and its numbers."""
 
 from __future__ import annotations
 
@@ -14,16 +14,27 @@ from tendonfmu.model.description import Law
 
 Numbers = NDArray[np.float64]
 
-DEFAULT_THRESHOLD = {"tendon": 0.0005, "joint": 0.01}  # m/s, rad/s; where a description has none
+DEFAULT_THRESHOLD = {"tendon": 0.0005, "joint": 0.01}  # m/s, rad/s; used if a description has none
 
 
 @dataclass(frozen=True)
 class Effect:
-    """One F_A, F_B, T_jv0 or T_jvf.
+    """One friction effect: an F_A, F_B, T_jv0 or T_jvf.
 
-    path: as in the description, such as "tendons[1].edge_friction[2]". kind: its key there. joint, tendon: from 1;
-        tendon 0 for friction in a joint. drive: the joint whose ẋ_ij or q̇_j slides it.
-    angles: [k] rad, working points over the angle of joint `joint` − 1; empty for a single law. laws: as many, or one.
+    Attributes
+    ----------
+    path
+        Path as in the description, such as "tendons[1].edge_friction[2]".
+    kind
+        Its key there.
+    joint, tendon
+        Place, from 1. Tendon 0: friction in a joint.
+    drive
+        The joint whose ẋ_ij or q̇_j slides it.
+    angles
+        Working points [k] (rad) over the angle of joint `joint` − 1. Empty for a single law.
+    laws
+        One law for each working point, or a single one.
     """
 
     path: str
@@ -36,12 +47,23 @@ class Effect:
 
     @property
     def law_paths(self) -> list[str]:
-        """[k] paths of the laws of the working points, or the effect's own path."""
+        """Paths of the laws of the working points [k], or the effect's own path."""
         return [f"{self.path}.laws[{k}]" for k in range(1, len(self.laws) + 1)] if self.angles else [self.path]
 
 
 def effects(data: Mapping[str, Any]) -> list[Effect]:
-    """All friction effects of a valid description that can slide at all."""
+    """Return all friction effects of a description that can slide.
+
+    Parameters
+    ----------
+    data
+        A valid finger description.
+
+    Returns
+    -------
+    list of Effect
+        First those in joints, then those at tendons.
+    """
     return [*_in_joints(data), *_at_tendons(data)]
 
 
@@ -65,14 +87,42 @@ def _at_tendons(data: Mapping[str, Any]) -> Iterator[Effect]:
 
 
 def velocity_threshold(data: Mapping[str, Any], effect: Effect) -> float:
-    """v_min of an effect, m/s or rad/s."""
+    """Return v_min of an effect.
+
+    Parameters
+    ----------
+    data
+        A valid finger description.
+    effect
+        One of its effects.
+
+    Returns
+    -------
+    float
+        m/s for a tendon's effect, rad/s for a joint's.
+    """
     key = "tendon" if effect.tendon else "joint"
     value = (data.get("velocity_threshold") or {}).get(key)
     return DEFAULT_THRESHOLD[key] if value is None else float(value)
 
 
 def sliding_velocity(data: Mapping[str, Any], effect: Effect, joint_velocity: Numbers) -> Numbers:
-    """[N] ẋ_ij (m/s, eq. 5) of a tendon's effect, q̇_j (rad/s) of a joint's. joint_velocity: [N, n]."""
+    """Return the velocity that slides an effect.
+
+    Parameters
+    ----------
+    data
+        A valid finger description.
+    effect
+        One of its effects.
+    joint_velocity
+        [N, n] (rad/s).
+
+    Returns
+    -------
+    Numbers
+        [N]: ẋ_ij (m/s, eq. 5) of a tendon's effect, q̇_j (rad/s) of a joint's.
+    """
     if not effect.tendon:
         return joint_velocity[:, effect.drive - 1]
     arms = moment_arms(data)[effect.tendon - 1]
@@ -80,9 +130,19 @@ def sliding_velocity(data: Mapping[str, Any], effect: Effect, joint_velocity: Nu
 
 
 def working_point_weights(effect: Effect, joint_position: Numbers) -> Numbers:
-    """[N, k] share of each law in the value at each sample, by linear interpolation; ones for a single law.
+    """Return the weight of each law of an effect in its value, by linear interpolation.
 
-    joint_position: [N, n] rad. q_0 = 0.
+    Parameters
+    ----------
+    effect
+        A friction effect.
+    joint_position
+        [N, n] (rad). q_0 = 0.
+
+    Returns
+    -------
+    Numbers
+        [N, k]. Ones for a single law.
     """
     if not effect.angles:
         return np.ones((len(joint_position), 1))

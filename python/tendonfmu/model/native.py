@@ -1,7 +1,7 @@
-"""The binding of the C runtime, and only it: every call of the model from Python goes through here.
+"""How Python calls the C runtime: the binding, through which every call of the model goes.
 
-Errors come as `NativeError` with the runtime's own line: what, where, what was expected. It is no `InputError`: who
-gives the runtime something of the user's names its file.
+Errors are `NativeError` with the runtime's own line: what, where and what was expected. They are not `InputError`: the
+caller that passes user input to the runtime adds the name of the file.
 """
 
 from __future__ import annotations
@@ -22,12 +22,28 @@ Array = NDArray[Any]
 
 
 class NativeError(ValueError):
-    """Refused by the runtime: a description, an image, a parameter, a sample or a state."""
+    """The runtime refuses a description, an image, a parameter, a sample or a state."""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of a finger: path as of the FMU's parameter, value in the image, allowed range, FMI unit."""
+    """One number of a finger.
+
+    Attributes
+    ----------
+    path
+        Path, as of the FMU's parameter.
+    start
+        Value in the image.
+    minimum, maximum
+        Allowed range.
+    above_minimum
+        Whether the value must be above the minimum, not equal to it.
+    tunable
+        Whether it may change between steps.
+    unit
+        FMI unit.
+    """
 
     path: str
     start: float
@@ -47,26 +63,67 @@ def _refusals() -> Iterator[None]:
 
 
 def version() -> str:
-    """Version of the compiled runtime."""
+    """Return the version of the compiled runtime.
+
+    Returns
+    -------
+    str
+        Numbers separated by points.
+    """
     return _native.version()
 
 
 def image_from_json(text: str | bytes) -> bytes:
-    """Model image of a finger description. Raises NativeError with key path, value and allowed range."""
+    """Compile a finger description to a model image.
+
+    Parameters
+    ----------
+    text
+        The description (JSON).
+
+    Returns
+    -------
+    bytes
+        The image.
+
+    Raises
+    ------
+    NativeError
+        Key path, value and allowed range.
+    """
     with _refusals():
         return _native.image_from_json(text.encode() if isinstance(text, str) else text)
 
 
 def image_guid(image: bytes, salt: int) -> str:
-    """Identifier of an image's content, "{xxxxxxxx-...}"; salt: any number, mixed in."""
+    """Return an identifier of an image's content.
+
+    Parameters
+    ----------
+    image
+        A model image.
+    salt
+        Any number; it changes the identifier.
+
+    Returns
+    -------
+    str
+        "{xxxxxxxx-...}".
+    """
     return _native.image_guid(image, salt)
 
 
 class Finger:
     """One finger of the C runtime: parameters, state, and runs over whole recordings in one call.
 
-    image: as `image_from_json` makes it. kinematics_source: 1, 2 or 3, as of the FMU.
-    Not for use by two threads at a time.
+    Not to be used by two threads at a time.
+
+    Parameters
+    ----------
+    image
+        A model image, as `image_from_json` makes it.
+    kinematics_source
+        1, 2 or 3, as of the FMU.
     """
 
     def __init__(self, image: bytes, kinematics_source: int = 1) -> None:
@@ -76,16 +133,36 @@ class Finger:
 
     @classmethod
     def from_description(cls, description: Mapping[str, Any] | str | bytes, kinematics_source: int = 1) -> Finger:
-        """From a description: parsed JSON or its text."""
+        """Make a finger from a description.
+
+        Parameters
+        ----------
+        description
+            Parsed JSON or its text.
+        kinematics_source
+            1, 2 or 3, as of the FMU.
+
+        Returns
+        -------
+        Finger
+            A new finger.
+
+        Raises
+        ------
+        NativeError
+            Key path, value and allowed range.
+        """
         text = description if isinstance(description, str | bytes) else json.dumps(description)
         return cls(image_from_json(text), kinematics_source)
 
     @property
     def joints(self) -> int:
+        """Number of joints n."""
         return self._finger.joints
 
     @property
     def tendons(self) -> int:
+        """Number of tendons m."""
         return self._finger.tendons
 
     @property
@@ -95,17 +172,17 @@ class Finger:
 
     @property
     def watches_rest(self) -> bool:
-        """Whether the description has contact.rest; then tendon positions are needed with every source."""
+        """Whether the description has contact.rest. It needs tendon positions with every source."""
         return self._finger.watches_rest
 
     @property
     def watches_sensors(self) -> bool:
-        """Whether the description has sensor_fault; then tendon positions are needed with every source."""
+        """Whether the description has sensor_fault. It needs tendon positions with every source."""
         return self._finger.watches_sensors
 
     @property
     def kernel(self) -> str:
-        """Instruction set of the step: "plain", "sse2" or "avx2"; all give the same bits."""
+        """Instruction set of the step: "plain", "sse2" or "avx2". All give the same bits."""
         return self._finger.kernel
 
     @kernel.setter
@@ -114,7 +191,13 @@ class Finger:
             self._finger.kernel = name
 
     def parameters(self) -> list[Parameter]:
-        """All parameters in canonical order: index k here is index k in the image."""
+        """Return all parameters in canonical order.
+
+        Returns
+        -------
+        list of Parameter
+            Index k is index k in the image.
+        """
         return [
             Parameter(self._finger.parameter_path(k), *self._finger.parameter_info(k))
             for k in range(self._finger.parameter_count)
@@ -127,51 +210,143 @@ class Finger:
         return index
 
     def get(self, path: str) -> float:
-        """Value of one parameter by its path."""
+        """Return the value of one parameter.
+
+        Parameters
+        ----------
+        path
+            Path of the parameter.
+
+        Returns
+        -------
+        float
+            In the parameter's unit.
+
+        Raises
+        ------
+        NativeError
+            The finger has no such parameter.
+        """
         return self._finger.get_parameters([self._index(path)])[0]
 
     def set(self, values: Mapping[str, float]) -> None:
-        """Writes parameters by path, all or none; each is checked against its range."""
+        """Write parameters by path, all or none.
+
+        Parameters
+        ----------
+        values
+            Values by path.
+
+        Raises
+        ------
+        NativeError
+            A path is unknown, or a value is out of its range.
+        """
         with _refusals():
             self._finger.set_parameters([self._index(path) for path in values], list(values.values()))
 
     def values(self) -> NDArray[np.float64]:
-        """[p] all parameter values."""
+        """Return all parameter values.
+
+        Returns
+        -------
+        ndarray
+            [p], in canonical order.
+        """
         return np.array(self._finger.get_parameters(range(self._finger.parameter_count)))
 
     def set_values(self, values: Sequence[float] | NDArray[np.float64]) -> None:
-        """Writes all parameters, [p]."""
+        """Write all parameters.
+
+        Parameters
+        ----------
+        values
+            [p], in canonical order.
+
+        Raises
+        ------
+        NativeError
+            A value is out of its range.
+        """
         with _refusals():
             self._finger.set_parameters(range(self._finger.parameter_count), [float(value) for value in values])
 
     def reset(self) -> None:
-        """Back to the image: its parameters, kinematics source 1, no sample taken."""
+        """Return to the image: its parameters, kinematics source 1, no sample taken."""
         self._finger.reset()
 
     def set_kinematics_source(self, source: int) -> None:
+        """Choose where angles and speeds come from.
+
+        Parameters
+        ----------
+        source
+            1, 2 or 3, as of the FMU.
+
+        Raises
+        ------
+        NativeError
+            Another number.
+        """
         with _refusals():
             self._finger.kinematics_source = source
 
     def save_state(self) -> bytes:
+        """Return a copy of the state.
+
+        Returns
+        -------
+        bytes
+            For `restore_state` of a finger of the same image.
+        """
         return self._finger.save_state()
 
     def restore_state(self, state: bytes) -> None:
+        """Return to a saved state.
+
+        Parameters
+        ----------
+        state
+            From `save_state`.
+
+        Raises
+        ------
+        NativeError
+            The state does not belong to this finger.
+        """
         with _refusals():
             self._finger.restore_state(state)
 
     def run(self, recording: Mapping[str, Array], parts: bool = False) -> dict[str, Array]:
-        """Takes all samples of a recording in one call and returns all outputs of the FMU.
+        """Take all samples of a recording in one call, and return all outputs of the FMU.
 
-        recording: `time` [N] (s), `tendon_force` and `tendon_position` [N, m], `joint_position` and `joint_velocity`
-            [N, n]; those that the kinematics source does not use may be left out.
-        parts: with `friction_parts` [N, n, m + 3], N·m, what makes each joint's friction (needs contact.uncertainty).
-        Returns [N, n], `slack` [N, m], `contact` [N]; flags are bool. Beyond these
-        `compensated_torque_std`, `residual`, `innovation`, `stuck_friction`, `friction_jump`, `drift`,
-        N·m (docs/reference/semantics.md#outputs). With links also `fingertip_force` and `fingertip_force_std` [N, 3]
-        (N, base frame), and [N] `fingertip_force_observable`, `fingertip_force_misfit`, `contact_link`. With
-        contact.rest also `contact_change` [N, n] (N·m) and `contact_at_rest` [N]. With sensor_fault also
-        `sensor_fault` [N, m] and `contact_observable` [N].
-        A later call goes on where this one ended.
+        A later call continues where this one ended.
+
+        Parameters
+        ----------
+        recording
+            `time` [N] (s), `tendon_force` [N, m] (N), `tendon_position` [N, m] (m), `joint_position` [N, n] (rad) and
+            `joint_velocity` [N, n] (rad/s). Signals that the kinematics source does not use may be left out.
+        parts
+            Whether to add `friction_parts` [N, n, m + 3] (N·m), the contributions to each joint's friction. This needs
+            contact.uncertainty.
+
+        Returns
+        -------
+        dict of arrays
+            Outputs [N, n], `slack` [N, m] and `contact` [N]; flags are bool. In addition to those of the FMU:
+            `compensated_torque_std`, `residual`, `innovation`, `stuck_friction`, `friction_jump` and `drift` (N·m;
+            docs/reference/semantics.md#outputs).
+
+            With links also `fingertip_force` and `fingertip_force_std` [N, 3] (N, base frame), and
+            `fingertip_force_observable`, `fingertip_force_misfit` and `contact_link` [N]. With contact.rest also
+            `contact_change` [N, n] (N·m) and `contact_at_rest` [N]. With sensor_fault also `sensor_fault` [N, m] and
+            `contact_observable` [N].
+
+        Raises
+        ------
+        NativeError
+            A signal is missing, has the wrong shape or an invalid value.
         """
         inputs = [
             None if recording.get(name) is None else np.ascontiguousarray(recording[name], dtype=np.float64)
@@ -189,7 +364,23 @@ class Finger:
         return outputs | {name: outputs[name].astype(bool) for name in flags}
 
     def directional_derivative(self, direction: Mapping[str, Array]) -> dict[str, Array]:
-        """Derivative of the last sample's outputs [n] along a direction of its inputs (missing ones count as zero)."""
+        """Return the derivative of the last sample's outputs along a direction of its inputs.
+
+        Parameters
+        ----------
+        direction
+            Change of each input [m] or [n]. Missing inputs count as zero.
+
+        Returns
+        -------
+        dict of arrays
+            Change of each output [n].
+
+        Raises
+        ------
+        NativeError
+            No sample was taken yet, or a direction has the wrong shape.
+        """
         sizes = (self.tendons, self.tendons, self.joints, self.joints)
         seeds = [
             np.asarray(direction.get(name, np.zeros(size)), dtype=float).tolist()
@@ -203,5 +394,5 @@ class Finger:
 def run_recording(
     description: Mapping[str, Any] | str | bytes, recording: Mapping[str, Array], kinematics_source: int = 1
 ) -> dict[str, Array]:
-    """Runs a fresh finger of a description over a recording; see `Finger.run`."""
+    """Run a new finger of a description over a recording; see `Finger.run`."""
     return Finger.from_description(description, kinematics_source).run(recording)

@@ -1,9 +1,9 @@
-"""Which inputs can matter to which outputs: the dependencies in the FMU's ModelStructure.
+"""Which inputs can affect which outputs: the dependencies in the FMU's ModelStructure.
 
-They follow from the finger's structure: which friction exists, which tendon passes which joint (a moment arm of 0 in
-the description is a tendon that does not pass), which angles R⁺ takes from which tendon. They hold for all three
-kinematics sources and all values of the tunable parameters, with branch decisions frozen: that a
-contact elsewhere stops the bias of a joint makes no dependency.
+They follow from the finger's structure: which friction exists, which tendon passes which joint (a moment arm of 0 means
+that it does not), and which angles R⁺ computes from which tendon. They hold for all three kinematics sources and all
+values of the tunable parameters. Branch decisions count as fixed: a contact elsewhere can stop the bias of a joint, but
+this is not a dependency.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ Dependencies = dict[str, list[dict[str, list[int]]]]
 
 @dataclass
 class Motion:
-    """Joints, 0-based, whose angle or velocity can matter."""
+    """Joints, 0-based, whose angle or velocity can have an effect."""
 
     angles: set[int] = field(default_factory=set)
     velocities: set[int] = field(default_factory=set)
@@ -43,9 +43,16 @@ class Motion:
 
 @dataclass(frozen=True)
 class Structure:
-    """What of a description decides on dependencies.
+    """The part of a description that decides on dependencies.
 
-    passes: [m, n] true where a tendon has a moment arm. inverse: [n, m] true where R⁺ has an entry.
+    Attributes
+    ----------
+    data
+        The description.
+    passes
+        [m, n], true where a tendon has a moment arm.
+    inverse
+        [n, m], true where R⁺ has an entry.
     """
 
     data: Mapping[str, Any]
@@ -62,15 +69,27 @@ class Structure:
 
 
 def structure_of(description: FingerDescription) -> Structure:
+    """Return the structure of a finger.
+
+    Parameters
+    ----------
+    description
+        A valid description.
+
+    Returns
+    -------
+    Structure
+        With R⁺ as the runtime computes it.
+    """
     passes = np.array(description.moment_arms) != 0.0
     inverse = _inverse_routing(description.image, *passes.shape) != 0.0
-    if description.data.get("sensor_fault") is not None:  # with a row that leaves, any may matter to any
+    if description.data.get("sensor_fault") is not None:  # when a sensor is left out, R⁺ changes everywhere
         inverse = np.ones_like(inverse)
     return Structure(description.data, passes, inverse)
 
 
 def _inverse_routing(image: bytes, tendons: int, joints: int) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """[n, m] R⁺ as the runtime has it: the slopes of the joint angles by the tendon positions."""
+    """Return R⁺ [n, m] of the runtime: the slopes of the joint angles by the tendon positions."""
     finger = native.Finger(image, kinematics_source=1)
     finger.run({"time": np.zeros(1), "tendon_force": np.zeros((1, tendons)), "tendon_position": np.zeros((1, tendons))})
     columns = [finger.directional_derivative({"tendon_position": unit})["joint_angle"] for unit in np.eye(tendons)]
@@ -78,7 +97,18 @@ def _inverse_routing(image: bytes, tendons: int, joints: int) -> np.ndarray[Any,
 
 
 def dependencies(structure: Structure) -> Dependencies:
-    """For each output and element (0-based): input name to the elements, 0-based and ascending, that can matter."""
+    """Return the inputs that can affect each output.
+
+    Parameters
+    ----------
+    structure
+        Structure of the finger.
+
+    Returns
+    -------
+    Dependencies
+        For each output and element (0-based), the elements of each input, 0-based and ascending.
+    """
     n, m = structure.joints, structure.tendons
     torques = [_torque(structure, j) for j in range(n)]
     by_joint = [_inputs(structure, motion, set(range(m))) for motion in torques]
@@ -93,7 +123,7 @@ def dependencies(structure: Structure) -> Dependencies:
         "slack": [_slack(structure, i) for i in range(m)],
     }
     if structure.data.get("links") is not None:
-        everything.add(Motion(angles=set(range(n))))  # they turn the force at the tip
+        everything.add(Motion(angles=set(range(n))))  # all angles turn the force at the tip
         place = _inputs(structure, everything, set(range(m)))
         result |= {name: [place] * (3 if name in VECTORS else 1) for name in PLACE}
     for name in ("compensated_torque", "compensated_torque_std", "friction_torque", "bias_torque", "joint_contact"):
@@ -103,7 +133,7 @@ def dependencies(structure: Structure) -> Dependencies:
 
 
 def _at_rest(structure: Structure, others: Dependencies) -> Dependencies:
-    """With contact.rest: whether the finger rests depends on all motors and forces, and so does what contact does."""
+    """Add, with contact.rest, all motors and forces to contact: they decide whether the finger rests."""
     if (structure.data.get("contact") or {}).get("rest") is None:
         return {}
     tendons = list(range(structure.tendons))
@@ -115,7 +145,7 @@ def _at_rest(structure: Structure, others: Dependencies) -> Dependencies:
 
 
 def _with_sensors(structure: Structure, others: Dependencies) -> Dependencies:
-    """With sensor_fault: what fails, and with it contact, depends on all sensors."""
+    """Add, with sensor_fault, all sensors to sensor faults and contact."""
     if structure.data.get("sensor_fault") is None:
         return {}
     tendons, joints = list(range(structure.tendons)), list(range(structure.joints))
@@ -129,7 +159,7 @@ def _with_sensors(structure: Structure, others: Dependencies) -> Dependencies:
 
 
 def _inputs(structure: Structure, motion: Motion, forces: set[int]) -> dict[str, list[int]]:
-    """Inputs behind joint angles and velocities, beside forces that matter by themselves.
+    """Return the inputs that determine joint angles and velocities, and forces that have a direct effect.
 
     Source 1 takes both from forces and positions by R⁺, source 2 velocities from positions, source 3 both as measured.
     """
@@ -144,9 +174,9 @@ def _inputs(structure: Structure, motion: Motion, forces: set[int]) -> dict[str,
 
 
 def _torque(structure: Structure, j: int) -> Motion:
-    """What friction and bias of joint j follow from, beside the forces.
+    """Return the motion that friction and bias of joint j depend on, besides the forces.
 
-    All forces matter to them at every joint: the Kalman gain takes the noise by the mean of |f0|.
+    All forces affect them at every joint: the noise in the Kalman gain depends on the mean of |f0|.
     """
     joint = structure.data["joints"][j]
     motion = Motion()
@@ -166,17 +196,17 @@ def _torque(structure: Structure, j: int) -> Motion:
 
 
 def _extension(structure: Structure, extension: Mapping[str, Any], j: int) -> Motion:
-    """What the torque of an extension at joint j follows from, beside the forces and numbers.
+    """Return the motion that the torque of an extension at joint j depends on, besides the forces and numbers.
 
-    Effects that are not named here change signals or friction: what comes out depends on the same inputs as before
-    (of a delay on those of earlier samples, and on the present ones as soon as its number is 0).
+    Effects that are not named here change signals or friction, and their result depends on the same inputs as before. A
+    delay depends on those of earlier samples, and on the present ones as soon as its number is 0.
     """
     effect, place, tendon = extension["effect"], (extension.get("joint") or 0) - 1, (extension.get("tendon") or 0) - 1
     if effect == "gravity":
         return _weight(structure, place, j)
     if effect == "joint_coupling":
         return Motion(angles={place, place + 1}) if j in (place, place + 1) else Motion()
-    if effect == "preload_friction":  # the sides to which the tendon moves before joint `place`, or before each
+    if effect == "preload_friction":  # the directions of the tendon before joint `place`, or before each joint
         first = max(place, 0)
         felt = structure.passes[tendon, j] and j >= first
         return Motion(velocities={k for k in range(first, structure.joints) if felt and structure.passes[tendon, k]})
@@ -186,13 +216,16 @@ def _extension(structure: Structure, extension: Mapping[str, Any], j: int) -> Mo
 
 
 def _weight(structure: Structure, link: int, j: int) -> Motion:
-    """The angles that turn a link, where joint j feels its weight."""
+    """Return the angles that turn a link, if joint j feels its weight."""
     turning = {k for k in range(link + 1) if _axis_cosine(structure, k, link) != 0.0}
     return Motion(angles=turning if j in turning else set())
 
 
 def _axis_cosine(structure: Structure, joint: int, other: int) -> float:
-    """Cosine of the angle between two axes, 1 without links; rounded as in the runtime, whose 0 is no dependency."""
+    """Return the cosine of the angle between two axes, 1 without links.
+
+    It is rounded as in the runtime, where a cosine of 0 means no dependency.
+    """
     links = structure.data.get("links")
     if links is None:
         return 1.0
@@ -208,14 +241,14 @@ def _unit(axis: Sequence[float]) -> list[float]:
 
 
 def _along_tendon(structure: Structure, i: int, last_edge: int, last_pulley: int) -> Motion:
-    """What the losses of tendon i at the edges and pulleys up to these joints follow from."""
+    """Return the motion that the losses of tendon i at the edges and pulleys up to these joints depend on."""
     motion = Motion()
     for is_edge, j, varies_with_angle in _effects(structure, i):
         if j > (last_edge if is_edge else last_pulley):
             continue
         # an edge moves with ẋ_j, a pulley with ẋ_{j+1}
         moving = {k for k in range(j if is_edge else j + 1, structure.joints) if structure.passes[i, k]}
-        if not moving:  # ẋ = 0 whatever the joints do: this effect never acts
+        if not moving:  # ẋ is always 0: this effect never acts
             continue
         motion.velocities |= moving
         if varies_with_angle:
@@ -224,7 +257,7 @@ def _along_tendon(structure: Structure, i: int, last_edge: int, last_pulley: int
 
 
 def _effects(structure: Structure, i: int) -> Iterator[tuple[bool, int, bool]]:
-    """(edge or pulley, its joint, whether it varies with the angle of the joint before) of each effect of a tendon."""
+    """Yield (is an edge, its joint, varies with the angle of the joint before) of each effect of a tendon."""
     tendon = structure.data["tendons"][i]
     for j, law in enumerate(tendon.get("pulley_friction") or []):
         if law is not None:
@@ -235,7 +268,7 @@ def _effects(structure: Structure, i: int) -> Iterator[tuple[bool, int, bool]]:
 
 
 def _slack(structure: Structure, i: int) -> dict[str, list[int]]:
-    """A cable loop is never slack; the others by their own force and all their losses."""
+    """Return the inputs of a tendon's slackness: its own force and all its losses. A cable loop is never slack."""
     if structure.data["tendons"][i].get("bidirectional"):
         return {}
     return _inputs(structure, _along_tendon(structure, i, structure.joints, structure.joints), {i})

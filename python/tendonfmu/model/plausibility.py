@@ -1,7 +1,7 @@
-"""What a valid finger description says that no finger has: units, signs, tendons that cannot hold a joint.
+"""Which parts of a valid description are implausible for a finger: units, signs, tendons that cannot hold a joint.
 
-All of it are warnings: a description may be of a crane. The limits are far from what a finger has, and units are far
-from each other: a factor of 57 at least.
+All findings are warnings, since a description may be of another machine, such as a crane. The limits are far from the
+values of fingers, and wrong units are far beyond them: by a factor of 57 at least.
 """
 
 from __future__ import annotations
@@ -23,14 +23,25 @@ SHORTEST_ARM = 1e-4  # m
 SOFTEST = 100.0  # N/m; 10 N would stretch it by 0.1 m; tendons have 1e3 to 1e6
 STIFFEST_COVER = 5.0  # N·m/rad; covers have 0.01 to 0.1
 FULL_TURN = 2 * np.pi  # rad
-TENDON_THRESHOLD, JOINT_THRESHOLD = 0.02, 0.5  # m/s and rad/s: of velocities that count as rest
-STRONGEST_FORCE = 1000.0  # N, of a finger's tendon: times the longest arm no contact is larger
-ALL_FRICTION = 1.0  # of the force; a pulley that takes more than all of it
-UNREACHED = 1e-6  # of a torque that the tendons should make
+TENDON_THRESHOLD, JOINT_THRESHOLD = 0.02, 0.5  # m/s, rad/s; no finger counts faster motion as rest
+STRONGEST_FORCE = 1000.0  # N, of a finger's tendon; times the longest arm, it exceeds every contact torque
+ALL_FRICTION = 1.0  # of the tendon's force; no pulley takes all of it
+UNREACHED = 1e-6  # of the torque that the tendons should make
 
 
 def description_findings(finger: FingerDescription) -> list[Finding]:
-    """Warnings about a valid description, in the order of its keys."""
+    """Find implausible values of a valid description.
+
+    Parameters
+    ----------
+    finger
+        A valid description.
+
+    Returns
+    -------
+    list of Finding
+        Warnings, in the order of the description's keys.
+    """
     data = finger.data
     arms = np.asarray(finger.moment_arms, dtype=float)
     rows = [
@@ -49,7 +60,20 @@ def description_findings(finger: FingerDescription) -> list[Finding]:
 
 
 def is_direct_drive(arms: Numbers) -> bool:
-    """Whether R [m, n] has arms of 1 m alone: a machine without tendons, whose radians, or metres, may be large."""
+    """Return whether all moment arms are 1 m.
+
+    This is a machine without tendons, whose radians, or metres, may be large.
+
+    Parameters
+    ----------
+    arms
+        Routing matrix R [m, n] (m).
+
+    Returns
+    -------
+    bool
+        True if every arm that is not 0 is 1 m or −1 m.
+    """
     return bool(np.all(np.abs(arms[arms != 0.0]) == 1.0))
 
 
@@ -72,7 +96,7 @@ def _moment_arms(arms: Numbers, data: Mapping[str, Any]) -> Iterator[Row]:
 
 
 def _directions(arms: Numbers, data: Mapping[str, Any], names: list[str]) -> Iterator[Row]:
-    """Joints that the tendons cannot turn both ways: each on its own, then with the others at rest."""
+    """Report joints that the tendons cannot turn both ways, while the other joints rest."""
     pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
     # a cable loop is two tendons
     columns = np.concatenate([arms, -arms[~pulls]]).T
@@ -96,11 +120,11 @@ def _directions(arms: Numbers, data: Mapping[str, Any], names: list[str]) -> Ite
         else:
             way = "either way" if not any(both) else "up" if not both[0] else "down"
             seen = f"no tensions turn joint {name} {way} and leave the other joints at rest"
-            yield "moment_arms", key, seen, "a wrong sign among the moment arms", "expected tendons that can"
+            yield "moment_arms", key, seen, "a wrong sign among the moment arms", "expected tendons that can do so"
 
 
 def is_reached(columns: Numbers, joint: int, sign: float) -> bool:
-    """Whether forces ≥ 0 make a torque at one joint alone. columns: [n, c] moment arms, one column per force."""
+    """Return whether forces ≥ 0 make a torque at one joint alone. columns: [n, c] moment arms, one column per force."""
     scale = float(np.abs(columns).max())
     target = np.zeros(len(columns))
     target[joint] = sign
@@ -161,10 +185,10 @@ def _thresholds(data: Mapping[str, Any], arms: Numbers) -> Iterator[Row]:
     ):
         value = given.get(name) or 0.0
         if value > most:
-            seen = f"{value:g} {unit}: all that is slower counts as rest"
+            seen = f"{value:g} {unit}: every slower motion counts as rest"
             yield "threshold", f"velocity_threshold.{name}", seen, f"a velocity in {wrong}", f"expected {unit}"
     for j, threshold in enumerate(data["contact"]["threshold"], start=1):
         most = STRONGEST_FORCE * float(np.abs(arms[:, j - 1]).max())
         if threshold > most:
-            seen = f"{threshold:g} N.m: more than a tendon of {STRONGEST_FORCE:g} N pulls"
+            seen = f"{threshold:g} N.m: more than a tendon with {STRONGEST_FORCE:g} N can cause"
             yield "threshold", f"contact.threshold[{j}]", seen, "a torque in N.mm", "expected N.m: 0.03 for 30 N.mm"

@@ -1,8 +1,8 @@
-"""Geometry of the routing drawing of a finger, after the paper's fig. 3: where each line and mark goes, in units of
-its own. `report/plots.py` draws it.
+"""Where each line and mark of a finger's routing drawing is, after the paper's fig. 3.
 
-The finger lies along x, base on the left. A tendon passes a joint above it where its moment arm is positive, below
-where it is negative. Tendons that end early run inside, so that they need not cross those that go on.
+Lengths are in units of the drawing. `report/plots.py` draws it. The finger lies along x, with its base on the left. A
+tendon passes above a joint if its moment arm is positive, and below if it is negative. Tendons that end early run
+inside, so that they do not cross those that continue.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ HUB_RADIUS = 0.32  # of the disc that stands for a joint
 LANE = 0.17  # between tendons on one side of a joint
 FLAT_BEFORE = 0.75  # how far before and behind a joint a tendon runs straight
 FLAT_BEHIND = 0.3
-EDGE_BEFORE = 0.6  # how far before a joint its edge stands
+EDGE_BEFORE = 0.6  # how far before a joint its edge is drawn
 MARGIN = 0.2  # of the finger's outline around its tendons
 SPRING_LENGTH = 0.9
 BASE = 1.9  # from the springs to the first joint
@@ -39,10 +39,20 @@ class DrawnJoint:
 
 @dataclass(frozen=True)
 class DrawnTendon:
-    """A tendon from its spring to where it ends.
+    """A tendon from its spring to its end.
 
-    line, spring: [k, 2] points. pulleys: [k, 2] where there is pulley friction. edges, varying_edges: [k, 2] where
-    there is friction before a joint, without and with working points.
+    Attributes
+    ----------
+    name
+        Name of the tendon.
+    line, spring
+        Points [k, 2].
+    pulleys
+        Points [k, 2] with pulley friction.
+    edges, varying_edges
+        Points [k, 2] with friction before a joint, without and with working points.
+    bidirectional
+        Whether it is a cable loop.
     """
 
     name: str
@@ -56,8 +66,20 @@ class DrawnTendon:
 
 @dataclass(frozen=True)
 class FingerDrawing:
-    """links: [n, 2] x of begin and end of the link behind each joint. outline: [k, 3] x, lower and upper side of the
-    finger around its tendons. left, right, height: bounds, −height to height.
+    """Geometry of a whole finger.
+
+    Attributes
+    ----------
+    name
+        Name of the finger.
+    joints, tendons
+        What is drawn of them.
+    links
+        [n, 2] x of begin and end of the link behind each joint.
+    outline
+        [k, 3] x, lower and upper side of the finger around its tendons.
+    left, right, height
+        Bounds; y reaches from −height to height.
     """
 
     name: str
@@ -71,7 +93,18 @@ class FingerDrawing:
 
 
 def finger_drawing(description: FingerDescription) -> FingerDrawing:
-    """Geometry of a finger of up to 16 joints and 64 tendons."""
+    """Compute the geometry of a finger.
+
+    Parameters
+    ----------
+    description
+        A valid description, up to 16 joints and 64 tendons.
+
+    Returns
+    -------
+    FingerDrawing
+        In units of the drawing.
+    """
     R: Points = np.array(description.moment_arms)
     heights = _heights(R)
     x: Points = JOINT_SPACING * np.arange(float(R.shape[1]))
@@ -96,7 +129,7 @@ def finger_drawing(description: FingerDescription) -> FingerDrawing:
 
 
 def _outline(x: Points, heights: Points, tip: float) -> Points:
-    """[k, 3] x, lower and upper side: around the tendons at each joint, smooth between, round at the tip."""
+    """Return x, lower and upper side [k, 3] around the tendons: smooth between the joints, round at the tip."""
     upper = np.maximum(heights.max(axis=0), HUB_RADIUS) + MARGIN
     lower = np.minimum(heights.min(axis=0), -HUB_RADIUS) - MARGIN
     at = np.linspace(x[0] - FLAT_BEFORE - 0.1, tip, 40 * len(x) + 40)
@@ -109,14 +142,14 @@ def _outline(x: Points, heights: Points, tip: float) -> Points:
 
 
 def _last_joints(R: Points) -> NDArray[np.intp]:
-    """[m] index of the last joint that each tendon passes."""
+    """Return the index [m] of the last joint that each tendon passes."""
     n = R.shape[1]
     reached = np.where(R != 0.0, np.arange(n), 0)
     return np.asarray(reached.max(axis=1))
 
 
 def _heights(R: Points) -> Points:
-    """[m, n] height at which each tendon passes each joint; near 0 where it has no moment arm."""
+    """Return the height [m, n] at which each tendon passes each joint; near 0 where it has no moment arm."""
     last = _last_joints(R)
     heights = np.zeros(R.shape)
     for j in range(R.shape[1]):
@@ -129,7 +162,7 @@ def _heights(R: Points) -> Points:
 
 
 def _starts(heights: Points) -> Points:
-    """[m] height of each spring: evenly spread, in the order in which the tendons arrive at the first joint."""
+    """Return the height [m] of each spring, evenly spread, in the order in which the tendons reach the first joint."""
     m = len(heights)
     order = np.lexsort(heights.T[::-1])
     starts = np.empty(m)
@@ -159,7 +192,7 @@ def _tendon(tendon: dict[str, object], name: str, x: Points, arms: Points, y: Po
 
 
 def _present(tendon: dict[str, object], key: str) -> dict[int, object]:
-    """Joint, 0-based, to the entry there."""
+    """Return the entries by joint, 0-based."""
     entries = tendon.get(key)
     return {j: entry for j, entry in enumerate(entries) if entry is not None} if isinstance(entries, list) else {}
 
@@ -169,7 +202,7 @@ def _points(pairs: list[tuple[float, float]]) -> Points:
 
 
 def _smooth_line(x: Points, y: Points, start: float) -> Points:
-    """[k, 2] from the spring over all joints: straight at each, smooth between."""
+    """Return points [k, 2] from the spring over all joints: straight at each joint, smooth between."""
     knots_x = np.concatenate([[-BASE], np.column_stack([x - FLAT_BEFORE, x + FLAT_BEHIND]).ravel()])
     knots_y = np.concatenate([[start], np.repeat(y, 2)])
     share = np.linspace(0.0, 1.0, 24)
@@ -182,7 +215,7 @@ def _smooth_line(x: Points, y: Points, start: float) -> Points:
 
 
 def _spring(height: float) -> Points:
-    """[k, 2] a zigzag that ends where the tendon begins."""
+    """Return points [k, 2] of a zigzag that ends where the tendon begins."""
     share = np.linspace(0.0, 1.0, 12)
     swing = np.array([0.0, 0.0, *[0.07, -0.07] * 4, 0.0, 0.0])
     return np.column_stack([-BASE - SPRING_LENGTH * (1.0 - share), height + swing])

@@ -1,7 +1,8 @@
-"""Recordings: read, checked and made ready.
+"""How recordings are read, checked and prepared for a fit.
 
-`recording` reads them, `converters` brings foreign formats into ours, `match` says whether they belong to a finger,
-and why not. `smoothing`, `prepared` and `residuals` make them ready for a fit and say what a finger leaves of them.
+`recording` reads them and `converters` turns foreign formats into ours. `match` says whether they belong to a finger,
+and if not, why. `smoothing`, `prepared` and `residuals` prepare them for a fit and compute the torque that a finger
+leaves unexplained.
 """
 
 import lazy_loader

@@ -1,6 +1,6 @@
-"""What is wrong with single channels of a recording: its clock, and sensors that clip, hold or come in coarse steps.
+"""Which single channels of a recording are faulty: its clock, and sensors that clip, hold a value or are coarse.
 
-Nothing here knows friction. Angles that a channel is held against come from the other channels.
+This module does not use a friction model. The values that a channel is compared with come from the other channels.
 """
 
 from __future__ import annotations
@@ -18,34 +18,45 @@ from tendonfmu.recordings.signal_noise import value_step
 
 Numbers = NDArray[np.float64]
 
-# --- the clock: samples per second
-SLOWEST, FASTEST = 5.0, 1e5  # of anything that controls or records a finger
-USUAL = (20.0, 2e4)
+# --- the clock
+SLOWEST, FASTEST = 5.0, 1e5  # samples per second; nothing controls or records a finger at a rate outside these
+USUAL = (20.0, 2e4)  # samples per second
 CLOCK_UNITS = ((1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
 FEWEST_STEPS = 20
-LOST = 1.5  # median steps; a longer one has lost samples
-WHOLE = 0.25  # of a median step: how near to a whole number of steps
+LOST = 1.5  # median steps; in a longer step samples were lost
+WHOLE = 0.25  # median steps; the step over lost samples is this near to a whole number of median steps
 LOST_SHARE = 2e-3  # of the samples; fewer do no harm
-JITTER = 0.1  # of the median step, standard deviation; what a velocity is wrong by
+JITTER = 0.1  # of the median step, standard deviation; velocities are wrong by the same share
 
 # --- channels
 CLIPPED_RUN = 5  # samples that repeat the extreme value
 CLIPPED_SHARE = 1e-3  # of the samples; fewer do no harm
-APPROACH = 10  # samples before a run over which the approach is seen
-SMOOTH_TURN = 12.0  # resolutions; a smooth signal approaches a turning point by less (8 over as long as it rests there)
-RESOLUTION = 2e-4  # of the range; a channel is not taken to be finer
+APPROACH = 10  # samples before and after a run over which the approach is measured
+SMOOTH_TURN = 12.0  # resolutions; a smooth signal approaches its turning point by less (8 over the time it rests there)
+RESOLUTION = 2e-4  # of the range; the resolution of a channel is assumed to be no finer
 CERTAIN = 4.0  # standard deviations
-LEVELS = 40  # fewer steps in the range of a motion are coarse
-COARSE = {"tendon_force": 0.05, "tendon_position": 2e-5, "joint_position": 2e-3}  # N, m, rad; finer steps are never
+LEVELS = 40  # a channel with fewer steps in the range of its motion is coarse
+COARSE = {"tendon_force": 0.05, "tendon_position": 2e-5, "joint_position": 2e-3}  # N, m, rad; finer ones are not coarse
 
 
 @dataclass(frozen=True)
 class Clock:
-    """The steps of time.
+    """The time steps of a recording.
 
-    step: s, median. unit: factor to seconds and name of the unit that the times seem to be in, or None. senseless: no
-    control loop has such a rate. lost: samples that are not there. gaps: long ones. jitter: standard deviation of the
-    other steps over the median.
+    Attributes
+    ----------
+    step
+        Median step (s).
+    unit
+        Factor to seconds and name of the unit in which the times seem to be given, or None.
+    senseless
+        Whether no control loop has such a sample rate.
+    lost
+        Number of missing samples.
+    gaps
+        Indices of the first sample after each gap.
+    jitter
+        Standard deviation of the other steps over the median step.
     """
 
     step: float
@@ -58,9 +69,20 @@ class Clock:
 
 @dataclass(frozen=True)
 class Clipped:
-    """A channel that repeats its largest or smallest value, and comes to it at speed.
+    """A channel that repeats its largest or smallest value and reaches it at speed.
 
-    value: in its unit. share: of the samples. runs: how often it comes there. is_top: at the largest value.
+    Attributes
+    ----------
+    column
+        Name of the column.
+    value
+        The repeated value, in the unit of the column.
+    share
+        Share of the samples that have it.
+    runs
+        Number of times that the channel reaches it.
+    is_top
+        Whether it is the largest value, not the smallest.
     """
 
     column: str
@@ -72,7 +94,17 @@ class Clipped:
 
 @dataclass(frozen=True)
 class Coarse:
-    """A channel whose values come in steps that are coarse against its motion. step, range: in its unit."""
+    """A channel whose steps are coarse compared with its motion.
+
+    Attributes
+    ----------
+    column
+        Name of the column.
+    step
+        Width of its steps, in its unit.
+    range
+        Range of its values, in its unit.
+    """
 
     column: str
     step: float
@@ -81,16 +113,31 @@ class Coarse:
 
 @dataclass(frozen=True)
 class Held:
-    """A channel that holds a value although others say that it should change. share: of the samples."""
+    """A channel that holds a value although other channels show that it should change.
+
+    Attributes
+    ----------
+    column
+        Name of the column.
+    value
+        The value that it holds.
+    share
+        Share of the samples in which it does.
+    first
+        Begin and end of the first such time (s).
+    """
 
     column: str
     value: float
     share: float
-    first: tuple[float, float]  # s, of the first time
+    first: tuple[float, float]
 
 
 def read_clock(time: Numbers) -> Clock | None:
-    """None for too few samples. time: [N] s, strictly increasing."""
+    """Return the time steps of a recording, or None for too few samples.
+
+    time: [N] s, strictly increasing.
+    """
     if len(time) <= FEWEST_STEPS:
         return None
     steps = np.diff(time)
@@ -101,7 +148,7 @@ def read_clock(time: Numbers) -> Clock | None:
     long = gaps(time * (units[0][0] if units else 1.0))
     short = np.delete(steps, np.asarray(long, dtype=int) - 1) / median
     whole = np.round(short)
-    usual = 1.4826 * float(np.median(np.abs(short - 1.0)))  # standard deviation, lost samples apart
+    usual = 1.4826 * float(np.median(np.abs(short - 1.0)))  # standard deviation, not affected by lost samples
     is_lost = (short > max(LOST, 1.0 + CERTAIN * usual)) & (np.abs(short - whole) < WHOLE)
     return Clock(
         step=median,
@@ -114,10 +161,10 @@ def read_clock(time: Numbers) -> Clock | None:
 
 
 def clipped_channels(recording: Recording, finger: FingerDescription) -> Iterator[Clipped]:
-    """Forces, positions and angles that saturate.
+    """Find forces, positions and angles that saturate.
 
-    A turning point of a smooth signal also repeats its extreme value, but comes to it slowly. A motor or a joint that
-    rests at its extreme is no fault: there the other channels rest as well.
+    A turning point of a smooth signal also repeats its extreme value, but the signal approaches it slowly. A motor or a
+    joint that rests at its extreme is not a fault: the other channels rest there as well.
     """
     for name in COARSE:
         for k, column in enumerate(recording.groups.get(name, np.empty((0, 0))).T):
@@ -134,7 +181,7 @@ def clipped_channels(recording: Recording, finger: FingerDescription) -> Iterato
 
 
 def _clipped_runs(column: Numbers) -> list[tuple[int, int]]:
-    """Runs (begin, end) at the largest value that are approached at speed."""
+    """Return the runs (begin, end) at the largest value that the channel approaches at speed."""
     largest, extent = float(column.max()), float(np.ptp(column))
     at = np.flatnonzero(column == largest)
     if len(at) < CLIPPED_RUN or extent == 0.0:
@@ -157,9 +204,10 @@ def _resolution(column: Numbers) -> float:
 
 
 def _bulges(expected: Numbers, run: tuple[int, int], resolution: float) -> bool:
-    """Whether the others say that the channel goes up and comes back within a run, beyond noise.
+    """Return whether the other channels show that the channel rises and falls within a run, by more than noise.
 
-    Its middle half against its ends: what sticks and slips off jumps behind the run, not within it.
+    The test compares the middle half of the run with its ends. A joint that sticks and then slips jumps behind the run,
+    not within it.
     """
     inside = expected[run[0] : run[1]]
     eighth = len(inside) // 8
@@ -172,7 +220,7 @@ def _bulges(expected: Numbers, run: tuple[int, int], resolution: float) -> bool:
 
 
 def coarse_channels(recording: Recording) -> Iterator[Coarse]:
-    """Channels that move in few steps."""
+    """Find channels that move in few steps."""
     for name, finest in COARSE.items():
         for k, column in enumerate(recording.groups.get(name, np.empty((0, 0))).T):
             step, extent = value_step(column), float(np.ptp(column))
@@ -181,7 +229,10 @@ def coarse_channels(recording: Recording) -> Iterator[Coarse]:
 
 
 def held_channels(recording: Recording, finger: FingerDescription) -> list[Held]:
-    """Channels that stand still while others move, and those that never change while their group does."""
+    """Find channels that hold a value while others change.
+
+    These are stuck sensors, and channels that never change while most of their group do.
+    """
     by_column: dict[str, list[StuckSensor]] = {}
     for sensor in stuck_sensors(recording, finger):
         by_column.setdefault(sensor.column, []).append(sensor)

@@ -1,6 +1,6 @@
-"""What is wrong with a recording beyond its format: gaps, rates, sensors that stand still.
+"""Which parts of a well-formed recording are unusable: gaps, unsuitable sample rates and stuck sensors.
 
-Every finding is a sentence; which samples it costs is said too.
+Each finding is a sentence that also says which samples are lost.
 """
 
 from __future__ import annotations
@@ -22,17 +22,27 @@ SHORTEST_GAP = 0.1  # s; single lost samples do no harm
 STUCK = 1.0  # s; a sensor that repeats one value longer, while others say that it should not, is stuck
 TURNS = 20.0  # rad; further than a joint of a finger turns
 SETTLING = 1.0  # s after a stuck sensor, until the velocity filter has forgotten it
-SLOW_RATE, FAST_RATE = 50.0, 5000.0  # samples per second; the model's events need the first, nothing needs the second
-_MOVES = {"tendon_position": 2e-4, "joint_position": 0.02, "joint_velocity": 0.05}  # m, rad, rad: should have moved by
-_FORCE_SHARE = 0.1  # of a tendon's mean force by which the others change meanwhile
-_OF_RANGE = 0.05  # of what it moves in the whole recording
+SLOW_RATE, FAST_RATE = 50.0, 5000.0  # samples per second; the model's events need the first, none needs the second
+# m, rad, rad; a channel is stuck only if it should have moved by more
+_MOVES = {"tendon_position": 2e-4, "joint_position": 0.02, "joint_velocity": 0.05}
+_FORCE_SHARE = 0.1  # of a tendon's mean force; a force is stuck only if the others change by more
+_OF_RANGE = 0.05  # of the range in the whole recording; a channel is stuck only if it should have moved by more
 
 
 @dataclass(frozen=True)
 class StuckSensor:
-    """A channel that holds one value from sample begin to sample end (excluded) though it should change.
+    """A channel that holds one value although it should change.
 
-    group: as in recording.GROUPS. element: from 1.
+    Attributes
+    ----------
+    group
+        Name of the group, as in `recording.GROUPS`.
+    element
+        Index in the group, from 1.
+    value
+        The value that it holds, in the unit of the group.
+    begin, end
+        First sample, and the one after the last.
     """
 
     group: str
@@ -43,11 +53,23 @@ class StuckSensor:
 
     @property
     def column(self) -> str:
+        """Name of the column."""
         return f"{self.group}[{self.element}]"
 
 
 def gaps(time: Numbers) -> list[int]:
-    """Indices of the first sample after each gap, or after a jump of the clock."""
+    """Return the first samples after gaps or jumps of the clock.
+
+    Parameters
+    ----------
+    time
+        Times [N] (s).
+
+    Returns
+    -------
+    list of int
+        Index of the first sample after each gap, in order. A gap is a step of more than 10 median steps and 0.1 s.
+    """
     if len(time) < 3:
         return []
     step = np.diff(time)
@@ -55,46 +77,46 @@ def gaps(time: Numbers) -> list[int]:
 
 
 def gap_sentences(recording: Recording) -> Iterator[str]:
-    """About each gap, at most three of them."""
+    """Describe the gaps, at most three of them each."""
     found = gaps(recording.time)
     for k in found[:3]:
         before, after = recording.time[k - 1], recording.time[k]
         yield (
-            f"time goes on by {after - before:.4g} s after row {k} ({before:.6g} s): a gap or a jump of the clock; "
-            "the parts before and after it are fitted as recordings of their own"
+            f"time jumps by {after - before:.4g} s after row {k} ({before:.6g} s): a gap or a jump of the clock; "
+            "the parts before and after it are fitted as separate recordings"
         )
     if len(found) > 3:
-        yield f"{len(found) - 3} more gaps; every part is fitted as a recording of its own"
+        yield f"{len(found) - 3} more gaps; every part is fitted as a separate recording"
 
 
 def rate_sentences(recording: Recording, finger: FingerDescription) -> Iterator[str]:
-    """About a sample rate that is too low to see friction change sides, or higher than helps."""
+    """Describe a sample rate that is too low to show reversals of friction, or higher than useful."""
     if len(recording) < 3:
         return
     rate = 1 / float(np.median(np.diff(recording.time)))
     if rate < SLOW_RATE:
         yield (
-            f"{rate:.3g} samples per second: reversals, sticking and the velocity filter are poorly resolved, and so "
-            f"are static friction and Stribeck velocities; expected at least {SLOW_RATE:g}, better 500"
+            f"reversals, sticking and the velocity filter are poorly resolved at {rate:.3g} samples per second, and "
+            f"so are static friction and Stribeck velocities; expected at least {SLOW_RATE:g}, better 500"
         )
     if rate > FAST_RATE:
         per_sample = (finger.data.get("bias") or {}).get("noise_time") is None
         noise = (
             "; without bias.noise_time the noise counts per sample, so standard errors are too small unless the "
-            "sensors' noise is white up to there"
+            "sensors' noise is white up to this rate"
         )
         yield (
-            f"{rate:.5g} samples per second: works, but takes {rate / 1000:.2g} times as long as 1000 and tells no more"
-            f"{noise if per_sample else ''}; decimating (after a low-pass filter) is better"
+            f"{rate:.5g} samples per second take {rate / 1000:.2g} times as long as 1000 and give no better result"
+            f"{noise if per_sample else ''}; expected at most {FAST_RATE:g}, by decimating after a low-pass filter"
         )
 
 
 def silent_tendons(recording: Recording, finger: FingerDescription) -> Iterator[str]:
-    """About tendons whose force is zero throughout."""
+    """Describe tendons whose force is zero throughout."""
     for i in np.flatnonzero(~recording.groups["tendon_force"].any(axis=0)):
         yield (
             f"tendon_force[{i + 1}] ({finger.tendon_names[i]}) is 0 throughout: a tendon without tension or a sensor "
-            "without signal; what its friction is cannot be told, its numbers stay as they were"
+            "without signal; its friction cannot be estimated and keeps the given numbers"
         )
 
 
@@ -102,7 +124,7 @@ def silent_tendons(recording: Recording, finger: FingerDescription) -> Iterator[
 
 
 def stuck_sensors(recording: Recording, finger: FingerDescription) -> list[StuckSensor]:
-    """Channels that repeat one value for more than `STUCK` while the other channels say that they should change."""
+    """Find channels that repeat a value for more than `STUCK` while the other channels show that they should change."""
     found: list[StuckSensor] = []
     for name, k, runs in _still(recording):
         if name == "tendon_force":
@@ -115,16 +137,24 @@ def stuck_sensors(recording: Recording, finger: FingerDescription) -> list[Stuck
 
 
 def expected_values(recording: Recording, finger: FingerDescription, group: str, k: int) -> Numbers | None:
-    """What a channel should read, up to a constant, by the other channels.
+    """Return what a channel should read according to the other channels, up to a constant.
 
     Parameters
     ----------
-    group: `tendon_position`, `joint_position` or `joint_velocity`. Of a velocity: what it does not account for [rad].
-    k: element from 0.
+    recording
+        The recording.
+    finger
+        A valid description.
+    group
+        `tendon_position`, `joint_position` or `joint_velocity`. For a velocity, the angle that it does not account for
+        (rad) is returned.
+    k
+        Element, from 0.
 
     Returns
     -------
-    [N] in the unit of the group (of `joint_velocity` rad); None where the other channels do not tell.
+    Numbers or None
+        [N] in the unit of the group (`joint_velocity`: rad). None if the other channels do not determine it.
     """
     groups = recording.groups
     if group == "tendon_position":
@@ -137,19 +167,19 @@ def expected_values(recording: Recording, finger: FingerDescription, group: str,
 
 
 def tendon_angles(recording: Recording, finger: FingerDescription) -> Numbers:
-    """[N, n] rad: joint angles by tendon positions and forces, R⁺(x0 − f0/k)."""
+    """Return the joint angles [N, n] (rad) that follow from tendon positions and forces, R⁺(x0 − f0/k)."""
     position = recording.groups["tendon_position"] - _stretch(recording, finger)
     return np.asarray(position @ np.linalg.pinv(np.asarray(finger.moment_arms, dtype=float)).T)
 
 
 def _stretch(recording: Recording, finger: FingerDescription) -> Numbers:
-    """[N, m] m: of the tendons' springs."""
+    """Return the stretch [N, m] (m) of the tendons' springs."""
     stiffness = np.array([float(tendon["stiffness"]) for tendon in finger.data["tendons"]])
     return np.asarray(recording.groups["tendon_force"] / stiffness)
 
 
 def _still(recording: Recording) -> Iterator[tuple[str, int, Runs]]:
-    """Columns (group, element from 0) with their runs of equal values longer than `STUCK`, where there are any."""
+    """Yield columns (group, element from 0) that have runs of equal values longer than `STUCK`, with these runs."""
     for name, values in recording.groups.items():
         if name == "external_torque":
             continue
@@ -161,7 +191,7 @@ def _still(recording: Recording) -> Iterator[tuple[str, int, Runs]]:
 
 
 def _position_by_others(groups: Mapping[str, Numbers], arms: Numbers, stretch: Numbers, i: int) -> Numbers | None:
-    """[N] m: tendon i's motor position as the other tendons, or the measured joint angles, have it."""
+    """Return tendon i's motor position [N] (m) that follows from the measured joint angles or the other tendons."""
     if "joint_position" in groups:
         return np.asarray(groups["joint_position"] @ arms[i] + stretch[:, i])
     others = np.delete(np.arange(len(arms)), i)
@@ -172,7 +202,7 @@ def _position_by_others(groups: Mapping[str, Numbers], arms: Numbers, stretch: N
 
 
 def _stuck(group: str, values: Numbers, k: int, expected: Numbers, runs: Runs) -> Iterator[StuckSensor]:
-    """Runs during which the expected values [N] change."""
+    """Yield the runs during which the expected values [N] change."""
     enough = max(_MOVES[group], _OF_RANGE * float(np.ptp(expected)))
     for begin, end in runs:
         if np.ptp(expected[begin:end]) > enough:
@@ -180,7 +210,7 @@ def _stuck(group: str, values: Numbers, k: int, expected: Numbers, runs: Runs) -
 
 
 def _stuck_force(force: Numbers, i: int, runs: Runs) -> Iterator[StuckSensor]:
-    """A force that stands still while those of most other tendons change; 0 is a slack tendon or a silent one."""
+    """Yield runs in which a force is constant while most others change. A force of 0 is a slack or silent tendon."""
     others = np.delete(force, i, axis=1)
     size = np.maximum(np.abs(others).mean(axis=0), 1e-9)
     for begin, end in runs:

@@ -1,8 +1,8 @@
-"""Do tendon positions, tendon forces and joint angles fit together as x0 − f0/k = R q says, and if not, what mends it?
+"""Whether tendon positions, tendon forces and joint angles satisfy x0 − f0/k = R q, and which correction is needed.
 
-The equation holds whatever rubs, touches or weighs, so it tells wrong columns before any friction is known. It tells
-nothing where a finger has as many joints as tendons and its joint angles are not measured. Zeros of the sensors do not
-count: covariances know no offsets.
+The equation holds independent of friction, contact and weight, so it shows wrong columns before any friction is known.
+It shows nothing if a finger has as many joints as tendons and its joint angles are not measured. Offsets of the sensors
+have no effect, since the test uses covariances only.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from tendonfmu.recordings.faults import TURNS
 Numbers = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-FEWEST = 200  # samples; fewer tell no covariance
-MISFIT = 5e-4  # share of variance below which an equation fits: arms and springs are not known better than 2 %
-GAIN = 4.0  # times less misfit that a correction must bring
-ALIKE = 1.5  # times the best correction's misfit: both are named
-SAME = 2e-4  # share of variance below which two corrections are as good as each other
-NOTHING = 1e-6  # of the largest terms of an equation; one with smaller ones says nothing
+FEWEST = 200  # samples; a covariance needs at least as many
+MISFIT = 5e-4  # share of variance below which an equation fits: arms and springs are known to 2 % at best
+GAIN = 4.0  # a correction must lower the misfit by this factor
+ALIKE = 1.5  # times the best correction's misfit; corrections below it are named as alternatives
+SAME = 2e-4  # share of variance below which two corrections are equally good
+NOTHING = 1e-6  # of the largest terms of all equations; an equation with smaller terms is not used
 MOST_SUBSETS, MOST_ORDERS, MOST_CIRCLES = 8, 6, 16  # columns of which all subsets, orders, circles of three are tried
-NOISY = 10.0  # times the variance of its noise: an equation with less motion says nothing
-ROUNDS = 8  # corrections of one recording
-STRONGEST = 5000.0  # N; a tendon of a finger breaks before
+NOISY = 10.0  # times the variance of its noise; an equation with less motion is not used
+ROUNDS = 8  # corrections of one recording, at most
+STRONGEST = 5000.0  # N; a tendon of a finger breaks at less
 EQUATED = ("tendon_force", "tendon_position", "joint_position")  # groups of the equation, in the order of its columns
-# Units in which columns are often written, as factors to ours
+# Units in which logs are often written, with their factors to the units of a recording
 UNITS: dict[str, tuple[tuple[float, str], ...]] = {
     "tendon_position": ((1e-3, "mm"), (1e-2, "cm"), (1e-6, "µm"), (0.0254, "inch")),
     "tendon_force": (
@@ -47,10 +47,20 @@ UNITS: dict[str, tuple[tuple[float, str], ...]] = {
 
 @dataclass(frozen=True)
 class Correction:
-    """What a map of columns would have to say.
+    """A correction that a map of columns would have to contain.
 
-    kind: "sign", "scale" or "exchange". columns: by name. factor: of a sign or scale. unit: that the scale comes from.
-    sources: of an exchange, the column that each of the columns has to be read from.
+    Attributes
+    ----------
+    kind
+        "sign", "scale" or "exchange".
+    columns
+        Names of the columns.
+    factor
+        Of a sign or scale.
+    unit
+        The unit that explains the scale.
+    sources
+        Of an exchange, the column from which each of the columns has to be read.
     """
 
     kind: str
@@ -61,15 +71,22 @@ class Correction:
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
-        """Of an exchange: column and the one that it has to be read from."""
+        """Return, for an exchange, each column and the one from which it has to be read."""
         return tuple(zip(self.columns, self.sources, strict=True))
 
 
 @dataclass(frozen=True)
 class Repair:
-    """A correction that makes the equations fit, and the others that do so as well.
+    """A correction that makes the equations fit, and others that do as well.
 
-    misfit, left: share of the variance that the equations leave that it changes, before and after it.
+    Attributes
+    ----------
+    correction
+        The most plausible correction.
+    alternatives
+        Corrections that fit as well.
+    misfit, left
+        Mean share of variance that the changed equations leave, before and after the correction.
     """
 
     correction: Correction
@@ -79,18 +96,35 @@ class Repair:
 
 
 class Balance:
-    """Second moments of a recording's columns, and the equations they have to satisfy.
+    """Second moments of a recording's columns, and the equations that they have to satisfy.
 
-    columns: names. rows: [e, c] equations in m, 0 when satisfied. covariance: [c, c]. largest: [c] largest magnitudes.
-    tendons: indices of those that have a force at all; the others are left out.
+    Attributes
+    ----------
+    columns
+        Names of the c columns.
+    rows
+        Equations [e, c] (m), 0 when satisfied.
+    covariance
+        Covariance of the columns [c, c].
+    largest
+        Largest magnitude of each column [c].
+    tendons
+        Indices of the tendons that have any force. The others are left out.
     """
 
     def __init__(
         self, finger: FingerDescription, groups: Mapping[str, Numbers], noise: Mapping[str, Numbers] | None = None
     ) -> None:
-        """groups: `tendon_force`, `tendon_position`, and `joint_position` where it is measured; sound samples only.
+        """Compute the moments.
 
-        noise: standard deviation of each column's noise, by group; None: none.
+        Parameters
+        ----------
+        finger
+            A valid description.
+        groups
+            `tendon_force`, `tendon_position`, and `joint_position` if it is measured; samples without faults only.
+        noise
+            Standard deviation of each column's noise, by group. None: no noise.
         """
         used = [name for name in EQUATED if name in groups]
         self.columns = [f"{name}[{k + 1}]" for name in used for k in range(groups[name].shape[1])]
@@ -106,7 +140,7 @@ class Balance:
         self.rows, self._angle = _equations(finger, self.tendons, "joint_position" in groups)
 
     def misfits(self, transform: Numbers) -> Numbers:
-        """[e] share of the variance, noise apart, that each equation leaves; NaN for those that say nothing.
+        """Return the share of variance [e], without noise, that each equation leaves. NaN: the equation is not used.
 
         transform: [c, c], from the columns as they are to what they should be.
         """
@@ -119,25 +153,25 @@ class Balance:
         return np.where(says, left / np.where(says, terms, 1.0), np.nan)
 
     def misfit(self, transform: Numbers) -> float:
-        """Mean share over the equations that say something."""
+        """Return the mean share over the equations that are used."""
         return _mean(self.misfits(transform))
 
     def worst(self, transform: Numbers) -> float:
-        """Largest share of an equation that says something."""
+        """Return the largest share of an equation that is used."""
         return float(np.nan_to_num(self.misfits(transform)).max(initial=0.0))
 
     def is_plausible(self, transform: Numbers) -> bool:
-        """Joints that turn less than `TURNS`, forces of at most `STRONGEST`."""
+        """Return whether all joints turn less than `TURNS` and all forces are at most `STRONGEST`."""
         turn = np.abs(self._angle @ transform) @ self._range
         force = [k for k, name in enumerate(self.columns) if name.startswith("tendon_force")]
         return bool(turn.max() < 2 * TURNS and (np.abs(transform) @ self.largest)[force].max() <= STRONGEST)
 
     def pushing(self, transform: Numbers) -> int:
-        """How many tendons that can only pull have a negative force."""
+        """Return how many tendons that can only pull have a negative force."""
         return int(((transform @ self._median)[self._pulls] < 0.0).sum())
 
     def plausible_scale(self) -> Correction | None:
-        """A unit of the positions or forces that makes angles plausible; of those that turn the joints most."""
+        """Return a unit of positions or forces, whichever turn the joints most, that makes the angles plausible."""
         groups = ("tendon_position", "tendon_force")
         share = {name: [column in self.group(name) for column in self.columns] for name in groups}
         turn = {name: float((np.abs(self._angle) @ (self._range * share[name])).max()) for name in groups}
@@ -149,11 +183,11 @@ class Balance:
         return None
 
     def worst_tendon(self) -> int:
-        """Index from 0 of the tendon whose equation leaves most."""
+        """Return the index, from 0, of the tendon whose equation leaves most."""
         return int(self.tendons[np.argmax(((self.rows @ self.covariance) * self.rows).sum(axis=1))])
 
     def transform(self, correction: Correction) -> Numbers:
-        """[c, c] what a correction does."""
+        """Return the matrix [c, c] of a correction."""
         made = np.eye(len(self.columns))
         if correction.kind == "exchange":
             indices = {name: k for k, name in enumerate(self.columns)}
@@ -167,7 +201,7 @@ class Balance:
         return made
 
     def corrections(self) -> Iterator[Correction]:
-        """All that is tried: signs, exchanges and units of columns and of whole groups."""
+        """Yield all candidates: signs, exchanges and units of columns and of whole groups."""
         groups = {name: self.group(name) for name in UNITS}
         for name, columns in groups.items():
             for subset in _subsets(columns):
@@ -183,12 +217,12 @@ class Balance:
             yield _exchange([groups["tendon_force"], groups["tendon_position"]], order)
 
     def group(self, name: str) -> list[str]:
-        """Its columns."""
+        """Return the columns of a group."""
         return [column for column in self.columns if column.startswith(f"{name}[")]
 
 
 def _equations(finger: FingerDescription, tendons: Indices, measured: bool) -> tuple[Numbers, Numbers]:
-    """[e, c] rows that are 0, and [n, c] joint angles by the tendons; columns as in `Balance`."""
+    """Return rows [e, c] that are 0, and joint angles [n, c] by the tendons; columns as in `Balance`."""
     arms = np.asarray(finger.moment_arms, dtype=float)
     compliance = np.diag([1.0 / float(tendon["stiffness"]) for tendon in finger.data["tendons"]])
     elastic = np.concatenate([-compliance, np.eye(len(arms))], axis=1)[tendons]
@@ -202,20 +236,20 @@ def _equations(finger: FingerDescription, tendons: Indices, measured: bool) -> t
 
 
 def taut_tendons(force: Numbers) -> Indices:
-    """Indices from 0 of tendons with any force. force: [N, m]."""
+    """Return the indices, from 0, of tendons with any force. force: [N, m]."""
     return np.flatnonzero(force.any(axis=0))
 
 
 def tells(finger: FingerDescription, groups: Mapping[str, Numbers]) -> bool:
-    """Whether the equation tells anything: more of them than unknown joint angles."""
+    """Return whether the equations can show anything: there are more of them than unknown joint angles."""
     return "joint_position" in groups or len(taut_tendons(groups["tendon_force"])) > len(finger.joint_names)
 
 
 def repairs(balance: Balance) -> tuple[list[Repair], float]:
-    """Corrections that make the equations fit, the most effective first, and the misfit that they leave.
+    """Find the corrections that make the equations fit, and the misfit that they leave.
 
-    One after the other: each is the best one beside those before, and must lower the misfit of the equations that it
-    changes `GAIN` times.
+    The search is greedy: each correction is the best one in addition to those before. It must lower the misfit of the
+    equations that it changes by a factor of at least `GAIN`.
     """
     done: list[Repair] = []
     transform = np.eye(len(balance.columns))
@@ -240,7 +274,10 @@ def repairs(balance: Balance) -> tuple[list[Repair], float]:
 
 
 def _scores(balance: Balance, tried: Sequence[Correction], transform: Numbers) -> Numbers:
-    """[tried] misfit with each; infinite where it gains too little, is implausible, or makes a tendon push."""
+    """Return the misfit [tried] with each correction.
+
+    It is infinite if the correction gains too little, is implausible or makes a tendon push.
+    """
     was, pushing = balance.is_plausible(transform), balance.pushing(transform)
     before, whole = balance.misfits(transform), balance.misfit(transform)
     scores = np.full(len(tried), np.inf)
@@ -258,7 +295,7 @@ def _scores(balance: Balance, tried: Sequence[Correction], transform: Numbers) -
 
 
 def _size(correction: Correction) -> int:
-    """The less it changes the likelier it is: signs and columns in another place. A unit is that of all."""
+    """Return the rank of a correction among equally good ones: fewer changed columns are likelier, units likeliest."""
     return 0 if correction.kind == "scale" else len(correction.columns)
 
 
@@ -271,14 +308,14 @@ def _mean(misfits: Numbers) -> float:
 
 
 def _subsets(columns: Sequence[str]) -> Iterator[tuple[str, ...]]:
-    """All of few columns; one, two and all of many."""
+    """Yield all subsets of few columns; of many columns, the subsets of one, two and all."""
     sizes = range(1, len(columns) + 1) if len(columns) <= MOST_SUBSETS else (1, 2, len(columns))
     for size in sizes:
         yield from combinations(columns, size)
 
 
 def _orders(count: int) -> Iterator[tuple[int, ...]]:
-    """All orders of few but the given one; of many, two exchanged or three in a circle."""
+    """Yield all orders of few elements except the given one; of many, two exchanged or three in a circle."""
     given = tuple(range(count))
     if count <= MOST_ORDERS:
         yield from (order for order in permutations(given) if order != given)
@@ -294,7 +331,7 @@ def _orders(count: int) -> Iterator[tuple[int, ...]]:
 
 
 def _exchange(groups: Sequence[Sequence[str]], order: Sequence[int]) -> Correction:
-    """Element k of each group read from element order[k]."""
+    """Return the exchange that reads element k of each group from element order[k]."""
     moved = [k for k, source in enumerate(order) if source != k]
     columns = tuple(group[k] for group in groups for k in moved)
     return Correction("exchange", columns, sources=tuple(group[order[k]] for group in groups for k in moved))

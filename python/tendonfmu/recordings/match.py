@@ -1,8 +1,8 @@
-"""Do recordings belong to a finger description? Said before any fit, with what to write into the map of columns.
+"""Whether recordings belong to a finger description, and if not, what to write into the map of columns.
 
-`belongs` answers for all recordings, `admit` for a command that goes on with them. Errors are what makes every number
-of a fit wrong: signs, order and units of columns, sensors that are dead. Warnings are what makes it worse: a poor
-clock, sensors that clip now and then.
+`belongs` answers for all recordings; `admit` does it for a command that continues with them. Errors make every number
+of a fit wrong: signs, order and units of columns, dead sensors. Warnings make a fit worse: a poor clock, sensors that
+clip now and then.
 """
 
 from __future__ import annotations
@@ -31,33 +31,36 @@ from tendonfmu.recordings.velocity import velocity_corrections
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-UNFIT, POOR = 0.15, 0.03  # share of variance that the equations may leave: beyond the first nothing fits
-HALF = 0.5  # of the samples: a fit refuses a sensor that is stuck in more
-MUCH_CLIPPED = 0.2  # of the samples
-NEGATIVE = 0.8  # of the samples: a tendon that pushes as often has a wrong sign or zero
-PUSHES = 0.01  # of the samples
-WINDOW = 0.02  # s; power is that of motion slower than this
+UNFIT, POOR = 0.15, 0.03  # share of variance that the equations leave: above these an error, a warning
+HALF = 0.5  # of the samples; a fit refuses a sensor that is stuck in more
+MUCH_CLIPPED = 0.2  # of the samples; more is an error
+NEGATIVE = 0.8  # of the samples; a tendon that pushes in more has a wrong sign or zero
+PUSHES = 0.01  # of the samples; less is not reported
+WINDOW = 0.02  # s; power is computed from means over this time
 FEWEST_WINDOWS = 50
 MOST_COMPARED = 12  # corrections
 AGAINST = 0.15  # of the power at a joint; sound recordings have 0.6 and more, those with a wrong sign -0.3 and less
-STILL = 0.02  # rad; less motion says nothing
-SLACK = 0.01  # of the largest force of a tendon; a slack one does not follow its joints
-OPPOSED = 0.5  # of what forces and reference leave of each other, when their sum leaves less
-LEAST_KEPT = 0.2  # of the samples, for the equations
+STILL = 0.02  # rad; joints that move less are not judged
+SLACK = 0.01  # of the largest force of a tendon; below, it is slack and does not follow its joints
+OPPOSED = 0.5  # the sum of torque and reference leaves less than this share of what the difference leaves
+LEAST_KEPT = 0.2  # of the samples; the equations use at least as many
 LEFT_TO_THE_FIT = ("gaps", "held")  # kinds of findings
 
 
 def belongs(finger: FingerDescription, recordings: Sequence[Recording]) -> list[Finding]:
-    """What says that recordings do not belong to a finger, or are poor; nothing for sound ones.
+    """Find signs that recordings do not belong to a finger, or are poor.
 
     Parameters
     ----------
-    finger: a valid description.
-    recordings: as `read_recording` gives them.
+    finger
+        A valid description.
+    recordings
+        As `read_recording` returns them.
 
     Returns
     -------
-    Findings in the order of the recordings, errors of each before its warnings.
+    list of Finding
+        In the order of the recordings, errors of each before its warnings. Empty if nothing was found.
     """
     found: list[Finding] = []
     for recording in recordings:
@@ -67,10 +70,27 @@ def belongs(finger: FingerDescription, recordings: Sequence[Recording]) -> list[
 
 
 def admit(finger: FingerDescription, recordings: Sequence[Recording]) -> list[str]:
-    """Before a fit: raises InputError for a recording that does not belong to the finger, returns the warnings' lines.
+    """Check recordings before a fit, and refuse those that do not belong to the finger.
 
-    Gaps and stuck sensors are left to `recordings.prepared.prepare`, which knows which columns are used, and says what
-    becomes of the samples.
+    Gaps and stuck sensors are left to `recordings.prepared.prepare`. It knows which columns are used, and reports which
+    samples are left out.
+
+    Parameters
+    ----------
+    finger
+        A valid description.
+    recordings
+        As `read_recording` returns them, or made in memory.
+
+    Returns
+    -------
+    list of str
+        One line for each warning.
+
+    Raises
+    ------
+    InputError
+        A recording does not belong to the finger, or has values that `read_recording` refuses.
     """
     for recording in recordings:
         check_numbers(recording)
@@ -78,7 +98,7 @@ def admit(finger: FingerDescription, recordings: Sequence[Recording]) -> list[st
 
 
 def refuse_errors(findings: Sequence[Finding]) -> list[str]:
-    """Raises InputError for the first error, returns the warnings' lines."""
+    """Raise InputError for the first error; otherwise return the lines of the warnings."""
     for finding in findings:
         if finding.severity == "error":
             raise InputError(finding.line())
@@ -103,7 +123,7 @@ def _findings(finger: FingerDescription, recording: Recording) -> list[Finding]:
     ]
     dead = any(finding.severity == "error" for finding in held)
     silent = any(each.share > HALF for each in stands)
-    if not dead:  # of a dead sensor no equation holds
+    if not dead:  # no equation holds with a dead sensor
         found += kinematic
         mended = _with_velocities(finger, mended, found)
         found += _of_pushing(finger, mended, {column for finding in kinematic for column in finding.columns})
@@ -131,7 +151,7 @@ def _of_channels(finger: FingerDescription, recording: Recording, held: Sequence
     steps = {each.column for each in coarse}
     often = {each.column for each in clipped if each.runs > 1}
     stands = [finding for finding in held if finding.severity == "error" or finding.columns[0] not in steps | often]
-    if stands or coarse:  # what the others say of a position is worth nothing then
+    if stands or coarse:  # the other channels do not give a reliable position then
         clipped = [each for each in clipped if each.column.startswith("tendon_force")]
     yield from stands
     said = {finding.columns[0] for finding in stands}
@@ -145,14 +165,14 @@ def _of_channels(finger: FingerDescription, recording: Recording, held: Sequence
 
 
 def _of_kinematics(finger: FingerDescription, recording: Recording) -> tuple[list[Finding], Recording]:
-    """Findings about signs, order and units of columns, and the recording as it would be with them mended."""
+    """Return findings about signs, order and units of columns, and the recording with these corrected."""
     if len(recording) < FEWEST:
         return [], recording
     found: list[Finding] = []
     balance, moves = _balance(finger, recording)
     if moves and tells(finger, recording.groups):
         done, left = repairs(balance)
-        if left > UNFIT:  # what mends a part of it only is a guess
+        if left > UNFIT:  # a correction that removes only a part of the misfit is a guess
             return [text.unfit(recording.path, done[0].misfit if done else left, "error", balance)], recording
         if len(done) == 1:
             done = [_likeliest(finger, recording, done[0])]
@@ -171,7 +191,7 @@ def _of_kinematics(finger: FingerDescription, recording: Recording) -> tuple[lis
 
 
 def _likeliest(finger: FingerDescription, recording: Recording, found: Repair) -> Repair:
-    """Of corrections that the equations cannot tell apart, first the one that suits velocities and friction."""
+    """Put first, of corrections that fit the equations equally, the one that fits velocities and friction best."""
     corrections = [found.correction, *found.alternatives]
     if len(corrections) == 1 or len(corrections) > MOST_COMPARED:
         return found
@@ -186,7 +206,7 @@ def _likeliest(finger: FingerDescription, recording: Recording, found: Repair) -
 
 
 def _balance(finger: FingerDescription, recording: Recording) -> tuple[Balance, bool]:
-    """The equations over the samples that serve, and whether any joint moves in them."""
+    """Return the equations over the usable samples, and whether any joint moves in them."""
     groups = {name: values for name, values in recording.groups.items() if name in EQUATED}
     rows = _serving(finger, recording, groups)
     kept = {name: values[rows] for name, values in groups.items()}
@@ -200,7 +220,7 @@ def _balance(finger: FingerDescription, recording: Recording) -> tuple[Balance, 
 
 
 def _serving(finger: FingerDescription, recording: Recording, groups: Mapping[str, Numbers]) -> Flags:
-    """[N] samples in which no channel holds a value for long and no tendon is slack; all where too few are left."""
+    """Return the samples [N] without a held channel and a slack tendon; all samples if too few are left."""
     changing = np.ones(len(recording), dtype=bool)
     for values in groups.values():
         for column in values.T:
@@ -231,7 +251,7 @@ def _mended(recording: Recording, correction: Correction) -> Recording:
 
 
 def _with_velocities(finger: FingerDescription, recording: Recording, found: list[Finding]) -> Recording:
-    """Adds findings about joint velocities; the recording as it would be with them mended."""
+    """Add findings about joint velocities, and return the recording with these corrected."""
     for correction, slope in velocity_corrections(recording, finger):
         found.append(text.velocity(recording.path, correction, slope))
         recording = _mended(recording, correction)
@@ -239,7 +259,7 @@ def _with_velocities(finger: FingerDescription, recording: Recording, found: lis
 
 
 def _of_pushing(finger: FingerDescription, recording: Recording, mended: set[str]) -> Iterator[Finding]:
-    """About tendons that pull only and have negative forces. mended: columns of which something is said already."""
+    """Report tendons that can only pull but have negative forces. mended: columns with a finding already."""
     share = (recording.groups["tendon_force"] < 0.0).mean(axis=0)
     for i, tendon in enumerate(finger.data["tendons"]):
         column = f"tendon_force[{i + 1}]"
@@ -251,7 +271,7 @@ def _of_pushing(finger: FingerDescription, recording: Recording, mended: set[str
 
 
 def _is_sign_right(finger: FingerDescription, recording: Recording, i: int) -> bool:
-    """Whether the equations say that tendon i's force grows as its spring stretches."""
+    """Return whether the equations show that tendon i's force grows as its spring stretches."""
     if not tells(finger, recording.groups) or len(recording) < FEWEST:
         return False
     balance, _ = _balance(finger, recording)
@@ -260,7 +280,7 @@ def _is_sign_right(finger: FingerDescription, recording: Recording, i: int) -> b
 
 
 def _of_reference(finger: FingerDescription, recording: Recording) -> Iterator[Finding]:
-    """About external torques that the tendons do not hold: friction is what is left of the two (eq. 9)."""
+    """Report external torques opposite to the tendons' torque: their difference should be friction only (eq. 9)."""
     external = recording.groups.get("external_torque")
     if external is None:
         return
@@ -271,14 +291,14 @@ def _of_reference(finger: FingerDescription, recording: Recording) -> Iterator[F
 
 
 def _of_power(finger: FingerDescription, recording: Recording) -> Iterator[Finding]:
-    """About joints that move against the pull of their tendons, which friction cannot make them do."""
+    """Report joints that move against the pull of their tendons, which friction cannot cause."""
     share = power_shares(finger, recording)
     if share is not None and share.min() < -AGAINST:
         yield text.against(recording.path, share, finger.joint_names, _turning(finger, recording))
 
 
 def _turning(finger: FingerDescription, recording: Recording) -> list[Correction]:
-    """Signs and exchanges that the equations do not see and that let every joint follow its tendons."""
+    """Find signs and exchanges that fit the equations equally and make every joint follow its tendons."""
     balance, _ = _balance(finger, recording)
     given = np.eye(len(balance.columns))
     most, pushing = max(2 * balance.misfit(given), SAME), balance.pushing(given)
@@ -298,15 +318,16 @@ def _turning(finger: FingerDescription, recording: Recording) -> list[Correction
 
 
 def power_shares(finger: FingerDescription, recording: Recording) -> Numbers | None:
-    """[n] work that the tendons do on each joint over closed motions: friction makes it 1, springs 0.
+    """Return the net work of the tendons on each joint as a share [n] of all work that they exchange with it.
 
-    0 too for joints that do not move. None for a recording that is too short.
+    Over closed motions, friction alone gives 1 and springs give 0. Joints that do not move get 0. The result is None
+    for a recording that is too short.
     """
     external, angle = (recording.groups.get(name) for name in ("external_torque", "joint_position"))
     torque = recording.groups["tendon_force"] @ np.asarray(finger.moment_arms, dtype=float)
     if external is not None:
         torque = torque - external
-    torque = torque - torque.mean(axis=0)  # a constant pull comes back all that it does
+    torque = torque - torque.mean(axis=0)  # a constant torque does no work over a closed motion
     if angle is None:
         angle = tendon_angles(recording, finger)
     every = max(1, round(WINDOW / float(np.median(np.diff(recording.time))))) if len(torque) > FEWEST else len(torque)

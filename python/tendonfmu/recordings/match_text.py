@@ -1,4 +1,4 @@
-"""Findings about recordings in words: what was seen, what is probably wrong, what to write."""
+"""What the findings about recordings say: the observation, its probable cause and what to write."""
 
 from __future__ import annotations
 
@@ -18,20 +18,33 @@ EQUATION = "position − force/stiffness = moment arms × joint angles"
 _REASONS = {
     "tendon_force": "the force falls where its spring stretches",
     "tendon_position": "the position runs against the other tendons and the joints",
-    "joint_position": "the measured angle runs against the angle that the tendons tell",
+    "joint_position": "the measured angle runs against the angle computed from the tendons",
     "joint_velocity": "the velocity runs against the angle",
     "external_torque": "it has to be the load that the tendons hold",
 }
 
 
 def element(column: str) -> tuple[str, int]:
-    """Group and index from 0 of a column's name."""
+    """Return the group and the index, from 0, of a column's name."""
     group, index = column.rstrip("]").split("[")
     return group, int(index) - 1
 
 
 def verdict(recording: Recording, findings: Sequence[Finding]) -> str:
-    """One line: does it belong to the finger, and how much was looked at."""
+    """Say in one line whether a recording belongs to the finger.
+
+    Parameters
+    ----------
+    recording
+        The recording.
+    findings
+        Its findings, from `belongs`.
+
+    Returns
+    -------
+    str
+        The file, the verdict, the number of samples, the duration, and how many errors and warnings there are.
+    """
     severities = [finding.severity for finding in findings]
     errors, warnings = severities.count("error"), severities.count("warning")
     words = "does not belong to this finger as it is" if errors else "belongs to this finger"
@@ -44,32 +57,35 @@ def verdict(recording: Recording, findings: Sequence[Finding]) -> str:
 
 
 def repair(path: Path, found: Repair) -> Finding:
-    """Of a correction that makes the equations fit."""
+    """Describe a correction that makes the equations fit."""
     correction = found.correction
     seen = (
-        f"{EQUATION} misses {_percent(found.misfit)} of the variance, and {_percent(found.left)} with "
+        f"{EQUATION} leaves {_percent(found.misfit)} of the variance unexplained, and {_percent(found.left)} with "
         f"{_in_words(correction)}"
     )
     probably = _cause(correction)
     if found.alternatives:
         others = [_in_words(other) for other in found.alternatives[:3]]
         more = len(found.alternatives) - len(others)
-        probably += f", or as likely {'; or '.join(others)}{f'; or {more} more' if more else ''}"
+        probably += f", or equally likely {'; or '.join(others)}{f'; or {more} more' if more else ''}"
     return _of_correction(path, correction, seen, probably)
 
 
 def velocity(path: Path, correction: Correction, slope: float) -> Finding:
-    """Of a joint velocity that does not belong to its angle. slope: change of the angle over the integral."""
+    """Describe a joint velocity that does not belong to its angle.
+
+    slope: change of the angle over the integral of the velocity.
+    """
     seen = f"the angle changes by {slope:.4g} times the integral of the velocity; expected 1"
     if correction.kind == "exchange":
-        seen = "the angle of each joint changes as the velocity of the other says"
+        seen = "the angle of each joint changes with the velocity of the other joint"
     return _of_correction(path, correction, seen, _cause(correction))
 
 
 def turns(path: Path, turn: Numbers, joints: Sequence[str], correction: Correction | None) -> Finding:
-    """Of angles that no finger has. turn: [n] rad, range of each joint."""
+    """Describe angles that no finger reaches. turn: [n] rad, range of each joint."""
     j = int(np.argmax(turn))
-    seen = f"joint {joints[j]} turns by up to {turn[j]:.4g} rad by tendon positions, forces and moment arms"
+    seen = f"tendon positions, forces and moment arms turn joint {joints[j]} by up to {turn[j]:.4g} rad"
     if correction is None:
         return Finding("error", "scale", path, ("tendon_position",), seen, "a wrong unit", "check the units of the map")
     probably = _cause(correction)
@@ -111,7 +127,7 @@ def _cause(correction: Correction) -> str:
 
 
 def _columns(columns: Sequence[str]) -> str:
-    """`tendon_force[1..4]` for a whole group in order."""
+    """Return `tendon_force[1..4]` for a whole group in order, else the names."""
     group, first = element(columns[0])
     if len(columns) > 1 and list(columns) == [f"{group}[{first + 1 + k}]" for k in range(len(columns))]:
         return f"{group}[{first + 1}..{first + len(columns)}]"
@@ -122,7 +138,7 @@ def _columns(columns: Sequence[str]) -> str:
 
 
 def columns(path: Path, group: str, found: int, counts: Mapping[str, int]) -> Finding:
-    """Of a group with too many or too few columns. counts: of tendons and joints of the finger."""
+    """Describe a group with too many or too few columns. counts: tendons and joints of the finger."""
     return Finding(
         "error",
         "columns",
@@ -136,15 +152,15 @@ def columns(path: Path, group: str, found: int, counts: Mapping[str, int]) -> Fi
 
 
 def unfit(path: Path, left: float, severity: str, balance: Balance) -> Finding:
-    """Of equations that no correction makes fit."""
+    """Describe equations that no correction makes fit."""
     worst = balance.worst_tendon()
     return Finding(
         severity,
         "unfit",
         path,
         (f"tendon_position[{worst + 1}]",),
-        f"{EQUATION} misses {_percent(left)} of the variance, most at tendon {worst + 1}; no sign, order or unit of "
-        "columns mends it",
+        f"{EQUATION} leaves {_percent(left)} of the variance unexplained, most at tendon {worst + 1}; no sign, order "
+        "or unit of columns corrects it",
         "moment_arms or stiffness of another finger, or positions in turns of a motor",
         "compare moment_arms, stiffness and the order of the tendons with the finger; for a motor's angle in rad write "
         "scale = radius of its pulley in m",
@@ -152,29 +168,33 @@ def unfit(path: Path, left: float, severity: str, balance: Balance) -> Finding:
 
 
 def against(path: Path, share: Numbers, joints: Sequence[str], turning: Sequence[Correction]) -> Finding:
-    """Of joints that move against the pull.
+    """Describe joints that move against the pull of their tendons.
 
-    share: [n] of their power, negative where they do. turning: what would let all of them follow, the likeliest first.
+    share: [n] of their power, negative for these joints. turning: corrections that would make all joints follow, the
+    likeliest first.
     """
     names = " and ".join(name for name, part in zip(joints, share, strict=True) if part < 0.0)
     seen = f"{names} moves against the pull of its tendons ({_percent(-float(share.min()))} of its power)"
     by_hand = "a finger that was moved by hand"
     if not turning:
-        write = "write sign -1 into the map of columns for what is reversed, or record without touching the finger"
+        write = "write sign -1 into the map of columns for the reversed columns, or record without touching the finger"
         return Finding("warning", "against", path, ("tendon_force", "tendon_position"), seen, by_hand, write)
-    others = "".join(f", or as likely {_in_words(other)}" for other in turning[1:4])
+    others = "".join(f", or equally likely {_in_words(other)}" for other in turning[1:4])
     return _of_correction(path, turning[0], seen, f"{_cause(turning[0])}{others}, or {by_hand}")
 
 
 def reference(path: Path, column: str, left: float, opposed: float) -> Finding:
-    """Of an external torque that opposes what it should be. left, opposed: N·m rms with its sign and with the other."""
+    """Describe an external torque with the wrong sign.
+
+    left, opposed: N·m rms of the difference, with the sign as it is and with the other.
+    """
     correction = Correction("sign", (column,), -1.0)
-    seen = f"joint torque minus it leaves {left:.4g} N.m rms, and {opposed:.4g} N.m with sign -1"
+    seen = f"joint torque minus this column leaves {left:.4g} N.m rms, and {opposed:.4g} N.m with sign -1"
     return _of_correction(path, correction, seen, _cause(correction))
 
 
 def pushing(path: Path, column: str, name: str, share: float, least: float, is_zero: bool) -> Finding:
-    """Of a tendon that pushes. is_zero: the sensor's zero is wrong rather than its sign."""
+    """Describe a tendon that pushes. is_zero: the sensor's zero is wrong rather than its sign."""
     seen = f"negative in {_percent(share)} of the samples, down to {least:.4g} N, but tendon {name} can only pull"
     if is_zero:
         severity = "error" if share > 0.5 else "warning"
@@ -196,7 +216,7 @@ def pushing(path: Path, column: str, name: str, share: float, least: float, is_z
 
 
 def senseless_rate(path: Path, clock: Clock, samples: int) -> Finding:
-    """Of a rate that no control loop has."""
+    """Describe a sample rate that no control loop has."""
     seen = f"{samples} samples {clock.step:.4g} s apart, {1 / clock.step:.4g} per second"
     if clock.unit is None:
         return Finding("error", "clock", path, ("time",), seen, "a wrong unit", "give time in s")
@@ -215,7 +235,7 @@ def senseless_rate(path: Path, clock: Clock, samples: int) -> Finding:
 
 
 def clock_warnings(path: Path, clock: Clock, time: Numbers) -> Iterator[Finding]:
-    """Of gaps, lost samples and uneven steps."""
+    """Describe gaps, lost samples and uneven steps."""
     if clock.gaps:
         first = clock.gaps[0]
         yield Finding(
@@ -234,7 +254,7 @@ def clock_warnings(path: Path, clock: Clock, time: Numbers) -> Iterator[Finding]
             "lost",
             path,
             ("time",),
-            f"{clock.lost} of {len(time) + clock.lost} samples are not there ({_percent(share)}), steps of "
+            f"{clock.lost} of {len(time) + clock.lost} samples are missing ({_percent(share)}), steps of "
             f"{clock.step:.4g} s",
             "a log that drops samples",
             "record with a larger buffer, or fewer channels",
@@ -247,7 +267,7 @@ def clock_warnings(path: Path, clock: Clock, time: Numbers) -> Iterator[Finding]
             ("time",),
             f"steps of {clock.step:.4g} s vary by {_percent(clock.jitter)} (standard deviation)",
             "the time at which a sample was written, not taken",
-            "log the time of the controller's own clock; velocities are wrong by as much",
+            "log the time of the controller's own clock; velocities are wrong by the same share",
         )
 
 
@@ -255,36 +275,36 @@ def clock_warnings(path: Path, clock: Clock, time: Numbers) -> Iterator[Finding]
 
 
 def held(path: Path, found: Held, severity: str) -> Finding:
-    """Of a channel that stands still."""
+    """Describe a channel that holds a value."""
     first, last = found.first
     return Finding(
         severity,
         "held",
         path,
         (found.column,),
-        f"stands at {found.value:.6g} in {_percent(found.share)} of the samples, first from {first:.4g} to "
-        f"{last:.4g} s, while others move",
+        f"holds {found.value:.6g} in {_percent(found.share)} of the samples, first from {first:.4g} to "
+        f"{last:.4g} s, while other channels change",
         "a stuck sensor, or a cable that is not plugged in",
         "replace the sensor's log, or cut these times out",
     )
 
 
 def clipped(path: Path, found: Clipped, severity: str) -> Finding:
-    """Of a channel that saturates."""
+    """Describe a channel that saturates."""
     end, value = ("above", "largest") if found.is_top else ("below", "smallest")
     return Finding(
         severity,
         "clipped",
         path,
         (found.column,),
-        f"repeats its {value} value {found.value:.6g} in {_percent(found.share)} of the samples, and comes to it fast",
+        f"repeats its {value} value {found.value:.6g} in {_percent(found.share)} of the samples, and reaches it fast",
         f"a sensor or amplifier that saturates {end} it",
         "record with a larger range, or less force or travel",
     )
 
 
 def coarse(path: Path, found: Coarse) -> Finding:
-    """Of a channel with few steps."""
+    """Describe a channel with few steps."""
     unit = GROUPS[element(found.column)[0]][0]
     return Finding(
         "warning",

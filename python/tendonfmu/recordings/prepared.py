@@ -1,4 +1,4 @@
-"""Recordings made ready for a fit: checked, cut at gaps, and each sample said to train, to be held out or left out."""
+"""Which samples a fit uses: a recording is checked, cut at gaps, and its samples train, are held out or left out."""
 
 from __future__ import annotations
 
@@ -42,9 +42,17 @@ SHORTEST_BLOCK = 1.0  # s; of a held-out block
 
 @dataclass(frozen=True)
 class Held:
-    """Which share of time is held out (0 to below 1), in blocks of how many seconds at most.
+    """The share of time that is held out, and in which blocks.
 
-    strict: refuse a recording that is too short for blocks of `SHORTEST_BLOCK`; otherwise its blocks are shorter.
+    Attributes
+    ----------
+    share
+        Share of time that is held out, 0 to below 1.
+    block
+        Longest block (s).
+    strict
+        Whether to refuse a recording that is too short for blocks of `SHORTEST_BLOCK`. Otherwise its blocks are
+        shorter.
     """
 
     share: float = 0.0
@@ -54,12 +62,25 @@ class Held:
 
 @dataclass(frozen=True)
 class FitRecording:
-    """A recording of a fit.
+    """A recording that is ready for a fit.
 
-    target: [N, n] N·m that the model has to explain: τ, or τ − external_torque (eq. 9). train, held_out, contact_out,
-    faulty: [N] bool, each sample in at most one of them: trained on; held out; labelled contact without a reference;
-    left out for a stuck sensor, or for a part that is too short. parts: slices without a gap, each with a bias path of
-    its own. model: the given finger's own T, angles and speeds. warnings: sentences.
+    Attributes
+    ----------
+    recording
+        The recording itself.
+    kinematics
+        Source of angles and speeds, 1 to 3.
+    target
+        Torque that the model has to explain [N, n] (N·m): τ, or τ − external_torque (eq. 9).
+    train, held_out, contact_out, faulty
+        Flags [N]; each sample has at most one of them. In this order: trained on; held out; labelled contact without a
+        reference; left out because of a stuck sensor or a part that is too short.
+    parts
+        Slices without a gap. Each has its own bias path.
+    model
+        T, angles and speeds of the given finger.
+    warnings
+        Sentences about what was left out and what is poor.
     """
 
     recording: Recording
@@ -75,38 +96,57 @@ class FitRecording:
 
     @property
     def path(self) -> Path:
+        """File of the recording."""
         return self.recording.path
 
     @property
     def time(self) -> Numbers:
+        """Times [N] (s)."""
         return self.recording.time
 
     @property
     def tracked(self) -> Flags:
-        """[N] samples that the bias filter learns from when a finished fit is judged, as it would at run time."""
+        """Samples [N] that the bias filter learns from when a finished fit is judged, as at run time."""
         return self.train | self.held_out
 
     @property
     def external(self) -> Numbers | None:
-        """[N, n] N·m of the reference sensor, or None."""
+        """Torque of the reference sensor [N, n] (N·m), or None."""
         return self.recording.groups.get("external_torque")
 
     @property
     def duration(self) -> float:
-        """s, without gaps."""
+        """Duration without gaps (s)."""
         return float(sum(self.time[part.stop - 1] - self.time[part.start] for part in self.parts))
 
     @property
     def mean_force(self) -> float:
-        """N, of all tendons."""
+        """Mean magnitude of all tendon forces (N)."""
         return float(np.abs(self.recording.groups["tendon_force"]).mean())
 
     def arrays(self, part: slice) -> dict[str, Numbers]:
-        """What `native.Finger.run` takes, of one part."""
+        """Return the signals of one part.
+
+        Parameters
+        ----------
+        part
+            One of `parts`.
+
+        Returns
+        -------
+        dict of Numbers
+            Contiguous arrays by name, as `native.Finger.run` takes them.
+        """
         return {name: np.ascontiguousarray(values[part]) for name, values in self.recording.arrays().items()}
 
     def entry(self) -> dict[str, Any]:
-        """For the report."""
+        """Return what a report says about the recording.
+
+        Returns
+        -------
+        dict
+            Path, counts of samples, parts, duration (s), mean force (N), kinematics and whether there is a reference.
+        """
         return {
             "path": str(self.path),
             "samples": len(self.time),
@@ -123,9 +163,31 @@ class FitRecording:
 
 
 def prepare(finger: FingerDescription, recording: Recording, kinematics: int, held: Held) -> FitRecording:
-    """Makes a recording ready, and says what of it is left out. Raises InputError where nothing sound can come of it.
+    """Prepare a recording for a fit, and collect what is left out of it.
 
-    Whether it belongs to the finger, `recordings.match.admit` has to say before.
+    Call `recordings.match.admit` first: it checks whether the recording belongs to the finger.
+
+    Parameters
+    ----------
+    finger
+        A valid description.
+    recording
+        A recording of this finger.
+    kinematics
+        Source of angles and speeds, 1 to 3.
+    held
+        Share that is held out.
+
+    Returns
+    -------
+    FitRecording
+        The recording with its parts, flags and warnings.
+
+    Raises
+    ------
+    InputError
+        A column is missing or has invalid values, a sensor is stuck in more than half of the samples, or too few
+        samples are left.
     """
     joints, tendons = len(finger.joint_names), len(finger.tendon_names)
     recording.require(joints, tendons, inputs_used(kinematics, watches_motors(finger.data)))
@@ -168,7 +230,7 @@ def _arrays(recording: Recording, part: slice) -> dict[str, Numbers]:
 
 
 def _parts(time: Numbers) -> tuple[list[slice], Flags]:
-    """Slices between gaps that are long enough, and the samples [N] of those that are not."""
+    """Return the slices between gaps that are long enough, and the samples [N] of those that are too short."""
     bounds = [0, *gaps(time), len(time)]
     short, parts = np.zeros(len(time), dtype=bool), []
     for begin, end in pairwise(bounds):
@@ -196,7 +258,20 @@ def _refuse_too_little(recording: Recording, parts: list[slice], usable: Flags, 
 
 
 def slack_sentences(slack: Flags, finger: FingerDescription) -> list[str]:
-    """About tendons whose modelled force falls below zero. slack: [N, m]."""
+    """Describe tendons whose modelled force falls below zero.
+
+    Parameters
+    ----------
+    slack
+        Flags [N, m].
+    finger
+        A valid description.
+
+    Returns
+    -------
+    list of str
+        One sentence for each such tendon.
+    """
     share = slack.mean(axis=0)
     return [
         f"tendon {i + 1} ({finger.tendon_names[i]}) is slack in {_percent(part)} % of the samples: its modelled force "
@@ -207,7 +282,7 @@ def slack_sentences(slack: Flags, finger: FingerDescription) -> list[str]:
 
 
 def _percent(share: float) -> str:
-    """Two digits, and all of those of 100."""
+    """Format a share in percent with two digits, near 100 without decimals."""
     return f"{100 * share:.2g}" if share < 0.995 else f"{100 * share:.0f}"
 
 
@@ -215,7 +290,7 @@ def _percent(share: float) -> str:
 
 
 def _stuck(recording: Recording, finger: FingerDescription, kinematics: int) -> tuple[Flags, list[str]]:
-    """[N] samples to leave out, and sentences. A channel that is not used costs nothing."""
+    """Return the samples [N] to leave out because of stuck sensors, and sentences. Unused channels cost no samples."""
     out, sentences = np.zeros(len(recording), dtype=bool), []
     used = {"tendon_force", *INPUTS_OF_SOURCE[kinematics]}
     by_column: dict[str, list[StuckSensor]] = {}
@@ -252,7 +327,7 @@ def _covered(time: Numbers, sensor: StuckSensor) -> Flags:
 
 
 def _held_out(recording: Recording, parts: list[slice], held: Held) -> Flags:
-    """[N] samples of every so many'th block of time, evenly spread; blocks count from the start of each part."""
+    """Return the samples [N] of evenly spread blocks of time. Blocks count from the start of each part."""
     out = np.zeros(len(recording), dtype=bool)
     if not held.share:
         return out
@@ -278,9 +353,23 @@ def _held_out(recording: Recording, parts: list[slice], held: Held) -> Flags:
 
 
 def motion_of(recordings: list[FitRecording]) -> tuple[Numbers, Numbers, Numbers]:
-    """Of the samples trained on: joint angle [K, n] rad, speed [K, n] rad/s, time [K] s that each stands for.
+    """Return where and how fast the joints moved in the samples that are trained on.
 
-    Every so many'th of very many: where a motion has been is seen well enough.
+    Only every k-th sample of very long recordings is returned, which shows the motion well enough.
+
+    Parameters
+    ----------
+    recordings
+        Recordings of one finger.
+
+    Returns
+    -------
+    angle
+        Joint angles [K, n] (rad).
+    speed
+        Joint speeds [K, n] (rad/s).
+    share
+        Time that each sample stands for [K] (s).
     """
     every = max(1, sum(len(each.time) for each in recordings) // _LOOKED_AT)
     angle, speed, share = [], [], []
@@ -300,9 +389,26 @@ def _sample_time(recording: FitRecording) -> Numbers:
 
 
 def refuse_stillness(finger: FingerDescription, recordings: list[FitRecording], moves: Mapping[str, bool]) -> list[str]:
-    """Refuses recordings without any motion; a sentence about joints that never move.
+    """Refuse recordings without any motion, and describe joints that never move.
 
-    moves: path of each friction effect -> whether it ever slides in the samples trained on.
+    Parameters
+    ----------
+    finger
+        A valid description.
+    recordings
+        Recordings of this finger.
+    moves
+        Whether each friction effect, by its path, ever slides in the samples that are trained on.
+
+    Returns
+    -------
+    list of str
+        One sentence for each joint that never moves.
+
+    Raises
+    ------
+    InputError
+        Nothing moves in any of the recordings.
     """
     if not moves:
         return []
@@ -322,7 +428,20 @@ def refuse_stillness(finger: FingerDescription, recordings: list[FitRecording], 
 
 
 def require_noise(finger: FingerDescription, recordings: list[FitRecording]) -> None:
-    """Refuses a finger whose residuals would count infinitely much."""
+    """Refuse a finger whose residuals would get an infinite weight.
+
+    Parameters
+    ----------
+    finger
+        A valid description.
+    recordings
+        Recordings of this finger.
+
+    Raises
+    ------
+    InputError
+        `bias.noise_std` is 0, and either `bias.noise_std_per_force` is 0 too or a sample has no tendon force.
+    """
     bias = finger.data.get("bias") or {}
     base = 0.01 if bias.get("noise_std") is None else float(bias["noise_std"])
     per_force = float(bias.get("noise_std_per_force") or 0.0)

@@ -1,4 +1,4 @@
-"""Recordings: columns, units and checks of docs/reference/recordings.md.
+"""What a recording is: its columns, units and checks (docs/reference/recordings.md).
 
 A column is `time` (s) or one of the groups below with an index from 1, such as `tendon_force[3]`.
 """
@@ -28,7 +28,7 @@ GROUPS: dict[str, tuple[str, bool]] = {
 }
 GROUP_PER = {name: "tendon" if name.startswith("tendon") else "joint" for name in GROUPS}
 LABEL = "contact"
-LARGEST, LATEST = 1e12, 1e15  # of a signal in its unit, and s: what the model takes
+LARGEST, LATEST = 1e12, 1e15  # largest signal, in its unit, and latest time (s) that the model accepts
 
 _ELEMENT = re.compile(r"([a-z_]+)\[([1-9][0-9]*)\]")
 
@@ -37,8 +37,18 @@ _ELEMENT = re.compile(r"([a-z_]+)\[([1-9][0-9]*)\]")
 class Recording:
     """Measured samples of one finger.
 
-    time: [N] s, strictly increasing. groups: name -> [N, m] or [N, n], units in `GROUPS`.
-    contact: [N] bool label, or None. others: columns read because they were asked for, [N] each.
+    Attributes
+    ----------
+    path
+        File of the recording.
+    time
+        Times [N] (s), strictly increasing.
+    groups
+        Signals by name of the group, [N, m] for tendons and [N, n] for joints, in the units of `GROUPS`.
+    contact
+        Contact label [N], or None.
+    others
+        Other columns that were asked for, [N] each.
     """
 
     path: Path
@@ -51,11 +61,30 @@ class Recording:
         return len(self.time)
 
     def arrays(self) -> dict[str, NDArray[np.float64]]:
-        """`time` and the groups in one dict, as `native.Finger.run` takes them."""
+        """Return `time` and the groups in one dict, as `native.Finger.run` takes them.
+
+        Returns
+        -------
+        dict of arrays
+            `time` [N] (s), and each group [N, m] or [N, n] in its unit.
+        """
         return {"time": self.time, **self.groups}
 
     def require(self, joints: int, tendons: int, groups: tuple[str, ...]) -> None:
-        """Refuses a recording that does not fit a finger, or lacks a group that is needed."""
+        """Refuse a recording that does not fit a finger, or lacks a group that is needed.
+
+        Parameters
+        ----------
+        joints, tendons
+            Numbers of joints and tendons of the finger.
+        groups
+            Names of the groups that are needed.
+
+        Raises
+        ------
+        InputError
+            A group is missing or has another number of columns.
+        """
         for name in groups:
             if name not in self.groups:
                 raise InputError(f"{self.path}: no column {name}[1]; expected {name}[1..{joints}] for these kinematics")
@@ -69,9 +98,26 @@ class Recording:
 
 
 def read_recording(path: str | os.PathLike[str], *, label: str = LABEL, others: Collection[str] = ()) -> Recording:
-    """Reads and checks a recording (.csv or .parquet). Raises InputError naming column and row.
+    """Read and check a recording.
 
-    label: column of the contact label, 0 or 1. others: further columns to keep where they are there.
+    Parameters
+    ----------
+    path
+        A .csv or .parquet file.
+    label
+        Column of the contact label, 0 or 1.
+    others
+        Other columns to keep, if the file has them.
+
+    Returns
+    -------
+    Recording
+        The checked recording.
+
+    Raises
+    ------
+    InputError
+        The file, column or row that is wrong, and what was expected.
     """
     file = Path(path)
     known = {LABEL, label, *others}
@@ -88,7 +134,7 @@ def read_recording(path: str | os.PathLike[str], *, label: str = LABEL, others: 
 
 
 def check_numbers(recording: Recording) -> None:
-    """What the reader of files has seen to, for a recording that was made in memory. Raises InputError."""
+    """Check a recording made in memory as `read_recording` checks a file. Raise InputError."""
     check_times(recording.path, recording.time)
     for name, values in recording.groups.items():
         wrong = np.argwhere(~(np.abs(values) <= LARGEST))
@@ -104,7 +150,7 @@ def check_numbers(recording: Recording) -> None:
 
 
 def check_times(file: Path, time: NDArray[np.float64]) -> None:
-    """Raises InputError unless times [N] increase strictly."""
+    """Raise InputError unless times [N] are strictly increasing."""
     late = np.flatnonzero(~(np.diff(time) > 0))
     if late.size:
         row = int(late[0]) + 2
@@ -115,7 +161,7 @@ def check_times(file: Path, time: NDArray[np.float64]) -> None:
 
 
 def _grouped(table: Mapping[str, NDArray[np.float64]]) -> dict[str, list[NDArray[np.float64]]]:
-    """Columns of each group in the order of their index."""
+    """Return the columns of each group in the order of their index."""
     found: dict[str, dict[int, NDArray[np.float64]]] = {}
     for name, column in table.items():
         if match := _ELEMENT.fullmatch(name):
@@ -124,7 +170,7 @@ def _grouped(table: Mapping[str, NDArray[np.float64]]) -> dict[str, list[NDArray
 
 
 def _check_columns(file: Path, names: list[str], known: Collection[str]) -> None:
-    """Every column known, none missing, no gap in a group. known: columns beside time and the groups."""
+    """Refuse unknown and missing columns, and gaps in a group. known: columns in addition to time and the groups."""
     for separator in ";\t":
         if len(names) == 1 and separator in names[0]:
             raise InputError(f"{file}: columns separated by {separator!r}; expected commas, and points in numbers")
@@ -148,7 +194,7 @@ def _check_columns(file: Path, names: list[str], known: Collection[str]) -> None
 
 
 def _check_sizes(file: Path, sizes: Mapping[str, int]) -> None:
-    """As many columns in every group of the tendons, and in every group of the joints."""
+    """Refuse groups of tendons that differ in their number of columns, and groups of joints likewise."""
     first: dict[str, str] = {}
     for name, size in sizes.items():
         other = first.setdefault(GROUP_PER[name], name)

@@ -1,7 +1,7 @@
-"""What a finger leaves of the torque of a recording: residuals before the bias update, and what is random in them.
+"""What torque of a recording a finger leaves unexplained: residuals before the bias update, and how random they are.
 
-T of eq. (10) and the jumps Δb of fig. 5 come from the C core; the bias filter of fig. 5 runs here,
-without contact detection, over the samples that it may learn from.
+T of eq. (10) and the jumps Δb of fig. 5 come from the C core. The bias filter of fig. 5 runs here, without contact
+detection, over the samples that it may learn from.
 """
 
 from __future__ import annotations
@@ -30,10 +30,18 @@ _BIAS = {"noise_std": 0.01, "noise_std_per_force": 0.0, "drift_variance": 1e-6} 
 
 @dataclass(frozen=True)
 class Model:
-    """A finger without bias filter over a recording, NaN (False) outside the parts.
+    """A finger without its bias filter over a recording; NaN (False) outside the parts.
 
-    torque: [N, n] T of eq. (10), N·m, less `delayed_torque`, so that measured τ − torque is what the bias sees. jump:
-    [N, n] Δb, N·m. joint_angle, joint_speed: [N, n] as used. slack: [N, m].
+    Attributes
+    ----------
+    torque
+        T of eq. (10) [N, n] (N·m), less `delayed_torque`, so that measured τ − torque is what the bias filter sees.
+    jump
+        Δb [N, n] (N·m).
+    joint_angle, joint_speed
+        Angles (rad) and speeds (rad/s) as used [N, n].
+    slack
+        Slack tendons [N, m].
     """
 
     torque: Numbers
@@ -46,7 +54,26 @@ class Model:
 def model_alone(
     data: Mapping[str, Any], arrays: Sequence[Mapping[str, Numbers]], parts: Sequence[slice], samples: int, source: int
 ) -> Model:
-    """arrays: of `native.Finger.run`, one for each part; each begins anew. source: kinematics, 1 to 3."""
+    """Run a finger without its bias filter over the parts of a recording.
+
+    Parameters
+    ----------
+    data
+        A valid finger description.
+    arrays
+        Signals of `native.Finger.run`, one dict for each part.
+    parts
+        Slices of the recording. The finger starts anew in each.
+    samples
+        Number of samples of the whole recording.
+    source
+        Kinematics, 1 to 3.
+
+    Returns
+    -------
+    Model
+        Arrays over the whole recording.
+    """
     joints, tendons = len(data["joints"]), len(data["tendons"])
     probe = native.Finger(native.image_from_json(json.dumps(_without_filter(data))), kinematics_source=source)
     start = probe.save_state()
@@ -64,9 +91,21 @@ def model_alone(
 
 
 def delayed_torque(data: Mapping[str, Any], arrays: Mapping[str, Numbers], torque: Numbers) -> Numbers | float:
-    """[N, n] N·m: τ of the forces in use less that of the measured ones; 0 unless a `time_delay` below 0 delays forces.
+    """Return τ of the forces in use less τ of the measured forces.
 
-    torque: [N, n] τ in use.
+    Parameters
+    ----------
+    data
+        A valid finger description.
+    arrays
+        Signals of one part, with `tendon_force`.
+    torque
+        τ in use [N, n] (N·m).
+
+    Returns
+    -------
+    Numbers or float
+        [N, n] (N·m). 0 unless a `time_delay` below 0 delays the forces.
     """
     rows = data.get("extensions") or []
     if not any(row["effect"] == "time_delay" and row["delay"] < 0 for row in rows):
@@ -76,7 +115,7 @@ def delayed_torque(data: Mapping[str, Any], arrays: Mapping[str, Numbers], torqu
 
 
 def _without_filter(data: Mapping[str, Any]) -> dict[str, Any]:
-    """The description whose bias moves by the jumps alone, and that never sees contact."""
+    """Return the description with a bias that only jumps move, and without contact detection."""
     bias = {key: value for key, value in (data.get("bias") or {}).items() if key in ("forget_rate", "entry_load")}
     still = {**bias, "drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": [0.0] * len(data["joints"])}
     never = {"threshold": [_NEVER] * len(data["joints"])}
@@ -88,8 +127,16 @@ def _without_filter(data: Mapping[str, Any]) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Residuals:
-    """residual: [N, n] r before the bias update, N·m, NaN for the first sample of a part and outside the parts.
-    variance: [N] S of it, (N·m)². bias: [N, n] b before the update, N·m.
+    """What the bias filter leaves; NaN outside the parts.
+
+    Attributes
+    ----------
+    residual
+        r before the bias update [N, n] (N·m). NaN also for the first sample of each part.
+    variance
+        S of the residual [N] ((N·m)²).
+    bias
+        b before the update [N, n] (N·m).
     """
 
     residual: Numbers
@@ -98,13 +145,29 @@ class Residuals:
 
     @property
     def standardised(self) -> Numbers:
-        """[N, n] r/√S."""
+        """Standardised residuals r/√S [N, n]."""
         return np.asarray(self.residual / np.sqrt(self.variance)[:, None])
 
 
 @dataclass(frozen=True)
 class BiasSettings:
-    """Of a description, with the defaults (docs/reference/finger_description.md). initial_torque: [n] N·m or None."""
+    """Settings of the bias filter.
+
+    Attributes
+    ----------
+    drift
+        `drift_variance`.
+    noise
+        `noise_std` (N·m).
+    per_force
+        `noise_std_per_force` (N·m/N).
+    noise_time
+        `noise_time` (s), or None.
+    initial_variance
+        `initial_variance` ((N·m)²), or None.
+    initial_torque
+        `initial_torque` [n] (N·m), or None.
+    """
 
     drift: float
     noise: float
@@ -115,6 +178,18 @@ class BiasSettings:
 
 
 def bias_settings(data: Mapping[str, Any]) -> BiasSettings:
+    """Return the bias settings of a description.
+
+    Parameters
+    ----------
+    data
+        A valid finger description.
+
+    Returns
+    -------
+    BiasSettings
+        With the defaults of docs/reference/finger_description.md where the description gives none.
+    """
     given = data.get("bias") or {}
     value = {key: default if given.get(key) is None else float(given[key]) for key, default in _BIAS.items()}
     optional = {
@@ -139,10 +214,29 @@ def track(
     learns: Flags,
     parts: Sequence[slice],
 ) -> Residuals:
-    """Runs the bias filter over y − T.
+    """Run the bias filter over y − T.
 
-    time: [N] s. mean_force: [N] N. remainder: [N, n] y − T, N·m. jump: [N, n] Δb, None: none. learns: [N] samples that
-    update the bias. parts: begin anew each.
+    Parameters
+    ----------
+    settings
+        Settings of the filter.
+    time
+        Times [N] (s).
+    mean_force
+        Mean tendon force [N] (N).
+    remainder
+        y − T [N, n] (N·m).
+    jump
+        Δb [N, n] (N·m). None: no jumps.
+    learns
+        Samples [N] that update the bias.
+    parts
+        Slices of the recording. The filter starts anew in each.
+
+    Returns
+    -------
+    Residuals
+        NaN in parts that have no sample to start from.
     """
     residual, bias = np.full_like(remainder, np.nan), np.full_like(remainder, np.nan)
     variance = np.full(len(time), np.nan)
@@ -162,7 +256,7 @@ def track(
 
 
 def _gains(settings: BiasSettings, time: Numbers, mean_force: Numbers, learns: Flags) -> tuple[Numbers, Numbers]:
-    """K [N], 0 where nothing is learned, and S [N] (NaN for the first sample)."""
+    """Return K [N], 0 where nothing is learned, and S [N] (NaN for the first sample)."""
     step = np.diff(time, prepend=time[0])
     spread = (settings.noise + settings.per_force * mean_force) ** 2
     known = float(spread[0]) if settings.initial_variance is None else settings.initial_variance
@@ -180,10 +274,13 @@ def _gains(settings: BiasSettings, time: Numbers, mean_force: Numbers, learns: F
 
 
 def _filter(remainder: Numbers, jump: Numbers, gain: Numbers, first: Numbers) -> Numbers:
-    """[N, n] b before each update: s_k = (1 − K_k)(s_k−1 + Δb_k) + K_k (y − T)_k, b_k = s_k−1 + Δb_k, s_0 = first.
+    """Return b before each update [N, n] (N·m).
 
-    In blocks, s = A (s_before + Σ c/A) with A the running product of 1 − K: exact but for rounding, while A is far from
-    underflow; blocks of an eager filter, whose A is not, are walked through.
+    s_k = (1 − K_k)(s_k−1 + Δb_k) + K_k (y − T)_k, b_k = s_k−1 + Δb_k, s_0 = first.
+
+    Computed in blocks as s = A (s_before + Σ c/A), with A the running product of 1 − K. This is exact except for
+    rounding while A is far from underflow. Where A is too small, because the filter learns fast, the block is computed
+    step by step.
     """
     after = np.empty_like(remainder)
     keep = 1 - gain[:, None]
@@ -207,7 +304,20 @@ def _filter(remainder: Numbers, jump: Numbers, gain: Numbers, first: Numbers) ->
 
 
 def rms(values: Numbers, chosen: Flags) -> list[float]:
-    """[n] root mean square of the chosen rows, NaN left out; NaN where there are none."""
+    """Return the root mean square of the chosen rows.
+
+    Parameters
+    ----------
+    values
+        [N, n].
+    chosen
+        Rows [N].
+
+    Returns
+    -------
+    list of float
+        [n], in the unit of the values. Rows with NaN are left out; NaN if no row remains.
+    """
     picked = values[chosen]
     picked = picked[~np.isnan(picked).any(axis=1)]
     if not len(picked):
@@ -216,10 +326,22 @@ def rms(values: Numbers, chosen: Flags) -> list[float]:
 
 
 def consistency(standardised: Sequence[Numbers], share: float = 1.0) -> dict[str, Any]:
-    """NIS: the mean of the squared standardised innovations, 1 for a consistent filter, and its chi-square interval.
+    """Return the NIS, the mean of the squared standardised innovations, and its chi-square interval.
 
-    standardised: [N, n] each, NaN where not used. share: independent ones among them, above 0, at most 1. Quantiles of
-    χ²_k by Wilson and Hilferty (1931), within 1e-3 of the interval's width from 30 innovations on.
+    The quantiles of χ²_k follow Wilson and Hilferty (1931). From 30 innovations on they are within 1e-3 of the
+    interval's width.
+
+    Parameters
+    ----------
+    standardised
+        Arrays [N, n], NaN where not used.
+    share
+        Share of independent innovations, above 0, at most 1.
+
+    Returns
+    -------
+    dict
+        `mean`: 1 for a consistent filter. `interval`: [low, high] at 95 %. `consistent`: whether the mean is in it.
     """
     values = np.concatenate([each[~np.isnan(each)] for each in standardised])
     if not len(values):
@@ -231,15 +353,24 @@ def consistency(standardised: Sequence[Numbers], share: float = 1.0) -> dict[str
 
 
 def _mean_chi_square(count: float, probability: float) -> float:
-    """Quantile of χ²_count/count."""
+    """Return the quantile of χ²_count/count."""
     part = 2 / (9 * count)
     return float((1 - part + NormalDist().inv_cdf(probability) * math.sqrt(part)) ** 3)
 
 
 def whiteness(standardised: Sequence[Numbers]) -> dict[str, list[float]]:
-    """Per joint: autocorrelation at lag one, and p of the Ljung-Box test over `LAGS` lags.
+    """Return how far the standardised residuals of each joint are from white noise.
 
-    standardised: [N, n] each, NaN where not used: pairs across those do not count.
+    Parameters
+    ----------
+    standardised
+        Arrays [N, n], NaN where not used. Pairs with a NaN do not count.
+
+    Returns
+    -------
+    dict
+        `lag_one` [n]: autocorrelation at lag one. `ljung_box_p` [n]: p of the Ljung-Box test over `LAGS` lags. Both are
+        NaN for too few samples.
     """
     joints = standardised[0].shape[1]
     lag_one, p_value = [], []
@@ -263,7 +394,7 @@ def _lagged(series: Sequence[Numbers], lag: int) -> float:
 
 
 def chi_square_tail(value: float, degrees: int) -> float:
-    """P(χ²_degrees > value) for an even number of degrees: exp(−x) Σ x^i/i!, x = value/2 (exact)."""
+    """Return P(χ²_degrees > value) for an even number of degrees: exp(−x) Σ x^i/i!, x = value/2 (exact)."""
     half = value / 2
     return float(sum(_poisson_terms(half, degrees // 2)))
 

@@ -1,11 +1,11 @@
-"""How noisy a recording's joint positions and joint torques are: what `position_filter.noise` of the description needs.
+"""How noisy the joint positions and joint torques of a recording are, as `position_filter.noise` needs it.
 
-The noise is what a sample has beside the smooth curve through its neighbours. A cubic through the two samples before
-and the two after predicts each sample, at their true times; what is left is noise, as long as the motion is slow
-against four samples. Of many short blocks the median counts, so that impacts and stick-slip do not. Quantisation counts
-too: a signal in steps of width d has at least the standard deviation d/√12 of its rounding, also where it rests.
+The noise is the difference of a sample from the smooth curve through its neighbours. A cubic through the two samples
+before and the two after, at their true times, predicts each sample. The rest is noise if the motion is slow compared
+with four samples. The median over many short blocks is used, so impacts and stick-slip have no effect. Quantisation
+counts as well: a signal in steps of width d has at least the standard deviation d/√12 of its rounding, even at rest.
 
-Noise is taken as white: a sensor with a low-pass of its own appears quieter than it is.
+The noise is assumed to be white: a sensor with its own low-pass filter appears quieter than it is.
 """
 
 from __future__ import annotations
@@ -25,29 +25,34 @@ Numbers = NDArray[np.float64]
 
 NEIGHBOURS = (-2, -1, 1, 2)  # samples of the cubic
 BLOCK = 40  # samples
-FEWEST = 60  # samples: less says nothing
-GAP = 3.0  # times the median step: no cubic across a longer one
-LEAST = 1e-6  # rad, the least that the description takes
-GRID = 1e-3  # of a step: how well differences must fit to be multiples of it
-MOST_LEVELS = 0.5  # of the samples may differ where values come in steps
+FEWEST = 60  # samples; fewer give no useful estimate
+GAP = 3.0  # times the median step; no cubic spans a longer step
+LEAST = 1e-6  # rad, the smallest noise that the description accepts
+GRID = 1e-3  # of a step; differences this near to a multiple of the step count as multiples
+MOST_LEVELS = 0.5  # distinct values per sample, at most, where values come in steps
 
 
 def joint_position_noise(data: Mapping[str, Any], recording: Recording | FitRecording, kinematics: int = 1) -> Numbers:
-    """Standard deviation of the noise of the joint angles in one sample.
+    """Estimate the standard deviation of the noise of the joint angles in one sample.
 
     Parameters
     ----------
-    data: a valid finger description.
-    recording: `Recording` or `FitRecording`; a `FitRecording` has its own kinematics.
-    kinematics: 1: angles from tendon positions and forces; 2, 3: measured joint positions.
+    data
+        A valid finger description.
+    recording
+        The recording. A `FitRecording` has its own kinematics.
+    kinematics
+        1: angles from tendon positions and forces. 2, 3: measured joint positions.
 
     Returns
     -------
-    [n] rad, at least 1e-6, as `position_filter.noise` takes it.
+    Numbers
+        [n] (rad), at least 1e-6, as `position_filter.noise` takes it.
 
     Raises
     ------
-    InputError: the recording has no such columns, or fewer than 60 samples without a gap.
+    InputError
+        The recording has no such columns, or fewer than 60 samples without a gap.
     """
     if isinstance(recording, FitRecording):
         kinematics = recording.kinematics
@@ -68,20 +73,24 @@ def joint_position_noise(data: Mapping[str, Any], recording: Recording | FitReco
 
 
 def joint_torque_noise(data: Mapping[str, Any], recording: Recording | FitRecording) -> Numbers:
-    """Standard deviation of the noise of the joint torques τ = Rᵀ f0 in one sample.
+    """Estimate the standard deviation of the noise of the joint torques τ = Rᵀ f0 in one sample.
 
     Parameters
     ----------
-    data: a valid finger description.
-    recording: `Recording` or `FitRecording`.
+    data
+        A valid finger description.
+    recording
+        `Recording` or `FitRecording`.
 
     Returns
     -------
-    [n] N·m.
+    Numbers
+        [n] (N·m).
 
     Raises
     ------
-    InputError: the recording does not fit the finger, or has fewer than 60 samples without a gap.
+    InputError
+        The recording does not fit the finger, or has fewer than 60 samples without a gap.
     """
     if isinstance(recording, FitRecording):
         recording = recording.recording
@@ -92,20 +101,24 @@ def joint_torque_noise(data: Mapping[str, Any], recording: Recording | FitRecord
 
 
 def white_noise(time: Numbers, values: Numbers) -> Numbers:
-    """Standard deviation of what each column has beside the smooth curve through its neighbours.
+    """Estimate the standard deviation of each column around the smooth curve through its neighbours.
 
     Parameters
     ----------
-    time: [N] s, strictly increasing; steps may vary.
-    values: [N, c].
+    time
+        Times [N] (s), strictly increasing. Steps may vary.
+    values
+        [N, c].
 
     Returns
     -------
-    [c], in the unit of the values.
+    Numbers
+        [c], in the unit of the values.
 
     Raises
     ------
-    InputError: fewer than 60 samples without a gap.
+    InputError
+        Fewer than 60 samples without a gap.
     """
     reach = max(NEIGHBOURS)
     if len(time) < FEWEST:
@@ -128,7 +141,7 @@ def white_noise(time: Numbers, values: Numbers) -> Numbers:
 
 
 def _lagrange(distance: Numbers, k: int) -> Numbers:
-    """[K] weight of neighbour k in the cubic's value at distance 0."""
+    """Return the weight [K] of neighbour k in the cubic's value at distance 0."""
     weight = np.ones(distance.shape[1])
     for other in range(len(distance)):
         if other != k:
@@ -137,18 +150,18 @@ def _lagrange(distance: Numbers, k: int) -> Numbers:
 
 
 def _of_blocks(variance: Numbers) -> float:
-    """From the variances of blocks: blocks in which nothing changes say nothing of a quantised signal."""
+    """Return the noise from the variances of blocks. Blocks of a quantised signal without any change are left out."""
     changing = variance[variance > 0.0]
     return float(np.sqrt(np.median(changing))) if len(changing) else 0.0
 
 
 def _rounding(values: Numbers) -> Numbers:
-    """[c] standard deviation of the rounding of columns whose values come in equal steps; else 0."""
+    """Return the standard deviation [c] of the rounding of columns whose values come in equal steps, else 0."""
     return np.asarray(np.array([value_step(column) for column in values.T]) / np.sqrt(12.0))
 
 
 def value_step(column: Numbers) -> float:
-    """Width of the equal steps in which a column's [N] values come, in its unit; 0 if they come in none."""
+    """Return the width of the equal steps in which a column's values [N] come, in its unit; 0 if there are none."""
     levels = np.unique(column)
     if len(levels) < 2 or len(levels) > MOST_LEVELS * len(column):
         return 0.0

@@ -1,8 +1,8 @@
-"""The signals that friction is estimated from: zero-phase smoothed, so that what is estimated is not the filter.
+"""Which signals friction is estimated from: smoothed without phase lag, so that no filter is mistaken for friction.
 
-Noise of the measured forces is noise of the joint angles, often as large as the distance over which friction builds
-up; a filter that runs online lags. Filtered forwards and backwards (Gustafsson, 1996) both go away. The models that
-come of it run on raw samples, with the velocity filter that their description asks for.
+Noise of the measured forces becomes noise of the joint angles, often as large as the distance over which friction
+builds up. A filter that runs online lags. Filtering forwards and backwards (Gustafsson, 1996) removes both. The
+estimated models run on raw samples, with the velocity filter of their description.
 """
 
 from __future__ import annotations
@@ -23,29 +23,49 @@ from tendonfmu.recordings.recording import Recording
 Numbers = NDArray[np.float64]
 
 ORDER = 2  # of the Butterworth filter, run both ways
-OF_CROSSING = 0.6  # of the frequency at which the torque's spectrum meets its noise
+OF_CROSSING = 0.6  # of the frequency at which the torque's spectrum falls to its noise; the cut-off
 LOWEST, HIGHEST = 5.0, 60.0  # Hz
 OF_RATE = 0.2  # of the sample rate, at most
-NOISE_BAND = 0.7  # of half the sample rate: above it the spectrum is taken for noise
-ABOVE_NOISE = 3.0  # times the noise's spectrum
-SAMPLES_PER_PERIOD = 10.0  # of the cutoff, that a smoothed recording keeps,
-FAST = (5.0, 250.0)  # or as many samples of it and a second, where that is fewer
+NOISE_BAND = 0.7  # of half the sample rate; above it the spectrum is assumed to be noise
+ABOVE_NOISE = 3.0  # times the noise's spectrum; below it the torque is noise
+SAMPLES_PER_PERIOD = 10.0  # of the cut-off, that a smoothed recording keeps,
+FAST = (5.0, 250.0)  # or, if fewer, the larger of this many per period of the cut-off and per second
 FEWEST = 64  # samples of a piece that can be smoothed
 
 
 @dataclass(frozen=True)
 class Signals:
-    """cutoff: Hz of the smoothing, None: raw signals. every: of so many samples one is kept."""
+    """Which signals are estimated from.
+
+    Attributes
+    ----------
+    cutoff
+        Cut-off of the smoothing (Hz). None: raw signals.
+    every
+        One of this many samples is kept.
+    """
 
     cutoff: float | None = None
     every: int = 1
 
     @property
     def words(self) -> str:
+        """The signals in words, for a report."""
         return "raw signals" if self.cutoff is None else f"signals smoothed at {self.cutoff:.3g} Hz, without lag"
 
     def recording(self, recording: Recording) -> Recording:
-        """The recording as it is estimated from."""
+        """Return the recording from which is estimated.
+
+        Parameters
+        ----------
+        recording
+            The raw recording.
+
+        Returns
+        -------
+        Recording
+            Smoothed and decimated, or the same if the signals are raw.
+        """
         if self.cutoff is None:
             return recording
         groups = {name: self._smoothed(recording.time, values) for name, values in recording.groups.items()}
@@ -67,8 +87,21 @@ class Signals:
         return found
 
     def description(self, data: Mapping[str, Any]) -> dict[str, Any]:
-        """The description for estimating: no velocity filter, whose lag would be estimated as friction, and a bias that
-        wanders as fast in time as at the recording's own rate."""
+        """Return the description for estimating.
+
+        It has no velocity filter, whose lag would be estimated as friction. Its bias drifts as fast in time as at the
+        recording's own sample rate.
+
+        Parameters
+        ----------
+        data
+            A valid finger description.
+
+        Returns
+        -------
+        dict
+            A changed copy.
+        """
         if self.cutoff is None:
             return dict(data)
         bias = dict(data.get("bias") or {})
@@ -80,7 +113,20 @@ class Signals:
         return {**kept, "velocity_filter_cutoff": 0.0, "bias": bias}
 
     def restored(self, data: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
-        """An estimated description with the settings of the given one, as it runs online."""
+        """Return an estimated description with the filter and bias settings of the given one, as it runs online.
+
+        Parameters
+        ----------
+        data
+            The estimated description.
+        given
+            The description that the settings come from.
+
+        Returns
+        -------
+        dict
+            A changed copy of `data`. It keeps its own `bias.initial_torque`.
+        """
         found = dict(data)
         for key in ("velocity_filter_cutoff", "position_filter", "bias"):
             found.pop(key, None)
@@ -93,8 +139,23 @@ class Signals:
 
 
 def smoothing_of(recordings: Sequence[Recording], data: Mapping[str, Any]) -> Signals | None:
-    """Smoothing at a share of the frequency at which the joint torque's spectrum meets its noise, over all recordings;
-    None where the recordings are too short for it."""
+    """Choose the smoothing of recordings.
+
+    The cut-off is a share of the frequency at which the spectrum of the joint torque falls to its noise, the median
+    over all recordings.
+
+    Parameters
+    ----------
+    recordings
+        Recordings of one finger.
+    data
+        A valid finger description.
+
+    Returns
+    -------
+    Signals or None
+        None if the recordings are too short or sampled too slowly.
+    """
     arms = moment_arms(data)
     found, rates = [], []
     for recording in recordings:
@@ -113,7 +174,7 @@ def smoothing_of(recordings: Sequence[Recording], data: Mapping[str, Any]) -> Si
 
 
 def _crossing(torque: Numbers, rate: float) -> float:
-    """Hz, median over joints: the first frequency at which the spectrum is near that of the noise."""
+    """Return the first frequency (Hz, median over joints) at which the spectrum is near that of the noise."""
     frequency, power = welch(torque, fs=rate, nperseg=min(1024, len(torque)), axis=0, detrend="linear")
     noise = np.median(power[frequency > NOISE_BAND * rate / 2], axis=0)
     below = power < ABOVE_NOISE * np.maximum(noise, 1e-30)
@@ -122,19 +183,32 @@ def _crossing(torque: Numbers, rate: float) -> float:
 
 
 def zero_phase(values: Numbers, cutoff: float, rate: float) -> Numbers:
-    """[N, ...] low-passed forwards and backwards. cutoff, rate: Hz."""
+    """Low-pass signals forwards and backwards.
+
+    Parameters
+    ----------
+    values
+        [N, ...].
+    cutoff, rate
+        Cut-off and sample rate (Hz).
+
+    Returns
+    -------
+    Numbers
+        [N, ...], without phase lag.
+    """
     sections = butter(ORDER, min(cutoff, 0.45 * rate), fs=rate, output="sos")
     return np.asarray(sosfiltfilt(sections, values, axis=0, padlen=min(len(values) - 1, int(3 * rate / cutoff))))
 
 
 def _kept(time: Numbers, every: int) -> NDArray[np.intp]:
-    """One of so many samples, counted anew after each gap."""
+    """Return the indices of one of every so many samples, counted anew after each gap."""
     parts = pairwise([0, *gaps(time), len(time)])
     return np.concatenate([np.arange(begin, end, every) for begin, end in parts])
 
 
 def _any_around(flags: NDArray[np.bool_], every: int) -> NDArray[np.bool_]:
-    """[N] whether any of the samples that one stands for is set."""
+    """Return whether [N] any of the samples that a kept sample stands for is set."""
     found = flags.copy()
     for shift in range(1, every):
         found[:-shift] |= flags[shift:]

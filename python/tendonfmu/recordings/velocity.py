@@ -1,4 +1,4 @@
-"""Do measured joint velocities belong to the joint angles? The angle's change is the integral of the velocity."""
+"""Whether measured joint velocities belong to the joint angles: each angle changes by the integral of its velocity."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from tendonfmu.recordings.recording import Recording
 Numbers = NDArray[np.float64]
 
 WINDOW = 0.1  # s over which changes are compared
-ALIKE = 0.8  # correlation of changes that belong together
-NEAR = 1.15  # times or parts of a unit's factor
+ALIKE = 0.8  # correlation above which changes belong together
+NEAR = 1.15  # a slope within this factor of a unit's factor shows the unit
 UNITS = ((np.pi / 180, "degrees/s"), (2 * np.pi / 60, "rpm"), (1e-3, "mrad/s"), (2 * np.pi, "turns/s"))
 
 
 def velocity_corrections(recording: Recording, finger: FingerDescription) -> Iterator[tuple[Correction, float]]:
-    """Corrections of columns of `joint_velocity`, each with the slope of angle against integral that says so."""
+    """Yield corrections of columns of `joint_velocity`, each with the slope of the angle over the integral."""
     velocity = recording.groups.get("joint_velocity")
     if velocity is None or len(recording) < FEWEST:
         return
@@ -45,7 +45,7 @@ def velocity_corrections(recording: Recording, finger: FingerDescription) -> Ite
 
 
 def _changes(recording: Recording, finger: FingerDescription, velocity: Numbers) -> tuple[Numbers, Numbers]:
-    """[K, n] rad: change of each angle over windows, and integral of each velocity."""
+    """Return the change of each angle and the integral of each velocity over windows, [K, n] rad."""
     angle = recording.groups.get("joint_position")
     if angle is None:
         angle = tendon_angles(recording, finger)

@@ -1,7 +1,7 @@
-"""The simulated finger, which shares no friction code with the model.
+"""How a finger is simulated, without any friction code of the model.
 
-`rig` reads rig files, `plant` is the binding of the compiled simulation, `simulation` records, `fmu_packaging` and
-`ssp` pack it for other simulators.
+`rig` reads rig files, `plant` is the binding of the compiled simulation, `simulation` records, and `fmu_packaging` and
+`ssp` package it for other simulators.
 """
 
 import lazy_loader

@@ -1,6 +1,7 @@
-"""From a rig to the FMU of its simulated finger: the binary is the same for every rig, the rig is a resource.
+"""How a rig becomes the FMU of its simulated finger.
 
-Same input, same bytes; no compiler (see fmu/packaging.py).
+The binary is the same for every rig; the rig is a resource. The same input gives the same bytes. No compiler is needed
+(see fmu/packaging.py).
 """
 
 from __future__ import annotations
@@ -22,10 +23,26 @@ LARGEST_SEED = 2**31 - 1
 
 
 def build_plant_fmu(rig_path: Path, output_path: Path, *, binaries: Path | None = None) -> Path:
-    """Packs the FMU of a rig's simulated finger and returns its path.
+    """Package the FMU of a rig's simulated finger.
 
-    binaries: a folder of <FMI platform>/tendonfmu_plant.<so, dll or dylib> in place of the installed ones.
-    Raises InputError. output_path appears whole or not at all.
+    Parameters
+    ----------
+    rig_path
+        The rig file.
+    output_path
+        The FMU. It is written whole or not at all.
+    binaries
+        A folder of <FMI platform>/tendonfmu_plant.<so, dll or dylib>, used instead of the installed ones.
+
+    Returns
+    -------
+    Path
+        `output_path`.
+
+    Raises
+    ------
+    InputError
+        The rig is refused, binaries are missing, or the output cannot be written.
     """
     rig = read_rig(rig_path)
     archive = pack(plant_members(rig, binaries=binaries))
@@ -35,7 +52,10 @@ def build_plant_fmu(rig_path: Path, output_path: Path, *, binaries: Path | None 
 
 
 def plant_members(rig: Rig, *, binaries: Path | None = None) -> dict[str, bytes]:
-    """Path in the archive to content, for all files of the FMU. Raises InputError where the plant refuses the rig."""
+    """Return content by path in the archive, for all files of the FMU.
+
+    Raise InputError if the plant refuses the rig.
+    """
     from tendonfmu.drawing import draw_finger
     from tendonfmu.fmu import render_documentation
     from tendonfmu.model import finger_drawing
@@ -65,7 +85,7 @@ def plant_members(rig: Rig, *, binaries: Path | None = None) -> dict[str, bytes]
 
 
 def _settings(rig: Rig, text: bytes) -> Settings:
-    """The rig's own settings, from a plant that has accepted it."""
+    """Return the rig's own settings, from a plant that has accepted it."""
     with refused_by(rig.path):
         settings = Plant(text).settings
     if settings.seed > LARGEST_SEED:

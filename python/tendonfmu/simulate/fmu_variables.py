@@ -1,4 +1,4 @@
-"""The variables of a simulated finger's FMU, from the table in modelDescription/plant_variables.json."""
+"""Which variables the FMU of a simulated finger has, from the table in modelDescription/plant_variables.json."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from tendonfmu.simulate.plant import INTEGRATORS, Settings
 from tendonfmu.simulate.rig import Rig
 
 STEP = 0.001  # s, communication step of the default experiment
-DURATION = 10.0  # s, of the default experiment where the rig records nothing
+DURATION = 10.0  # s, of the default experiment if the rig has no recording
 
 
 def describe_plant(rig: Rig, settings: Settings, table: VariableTable) -> dict[str, Any]:
-    """The template's context, but for what belongs to the package: identifier, GUID, version, sources.
+    """Return the template's context, except what belongs to the package: identifier, GUID, version, sources.
 
-    settings: those of the rig, the start values of the parameters. See modelDescription/README.md.
+    settings: those of the rig; they are the start values of the parameters. See modelDescription/README.md.
     """
     sizes = group_sizes(rig.joints, rig.tendons)
     variables = [variable for group in table.data["groups"] for variable in elements(group, sizes)]
@@ -33,7 +33,7 @@ def describe_plant(rig: Rig, settings: Settings, table: VariableTable) -> dict[s
         "units": units_of(variables, table),
         "log_categories": table.data["log_categories"],
         "variables": variables,
-        # a step ends before its outputs can be read, and inputs act in the next one: nothing feeds through
+        # outputs are read after a step, and inputs act in the next one: no direct feedthrough
         "outputs": [{"index": index, "dependencies": [], "kinds": []} for index in outputs],
         "initial_unknowns": outputs,
         "directional_derivative": False,
@@ -47,7 +47,7 @@ def describe_plant(rig: Rig, settings: Settings, table: VariableTable) -> dict[s
 
 
 def _starts(settings: Settings) -> dict[str, Any]:
-    """Start values of the parameters as XML has them."""
+    """Return the start values of the parameters as XML writes them."""
     flags = {name: str(getattr(settings, name)).lower() for name in ("scheduled_motion", "scheduled_pushes", "sensors")}
     return {
         "integrator": INTEGRATORS[settings.integrator],

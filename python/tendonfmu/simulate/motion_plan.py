@@ -1,7 +1,7 @@
-"""What the motors of a simulated finger are told to do: the rig's `motion`, expanded to knots.
+"""Which motion the motors of a simulated finger are commanded: the rig's `motion`, expanded to knots.
 
-Between knots a joint follows the quintic of the knots' positions, velocities and accelerations, before the first and
-after the last it stands. The pretension goes from knot to knot by a smooth step.
+Between knots a joint follows the quintic of the knots' positions, velocities and accelerations. Before the first and
+after the last knot it stands still. The pretension changes from knot to knot by a smooth step.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ LONGEST = 1e6  # s
 # A stroke between resting points is a quintic; its peak speed is this times its mean speed (minimum jerk: Flash, Hogan,
 # "The coordination of arm movements", J. Neuroscience 5(7), 1985).
 PEAK_OVER_MEAN = 1.875
-SHORTEST_STROKE = 0.4  # s: a short way is made slowly, not with high accelerations
-MARGIN = 0.05  # of a joint's range at either end that strokes leave out by default
+SHORTEST_STROKE = 0.4  # s; short strokes are slow, so that accelerations stay small
+MARGIN = 0.05  # of a joint's range; strokes leave this out at either end by default
 FASTEST = 100.0  # rad/s
 STRONGEST = 1e5  # N
-# What the columns of a motion file may hold: lowest, highest, unit.
+# Allowed values of the columns of a motion file: lowest, highest, unit.
 RANGES = {
     "time": (0.0, 1e9, "s"),
     "pretension": (1e-9, STRONGEST, "N"),
@@ -37,14 +37,23 @@ RANGES = {
     "velocity": (-1e4, 1e4, "rad/s"),
     "acceleration": (-1e7, 1e7, "rad/s2"),
 }
-STILL = 1e-9  # rad/s, rad/s2: what counts as standing at the ends of a motion file
+STILL = 1e-9  # rad/s, rad/s2; a joint with less stands still at the ends of a motion file
 
 
 @dataclass(frozen=True)
 class Motion:
-    """An expanded motion. joints: per joint the knots {time s, position rad, velocity rad/s, acceleration rad/s2}.
+    """An expanded motion.
 
-    pretension: knots {time s, value N}. says: the motion in words. file: read for it, or None.
+    Attributes
+    ----------
+    joints
+        Knots of each joint: time (s), position (rad), velocity (rad/s), acceleration (rad/s2).
+    pretension
+        Knots: time (s), value (N).
+    says
+        The motion in words.
+    file
+        The file that was read for it, or None.
     """
 
     joints: list[dict[str, list[float]]]
@@ -53,13 +62,13 @@ class Motion:
     file: Path | None = None
 
     def expanded(self) -> dict[str, Any]:
-        """As the C++ reader takes it."""
+        """Return the motion as the C++ reader takes it."""
         return {"joints": self.joints, "pretension": self.pretension}
 
 
 @dataclass(frozen=True)
 class Joints:
-    """Limits of the joints, [n] rad; infinite where a joint has none."""
+    """Limits of the joints [n] (rad), infinite where a joint has none."""
 
     lower: Sequence[float]
     upper: Sequence[float]
@@ -69,9 +78,9 @@ class Joints:
 
 
 def expand_motion(motion: Node, joints: Joints, seed: int, duration: float | None) -> Motion:
-    """The rig's `motion` as knots. Raises Refusal with key path, or InputError with the file.
+    """Return the rig's `motion` as knots. Raise Refusal with the key path, or InputError with the file.
 
-    seed: used where the motion has none. duration: of the recording, s, if any; that of the motion where it has none.
+    seed: used if the motion has none. duration: of the recording (s), used if the motion has none; or None.
     """
     if not isinstance(motion.value, dict):
         motion.refuse('an object with the key kind: "still", "strokes" or "file"')
@@ -119,7 +128,7 @@ def _strokes(motion: Node, joints: Joints, seed: int, duration: float | None) ->
 
 @dataclass(frozen=True)
 class _Strokes:
-    """Every joint on its own: strokes between random targets, a rest after some of them."""
+    """Strokes of each joint on its own: between random targets, with a rest after some of them."""
 
     seed: int
     duration: float
@@ -129,14 +138,14 @@ class _Strokes:
     rest_share: float
 
     def of_joint(self, joint: int, start: float, lower: float, upper: float) -> dict[str, list[float]]:
-        """Knots of one joint, which stands for `still` seconds at both ends."""
+        """Return the knots of one joint, which stands still for `still` seconds at both ends."""
         draws = Draws(self.seed, 1, joint)
         angle, now, end = start, self.still, self.duration - self.still
         times, angles = [0.0], [start]
         while now + SHORTEST_STROKE <= end:
             way = draws.between(lower, upper) - angle
             seconds = max(SHORTEST_STROKE, PEAK_OVER_MEAN * abs(way) / draws.between(*self.speed))
-            if now + seconds > end:  # the last stroke ends where its time ends, no faster than drawn
+            if now + seconds > end:  # the last stroke is cut to the remaining time, at the speed that was drawn
                 way, seconds = way * (end - now) / seconds, end - now
             if now > times[-1]:
                 times.append(now)
@@ -176,7 +185,10 @@ def _standing(angle: float) -> dict[str, list[float]]:
 
 
 def _posture(node: Node, lower: Sequence[float], upper: Sequence[float]) -> list[float]:
-    """[n] rad, the first posture: within reach; the middle of the range where none is given, 0 without limits."""
+    """Return the first posture [n] (rad), within the limits.
+
+    The default is the middle of the range, or 0 without limits.
+    """
     if node.absent:
         middle = [0.5 * (low + high) for low, high in zip(lower, upper, strict=True)]
         return [angle if math.isfinite(angle) else 0.0 for angle in middle]
@@ -188,7 +200,7 @@ def _posture(node: Node, lower: Sequence[float], upper: Sequence[float]) -> list
 
 
 def _range_of_strokes(motion: Node, joints: Joints) -> tuple[list[float], list[float]]:
-    """[n] lowest and highest targets: as given, or the limits less a margin."""
+    """Return the lowest and highest targets [n]: as given, or the limits less a margin."""
     margin = [MARGIN * (high - low) for low, high in zip(joints.lower, joints.upper, strict=True)]
     found = {
         "lower": [low + part for low, part in zip(joints.lower, margin, strict=True)],
@@ -229,7 +241,7 @@ def _check_columns(file: Path, names: list[str], joints: int) -> None:
 
 
 def _check_motion(file: Path, table: Table, joints: Joints) -> None:
-    """Numbers in their ranges, times that increase, a start within reach, joints that stand at both ends."""
+    """Check values, increasing times, a start within the limits, and joints that stand still at both ends."""
     for name, column in table.items():
         if name.startswith("tendon_position["):
             continue
@@ -257,7 +269,7 @@ def _check_motion(file: Path, table: Table, joints: Joints) -> None:
 
 
 def _check_column(file: Path, name: str, column: Array, good: NDArray[np.bool_], expected: str) -> None:
-    """Refuses the first row that is not good."""
+    """Refuse the first row that is not good."""
     bad = np.flatnonzero(~good)
     if bad.size:
         row = int(bad[0]) + 1
@@ -265,7 +277,7 @@ def _check_column(file: Path, name: str, column: Array, good: NDArray[np.bool_],
 
 
 def _plateaus(table: Table) -> dict[str, list[float]]:
-    """Knots of a sampled pretension: the rows on either side of every change."""
+    """Return the knots of a sampled pretension: the rows on either side of every change."""
     time, value = table["time"], table["pretension"]
     changes = np.diff(value) != 0.0
     keep = np.concatenate([[True], changes]) | np.concatenate([changes, [False]])

@@ -1,6 +1,6 @@
-"""The binding of the simulated finger (runtime/include/tendonfmu_plant.h), and only it.
+"""How Python calls the simulated finger: the binding of runtime/include/tendonfmu_plant.h.
 
-Where SUNDIALS was not found when the package was built, there is no simulated finger: `Plant` then raises
+If SUNDIALS was not found when the package was built, there is no simulated finger. `Plant` then raises
 `InputError(PLANT_MISSING)`, and everything else works.
 """
 
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
 
-# a module that is there and does not load is a fault to be seen, not a missing one
+# find_spec, not try/except: a module that exists but does not load must raise its error
 HAS_PLANT = find_spec("tendonfmu._plant") is not None
 if HAS_PLANT:
     from tendonfmu import _plant
@@ -28,7 +28,7 @@ Array = NDArray[Any]
 PLANT_MISSING = "this installation has no simulated finger (SUNDIALS was not found when it was built)"
 INTEGRATORS = {"cvode": 1, "fixed_step": 2}
 
-# what the sensors say, and the truth; sizes as in tendonfmu_plant_signals
+# readings of the sensors, and the true signals; sizes as in tendonfmu_plant_signals
 MEASURED = ("tendon_force", "tendon_position", "joint_position", "joint_velocity", "external_torque")
 TRUE = (
     "tendon_force",
@@ -54,19 +54,33 @@ SCALARS = ("contact", "friction_level")
 
 
 class PlantError(ValueError):
-    """Refused by the plant: a rig, a setting, an input, a time or a state. `refused_by` makes it an InputError."""
+    """The plant refuses a rig, a setting, an input, a time or a state. `refused_by` turns it into an InputError."""
 
 
 class SolverError(PlantError):
-    """The integrator gave up: time, cause, what to try."""
+    """The integrator failed: time, cause and what to try."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What a plant does by itself; see tendonfmu_plant_settings.
+    """Settings of a plant; see tendonfmu_plant_settings.
 
-    integrator: a key of `INTEGRATORS`. relative_tolerance: of CVODE. step: s, of the fixed-step integrator.
-    push_point: m, in the frame of push_link (from 1).
+    Attributes
+    ----------
+    integrator
+        A key of `INTEGRATORS`.
+    relative_tolerance
+        Of CVODE.
+    step
+        Of the fixed-step integrator (s).
+    scheduled_motion, scheduled_pushes, sensors
+        Whether the plant runs the rig's motion, pushes and sensors.
+    seed
+        Of the sensors' noise.
+    push_point
+        Point of the pushes [3] (m), in the frame of push_link.
+    push_link
+        From 1.
     """
 
     integrator: str
@@ -103,7 +117,7 @@ def _refusals() -> Iterator[None]:
 
 @contextmanager
 def refused_by(rig: Path) -> Iterator[None]:
-    """Within, what the plant refuses is the fault of a rig's file: an InputError that begins with it."""
+    """Turn what the plant refuses inside the block into an InputError that starts with the rig's file."""
     try:
         yield
     except PlantError as refused:
@@ -111,7 +125,13 @@ def refused_by(rig: Path) -> Iterator[None]:
 
 
 def require_plant() -> None:
-    """Raises InputError where this installation has no simulated finger."""
+    """Check that this installation has a simulated finger.
+
+    Raises
+    ------
+    InputError
+        It was built without SUNDIALS.
+    """
     if not HAS_PLANT:
         raise InputError(PLANT_MISSING)
 
@@ -119,8 +139,12 @@ def require_plant() -> None:
 class Plant:
     """A simulated finger: created from the text of an expanded rig, initialised, then run forward in time.
 
-    rig_json: as `Rig.json()` gives it. Raises PlantError with key path, value and expectation.
-    Not for use by two threads at a time.
+    Not to be used by two threads at a time. Methods raise PlantError for invalid arguments and calls out of order.
+
+    Parameters
+    ----------
+    rig_json
+        As `Rig.json()` returns it. PlantError gives key path, value and expectation.
     """
 
     def __init__(self, rig_json: str | bytes) -> None:
@@ -130,10 +154,12 @@ class Plant:
 
     @property
     def joints(self) -> int:
+        """Number of joints n."""
         return self._plant.joints
 
     @property
     def tendons(self) -> int:
+        """Number of tendons m."""
         return self._plant.tendons
 
     @property
@@ -143,15 +169,17 @@ class Plant:
 
     @property
     def time(self) -> float:
-        """s; 0 after the initialisation."""
+        """Present time (s); 0 after the initialisation."""
         return self._plant.time
 
     @property
     def initialised(self) -> bool:
+        """Whether `initialise` was called."""
         return self._plant.initialised
 
     @property
     def settings(self) -> Settings:
+        """Present settings."""
         with _refusals():
             integrator, tolerance, step, motion, pushes, sensors, seed, point, link = self._plant.settings()
         names = {number: name for name, number in INTEGRATORS.items()}
@@ -159,7 +187,18 @@ class Plant:
         return Settings(names[integrator], tolerance, step, motion, pushes, sensors, seed, (x, y, z), link)
 
     def configure(self, **changes: Any) -> None:
-        """Changes settings by the names of `Settings`; before the initialisation only."""
+        """Change settings, before the initialisation only.
+
+        Parameters
+        ----------
+        **changes
+            New values by the names of `Settings`.
+
+        Raises
+        ------
+        PlantError
+            A setting is invalid, or the plant is initialised already.
+        """
         wanted = replace(self.settings, **changes)
         if wanted.integrator not in INTEGRATORS:
             raise PlantError(f"integrator = {wanted.integrator!r}: expected {' or '.join(INTEGRATORS)}")
@@ -182,36 +221,89 @@ class Plant:
         pretension: float = 0.0,
         push_force: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> None:
-        """Held until set again. Commands [m] m (None: as they are), pretension N, push_force [3] N, base frame."""
+        """Set the inputs. They are held until they are set again.
+
+        Parameters
+        ----------
+        tendon_position_command
+            [m] (m). None: leave as it is.
+        pretension
+            N.
+        push_force
+            [3] (N), base frame.
+
+        Raises
+        ------
+        PlantError
+            An input is invalid.
+        """
         command = None if tendon_position_command is None else [float(value) for value in tendon_position_command]
         with _refusals():
             self._plant.set_inputs(command, float(pretension), [float(value) for value in push_force])
 
     def initialise(self) -> None:
-        """Settles the finger, then stands at time 0. Raises SolverError."""
+        """Settle the finger. It is then at time 0.
+
+        Raises
+        ------
+        SolverError
+            The integrator failed.
+        """
         with _refusals():
             self._plant.initialise()
 
     def advance(self, time: float) -> None:
-        """Integrates up to `time`, s. Raises SolverError; the plant then stands where it stood."""
+        """Integrate up to a time.
+
+        Parameters
+        ----------
+        time
+            End of the integration (s).
+
+        Raises
+        ------
+        SolverError
+            The integrator failed. The plant then has its state from before the call.
+        """
         with _refusals():
             self._plant.advance(time)
 
     def reset(self) -> None:
-        """Back to before the initialisation, settings kept."""
+        """Return to the state before the initialisation. Settings are kept."""
         with _refusals():
             self._plant.reset()
 
     def hold_command(self) -> NDArray[np.float64]:
-        """[m] m: motor positions that hold the rig's first posture with its pretension."""
+        """Return the motor positions that hold the rig's first posture with its pretension.
+
+        Returns
+        -------
+        ndarray
+            [m] (m).
+        """
         with _refusals():
             return np.array(self._plant.hold_command())
 
     def run(self, time: Array, signals: Sequence[str] = SIGNALS) -> dict[str, Array]:
-        """Advances through increasing times [N] s and gives one row of each signal wanted.
+        """Advance through increasing times, and return one row of each signal wanted.
 
-        Returns [N, size] by the names of `SIGNALS`, sizes and units as in tendonfmu_plant_signals; `contact` and
-        `friction_level` are [N]; flags are bool. Raises SolverError.
+        Parameters
+        ----------
+        time
+            [N] (s).
+        signals
+            Names from `SIGNALS`.
+
+        Returns
+        -------
+        dict of arrays
+            [N, size] by name, sizes and units as in tendonfmu_plant_signals. `contact` and `friction_level` are [N];
+            flags are bool.
+
+        Raises
+        ------
+        SolverError
+            The integrator failed.
         """
         with _refusals():
             found = self._plant.run(np.ascontiguousarray(time, dtype=np.float64), list(signals))
@@ -221,31 +313,83 @@ class Plant:
         return {name: array[:, 0] if name in SCALARS else array for name, array in found.items()}
 
     def save_state(self) -> bytes:
+        """Return a copy of the state.
+
+        Returns
+        -------
+        bytes
+            For `restore_state`.
+        """
         with _refusals():
             return self._plant.save_state()
 
     def restore_state(self, state: bytes) -> None:
-        """Takes bytes of `save_state` of a plant of the same rig and settings, initialised as this one must be."""
+        """Return to a saved state.
+
+        Parameters
+        ----------
+        state
+            From `save_state` of an initialised plant of the same rig and settings. This plant must be initialised as
+            well.
+
+        Raises
+        ------
+        PlantError
+            The state does not belong to this plant.
+        """
         with _refusals():
             self._plant.restore_state(state)
 
     @property
     def statistics(self) -> Statistics:
+        """Work of the integrator since the initialisation."""
         with _refusals():
             return Statistics(*self._plant.statistics())
 
     def continuous_state(self) -> NDArray[np.float64]:
-        """[order] the state at the present time, in the order of tendonfmu_plant_derivative."""
+        """Return the state at the present time.
+
+        Returns
+        -------
+        ndarray
+            [order], in the order of tendonfmu_plant_derivative.
+        """
         with _refusals():
             return self._plant.continuous_state().reshape(-1)
 
     def derivative(self, time: float, state: Array) -> NDArray[np.float64]:
-        """[order] right-hand side of the differential equations at a state [order]."""
+        """Return the right-hand side of the differential equations.
+
+        Parameters
+        ----------
+        time
+            s.
+        state
+            [order].
+
+        Returns
+        -------
+        ndarray
+            [order].
+        """
         with _refusals():
             slope, _ = self._plant.derivative(time, np.ascontiguousarray(state, dtype=np.float64), False)
         return slope.reshape(-1)
 
     def jacobian(self, time: float, state: Array) -> NDArray[np.float64]:
-        """[order, order] derivative of the right-hand side by the state."""
+        """Return the derivative of the right-hand side by the state.
+
+        Parameters
+        ----------
+        time
+            s.
+        state
+            [order].
+
+        Returns
+        -------
+        ndarray
+            [order, order].
+        """
         with _refusals():
             return self._plant.derivative(time, np.ascontiguousarray(state, dtype=np.float64), True)[1]

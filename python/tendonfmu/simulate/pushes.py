@@ -1,4 +1,4 @@
-"""Forces on a simulated finger: the rig's `pushes`, a list or a recipe of random ones, expanded to a list."""
+"""Which forces push a simulated finger: the rig's `pushes`, a list or a recipe of random ones, expanded to a list."""
 
 from __future__ import annotations
 
@@ -21,7 +21,14 @@ STRONGEST = 1e4  # N
 class Segment:
     """The part of a link that can be pushed: from its joint to the next joint, or to the tip.
 
-    link: number from 1. end: [3] m in the link's frame, from the origin. axis: [3] the link's joint axis.
+    Attributes
+    ----------
+    link
+        Number of the link, from 1.
+    end
+        End [3] (m) in the link's frame; the part starts at the origin.
+    axis
+        The link's joint axis [3].
     """
 
     link: int
@@ -30,13 +37,15 @@ class Segment:
 
     @property
     def length(self) -> float:
+        """Length (m)."""
         return math.sqrt(sum(part * part for part in self.end))
 
 
 def expand_pushes(pushes: Node, segments: Sequence[Segment], seed: int, duration: float) -> list[Any]:
-    """The rig's `pushes` as a list in order of time; those of a list are read by the plant alone. Raises Refusal.
+    """Return the rig's `pushes` as a list in order of time. Raise Refusal.
 
-    segments: base first. seed: used where the recipe has none. duration: of the recording, s.
+    The plant alone checks the pushes of a given list. segments: base first. seed: used if the recipe has none.
+    duration: of the recording (s).
     """
     if pushes.absent:
         return []
@@ -112,7 +121,7 @@ class _Recipe:
         return pushes
 
     def _place(self, draws: Draws) -> tuple[Segment, list[float]]:
-        """The tip, or a point drawn uniformly along all links."""
+        """Return the tip, or a point drawn uniformly along all links."""
         if self.node.member("where").value != "anywhere":
             return self.segments[-1], [float(part) for part in self.segments[-1].end]
         along = draws.between(0.0, sum(segment.length for segment in self.segments))
@@ -124,7 +133,7 @@ class _Recipe:
         return segment, [share * part for part in segment.end]
 
     def _direction(self, kind: str, segment: Segment, draws: Draws) -> list[float]:
-        """[3] unit vector in the link's frame: from anywhere, along the joint's axis, or across axis and link."""
+        """Return a unit vector [3] in the link's frame: any, along the joint's axis, or normal to axis and link."""
         if kind == "any":
             return draws.direction()
         sign = draws.sign()
@@ -136,7 +145,7 @@ class _Recipe:
 
 
 def _directions(node: Node) -> list[str]:
-    """Kinds of direction that pushes take in turn."""
+    """Return the kinds of direction that the pushes use in turn."""
     if node.absent:
         return ["any"]
     kinds = node.elements() if isinstance(node.value, list) and node.value else [node]

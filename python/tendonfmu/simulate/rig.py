@@ -1,9 +1,9 @@
-"""Rig files (`tendonfmu-rig-1`): a finger description with physics, sensors, motion, pushes and a seed.
+"""What a rig file (`tendonfmu-rig-1`) says: a finger description with physics, sensors, motion, pushes and a seed.
 
 A rig file is short: the finger by its path, the motion by a recipe, another rig as its `base`. Reading it gives the
-*expanded* rig that the plant takes: the finger inline, the motion as knots, the pushes as a list. What stands in the
-same way in both (physics, sensors, integration) is checked by the plant alone; `schema/rig.schema.json` says all of
-it to editors.
+*expanded* rig that the plant takes: the finger inline, the motion as knots, the pushes as a list. The plant alone
+checks the parts that are the same in both (physics, sensors, integration). `schema/rig.schema.json` defines all keys
+for editors.
 """
 
 from __future__ import annotations
@@ -31,24 +31,40 @@ LONGEST = 1e6  # s
 MOST_SAMPLES = 50_000_000
 LONGEST_BASE_CHAIN = 16
 
-# what a recording may hold beside tendon forces and positions
+# columns that a recording may have in addition to tendon forces and positions
 COLUMNS = ("joint_position", "joint_velocity", "external_torque", "contact")
 
 TOP = (
     "format", "base", "name", "version", "seed", "finger", "physics", "sensors", "motion", "pushes", "settle",
     "integration", "recording",
 )  # fmt: skip
-# kinds of motion and pushes have keys of their own: another kind replaces the base's, the same kind changes it
-PATHS = (("finger",), ("motion", "file"))
+PATHS = (("finger",), ("motion", "file"))  # keys that hold a path, relative to their file
 
 
 @dataclass(frozen=True)
 class Rig:
-    """A rig that has been read and expanded; the plant has not seen it yet (see `tendonfmu.simulate.plant.Plant`).
+    """A rig that has been read and expanded, but not yet checked by the plant (see `Plant`).
 
-    path: where it was read. files: all files it was made of, itself first. data: merged with its bases.
-    finger: its description. motion: with its knots. expanded: as the plant takes it.
-    rate: samples per second. duration: of the recording, s, or None. columns: wanted beside the tendons'.
+    Attributes
+    ----------
+    path
+        The file that it was read from.
+    files
+        All files that it was made from, its own first.
+    data
+        Its keys, merged with those of its bases.
+    finger
+        Its finger description.
+    motion
+        Its motion with knots.
+    expanded
+        The rig as the plant takes it.
+    rate
+        Samples per second.
+    duration
+        Duration of the recording (s), or None.
+    columns
+        Columns that the recording has in addition to the tendons' columns.
     """
 
     path: Path
@@ -63,26 +79,47 @@ class Rig:
 
     @property
     def name(self) -> str:
+        """Name of the rig."""
         return str(self.data["name"])
 
     @property
     def version(self) -> int:
+        """Version of the rig."""
         return int(self.data["version"])
 
     @property
     def joints(self) -> int:
+        """Number of joints n."""
         return len(self.finger.joint_names)
 
     @property
     def tendons(self) -> int:
+        """Number of tendons m."""
         return len(self.finger.tendon_names)
 
     def json(self) -> str:
-        """The expanded rig as the plant reads it; the same rig gives the same text."""
+        """Return the expanded rig as the plant reads it.
+
+        Returns
+        -------
+        str
+            JSON. The same rig gives the same text.
+        """
         return json.dumps(self.expanded, allow_nan=False)
 
     def times(self) -> NDArray[np.float64]:
-        """[N] s: 0, 1/rate, ... below the recording's duration. Raises InputError where it has none."""
+        """Return the times of the recording's samples.
+
+        Returns
+        -------
+        ndarray
+            [N] (s): 0, 1/rate, ... below the duration.
+
+        Raises
+        ------
+        InputError
+            The rig has no recording.
+        """
         if self.duration is None:
             raise InputError(f"{self.path}: recording: missing; expected an object with duration, s")
         samples = _sample_count(self.duration, self.rate)
@@ -90,7 +127,18 @@ class Rig:
 
 
 def is_rig(path: Path) -> bool:
-    """Whether a file says that it is a rig, also a bad one. False for what is no JSON object or cannot be read."""
+    """Return whether a file claims to be a rig, even an invalid one.
+
+    Parameters
+    ----------
+    path
+        Any file.
+
+    Returns
+    -------
+    bool
+        False for a file that is no JSON object or cannot be read.
+    """
     try:
         with path.open(encoding="utf-8") as file:
             data = json.load(file)
@@ -100,16 +148,49 @@ def is_rig(path: Path) -> bool:
 
 
 def description_files(path: Path) -> list[Path]:
-    """The files that describe a rig: itself, its bases, its finger. Its motion is a result that may be made anew."""
+    """Return the files that describe a rig: itself, its bases and its finger.
+
+    A motion file is not included, since it is a result that may be made again.
+
+    Parameters
+    ----------
+    path
+        The rig file.
+
+    Returns
+    -------
+    list of Path
+        The rig first.
+
+    Raises
+    ------
+    InputError
+        A rig file cannot be read.
+    """
     files: list[Path] = []
     finger = _with_base(path, files, []).get("finger")
     return [*files, Path(finger)] if isinstance(finger, str) else files
 
 
 def read_rig(path: Path) -> Rig:
-    """Reads and expands a rig. Raises InputError: file, key path, value, what was expected.
+    """Read and expand a rig.
 
-    Checks what the plant never sees; the rest is refused by `Plant(rig.json())`.
+    This checks only what the plant does not see. `Plant(rig.json())` checks the rest.
+
+    Parameters
+    ----------
+    path
+        The rig file.
+
+    Returns
+    -------
+    Rig
+        The expanded rig.
+
+    Raises
+    ------
+    InputError
+        File, key path, value and what was expected.
     """
     files: list[Path] = []
     data = _with_base(path, files, [])
@@ -123,7 +204,7 @@ def read_rig(path: Path) -> Rig:
 
 
 def _with_base(path: Path, files: list[Path], chain: list[Path]) -> dict[str, Any]:
-    """The keys of a rig file, those it does not give taken from its base. files: those read are appended."""
+    """Return the keys of a rig file; missing keys come from its base. The files read are appended to `files`."""
     if path.resolve() in [each.resolve() for each in chain]:
         loop = " -> ".join(str(each) for each in (*chain, path))
         raise InputError(f"{chain[-1]}: base: {loop}; expected no rig that is its own base")
@@ -133,7 +214,7 @@ def _with_base(path: Path, files: list[Path], chain: list[Path]) -> dict[str, An
     files.append(path)
     try:
         if isinstance(data, dict):
-            Node(data).member("format").choice(FORMAT)  # before its keys: it may be a finger
+            Node(data).member("format").choice(FORMAT)  # before the other keys: the file may be a finger description
         root = Node(data).keys(TOP)
         base = root.member("base")
         own = {key: value for key, value in data.items() if key != "base"}
@@ -147,7 +228,7 @@ def _with_base(path: Path, files: list[Path], chain: list[Path]) -> dict[str, An
 
 
 def _place_paths(data: dict[str, Any], folder: Path) -> None:
-    """Paths are relative to the file in which they stand."""
+    """Resolve paths, which are relative to the file that contains them."""
     for *way, key in PATHS:
         place: Any = data
         for step in way:
@@ -157,9 +238,10 @@ def _place_paths(data: dict[str, Any], folder: Path) -> None:
 
 
 def _merged(base: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
-    """Keys of `own`, beside those of `base` that it does not give: objects key by key, everything else whole.
+    """Merge the keys of `own` into those of `base`: objects key by key, all other values whole.
 
-    null takes a key away. A motion of another kind takes the place of the base's.
+    null removes a key. A motion of another kind replaces the base's, since kinds have different keys; one of the same
+    kind changes it.
     """
     result = dict(base)
     for key, value in own.items():
@@ -203,7 +285,7 @@ def _expand(path: Path, files: list[Path], data: dict[str, Any]) -> Rig:
 
 
 def _finger(node: Node, path: Path, files: list[Path]) -> FingerDescription:
-    """The finger, by its path or inline."""
+    """Return the finger, given by its path or inline."""
     if isinstance(node.value, str):
         file = Path(node.text("path of a finger description, relative to this file"))
         files.append(file)
@@ -219,7 +301,7 @@ def _finger(node: Node, path: Path, files: list[Path]) -> FingerDescription:
 
 
 def _links(physics: Node, joints: int) -> tuple[list[Segment], Joints]:
-    """What motion and pushes take from the links: their shape and the joints' limits. The plant checks the rest."""
+    """Return the links' shape and the joints' limits, which motion and pushes need. The plant checks the rest."""
     if not isinstance(physics.value, dict):
         physics.refuse("an object with links")
     links = physics.member("links")
@@ -268,5 +350,5 @@ def _recording(recording: Node, rate: float) -> tuple[float | None, list[str]]:
 
 
 def _sample_count(duration: float, rate: float) -> int:
-    """Samples 0, 1/rate, ... below the duration; rounding of the product decides nothing."""
+    """Count the samples 0, 1/rate, ... below the duration, independent of rounding of the product."""
     return max(1, math.ceil(duration * rate - 1e-6))

@@ -1,4 +1,4 @@
-"""What a rig is, in lines of text: for `tendonfmu check`."""
+"""What a rig has, in lines of text for `tendonfmu check`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,23 @@ Data = Mapping[str, Any]
 
 
 def describe_rig(path: Path) -> list[str]:
-    """Reads a rig, has the plant check it, and says what it is. Raises InputError."""
+    """Read a rig, let the plant check it, and describe it.
+
+    Parameters
+    ----------
+    path
+        The rig file.
+
+    Returns
+    -------
+    list of str
+        Lines of text.
+
+    Raises
+    ------
+    InputError
+        The rig is refused: file, key path, value and what was expected.
+    """
     rig = read_rig(path)
     return _lines(rig, plant_of(rig))
 
@@ -49,7 +65,7 @@ def _lines(rig: Rig, plant: Plant) -> list[str]:
 
 
 def effects(physics: Data) -> Iterator[str]:
-    """Effects of the physics that are switched on, in words; all of docs/reference/rig.md but the base model."""
+    """Name the effects of the physics that are switched on: those of docs/reference/rig.md beyond the base model."""
     links, tendons = physics["links"], physics.get("tendons") or []
     friction: Data = physics.get("friction") or {}
     if any(_vector(physics.get("gravity"), [0.0, 0.0, -9.81])):

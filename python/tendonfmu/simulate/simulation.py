@@ -1,4 +1,4 @@
-"""Recordings of the simulated finger, and the truth beside them."""
+"""What a simulated finger records, together with the true signals."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tendonfmu.simulate.rig import Rig
 
 Table = dict[str, NDArray[np.float64]]
 
-# Samples in one call of the plant: between calls a bar moves and Ctrl-C is heard.
+# Samples in one call of the plant. Progress and Ctrl-C are handled between calls.
 CHUNK = 100
 ALWAYS = ("tendon_force", "tendon_position")
 ENERGIES = ("kinetic_energy", "potential_energy", "motor_work", "friction_work", "damping_work", "push_work")
@@ -21,9 +21,20 @@ ENERGIES = ("kinetic_energy", "potential_energy", "motor_work", "friction_work",
 
 @dataclass(frozen=True)
 class Simulation:
-    """recording: columns of docs/reference/recordings.md. truth: true signals at the same times, None unless asked for.
+    """A simulated recording.
 
-    contact_seconds: with a force above the rig's `contact_force`. integrator: that was used. work: what it did.
+    Attributes
+    ----------
+    recording
+        Columns of docs/reference/recordings.md.
+    truth
+        True signals at the same times, or None if they were not asked for.
+    contact_seconds
+        Time with a force above the rig's `contact_force` (s).
+    integrator
+        The integrator that was used.
+    work
+        Work of the integrator.
     """
 
     recording: Table
@@ -33,7 +44,7 @@ class Simulation:
     work: Statistics
 
     def summary(self, rig: Rig) -> list[str]:
-        """What was simulated, in lines of text."""
+        """Describe what was simulated, in lines of text."""
         time = self.recording["time"]
         pushes = len(rig.expanded["pushes"])
         counted = "1 push" if pushes == 1 else f"{pushes} pushes"
@@ -44,7 +55,7 @@ class Simulation:
 
 
 def plant_of(rig: Rig) -> Plant:
-    """The plant of a rig. Raises InputError with the rig's file and the key path."""
+    """Return the plant of a rig. Raise InputError with the rig's file and the key path."""
     with refused_by(rig.path):
         return Plant(rig.json())
 
@@ -56,10 +67,30 @@ def simulate(
     integrator: str | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Simulation:
-    """Runs a rig from its initialisation to the end of its recording; the same rig gives the same numbers.
+    """Run a rig from its initialisation to the end of its recording.
 
-    truth: also give the truth. integrator: "cvode" or "fixed_step" instead of the rig's. progress: called with
-    samples done and all samples. Raises InputError: a rig that is refused, or where the solver gave up, and why.
+    The same rig gives the same numbers.
+
+    Parameters
+    ----------
+    rig
+        An expanded rig with a recording.
+    truth
+        Whether to return the true signals as well.
+    integrator
+        "cvode" or "fixed_step", used instead of the rig's.
+    progress
+        Called with the number of samples done and of all samples.
+
+    Returns
+    -------
+    Simulation
+        The recording, and the truth if it was asked for.
+
+    Raises
+    ------
+    InputError
+        The rig is refused, or the solver failed, with the cause.
     """
     require_plant()
     time = rig.times()
@@ -114,6 +145,6 @@ def _truth(time: Array, signals: dict[str, Array]) -> Table:
 
 
 def _columns(name: str, array: Array) -> Table:
-    """Columns name[1], name[2], ... of [N, size]; -0.0 is written as 0.0."""
+    """Return columns name[1], name[2], ... of [N, size]; -0.0 becomes 0.0."""
     clean = array if array.dtype == bool else array + 0.0
     return {f"{name}[{k + 1}]": np.ascontiguousarray(clean[:, k]) for k in range(array.shape[1])}

@@ -1,7 +1,8 @@
-"""An SSP package that couples a simulated finger with the friction FMU of the same finger (SSP 1.0).
+"""How an SSP package couples a simulated finger with the friction FMU of the same finger (SSP 1.0).
 
-Plain: one system without connectors of its own, two components, connections between them; masters ask for no more.
-For masters that hand nothing over before the first step, the package holds what the friction FMU's inputs then are.
+The package is plain: one system without connectors, two components, and connections between them. Masters need no more.
+Some masters pass nothing before the first step; for them the package contains the start values of the friction FMU's
+inputs.
 """
 
 from __future__ import annotations
@@ -24,9 +25,9 @@ from tendonfmu.simulate.simulation import plant_of
 PLANT, FRICTION = "plant", "friction"
 PLANT_FMU, FRICTION_FMU = "TendonFinger.fmu", "friction.fmu"
 START_VALUES = "resources/start_values.ssv"
-DURATION = 10.0  # s, of the default experiment where the rig records nothing
+DURATION = 10.0  # s, of the default experiment if the rig has no recording
 
-# beside the connected ones, to look at; fmpy knows no inputs that are left unconnected
+# outputs to look at, in addition to the connected ones; fmpy does not support unconnected inputs
 PLANT_OUTPUTS = ("truth.external_torque",)
 FRICTION_OUTPUTS = ("compensated_torque", "friction_torque")
 
@@ -41,10 +42,10 @@ _SSV = ElementMaker(namespace=_SPACES["ssv"], nsmap={"ssv": _SPACES["ssv"]})
 
 
 def build_ssp(rig_path: Path, output_path: Path) -> Path:
-    """Packs the SSP package of a rig and returns its path; same input, same bytes.
+    """Package the SSP package of a rig and return its path. The same input gives the same bytes.
 
-    The friction FMU is that of the rig's finger description: a model without the rig's further physics.
-    Raises InputError, also where output_path is a file that the rig is made of. It appears whole or not at all.
+    The friction FMU is made from the rig's finger description: a model without the rig's additional physics. Raises
+    InputError, also if output_path is a file that the rig is made from. The file is written whole or not at all.
     """
     rig = read_rig(rig_path)
     check_output(output_path, *rig.files)
@@ -55,7 +56,7 @@ def build_ssp(rig_path: Path, output_path: Path) -> Path:
 
 
 def ssp_members(rig: Rig) -> dict[str, bytes]:
-    """Path in the archive to content."""
+    """Return content by path in the archive."""
     return {
         "SystemStructure.ssd": system_structure(rig),
         f"resources/{PLANT_FMU}": pack(plant_members(rig)),
@@ -65,7 +66,7 @@ def ssp_members(rig: Rig) -> dict[str, bytes]:
 
 
 def system_structure(rig: Rig) -> bytes:
-    """SystemStructure.ssd: every input of the friction FMU comes from the plant's output of the same name."""
+    """Return SystemStructure.ssd: each input of the friction FMU comes from the plant's output of the same name."""
     sizes = {"tendon_force": rig.tendons, "tendon_position": rig.tendons}
 
     def names(groups: Any) -> list[str]:
@@ -97,7 +98,7 @@ def system_structure(rig: Rig) -> bytes:
 
 
 def start_values(rig: Rig) -> bytes:
-    """An SSV parameter set: the friction FMU's inputs at time 0, as the settled finger's sensors give them."""
+    """Return an SSV parameter set: the friction FMU's inputs at time 0, from the sensors of the settled finger."""
     plant = plant_of(rig)
     with refused_by(rig.path):
         plant.initialise()

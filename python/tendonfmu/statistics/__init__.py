@@ -1,8 +1,8 @@
-"""Statistics that know no finger.
+"""How certain results are: statistics without any knowledge of fingers.
 
-Series are averaged over blocks (`block_averages`, `blocks`), a slow bias is taken out by splines (`splines`), parts
-are held out (`folds`), columns are judged by their Gram matrices (`block_grams`), noise is made white (`whitening`),
-and what is counted or measured gets an interval (`intervals`, `paired_gain`, `effective_number`).
+Series are averaged over blocks (`block_averages`, `blocks`), splines remove a slow bias (`splines`), and parts are held
+out (`folds`). Columns are judged by their Gram matrices (`block_grams`), noise is whitened (`whitening`), and counts
+and measurements get an interval (`intervals`, `paired_gain`, `effective_number`).
 """
 
 import lazy_loader

@@ -1,4 +1,4 @@
-"""Averages over blocks of samples, for signals that come in stretches: of values, and of jumps added up on the way."""
+"""What the averages of interrupted signals over blocks are: of values, and of jumps that accumulate."""
 
 from __future__ import annotations
 
@@ -21,15 +21,27 @@ NO_BLOCK = -1
 class SampleBlocks:
     """Which samples each block averages.
 
-    of: for each recording [N] the number of each sample's block, from 0 over all recordings; −1: in none. The samples
-    of a block follow each other and belong to one part without a gap. count: of all blocks.
+    The samples of a block are consecutive and belong to one part without a gap.
+
+    Attributes
+    ----------
+    of
+        For each recording the block of each sample [N], from 0 over all recordings; −1: in no block.
+    count
+        Number of all blocks.
     """
 
     of: tuple[Indices, ...]
     count: int
 
     def sizes(self) -> Indices:
-        """[B] samples in each block."""
+        """Count the samples in each block.
+
+        Returns
+        -------
+        Indices
+            [B].
+        """
         total = np.zeros(self.count, dtype=np.int64)
         for block in self.of:
             total += np.bincount(block[block >= 0], minlength=self.count)
@@ -37,10 +49,28 @@ class SampleBlocks:
 
 
 def regular_blocks(times: Sequence[Numbers], parts: Sequence[Sequence[slice]], length: float) -> SampleBlocks:
-    """Blocks of the same length.
+    """Make blocks of the same length.
 
-    times: of each recording, [N] s. parts: its stretches without a gap; blocks count from the start of each. length: s.
-    Raises InputError for a length of 0 or less. A block that time leaves without a sample does not exist.
+    A block that would contain no sample does not exist.
+
+    Parameters
+    ----------
+    times
+        Times of each recording [N] (s).
+    parts
+        Its stretches without a gap. Blocks count from the start of each.
+    length
+        Length of a block (s).
+
+    Returns
+    -------
+    SampleBlocks
+        The block of each sample.
+
+    Raises
+    ------
+    InputError
+        The length is 0 or less.
     """
     if not length > 0:
         raise InputError(f"length of a block = {length:g} s: expected above 0")
@@ -48,7 +78,7 @@ def regular_blocks(times: Sequence[Numbers], parts: Sequence[Sequence[slice]], l
     for time, slices in zip(times, parts, strict=True):
         block = np.full(len(time), NO_BLOCK, dtype=np.int64)
         for part in slices:
-            # half of a microsecond: sample times are rounded, and belong to the block that begins there
+            # half a microsecond: a rounded sample time at a boundary belongs to the block that begins there
             number = np.floor((time[part] - time[part.start] + 5e-7) / length).astype(np.int64)
             new = np.cumsum(np.diff(number, prepend=number[0]) > 0)
             block[part] = count + new
@@ -60,17 +90,31 @@ def regular_blocks(times: Sequence[Numbers], parts: Sequence[Sequence[slice]], l
 class BlockSums:
     """Sums over blocks, filled stretch by stretch.
 
-    sums: [B, n, c] to add to, float32 or float64. The stretches are those of one part, in their order: jumps are added
-    up from its start.
+    The stretches are those of one part, in order. Jumps accumulate from its start.
+
+    Parameters
+    ----------
+    sums
+        Array to add to [B, n, c], float32 or float64.
+    mix
+        Sparse or dense matrix [u, c] from the given values to the summed ones. None: the same.
     """
 
     def __init__(self, sums: NDArray[Any], mix: Any = None) -> None:
-        """mix: [u, c] sparse or dense matrix, from what is given to what is summed; None: the same."""
+        """Start at the beginning of a part."""
         self._sums, self._mix = sums, mix
         self._carried: Numbers | None = None
 
     def add(self, block: Indices, values: Numbers, jumps: Numbers) -> None:
-        """block: [K] of each sample. values, jumps: [K, n, u]."""
+        """Add a stretch of samples.
+
+        Parameters
+        ----------
+        block
+            Block of each sample [K].
+        values, jumps
+            [K, n, u].
+        """
         starts = np.flatnonzero(np.diff(block, prepend=block[0] - 1))
         runs = np.add.reduceat(values, starts, axis=0)
         self._add_jumps(runs, jumps, starts, np.diff(starts, append=len(block)))
@@ -85,7 +129,7 @@ class BlockSums:
         self._sums[numbers[inside]] += chosen
 
     def _add_jumps(self, runs: Numbers, jumps: Numbers, starts: Indices, lengths: Indices) -> None:
-        """Adds to each run what its samples have of all jumps before them, and of those at them."""
+        """Add to each run what its samples have of all jumps before them, and of those at them."""
         flat = jumps.reshape(len(jumps), -1)
         total = runs.reshape(len(runs), -1)
         if self._carried is not None:
@@ -94,7 +138,7 @@ class BlockSums:
         if not len(rows):
             return
         ends = starts + lengths
-        # of a jump at row k: all samples of later runs, and those of its own run from k on
+        # a jump at row k counts for all samples of later runs, and for those of its own run from k on
         share = np.clip(ends[:, None] - np.maximum(rows[None, :], starts[:, None]), 0, None).astype(np.float64)
         total += share @ flat[rows]
         last = flat[rows].sum(axis=0)

@@ -1,8 +1,8 @@
-"""Held-out errors of any subset of columns from Gram matrices: after they are made, no sample is touched.
+"""What the held-out error of any subset of columns is, computed from Gram matrices without touching samples again.
 
-Target and columns are block means with the slow bias projected out of both. Of each fold the products of all columns
-are kept; leaving a fold out is a subtraction. What the nominal model's own numbers can mend is refitted without the
-fold each time (Frisch and Waugh, 1933): candidates and target are replaced by what that refit leaves of them.
+Target and columns are block means with the slow bias projected out of both. The products of all columns are kept for
+each fold; leaving a fold out is a subtraction. The numbers of the nominal model are refitted without the fold each time
+(Frisch and Waugh, 1933): candidates and target are replaced by what that refit leaves of them.
 """
 
 from __future__ import annotations
@@ -23,17 +23,23 @@ Numbers = NDArray[np.float64]
 Array = NDArray[Any]
 Indices = NDArray[np.intp]
 
-MEMORY = 20.0  # blocks that noise remembers, about: so many rows count as one against what is known beforehand
+MEMORY = 20.0  # blocks over which noise is correlated, about; so many rows count as one against prior knowledge
 _PIECE = 4096  # rows at a time
-_SMALLEST = 1e-100  # of a scale: its square is a number
+_SMALLEST = 1e-100  # of a scale; its square does not underflow
 
 
 @dataclass(frozen=True)
 class _Fold:
     """One fold left out.
 
-    refit: [u, c + 1] numbers of the nominal model per candidate, and of the target. energy [c, c], score [c]: what is
-    learned from, nominal numbers refitted. own_energy [c, c], own_score [c], own_square: the same on the fold itself.
+    Attributes
+    ----------
+    refit
+        Numbers of the nominal model for each candidate, and for the target [u, c + 1].
+    energy, score
+        [c, c] and [c] of the other folds, nominal numbers refitted.
+    own_energy, own_score, own_square
+        The same on the fold itself: [c, c], [c] and a number.
     """
 
     refit: Numbers
@@ -45,10 +51,22 @@ class _Fold:
 
 
 class Products:
-    """Columns free of a slow bias, and their products by fold: what does not depend on a target."""
+    """Columns without a slow bias, and their products by fold: the part that does not depend on a target.
+
+    Parameters
+    ----------
+    folds
+        Folds of the blocks.
+    nominal
+        Derivatives by the nominal numbers [B, n, u].
+    values
+        Derivatives by the candidates [B, n, c].
+    splines
+        Splines of the slow bias [B, s].
+    """
 
     def __init__(self, folds: Folds, nominal: Array, values: Array, splines: Splines) -> None:
-        """nominal: [B, n, u], values: [B, n, c]: derivatives. splines: [B, s] of the slow bias."""
+        """Project the bias out, and multiply."""
         self.folds, self.nominal_count, self.count = folds, nominal.shape[2], values.shape[2]
         rows, joints = folds.rows, nominal.shape[1]
         self.span = Span(splines[rows])
@@ -59,7 +77,7 @@ class Products:
         self.by_fold = [self._of(np.flatnonzero(folds.fold == number)) for number in range(folds.folds)]
 
     def _of(self, rows: Indices) -> Numbers:
-        """[u + c]² of some rows."""
+        """Return the products [u + c]² of some rows."""
         size, joints = self.table.shape[2], self.table.shape[1]
         total = np.zeros((size, size))
         for begin in range(0, len(rows), _PIECE):
@@ -69,7 +87,20 @@ class Products:
         return total
 
     def chosen(self, shared: Numbers | None, candidates: Indices | None) -> Products:
-        """With combinations [c, k] of the values among the nominal columns as well, and of the values some alone."""
+        """Return the products with other columns.
+
+        Parameters
+        ----------
+        shared
+            Combinations [c, k] of the candidates that become nominal columns as well. None: none.
+        candidates
+            Indices of the candidates that remain. None: all.
+
+        Returns
+        -------
+        Products
+            A copy, or this one if nothing changes.
+        """
         u = self.nominal_count
         mixed = np.zeros((self.count, 0)) if shared is None else shared
         kept = np.arange(self.count) if candidates is None else candidates
@@ -83,7 +114,7 @@ class Products:
         return found
 
     def _turned(self, products: Numbers, mixed: Numbers, kept: Indices) -> Numbers:
-        """[u + k + kept]² of [u + c]²; kept: indices among all columns."""
+        """Return products [u + k + kept]² from [u + c]². kept: indices among all columns."""
         u = self.nominal_count
         cross = products[:, u:] @ mixed
         own = np.concatenate([np.arange(u), kept])
@@ -97,7 +128,18 @@ class Products:
         return found
 
     def with_own(self, values: Array) -> Products:
-        """With other candidates [r, n, k], free of the slow bias already; r: the folds' rows."""
+        """Return the products with other candidates.
+
+        Parameters
+        ----------
+        values
+            Candidates [r, n, k] without the slow bias; r: rows of the folds.
+
+        Returns
+        -------
+        Products
+            A copy.
+        """
         u = self.nominal_count
         found = copy(self)
         found.count = values.shape[2]
@@ -117,7 +159,23 @@ class Products:
 
 
 class Grams:
-    """Products of a target, of the nominal model's columns and of candidates', by fold."""
+    """Products of a target, of the nominal model's columns and of candidates, by fold.
+
+    Parameters
+    ----------
+    folds
+        Folds of the blocks.
+    target
+        [B, n] (N·m).
+    nominal
+        Derivatives by the nominal numbers [B, n, u].
+    values
+        Derivatives by the candidates [B, n, c].
+    splines
+        Splines of the slow bias [B, s].
+    scale
+        How far each nominal number is expected to move [u]. This ridge decides if the data do not.
+    """
 
     def __init__(
         self,
@@ -128,14 +186,29 @@ class Grams:
         splines: Splines,
         scale: Numbers,
     ) -> None:
-        """target: [B, n] N·m. nominal: [B, n, u], values: [B, n, c]: derivatives. splines: [B, s] of the slow bias.
-        scale: [u] how far each nominal number may be expected to move: a ridge that decides where the data do not.
-        """
+        """Multiply, and refit the nominal numbers without each fold."""
         self._begin(Products(folds, nominal, values, splines), target, scale, None)
 
     @classmethod
     def of(cls, products: Products, target: Numbers, scale: Numbers, judged: NDArray[np.bool_] | None = None) -> Grams:
-        """judged: [f] folds whose errors count, all by default; the others are only learned from."""
+        """Make grams of existing products and a target.
+
+        Parameters
+        ----------
+        products
+            Products of the columns.
+        target
+            [B, n] (N·m).
+        scale
+            How far each nominal number is expected to move [u].
+        judged
+            Folds [f] whose errors count, by default all. The others are only learned from.
+
+        Returns
+        -------
+        Grams
+            With the same folds as the products.
+        """
         found = cls.__new__(cls)
         found._begin(products, target, scale, judged)
         return found
@@ -154,7 +227,7 @@ class Grams:
         spread = self.square / max(self._target.size, 1) * MEMORY
         ridge = np.zeros(self.nominal_count)
         known = np.isfinite(scale) & (scale > 0)
-        # a column that is 0 has a scale without bound: the quotient is squared, which cannot overflow
+        # a column of zeros has a huge scale; squaring the quotient cannot overflow, squaring the scale could
         ridge[known] = (np.sqrt(spread) / np.maximum(scale[known], _SMALLEST)) ** 2
         diagonal = np.diagonal(whole)[: self.nominal_count]
         self._ridge = np.maximum(ridge, 1e-9 * diagonal) + 1e-300
@@ -164,7 +237,7 @@ class Grams:
     # --- making -------------------------------------------------------------------------------------------------------
 
     def _with_target(self, by_fold: Sequence[Numbers]) -> list[Numbers]:
-        """[u + c + 1]² of all columns and the target, of each fold."""
+        """Return the products [u + c + 1]² of all columns and the target, for each fold."""
         size = self._table.shape[2]
         found = []
         for number, columns in enumerate(by_fold):
@@ -198,11 +271,22 @@ class Grams:
 
     @property
     def without(self) -> float:
-        """Σ e² on held-out folds, (N·m)², of the nominal model refitted, without any candidate."""
+        """Σ e² on held-out folds ((N·m)²) of the nominal model refitted, without any candidate."""
         return float(sum(each.own_square for each, counts in zip(self._by_fold, self._judged, strict=True) if counts))
 
     def surviving(self, mix: Numbers) -> float:
-        """Share of the variance of a combination of candidates [c, d] that the refit leaves: of its best direction."""
+        """Return how much of a combination of candidates the refit leaves.
+
+        Parameters
+        ----------
+        mix
+            Combination [c, d].
+
+        Returns
+        -------
+        float
+            Share of the variance of its best direction, 0 to 1.
+        """
         used = np.flatnonzero(mix.any(axis=1))
         part, inner = mix[used], np.ix_(used, used)
         before = part.T @ self._raw_energy()[inner] @ part
@@ -226,11 +310,39 @@ class Grams:
         return self._raw
 
     def magnitudes(self, mix: Numbers, low: Numbers, high: Numbers) -> Numbers:
-        """[d] learned from everything, between bounds [d]."""
+        """Return the magnitudes of a combination of candidates, learned from all folds.
+
+        Parameters
+        ----------
+        mix
+            Combination [c, d].
+        low, high
+            Bounds [d].
+
+        Returns
+        -------
+        Numbers
+            [d].
+        """
         return bounded(mix.T @ self._whole.energy @ mix, mix.T @ self._whole.score, low, high)
 
     def error(self, mix: Numbers, low: Numbers, high: Numbers) -> tuple[float, Numbers]:
-        """Σ e² on held-out folds, (N·m)², with a combination of candidates [c, d]; magnitudes without each [f, d]."""
+        """Return the held-out error with a combination of candidates.
+
+        Parameters
+        ----------
+        mix
+            Combination [c, d].
+        low, high
+            Bounds of its magnitudes [d].
+
+        Returns
+        -------
+        error
+            Σ e² on held-out folds ((N·m)²).
+        magnitudes
+            Learned without each fold [f, d].
+        """
         left, found = 0.0, []
         used = np.flatnonzero(mix.any(axis=1))
         part = mix[used]
@@ -243,8 +355,20 @@ class Grams:
         return left, np.array(found)
 
     def by_stretch(self, mix: Numbers | None, magnitudes: Numbers | None) -> Numbers:
-        """[stretches that count] Σ e² on unseen samples. mix: [c, d], magnitudes: [f, d], as `error` gives them; None:
-        without."""
+        """Return the error of each stretch on unseen samples.
+
+        Parameters
+        ----------
+        mix
+            Combination [c, d]. None: no candidates.
+        magnitudes
+            [f, d], as `error` returns them.
+
+        Returns
+        -------
+        Numbers
+            Σ e² [stretches that count] ((N·m)²).
+        """
         found = np.zeros(self.folds.stretches)
         for number, counts in enumerate(self._judged):
             if counts:
@@ -253,20 +377,30 @@ class Grams:
         return np.asarray(found[self._counted])
 
     def unseen_residual(self, mix: Numbers | None = None, magnitudes: Numbers | None = None) -> Numbers:
-        """[r, n] N·m left on the unseen rows that count, in the order of `counted_stretch`. mix, magnitudes: as for
-        `by_stretch`."""
+        """Return the residual on the unseen rows that count.
+
+        Parameters
+        ----------
+        mix, magnitudes
+            As for `by_stretch`.
+
+        Returns
+        -------
+        Numbers
+            [r, n] (N·m), in the order of `counted_stretch`.
+        """
         return np.concatenate([self._unseen(int(k), mix, magnitudes)[1] for k in np.flatnonzero(self._judged)])
 
     @property
     def counted_stretch(self) -> NDArray[np.int64]:
-        """[r] stretch of each unseen row that counts."""
+        """Stretch of each unseen row that counts [r]."""
         own = [self.folds.stretch[self.folds.fold == k] for k in np.flatnonzero(self._judged)]
         return np.asarray(np.concatenate(own), dtype=np.int64)
 
     def _unseen(
         self, number: int, mix: Numbers | None, magnitudes: Numbers | None
     ) -> tuple[NDArray[np.bool_], Numbers]:
-        """Rows of a fold, and [r, n] N·m that the model learned without it leaves there."""
+        """Return the rows of a fold, and the residual [r, n] (N·m) there of the model learned without it."""
         u, each = self.nominal_count, self._by_fold[number]
         rows = self.folds.fold == number
         change = np.zeros(u + self.count)
@@ -279,8 +413,22 @@ class Grams:
         return rows, np.asarray(self._target[rows] - self._table[rows][:, :, used] @ change[used])
 
     def scores(self, mix: Numbers, magnitudes: Numbers) -> tuple[Numbers, Numbers]:
-        """Energy [d, d] of a combination of candidates [c, d], what refitting can mend taken off, and its product
-        with the unseen residual of each stretch [stretches, d]: the parts of a sandwich (cluster-robust) covariance."""
+        """Return the parts of a sandwich (cluster-robust) covariance of a combination of candidates.
+
+        Parameters
+        ----------
+        mix
+            Combination [c, d].
+        magnitudes
+            [f, d], as `error` returns them.
+
+        Returns
+        -------
+        energy
+            [d, d], after the refit.
+        scores
+            [stretches, d]: products of the combination, after the refit, with the unseen residual of each stretch.
+        """
         u, used = self.nominal_count, np.flatnonzero(mix.any(axis=1))
         part = mix[used]
         nominal = self._whole.refit[:, used] @ part
@@ -293,8 +441,15 @@ class Grams:
         return part.T @ self._whole.energy[np.ix_(used, used)] @ part, found
 
     def left(self) -> tuple[Numbers, Numbers]:
-        """[stretches, n] Σ e² of each joint on unseen samples, (N·m)², without any candidate, and [stretches] rows: of
-        all stretches, whether they count or not."""
+        """Return the errors on unseen samples without any candidate, whether the stretches count or not.
+
+        Returns
+        -------
+        squares
+            Σ e² of each stretch and joint [stretches, n] ((N·m)²).
+        rows
+            Rows of each stretch [stretches].
+        """
         found = np.zeros((self.folds.stretches, self._target.shape[1]))
         for number in range(self.folds.folds):
             rows, left = self._unseen(number, None, None)
@@ -303,11 +458,22 @@ class Grams:
 
     @property
     def refitted(self) -> Numbers:
-        """[u] what refitting on everything adds to the nominal numbers, without any candidate."""
+        """Change of the nominal numbers when they are refitted to all folds without any candidate [u]."""
         return np.asarray(self._whole.refit[:, -1])
 
     def errors_of(self, targets: Numbers) -> Numbers:
-        """[K] Σ e² on held-out folds, (N·m)², of other targets [B, n, K], the nominal numbers refitted to each."""
+        """Return the held-out errors of other targets, the nominal numbers refitted to each.
+
+        Parameters
+        ----------
+        targets
+            [B, n, K] (N·m).
+
+        Returns
+        -------
+        Numbers
+            Σ e² on held-out folds [K] ((N·m)²).
+        """
         u, rows = self.nominal_count, self.folds.rows
         flat = self._table[:, :, :u].astype(np.float64)
         left = np.stack([self._span.without(targets[rows, j]) for j in range(targets.shape[1])], axis=1)
@@ -325,13 +491,22 @@ class Grams:
         return [self.folds.fold == number for number in range(self.folds.folds)]
 
     def residual(self) -> Numbers:
-        """[R, n] N·m left of the target by the nominal model refitted on everything."""
+        """Return what the nominal model, refitted to all folds, leaves of the target.
+
+        Returns
+        -------
+        Numbers
+            [R, n] (N·m).
+        """
         change = self._whole.refit[:, -1]
         return np.asarray(self._target - self._table[:, :, : self.nominal_count] @ change)
 
 
 def bounded(energy: Numbers, score: Numbers, low: Numbers, high: Numbers) -> Numbers:
-    """[d] least squares between bounds: what lies beyond one is put there, the worst first, the rest solved again."""
+    """Return a least-squares solution [d] between bounds.
+
+    The value farthest beyond a bound is fixed there, and the others are solved again, until none is beyond.
+    """
     count = len(score)
     length = np.sqrt(np.maximum(np.diagonal(energy), 1e-300))
     scaled = energy / (length[:, None] * length)
@@ -352,7 +527,7 @@ def bounded(energy: Numbers, score: Numbers, low: Numbers, high: Numbers) -> Num
 
 
 def _solved(matrix: Numbers, right: Numbers) -> Numbers:
-    """[u, k] of a symmetric matrix above 0, its columns brought to one length first."""
+    """Solve a symmetric positive matrix for [u, k]. Its columns are scaled to length 1 first."""
     length = np.sqrt(np.diagonal(matrix))
     if not len(length):
         return np.zeros((0, right.shape[1]))
@@ -362,6 +537,17 @@ def _solved(matrix: Numbers, right: Numbers) -> Numbers:
 
 
 def standard_error(gains: Sequence[float] | Numbers) -> float:
-    """Of the sum of gains by stretch [K]; infinite for a single one."""
+    """Return the standard error of a sum of gains.
+
+    Parameters
+    ----------
+    gains
+        Gain of each stretch [K].
+
+    Returns
+    -------
+    float
+        Infinite for a single stretch.
+    """
     values = np.asarray(gains)
     return float(np.sqrt(len(values)) * np.std(values, ddof=1)) if len(values) > 1 else np.inf

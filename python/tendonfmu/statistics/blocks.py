@@ -1,4 +1,4 @@
-"""Time series cut into short blocks, with what statistics ask of them: when each was, and what stands in it."""
+"""What a time series cut into short blocks consists of: the time of each block and its values."""
 
 from __future__ import annotations
 
@@ -12,10 +12,22 @@ Numbers = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class BlockSeries:
-    """Recordings one after another, block means; B blocks of n series each.
+    """Block means of recordings, one after another: B blocks of n series each.
 
-    time: [B] s, centre. recording: [B] from 0; segment: [B] stretch without a gap, from 0. target: [B, n] what is to be
-    explained. used: [B] whether all its samples may be learned from. step: s.
+    Attributes
+    ----------
+    time
+        Centre of each block [B] (s).
+    recording
+        Recording of each block [B], from 0.
+    segment
+        Stretch without a gap of each block [B], from 0.
+    target
+        What has to be explained [B, n].
+    used
+        Whether all samples of the block may be learned from [B].
+    step
+        Length of a block (s).
     """
 
     time: Numbers

@@ -1,8 +1,9 @@
 """How many independent samples the residuals of a fit are worth.
 
-A likelihood that counts each sample as new is right for white residuals. What a model misses lasts for many samples, so
-N of them tell as much as N/τ, τ = 1 + 2 Σ ρ_k their integrated autocorrelation time (Sokal 1997, sect. 2). The sum ends
-with the first ρ_k that chance explains: white residuals have τ = 1 exactly, and noise at far lags adds nothing.
+A likelihood that counts each sample as new is correct for white residuals. Model errors last for many samples, so N of
+them are worth N/τ independent ones. τ = 1 + 2 Σ ρ_k is their integrated autocorrelation time (Sokal 1997, sect. 2). The
+sum ends before the first ρ_k that chance explains: white residuals have τ = 1 exactly, and noise at far lags adds
+nothing.
 """
 
 from __future__ import annotations
@@ -14,14 +15,14 @@ from numpy.typing import NDArray
 
 Numbers = NDArray[np.float64]
 
-CHANCE = 3.0  # standard deviations of ρ_k of white noise (1/√pairs): beyond it one of 740 white series is at a lag
-FEWEST = 20  # pairs of a lag; fewer say nothing of it
+CHANCE = 3.0  # standard deviations of ρ_k of white noise (1/√pairs); at a lag, one of 740 white series exceeds it
+FEWEST = 20  # pairs of a lag; lags with fewer are not used
 
 
 def correlation_time(values: Numbers) -> float:
-    """τ of a series in samples, at least 1.
+    """Return τ of a series in samples, at least 1.
 
-    values: [N] standardised residuals about 0, NaN where not used: pairs across those do not count.
+    values: [N] standardised residuals about 0, NaN where not used. Pairs with a NaN do not count.
     """
     known = ~np.isnan(values)
     count = int(known.sum())
@@ -38,24 +39,44 @@ def correlation_time(values: Numbers) -> float:
 
 
 def _autocovariance(values: Numbers) -> Numbers:
-    """[N] Σ values_i·values_(i+k) for k = 0 .. N − 1."""
+    """Return Σ values_i·values_(i+k) for k = 0 .. N − 1 [N]."""
     size = 1 << (2 * len(values) - 1).bit_length()
     spectrum = np.fft.rfft(values, size)
     return np.asarray(np.fft.irfft(np.abs(spectrum) ** 2, size)[: len(values)])
 
 
 def sample_weights(standardised: Numbers) -> Numbers:
-    """[n] by joint 1/τ: the share of a sample that each sample of a stretch counts for.
+    """Return the share of an independent sample that each sample of a stretch counts for.
 
-    standardised: [N, n] of one stretch without a gap, NaN where not used.
+    Parameters
+    ----------
+    standardised
+        Residuals of one stretch without a gap [N, n], NaN where not used.
+
+    Returns
+    -------
+    Numbers
+        1/τ of each joint [n].
     """
     return np.array([1.0 / correlation_time(column) for column in standardised.T])
 
 
 def effective_samples(standardised: Sequence[Numbers], weights: Sequence[Numbers]) -> tuple[Numbers, Numbers]:
-    """[n] samples by joint, and how many independent ones they are worth.
+    """Count samples, and the independent samples that they are worth.
 
-    standardised: [N, n] of each recording, NaN where not used. weights: [N, n] of each.
+    Parameters
+    ----------
+    standardised
+        Residuals of each recording [N, n], NaN where not used.
+    weights
+        Weight of each sample [N, n], for each recording.
+
+    Returns
+    -------
+    count
+        Samples of each joint [n].
+    worth
+        Independent samples of each joint [n].
     """
     used = [~np.isnan(each) for each in standardised]
     count = sum(flags.sum(axis=0) for flags in used)

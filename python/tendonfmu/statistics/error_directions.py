@@ -1,7 +1,7 @@
-"""A few relative errors of the parts of a torque that give its standard deviation.
+"""Which few relative errors of the parts of a torque give its standard deviation.
 
-A direction w stands for an error Σ_i w_i φ_i of a torque with the parts φ; several independent ones give the standard
-deviation (Σ_d (w_d·φ)²)^½.
+A direction w stands for an error Σ_i w_i φ_i of a torque with the parts φ. Several independent directions give the
+standard deviation (Σ_d (w_d·φ)²)^½.
 """
 
 from __future__ import annotations
@@ -13,30 +13,57 @@ from scipy.optimize import least_squares
 Numbers = NDArray[np.float64]
 
 MOST = 4  # directions; docs/reference/semantics.md#uncertainty
-_UNSEEN = 1e-12  # of the largest second moment: a combination of parts that the motion does not show
-_NOTHING = 1e-12  # of the variance: a direction that says no more is left out
+_UNSEEN = 1e-12  # of the largest second moment; the motion does not show combinations of parts with less
+_NOTHING = 1e-12  # of the variance; directions with less are left out
 _ROUNDS = 40  # of the least squares
 
 
 def predicted(parts: Numbers, directions: Numbers) -> Numbers:
-    """[K] standard deviation of torques with parts [K, q], by directions [d, q]."""
+    """Return the standard deviation of torques.
+
+    Parameters
+    ----------
+    parts
+        Parts of the torques [K, q] (N·m).
+    directions
+        [d, q].
+
+    Returns
+    -------
+    Numbers
+        [K] (N·m).
+    """
     return np.asarray(np.sqrt(squares(parts @ directions.T)))
 
 
 def squares(rows: Numbers) -> Numbers:
-    """[K] sum of the squares of each row, without a copy of them."""
+    """Return the sum of squares of each row [K], without a copy of the rows."""
     return np.asarray(np.einsum("ku,ku->k", rows, rows))
 
 
 def few_directions(parts: Numbers, slopes: Numbers, most: int = MOST) -> tuple[Numbers, float]:
-    """Directions [d, q], d at most `most`, and the share of the mean variance in the leading ones.
+    """Find a few directions that give the standard deviation of torques.
 
-    parts: [K, q] N·m. slopes: [K, u] N·m, of torques by independent unknowns of variance 1: variance Σ_u slopes².
+    `slopes` is regressed on the parts (slopes ≈ parts·A). The leading eigenvectors of A Aᵀ, in the metric of the parts'
+    second moment, are the directions with most of the mean variance. They leave out later eigenvectors, and whatever is
+    no combination of parts, such as working points. To make up for this, they are scaled to the mean variance and then
+    adjusted by least squares, so that their prediction is as near as possible to the standard deviation of each sample.
 
-    slopes is regressed on the parts (slopes ≈ parts·A); the leading eigenvectors of A Aᵀ in the metric of the parts'
-    second moment are the directions that carry most of the mean variance. What they leave out (later eigenvectors, and
-    what is no combination of parts, such as working points) is put back: scaled to the mean variance, they are moved by
-    least squares until what they predict comes as near to each sample's standard deviation as they can.
+    Parameters
+    ----------
+    parts
+        [K, q] (N·m).
+    slopes
+        Derivatives of the torques by independent unknowns of variance 1 [K, u] (N·m). The variance is Σ_u slopes².
+    most
+        Largest number of directions.
+
+    Returns
+    -------
+    directions
+        [d, q], d at most `most`.
+    share
+        Share of the mean variance in the leading eigenvectors.
     """
     std = np.sqrt(squares(slopes))
     variance = float(np.mean(std**2))
@@ -55,16 +82,16 @@ def few_directions(parts: Numbers, slopes: Numbers, most: int = MOST) -> tuple[N
 
 
 def _leading(regression: Numbers, most: int) -> tuple[Numbers, Numbers]:
-    """The largest eigenvalues [d] of A Aᵀ and their vectors [r, d], for A [r, u]."""
+    """Return the largest eigenvalues [d] of A Aᵀ and their vectors [r, d], for A [r, u]."""
     values, vectors = np.linalg.eigh(regression @ regression.T)
     chosen = np.argsort(-values)[:most]
     return np.maximum(values[chosen], 0.0), vectors[:, chosen]
 
 
 def _matched(shown: Numbers, start: Numbers, std: Numbers) -> Numbers:
-    """[d, r] that predict std [K] best, in the sense of least squares. start: [d, r]."""
+    """Return the directions [d, r] that predict std [K] best by least squares. start: [d, r]."""
     size = max(float(np.sqrt(np.mean(std**2))), 1e-300)
-    small = 1e-9 * size  # where all parts are zero the root has no slope
+    small = 1e-9 * size  # the root has no slope where all parts are zero
 
     def project(flat: Numbers) -> tuple[Numbers, Numbers]:
         each = shown @ flat.reshape(start.shape).T
@@ -85,12 +112,12 @@ def _matched(shown: Numbers, start: Numbers, std: Numbers) -> Numbers:
 
 
 def _principal(directions: Numbers) -> Numbers:
-    """The same predictions by orthogonal directions, the largest first: any rotation among them predicts the same."""
+    """Return orthogonal directions with the same predictions, the largest first. Rotations change no prediction."""
     _, size, axes = np.linalg.svd(directions, full_matrices=False)
     return np.asarray(size[:, None] * axes)
 
 
 def _signs(directions: Numbers) -> Numbers:
-    """[d, 1] so that the largest number of each is positive; an error and its opposite are the same."""
+    """Return signs [d, 1] that make the largest number of each direction positive. Opposite errors are equivalent."""
     largest = np.argmax(np.abs(directions), axis=1)
     return np.asarray(np.where(directions[np.arange(len(directions)), largest] < 0, -1.0, 1.0)[:, None])

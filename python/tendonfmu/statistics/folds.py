@@ -1,4 +1,4 @@
-"""Contiguous parts of the recordings: folds that are held out in turn, and stretches that say how certain it is."""
+"""Which contiguous parts of recordings are held out in turn (folds), and which show the uncertainty (stretches)."""
 
 from __future__ import annotations
 
@@ -11,15 +11,23 @@ from tendonfmu.statistics.blocks import BlockSeries
 
 Indices = NDArray[np.int64]
 
-STRETCH = 2.0  # s: longer than what a bias between the splines' knots remembers
+STRETCH = 2.0  # s; longer than the correlation of a bias between the splines' knots
 MOST_FOLDS = 8
-FEWEST_STRETCHES = 4  # two halves of two: below, nothing is said of unseen data
+FEWEST_STRETCHES = 4  # two halves of two; with fewer there is no held-out error
 
 
 @dataclass(frozen=True)
 class Folds:
-    """rows: [R] blocks of the series that are used, in runs without a gap. run, stretch, fold: of each row, from 0.
-    stretches, folds: their numbers.
+    """Folds and stretches of the blocks of a series.
+
+    Attributes
+    ----------
+    rows
+        Blocks of the series that are used [R], in runs without a gap.
+    run, stretch, fold
+        Of each row [R], from 0.
+    stretches, folds
+        Their numbers.
     """
 
     rows: Indices
@@ -31,12 +39,23 @@ class Folds:
 
     @property
     def enough(self) -> bool:
-        """Whether a held-out error means anything."""
+        """Whether there are enough stretches for a meaningful held-out error."""
         return self.stretches >= FEWEST_STRETCHES
 
 
 def make_folds(series: BlockSeries) -> Folds:
-    """Stretches of about 2 s that no gap cuts, side by side in up to 8 folds of equally many."""
+    """Make stretches of about 2 s without gaps, and up to 8 contiguous folds of equally many stretches.
+
+    Parameters
+    ----------
+    series
+        Block means.
+
+    Returns
+    -------
+    Folds
+        Of the blocks that are used.
+    """
     rows = np.flatnonzero(series.used)
     length = max(1, round(STRETCH / series.step))
     new = (np.diff(rows, prepend=-2) > 1) | (np.diff(series.segment[rows], prepend=-1) != 0)

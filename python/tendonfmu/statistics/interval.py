@@ -1,4 +1,4 @@
-"""A value with its interval."""
+"""What an interval is: a value with its bounds."""
 
 from __future__ import annotations
 
@@ -7,7 +7,15 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Interval:
-    """A value with its 95 % interval."""
+    """A value with its 95 % interval.
+
+    Attributes
+    ----------
+    value
+        The value.
+    low, high
+        Ends of the interval.
+    """
 
     value: float
     low: float

@@ -1,6 +1,6 @@
-"""95 % confidence intervals of what a score counts and measures: exact where a distribution is known, else a bootstrap.
+"""How certain counts and measurements of a score are: 95 % confidence intervals.
 
-NaN stands for what is unknown.
+They are exact if the distribution is known, otherwise from a bootstrap. NaN stands for unknown.
 """
 
 from __future__ import annotations
@@ -19,13 +19,21 @@ Statistic = Callable[[Numbers], Numbers]
 CONFIDENCE = 0.95
 _TAIL = (1 - CONFIDENCE) / 2
 RESAMPLES = 2000
-FEWEST = 5  # events or blocks; resampling fewer says nothing of their spread
-_MOST = 500  # blocks; neighbours are put together beyond that, so that memory stays small
+FEWEST = 5  # events or blocks; resampling fewer does not show their spread
+_MOST = 500  # blocks; more are joined with their neighbours, so that memory stays small
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A value and the interval [low, high] of the true one."""
+    """A value and the 95 % interval of the true value.
+
+    Attributes
+    ----------
+    value
+        The value.
+    low, high
+        Ends of the interval; NaN if unknown.
+    """
 
     value: float
     low: float = math.nan
@@ -33,7 +41,20 @@ class Estimate:
 
 
 def share(count: int, of: int) -> Estimate:
-    """count/of with the exact binomial interval (Clopper and Pearson 1934); unknown of none."""
+    """Return a share with the exact binomial interval (Clopper and Pearson 1934).
+
+    Parameters
+    ----------
+    count
+        How many.
+    of
+        Of how many.
+
+    Returns
+    -------
+    Estimate
+        Unknown if `of` is 0.
+    """
     if not of:
         return Estimate(math.nan)
     low = float(betaincinv(count, of - count + 1, _TAIL)) if count else 0.0
@@ -42,7 +63,20 @@ def share(count: int, of: int) -> Estimate:
 
 
 def rate(count: int, exposure: float) -> Estimate:
-    """count/exposure with the exact Poisson interval (Garwood 1936); unknown without exposure."""
+    """Return a rate with the exact Poisson interval (Garwood 1936).
+
+    Parameters
+    ----------
+    count
+        Number of events.
+    exposure
+        In any unit, such as s.
+
+    Returns
+    -------
+    Estimate
+        Events per unit. Unknown without exposure.
+    """
     if not exposure > 0:
         return Estimate(math.nan)
     low = float(gammaincinv(count, _TAIL)) if count else 0.0
@@ -51,7 +85,22 @@ def rate(count: int, exposure: float) -> Estimate:
 
 
 def quantile(values: Numbers, probability: float, seed: int) -> Estimate:
-    """Of [k] values, one for each event; the interval by resampling events (percentiles)."""
+    """Return a quantile, with an interval from resampled events (percentiles).
+
+    Parameters
+    ----------
+    values
+        One for each event [k].
+    probability
+        Of the quantile.
+    seed
+        Of the resampling.
+
+    Returns
+    -------
+    Estimate
+        In the unit of the values. Without interval for fewer than `FEWEST` events.
+    """
     if not len(values):
         return Estimate(math.nan)
     found = float(np.quantile(values, probability))
@@ -62,9 +111,21 @@ def quantile(values: Numbers, probability: float, seed: int) -> Estimate:
 
 
 def of_sums(sums: Numbers, statistic: Statistic, seed: int) -> list[Estimate]:
-    """A statistic of sums over events or blocks; the interval by resampling these (percentiles).
+    """Return a statistic of sums over events or blocks, with intervals from resampling these (percentiles).
 
-    sums: [b, k] of each event or block. statistic: [r, k] sums over all -> [r, n].
+    Parameters
+    ----------
+    sums
+        Of each event or block [b, k].
+    statistic
+        Function from sums over all [r, k] to [r, n].
+    seed
+        Of the resampling.
+
+    Returns
+    -------
+    list of Estimate
+        [n]. Without intervals for fewer than `FEWEST` events or blocks.
     """
     values = statistic(sums.sum(axis=0, keepdims=True))[0]
     if len(sums) < FEWEST:
@@ -76,7 +137,7 @@ def of_sums(sums: Numbers, statistic: Statistic, seed: int) -> list[Estimate]:
 
 
 def _joined(sums: Numbers) -> Numbers:
-    """Neighbouring blocks put together until there are at most `_MOST`."""
+    """Join neighbouring blocks until there are at most `_MOST`."""
     if len(sums) <= _MOST:
         return sums
     begins = np.unique(np.linspace(0, len(sums), _MOST, endpoint=False).astype(int))

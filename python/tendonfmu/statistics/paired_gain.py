@@ -1,8 +1,8 @@
-"""The gain of one model over another with its 95 % interval, from paired residuals on blocks of time.
+"""How much better one model is than another, with the 95 % interval from paired residuals on blocks of time.
 
-Residuals are coloured, and how large they are depends on the motion; so blocks of about two seconds are drawn, each
-with the residuals of both models in it, and the logarithm of the ratio of their rms is studentised: the block bootstrap
-of Künsch, "The jackknife and the bootstrap for general stationary observations", Ann. Statist. 17 (1989), with the
+Residuals are coloured, and their size depends on the motion. So blocks of about two seconds are drawn, each with the
+residuals of both models, and the logarithm of the ratio of their rms is studentised. This is the block bootstrap of
+Künsch, "The jackknife and the bootstrap for general stationary observations", Ann. Statist. 17 (1989), with the
 bootstrap-t of Efron and Tibshirani, "An introduction to the bootstrap" (1993), section 12.5.
 """
 
@@ -21,32 +21,64 @@ Flags = NDArray[np.bool_]
 
 BLOCK = 2.0  # s; longer than residuals of a fitted finger are correlated
 LEVEL = 0.95
-FEWEST = 3  # blocks; of fewer no interval can be said
-_FEW, _SHORTEST = 6, 0.5  # blocks that there ought to be; s, of a block
+FEWEST = 3  # blocks; fewer give no interval
+_FEW, _SHORTEST = 6, 0.5  # blocks, wanted at least; s, shortest block for this
 _RESAMPLES = 4000
-_MOST = 400  # blocks; more are put together
-_LEAST_PLAIN = 12  # blocks; of fewer the resamples' own errors are too rough to divide by: Student's t instead
+_MOST = 400  # blocks; more are joined
+_LEAST_PLAIN = 12  # blocks; with fewer, the resamples' own errors are too rough, and Student's t is used
 
 
 @dataclass(frozen=True)
 class BlockIndex:
-    """Which block each sample is in. index: [N] from 0, −1 outside the chosen samples. count: of blocks."""
+    """The block of each sample.
+
+    Attributes
+    ----------
+    index
+        [N], from 0; −1 outside the chosen samples.
+    count
+        Number of blocks.
+    """
 
     index: NDArray[np.intp]
     count: int
 
     def sums(self, values: Numbers) -> Numbers:
-        """[count] sums of values [N] over the blocks."""
+        """Return the sums of values over the blocks.
+
+        Parameters
+        ----------
+        values
+            [N].
+
+        Returns
+        -------
+        Numbers
+            [count].
+        """
         chosen = self.index >= 0
         return np.asarray(np.bincount(self.index[chosen], weights=values[chosen], minlength=self.count), dtype=float)
 
 
 def blocks_of(time: Numbers, chosen: Flags, length: float = BLOCK) -> BlockIndex:
-    """Cuts the chosen samples into blocks of about `length` s each, none across a stretch that is not chosen; of few
-    seconds into shorter ones.
+    """Cut the chosen samples into blocks.
 
-    time: [N] s. A stretch of less than half a block is one of its own only where it has no neighbour: it joins the
-    block before.
+    No block spans samples that are not chosen. A short total time gives shorter blocks. A stretch of less than half a
+    block joins the block before, if there is one.
+
+    Parameters
+    ----------
+    time
+        Times [N] (s).
+    chosen
+        Samples [N].
+    length
+        Length of a block, about (s).
+
+    Returns
+    -------
+    BlockIndex
+        The block of each sample.
     """
     index = np.full(len(time), -1, dtype=np.intp)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(np.int8), [0]])))
@@ -66,10 +98,21 @@ def blocks_of(time: Numbers, chosen: Flags, length: float = BLOCK) -> BlockIndex
 
 
 def gain_interval(before: Numbers, after: Numbers, seed: int = 0) -> Interval:
-    """1 − rms_after/rms_before with its 95 % interval.
+    """Return the gain 1 − rms_after/rms_before with its 95 % interval.
 
-    before, after: [B] sums of squared residuals of both models over the same samples of each block, in time's order.
-    Where neighbouring blocks vary together they are put together first. NaN ends of fewer than three blocks.
+    Neighbouring blocks that vary together are joined first.
+
+    Parameters
+    ----------
+    before, after
+        Sums of squared residuals of both models over the same samples of each block [B], in order of time.
+    seed
+        Of the resampling.
+
+    Returns
+    -------
+    Interval
+        Its ends are NaN for fewer than three blocks.
     """
     total_before, total_after = float(before.sum()), float(after.sum())
     if total_before <= 0:
@@ -83,7 +126,7 @@ def gain_interval(before: Numbers, after: Numbers, seed: int = 0) -> Interval:
 
 
 def _log_ratio_ends(pairs: Numbers, seed: int) -> tuple[float, float]:
-    """Ends of the interval of log(rms after/rms before). pairs: [B, 2] sums of squares."""
+    """Return the ends of the interval of log(rms after/rms before). pairs: [B, 2] sums of squares."""
     estimate, error = (float(part[0]) for part in _log_ratio(np.ones((1, len(pairs))), pairs))
     if error <= 0:
         return estimate, estimate
@@ -92,7 +135,7 @@ def _log_ratio_ends(pairs: Numbers, seed: int) -> tuple[float, float]:
 
 
 def _quantiles(pairs: Numbers, estimate: float, seed: int) -> tuple[float, float]:
-    """Of the studentised log ratio."""
+    """Return the quantiles of the studentised log ratio."""
     from scipy.stats import t
 
     tail = (1 - LEVEL) / 2
@@ -108,10 +151,10 @@ def _quantiles(pairs: Numbers, estimate: float, seed: int) -> tuple[float, float
 
 
 def _log_ratio(weights: Numbers, pairs: Numbers) -> tuple[Numbers, Numbers]:
-    """[R] log(rms after/rms before) with blocks counted `weights` [R, B] times, and [R] its standard error.
+    """Return log(rms after/rms before) [R] and its standard error [R], with blocks counted `weights` [R, B] times.
 
-    The error is that of a ratio of sums (delta method, or infinitesimal jackknife): with the shares a_b, c_b of a block
-    in both sums its influence is u_b = (a_b − c_b)/2, and the variance B/(B − 1) Σ u_b².
+    The error is that of a ratio of sums (delta method, or infinitesimal jackknife). With the shares a_b, c_b of a block
+    in both sums its influence is u_b = (a_b − c_b)/2, and the variance is B/(B − 1) Σ u_b².
     """
     sums = weights @ pairs
     estimate = 0.5 * np.log(sums[:, 1] / sums[:, 0])
@@ -124,7 +167,7 @@ def _log_ratio(weights: Numbers, pairs: Numbers) -> tuple[Numbers, Numbers]:
 
 
 def _independent(pairs: Numbers) -> Numbers:
-    """Neighbouring blocks put together in twos, while their influences are correlated beyond chance, or too many."""
+    """Join neighbouring blocks in pairs while there are too many, or their influences are correlated beyond chance."""
     while len(pairs) >= 2 * _LEAST_PLAIN:
         sums = pairs.sum(axis=0)
         influence = pairs[:, 1] / sums[1] - pairs[:, 0] / sums[0]

@@ -1,5 +1,7 @@
-"""Piecewise quintic curves: between knots the one polynomial of degree 5 that meets position, velocity and acceleration
-at both ends (quintic Hermite), constant outside. Twice continuously differentiable.
+"""How piecewise quintic curves run between knots, twice continuously differentiable.
+
+Each piece is the polynomial of degree 5 with position, velocity and acceleration of both its knots (quintic Hermite).
+Outside the knots the position is constant.
 """
 
 from __future__ import annotations
@@ -11,10 +13,20 @@ Numbers = NDArray[np.float64]
 
 
 def evaluate(knots: Numbers, time: Numbers) -> tuple[Numbers, Numbers, Numbers]:
-    """Position, velocity and acceleration, [N] each, of a curve at `time` [N] (s).
+    """Evaluate a curve and its derivatives.
 
-    knots: [k, 4] of time (s, increasing), position (rad), velocity (rad/s), acceleration (rad/s²); k >= 1. At rest
-        outside, which is continuous where the first and the last knot are at rest.
+    Parameters
+    ----------
+    knots
+        [k, 4] of time (s, increasing), position (rad), velocity (rad/s), acceleration (rad/s²); k >= 1.
+    time
+        [N] (s).
+
+    Returns
+    -------
+    position, velocity, acceleration
+        [N] (rad, rad/s, rad/s²). Outside the knots the curve is at rest, which is continuous if the first and the last
+        knot are at rest.
     """
     if len(knots) == 1:
         return np.full(len(time), knots[0, 1]), np.zeros(len(time)), np.zeros(len(time))
@@ -24,13 +36,13 @@ def evaluate(knots: Numbers, time: Numbers) -> tuple[Numbers, Numbers, Numbers]:
     u = np.clip((time - begin[0]) / h, 0.0, 1.0)
     v0, v1 = begin[2] * h, end[2] * h
     a0, a1 = begin[3] * h * h / 2, end[3] * h * h / 2
-    rise = end[1] - begin[1] - v0 - a0  # what the cubic and higher terms have to make good at u = 1
+    rise = end[1] - begin[1] - v0 - a0  # the cubic and higher terms add up to this at u = 1
     slope, bend = v1 - v0 - 2 * a0, a1 - a0
     c3, c4, c5 = 10 * rise - 4 * slope + bend, -15 * rise + 7 * slope - 2 * bend, 6 * rise - 3 * slope + bend
     position = begin[1] + u * (v0 + u * (a0 + u * (c3 + u * (c4 + u * c5))))
     velocity = (v0 + u * (2 * a0 + u * (3 * c3 + u * (4 * c4 + u * 5 * c5)))) / h
     acceleration = (2 * a0 + u * (6 * c3 + u * (12 * c4 + u * 20 * c5))) / (h * h)
-    # the last knot exactly, not to rounding
+    # exactly the last knot, without rounding errors
     position, velocity, acceleration = (
         np.where(u < 1, inside, last) for inside, last in zip((position, velocity, acceleration), end[1:], strict=True)
     )

@@ -1,4 +1,4 @@
-"""Random draws that stay the same: the streams of PCG64, whose raw numbers numpy does not change between versions."""
+"""Which random numbers stay the same in all versions: streams of PCG64, whose raw numbers numpy does not change."""
 
 from __future__ import annotations
 
@@ -10,26 +10,63 @@ LARGEST_SEED = 2**53
 
 
 class Draws:
-    """A stream of random numbers of its own for every (seed, names)."""
+    """A separate stream of random numbers for every (seed, names).
+
+    Parameters
+    ----------
+    seed
+        From 0 to `LARGEST_SEED`.
+    *stream
+        Numbers that name the stream.
+    """
 
     def __init__(self, seed: int, *stream: int) -> None:
         self._generator = np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, *stream])))
 
     def share(self) -> float:
-        """Uniform in [0, 1)."""
+        """Draw a number.
+
+        Returns
+        -------
+        float
+            Uniform in [0, 1).
+        """
         return float(self._generator.random())
 
     def between(self, low: float, high: float) -> float:
-        """Uniform in [low, high)."""
+        """Draw a number between bounds.
+
+        Parameters
+        ----------
+        low, high
+            Bounds.
+
+        Returns
+        -------
+        float
+            Uniform in [low, high).
+        """
         return low + (high - low) * self.share()
 
     def sign(self) -> float:
+        """Draw a sign.
+
+        Returns
+        -------
+        float
+            1 or −1, equally likely.
+        """
         return 1.0 if self.share() < 0.5 else -1.0
 
     def direction(self) -> list[float]:
-        """[3] unit vector, uniform on the sphere (Marsaglia, Ann. Math. Statist. 43(2), 1972).
+        """Draw a direction (Marsaglia, Ann. Math. Statist. 43(2), 1972).
 
-        By square roots alone, which every machine rounds alike.
+        It uses square roots only, which every machine rounds alike.
+
+        Returns
+        -------
+        list of float
+            Unit vector [3], uniform on the sphere.
         """
         while True:
             x, y = self.between(-1.0, 1.0), self.between(-1.0, 1.0)

@@ -1,7 +1,7 @@
-"""Oscillations at a steady frequency in a residual, whatever the hand does: vibration, mains, a motor's cogging.
+"""Which oscillations at a steady frequency a residual has: vibration, mains, a motor's cogging.
 
-A periodogram of noise is exponentially distributed around its smooth spectrum; the largest of all its values has a
-known distribution (Fisher 1929; here with a local background, so that coloured noise is no line).
+A periodogram of noise is exponentially distributed around its smooth spectrum, and the largest of its values has a
+known distribution (Fisher 1929). Here the background is local, so that coloured noise is not mistaken for a line.
 """
 
 from __future__ import annotations
@@ -22,14 +22,26 @@ if TYPE_CHECKING:
 
 Numbers = NDArray[np.float64]
 
-LOWEST = 0.5  # Hz: slower ones belong to the bias
+LOWEST = 0.5  # Hz; slower oscillations belong to the bias
 BACKGROUND = 121  # bins of the smooth spectrum on either side
 MOST_LINES = 5
 
 
 @dataclass(frozen=True)
 class Line:
-    """frequency: Hz. amplitude: N·m, largest of the recordings. p_value: over all frequencies. share: of variance."""
+    """An oscillation at a steady frequency.
+
+    Attributes
+    ----------
+    frequency
+        Hz.
+    amplitude
+        Largest of the recordings (N·m).
+    p_value
+        Over all frequencies.
+    share
+        Share of the variance.
+    """
 
     frequency: float
     amplitude: float
@@ -40,9 +52,25 @@ class Line:
 def find_lines(
     series: BlockSeries, residual: Numbers, filters: Whitener, *, level: float
 ) -> tuple[tuple[Line, ...], Numbers]:
-    """Lines in the residual [B] of a joint with p-values up to the level, and their sum [B]; 0 in unused blocks.
+    """Find lines in the residual of a joint.
 
-    filters: of this joint; lines are looked for in what it leaves, so that a steep spectrum does not spill over.
+    Parameters
+    ----------
+    series
+        Block means.
+    residual
+        [B] (N·m).
+    filters
+        Whitener of this joint. Lines are searched for in the whitened residual, so that a steep spectrum causes none.
+    level
+        Largest p-value of a line.
+
+    Returns
+    -------
+    lines
+        At most `MOST_LINES`, the most significant first.
+    total
+        Their sum [B] (N·m), 0 in unused blocks.
     """
     used = series.used & np.isfinite(residual)
     left = np.where(used, residual, 0.0)
@@ -62,7 +90,7 @@ def find_lines(
 
 
 def _strongest(series: BlockSeries, flat: Numbers, used: NDArray[np.bool_]) -> tuple[float, float] | None:
-    """Frequency, Hz, and family-wise p-value of the highest point of the periodogram over its background."""
+    """Return frequency (Hz) and family-wise p-value of the highest point of the periodogram over its background."""
     recordings = np.unique(series.recording)
     places = [np.flatnonzero(series.recording == each) for each in recordings]
     slots = [np.round((series.time[rows] - series.time[rows[0]]) / series.step).astype(int) for rows in places]
@@ -82,13 +110,13 @@ def _strongest(series: BlockSeries, flat: Numbers, used: NDArray[np.bool_]) -> t
         return None
     ratio = power / _background(power) * gammainccinv(waves, 0.5)
     peak = int(np.argmax(np.where(allowed, ratio, 0.0)))
-    tests = 1.5 * float(allowed.sum())  # twice as fine as independent points, which are half of them
+    tests = 1.5 * float(allowed.sum())  # the grid is twice as fine as independent points
     p_value = float(-np.expm1(tests * np.log1p(-min(gamma.sf(ratio[peak], waves), 1.0 - 1e-12))))
     return float(frequency[peak]), p_value
 
 
 def _background(power: Numbers) -> Numbers:
-    """Median of the spectrum to the left or to the right of each point, the greater of both (an edge is no line)."""
+    """Return the greater of the spectrum's medians to the left and right of each point, so that an edge is no line."""
     size = BACKGROUND
     middle = median_filter(power, size=size, mode="nearest")
     gap = 4  # bins of the line itself
@@ -99,7 +127,7 @@ def _background(power: Numbers) -> Numbers:
 
 
 def _fitted(series: BlockSeries, left: Numbers, used: NDArray[np.bool_], near: float) -> tuple[Numbers, float]:
-    """Least-squares wave of each recording at the frequency, and the greatest amplitude."""
+    """Return the least-squares wave of each recording at the frequency, and the greatest amplitude."""
     wave, amplitude = np.zeros(len(left)), 0.0
     for each in np.unique(series.recording):
         rows = (series.recording == each) & used

@@ -1,4 +1,4 @@
-"""What no cause may be credited with: the slow bias, and all that refitting the nominal model can mend."""
+"""What must not be credited to a cause: the slow bias, and everything that refitting the nominal model explains."""
 
 from __future__ import annotations
 
@@ -15,17 +15,30 @@ Numbers = NDArray[np.float64]
 Array = NDArray[Any]
 Splines = Any  # scipy.sparse.csr_array [B, s], which comes without types
 
-KNOTS = 2.0  # s: what a bias does
+KNOTS = 2.0  # s; the splines follow a bias at this pace
 TRENDS = (
-    10.0  # s: of tests. What a bias does faster is noise that whitening sees: with knots of 2 s p-values are too small
+    10.0  # s, for tests; faster changes of a bias are noise for the whitening (knots of 2 s make p-values too small)
 )
 _PIECE = 4096  # rows at a time
-_LOST = 1e-9  # of a column's square, below which the projection left rounding only
-_RANK = 1e-10  # of the largest power, columns scaled to length 1 before: derivatives are exact, rounding is far below
+_LOST = 1e-9  # of a column's square; if the projection leaves less, it is rounding only
+_RANK = 1e-10  # of the largest power of columns of length 1; derivatives are exact, rounding is far below
 
 
 def bias_splines(series: BlockSeries, knots: float = KNOTS) -> Splines:
-    """[B, s] cubic B-splines in time, of each stretch without a gap its own, knots about `knots` s apart."""
+    """Make splines of a slow bias.
+
+    Parameters
+    ----------
+    series
+        Block means.
+    knots
+        Distance of the knots, about (s).
+
+    Returns
+    -------
+    Splines
+        Cubic B-splines in time [B, s], separate for each stretch without a gap.
+    """
     blocks = []
     for number in np.unique(series.segment):
         time = series.time[series.segment == number]
@@ -40,22 +53,50 @@ def bias_splines(series: BlockSeries, knots: float = KNOTS) -> Splines:
 
 
 def constant_bias(series: BlockSeries) -> Splines:
-    """[B, s] a constant for every stretch without a gap."""
+    """Make a constant bias for every stretch without a gap.
+
+    Parameters
+    ----------
+    series
+        Block means.
+
+    Returns
+    -------
+    Splines
+        [B, s], ones and zeros.
+    """
     return sparse.csr_array((series.segment[:, None] == np.unique(series.segment)).astype(np.float64))
 
 
 class Span:
-    """Takes what lies in the span of splines off other columns."""
+    """Removes the span of splines from other columns.
+
+    Parameters
+    ----------
+    splines
+        [R, s].
+    """
 
     def __init__(self, splines: Splines) -> None:
-        """splines: [R, s]."""
+        """Invert the Gram matrix of the splines."""
         alive = np.flatnonzero(np.asarray(abs(splines).sum(axis=0)).ravel() > 0)
         self._matrix = sparse.csr_array(splines[:, alive])
         gram = np.asarray((self._matrix.T @ self._matrix).todense())
         self._inverse = np.linalg.pinv(gram, rcond=_RANK, hermitian=True) if gram.size else gram
 
     def without(self, columns: Array) -> Numbers:
-        """[R, d] less their part in the span; a column of which nothing but rounding is left becomes 0."""
+        """Return columns without their part in the span.
+
+        Parameters
+        ----------
+        columns
+            [R, d].
+
+        Returns
+        -------
+        Numbers
+            [R, d]. A column of which only rounding is left becomes 0.
+        """
         values = np.asarray(columns, dtype=np.float64)
         if not self._matrix.shape[1]:
             return values
@@ -66,13 +107,24 @@ class Span:
 
 
 def basis(columns: Array) -> Numbers:
-    """[R, r] orthonormal basis of the span of columns [R, c]; directions that rounding decides are left out."""
+    """Return an orthonormal basis of the span of columns.
+
+    Parameters
+    ----------
+    columns
+        [R, c].
+
+    Returns
+    -------
+    Numbers
+        [R, r]. Directions that depend on rounding are left out.
+    """
     values = np.asarray(columns, dtype=np.float64)
     length = np.sqrt(np.einsum("rc,rc->c", values, values))
     values = values[:, length > 0] / length[length > 0]
     if not values.shape[1]:
         return np.zeros((len(values), 0))
-    # by the Gram matrix: rows are many, columns few; below its precision nothing is kept anyway
+    # by the Gram matrix, since there are many rows and few columns; its lower precision does no harm
     power, direction = np.linalg.eigh(values.T @ values)
     kept = power > _RANK * power[-1]
     found = values @ (direction[:, kept] / np.sqrt(power[kept]))
@@ -80,13 +132,41 @@ def basis(columns: Array) -> Numbers:
 
 
 def without(columns: Array, span: Numbers) -> Array:
-    """Columns [R, ...] less what lies in an orthonormal span [R, r]; keeps the type of number."""
+    """Return columns without their part in an orthonormal span.
+
+    Parameters
+    ----------
+    columns
+        [R, ...].
+    span
+        [R, r].
+
+    Returns
+    -------
+    Array
+        [R, ...], with the columns' type of number.
+    """
     own = span.astype(columns.dtype, copy=False)
     return np.asarray(columns - own @ (own.T @ columns))
 
 
 def residual_of(series: BlockSeries, splines: Splines, nominal: Array) -> Numbers:
-    """[B, n] N·m: target less bias and all that `nominal` [B, n, u] explains by least squares; unused rows as found."""
+    """Return the target without bias and without what the nominal columns explain by least squares.
+
+    Parameters
+    ----------
+    series
+        Block means.
+    splines
+        Splines of the bias [B, s].
+    nominal
+        [B, n, u].
+
+    Returns
+    -------
+    Numbers
+        [B, n] (N·m). Unused rows keep the target less its mean.
+    """
     used = series.used
     span = Span(splines[used])
     target = span.without(series.target[used])
@@ -101,7 +181,7 @@ def residual_of(series: BlockSeries, splines: Splines, nominal: Array) -> Number
 
 
 def _explained(columns: Array, target: Numbers) -> Numbers:
-    """[R] of a target [R] by least squares on columns [R, c], through their Gram matrix."""
+    """Return what columns [R, c] explain of a target [R] by least squares, through their Gram matrix."""
     gram, score = np.zeros((columns.shape[1], columns.shape[1])), np.zeros(columns.shape[1])
     for begin in range(0, len(columns), _PIECE):
         part = np.asarray(columns[begin : begin + _PIECE], dtype=np.float64)

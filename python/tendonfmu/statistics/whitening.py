@@ -1,8 +1,8 @@
-"""Noise that remembers made white: an autoregressive model per joint, and what joints have in common.
+"""How correlated noise is whitened: by an autoregressive model for each joint.
 
-The model looks back over windows that grow with their distance (heterogeneous autoregression: Corsi, 2009), so that a
-few numbers describe both the short memory of coloured noise and the long one of a bias that wanders faster than its
-splines. How many windows is chosen by Schwarz's criterion. Filtering target and columns alike turns least squares into
+The model looks back over windows that grow with their distance (heterogeneous autoregression: Corsi, 2009). So a few
+numbers describe both the short memory of coloured noise and the long memory of a bias that changes faster than its
+splines. Schwarz's criterion chooses the number of windows. Filtering target and columns alike turns least squares into
 generalised least squares (Cochrane and Orcutt, 1949).
 """
 
@@ -20,15 +20,23 @@ Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Array = NDArray[Any]
 
-# first and last block before the present one whose mean is a regressor
+# the mean of these blocks, first to last before the present one, is a regressor
 WINDOWS = ((1, 1), (2, 2), (3, 3), (4, 4), (5, 8), (9, 16), (17, 32), (33, 64), (65, 128))
 _ROOM = 20  # rows for each coefficient, at least
 
 
 @dataclass(frozen=True)
 class Whitener:
-    """coefficients: [p, n] of the means over the first p windows. scale: [n] N·m of what they leave. valid: [B] rows
-    whose windows are used and of the same stretch.
+    """The filter of each joint.
+
+    Attributes
+    ----------
+    coefficients
+        Of the means over the first p windows [p, n].
+    scale
+        Standard deviation of what they leave [n] (N·m).
+    valid
+        Rows whose windows are used and in the same stretch [B].
     """
 
     coefficients: Numbers
@@ -36,7 +44,18 @@ class Whitener:
     valid: Flags
 
     def apply(self, values: Array) -> Array:
-        """[B, n, ...] filtered and in units of the noise; rows that are not valid are 0."""
+        """Filter values, and scale them to the noise.
+
+        Parameters
+        ----------
+        values
+            [B, n, ...].
+
+        Returns
+        -------
+        Array
+            [B, n, ...] in units of the noise. Rows that are not valid are 0.
+        """
         shape = (1, values.shape[1], *[1] * (values.ndim - 2))
         found = np.array(values, dtype=np.float64)
         before = _sums(found)
@@ -48,18 +67,18 @@ class Whitener:
 
 
 def _sums(values: Numbers) -> Numbers:
-    """[B + 1, ...] sums of all rows before."""
+    """Return the sums of all rows before [B + 1, ...]."""
     return np.concatenate([np.zeros_like(values[:1]), np.cumsum(values, axis=0)])
 
 
 def _mean(before: Numbers, first: int, last: int) -> Numbers:
-    """[B − last, ...] mean over rows k − last .. k − first, for k from `last` on."""
+    """Return the mean over rows k − last .. k − first, for k from `last` on [B − last, ...]."""
     rows = len(before) - 1
     return np.asarray((before[last - first + 1 : rows - first + 1] - before[: rows - last]) / (last - first + 1))
 
 
 def valid_rows(series: BlockSeries, reach: int) -> Flags:
-    """[B] used rows with `reach` used ones before them in the same stretch without a gap."""
+    """Return the used rows [B] that have `reach` used rows before them in the same stretch without a gap."""
     run = np.ones(len(series.time), dtype=bool)
     run[1:] = series.used[1:] & series.used[:-1] & (series.segment[1:] == series.segment[:-1])
     run[0] = False
@@ -68,7 +87,22 @@ def valid_rows(series: BlockSeries, reach: int) -> Flags:
 
 
 def whitener(series: BlockSeries, residual: Numbers) -> Whitener:
-    """residual: [B, n] N·m, model and bias taken off. All joints look back as far as the one that needs most."""
+    """Estimate the filter of each joint.
+
+    All joints look back as far as the one that needs most.
+
+    Parameters
+    ----------
+    series
+        Block means.
+    residual
+        [B, n] (N·m), without model and bias.
+
+    Returns
+    -------
+    Whitener
+        The filters.
+    """
     most = _most_windows(series)
     valid = valid_rows(series, _reach(most))
     fits = [_autoregression(residual[:, j], valid, most) for j in range(residual.shape[1])]
@@ -88,7 +122,7 @@ def _reach(windows: int) -> int:
 
 
 def _most_windows(series: BlockSeries) -> int:
-    """So many that nine of ten used rows stay, and that each has rows enough."""
+    """Return the largest number of windows that keeps nine of ten used rows and gives each coefficient enough rows."""
     used = int(series.used.sum())
     for count in range(len(WINDOWS), 0, -1):
         rows = int(valid_rows(series, _reach(count)).sum())
@@ -98,7 +132,7 @@ def _most_windows(series: BlockSeries) -> int:
 
 
 def _autoregression(values: Numbers, valid: Flags, most: int) -> Numbers:
-    """[p] coefficients by least squares, p = 0..most of the least BIC; all see the same rows."""
+    """Return coefficients [p] by least squares, p = 0..most with the least BIC. All orders use the same rows."""
     rows = np.flatnonzero(valid)
     target = values[rows]
     before = _sums(values)

@@ -1,7 +1,7 @@
-"""Long computations: what they are doing, how they end, and how they are resumed or spread.
+"""How long computations show progress, end, resume and run in parallel.
 
-`phases` says how far a computation is, `interruption` ends it at Ctrl-C and SIGTERM, `steps` keeps the results of
-each step in a folder, `jobs` calls a function for many inputs, here or on the workers of a cluster.
+`phases` shows how far a computation is, `interruption` ends it at Ctrl-C and SIGTERM, `steps` keeps the results of each
+step in a folder, and `jobs` calls a function for many inputs, here or on the workers of a cluster.
 """
 
 import lazy_loader

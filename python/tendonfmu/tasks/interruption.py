@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: both end a command as KeyboardInterrupt, and neither in the middle of writing its results."""
+"""How Ctrl-C and SIGTERM end a command: as KeyboardInterrupt, and never while results are being written."""
 
 from __future__ import annotations
 
@@ -13,23 +13,38 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class Terminated(KeyboardInterrupt):
-    """The process was asked to end by SIGTERM."""
+    """SIGTERM asked the process to end."""
 
 
 class Ending:
-    """Remembers which signal ends the command. status: 128 + its number; SIGINT where none was seen."""
+    """Remembers which signal ends the command.
+
+    Attributes
+    ----------
+    status
+        128 + number of the signal; SIGINT if none was seen.
+    """
 
     def __init__(self) -> None:
         self.status = 128 + signal.SIGINT
 
     def terminate(self, number: int, frame: FrameType | None) -> None:
+        """Handle a signal: remember its number and raise Terminated."""
         self.status = 128 + number
         raise Terminated
 
 
 @contextmanager
 def ended_by_signals() -> Iterator[Ending]:
-    """Within, SIGTERM raises KeyboardInterrupt, as Ctrl-C does. Does nothing outside the main thread."""
+    """Let SIGTERM raise KeyboardInterrupt inside the block, as Ctrl-C does.
+
+    Outside the main thread it does nothing.
+
+    Yields
+    ------
+    Ending
+        Which signal ended the block.
+    """
     ending = Ending()
     if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGTERM) != signal.SIG_DFL:
         yield ending
@@ -43,10 +58,10 @@ def ended_by_signals() -> Iterator[Ending]:
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Within, Ctrl-C and SIGTERM wait; the first that came takes effect at the end.
+    """Delay Ctrl-C and SIGTERM to the end of the block, where the first of them takes effect.
 
-    For the milliseconds in which several files take their places together. Does nothing outside the main thread, which
-    alone is interrupted.
+    The block should take milliseconds: it is for replacing several files together. Outside the main thread it does
+    nothing, since only the main thread is interrupted.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -64,7 +79,10 @@ def uninterrupted() -> Iterator[None]:
 
 @contextmanager
 def worker_threads(count: int) -> Iterator[ThreadPoolExecutor]:
-    """A pool that an error, or Ctrl-C, does not wait for: what has not begun is dropped, what runs is left behind."""
+    """Make a pool that does not wait after an error or Ctrl-C.
+
+    Calls that have not begun are dropped; running calls are left behind.
+    """
     pool = ThreadPoolExecutor(count)
     try:
         yield pool

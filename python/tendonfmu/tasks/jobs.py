@@ -1,12 +1,12 @@
-"""Many calls of one function, here or on the workers of `dask.distributed`: a row of answers each, resumed at any time.
+"""How one function is called for many inputs, here or on the workers of `dask.distributed`, and resumed at any time.
 
     jobs = [Job("monday", ("monday.parquet",)), Job("tuesday", ("tuesday.parquet",))]
     with workers_of(address="tcp://head:8786") as client:
         run_jobs(friction_of, jobs, Path("history"), client)
     rows = rows_of(jobs, Path("history"))
 
-A job's row is DIR/rows/NAME.json, written whole as soon as the job ends; a job with a row is not run again. The process
-that asks writes the rows: workers need no common disk for them.
+The row of a job, its result, is DIR/rows/NAME.json. It is written whole as soon as the job ends. A job with a row is
+not run again. The calling process writes the rows, so workers need no shared disk for them.
 """
 
 from __future__ import annotations
@@ -36,7 +36,15 @@ Function = Callable[..., Row]
 
 @dataclass(frozen=True)
 class Job:
-    """name: of its row's file, of characters that a file's name may have. arguments: of the function, to be pickled."""
+    """One call of the function.
+
+    Attributes
+    ----------
+    name
+        Name of its row's file, of characters that a file's name may have.
+    arguments
+        Arguments of the function; they are pickled.
+    """
 
     name: str
     arguments: tuple[Any, ...] = ()
@@ -47,18 +55,46 @@ def row_file(folder: Path, name: str) -> Path:
 
 
 def read_row(folder: Path, name: str) -> Row | None:
-    """None where the job has not ended."""
+    """Return the row of a job, or None if the job has not ended."""
     file = row_file(folder, name)
     return dict(json.loads(file.read_text(encoding="utf-8"))) if file.is_file() else None
 
 
 def rows_of(jobs: Sequence[Job], folder: Path) -> list[Row]:
-    """All rows there are, in the order of the jobs."""
+    """Return all existing rows.
+
+    Parameters
+    ----------
+    jobs
+        The jobs.
+    folder
+        Folder of the rows.
+
+    Returns
+    -------
+    list of dict
+        In the order of the jobs.
+    """
     return [row for row in (read_row(folder, job.name) for job in jobs) if row is not None]
 
 
 def waiting_jobs(jobs: Sequence[Job], folder: Path, failed_again: bool = False) -> list[Job]:
-    """Jobs without a row; failed_again: also those whose row is an error."""
+    """Return the jobs that have to run.
+
+    Parameters
+    ----------
+    jobs
+        The jobs.
+    folder
+        Folder of the rows.
+    failed_again
+        Whether to include jobs whose row is an error.
+
+    Returns
+    -------
+    list of Job
+        Jobs without a row, in their order.
+    """
     return [job for job in jobs if _is_waiting(read_row(folder, job.name), failed_again)]
 
 
@@ -76,27 +112,35 @@ def run_jobs(
     failed_again: bool = False,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> int:
-    """Calls the function for each job without a row, and writes its row as it ends.
+    """Call the function for each job without a row, and write its row when it ends.
 
     Parameters
     ----------
-    function : of a module that workers can import; function(*arguments) -> row, a dict of numbers, words and None.
-        What it raises becomes the row's `error`.
-    jobs : with names that differ.
-    folder : of the rows.
-    client : of `workers_of`, or None: here, one after another.
-    stop_after : s, after which no further job begins.
-    failed_again : run jobs whose row is an error once more.
-    progress : called with the number of jobs that have a row, and of all.
+    function
+        Function of a module that workers can import. function(*arguments) returns a row, a dict of numbers, strings and
+        None. An exception becomes the row's `error`.
+    jobs
+        Jobs with distinct names.
+    folder
+        Folder of the rows.
+    client
+        From `workers_of`. None: run here, one after another.
+    stop_after
+        Time after which no further job starts (s).
+    failed_again
+        Whether to run jobs again whose row is an error.
+    progress
+        Called with the number of jobs that have a row, and of all jobs.
 
     Returns
     -------
-    int : how many jobs ran.
+    int
+        How many jobs ran.
 
     Raises
     ------
-    InputError : a folder that cannot be written, names that no file can have or that are not unique, a scheduler that
-        was lost.
+    InputError
+        The folder cannot be written, a name is not unique or not allowed for a file, or the scheduler was lost.
     """
     _check_names([job.name for job in jobs])
     check_output_folder(folder)
@@ -118,7 +162,7 @@ def _check_names(names: Sequence[str]) -> None:
         if not name or name.startswith(".") or Path(name).name != name or "\\" in name:
             raise InputError(f"jobs: name {name!r}; expected one that a file can have")
         if name in taken:
-            raise InputError(f"jobs: the name {name} stands twice; expected names that differ")
+            raise InputError(f"jobs: the name {name} occurs twice; expected names that differ")
         taken.add(name)
 
 
@@ -132,7 +176,7 @@ def _json(row: Row) -> str:
 
 
 def _plain(row: Row) -> Row:
-    """Numbers of numpy as those of JSON; what is not finite as null."""
+    """Convert numbers of numpy to those of JSON, and numbers that are not finite to null."""
     found: Row = {}
     for key, value in row.items():
         value = value.item() if isinstance(value, np.generic) else value
@@ -145,18 +189,18 @@ def failed_row(name: str, failed: BaseException) -> Row:
 
 
 def call(function: Function, job: Job) -> Row:
-    """The job's row, made where it runs."""
+    """Return the job's row. This runs where the job runs."""
     begin, begin_cpu = time.perf_counter(), time.process_time()
     try:
         row = {"error": "", **function(*job.arguments), "name": job.name}
-        _json(row)  # what no row can hold is an error of the job
-    except Exception as failed:  # days of work go on: the row says what happened
+        _json(row)  # a value that is not allowed in a row is an error of the job
+    except Exception as failed:  # the other jobs continue; the row reports the error
         row = failed_row(job.name, failed)
     return row | {"run_seconds": time.perf_counter() - begin, "cpu_seconds": time.process_time() - begin_cpu}
 
 
 def _rows(function: Function, jobs: Sequence[Job], client: Any, deadline: float) -> Iterator[Row]:
-    """Each row as it ends."""
+    """Yield each row when its job ends."""
     waiting = iter(jobs)
 
     def next_job() -> Job | None:
@@ -170,15 +214,15 @@ def _rows(function: Function, jobs: Sequence[Job], client: Any, deadline: float)
 
 
 def _rows_of_workers(function: Function, next_job: Callable[[], Job | None], client: Any) -> Iterator[Row]:
-    """Only as many jobs are under way as there are threads to take them: dask blames all jobs of a worker that dies, so
-    none waits there beside another one.
+    """Yield each row from the workers, with at most one running job per thread.
 
-    Dask runs a job of a worker that died once more on another one. A job is under way until its row is here, so each
-    one gives one row, however often it ran.
+    Dask blames all jobs on a worker that dies, so no job waits on a worker beside another one. Dask repeats a job of a
+    dead worker on another worker. A job counts as running until its row has arrived, so each job gives one row, however
+    often it ran.
     """
     import distributed
 
-    library: Any = distributed  # it has no types
+    library: Any = distributed  # distributed has no types
     under_way: dict[Any, Job] = {}
     pending = library.as_completed()
 
@@ -196,25 +240,28 @@ def _rows_of_workers(function: Function, next_job: Callable[[], Job | None], cli
         for future in pending:
             yield _row_of(future, under_way.pop(future))
             top_up()
-    except (OSError, library.CancelledError) as lost:  # what a job raises is in its row
+    except (OSError, library.CancelledError) as lost:  # not from a job: its errors are in its row
         words = " ".join(str(lost).split())
         raise InputError(
-            f"the dask scheduler was lost ({type(lost).__name__}: {words}); expected it to stay: the same command "
-            "goes on"
+            f"the dask scheduler was lost ({type(lost).__name__}: {words}); expected it to keep running: the same "
+            "command resumes the jobs"
         ) from None
 
 
 def _row_of(future: Any, job: Job) -> Row:
-    """Errors of the job that `call` could not catch: a function that the worker cannot import, a job that ends one
-    worker after another (memory, a crash) until dask gives it up."""
+    """Return the row of a job, also for errors that `call` could not catch.
+
+    Such errors are a function that the worker cannot import, and a job that ends one worker after another (memory, a
+    crash) until dask gives up.
+    """
     try:
         return failed_row(job.name, _first_of(future.exception())) if future.status == "error" else future.result()
     finally:
-        future.release()  # else dask makes it again when the worker that has it dies
+        future.release()  # otherwise dask computes it again when the worker that holds it dies
 
 
 def _first_of(failed: BaseException) -> BaseException:
-    """What dask wraps in an error of its own."""
+    """Return the original error that dask has wrapped in its own."""
     while failed.__cause__ is not None:
         failed = failed.__cause__
     return failed
@@ -225,9 +272,24 @@ def _first_of(failed: BaseException) -> BaseException:
 
 @contextmanager
 def workers_of(address: str | None = None, count: int = 1) -> Iterator[Any]:
-    """A dask client: of the scheduler at an address (tcp://HOST:PORT), or of so many worker processes here.
+    """Connect to workers.
 
-    Raises InputError without dask, without an answer from the address, and for workers of another version.
+    Parameters
+    ----------
+    address
+        Address of a scheduler (tcp://HOST:PORT). None: start worker processes here.
+    count
+        Number of worker processes to start here.
+
+    Yields
+    ------
+    Client
+        A dask client.
+
+    Raises
+    ------
+    InputError
+        Dask is missing, the address does not answer, or workers have another version of tendonfmu.
     """
     library = _library()
     if address is None:
@@ -254,7 +316,7 @@ def _library() -> Any:
 
 @contextmanager
 def _local_workers(library: Any, count: int) -> Iterator[Any]:
-    """One thread of linear algebra per worker; a port of its own, so that two campaigns do not meet."""
+    """Start workers with one thread of linear algebra each, on a free port, so that two campaigns do not conflict."""
     import dask
 
     limits = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
@@ -269,20 +331,20 @@ def _local_workers(library: Any, count: int) -> Iterator[Any]:
 
 
 def version_here() -> str:
-    """Of the package where it runs."""
+    """Return the version of the package where this runs."""
     return tendonfmu.__version__
 
 
 def check_versions(client: Any, address: str) -> None:
-    """Raises InputError where there is no worker, or a scheduler or worker without tendonfmu of this version."""
+    """Raise InputError if there is no worker, or if scheduler or workers lack this version of tendonfmu."""
     try:
         client.wait_for_workers(1, timeout=SECONDS_TO_CONNECT)
     except TimeoutError:
         raise InputError(f"--scheduler {address}: no workers; expected at least one, `dask worker {address}`") from None
     try:
-        # the scheduler reads jobs, too
+        # the scheduler unpickles jobs as well
         found = {"the scheduler": client.run_on_scheduler(version_here), **client.run(version_here)}
-    except Exception as failed:  # of any of them: no such module, most often
+    except Exception as failed:  # from any of them, mostly a missing module
         words = " ".join(str(_first_of(failed)).split())
         raise InputError(
             f"--scheduler {address}: it or a worker cannot import tendonfmu ({words}); expected version "
@@ -294,5 +356,11 @@ def check_versions(client: Any, address: str) -> None:
 
 
 def worker_count() -> int:
-    """As many as there are processors to use."""
+    """Return the default number of workers.
+
+    Returns
+    -------
+    int
+        Number of processors that this process may use.
+    """
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

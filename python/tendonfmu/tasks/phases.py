@@ -1,10 +1,12 @@
-"""Where a long computation is: its phases, how far each is, and how long the rest will take. Prints nothing.
+"""How far a long computation is: its phases, the progress of each, and the remaining time.
 
-phases = Phases({"fitting the model": 3.0, "looking for causes": 10.0}, watch=show)
-with phases.start("fitting the model", total=40) as step:
-    for k in range(40):
-        ...
-        step(k + 1)
+    phases = Phases({"fitting the model": 3.0, "looking for causes": 10.0}, watch=show)
+    with phases.start("fitting the model", total=40) as step:
+        for k in range(40):
+            ...
+            step(k + 1)
+
+This module prints nothing.
 """
 
 from __future__ import annotations
@@ -14,14 +16,26 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from time import perf_counter
 
-PATIENCE = 3.0  # s; before, nothing is said of the time that is left
-LEAST_SHARE = 0.02  # of all the work: what is extrapolated from less says nothing
+PATIENCE = 3.0  # s; the remaining time is not estimated before
+LEAST_SHARE = 0.02  # of all the work; the remaining time is not extrapolated from less
 
 
 @dataclass(frozen=True)
 class PhaseState:
-    """number: of the phase, from 1, of `count`. words: what is being done. done, total: steps of it; total None where
-    it is not known. seconds: since the beginning. left_s: estimate for all that is left, None in the first seconds.
+    """The state of a computation.
+
+    Attributes
+    ----------
+    number, count
+        Number of the present phase, from 1, and of all phases.
+    words
+        What is being done.
+    done, total
+        Steps of the phase. total is None if it is unknown.
+    seconds
+        Time since the beginning (s).
+    left_s
+        Estimate of the remaining time (s). None in the first seconds.
     """
 
     number: int
@@ -40,11 +54,17 @@ Step = Callable[[int], None]
 class Phases:
     """Phases in their order.
 
-    names: words -> share of the work, in any unit; or words alone, for equal shares. watch: called at every step.
-    clock: s.
+    A phase may be skipped: its share is then neither done nor left. A phase may be repeated, also after others: its
+    earlier runs count as work done, and the phases after it as left.
 
-    A phase may be skipped: its share is then neither done nor left. A phase may come again, also after others: what it
-    did before counts as work done, and the phases after it as left.
+    Parameters
+    ----------
+    names
+        Words -> share of the work, in any unit. Words alone: equal shares.
+    watch
+        Called at every step.
+    clock
+        Returns the time (s).
     """
 
     def __init__(
@@ -63,7 +83,20 @@ class Phases:
 
     @contextmanager
     def start(self, words: str, total: int | None = None) -> Iterator[Step]:
-        """Gives step(done), to be called as the work goes on. words: one of the names."""
+        """Enter a phase.
+
+        Parameters
+        ----------
+        words
+            One of the names.
+        total
+            Number of steps. None: unknown.
+
+        Yields
+        ------
+        Step
+            step(done), to be called during the work.
+        """
         index = self._names.index(words)
 
         def step(done: int) -> None:

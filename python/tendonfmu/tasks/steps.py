@@ -1,7 +1,7 @@
-"""Steps of a long computation whose results stay in a folder: what is done and unchanged is not done again.
+"""How the steps of a long computation are kept in a folder, so that finished and unchanged steps are not repeated.
 
-A result is JSON and belongs to all that it was made from: the digest of the files, of the options, of the results
-before it and of the version of the product.
+A result is JSON and belongs to everything it was made from: the digest of the files, of the options, of the results
+before it, and of the version of the product.
 """
 
 from __future__ import annotations
@@ -20,12 +20,25 @@ FORMAT = "tendonfmu-calibration-step-1"
 
 
 class Steps:
-    """In a folder. made_from: what every step depends on, as JSON has it."""
+    """Results of steps in a folder.
+
+    Parameters
+    ----------
+    folder
+        Folder of the computation.
+    made_from
+        What every step depends on, as JSON values.
+
+    Attributes
+    ----------
+    repeated
+        Names of the steps whose results were reused.
+    """
 
     def __init__(self, folder: Path, made_from: Mapping[str, Any]) -> None:
         self._folder = folder / FOLDER
         self._before = digest_of(made_from)
-        self.repeated: list[str] = []  # names of the steps whose results were there
+        self.repeated: list[str] = []  # names of the steps whose results were reused
 
     def result(
         self,
@@ -34,8 +47,23 @@ class Steps:
         compute: Callable[[], dict[str, Any]],
         page: Path | None = None,
     ) -> dict[str, Any]:
-        """Of this step, computed unless it is there already. made_from: what it depends on beside the steps before.
-        page: a file that the step writes, too: it has to be there.
+        """Return the result of a step, computed only if it does not exist.
+
+        Parameters
+        ----------
+        name
+            Name of the step.
+        made_from
+            What it depends on in addition to the steps before, as JSON values.
+        compute
+            Computes the result.
+        page
+            A file that the step also writes. If it is missing, the step is computed again.
+
+        Returns
+        -------
+        dict
+            The result, as JSON reads it.
         """
         key = self._before = digest_of({"before": self._before, "name": name, **made_from})
         file = self._folder / f"{name}.json"
@@ -46,17 +74,23 @@ class Steps:
         result = compute()
         self._folder.mkdir(parents=True, exist_ok=True)
         write_text(file, json.dumps({"format": FORMAT, "key": key, "result": result}) + "\n")
-        # as a later call reads it: tuples become lists at once
+        # as a later call would read it: tuples become lists
         return dict(json.loads(json.dumps(result)))
 
 
 def forget_steps(folder: Path) -> None:
-    """The next calibration in this folder does everything anew."""
+    """Delete the results, so that the next calibration in this folder computes everything again.
+
+    Parameters
+    ----------
+    folder
+        Folder of the computation.
+    """
     shutil.rmtree(folder / FOLDER, ignore_errors=True)
 
 
 def _read(file: Path, key: str) -> dict[str, Any] | None:
-    """A result with this key; None where there is none, or where something else stands there."""
+    """Return the result with this key, or None if there is none or the file is something else."""
     try:
         content = json.loads(file.read_bytes())
     except (OSError, ValueError):
@@ -68,11 +102,34 @@ def _read(file: Path, key: str) -> dict[str, Any] | None:
 
 
 def digest_of(content: Mapping[str, Any]) -> str:
-    """Of JSON, whatever the order of its keys."""
+    """Return the digest of JSON values, independent of the order of keys.
+
+    Parameters
+    ----------
+    content
+        JSON values.
+
+    Returns
+    -------
+    str
+        SHA-256, hexadecimal.
+    """
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def digest_of_file(file: Path) -> str:
+    """Return the digest of a file.
+
+    Parameters
+    ----------
+    file
+        The file.
+
+    Returns
+    -------
+    str
+        SHA-256, hexadecimal.
+    """
     found = hashlib.sha256()
     with file.open("rb") as opened:
         while piece := opened.read(1 << 20):

@@ -1,9 +1,8 @@
-"""Third-party recordings to ours: one foreign format a file.
+"""How recordings of others become recordings of tendonfmu: one foreign format per file.
 
-A converter is a function (file, its own options) -> columns of a recording
-(docs/reference/recordings.md). To add one, write a
-module beside this and name it in `CONVERTERS`. Logs without a format of their own are read by a map of columns
-(`table`).
+A converter is a function (file, its own options) -> columns of a recording (docs/reference/recordings.md). To add one,
+write a module in this package and name it in `CONVERTERS`. Logs without a format of their own are read with a map of
+columns (`table`).
 """
 
 from __future__ import annotations
@@ -24,14 +23,24 @@ Converter = Callable[..., Columns]
 
 @dataclass(frozen=True)
 class Source:
-    """A foreign format: the module that reads it, what it is, and the options of `convert` that it takes."""
+    """A foreign format.
+
+    Attributes
+    ----------
+    module
+        The module that reads it.
+    about
+        What the format is.
+    options
+        The options of `convert` that it takes.
+    """
 
     module: str
     about: str
     options: tuple[str, ...]
 
 
-# by the name on the command line
+# key: name on the command line
 CONVERTERS = {
     "davinci": Source(
         "tendonfmu.recordings.converters.davinci",
@@ -47,7 +56,7 @@ CONVERTERS = {
 
 
 def converter(name: str) -> Converter:
-    """The converter of that name; raises InputError listing the known ones."""
+    """Return the converter of that name. Raise InputError with the known names."""
     if name not in CONVERTERS:
         raise InputError(f"convert: unknown format {name!r}; expected one of {', '.join(CONVERTERS)}, table")
     convert: Converter = importlib.import_module(CONVERTERS[name].module).convert
@@ -55,7 +64,27 @@ def converter(name: str) -> Converter:
 
 
 def convert_file(name: str, file: Path, options: Mapping[str, Any]) -> Columns:
-    """Columns of the recording in a foreign file. options: those that were given; raises InputError for a wrong one."""
+    """Convert a file of a foreign format.
+
+    Parameters
+    ----------
+    name
+        Name of the format, as on the command line.
+    file
+        The foreign file.
+    options
+        Options that the user gave, by name.
+
+    Returns
+    -------
+    dict of arrays
+        Columns of a recording, [N] each, in the units of docs/reference/recordings.md.
+
+    Raises
+    ------
+    InputError
+        The format is unknown, it does not have such an option, or the file is wrong.
+    """
     convert = converter(name)
     known = CONVERTERS[name].options
     for option in options:

@@ -1,8 +1,7 @@
-"""MAP.json of `tendonfmu convert table`: which column of a log is which of ours, in which unit, sign and zero.
+"""What MAP.json of `tendonfmu convert table` says: which column of a log becomes which of ours, in which unit.
 
-Each of our columns is  sign · scale · factor of the unit · (reading − offset).
-docs/reference/commands/convert.md explains the keys;
-`schema/map.schema.json` says the same to editors.
+Each of our columns is  sign · scale · factor of the unit · (reading − offset). docs/reference/commands/convert.md
+explains the keys, and `schema/map.schema.json` defines them for editors.
 """
 
 from __future__ import annotations
@@ -47,9 +46,18 @@ _COLUMN = re.compile(r"([a-z_]+)\[([1-9][0-9]?)\]")
 
 @dataclass(frozen=True)
 class MappedColumn:
-    """One column of ours. path: its key in the map. source: name in the log, or its number from 1.
+    """One of our columns.
 
-    factor: sign · scale · unit. offset: the reading that stands for zero, in the log's unit; None: the first one.
+    Attributes
+    ----------
+    path
+        Its key in the map.
+    source
+        Name of the column in the log, or its number from 1.
+    factor
+        sign · scale · unit.
+    offset
+        The reading that stands for zero, in the log's unit. None: the first reading.
     """
 
     path: str
@@ -58,16 +66,26 @@ class MappedColumn:
     offset: float | None = 0.0
 
     def values(self, readings: NDArray[np.float64]) -> NDArray[np.float64]:
-        """[N] in SI, of readings [N]."""
+        """Return the values [N] in SI of readings [N]."""
         offset = readings[0] if self.offset is None else self.offset
-        # no arithmetic that is not asked for: numbers in SI come out as they went in
+        # no unnecessary arithmetic: numbers in SI must not change by rounding
         shifted = readings - offset if offset else readings
         return shifted * self.factor if self.factor != 1.0 else shifted
 
 
 @dataclass(frozen=True)
 class Joint:
-    """A one-joint machine. kind: "turning" or "sliding". velocity_cutoff: Hz, 0: none, None: by the log's rate."""
+    """A one-joint machine.
+
+    Attributes
+    ----------
+    kind
+        "turning" or "sliding".
+    name
+        Name of the joint.
+    velocity_cutoff
+        Cut-off of the velocity (Hz). 0: no filter. None: chosen by the log's sample rate.
+    """
 
     kind: str
     name: str
@@ -76,9 +94,18 @@ class Joint:
 
 @dataclass(frozen=True)
 class LogFormat:
-    """How a CSV log is written. separator: None: found in its header. header: whether it has a line of names.
+    """How a CSV log is written.
 
-    skip: lines before the header. decimal: "." or ",".
+    Attributes
+    ----------
+    separator
+        None: found in the first line.
+    decimal
+        "." or ",".
+    skip
+        Lines before the header.
+    header
+        Whether the log has a line of names.
     """
 
     separator: str | None = None
@@ -89,7 +116,19 @@ class LogFormat:
 
 @dataclass(frozen=True)
 class ColumnMap:
-    """A map that has been checked. columns: by our name, or by the words of `joint` where that is given."""
+    """A map that has been checked.
+
+    Attributes
+    ----------
+    path
+        File of the map.
+    columns
+        By our name, or by the keys of `joint` if that is given.
+    joint
+        The one-joint machine, or None.
+    log
+        Format of the log.
+    """
 
     path: Path
     columns: Mapping[str, MappedColumn]
@@ -98,7 +137,7 @@ class ColumnMap:
 
 
 def read_map(path: Path) -> ColumnMap:
-    """Reads MAP.json. Raises InputError: file, key, what was expected."""
+    """Read and check MAP.json. Raise InputError with file, key and what was expected."""
     document = read_json(path, "a map of columns")
     try:
         return _read(path, Node(document))
@@ -140,7 +179,7 @@ def _read_log(node: Node) -> LogFormat:
 
 
 def _read_columns(node: Node) -> Iterator[tuple[str, MappedColumn]]:
-    """The long form: our columns by name. That none is missing is for the reader of recordings to say."""
+    """Read the long form: our columns by name. The reader of recordings checks their number."""
     names = node.keys(node.value if isinstance(node.value, dict) else ()).value
     for name in names:
         match = _COLUMN.fullmatch(name)
@@ -168,7 +207,7 @@ def _read_joint(node: Node) -> tuple[dict[str, MappedColumn], Joint]:
             node.member(word).refuse(f"the log's column of it, in one of {', '.join(parts[word])}")
     name, cutoff = node.member("name"), node.member("velocity_cutoff")
     if not cutoff.absent and not node.member("velocity").absent:
-        cutoff.refuse("no cut-off beside a column of velocity: it is taken as it is")
+        cutoff.refuse("no cut-off together with a column of velocity, which is not filtered")
     joint = Joint(
         kind,
         "joint" if name.absent else name.text("a name"),
@@ -199,7 +238,7 @@ def _read_column(node: Node, known: Mapping[str, float]) -> MappedColumn:
 
 
 def _factor(unit: Node, known: Mapping[str, float]) -> float:
-    """Of the unit; SI where none is given is not taken for granted, but for what has none."""
+    """Return the factor of the unit. A missing unit is refused unless the quantity has none."""
     if known is units.NONE and unit.absent:
         return 1.0
     if not isinstance(unit.value, str) or unit.value not in known:

@@ -1,24 +1,26 @@
-"""da Vinci tool characterisation (O'Neill, Stephens, Kowalewski, IEEE RA-L 2018): one jaw, driven through its spindle.
+"""How a da Vinci tool characterisation becomes a recording: one jaw, driven through its spindle.
 
-The instrument becomes a finger of one joint and one bidirectional tendon of a stated radius r: the cable loop on the
-spindle. Signs of a left spindle, as in the data's own notes: with theta = -col2, torque = +col3 and load = -col6
-everything is positive when the motor closes against the load.
+Data: O'Neill, Stephens, Kowalewski, IEEE RA-L 2018.
+
+The instrument becomes a finger of one joint and one bidirectional tendon of a given radius r: the cable loop on the
+spindle. The signs are those of a left spindle, as in the notes of the data: with theta = -col2, torque = +col3 and load
+= -col6 everything is positive when the motor closes against the load.
 
 | recording | from | unit |
 | --- | --- | --- |
 | time | col 1 (the header says ms, it is s) | s |
-| tendon_position[1] = r theta | col 2, 8192 counts a turn | m |
-| tendon_force[1] = torque / r | col 3, 0.000039811 N.m a count | N |
-| joint_position[1] | col 5, 4000 counts a turn: grows with theta | rad |
-| external_torque[1] = load | col 6, 0.000039811 N.m a count | N.m |
+| tendon_position[1] = r theta | col 2, 8192 counts per turn | m |
+| tendon_force[1] = torque / r | col 3, 0.000039811 N.m per count | N |
+| joint_position[1] | col 5, 4000 counts per turn: grows with theta | rad |
+| external_torque[1] = load | col 6, 0.000039811 N.m per count | N.m |
 
 With a moment arm of r, joint_torque = R^T f0 is the torque of the spindle, and joint_torque - external_torque is
-friction: it opposes the motion, positive while theta grows.
+friction. Friction opposes the motion: it is positive while theta grows.
 
-The net force of a loop changes its sign where the jaw is pushed open against a light load, though both its cables pull
-all the time. With a pretension P the recording is that of the closing cable alone, an ordinary tendon:
-tendon_force[1] = P + torque / r. The opening cable pulls with P all the time, a known load: external_torque[1] =
-load + r P. Friction that grows with the load at the jaw is then friction that grows with the force of this tendon.
+The net force of a loop changes its sign where the jaw is pushed open against a light load, although both cables of the
+loop always pull. With a pretension P the recording is that of the closing cable alone, an ordinary tendon:
+tendon_force[1] = P + torque / r. The opening cable always pulls with P, a known load: external_torque[1] = load + r P.
+Friction that grows with the load at the jaw is then friction that grows with the force of this tendon.
 """
 
 from __future__ import annotations
@@ -36,13 +38,13 @@ COLUMNS = 10
 SPINDLE_COUNTS = 8192  # a turn
 JAW_COUNTS = 4000  # a turn
 TORQUE = 0.000039811  # N.m a count
-RADIUS = 0.005  # m; sets the scale of force and position, no torque depends on it
+RADIUS = 0.005  # m; sets the scale of force and position; torques do not depend on it
 
 
 def convert(file: Path, radius: float = RADIUS, pretension: float = 0.0) -> dict[str, NDArray[Any]]:
-    """Columns of the recording; radius in m, pretension of the opening cable in N, 0: the net force of the loop.
+    """Return the columns of the recording. Raise InputError with row and column.
 
-    Raises InputError naming row and column.
+    radius: m. pretension: N, of the opening cable; 0: the net force of the loop.
     """
     rows = _read(file)
     force = rows[:, 2] * TORQUE / radius + pretension

@@ -1,10 +1,12 @@
-"""EMPS, the Electro-Mechanical Positioning System (Janot, Gautier, Brunot, Nonlinear System Identification Benchmarks
-2019): a carriage of mass M on a ball screw, with friction in its drive and no tendon.
+"""How a recording of EMPS, the Electro-Mechanical Positioning System, becomes ours: a carriage on a ball screw.
 
-It becomes a finger of one joint and one bidirectional tendon with a moment arm of 1 m: a metre of travel is a radian,
-a newton is a newton metre, m/s is rad/s, kg is kg·m². Its equation of motion M·a = F − F_friction − F_offset reads, as
-eq. 9 has it, T_eff = τ − external_torque with τ = F and external_torque = +M·a: the torque that
-accelerates the carriage is known load, the rest is friction and its offset.
+Data: Janot, Gautier, Brunot, Nonlinear System Identification Benchmarks 2019. The carriage has mass M, friction in its
+drive and no tendon.
+
+It becomes a finger of one joint and one bidirectional tendon with a moment arm of 1 m: a metre of travel is a radian, a
+newton is a newton metre, m/s is rad/s, kg is kg·m². In terms of eq. 9 its equation of motion M·a = F − F_friction −
+F_offset is T_eff = τ − external_torque with τ = F and external_torque = +M·a: the torque that accelerates the carriage
+is known load, the rest is friction and its offset.
 
 | recording | from | unit |
 | --- | --- | --- |
@@ -33,15 +35,15 @@ Array = NDArray[np.float64]
 MASS = 95.1089  # kg, published
 DECIMATION = 10
 CUTOFF = 100.0  # Hz, of a 4th order Butterworth filter, forwards and backwards
-EDGE = 10  # samples at each end, one period of the cut-off: filter and differences are one-sided there
+EDGE = 10  # samples left out at each end, one period of the cut-off: filter and differences are one-sided there
 SERIES = ("t", "qm", "vir")
 LEAST = 100  # samples, times the decimation
 
 
 def convert(file: Path, mass: float = MASS, decimation: int = DECIMATION) -> dict[str, NDArray[Any]]:
-    """Columns of the recording at every decimation-th sample; mass in kg. Raises InputError naming the variable.
+    """Return the columns of the recording at every decimation-th sample. Raise InputError with the variable.
 
-    Force and position pass the same filter, so that the equation of motion holds for what comes out.
+    Force and position pass the same filter, so that the equation of motion holds for the result. mass: kg.
     """
     time, position, force = _read(file)
     step = _step(file, time, LEAST * decimation)
@@ -67,11 +69,12 @@ def _zero_phase(series: Array, step: float) -> Array:
 
 
 def _decimated(series: Array, n: int) -> Array:
-    """Every n-th value of a triangular mean over ±n samples, without those whose mean would reach beyond the ends.
+    """Return every n-th value of a triangular mean over ±n samples, except where the mean would reach beyond the ends.
 
-    Its zeros lie at the multiples of the new rate, so nothing folds onto standstill; and it is positive throughout:
-    friction jumps with the sign of the velocity, and a steeper filter, which rings there, makes reversals that never
-    were (with the Chebyshev filter of scipy's `decimate` the error of the published model grows from 4.1 to 5.9 %).
+    The zeros of the mean lie at the multiples of the new rate, so nothing folds onto standstill. Its weights are
+    positive. This matters because friction jumps with the sign of the velocity: a steeper filter rings there and makes
+    reversals that did not happen. With the Chebyshev filter of scipy's `decimate` the error of the published model
+    grows from 4.1 to 5.9 %.
     """
     weights = np.bartlett(2 * n + 1)[1:-1] / n
     kept = np.arange(n, len(series) - n + 1, n) if n > 1 else np.arange(len(series))
@@ -79,7 +82,7 @@ def _decimated(series: Array, n: int) -> Array:
 
 
 def _read(file: Path) -> tuple[Array, Array, Array]:
-    """[N] time in s, position in m, force in N."""
+    """Return time [N] (s), position [N] (m) and force [N] (N)."""
     content = _content(file)
     for name in (*SERIES, "gtau"):
         if name not in content:
@@ -102,14 +105,14 @@ def _content(file: Path) -> dict[str, Any]:
         content: dict[str, Any] = reader.loadmat(file, appendmat=False)
     except OSError as error:
         raise InputError(f"{file}: {error.strerror or error}; expected a MATLAB file of the EMPS benchmark") from None
-    except Exception as error:  # scipy raises what its parsers meet: ValueError, TypeError, zlib.error ...
+    except Exception as error:  # scipy passes on the errors of its parsers: ValueError, TypeError, zlib.error ...
         reason = str(error).split("\n", 1)[0]
         raise InputError(f"{file}: not a MATLAB file that scipy reads ({reason}); expected one of EMPS") from None
     return content
 
 
 def _numbers(file: Path, name: str, value: Any) -> Array:
-    """The variable as a row of finite numbers."""
+    """Return the variable as a row of finite numbers."""
     array = np.asarray(value)
     if array.dtype.kind not in "fiu" or array.size != max(array.shape, default=1):
         raise InputError(f"{file}: {name}: {array.dtype} of shape {array.shape}; expected a row or column of numbers")
@@ -121,7 +124,7 @@ def _numbers(file: Path, name: str, value: Any) -> Array:
 
 
 def _step(file: Path, time: Array, least: int) -> float:
-    """s; the same between all samples, since filter and differences take it for granted."""
+    """Return the step (s). It must be equal between all samples, since filter and differences assume it."""
     if len(time) < least:
         raise InputError(f"{file}: t: {len(time)} samples; expected at least {least}, {LEAST} times --decimation")
     steps = np.diff(time)
@@ -136,11 +139,11 @@ def _step(file: Path, time: Array, least: int) -> float:
 
 
 def _scipy(part: str) -> Any:
-    """scipy is needed here alone, and only when such a file is converted."""
+    """Import a part of scipy, only when such a file is converted."""
     try:
         return importlib.import_module(f"scipy.{part}")
     except ImportError:
         raise InputError(
-            "convert emps: the Python package scipy is not installed; expected it beside tendonfmu "
+            "convert emps: the Python package scipy is not installed; expected it in the environment of tendonfmu "
             "(python -m pip install scipy)"
         ) from None

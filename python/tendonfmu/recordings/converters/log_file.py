@@ -1,6 +1,6 @@
-"""Columns of anybody's log: CSV of any separator, also compressed by gzip, and Parquet.
+"""Which columns a user's log has: CSV with any separator, also compressed by gzip, and Parquet.
 
-Rows count from 1 and do not include the line of names. Only the columns that are asked for need to be numbers.
+Rows count from 1, without the line of names. Only the columns that are asked for need to be numbers.
 """
 
 from __future__ import annotations
@@ -28,14 +28,22 @@ FLAGS = {"true": 1.0, "false": 0.0}
 
 @dataclass(frozen=True)
 class LogColumns:
-    """Readings [N] by the map's key, as they are in the log. notes: what was left out, a sentence each."""
+    """Columns as they are in the log.
+
+    Attributes
+    ----------
+    readings
+        Readings [N] by the map's key.
+    notes
+        What was left out, one sentence each.
+    """
 
     readings: Mapping[str, Series]
     notes: list[str] = field(default_factory=list)
 
 
 def read_log(file: Path, wanted: ColumnMap) -> LogColumns:
-    """The columns that a map names. Raises InputError: file, column, row, what was expected."""
+    """Read the columns that a map names. Raise InputError with file, column, row and what was expected."""
     suffix = Path(file.stem).suffix if file.suffix.lower() == ".gz" else file.suffix
     if suffix.lower() not in SUFFIXES or (suffix.lower() == ".parquet" and file.suffix.lower() == ".gz"):
         raise InputError(f"{file}: unknown format {suffix!r}; expected {', '.join(SUFFIXES)}, text also with .gz")
@@ -53,7 +61,7 @@ def read_log(file: Path, wanted: ColumnMap) -> LogColumns:
 
 
 def _find(file: Path, wanted: ColumnMap, names: Sequence[str]) -> dict[str, int]:
-    """Place from 0 of each wanted column, by the map's key."""
+    """Return the index, from 0, of each wanted column, by the map's key."""
     return {key: _place(file, wanted.path, column, names) for key, column in wanted.columns.items()}
 
 
@@ -65,7 +73,7 @@ def _place(file: Path, path: Path, column: MappedColumn, names: Sequence[str]) -
         return source - 1
     if names.count(source) != 1:
         count = names.count(source)
-        what = f"is there {count} times; expected once, or its number" if count else "is not there"
+        what = f"occurs {count} times; expected once, or its number" if count else "is missing"
         raise InputError(
             f"{file}: column {source!r} of {column.path} in {path} {what}; it has {nearest(source, names)}"
         )
@@ -90,7 +98,7 @@ def _read_parquet(file: Path, wanted: ColumnMap) -> LogColumns:
 
 
 def _arrow_numbers(file: Path, name: str, column: Any) -> Series:
-    """A missing value becomes NaN."""
+    """Return a column as numbers. A missing value becomes NaN."""
     import pyarrow as pa
 
     kind = column.type
@@ -121,7 +129,7 @@ def _read_text(file: Path, wanted: ColumnMap) -> LogColumns:
 
 
 def _lines(file: Path, skip: int) -> tuple[list[str], list[str]]:
-    """Whole lines that are not empty, and a note where the last one lacks its end: it may have lost digits."""
+    """Return the lines that are not empty, and a note if the last one has no line end: it may have lost digits."""
     try:
         content = gzip.decompress(file.read_bytes()) if file.suffix.lower() == ".gz" else file.read_bytes()
         text = content.decode("utf-8-sig")
@@ -141,7 +149,7 @@ def _lines(file: Path, skip: int) -> tuple[list[str], list[str]]:
 
 
 def _separator(line: str, log: LogFormat) -> str:
-    """The one that occurs most in the first line; spaces only where there is nothing else."""
+    """Return the separator that occurs most in the first line. A space counts only if there is no other."""
     counts = {each: line.count(each) for each in SEPARATORS if each != log.decimal}
     tight = {each: count for each, count in counts.items() if each != " " and count}
     return max(tight, key=lambda each: tight[each]) if tight else " "
@@ -156,7 +164,7 @@ def _fields(line: str, separator: str) -> list[str]:
 def _parse_fast(
     rows: list[str], separator: str, decimal: str, columns: int, places: list[int]
 ) -> NDArray[np.float64] | None:
-    """[rows, wanted columns], or None where a field needs a closer look."""
+    """Return the wanted columns [rows, columns], or None if a field needs a closer look."""
     if not rows:
         return np.empty((0, len(places)))
     if decimal != "." or any('"' in row or _count(row, separator) != columns for row in rows):
@@ -175,7 +183,7 @@ def _count(row: str, separator: str) -> int:
 def _parse_by_field(
     file: Path, rows: list[str], separator: str, decimal: str, names: list[str], places: list[int]
 ) -> NDArray[np.float64]:
-    """The same one by one: refuses the first bad field by name."""
+    """Return the same, field by field, and refuse the first invalid field by name."""
     parsed = np.empty((len(rows), len(places)))
     for k, line in enumerate(rows):
         fields = _fields(line, separator)
@@ -193,7 +201,7 @@ def _number(file: Path, name: str, row: int, text: str, decimal: str) -> float:
     plain = text.strip().lower()
     if plain in FLAGS:
         return FLAGS[plain]
-    # a point beside a decimal comma is one of thousands, and those are not guessed at
+    # a point in a number with a decimal comma separates thousands; this is refused, not guessed
     sound = "_" not in plain and (decimal == "." or "." not in plain)
     try:
         value = float(plain.replace(decimal, ".")) if sound else math.nan

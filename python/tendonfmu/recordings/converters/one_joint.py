@@ -1,4 +1,6 @@
-"""A machine with one joint as a finger of one bidirectional tendon with a moment arm of 1 m: torque is tendon force.
+"""How the log of a one-joint machine becomes a finger of one bidirectional tendon with a moment arm of 1 m.
+
+Torque is tendon force:
 
 | recording | turning | sliding |
 | --- | --- | --- |
@@ -7,9 +9,9 @@
 | joint_velocity[1], rad/s | velocity, rad/s | velocity, m/s |
 | external_torque[1], N.m | known load, N.m | known load, N |
 
-So a metre of a sliding axis is a radian, a newton a newton metre, and a kilogram a kg·m². Without a column of velocity,
-it is made of the angle: central differences, then a Butterworth filter of 2nd order forwards and backwards, which
-delays nothing.
+So a metre of a sliding axis is a radian, a newton is a newton metre, and a kilogram is a kg·m². If there is no column
+of velocity, it is computed from the angle: central differences, then a Butterworth filter of 2nd order forwards and
+backwards, which adds no delay.
 """
 
 from __future__ import annotations
@@ -26,16 +28,16 @@ from tendonfmu.recordings.converters.column_map import Joint
 Series = NDArray[np.float64]
 
 CUTOFF = 20.0  # Hz; as of the runtime's own filter
-SHARE_OF_RATE = 0.2  # the cut-off is at most this part of the sample rate: central differences fall off above it
-GAP = 10.0  # times the usual step: what is longer interrupts the log, and no filter passes over it
+SHARE_OF_RATE = 0.2  # of the sample rate; the cut-off is at most this, since central differences fall off above it
+GAP = 10.0  # times the usual step; a longer step interrupts the log, and no filter spans it
 LEAST = 20  # samples
-RESTS = 0.01  # of the largest speed: what is slower before the first motion is a start at rest
+RESTS = 0.01  # of the largest speed; slower samples before the first motion are a start at rest
 
 
 def joint_columns(file: Path, parts: dict[str, Series], joint: Joint) -> tuple[dict[str, Series], float, list[str]]:
-    """Columns of the recording, the cut-off of its velocity in Hz (0: not filtered, or given), and notes.
+    """Return the columns of the recording, the cut-off of its velocity in Hz (0: not filtered, or given), and notes.
 
-    parts: [N] each, in SI, by the words of the map. Raises InputError.
+    parts: [N] each, in SI, by the keys of the map. Raises InputError.
     """
     time = parts["time"]
     if len(time) < LEAST:
@@ -69,7 +71,10 @@ def joint_columns(file: Path, parts: dict[str, Series], joint: Joint) -> tuple[d
 
 
 def central_velocity(time: Series, angle: Series, cutoff: float) -> Series:
-    """[N] of angles [N] at times [N]; cutoff in Hz, 0: not filtered. A gap of the log divides it."""
+    """Return the velocity [N] of angles [N] at times [N]. Gaps of the log divide it.
+
+    cutoff: Hz, 0: not filtered.
+    """
     steps = np.diff(time)
     usual = float(np.median(steps))
     velocity = np.empty_like(angle)
@@ -85,9 +90,9 @@ def central_velocity(time: Series, angle: Series, cutoff: float) -> Series:
 
 
 def first_motion(file: Path, velocity: Series) -> int:
-    """Samples before the first motion.
+    """Return the number of samples before the first motion.
 
-    They are left out: how friction stands in a machine that has not moved yet is not known, and the constant bias of
+    They are left out: the friction of a machine that has not moved yet is unknown, and the constant bias of
     `one_joint_description` would take it for an offset.
     """
     speed = np.abs(velocity)

@@ -1,8 +1,8 @@
-"""The description of a one-joint machine whose drive torque is measured, with numbers that its own log gives.
+"""Which description fits a one-joint machine with measured drive torque, with starting numbers from its own log.
 
 A straight line explains the torque: torque − known load = coulomb·sgn(v) + viscous·v + inertia·a + offset, by least
-squares over the samples in motion. `tendonfmu fit` begins there. With a known load there is no row `inertia`: who
-knows the load has taken off what accelerates the machine as well.
+squares over the samples in motion. `tendonfmu fit` starts from these numbers. With a known load there is no row
+`inertia`: a known load already contains the torque that accelerates the machine.
 """
 
 from __future__ import annotations
@@ -21,13 +21,29 @@ from tendonfmu.recordings.signal_noise import value_step
 Series = NDArray[np.float64]
 
 STIFFNESS = 1e9  # N/m: the drive is rigid, q = x0
-SLOWEST = 1e-3  # of the largest speed: below, the joint counts as at rest
-THRESHOLD = 5.0  # times what the start misses (rms); `tendonfmu tune` finds better ones
-LEAST_SHARE = 1e-3  # of the torque's rms: a start of a magnitude that least squares makes negative
+SLOWEST = 1e-3  # of the largest speed; below, the joint counts as at rest
+THRESHOLD = 5.0  # times the residual of the straight line (rms); `tendonfmu tune` finds better thresholds
+LEAST_SHARE = 1e-3  # of the torque's rms; starting value of a magnitude for which least squares gives less
 
 
 def describe_joint(log: ConvertedLog) -> dict[str, Any]:
-    """A finger description (JSON) of the machine in a log. Raises InputError where the map has no `joint`."""
+    """Make the finger description of the machine in a log.
+
+    Parameters
+    ----------
+    log
+        A converted log whose map has the key `joint`.
+
+    Returns
+    -------
+    dict
+        A finger description, as in the JSON file.
+
+    Raises
+    ------
+    InputError
+        The map has no `joint`, or the joint does not move.
+    """
     joint = log.map.joint
     if joint is None:
         raise InputError(
@@ -53,7 +69,7 @@ def describe_joint(log: ConvertedLog) -> dict[str, Any]:
         "tendons": [{"name": "drive", "bidirectional": True, "stiffness": STIFFNESS, "moment_arms": [1.0]}],
         "velocity_threshold": {"tendon": slowest, "joint": slowest},
         "velocity_filter_cutoff": cutoff,
-        # one offset for a recording: a bias that learns would follow what is to be found
+        # one offset for a recording: a bias that learns would follow the friction that is to be estimated
         "bias": {
             "drift_variance": 0.0,
             "noise_std": start["missed"],
@@ -67,20 +83,35 @@ def describe_joint(log: ConvertedLog) -> dict[str, Any]:
 
 
 def description_text(description: dict[str, Any]) -> str:
-    """As it is written to a file."""
+    """Return the text of a description's file.
+
+    Parameters
+    ----------
+    description
+        A finger description.
+
+    Returns
+    -------
+    str
+        JSON with a line end.
+    """
     return json.dumps(description, indent=1) + "\n"
 
 
 def slowest_motion(velocity: Series, angle: Series, cutoff: float) -> float:
-    """rad/s below which the joint is at rest: what one step of the encoder makes of a velocity, and no less than a
-    thousandth of the largest speed.
+    """Return the speed (rad/s) below which the joint is at rest.
+
+    It is the velocity that one step of the encoder causes, and at least a thousandth of the largest speed.
     """
     step = 2 * np.pi * cutoff * value_step(angle)
     return float(f"{max(step, value_step(velocity), SLOWEST * np.abs(velocity).max()):.3g}")
 
 
 def starting_numbers(columns: dict[str, Series], slowest: float) -> dict[str, float]:
-    """coulomb (N.m), viscous (N.m.s/rad), inertia (kg.m2), offset (N.m), missed (N.m, rms of what the line leaves)."""
+    """Return the numbers of the straight line.
+
+    These are coulomb (N.m), viscous (N.m.s/rad), inertia (kg.m2), offset (N.m) and missed (N.m, rms of the residual).
+    """
     velocity = columns["joint_velocity[1]"]
     known = columns.get("external_torque[1]")
     torque = columns["tendon_force[1]"] - (0.0 if known is None else known)
@@ -88,7 +119,7 @@ def starting_numbers(columns: dict[str, Series], slowest: float) -> dict[str, fl
     moving = np.abs(velocity) > slowest
     regressors = [np.sign(velocity), velocity, np.ones_like(velocity)] + ([acceleration] if known is None else [])
     matrix = np.column_stack(regressors)[moving]
-    # columns of one size, so that a motion at one speed (two of them alike) gives the smallest numbers, not any
+    # normalised columns: for a motion at one speed, where two columns are equal, this gives the smallest numbers
     sizes = np.maximum(np.linalg.norm(matrix, axis=0), np.finfo(float).tiny)
     found = np.linalg.lstsq(matrix / sizes, torque[moving], rcond=1e-9)[0] / sizes
     missed = float(np.sqrt(np.mean((torque[moving] - matrix @ found) ** 2)))

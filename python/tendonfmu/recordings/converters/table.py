@@ -1,4 +1,4 @@
-"""Anybody's log to a recording, by a map of columns: docs/reference/commands/convert.md."""
+"""How a user's log becomes a recording, with a map of columns: docs/reference/commands/convert.md."""
 
 from __future__ import annotations
 
@@ -20,7 +20,19 @@ Series = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ConvertedLog:
-    """Columns of a recording, in SI. velocity_cutoff: Hz, of the velocities made here. notes: a sentence each."""
+    """A log that has been converted.
+
+    Attributes
+    ----------
+    columns
+        Columns of a recording, [N] each, in SI.
+    map
+        The map that was used.
+    velocity_cutoff
+        Cut-off of velocities that were computed here (Hz); 0 if there are none.
+    notes
+        What was left out or computed, one sentence each.
+    """
 
     columns: dict[str, Series]
     map: ColumnMap
@@ -29,20 +41,24 @@ class ConvertedLog:
 
 
 def convert_table(file: Path, map_file: Path) -> ConvertedLog:
-    """The recording in a log.
+    """Convert a log with a map of columns.
 
     Parameters
     ----------
-    file : log, CSV of any separator (also .gz) or Parquet
-    map_file : MAP.json
+    file
+        The log: CSV with any separator (also .gz) or Parquet.
+    map_file
+        MAP.json.
 
     Returns
     -------
-    ConvertedLog : its columns are those of docs/reference/recordings.md, [N] each
+    ConvertedLog
+        Its columns are those of docs/reference/recordings.md, [N] each.
 
     Raises
     ------
-    InputError : file, column or key, row, what was expected
+    InputError
+        The file, column or key, and row that is wrong, and what was expected.
     """
     wanted = read_map(map_file)
     log = read_log(file, wanted)

@@ -1,4 +1,4 @@
-"""Units that a map of columns may name, each with its exact factor to SI: si = factor · value.
+"""Which units a map of columns may name, each with its exact factor to SI: si = factor · value.
 
 A metre of a sliding axis stands for a radian of a joint (see `one_joint`); no unit is both a length and an angle.
 """
@@ -29,7 +29,7 @@ SPEED = {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "m/min": 1.0 / 60}
 ANGULAR_SPEED = {"rad/s": 1.0, "mrad/s": 1e-3, "deg/s": math.pi / 180, "rpm": 2 * math.pi / 60, "turn/s": 2 * math.pi}
 NONE = {"1": 1.0}
 
-# what each column of a recording may be given in
+# units in which each column of a recording may be given
 OF_COLUMN = {
     "time": TIME,
     "tendon_force": FORCE,
@@ -42,7 +42,7 @@ OF_COLUMN = {
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """The known names for a message, those most alike first: at most six."""
+    """Return the known names for a message, the most similar first, at most six."""
     names = list(known)
     folded = {each.casefold(): each for each in names}
     alike = [folded[each] for each in difflib.get_close_matches(name.casefold(), folded, n=3, cutoff=0.5)]
