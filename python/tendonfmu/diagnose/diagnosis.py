@@ -254,7 +254,7 @@ class _Result:
             extended=gain.extended,
             bias_only_rms=gain.bias_only_rms,
             noise_floor=tuple(float(value) for value in floor),
-            floor_source="what nothing recorded predicts on unseen stretches",
+            floor_source="the part of the error on unseen stretches that nothing recorded predicts",
             gain=gain.value,
             steps=gain.steps,
             causes=tuple(self._cause(k, verified, left) for k in range(len(verified.causes))),

@@ -35,7 +35,7 @@ def described(
 
 def _part(share: float) -> str:
     if share < 0.01:
-        return "a small but certain part of what is left, in its quick changes,"
+        return "a small but certain, fast-changing part of what is left"
     return f"{100.0 * share:.0f} % of the variance of what is left"
 
 
@@ -57,7 +57,7 @@ def _what(findings: Sequence[Finding]) -> Iterator[str]:
                 )
             )
             steady = "a steady oscillation" if len(lines) == 1 else "steady oscillations"
-            yield f"{steady} at {frequencies} Hz of {sizes} mN·m, whatever the motion"
+            yield f"{steady} at {frequencies} Hz of {sizes} mN·m, independent of the motion"
 
 
 def _listed(values: Sequence[str]) -> str:

@@ -255,7 +255,7 @@ class _Changes:
             extended=gain.extended,
             bias_only_rms=gain.bias_only_rms,
             noise_floor=tuple(float(each) for each in np.minimum(self._floor(), gain.extended.test_rms)),
-            floor_source="what is left of unseen stretches with what is wrong in both recordings taken off",
+            floor_source="what remains on unseen stretches without the errors that both recordings share",
             gain=gain.value,
             steps=gain.steps,
             causes=causes,

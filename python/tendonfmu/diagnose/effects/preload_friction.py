@@ -35,7 +35,7 @@ CANDIDATE = Candidate(
     title="a tendon rubs however little it pulls",
     explanation=(
         "The tendon loses the same force at every tension, as in a seal, a tight sheath or a clamped guide. Look "
-        "at whether friction is left when the pretension is taken off."
+        "at whether friction remains without pretension."
     ),
     sign=1,
     excited_by="the same strokes at pretensions as different as the hand allows, the lowest first of all",
