@@ -239,7 +239,7 @@ def adequate() -> Diagnosis:
         extended=errors,
         bias_only_rms=(14.6e-3, 9.8e-3),
         noise_floor=errors.test_rms,
-        floor_source="what nothing recorded predicts on unseen stretches",
+        floor_source="the part of the error on unseen stretches that nothing recorded predicts",
         gain=Interval(0.0, 0.0, 0.0),
         steps=(together(errors),),
         causes=(),
@@ -454,7 +454,7 @@ def changed() -> Diagnosis:
             2, ChangedSize("torque", "N.m", level, _less(moved, -0.0004), moved), Interval(0.9, 0.87, 0.93), 1e-9
         ),
         unexplained=Unexplained(0.0, "", (0.0, 0.0)),
-        floor_source="what is left of unseen stretches with what is wrong in both recordings taken off",
+        floor_source="what remains on unseen stretches without the errors that both recordings share",
         experiment=Experiment("Make the motions of the reference again, exactly, at the same load and pretension."),
         detection=None,
         extended_data=extended,

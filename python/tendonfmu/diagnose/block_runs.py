@@ -1,4 +1,4 @@
-"""Block means of whole runs of the core: G of a description."""
+"""What the core predicts over whole recordings: block means of G of a description."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from tendonfmu.statistics import SampleBlocks
 
 Numbers = NDArray[np.float64]
 
-_NEVER = 1e9  # N·m; no contact threshold is ever passed
-_STRETCH = 4000  # samples of a run at a time: what a run returns stays near the processor
+_NEVER = 1e9  # N·m; a contact threshold that is never passed
+_STRETCH = 4000  # samples of a run at a time, so that its outputs stay in the processor's cache
 
 
 def block_prediction(data: Mapping[str, Any], recordings: Sequence[FitRecording], blocks: SampleBlocks) -> Numbers:
-    """[B, n] block means of G of a description, N·m, less the torque of the forces in use beyond the measured ones.
+    """Return block means of G of a description, less the torque of forces used beyond the measured ones, N·m [B, n].
 
-    The latter is 0 but for forces that the description delays (`time_delay` below 0).
+    The latter is 0 unless the description delays the forces (`time_delay` below 0).
     """
     sums = np.zeros((blocks.count, len(data["joints"])))
     finger, arms = native.Finger(native.image_from_json(json.dumps(_learning_nothing(data)))), moment_arms(data)
@@ -34,7 +34,7 @@ def block_prediction(data: Mapping[str, Any], recordings: Sequence[FitRecording]
             for begin in range(part.start, part.stop, _STRETCH):
                 rows = slice(begin, min(begin + _STRETCH, part.stop))
                 arrays = recording.arrays(rows)
-                # τ − T_eff, and T_eff is T with all jumps so far where the bias learns nothing
+                # τ − T_eff; T_eff is T with all jumps so far if the bias learns nothing
                 whole = arrays["tendon_force"] @ arms - finger.run(arrays)["compensated_torque"]
                 _add_up(sums, block[rows], whole)
     return np.asarray(sums / np.maximum(blocks.sizes(), 1)[:, None])
@@ -50,7 +50,7 @@ def _add_up(sums: Numbers, block: NDArray[np.int64], values: Numbers) -> None:
 
 
 def _learning_nothing(data: Mapping[str, Any]) -> dict[str, Any]:
-    """The description whose bias moves by the jumps alone, and that never sees contact."""
+    """Return the description with a bias that only jumps and with contact detection out of reach."""
     kept = {key: value for key, value in (data.get("bias") or {}).items() if key in ("forget_rate", "entry_load")}
     joints = len(data["joints"])
     still = {**kept, "drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": [0.0] * joints}
@@ -64,9 +64,9 @@ def block_late_forces(
     delay: float,
     prediction: Numbers,
 ) -> Numbers:
-    """[B, n] what y − G becomes, N·m, when the forces are measured `delay` s later than they are, or earlier below 0.
+    """Return how y − G changes [B, n], N·m, if forces are measured `delay` s later than they act (earlier if below 0).
 
-    prediction: G of the description at the recordings, whose forces are those that it explains.
+    `prediction` is G of the description at the recordings, whose forces must be those that it explains.
     """
     late = [_with_late_forces(recording, delay) for recording in recordings]
     moved = _block_torque(data, late, blocks) - _block_torque(data, recordings, blocks)
@@ -85,7 +85,7 @@ def _with_late_forces(recording: FitRecording, delay: float) -> FitRecording:
 
 
 def _block_torque(data: Mapping[str, Any], recordings: Sequence[FitRecording], blocks: SampleBlocks) -> Numbers:
-    """[B, n] block means of τ = Rᵀ f."""
+    """Return block means of τ = Rᵀ f [B, n], N·m."""
     arms = moment_arms(data)
     sums = np.zeros((blocks.count, arms.shape[1]))
     for recording, block in zip(recordings, blocks.of, strict=True):

@@ -1,8 +1,8 @@
-"""What every candidate would add to the model's torque, at every place and point of its grid, averaged over blocks.
+"""What every candidate would add to the model's torque, at every place and every point of its grid.
 
-The signal is G_k = T_k + Σ Δb up to k: T of eq. (10) with all jumps of fig. 5 so far. A candidate's column is the
-derivative of G by its number at a strength of zero, or the difference that its term makes to G. All of it comes from
-the C core.
+The signal is G_k = T_k + Σ Δb up to k: T of eq. (10) with all jumps of fig. 5 so far, averaged over blocks of time. A
+candidate's column is the derivative of G by its number at a strength of zero, or the difference that its term makes to
+G. The C core computes all of them.
 """
 
 from __future__ import annotations
@@ -27,17 +27,28 @@ Single = NDArray[np.float32]
 Progress = Callable[[int, int], None]
 Worth = Callable[[Candidate, Place, Mapping[str, float]], bool]
 
-_LARGEST = 1e9  # of a non-linear number in any unit: docs/reference/semantics.md#extensions
-_MOST_MEMORY = 8.0  # GB, of all columns
+_LARGEST = 1e9  # largest non-linear number in any unit: docs/reference/semantics.md#extensions
+_MOST_MEMORY = 8.0  # GB, for all columns
 
 
 @dataclass(frozen=True)
 class Shape:
     """A candidate at one point of its grid.
 
-    shape: its non-linear numbers. columns: where its columns are in `CandidateColumns.values`. paths: the first number
-    that each moves. signs: expected of each magnitude, 0 either. expected: magnitudes of an ordinary effect. secant:
-    the column is the difference that the term makes at full strength; a magnitude of 1 is expected.
+    Attributes
+    ----------
+    shape
+        Its non-linear numbers.
+    columns
+        Where its columns are in `CandidateColumns.values`.
+    paths
+        For each column, the first number that it moves.
+    signs
+        Expected sign of each magnitude, 0 for either.
+    expected
+        Magnitudes of an ordinary effect.
+    secant
+        Whether the column is the difference that the term makes at full strength; the expected magnitude is then 1.
     """
 
     shape: Mapping[str, float]
@@ -64,11 +75,22 @@ class Proposal:
 
 @dataclass(frozen=True)
 class CandidateColumns:
-    """Block means.
+    """Block means of the prediction and of all columns.
 
-    prediction: [B, n] G of the description, N·m. nominal: [B, n, u] its derivatives by what a fit of it estimates;
-    nominal_names: [u], a law's numbers as coulomb, drop, rate (1/Stribeck velocity) and viscous. values: [B, n, c] of
-    the candidates; names: [c]. proposals: which columns are whose.
+    Attributes
+    ----------
+    prediction
+        G of the description, N·m [B, n].
+    nominal
+        Derivatives of G by the numbers that a fit of the description estimates [B, n, u].
+    nominal_names
+        Names [u]; a law's numbers are coulomb, drop, rate (1/Stribeck velocity) and viscous.
+    values
+        Columns of the candidates [B, n, c].
+    names
+        Names [c].
+    proposals
+        Which columns belong to which candidate and place.
     """
 
     prediction: Numbers
@@ -89,12 +111,25 @@ def candidate_columns(
     worth: Worth | None = None,
     progress: Progress | None = None,
 ) -> CandidateColumns:
-    """The columns of the description and of all candidates that it lacks.
+    """Compute the columns of the description and of all candidates that it lacks.
 
-    data: the fitted nominal description. recordings: made ready for it, all with the same kinematics source. span: of
-    the recordings, None: found here. worth: says which shapes of a candidate at a place are looked at. progress: called
-    with samples done and all samples, over all passes. Raises
-    InputError where the columns would not fit in memory.
+    Parameters
+    ----------
+    data
+        The fitted nominal description.
+    recordings
+        Prepared for it, all with the same kinematics source.
+    span
+        Span of the recordings; computed if None.
+    worth
+        Says which shapes of a candidate at a place are computed.
+    progress
+        Called with the number of samples done and of all samples, over all passes.
+
+    Raises
+    ------
+    InputError
+        If the columns do not fit in memory.
     """
     plain = without_uncertainty(data)
     found_span = span_of(plain, recordings) if span is None else span
@@ -112,10 +147,7 @@ def candidate_columns(
 
 
 class _Work:
-    """All that has to be run: passes of derivatives, and terms at full strength.
-
-    values: [B, n, u + c], to be filled.
-    """
+    """All runs of the core: passes of derivatives, and terms at full strength; `values` [B, n, u + c] is filled."""
 
     def __init__(
         self,
@@ -131,7 +163,10 @@ class _Work:
         self._done = 0
 
     def plan(self, nominal: Sequence[Direction], variants: Sequence[tuple[Variant, int]]) -> None:
-        """nominal: directions of the first columns. variants: each with the place of its first column."""
+        """Plan the runs for the nominal directions, which are the first columns, and for the variants.
+
+        Each variant comes with the index of its first column.
+        """
         exact = []
         for variant, at in variants:
             if not variant.secant_rows:
@@ -144,7 +179,7 @@ class _Work:
         self._total = self._samples * (len(self._passes) + len(self._bundles) + 1)
 
     def run(self) -> Numbers:
-        """Fills the values; returns G of the description."""
+        """Fill the values; return G of the description."""
         for each in self._passes:
             run_pass(each.data(), each.columns, self._recordings, self._blocks, self.values, self._watch)
         self.values /= np.maximum(self._blocks.sizes(), 1)[:, None, None].astype(np.float32)
@@ -178,14 +213,16 @@ class _Work:
 def _refuse_too_many(size: float, columns: int) -> None:
     if size > _MOST_MEMORY:
         raise InputError(
-            f"{columns} columns of what may be missing need {size:.0f} GB: expected at most {_MOST_MEMORY:g} GB: "
+            f"{columns} columns of candidate causes need {size:.0f} GB; expected at most {_MOST_MEMORY:g} GB: use "
             "a finger of fewer joints and tendons at a time, or shorter recordings"
         )
 
 
 def without_uncertainty(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Without directions of uncertainty, which tell of the description's own numbers and grow with their count, and
-    without a watch over the sensors, which is no part of the model."""
+    """Return the description without directions of uncertainty and without sensor monitoring.
+
+    The former depend on the description's own numbers and grow with their count. The latter is no part of the model.
+    """
     contact = {key: value for key, value in data["contact"].items() if not key.startswith("uncertainty")}
     return {**data, "contact": contact, "sensor_fault": None}
 
@@ -203,12 +240,12 @@ def _proposed(
 
 
 def _is_sane(variant: Variant) -> bool:
-    """Whether a description takes its numbers: recordings of another scale lead to any."""
+    """Return whether a description accepts the variant's numbers; recordings of another scale can lead to any value."""
     return all(abs(value) <= _LARGEST for value in variant.shape.values())
 
 
 def _bundles(secants: Sequence[tuple[Variant, int]]) -> list[list[tuple[Variant, int]]]:
-    """Those that share a run: terms of which each changes the torque of another joint alone."""
+    """Group the variants that share a run: each of their terms changes the torque of a different joint alone."""
     bundles: list[list[tuple[Variant, int]]] = []
     for variant, at in secants:
         own = variant.only_joint

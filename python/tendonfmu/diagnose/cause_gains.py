@@ -1,4 +1,4 @@
-"""What causes are worth on unseen data; those that are worth nothing there are taken out again."""
+"""How much each cause gains on unseen data; causes that gain nothing there are dropped."""
 
 from __future__ import annotations
 
@@ -30,9 +30,24 @@ Parameters = Mapping[str, tuple[float, str]]
 
 @dataclass(frozen=True)
 class Verified:
-    """causes: the largest gain first, places of one effect together; gains, parameters (of each place), without (the
-    fit that lacks it): of each. dropped: what unseen data do not bear out. nominal_data, extended_data: descriptions as
-    they run online. extended: with the settings for estimating.
+    """The causes that unseen data confirm.
+
+    Attributes
+    ----------
+    causes
+        In order of gain, the largest first; places of one effect are one cause.
+    gains
+        Of each cause.
+    parameters
+        Numbers of each place of each cause.
+    without
+        For each cause, the fit that lacks it.
+    dropped
+        Causes that unseen data do not confirm.
+    nominal_data, extended_data
+        Descriptions as they run online.
+    extended
+        Extended description with the settings for estimation.
     """
 
     causes: tuple[NamedCause, ...]
@@ -55,7 +70,10 @@ def verify(
     settings: FitSettings,
     seed: int,
 ) -> Verified:
-    """training, tests: as they were measured; where there are no tests, what is held out of training is judged on."""
+    """Measure the gain of each cause on unseen data and drop the weak ones.
+
+    `training` and `tests` are as measured. Without tests, the held-out parts of `training` are judged.
+    """
     bench = _Bench(given, found, training, tests, settings, seed)
     causes, dropped = merged(found.causes), []
     while True:
@@ -69,7 +87,7 @@ def verify(
             if not (gain.low > 0.0 and gain.value >= least_gain * names[k] and bench.runs_better(fit, without[k]))
         ]
         if not weak and causes and not bench.runs_better(fit, bench.nominal):
-            weak = list(range(len(causes)))  # each mends what another one spoils
+            weak = list(range(len(causes)))  # each corrects what another one spoils
         if not weak:
             break
         worst = min(weak, key=lambda k: gains[k].value)
@@ -94,7 +112,7 @@ def verify(
 
 
 def _names(causes: Sequence[NamedCause], gains: Sequence[Interval]) -> list[int]:
-    """Of each cause how many names there are with it, the largest gain first."""
+    """Return, for each cause, the number of names up to and including it, the largest gain first."""
     found, named = [1] * len(causes), list[str]()
     for k in sorted(range(len(causes)), key=lambda k: -gains[k].value):
         found[k] = names_with(causes[k].effect, named)
@@ -103,8 +121,10 @@ def _names(causes: Sequence[NamedCause], gains: Sequence[Interval]) -> list[int]
 
 
 def merged(causes: Sequence[NamedCause]) -> list[NamedCause]:
-    """Places of one effect as one cause: a place of its own beside others is part of the table of places. It is
-    confused with whatever one of its places is confused with, but not with what is named as well."""
+    """Merge the places of one effect into one cause.
+
+    The merged cause can be confused with whatever one of its places can be confused with, except other named causes.
+    """
     by_effect: dict[str, NamedCause] = {}
     for cause in causes:
         known = by_effect.get(cause.effect)
@@ -123,7 +143,7 @@ def merged(causes: Sequence[NamedCause]) -> list[NamedCause]:
 
 
 def _rivals(cause: NamedCause, named: Collection[str]) -> tuple[Hypothesis, ...]:
-    """Of every other effect the best hypothesis."""
+    """Return the best hypothesis of every other effect."""
     found: dict[str, Hypothesis] = {}
     for each in cause.alike:
         if each.effect not in named:
@@ -134,7 +154,7 @@ def _rivals(cause: NamedCause, named: Collection[str]) -> tuple[Hypothesis, ...]
 def _parameters(
     nominal: FittedModel, model: FittedModel, causes: Sequence[NamedCause], order: Sequence[int]
 ) -> tuple[tuple[Parameters, ...], ...]:
-    """Of each cause, in this order, of each of its places."""
+    """Return the numbers of each place of each cause, in this order."""
     found = iter(cause_parameters(nominal.data, [each for cause in causes for each in cause.accepted], model))
     by_cause = [tuple(next(found) for _ in cause.accepted) for cause in causes]
     return tuple(by_cause[k] for k in order)
@@ -166,7 +186,7 @@ class _Bench:
             self._hold_out()
 
     def _hold_out(self) -> None:
-        """Fits leave out what is judged on."""
+        """Exclude the judged samples from the fits."""
         finger = replace(self._given, data=self._signals.description(self._given.data))
         own = estimation_recordings(finger, self._training, self._signals)
         self._fit_to = [
@@ -185,7 +205,7 @@ class _Bench:
 
     @cached_property
     def _predicted(self) -> list[FitRecording]:
-        """The recordings with the forces that the model of all causes predicts."""
+        """Return the recordings with the forces that the model of all causes predicts."""
         extended, estimation = self._found.extended.data, self._found.estimation
         series = series_of(extended, estimation.recordings, estimation.grid, self._found.out)
         predicted = predicted_of(extended, estimation.recordings, estimation.grid, series)
@@ -196,12 +216,15 @@ class _Bench:
         return [gain_interval(self._error(each), after, self._seed) for each in without]
 
     def runs_better(self, model: FittedModel, without: FittedModel) -> bool:
-        """Whether the first leaves less of r."""
+        """Return whether the first model leaves less of r."""
         return self._unseen.square(self.online(model)) < self._unseen.square(self.online(without))
 
     def _error(self, model: FittedModel) -> Numbers:
-        """[K] Σ e² by stretch on unseen data. Of the training recordings a fifth would tell little: there each fold is
-        unseen in turn, with its linear numbers refitted, as in the search."""
+        """Return Σ e² by stretch on unseen data [K].
+
+        A fifth of the training recordings would show little. Without tests, each fold is therefore unseen in turn and
+        the linear numbers are refitted, as in the search.
+        """
         if id(model) not in self._errors:
             if self._tests:
                 error = self._unseen.by_stretch(self.online(model))
@@ -214,7 +237,7 @@ class _Bench:
 
     @cached_property
     def _unseen(self) -> OnlineError:
-        """Where models run online; of the training recordings all that is free motion."""
+        """Return the errors of models that run online; of the training recordings, all free motion counts."""
         judged = self._tests or [replace(each, train=each.train | each.held_out) for each in self._training]
         return OnlineError(self.online(self.nominal), judged)
 

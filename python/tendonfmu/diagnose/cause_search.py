@@ -1,4 +1,4 @@
-"""A description and recordings seen as columns: what it leaves of the torque, and what every effect would add."""
+"""How a description and recordings look as columns: what the description leaves, and what every effect would add."""
 
 from __future__ import annotations
 
@@ -43,8 +43,16 @@ Flags = NDArray[np.bool_]
 class View:
     """A description and what it may lack, on all recordings.
 
-    predicted: the recordings with the forces that the model predicts. splines: [B, s] of the slow bias. grams: products
-    of all columns. least: sizes that the sensors can show.
+    Attributes
+    ----------
+    predicted
+        The recordings with the forces that the model predicts.
+    splines
+        Splines of the slow bias [B, s].
+    grams
+        Products of all columns.
+    least
+        Sizes that the sensors can show.
     """
 
     data: Mapping[str, Any]
@@ -63,13 +71,13 @@ class View:
         return Selection(self.grams, hypotheses(self.columns, moment_arms(self.data), reach), self.least)
 
     def beside(self, keys: Collection[Key]) -> Selection:
-        """What is missing if these hypotheses are taken as present, each with all its shapes at that place."""
+        """Return what is missing if these hypotheses are present, each with all its shapes at that place."""
         known = [each for each in self.selection.hypotheses if each.key in keys]
         return Selection(self.grams, self.selection.hypotheses, self.least, known) if known else self.selection
 
     @cached_property
     def residual(self) -> Numbers:
-        """[B, n] N·m, bias and all that refitting can mend taken off."""
+        """Residual without the bias and all that refitting can explain, N·m [B, n]."""
         return residual_of(self.series, self.splines, self.columns.nominal)
 
     @cached_property
@@ -78,7 +86,7 @@ class View:
         return Confirmation(self.series, self.folds, self.splines, trends, self.columns.nominal)
 
     def p_value(self, hypothesis: Hypothesis) -> float:
-        """Of a hypothesis being chance, corrected for all that were tried."""
+        """Return the probability of such a result by chance, corrected for all hypotheses that were tried."""
         used = np.flatnonzero(hypothesis.mix.any(axis=1))
         columns = self.columns.values[:, :, used].astype(np.float64) @ hypothesis.mix[used]
         return self.confirmation.p_value(columns, sum(len(each.shapes) for each in self.columns.proposals))
@@ -93,7 +101,7 @@ def look(
     progress: Callable[[int, int], None] | None = None,
     candidates: Sequence[Candidate] = CANDIDATES,
 ) -> View:
-    """data: a fitted description. left_out: [B] blocks that are not looked at."""
+    """Compute the view of a fitted description; blocks in `left_out` [B] are ignored."""
     series = series_of(data, recordings, grid, left_out)
     splines = bias_of(data, series)
     predicted = predicted_of(data, recordings, grid, series)
@@ -111,7 +119,7 @@ def look(
 
 
 def nominal_scale(data: Mapping[str, Any]) -> Numbers:
-    """[u] how large each number that a fit of the description estimates may be expected to be."""
+    """Return how large each number that a fit of the description estimates is expected to be [u]."""
     estimator = Estimator(native.image_from_json(json.dumps(without_uncertainty(data))))
     return np.array([each.scale for each in estimator.unknowns if not each.path.startswith("bias.")])
 
@@ -119,7 +127,24 @@ def nominal_scale(data: Mapping[str, Any]) -> Numbers:
 def series_of(
     data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, left_out: Flags | None = None
 ) -> Series:
-    """left_out: [B] blocks that are not used."""
+    """Return the block means of a description's signals and residual.
+
+    Parameters
+    ----------
+    data
+        Description whose prediction is subtracted.
+    recordings
+        Prepared for the description.
+    grid
+        Blocks of the recordings.
+    left_out
+        Blocks that are not used [B].
+
+    Returns
+    -------
+    Series
+        Block means [B, ...] with `target` = y − G, N·m.
+    """
     series = make_series(data, recordings, grid, block_prediction(data, recordings, grid))
     return series if left_out is None else replace(series, used=series.used & ~left_out)
 
@@ -127,22 +152,42 @@ def series_of(
 def predicted_of(
     data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, series: Series
 ) -> list[FitRecording]:
-    """The recordings with the forces that the description predicts; series: of it."""
+    """Return the recordings with the forces that the description predicts.
+
+    Parameters
+    ----------
+    data
+        Fitted description.
+    recordings
+        As estimated from.
+    grid
+        Blocks of the recordings.
+    series
+        Series of this description.
+
+    Returns
+    -------
+    list of FitRecording
+        With forces that lack the noise they share with the torque (`regressors`).
+    """
     return predicted_forces(data, recordings, grid, series, residual_alone(data, series))
 
 
 def residual_alone(data: Mapping[str, Any], series: Series) -> Numbers:
-    """[B, n] N·m: what the description leaves, its numbers as they are, bias taken off."""
+    """Return what the description leaves with its numbers as they are, bias removed, N·m [B, n]."""
     return residual_of(series, bias_of(data, series), np.zeros((*series.target.shape, 0)))
 
 
 def bias_of(data: Mapping[str, Any], series: Series, knots: float = KNOTS) -> Splines:
-    """[B, s]: splines, or constants where the description says that the bias does not wander. knots: s apart."""
+    """Return the columns of the bias [B, s]: splines, or constants if the description's bias does not drift.
+
+    `knots` is the distance of the splines' knots, s.
+    """
     return bias_splines(series, knots) if bias_settings(data).drift > 0 else constant_bias(series)
 
 
 def blocks_of(grid: Grid, recordings: Sequence[FitRecording]) -> SampleBlocks:
-    """The grid's blocks, as `candidate_columns` takes them."""
+    """Return the grid's blocks in the form that `candidate_columns` takes."""
     found = [np.full(len(recording.time), -1, dtype=np.int64) for recording in recordings]
     for segment in grid.segments:
         numbers = np.repeat(np.arange(segment.first, segment.first + segment.count), segment.samples)

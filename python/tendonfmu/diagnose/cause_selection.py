@@ -1,8 +1,9 @@
-"""The next cause: what lowers the error on unseen data most, if that is material, certain and no chance.
+"""Which cause comes next: the one that lowers the error on unseen data most, if it is material and certain.
 
-Material: the rms on held-out folds falls by a stated share at least. Certain: its gain is more than two standard errors
-over the stretches. A size below what the sensors resolve is no cause. From coarse to fine: a place of its own is only
-taken where it is better than all places together.
+- Material: the rms on held-out folds falls by at least a given share.
+- Certain: the gain is more than two standard errors over the stretches.
+- A size below what the sensors resolve is no cause.
+- Selection goes from coarse to fine: a single place is taken only if it is better than all places together.
 """
 
 from __future__ import annotations
@@ -20,19 +21,26 @@ from tendonfmu.statistics import Grams, standard_error
 Numbers = NDArray[np.float64]
 
 CERTAIN = 2.0  # standard errors above 0
-ALIKE = 1.64  # standard errors of the paired difference within which two causes are not told apart
-SAME = 0.015  # of the error, about a quarter of what is material: a smaller difference is none, however certain
-COMMON = {"presliding", "time_delay"}  # of every finger, and of how it was recorded
-FINER = 0.5  # standard errors by which a finer place has to be better: both have as many numbers
-NEAR = 0.1  # of what an effect takes away: derivatives of it tell its places apart no better
-LEAST_SHARE = 0.01  # of a candidate's variance that has to survive the refit for it to be visible
+ALIKE = 1.64  # standard errors of the paired difference, within which two causes cannot be distinguished
+SAME = 0.015  # of the error, about a quarter of what is material: a smaller difference does not count, however certain
+COMMON = {"presliding", "time_delay"}  # presliding is in every finger, a delay in every way of recording
+FINER = 0.5  # standard errors by which a finer place must be better: both have as many numbers
+NEAR = 0.1  # of what an effect removes: its derivatives do not distinguish places that are this close
+LEAST_SHARE = 0.01  # of a candidate's variance that must survive the refit for it to be visible
 
 
 @dataclass(frozen=True)
 class Judged:
     """A hypothesis on unseen data.
 
-    error: Σ e², (N·m)². by_stretch: [stretches] of it. magnitudes: [d] learned from everything.
+    Attributes
+    ----------
+    error
+        Σ e², (N·m)².
+    by_stretch
+        The same by stretch [stretches].
+    magnitudes
+        Learned from all data [d].
     """
 
     hypothesis: Hypothesis
@@ -43,8 +51,14 @@ class Judged:
 
 @dataclass(frozen=True)
 class Pick:
-    """A cause. gain: 1 − rms with / rms without, on unseen data; error: its standard error. alike: the best hypothesis
-    of every other effect that the data cannot tell from it, best first.
+    """A selected cause.
+
+    Attributes
+    ----------
+    gain, error
+        1 − rms with / rms without, on unseen data, and its standard error.
+    alike
+        The best hypothesis of every other effect that the data cannot distinguish from it, best first.
     """
 
     judged: Judged
@@ -58,12 +72,15 @@ class Pick:
 
 
 class Selection:
-    """All hypotheses judged with the same matrices."""
+    """All hypotheses, judged with the same matrices."""
 
     def __init__(
         self, grams: Grams, hypotheses: Sequence[Hypothesis], least: LeastSizes, beside: Sequence[Hypothesis] = ()
     ) -> None:
-        """beside: hypotheses that are taken as present, so that nothing else is credited with what they explain."""
+        """Judge all hypotheses.
+
+        `beside` holds hypotheses that are taken as present, so that no other effect is credited with what they explain.
+        """
         self.grams = grams
         self._beside = _Beside(beside)
         self.shares = [grams.surviving(each.mix) for each in hypotheses]
@@ -84,7 +101,7 @@ class Selection:
         self._known: dict[int, Judged] = {}
 
     def ranked(self) -> list[Judged]:
-        """The best hypothesis of each effect that lowers the error, the best first."""
+        """Return the best hypothesis of each effect that lowers the error, the best first."""
         seen: dict[str, int] = {}
         for k, (error, hypothesis, _, _) in enumerate(self._found):
             if error < self.base.sum():
@@ -99,13 +116,18 @@ class Selection:
         return self._known[number]
 
     def gain(self, judged: Judged, before: Numbers | None = None) -> tuple[float, float]:
-        """1 − rms with / rms without, and its standard error. before: [stretches] Σ e² without; None: of the model."""
+        """Return 1 − rms with / rms without, and its standard error.
+
+        `before` is Σ e² without the hypothesis by stretch [stretches]; None for that of the model.
+        """
         whole = self.base if before is None else before
         return rms_gain(whole, judged.by_stretch)
 
     def best(self, least_gain: float, tried: Collection[str] = ()) -> Pick | None:
-        """The effect that lowers the error most, at the coarsest place that is as good; None where none is material and
-        certain. tried: effects that are left out."""
+        """Return the effect that lowers the error most, at the coarsest place that is as good.
+
+        None if no effect is material and certain. Effects in `tried` are left out.
+        """
         ranked = [each for each in self.ranked() if each.hypothesis.effect not in tried]
         if not ranked:
             return None
@@ -118,7 +140,7 @@ class Selection:
         return Pick(judged, gain, error, tuple(alike))
 
     def refined(self, effect: str) -> Judged:
-        """The best place at the coarsest level, then finer ones as long as they are certainly better."""
+        """Return the best place at the coarsest level, or a finer one if it is certainly better."""
         levels: dict[int, int] = {}
         for k, (_, hypothesis, _, _) in enumerate(self._found):
             if hypothesis.effect == effect:
@@ -132,7 +154,7 @@ class Selection:
         return chosen
 
     def near(self, judged: Judged) -> list[Judged]:
-        """The same effect at other places of the same level that is nearly as good, the best first."""
+        """Return the same effect at other places of the same level that are nearly as good, the best first."""
         own = judged.hypothesis
         most = judged.error + NEAR * (float(self.base.sum()) - judged.error)
         seen: dict[Key, int] = {}
@@ -143,20 +165,23 @@ class Selection:
 
 
 def names_with(effect: str, named: Collection[str]) -> int:
-    """How many names there are with this one: a model that is a little wrong everywhere can always be given one more,
-    so that each name has to pay more than the one before. COMMON ones, and further places of one, do not count."""
+    """Return how many names count if this one is added.
+
+    A model that is a little wrong everywhere can always be given one more name. So each name must gain more than the
+    one before. COMMON effects, and further places of a named effect, do not count.
+    """
     others = set(named) - COMMON
     return 1 if effect in COMMON or effect in others else 1 + len(others)
 
 
 def is_alike(other: Numbers, best: Numbers) -> bool:
-    """Whether errors by stretch [K] cannot be told from those of the best."""
+    """Return whether errors by stretch [K] cannot be distinguished from those of the best."""
     behind = other - best
     return bool(behind.sum() <= max(ALIKE * standard_error(behind), SAME * best.sum()))
 
 
 class _Beside:
-    """Columns of hypotheses that are always there."""
+    """Columns of hypotheses that are always present."""
 
     def __init__(self, hypotheses: Sequence[Hypothesis]) -> None:
         self._mixes = [each.mix for each in hypotheses]
@@ -164,12 +189,12 @@ class _Beside:
         self._high = np.concatenate([np.zeros(0), *(each.high for each in hypotheses)])
 
     def judged(self, grams: Grams) -> tuple[Numbers, Numbers]:
-        """Their mix [c, d], and their magnitudes without each fold [f, d]."""
+        """Return the mix of all columns [c, d], and their magnitudes without each fold [f, d]."""
         mix = np.concatenate(self._mixes, axis=1)
         return mix, grams.error(mix, self.low, self._high)[1]
 
     def with_(self, hypothesis: Hypothesis) -> tuple[Numbers, Numbers, Numbers]:
-        """Mix and bounds of all, the hypothesis last."""
+        """Return mix and bounds of all, the hypothesis last."""
         return (
             np.concatenate([*self._mixes, hypothesis.mix], axis=1),
             np.concatenate([self.low, hypothesis.low]),
@@ -178,7 +203,10 @@ class _Beside:
 
 
 def rms_gain(before: Numbers, after: Numbers) -> tuple[float, float]:
-    """1 − rms after / rms before of Σ e² by stretch [K], and its standard error (delta method over stretches)."""
+    """Return 1 − rms after / rms before from Σ e² by stretch [K], and its standard error.
+
+    The standard error comes from the delta method over stretches.
+    """
     whole, left = float(before.sum()), float(after.sum())
     if whole <= 0.0:
         return 0.0, np.inf

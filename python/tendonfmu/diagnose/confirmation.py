@@ -1,10 +1,12 @@
-"""Whether what was selected could be chance: a cluster-robust test, on the residual as it is and made white.
+"""Whether a selected cause could be chance: a cluster-robust test, on the residual as it is and on the whitened one.
 
-Scores of stretches of 2 s are independent, whatever the noise does within one (Liang and Zeger, 1986). What the splines
-of the bias took from a stretch's residual is given back (CR2: Bell and McCaffrey, 2002): slow columns, which splines
-nearly follow, would else be confirmed by chance several times too often. Made white, the residual's slow colour does
-not hide a small effect; as it is, what a model of a real machine always leaves at high frequencies does not. Either may
-confirm; the p-value counts both, and everything that was tried (Bonferroni).
+Scores of stretches of 2 s count as independent, whatever the noise does within one (Liang and Zeger, 1986). What the
+splines of the bias removed from a stretch's residual is restored (CR2: Bell and McCaffrey, 2002). Without this, slow
+columns, which splines nearly follow, would be confirmed by chance several times too often.
+
+In the whitened residual, slow noise does not hide a small effect. In the plain residual, the high-frequency error that
+every model of a real machine leaves does not hide it. Either test may confirm; the p-value accounts for both and for
+everything that was tried (Bonferroni).
 """
 
 from __future__ import annotations
@@ -22,17 +24,26 @@ Numbers = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Columns = NDArray[np.float32] | Numbers
 
-_RANK = 1e-9  # of the largest power: what columns in single precision can tell
+_RANK = 1e-9  # of the largest power: resolution of columns in single precision
 _PIECE, _CHUNK = 4096, 64  # rows, columns at a time
-_MOST_LEVERAGE = 0.999  # of a direction in a stretch: beyond, nothing is left to be given back
+_MOST_LEVERAGE = 0.999  # of a direction in a stretch: beyond, there is nothing left to restore
 
 
 class Confirmation:
-    """The residual of a description, and what refitting it can mend."""
+    """The residual of a description, and what refitting it can explain."""
 
     def __init__(self, series: Series, folds: Folds, splines: Splines, trends: Splines, nominal: Columns) -> None:
-        """splines: [B, s] of the slow bias; trends: [B, t] slower ones, for the white residual, whose filter sees what
-        the bias does faster. nominal: [B, n, u] derivatives by the description's own numbers."""
+        """Prepare both tests.
+
+        Parameters
+        ----------
+        splines
+            Splines of the slow bias [B, s].
+        trends
+            Slower splines [B, t] for the white residual, whose filter handles what the bias does faster.
+        nominal
+            Derivatives by the description's own numbers [B, n, u].
+        """
         joints = series.target.shape[1]
         white = whitener(series, residual_of(series, trends, nominal))
         plain = Whitener(np.zeros((0, joints)), np.ones(joints), series.used)
@@ -42,12 +53,12 @@ class Confirmation:
         ]
 
     def p_value(self, columns: Columns, tried: int) -> float:
-        """Of columns [B, n, d] together; tried: how many like them."""
+        """Return the p-value of columns [B, n, d] together; `tried` is the number of such sets that were tried."""
         return min(1.0, len(self._tests) * tried * min(test.p_value(columns) for test in self._tests))
 
 
 class _ClusterTest:
-    """Wald's test of a regression with a covariance that stretches of time give."""
+    """Wald's test of a regression; the covariance comes from stretches of time."""
 
     def __init__(self, series: Series, folds: Folds, splines: Splines, nominal: Columns, filters: Whitener) -> None:
         joints = series.target.shape[1]
@@ -67,7 +78,7 @@ class _ClusterTest:
         self._target = self._left(self._flat(series.target[:, :, None]))[:, 0]
 
     def _flat(self, values: Columns) -> Columns:
-        """[R·n, d] filtered, without the bias."""
+        """Return values filtered and without the bias [R·n, d]."""
         found = np.empty((len(self._rows), *values.shape[1:]), dtype=values.dtype)
         for begin in range(0, values.shape[2], _CHUNK):
             chunk = slice(begin, begin + _CHUNK)
@@ -77,13 +88,15 @@ class _ClusterTest:
         return np.asarray(found.reshape(found.shape[0] * found.shape[1], values.shape[2]))
 
     def _left(self, values: Columns) -> Numbers:
-        """[R·n, d] without what refitting the nominal numbers can mend."""
+        """Return values without what refitting the nominal numbers can explain [R·n, d]."""
         return np.asarray(values - self._nominal @ (self._inverse @ _product(self._nominal, values)), dtype=np.float64)
 
     @cached_property
     def _given_back(self) -> list[tuple[Indices, int, Numbers, Numbers]]:
-        """Of each stretch and joint: rows, joint, directions [rows, q] that the splines weaken, and how much each is
-        strengthened."""
+        """Directions that the splines weaken, for each stretch and joint.
+
+        Each entry holds rows, joint, directions [rows, q], and by how much each direction is strengthened.
+        """
         found = []
         for rows in self._rows_of_stretches:
             for j, span in enumerate(self._spans):
@@ -94,7 +107,7 @@ class _ClusterTest:
         return found
 
     def _unshrunk(self, left: Numbers) -> Numbers:
-        """[R·n] a residual with what the splines took from it by stretch."""
+        """Return a residual with what the splines removed by stretch restored [R·n]."""
         found = left.reshape(-1, len(self._spans)).copy()
         for rows, j, directions, strength in self._given_back:
             found[rows, j] += directions @ (strength * (directions.T @ found[rows, j]))
@@ -122,7 +135,7 @@ class _ClusterTest:
 
 
 def _product(one: Columns, other: Columns) -> Numbers:
-    """[d, e] in double precision, piece by piece: whole copies of many columns would not fit in memory."""
+    """Return the product in double precision [d, e], piece by piece: copies of many columns would not fit in memory."""
     found = np.zeros((one.shape[1], other.shape[1]))
     for begin in range(0, len(one), _PIECE):
         part = slice(begin, begin + _PIECE)

@@ -1,7 +1,8 @@
-"""What the extended model means for contact detection: both models tuned alike on free motion, both scored on labels.
+"""How much the extended model improves contact detection, measured on labelled recordings.
 
-The thresholds of each are the lowest that keep the same rate of false alarms in the same free motion
-(`detect.tuning.ContactTuning`); events, false alarms and delays are counted by `detect.counting`.
+Both models are tuned alike on free motion: the thresholds of each are the lowest that keep the same rate of false
+alarms in the same free motion (`detect.tuning.ContactTuning`). Both are then scored on the labels: `detect.counting`
+counts events, false alarms and delays.
 """
 
 from __future__ import annotations
@@ -36,18 +37,19 @@ from tendonfmu.recordings import FitRecording, Recording
 Data = Mapping[str, Any]
 Flags = NDArray[np.bool_]
 
-RATE = 6.0  # 1/h of false alarms that both are tuned for, or what the free motion supports
+RATE = 6.0  # 1/h; false alarm rate that both are tuned for, or the lowest that the free motion supports
 CONFIDENCE = 0.9
-_SHORTEST = 4.0  # s, of a stretch without contact that is taken as free motion
-_MARGIN = 1.0  # s, beside contact
+_SHORTEST = 4.0  # s; shortest stretch without contact that counts as free motion
+_MARGIN = 1.0  # s, on either side of a contact
 _SPARE = 1.3  # times the least time that supports a rate: recordings are cut into blocks
 
 
 def detection_gain(nominal: Data, extended: Data, recordings: Sequence[FitRecording]) -> DetectionGain | None:
-    """None without labelled contact, or where nothing can be tuned: no free motion, or a bias that does not drift.
+    """Return the gain for contact detection; None without labelled contact or if no thresholds can be tuned.
 
-    nominal, extended: fitted descriptions. recordings: all of the diagnosis, for training and tests; those without any
-    contact are free motion, and where there are none, the stretches without contact of the others.
+    Thresholds cannot be tuned without free motion or with a bias that does not drift. `nominal` and `extended` are
+    fitted descriptions. `recordings` are all of the diagnosis, for training and tests. Recordings without any contact
+    are the free motion; if there are none, the stretches without contact of the others are used.
     """
     labelled = [each.recording for each in recordings if each.recording.contact is not None]
     labelled = [each for each in labelled if each.contact is not None and each.contact.any()]
@@ -63,7 +65,7 @@ def detection_gain(nominal: Data, extended: Data, recordings: Sequence[FitRecord
         return None
     try:
         tuned = [_tuned(data, free, kinematics, rate) for data in (nominal, extended)]
-    except InputError:  # no thresholds can be tuned, such as of a bias without drift
+    except InputError:  # no thresholds can be tuned, for example with a bias without drift
         return None
     before, after = (_score(data, labelled, kinematics) for data in tuned)
     return DetectionGain(
@@ -92,7 +94,7 @@ def _free_motion(finger: FingerDescription, recordings: Sequence[Recording], kin
 
 
 def _is_free(finger: FingerDescription, recording: Recording, kinematics: int) -> bool:
-    """Whether it counts as free motion: long enough, moving, and without a load that a reference sensor feels."""
+    """Return whether a recording is free motion: long enough, moving, and without a load on a reference sensor."""
     try:
         parts, _ = free_parts(finger, recording, kinematics)
     except InputError:
@@ -101,7 +103,7 @@ def _is_free(finger: FingerDescription, recording: Recording, kinematics: int) -
 
 
 def _pieces(recording: Recording, contact: Flags) -> list[Recording]:
-    """Stretches without contact and not close to it."""
+    """Return the stretches that are not in or close to contact."""
     time = recording.time
     touched = time[contact]
     after = np.searchsorted(touched, time - _MARGIN) < np.searchsorted(touched, time + _MARGIN, side="right")
@@ -139,7 +141,7 @@ def _score(data: Data, recordings: Sequence[Recording], kinematics: int) -> Dete
 
 
 def _thresholds(data: Data) -> tuple[float, ...]:
-    """[n] N·m, of what decides first."""
+    """Return the thresholds of the method that decides first [n], N·m."""
     contact = data["contact"]
     found = (contact.get("innovation") or contact)["threshold"]
     return tuple(math.inf if each is None else float(each) for each in found)

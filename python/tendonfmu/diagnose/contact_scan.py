@@ -1,9 +1,12 @@
-"""Stretches of a residual that no smooth effect explains: a push, a stall, a slack tendon.
+"""Which stretches of a residual no smooth effect explains: a push, a stall, a slack tendon.
 
-Windows of several lengths slide over what neither a slow bias nor a flexible learner, on unseen blocks, follows. The
-bias is a running median here: splines would bend towards a push and leave its mirror image on either side. Each length
-has its own robust scale, so the colour of the noise does not matter; how high chance reaches is extrapolated from the
-quartiles of the block maxima (Gumbel), which heavy tails raise and a few contaminated blocks do not.
+Windows of several lengths slide over the part of the residual that neither a slow bias nor a flexible learner predicts
+on unseen blocks.
+
+- The bias is a running median here. Splines would bend towards a push and leave its mirror image on either side.
+- Each length has its own robust scale, so the colour of the noise does not matter.
+- The largest value that chance reaches is extrapolated from the quartiles of the block maxima (Gumbel distribution).
+  Heavy tails raise it, a few contaminated blocks do not.
 """
 
 from __future__ import annotations
@@ -27,9 +30,9 @@ if TYPE_CHECKING:
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-LEVEL = 0.01  # of any event at all where there is none
-LEAST = 5.5  # robust standard deviations, whatever the quartiles say
-EDGE = 3.0  # of the shortest window: an event reaches as far as it is above
+LEVEL = 0.01  # probability of any event in recordings without one
+LEAST = 5.5  # robust standard deviations: least height of an event, whatever the quartiles give
+EDGE = 3.0  # of the shortest window, in robust standard deviations: an event extends as far as this
 SLOW = 4.0  # s of the running median, more than twice the longest push
 WIDTHS = {
     0.1: 1.5,
@@ -38,20 +41,23 @@ WIDTHS = {
     0.8: SLOW,
     1.6: SLOW,
     3.2: 2 * SLOW,
-}  # s of a window → s of the running median it is held against
-JUMP = 8.0  # times the usual speed: a residual of LEAST is then enough, that rare a motion is in no learner's reach
+}  # s of a window -> s of the running median that it is compared with
+JUMP = 8.0  # times the usual speed: such motion is too rare to be learned, so a residual of LEAST is enough
 MERGED = 0.3  # s between parts of one event
-EXPLAINED = 0.5  # of the residual's variance, from which on what a flexible learner predicts of it is taken off
+EXPLAINED = 0.5  # of the residual's variance: a learner that predicts more is subtracted
 PAD = 0.1  # s on either side
-MOST = 0.25  # of the time: what is there more often is no event
+MOST = 0.25  # of the time: something that is there more often is not an event
 MAD = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
 
 
 def scan_events(
     series: Series, residual: Numbers, splines: Splines, recordings: Sequence[str], *, seed: int = 0
 ) -> tuple[Event, ...]:
-    """residual: [B, n] N·m of the nominal model. splines: [B, s] of the bias, whose span was taken from it.
-    recordings: names, by number. In order of recording and time."""
+    """Find events in a residual [B, n], N·m, of the nominal model, in order of recording and time.
+
+    `splines` [B, s] are those of the bias; their span has been removed from the residual. `recordings` are names, by
+    number.
+    """
     residual = np.where(series.used[:, None], residual, 0.0)
     plan = make_folds(series)
     if not plan.enough:
@@ -59,12 +65,12 @@ def scan_events(
     learner = Learner(features(series, seed=seed), residual, splines, plan)
     left = np.array(series.target)
     guess = learner.predicted(learner.columns)
-    # what explains most is an effect; less may be the push itself, learned from its neighbours
+    # a prediction of most of the residual is an effect; a smaller one may be the push, learned from its neighbours
     helps = learner.gains(guess).sum(axis=0) > EXPLAINED * np.sum(learner.target**2, axis=0)
     left[plan.rows] -= np.where(helps, guess, 0.0)
     inside = _outlying(series, left, plan, np.zeros(left.shape, dtype=bool))
     if inside.any():
-        # again with a bias that what was found does not bend
+        # scan again with a bias that ignores the blocks found so far
         inside = _outlying(series, left, plan, inside)
     if float(inside[plan.rows].any(axis=1).mean()) > MOST:
         return ()
@@ -73,7 +79,7 @@ def scan_events(
 
 
 def left_out(series: Series, events: Sequence[Event], recordings: Sequence[str]) -> Flags:
-    """[B] whether a block lies in an event."""
+    """Return whether each block lies in an event [B]."""
     inside = np.zeros(len(series.time), dtype=bool)
     for event in events:
         own = series.recording == recordings.index(event.recording)
@@ -82,7 +88,10 @@ def left_out(series: Series, events: Sequence[Event], recordings: Sequence[str])
 
 
 def _flat(left: Numbers, plan: Folds, known: Flags, length: int) -> Numbers:
-    """[U, n] without its running median, to which known blocks count as lying between their neighbours."""
+    """Return the residual without its running median [U, n].
+
+    In known blocks the median is interpolated from their neighbours.
+    """
     result = left[plan.rows]
     for joint in range(left.shape[1]):
         values, own = left[plan.rows, joint], known[plan.rows, joint]
@@ -94,7 +103,7 @@ def _flat(left: Numbers, plan: Folds, known: Flags, length: int) -> Numbers:
 
 
 def _slow(values: Numbers, run: NDArray[np.int64], length: int) -> Numbers:
-    """Running median within each run."""
+    """Return the running median within each run."""
     result = np.empty(len(values))
     for begin, end in pairwise(_ends(run)):
         result[begin:end] = median_filter(values[begin:end], size=min(length, end - begin), mode="nearest")
@@ -102,14 +111,14 @@ def _slow(values: Numbers, run: NDArray[np.int64], length: int) -> Numbers:
 
 
 def _ends(run: NDArray[np.int64]) -> list[int]:
-    """First row of each run, and the number of rows."""
+    """Return the first row of each run, and the number of rows."""
     return [0, *(np.flatnonzero(np.diff(run)) + 1).tolist(), len(run)]
 
 
 def _outlying(series: Series, left: Numbers, plan: Folds, known: Flags) -> Flags:
-    """[B, n] blocks of windows that are higher than chance reaches, as far as the shortest window still stands out.
+    """Return the blocks of windows that exceed what chance reaches [B, n].
 
-    known: [B, n] blocks that the bias does not follow.
+    They are extended while the shortest window still stands out. `known` marks blocks that the bias ignores [B, n].
     """
     inside = np.zeros(left.shape, dtype=bool)
     tests = len(WIDTHS) * left.shape[1]
@@ -132,14 +141,14 @@ def _outlying(series: Series, left: Numbers, plan: Folds, known: Flags) -> Flags
 
 
 def _jumps(velocity: Numbers) -> Flags:
-    """[U] blocks of a velocity that the joint has at no other time: it came loose, or was thrown."""
+    """Return blocks with a speed that the joint has at no other time [U]: it came loose, or was thrown."""
     speed = np.abs(velocity)
     moving = speed[speed > np.median(speed)]
     return np.asarray(speed > JUMP * np.quantile(moving, 0.9)) if len(moving) else np.zeros(len(speed), dtype=bool)
 
 
 def _reached(core: Flags, raised: Flags, run: NDArray[np.int64]) -> Flags:
-    """Stretches of raised rows of a run that touch a core; a core without any stays as it is."""
+    """Return the stretches of raised rows of a run that touch a core; a core without raised rows stays as it is."""
     edge = np.flatnonzero((np.diff(raised.astype(int)) != 0) | (np.diff(run) != 0)) + 1
     result = np.zeros(len(core), dtype=bool)
     for begin, end in pairwise([0, *edge.tolist(), len(core)]):
@@ -149,7 +158,7 @@ def _reached(core: Flags, raised: Flags, run: NDArray[np.int64]) -> Flags:
 
 
 def _sliding(values: Numbers, run: NDArray[np.int64], length: int) -> Numbers:
-    """Centred means over a window within each run; runs shorter than it count as nothing."""
+    """Return centred means over a window within each run; 0 in runs shorter than the window."""
     result = np.zeros(len(values))
     for begin, end in pairwise(_ends(run)):
         if end - begin >= length:
@@ -160,7 +169,7 @@ def _sliding(values: Numbers, run: NDArray[np.int64], length: int) -> Numbers:
 
 
 def _reach(score: Numbers, plan: Folds, tests: int) -> float:
-    """How high chance reaches: Gumbel's distribution through the quartiles of the maxima of blocks."""
+    """Return the value that chance reaches: Gumbel distribution through the quartiles of the block maxima."""
     highest = np.zeros(plan.stretches)
     np.maximum.at(highest, plan.stretch, score)
     low, middle, high = np.quantile(highest, (0.25, 0.5, 0.75))
@@ -170,7 +179,7 @@ def _reach(score: Numbers, plan: Folds, tests: int) -> float:
 
 
 def _widened(high: Flags, run: NDArray[np.int64], length: int) -> Flags:
-    """Blocks under a window of this length around a marked centre, in the same run."""
+    """Return the blocks under a window of this length around each marked centre, in the same run."""
     result = np.zeros(len(high), dtype=bool)
     for centre in np.flatnonzero(high):
         part = slice(max(0, centre - length // 2), centre + length // 2 + 1)
@@ -179,7 +188,10 @@ def _widened(high: Flags, run: NDArray[np.int64], length: int) -> Flags:
 
 
 def _stretches(series: Series, inside: Flags) -> list[NDArray[np.int64]]:
-    """Rows of each event: marked blocks of all joints, joined over short breaks, padded; within a segment."""
+    """Return the rows of each event.
+
+    Marked blocks of all joints are joined over short breaks and padded, within a segment.
+    """
     marked = np.flatnonzero(inside.any(axis=1))
     if not len(marked):
         return []
@@ -212,7 +224,7 @@ def _event(series: Series, left: Numbers, inside: Flags, rows: NDArray[np.int64]
 
 
 def _circumstances(series: Series, rows: NDArray[np.int64], joint: int) -> str:
-    """What is seen of the hand meanwhile: a slack tendon, a joint that stands still."""
+    """Return what the recording shows at that time: a slack tendon, a jumping or resting joint."""
     notes = []
     usual = np.median(np.abs(series.force), axis=0)
     slack = np.flatnonzero(np.abs(series.force[rows]).min(axis=0) < 0.05 * usual)

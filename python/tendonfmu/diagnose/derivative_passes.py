@@ -1,7 +1,7 @@
-"""Derivatives of the model's torque by many numbers of a description, also by terms that are not in it yet.
+"""How the model's torque depends on many numbers of a description, also on those of terms that it does not have yet.
 
-Terms at a strength of zero do not disturb each other: as many as fit go into one description and one pass over the
-recordings, and each column is put together of the core's derivatives by the finest numbers there are.
+Terms at a strength of zero do not affect each other. So as many as fit go into one description and one pass over the
+recordings. Each column is put together from the core's derivatives by the finest numbers there are.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ from tendonfmu.statistics import BlockSums, SampleBlocks
 Numbers = NDArray[np.float64]
 Single = NDArray[np.float32]
 Stretch = tuple[int, Numbers, Numbers]  # first sample; derivatives of T and of the jumps there, [K, n, u]
-Direction = Mapping[str, float]  # path -> how much of it; of a description that may be coarser than the merged one
-Watch = Callable[[int], None]  # samples that were looked at since the last call
+Direction = Mapping[str, float]  # path -> share; the description may be coarser than the merged one
+Watch = Callable[[int], None]  # samples processed since the last call
 
 MOST_ROWS = 1024  # of `extensions`; docs/reference/semantics.md#extensions
-_MOST_NUMBERS = 1500  # of a pass: its derivatives of a stretch of samples stay in tens of megabytes
-_BYTES = 3e7  # of derivatives at a time: more does not stay near the processor
+_MOST_NUMBERS = 1500  # in a pass: keeps the derivatives of a stretch within tens of megabytes
+_BYTES = 3e7  # of derivatives at a time: more does not stay in the processor's cache
 _STRETCH, _LONGEST = 400, 2500  # samples at a time
-_SEGMENT_SHARE = 24 * 24  # the estimator begins anew from 24 states of a recording, and runs on from there
-_TINY = 1e-9  # expected size of a magnitude of a law that is 0: the estimator starts it at a millionth of that
+_SEGMENT_SHARE = 24 * 24  # the estimator starts at 24 stored states of a recording and runs on from there
+_TINY = 1e-9  # expected size of a magnitude of a law that is 0: the estimator starts at a millionth of it
 
 
 @dataclass
 class Pass:
     """Terms that are in the same description at a strength of zero.
 
-    columns: for each its place among all columns and its direction, in paths of the merged description.
+    For each column, `columns` holds its index among all columns and its direction, in paths of the merged description.
     """
 
     base: Mapping[str, Any]
@@ -50,7 +50,7 @@ class Pass:
     columns: list[tuple[int, Direction]] = field(default_factory=list)
 
     def takes(self, variant: Variant) -> bool:
-        """Whether a variant's term fits in beside the others."""
+        """Return whether a variant's term fits in with the others."""
         settings, given = variant.settings or {}, len(self.base.get("extensions") or [])
         return (
             all(self.settings.get(path, value) == value for path, value in settings.items())
@@ -60,7 +60,7 @@ class Pass:
         )
 
     def add(self, variant: Variant, first: int) -> None:
-        """first: place of its first column among all."""
+        """Add a variant; `first` is the index of its first column among all."""
         given = len(self.base.get("extensions") or [])
         shift = len(self.rows)
         own = {
@@ -83,7 +83,7 @@ def _moved(path: str, own: Mapping[str, str]) -> str:
 
 
 def plan_passes(base: Mapping[str, Any], variants: Sequence[tuple[Variant, int]]) -> list[Pass]:
-    """As few passes as may be. variants: each with the place of its first column."""
+    """Distribute variants over as few passes as possible; each comes with the index of its first column."""
     passes = [Pass(base)]
     for variant, first in variants:
         chosen = next((each for each in passes if each.takes(variant)), None)
@@ -95,7 +95,7 @@ def plan_passes(base: Mapping[str, Any], variants: Sequence[tuple[Variant, int]]
 
 
 def nominal_directions(data: Mapping[str, Any]) -> tuple[list[str], list[Direction]]:
-    """What a fit of a description estimates, the initial bias left out: names, and the numbers that each moves."""
+    """Return the numbers that a fit of a description estimates, except for the initial bias: names and directions."""
     image = native.image_from_json(json.dumps({**data, "sensor_fault": None}))
     paths = [parameter.path for parameter in native.Finger(image).parameters()]
     estimator = Estimator(image)
@@ -116,9 +116,10 @@ def run_pass(
     sums: Single,
     watch: Watch,
 ) -> None:
-    """Adds to sums [B, n, c] the sums over blocks of the derivatives of G, the torque with all jumps so far, N·m.
+    """Add to `sums` [B, n, c] the block sums of the derivatives of G, the torque with all jumps so far, N·m.
 
-    columns: place in `sums`, ascending, and direction, in paths of `data` or of a coarser description of the finger.
+    `columns` holds indices in `sums`, ascending, and directions, in paths of `data` or of a coarser description of the
+    finger.
     """
     finer = [(place, _finer(data, direction)) for place, direction in columns]
     estimator, numbers = _estimator_of(data, {path for _, direction in finer for path in direction})
@@ -148,7 +149,7 @@ def _finer(data: Mapping[str, Any], direction: Direction) -> dict[str, float]:
 
 
 def _stretches(estimator: Estimator, recording: FitRecording, part: slice, watch: Watch) -> Iterator[Stretch]:
-    """In the part's order, counted from its start."""
+    """Yield derivatives of the part in order; samples count from its start."""
     number = estimator.add_recording(recording.arrays(part), recording.kinematics)
     samples = part.stop - part.start
     row = 2 * 8 * estimator.joints * len(estimator.unknowns)
@@ -161,7 +162,7 @@ def _stretches(estimator: Estimator, recording: FitRecording, part: slice, watch
 
 
 def _estimator_of(data: Mapping[str, Any], wanted: set[str]) -> tuple[Estimator, dict[str, int]]:
-    """An estimator in which each of the wanted numbers is an unknown of its own, and path -> its column."""
+    """Return an estimator in which each wanted number is an unknown of its own, and path -> its column."""
     image = native.image_from_json(json.dumps({**data, "sensor_fault": None}))
     paths = [parameter.path for parameter in native.Finger(image).parameters()]
     index = {path: k for k, path in enumerate(paths)}
@@ -177,7 +178,10 @@ def _estimator_of(data: Mapping[str, Any], wanted: set[str]) -> tuple[Estimator,
 
 
 def _statics_beside(data: Mapping[str, Any], wanted: set[str]) -> set[str]:
-    """Of laws with a Stribeck effect: static − coulomb is held, not static, where coulomb moves."""
+    """Return the statics of laws with a Stribeck effect whose coulomb is wanted.
+
+    If coulomb moves, static − coulomb is held constant, not static.
+    """
     found = set()
     for path in wanted:
         if is_law_number(path) and path.endswith(".coulomb"):

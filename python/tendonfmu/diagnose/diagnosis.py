@@ -1,9 +1,11 @@
-"""What the simulation of a finger gets wrong, what causes it, and what is gained by mending it.
+"""What the simulation of a finger gets wrong, what causes it, and what correcting it gains.
 
-from tendonfmu.diagnose.diagnosis import diagnose
+::
 
-found = diagnose("finger.json", ["monday.parquet"], tests=["tuesday.parquet"])
-found.verdict, [cause.where for cause in found.causes], found.gain
+    from tendonfmu.diagnose import diagnose
+
+    found = diagnose("finger.json", ["monday.parquet"], tests=["tuesday.parquet"])
+    found.verdict, [cause.where for cause in found.causes], found.gain
 """
 
 from __future__ import annotations
@@ -52,11 +54,11 @@ Numbers = NDArray[np.float64]
 Finger = FingerDescription | str | os.PathLike[str]
 Source = Recording | str | os.PathLike[str]
 
-HELD = Held(0.2, 10.0)  # of the recordings, for the gain, where no others are given
-HALF = Held(0.5, 10.0)  # of a change: its few numbers need less, and single samples of r are mostly noise
+HELD = Held(0.2, 10.0)  # of the recordings, for the gain, if no tests are given
+HALF = Held(0.5, 10.0)  # for a change: its few numbers need less data, and single samples of r are mostly noise
 LEAST_GAIN = 0.03
-MOST_RIVALS = 3  # of a cause, that an experiment is looked for
-MOST_UNSEEN = 6  # effects that are not visible, that an experiment is looked for
+MOST_RIVALS = 3  # rivals of a cause for which an experiment is planned
+MOST_UNSEEN = 6  # invisible effects for which an experiment is planned
 SIGNALS = "signals, delay and presliding"
 PHASES = {
     SIGNALS: 20.0,
@@ -81,16 +83,44 @@ def diagnose(
     reference: Sequence[Source] | None = None,
     progress: Callable[[PhaseState], None] | None = None,
 ) -> Diagnosis:
-    """Finds what a description lacks; with reference recordings, what has changed since them.
+    """Find what a description lacks; with reference recordings, find what has changed since them.
 
-    finger: description, or its file. recordings: of contact-free motion; samples labelled contact are left out. tests:
-    recordings that the gain is measured on. Without them that is every fifth stretch of 10 s of `recordings`, that the
-    numbers are not fitted to, and causes are judged on up to eight parts of all of it, held out in turn. kinematics:
-    source, 1 to 3. least_gain: share of what is left of the rms that a cause has to take away, 0 to 0.5. jobs: threads
-    of the fits. checked: the recordings were held against the finger, and what is to be said of them was said.
-    reference: recordings of the same finger when it was well, another motion or the same; `recordings` and `tests` are
-    then those of now, several in order of time.
-    progress: called with what is being done. Raises InputError where a file or an option is at fault.
+    Without `tests`, every fifth stretch of 10 s of `recordings` is held out from the fit and used to measure the gain.
+    Causes are then judged on up to eight parts of all recordings, held out in turn.
+
+    Parameters
+    ----------
+    finger
+        Description, or its file.
+    recordings
+        Of contact-free motion, or their files; samples labelled contact are left out.
+    tests
+        Recordings on which the gain is measured.
+    kinematics
+        Kinematics source, 1 to 3.
+    least_gain
+        Share of the remaining rms that a cause must remove, 0 to 0.5.
+    seed
+        Seed of all random numbers.
+    jobs
+        Threads of the fits.
+    checked
+        Whether the recordings were already checked against the finger and the warnings given.
+    reference
+        Recordings of the same finger when it was well, of another motion or the same. `recordings` and `tests` are then
+        those of now, several in order of time.
+    progress
+        Called with what is being done.
+
+    Returns
+    -------
+    Diagnosis
+        Verdict, causes, gains and everything else that a report shows.
+
+    Raises
+    ------
+    InputError
+        If a file or an option is at fault.
     """
     begun = perf_counter()
     if reference is not None:
@@ -105,7 +135,7 @@ def diagnose(
         case = _case(finger, recordings, tests, kinematics, least_gain, checked)
         with phases.start(SIGNALS):
             chosen = choose(case.finger, case.whole, FitSettings(threads=jobs, path=case.finger.path))
-        with own_fault("diagnosis"):  # all that was given has been checked and fitted once
+        with own_fault("diagnosis"):  # all input has been checked and fitted once
             found = search(case.whole, chosen, least_gain=least_gain, seed=seed, phases=phases)
             result = _Result(case, found, least_gain, seed, jobs, phases)
             return replace(result.diagnosis(), seconds=perf_counter() - begun)
@@ -116,7 +146,7 @@ def diagnose(
 
 @dataclass(frozen=True)
 class _Case:
-    """training: with held-out stretches where there are no tests. tests: to judge on. warnings: about recordings."""
+    """Checked input. `training` has held-out stretches if there are no `tests`; `warnings` are about recordings."""
 
     finger: FingerDescription
     training: list[FitRecording]
@@ -175,7 +205,7 @@ def change_case(
     least_gain: float,
     checked: bool,
 ) -> ChangeCase:
-    """The recordings of now and of the reference, checked: by themselves, and against each other."""
+    """Read and check the recordings of now and of the reference, each by itself and against each other."""
     own = _case(finger, now, tests, kinematics, least_gain, checked, HALF)
     before = _case(own.finger, reference, [], kinematics, least_gain, checked)
     then = before.whole
@@ -196,7 +226,7 @@ class _Result:
         self._series = found.last.series
 
     def diagnosis(self) -> Diagnosis:
-        """Without the time it took."""
+        """Return the diagnosis; its duration is still 0."""
         found, case = self._found, self._case
         with self._phases.start("gain on unseen data"):
             verified = self._verified()
@@ -224,7 +254,7 @@ class _Result:
             extended=gain.extended,
             bias_only_rms=gain.bias_only_rms,
             noise_floor=tuple(float(value) for value in floor),
-            floor_source="what nothing recorded predicts on unseen stretches",
+            floor_source="the part of the error on unseen stretches that nothing recorded predicts",
             gain=gain.value,
             steps=gain.steps,
             causes=tuple(self._cause(k, verified, left) for k in range(len(verified.causes))),
@@ -280,7 +310,7 @@ class _Result:
     # --- causes ---
 
     def _left(self, data: Mapping[str, Any]) -> Numbers:
-        """[B, n] N·m: residual of a model over all recordings that were estimated from, bias taken off."""
+        """Return the residual of a model over all recordings that were estimated from, bias removed, N·m [B, n]."""
         estimation = self._found.estimation
         series = series_of(data, estimation.recordings, estimation.grid)
         return residual_alone(data, replace(series, used=self._series.used))
@@ -318,8 +348,10 @@ class _Result:
         return measure_remainder(view.series, residual, view.splines, force=np.concatenate(force), seed=self._seed)
 
     def _unexplained(self, left: Remainder, residual: Numbers) -> Unexplained:
-        """Of the variance that is left: what unseen stretches of it show to be no noise; unknown where mending it would
-        be material."""
+        """Return the share of the remaining variance that unseen stretches show to be no noise.
+
+        It is unknown if correcting it would be material.
+        """
         variance = np.mean(residual[self._series.used] ** 2, axis=0)
         shares = np.clip(np.array(left.share), 0.0, 1.0)
         whole = float(variance.sum())
@@ -332,7 +364,7 @@ class _Result:
         return Unexplained(share, description, tuple(shares.tolist()), left.p_value, bool(unknown), gain)
 
     def _torque(self) -> Numbers:
-        """[B, n] N·m: what is to be explained."""
+        """Return the torque to be explained, N·m [B, n]."""
         estimation = self._found.estimation
         return np.concatenate(
             [
@@ -342,27 +374,29 @@ class _Result:
         )
 
     def _experiments(self, verified: Verified) -> tuple[Experiments, tuple[Invisible, ...]]:
-        """For confusion sets, and for what is not visible: one question for each effect, at the place that comes
-        nearest to being visible."""
+        """Plan experiments for causes that cannot be distinguished and for effects that are not visible.
+
+        Each invisible effect is one question, at the place that comes nearest to being visible.
+        """
         nominal, source = self._found.nominal.data, self._found.fitted_to[0].kinematics
         rivals = [
             Question(cause.accepted[0], rival)
             for cause in verified.causes
             for rival in [_ordinary(each) for each in cause.alike[:MOST_RIVALS]]
             if all(each.place in each.candidate.places(nominal, source) for each in (cause.accepted[0], rival))
-        ]  # not about a law that another cause has brought
+        ]  # only laws that the nominal description has
         unseen = self._unseen()
         nearest: dict[str, Hypothesis] = {}
         for hypothesis, _ in unseen:
             own = _ordinary(hypothesis)
-            if own.place in own.candidate.places(nominal, source):  # not at a law that a cause has brought
+            if own.place in own.candidate.places(nominal, source):  # only laws that the nominal description has
                 nearest.setdefault(hypothesis.effect, hypothesis)
         asked = list(nearest)[:MOST_UNSEEN]
         questions = [*rivals, *(Question(_ordinary(nearest[effect])) for effect in asked)]
         noise = self._left(self._found.extended.data)[self._series.used].std(axis=0)
         with self._phases.start("next experiment", len(questions) or None) as step:
             planned = plan_experiments(
-                nominal,  # that has no cause that is in question
+                nominal,  # without the causes in question
                 self._found.fitted_to,
                 questions,
                 noise=[float(value) for value in noise],
@@ -379,7 +413,10 @@ class _Result:
         )
 
     def _unseen(self) -> list[tuple[Hypothesis, float]]:
-        """Of each place that is not visible the shape that comes nearest, with its share; the nearest places first."""
+        """Return, for each invisible place, the shape that comes nearest to being visible, and its share.
+
+        The places nearest to being visible come first.
+        """
         selection = self._found.last.selection
         best: dict[tuple[str, int | None, int | None], tuple[Hypothesis, float]] = {}
         for each, share in zip(selection.hypotheses, selection.shares, strict=True):
@@ -401,13 +438,16 @@ def _candidate(hypothesis: Hypothesis) -> Candidate:
 
 
 def _ordinary(hypothesis: Hypothesis) -> Accepted:
-    """An effect of ordinary size, at its first place."""
+    """Return an effect of ordinary size, at its first place."""
     member = hypothesis.members[0]
     return Accepted(member.proposal.candidate, member.proposal.place, dict(member.shape.shape))
 
 
 def _too_small(named: NamedCause) -> Cause:
-    """What was certain and is not material, or not on unseen data; it is in no description, so it has no numbers."""
+    """Return a cause that is certain but not material or not confirmed on unseen data.
+
+    It is in no description, so it has no numbers.
+    """
     candidate = named.accepted[0].candidate
     return Cause(
         where=Where(named.effect, named.joint, named.tendon),

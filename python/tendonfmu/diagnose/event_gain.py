@@ -1,4 +1,4 @@
-"""What it is worth to leave events (contact, a stall) out of the recordings."""
+"""How much the error falls when events (contact, a stall) are left out of the recordings."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from tendonfmu.statistics import Interval, blocks_of, paired_gain
 
 Numbers = NDArray[np.float64]
 
-_TWO_SIDED = 1.96  # standard errors of a 95 % interval
+_TWO_SIDED = 1.96  # of the standard error, for a 95 % interval
 
 
 def event_gain(data: Mapping[str, Any], recordings: Sequence[FitRecording], events: Sequence[Event]) -> Interval | None:
-    """Share of the rms that leaving the events out takes away, with a 95 % interval; None without events.
+    """Return the share of the rms that leaving the events out removes, with a 95 % interval; None without events.
 
-    The events are taken as they are; how large the error would be without them is as certain as the rest of the time,
-    by blocks of 2 s, shows. data: fitted description, as it runs online. recordings: as they were measured, with the
-    events in them; `train` says what is judged.
+    The events are taken as given. The error without them is as certain as the rest of the recording, judged by blocks
+    of 2 s. `data` is a fitted description as it runs online. `recordings` are as measured, with the events in them;
+    `train` says which samples are judged.
     """
     if not events:
         return None
@@ -45,14 +45,18 @@ def event_gain(data: Mapping[str, Any], recordings: Sequence[FitRecording], even
 
 
 def _gain(within: float, samples: int, free: Numbers, free_samples: Numbers) -> Interval | None:
-    """within: Σ r² in the events, of so many samples; free: [B] Σ r² of the blocks beside them, of so many samples."""
+    """Compute the interval from the sums of r².
+
+    `within` is Σ r² in the events, over `samples` samples. `free` is Σ r² of the blocks outside of events [B], over
+    `free_samples` samples [B].
+    """
     rest, count = float(free.sum()), float(free_samples.sum())
     if len(free) < paired_gain.FEWEST or not rest > 0.0:
         return None
     mean = rest / count
-    # of a ratio of sums, by blocks
+    # standard error of a ratio of sums, by blocks
     spread = float(np.sqrt(np.sum((free - mean * free_samples) ** 2) * len(free) / (len(free) - 1)))
-    ratio = math.log(mean * (count + samples) / (rest + within)) / 2.0  # of the rms, without over with the events
+    ratio = math.log(mean * (count + samples) / (rest + within)) / 2.0  # log of the rms without over with events
     error = within / (rest + within) * spread / rest / 2.0
     ends = (ratio, ratio + _TWO_SIDED * error, ratio - _TWO_SIDED * error)
     return Interval(*(1.0 - math.exp(each) for each in ends))

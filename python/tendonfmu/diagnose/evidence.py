@@ -1,4 +1,4 @@
-"""The residual over a cause's own coordinate, with and without the cause."""
+"""How the residual looks over a cause's own coordinate, with and without the cause."""
 
 from __future__ import annotations
 
@@ -15,17 +15,18 @@ Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 BINS = 24
-SHOWN = 4.0  # squared means of the bins, without the cause over with it
-FEWEST = 10  # blocks of a bin
+SHOWN = 4.0  # ratio of the bins' squared means without and with the cause, for a picture that shows it
+FEWEST = 10  # blocks in a bin
 
 
 def evidence(
     places: Sequence[Place], candidate: Candidate, series: Series, before: Numbers, after: Numbers
 ) -> tuple[Evidence, ...]:
-    """Of the joint where the cause changes most: one picture over the effect's own coordinate. Where that shows little,
-    over the torque that the cause adds: without the cause the residual follows it with slope 1.
+    """Return a picture of the residual at the joint where the cause changes most.
 
-    places: of the cause. before, after: [B, n] N·m residual without and with the cause.
+    The picture is drawn over the effect's own coordinate. If that shows little, it is drawn over the torque that the
+    cause adds: without the cause, the residual follows this torque with slope 1. `places` are those of the cause;
+    `before` and `after` [B, n], N·m, are the residuals without and with it.
     """
     change = np.sum((before - after)[series.used] ** 2, axis=0)
     joint = int(np.argmax(change))
@@ -38,19 +39,22 @@ def evidence(
 
 
 def _nearest(places: Sequence[Place], joint: int) -> Place:
-    """The place at that joint, if there is one."""
+    """Return the place at that joint if there is one, else the first place."""
     return next((each for each in places if each.joint == joint + 1), places[0])
 
 
 def shown(found: Evidence) -> bool:
-    """Whether the cause takes away most of what the means of the bins were."""
+    """Return whether the cause removes most of the bins' mean residual."""
     return float(np.sum(found.before**2)) >= SHOWN * float(np.sum(found.after**2))
 
 
 def _binned(
     label: str, unit: str, values: Numbers, series: Series, pair: tuple[Numbers, Numbers], joint: int
 ) -> tuple[Evidence, ...]:
-    """Over bins of equal count; nothing where there are too few blocks. values: [B]. pair: [B] without and with."""
+    """Average over bins of equal count; return nothing if there are too few blocks.
+
+    `values` [B] is the coordinate; `pair` holds the residuals [B] without and with the cause.
+    """
     kept = series.used & np.isfinite(values)
     bins = min(BINS, int(kept.sum()) // FEWEST)
     if bins < 2:
@@ -64,7 +68,10 @@ def _binned(
 
 
 def standard_errors(values: Numbers, parts: list[NDArray[np.int64]], series: Series) -> Numbers:
-    """Of the means; neighbouring blocks of time are not independent, so whole seconds count as one."""
+    """Return the standard errors of the bins' means.
+
+    Neighbouring blocks of time are not independent, so each whole second counts as one sample.
+    """
     second = np.floor(series.time).astype(np.int64) + 1_000_000 * series.recording
     found = []
     for rows in parts:
@@ -75,7 +82,7 @@ def standard_errors(values: Numbers, parts: list[NDArray[np.int64]], series: Ser
 
 
 def coordinate_of(place: Place, kind: str, series: Series, joint: int) -> tuple[str, str, Numbers]:
-    """Label, unit, [B] values."""
+    """Return label, unit and values [B] of the coordinate."""
     own = joint if place.joint is None else place.joint - 1
     tendon = None if place.tendon is None else place.tendon - 1
     if kind == "velocity" and tendon is not None:
@@ -97,5 +104,5 @@ def coordinate_of(place: Place, kind: str, series: Series, joint: int) -> tuple[
 
 
 def _signed_travel(series: Series) -> Numbers:
-    """[B, n] rad, in the direction of motion."""
+    """Return the travel since the last reversal with the sign of the motion [B, n], rad."""
     return np.asarray(series.travel * np.sign(series.velocity))

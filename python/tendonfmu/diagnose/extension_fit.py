@@ -1,7 +1,7 @@
-"""The extended finger: the nominal description with the terms of the accepted causes, all numbers fitted again.
+"""How the extended finger is fitted: the nominal description with the terms of the accepted causes, all numbers again.
 
-The same likelihood, the same bias settings and the same samples as for the nominal fit (`FrictionFit`, method batch);
-what is left out here is its judging of every number, so that a selection may fit again and again.
+Likelihood, bias settings and samples are those of the nominal fit (`FrictionFit`, method batch). The numbers are not
+judged one by one here, so that a selection can fit many times.
 """
 
 from __future__ import annotations
@@ -39,16 +39,16 @@ if TYPE_CHECKING:
 
 Numbers = NDArray[np.float64]
 
-MOST_SAMPLES = 20_000  # that a fit learns from, about
-BOUND = 1e-6  # of the range to a bound: a number that is as near has run into it
-NEW = 3.0  # times its start: the standard deviation of what is known of a new number before
+MOST_SAMPLES = 20_000  # samples that a fit learns from, about
+BOUND = 1e-6  # of the range: a number that is this near to a bound has reached it
+NEW = 3.0  # times its start: prior standard deviation of a new number
 _SIDE = re.compile(r"\.(positive|negative)(?=\.|$)")
 _POINT = re.compile(r"\.laws\[\d+\]")
 
 
 @dataclass(frozen=True)
 class Accepted:
-    """A cause that was accepted: a candidate at a place, its non-linear numbers, its magnitudes as estimated so far."""
+    """An accepted cause: a candidate at a place, its non-linear numbers, and its magnitudes as estimated so far."""
 
     candidate: Candidate
     place: Place
@@ -56,13 +56,29 @@ class Accepted:
     magnitudes: Any = ()
 
     def added_to(self, data: Mapping[str, Any]) -> dict[str, Any]:
-        """The description with this cause's term."""
+        """Return the description with this cause's term."""
         return self.candidate.extended(data, self.place, self.shape, self.magnitudes)
 
 
 @dataclass(frozen=True)
 class FitSettings:
-    """Options of `FrictionFit`, method batch. threads 0: all cores. path: of the description, for messages."""
+    """Options of a fit, as of `FrictionFit` with method batch.
+
+    Attributes
+    ----------
+    choice
+        Which numbers are fitted.
+    prior
+        Prior standard deviation, in units of each number's expected magnitude.
+    max_passes
+        Largest number of passes over the recordings.
+    tolerance
+        Length of the last step, in standard errors of all unknowns together.
+    threads
+        Number of threads; 0 for all cores.
+    path
+        File of the description, for messages.
+    """
 
     choice: Choice = field(default_factory=Choice)
     prior: float = 1.0
@@ -76,9 +92,18 @@ class FitSettings:
 class FittedModel:
     """A description whose numbers were fitted.
 
-    given: the description that says how large each number may be (its values are the prior's standard deviations).
-    values, errors: by path of an estimated number, SI; errors are standard errors of white noise, NaN at a bound.
-    cost: ½ Σ e²/S with the prior's part. at_bound: paths. warnings: sentences.
+    Attributes
+    ----------
+    given
+        The description that says how large each number may be: its values are the standard deviations of the prior.
+    values, errors
+        By path of an estimated number, SI units. Errors are standard errors for white noise; NaN at a bound.
+    cost
+        ½ Σ e²/S including the prior.
+    at_bound
+        Paths of numbers at a bound.
+    warnings
+        Sentences.
     """
 
     data: Mapping[str, Any]
@@ -90,7 +115,7 @@ class FittedModel:
     warnings: tuple[str, ...] = ()
 
     def text(self) -> str:
-        """As JSON, as `tendonfmu fit -o` writes it."""
+        """Return the description as JSON, as `tendonfmu fit -o` writes it."""
         return description_text(self.data)
 
 
@@ -101,12 +126,24 @@ def fit_numbers(
     *,
     given: Mapping[str, Any] | None = None,
 ) -> FittedModel:
-    """Fits the numbers of a description to the samples of `FitRecording.train`.
+    """Fit the numbers of a description to the samples of `FitRecording.train`.
 
-    data: where the fit begins. given: the description that says how large numbers may be, data itself by default; a
-    number that it has and that a fit before has driven towards 0 can then come back. The torque that is explained is
-    `FitRecording.target`, also where the recording's forces are others (`regressors.predicted_forces`: without the
-    noise, which a term that scales with the force would fit by shrinking it). Raises InputError.
+    The torque to be explained is `FitRecording.target`, even if the forces of the recording are different ones. This is
+    so for `regressors.predicted_forces`: they lack the noise, which a term that scales with the force would otherwise
+    fit by shrinking the force.
+
+    Parameters
+    ----------
+    data
+        Where the fit starts.
+    given
+        The description that says how large numbers may be; None for `data` itself. A number that an earlier fit has
+        driven towards 0 can return if it is present in `given`.
+
+    Raises
+    ------
+    InputError
+        If the description is not valid.
     """
     origin = data if given is None else given
     structure, learned = learn_numbers(data, recordings, settings, given=origin)
@@ -128,7 +165,33 @@ def fit_numbers(
 def learn_numbers(
     data: Mapping[str, Any], recordings: Sequence[FitRecording], settings: FitSettings, *, given: Mapping[str, Any]
 ) -> tuple[Structure, Learned]:
-    """What `fit_numbers` learns, with all that is known of it."""
+    """Fit the numbers of a description and return everything known about the fit.
+
+    Parameters
+    ----------
+    data
+        Where the fit starts.
+    recordings
+        Their `train` samples are used, thinned to about MOST_SAMPLES.
+    settings
+        Options of the fit.
+    given
+        The description that says how large numbers may be.
+
+    Returns
+    -------
+    Structure
+        The description with its numbers and their scales.
+    Learned
+        Unknowns, covariance and cost.
+
+    Raises
+    ------
+    InputError
+        If the description is not valid.
+    KeyboardInterrupt
+        If the fit is interrupted.
+    """
     every = -(-sum(int(recording.train.sum()) for recording in recordings) // MOST_SAMPLES)
     recordings = [_thinned(_with_own_target(data, recording), max(every, 1)) for recording in recordings]
     structure = _with_scale(build_structure(_described(data, settings.path), settings.choice), given)
@@ -141,7 +204,7 @@ def learn_numbers(
     )
     try:
         return structure, learn_batch(structure, recordings, Watch(None), options, None)
-    except Interrupted:  # a fit that is only a part of something has no use for what it has so far
+    except Interrupted:  # the intermediate result of a partial fit is of no use
         raise KeyboardInterrupt from None
 
 
@@ -151,9 +214,9 @@ def fit_extended(
     recordings: Sequence[FitRecording],
     settings: FitSettings = FitSettings(),
 ) -> FittedModel:
-    """The nominal model with the causes' terms, all numbers fitted again, beginning at the nominal fit.
+    """Fit the nominal model with the causes' terms, all numbers again, starting at the nominal fit.
 
-    recordings: those of the nominal fit, with the same masks. Raises InputError.
+    `recordings` are those of the nominal fit, with the same masks. Raises InputError.
     """
     causes = possible(nominal.data, causes)
     if not causes:
@@ -171,32 +234,35 @@ def fit_extended(
 def cause_parameters(
     nominal: Mapping[str, Any], causes: Sequence[Accepted], model: FittedModel
 ) -> tuple[Mapping[str, tuple[float, str]], ...]:
-    """By cause its numbers in a model that was fitted with all of them: path -> (value, unit)."""
+    """Return the numbers of each cause in a model that was fitted with all of them: path -> (value, unit)."""
     units = {parameter.path: parameter.unit for parameter in native.Finger.from_description(model.data).parameters()}
     return tuple(_parameters(model, own, units) for own in added_paths(nominal, causes))
 
 
 def extended_description(data: Mapping[str, Any], causes: Sequence[Accepted]) -> Mapping[str, Any]:
-    """The description with the causes' terms, one after the other."""
+    """Return the description with the causes' terms, added one after the other."""
     for cause in causes:
         data = cause.added_to(data)
     return data
 
 
 def added_paths(data: Mapping[str, Any], causes: Sequence[Accepted]) -> tuple[tuple[str, ...], ...]:
-    """By cause the paths of the numbers that it adds or, where a law becomes two sides or more points, replaces."""
+    """Return, for each cause, the paths of the numbers that it adds or replaces.
+
+    It replaces numbers where a law is split into two sides or several working points.
+    """
     found = []
     for cause in causes:
         extended = cause.added_to(data)
         before = dict(_leaves(data))
-        # what is only written down differently is no number of the cause
+        # a number that is only written differently does not belong to the cause
         found.append(tuple(path for path, value in _leaves(extended) if path not in before or before[path] != value))
         data = extended
     return tuple(found)
 
 
 def _parameters(model: FittedModel, paths: Sequence[str], units: Mapping[str, str]) -> dict[str, tuple[float, str]]:
-    """Of the paths those that were estimated, and all numbers of extensions."""
+    """Return those of the paths that were estimated, and all numbers of extensions."""
     own = (path for path in paths if path in model.values or (path in units and path.startswith("extensions[")))
     return {path: (float(get_number(model.data, path)), units[path]) for path in own}
 
@@ -205,19 +271,19 @@ def _parameters(model: FittedModel, paths: Sequence[str], units: Mapping[str, st
 
 
 def possible(data: Mapping[str, Any], causes: Sequence[Accepted]) -> list[Accepted]:
-    """Without those that change a law which only a cause that is not among them brings."""
+    """Return the causes without those that change a law which only a cause outside of the list would add."""
     found = []
     for cause in causes:
         try:
             data = cause.added_to(data)
-        except (KeyError, StopIteration, AttributeError):  # no such law: nothing to change where it should be
+        except (KeyError, StopIteration, AttributeError):  # the law that the cause would change is missing
             continue
         found.append(cause)
     return found
 
 
 def _with_own_target(data: Mapping[str, Any], recording: FitRecording) -> FitRecording:
-    """The recording with the external torque that makes its own target of its forces."""
+    """Return the recording with the external torque that makes its target follow from its forces."""
     groups = recording.recording.groups
     known = groups["tendon_force"] @ moment_arms(data) - recording.target
     given = groups.get("external_torque", np.zeros_like(known))
@@ -227,7 +293,10 @@ def _with_own_target(data: Mapping[str, Any], recording: FitRecording) -> FitRec
 
 
 def _thinned(recording: FitRecording, every: int) -> FitRecording:
-    """Learns from one in so many samples: noise that is coloured tells no more, and the model still sees them all."""
+    """Train on every `every`-th sample.
+
+    More samples of coloured noise add no information, and the model still runs over all of them.
+    """
     if every == 1:
         return recording
     return replace(recording, train=recording.train & (np.arange(len(recording.train)) % every == 0))
@@ -242,8 +311,10 @@ def _described(data: Mapping[str, Any], path: Path) -> FingerDescription:
 
 
 def _with_scale(structure: Structure, given: Mapping[str, Any]) -> Structure:
-    """Expected magnitudes from the given description, wherever it has the number, or the law before it was split; of
-    what is new some times where it starts.
+    """Set the expected magnitudes of the numbers.
+
+    They come from the given description if it has the number, or the law before it was split. A new number gets NEW
+    times its start.
     """
     scale = structure.scale.copy()
     for number in structure.numbers:
@@ -270,7 +341,7 @@ def _number_or_none(data: Mapping[str, Any], path: str) -> float | None:
 
 
 def _at_bound(learned: Learned) -> tuple[str, ...]:
-    """Paths of the numbers whose unknown has run into a bound of its box."""
+    """Return the paths of the numbers whose unknown has reached a bound."""
     found = []
     for unknown, z in zip(learned.estimator.unknowns, learned.z, strict=True):
         reach = BOUND * max(unknown.scale, abs(z))
@@ -280,7 +351,7 @@ def _at_bound(learned: Learned) -> tuple[str, ...]:
 
 
 def _leaves(data: Any, path: str = "") -> Iterator[tuple[str, float]]:
-    """(path, value) of all numbers of a parsed description, indices from 1."""
+    """Yield (path, value) of all numbers of a parsed description; indices start at 1."""
     if isinstance(data, Mapping):
         for key, value in data.items():
             yield from _leaves(value, f"{path}.{key}" if path else key)
@@ -292,7 +363,7 @@ def _leaves(data: Any, path: str = "") -> Iterator[tuple[str, float]]:
 
 
 def _standard_errors(structure: Structure, learned: Learned) -> dict[str, float]:
-    """By path, from the covariance of the unknowns (delta method)."""
+    """Return the standard errors by path, from the covariance of the unknowns (delta method)."""
     matrix = verdicts.slopes(learned.estimator, learned.z)[
         [structure.index[number.path] for number in structure.numbers]
     ]

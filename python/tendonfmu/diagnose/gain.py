@@ -1,10 +1,11 @@
-"""What an extension is worth: both FMUs run over data that neither was fitted to, and their residuals compared.
+"""How much an extension gains: both FMUs run over data that neither was fitted to, and their residuals are compared.
 
-The residual r is τ less T of eq. (10) and less the bias before it has seen the sample. It is no output of an FMU:
-compensated_torque = (1 − K)·r is what the update leaves of it. So the core runs over the same samples beside it: where
-all outputs of both agree, its r is that of the FMU, and tells how the bias jumped. A known external torque, labelled
-contact and gaps need the bias filter once more, over y − T (`track`), with the T that the FMU put out;
-in a recording without them that is r of the core again, and both are compared.
+The residual r is τ − T of eq. (10) − bias before the update. It is no output of an FMU: compensated_torque = (1 − K)·r
+is what the update leaves of it. So the core runs over the same samples. Where all outputs of FMU and core agree, the
+core's r is that of the FMU, and it shows how the bias jumped.
+
+With a known external torque, labelled contact or gaps, the bias filter runs once more over y − T (`track`), with the T
+of the FMU. In a recording without these, this gives r of the core again, and both are compared.
 """
 
 from __future__ import annotations
@@ -31,20 +32,30 @@ Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Data = Mapping[str, Any]
 
-AGREEMENT = 1e-9  # of the largest value of an output's series: what any two implementations may differ by
-_NEVER = 1e9  # N·m; no contact threshold is ever passed
+AGREEMENT = 1e-9  # of the largest value of an output's series: allowed difference of two implementations
+_NEVER = 1e9  # N·m; a contact threshold that is never passed
 _THRESHOLD = re.compile(r"contact\.(innovation\.)?threshold\[")
-_TINY = 1e-12  # N·m, of a series that is 0
+_TINY = 1e-12  # N·m; lower limit of a scale, for series that are 0
 
 
 @dataclass(frozen=True)
 class Gain:
-    """nominal, extended: rms per joint on the samples trained on, and on those of the test.
+    """Errors and gain of an extended model.
 
-    value: 1 − rms_extended/rms_nominal over all joints on the test. steps: rms over all joints on the test, N·m, of
-    each model of a sequence. blocks: of how many seconds-long blocks of the test the
-    intervals are. held_out: the test is held-out blocks of the training recordings. agreement: largest difference
-    between an FMU's outputs and the core's, in units of the output's largest value.
+    Attributes
+    ----------
+    nominal, extended
+        Rms per joint on the samples trained on and on those of the test.
+    value
+        1 − rms_extended/rms_nominal over all joints on the test.
+    steps
+        Rms over all joints on the test of each model of a sequence, N·m.
+    blocks
+        Number of blocks of some seconds of the test; the intervals come from them.
+    held_out
+        Whether the test is held-out blocks of the training recordings.
+    agreement
+        Largest difference between the outputs of an FMU and of the core, in units of the output's largest value.
     """
 
     nominal: ModelErrors
@@ -66,11 +77,25 @@ def measure_gain(
     between: Sequence[Data] = (),
     seed: int = 0,
 ) -> Gain:
-    """nominal, extended: fitted descriptions with the same `bias`. tests: recordings that nothing was fitted to; where
-    there are none, the samples `held_out` of the training recordings. between: models with some of the causes.
+    """Measure the gain of the extended over the nominal model.
 
-    The FMUs of nominal and extended are run; the models between them by the core alone. Raises InputError where
-    there is nothing to test on, InternalError where the FMU does not agree with the core.
+    The FMUs of `nominal` and `extended` are run; for the models between them only the core.
+
+    Parameters
+    ----------
+    nominal, extended
+        Fitted descriptions with the same `bias`.
+    tests
+        Recordings that nothing was fitted to. Without any, the `held_out` samples of the training recordings are used.
+    between
+        Models with some of the causes.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to test on.
+    InternalError
+        If an FMU does not agree with the core.
     """
     test = _Test.of(training, tests)
     _check_settings(nominal, extended)
@@ -93,23 +118,36 @@ def measure_gain(
 
 
 def require_unseen(training: Sequence[FitRecording], tests: Sequence[FitRecording]) -> None:
-    """Raises InputError where there is nothing to measure a gain on."""
+    """Raise InputError if there is nothing to measure a gain on."""
     _Test.of(training, tests)
 
 
 def _check_settings(nominal: Data, extended: Data) -> None:
     if _filter_of(nominal) != _filter_of(extended):
-        raise InternalError("bias: not the same in both descriptions; rms would tell nothing")
+        raise InternalError("bias: different settings in the two descriptions, so their rms cannot be compared")
 
 
 def _filter_of(data: Data) -> BiasSettings:
-    """The bias filter's settings; where the bias begins is a number that is fitted, and may differ."""
+    """Return the settings of the bias filter without its initial value, which is fitted and may differ."""
     return replace(bias_settings(data), initial_torque=None)
 
 
 def residual_of(data: Data, recording: FitRecording) -> Numbers:
-    """[N, n] r before the bias update, N·m, by the core alone: of the whole recording, whose friction remembers
-    across gaps as an FMU does, while the bias begins anew after them; NaN where there is none.
+    """Return the residual r of a recording before the bias update, from a run of the core.
+
+    Friction remembers across gaps, as in an FMU; the bias starts anew after a gap.
+
+    Parameters
+    ----------
+    data
+        Description that runs.
+    recording
+        Recording prepared for it.
+
+    Returns
+    -------
+    array
+        r, N·m [N, n]; NaN where there is none.
     """
     return residuals(data, recording, _model(data, recording, _core_outputs(data, recording))).residual
 
@@ -119,8 +157,15 @@ def residual_of(data: Data, recording: FitRecording) -> Numbers:
 
 @dataclass(frozen=True)
 class BothRun:
-    """residual: [N, n] r, N·m. agreement: largest difference of the outputs of FMU and core, in units of the output's
-    largest value; where the recording is one piece of free motion, that of r, too.
+    """The residual and how well FMU and core agree.
+
+    Attributes
+    ----------
+    residual
+        r, N·m [N, n].
+    agreement
+        Largest difference of the outputs of FMU and core, in units of the output's largest value. If the recording is
+        one piece of free motion, the difference of r counts, too.
     """
 
     residual: Numbers
@@ -128,9 +173,9 @@ class BothRun:
 
 
 def run_both(data: Data, recording: FitRecording) -> BothRun:
-    """Packs the FMU of a description, runs it over a recording without contact detection, and takes r from its T.
+    """Pack the FMU of a description, run it over a recording without contact detection, and compute r from its T.
 
-    Raises InputError where FMU and core do not agree.
+    Raises InternalError if FMU and core do not agree.
     """
     outputs, beside = _fmu_outputs(data, recording), _core_outputs(data, recording)
     agreement = max(_difference(outputs[name], beside[name]) for name in NUMBERS)
@@ -147,7 +192,10 @@ def run_both(data: Data, recording: FitRecording) -> BothRun:
 
 
 def _fmu_outputs(data: Data, recording: FitRecording) -> dict[str, Numbers]:
-    """[N, n] by group, of the FMU as packed, its contact thresholds out of reach by start values."""
+    """Return the outputs of the packed FMU by group [N, n].
+
+    Start values put its contact thresholds out of reach.
+    """
     out_of_reach = {
         parameter.path: min(_NEVER, parameter.maximum)
         for parameter in native.Finger.from_description(data).parameters()
@@ -164,13 +212,16 @@ def _fmu_outputs(data: Data, recording: FitRecording) -> dict[str, Numbers]:
 
 
 def _core_outputs(data: Data, recording: FitRecording) -> dict[str, Any]:
-    """Of `native.Finger.run`, without contact detection."""
+    """Return the outputs of `native.Finger.run` without contact detection."""
     free = {**data, "contact": {"threshold": [_NEVER] * len(data["joints"])}, "sensor_fault": None}
     return native.Finger.from_description(free, recording.kinematics).run(recording.recording.arrays())
 
 
 def _model(data: Data, recording: FitRecording, outputs: Mapping[str, Any]) -> Model:
-    """T and Δb of a run: the bias moves by Δb and by what the update takes from r, which is r − compensated_torque."""
+    """Return T and Δb of a run.
+
+    The bias moves by Δb and by what the update takes from r, which is r − compensated_torque.
+    """
     bias = outputs["bias_torque"]
     torque = outputs["friction_torque"] - bias
     jump = np.diff(bias, axis=0, prepend=bias[:1]) - (outputs["residual"] - outputs["compensated_torque"])
@@ -185,7 +236,7 @@ def _model(data: Data, recording: FitRecording, outputs: Mapping[str, Any]) -> M
 
 
 def _one_piece(data: Data, recording: FitRecording) -> bool:
-    """Whether the bias filter of the FMU sees what a judgement of the fit sees: all of it, and the same mean force."""
+    """Return whether the FMU's bias filter sees what a fit is judged on: all samples, with the same mean force."""
     rows = data.get("extensions") or []
     delayed = any(row["effect"] == "time_delay" and row["delay"] < 0 for row in rows)
     same_noise = not (delayed and bias_settings(data).per_force)
@@ -193,7 +244,7 @@ def _one_piece(data: Data, recording: FitRecording) -> bool:
 
 
 def _difference(mine: Numbers, other: Numbers) -> float:
-    """Largest difference in units of the largest value."""
+    """Return the largest difference in units of the largest value."""
     return float(np.abs(mine - other).max()) / max(float(np.abs(other).max()), _TINY)
 
 
@@ -223,31 +274,37 @@ class _Test:
         return cls(training, recordings, masks, blocks, held_out)
 
     def squares(self, left: Sequence[Numbers]) -> Numbers:
-        """[B] sums of squares over all joints of the residuals [N, n] of the recordings, by block."""
+        """Return block sums [B] of the squared residuals [N, n], over all joints and recordings."""
         return np.concatenate(
             [block.sums(np.sum(each**2, axis=1)) for block, each in zip(self.blocks, left, strict=True)]
         )
 
     def squares_of(self, data: Data) -> Numbers:
-        """The same of a description, by the core."""
+        """Return the same for a description, run by the core."""
         return self.squares([residual_of(data, each) for each in self.recordings])
 
     @property
     def count(self) -> int:
-        """Samples that are judged, times joints."""
+        """Number of judged samples times joints."""
         return sum(int(mask.sum()) for mask in self.masks) * int(self.recordings[0].target.shape[1])
 
     def tested(self, left: Sequence[Numbers]) -> tuple[float, ...]:
         return _pooled(left, self.masks)
 
     def trained(self, data: Data, left: Sequence[Numbers]) -> tuple[float, ...]:
-        """left: of the recordings tested on, which are those trained on where blocks were held out."""
+        """Return the rms on the samples trained on.
+
+        `left` holds the residuals of the tested recordings; these are the training recordings if blocks were held out.
+        """
         found = left if self.held_out else [residual_of(data, each) for each in self.training]
         return _pooled(found, [_judged(each, each.train) for each in self.training])
 
 
 def _judged(recording: FitRecording, chosen: Flags) -> Flags:
-    """[N] without the samples that have no residual: the first of each part, and those before the bias has begun."""
+    """Return the chosen samples that have a residual [N].
+
+    The first sample of each part and those before the bias has started have none.
+    """
     judged = np.zeros(len(recording.time), dtype=bool)
     for part in recording.parts:
         if recording.tracked[part].any():

@@ -1,7 +1,7 @@
-"""What may be missing, from coarse to fine: an effect everywhere, at all places of a joint or tendon, at one place.
+"""Which effects may be missing, from coarse to fine: everywhere, at all places of a joint or tendon, at one place.
 
-A hypothesis is a combination of columns of single places with one set of magnitudes. One effect at many places is one
-hypothesis; a finer one is only taken where it tells materially more.
+A hypothesis combines columns of single places with one set of magnitudes. One effect at many places is one hypothesis;
+a finer one is taken only if it explains materially more.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Numbers = NDArray[np.float64]
 Key = tuple[str, int | None, int | None]
 
 EVERYWHERE, SOMEWHERE, HERE = 0, 1, 2  # levels: all places, those of one joint or tendon, a single one
-# Effects of surfaces and materials, which a finger tends to have at all of its places alike. The others belong to one
+# Effects of surfaces and materials. A finger tends to have them at all of its places alike. The others belong to one
 # sensor, link or pulley.
 SHARED = (
     "viscous_friction",
@@ -33,16 +33,16 @@ SHARED = (
     "cover_stiffness",
     "cover_hardening",
 )
-# Corrections of what the torque itself is made of: a large one shrinks the torque, and with it all that is left of it.
+# Corrections of the torque itself: a large one shrinks the torque, and with it everything that is left of it.
 SCALING = ("force_gain", "moment_arm", "moment_arm_variation", "pulley_eccentricity")
-LARGEST_SCALING = 0.2  # of the tendon's largest arm, or of its force, anywhere on the joint's range
-LEAST_OF_FAST = 0.3  # gain of a pulley that turns faster than its joint: any feature of the angle is a little like that
-LARGEST_SECANT = 3.0  # times the step that its column was taken with: beyond, the column says nothing
+LARGEST_SCALING = 0.2  # of the tendon's largest arm, or of its force, anywhere in the joint's range
+LEAST_OF_FAST = 0.3  # least gain of a pulley that turns faster than its joint: any function of the angle resembles it
+LARGEST_SECANT = 3.0  # times the step that its column was computed with; the column is not valid beyond
 
 
 @dataclass(frozen=True)
 class Member:
-    """One place of a hypothesis: a proposal with one of its shapes. weight: of the common magnitude."""
+    """One place of a hypothesis: a proposal with one of its shapes. `weights` multiply the common magnitudes."""
 
     proposal: Proposal
     shape: Shape
@@ -51,10 +51,20 @@ class Member:
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """effect, joint, tendon: as reported; None where it is everywhere. level: EVERYWHERE, SOMEWHERE or HERE.
+    """One effect at a place or group of places.
 
-    mix: [c, d] from magnitudes to candidate columns; low, high: [d] bounds of the magnitudes. least_gain: share of the
-    rms that it has to take away to be looked at.
+    Attributes
+    ----------
+    effect, joint, tendon
+        As reported; None if everywhere.
+    level
+        EVERYWHERE, SOMEWHERE or HERE.
+    mix
+        Map from magnitudes to candidate columns [c, d].
+    low, high
+        Bounds of the magnitudes [d].
+    least_gain
+        Share of the rms that it must remove to be considered.
     """
 
     effect: str
@@ -73,7 +83,10 @@ class Hypothesis:
 
 
 def hypotheses(columns: CandidateColumns, arms: Numbers, reach: Numbers) -> list[Hypothesis]:
-    """All of them, the coarse ones first. arms: [m, n] m. reach: [n] rad, largest angle of each joint."""
+    """Return all hypotheses, the coarse ones first.
+
+    `arms` are in m [m, n]; `reach` is the largest angle of each joint, rad [n].
+    """
     count = columns.values.shape[2]
     found = [
         _single(proposal, shape, count, arms, reach) for proposal in columns.proposals for shape in proposal.shapes
@@ -108,7 +121,7 @@ def _bounds(shape: Shape) -> tuple[Numbers, Numbers]:
 
 
 def _groups(effect: str, proposals: Sequence[Proposal], count: int) -> Iterator[Hypothesis]:
-    """Of all places, of those of each joint and of each tendon; only where that is more than one place and not all."""
+    """Yield hypotheses of all places, and of the places of each joint and tendon if these are several but not all."""
     places = {proposal.place for proposal in proposals}
     if len(places) < 2:
         return
@@ -129,7 +142,7 @@ def _groups(effect: str, proposals: Sequence[Proposal], count: int) -> Iterator[
 
 
 def _alike(proposals: Sequence[Proposal]) -> Iterator[list[tuple[Proposal, Shape]]]:
-    """Of every place each law's k-th shape, for all k that all laws have."""
+    """Yield, for each k, the k-th shape of each law at every place, as long as all laws have one."""
     laws: list[tuple[Proposal, list[Shape]]] = []
     for proposal in proposals:
         by_law: dict[tuple[str, ...], list[Shape]] = {}
@@ -146,7 +159,7 @@ def _alike(proposals: Sequence[Proposal]) -> Iterator[list[tuple[Proposal, Shape
 def _together(
     effect: str, joint: int | None, tendon: int | None, level: int, parts: Sequence[tuple[Proposal, Shape]], count: int
 ) -> Hypothesis:
-    """Magnitude 1: at every place as much as is ordinary there."""
+    """Combine shapes so that a magnitude of 1 is an ordinary effect at every place."""
     size = len(parts[0][1].signs)
     mix = np.zeros((count, size))
     members = []

@@ -1,7 +1,7 @@
-"""The least size that the sensors can show of an effect: what is smaller is no cause.
+"""What the smallest size of an effect is that the sensors can show; smaller effects are not reported as causes.
 
-Play and the distance of presliding have to be several times the noise of the positions; a delay has to be more than
-half a sample, and more than the lag that filtering leaves.
+Play and the distance of presliding must be several times the noise of the positions. A delay must be more than half a
+sample, and more than the lag that filtering leaves.
 """
 
 from __future__ import annotations
@@ -18,14 +18,26 @@ from tendonfmu.diagnose.hypotheses import LARGEST_SECANT, Hypothesis
 
 Numbers = NDArray[np.float64]
 
-OF_NOISE = 4.0  # standard deviations of the position's noise
-OF_SAMPLE = 0.75  # sample: velocities are late by half of one
-BEFORE_FIT = 0.5  # of the least size: how large an effect is only the fit tells
+OF_NOISE = 4.0  # standard deviations of the position noise
+OF_SAMPLE = 0.75  # samples: velocities are late by half a sample
+BEFORE_FIT = 0.5  # of the least size: only the fit shows how large an effect is
 
 
 @dataclass(frozen=True)
 class LeastSizes:
-    """joint_noise: [n] rad, tendon_noise: [m] m, standard deviation. step: s between samples. lag: s of filters."""
+    """What limits the sensors.
+
+    Attributes
+    ----------
+    joint_noise
+        Standard deviation of the noise of the joint positions, rad [n].
+    tendon_noise
+        Standard deviation of the noise of the tendon positions, m [m].
+    step
+        Time between samples, s.
+    lag
+        Lag of the filters, s.
+    """
 
     joint_noise: Numbers
     tendon_noise: Numbers
@@ -33,7 +45,7 @@ class LeastSizes:
     lag: float
 
     def least(self, effect: str, joint: int | None, tendon: int | None) -> float:
-        """In the unit of the effect's number; 0 where nothing is known of it."""
+        """Return the least size in the unit of the effect's number; 0 if none is known."""
         if effect == "time_delay":
             return OF_SAMPLE * self.step + self.lag
         if effect in ("backlash", "presliding"):
@@ -44,17 +56,20 @@ class LeastSizes:
         return 0.0
 
     def worth(self, candidate: Candidate, place: Place, shape: Mapping[str, float]) -> bool:
-        """Whether a step of this size can lead to a resolved one: a column is good for LARGEST_SECANT times it."""
+        """Return whether a step of this size can lead to a size that the sensors resolve.
+
+        A column is valid for up to LARGEST_SECANT times its step.
+        """
         least = self.least(candidate.name, place.joint, place.tendon)
         return least == 0.0 or LARGEST_SECANT * abs(float(next(iter(shape.values())))) >= least
 
     def shows(self, effect: str, place: Place, row: Mapping[str, Any] | None) -> bool:
-        """Whether a fitted play or delay, a row of `extensions`, is large enough."""
+        """Return whether a fitted play or delay, a row of `extensions`, is large enough."""
         number = {"backlash": "width", "time_delay": "delay"}.get(effect)
         return row is None or number is None or abs(row[number]) >= self.least(effect, place.joint, place.tendon)
 
     def resolved(self, hypothesis: Hypothesis, magnitudes: Sequence[float] | Numbers) -> bool:
-        """Whether a hypothesis with these magnitudes [d] is large enough."""
+        """Return whether a hypothesis with these magnitudes [d] is large enough."""
         if hypothesis.effect == "presliding":  # its size is the distance that was tried, not the magnitude
             return True
         least = self.least(hypothesis.effect, hypothesis.joint, hypothesis.tendon)
@@ -62,8 +77,8 @@ class LeastSizes:
 
 
 def _size(hypothesis: Hypothesis, magnitudes: Sequence[float] | Numbers) -> float:
-    """Of its first number, at its first place."""
-    if not hypothesis.members:  # a number that the description has
+    """Return the size of the hypothesis's first number at its first place."""
+    if not hypothesis.members:  # a number that the description already has
         return abs(float(magnitudes[0]))
     member = hypothesis.members[0]
     shape: Mapping[str, float] = member.shape.shape
@@ -72,7 +87,10 @@ def _size(hypothesis: Hypothesis, magnitudes: Sequence[float] | Numbers) -> floa
 
 
 def noise_of(raw: Numbers, smooth: Numbers) -> Numbers:
-    """[d] standard deviation of what smoothing takes off positions [N, d], robust; at least what quantisation makes."""
+    """Return the noise [d] of positions [N, d]: the spread of what smoothing removes, at least the quantisation noise.
+
+    The spread is a standard deviation from the median absolute deviation, so it is robust.
+    """
     left = raw - smooth
     spread = 1.4826 * np.median(np.abs(left - np.median(left, axis=0)), axis=0)
     steps = np.abs(np.diff(raw, axis=0))

@@ -1,4 +1,4 @@
-"""The numbers of a description fitted for a diagnosis."""
+"""Which values the numbers of a description take when a diagnosis fits them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def fitted(
     *,
     given: Mapping[str, Any] | None = None,
 ) -> FittedModel:
-    """As `extension_fit.fit_numbers`; a description without a number to estimate stays as it is."""
+    """Fit a description as `extension_fit.fit_numbers` does; return it unchanged if it has no number to estimate."""
     if not unknowns(data):
         return FittedModel(data=data, given=data, values={}, errors={}, cost=float("nan"))
     return fit_numbers(data, recordings, settings, given=given)

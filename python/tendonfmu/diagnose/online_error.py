@@ -1,8 +1,8 @@
-"""What a description gets wrong as it runs online, on raw samples and with its own filters, apart from a slow bias.
+"""How large the error of a description is when it runs online: raw samples, its own filters, slow bias removed.
 
-Means of 10 ms, less a bias that wanders within 2 s (splines, as the search has it). The bias filter's own r hides
-causes: it follows what is slow, a spring or a weight, and single samples are mostly noise of the sensors. So r only
-says that a cause does no harm.
+The error is taken from means over 10 ms, less a bias that moves within 2 s (splines, as in the search). The residual r
+of the bias filter is not used for this, because it hides causes: the filter follows everything slow, such as a spring
+or a weight, and single samples of r are mostly sensor noise. So r only shows that a cause does no harm.
 """
 
 from __future__ import annotations
@@ -23,11 +23,18 @@ Numbers = NDArray[np.float64]
 
 
 class OnlineError:
-    """Of models over the same samples of the same recordings."""
+    """Errors of several models over the same samples of the same recordings."""
 
     def __init__(self, data: Mapping[str, Any], recordings: Sequence[FitRecording]) -> None:
-        """data: any of the models, which share the settings of the bias. recordings: as they were measured; `train`
-        says what is judged."""
+        """Prepare the recordings.
+
+        Parameters
+        ----------
+        data
+            Any of the models; they share the settings of the bias.
+        recordings
+            As they were measured; `train` says which samples are judged.
+        """
         self._recordings, self._grid = recordings, make_grid(recordings)
         series = series_of(data, recordings, self._grid)
         folds = make_folds(series)
@@ -36,12 +43,12 @@ class OnlineError:
         self._measured = series.target[self._rows] + block_prediction(data, recordings, self._grid)[self._rows]
 
     def square(self, data: Mapping[str, Any]) -> float:
-        """Σ r² over all joints, (N·m)²: every sample, before the bias has seen it."""
+        """Return Σ r² over all joints, (N·m)², of every sample; r is taken before the bias update."""
         left = (residual_of(data, each)[each.train] for each in self._recordings)
         return float(sum(np.nansum(each**2) for each in left))
 
     def by_stretch(self, data: Mapping[str, Any]) -> Numbers:
-        """[K] Σ e² over all joints, (N·m)², by stretches of about 2 s."""
+        """Return Σ e² over all joints, (N·m)² [K], by stretches of about 2 s."""
         predicted = block_prediction(data, self._recordings, self._grid)[self._rows]
         left = self._span.without(self._measured - predicted)
         sums = np.bincount(self._stretch, np.sum(left**2, axis=1), minlength=self._stretches)

@@ -1,9 +1,10 @@
-"""Tendon forces without the noise that they share with the target.
+"""Which tendon forces a column may use: forces without the noise that they share with the target.
 
-The joint torque that is to be explained is made of the measured forces, and so is every column that has a force in it.
-What no model explains of the torque is in both: a column that carries it fits the noise, and would be a cause of every
-recording. Columns are therefore taken at the forces that the model itself predicts: the measured ones less the
-unexplained torque, spread over the tendons as the smallest forces that make it (errors in variables; instrument).
+The joint torque to be explained is computed from the measured forces, and so is every column that contains a force. So
+the part of the torque that no model explains is in both. A column that carries it would fit the noise and appear as a
+cause of every recording. Columns are therefore computed at the forces that the model itself predicts. These are the
+measured forces less the unexplained torque, which is spread over the tendons as the smallest forces that produce it
+(errors in variables; instrument).
 """
 
 from __future__ import annotations
@@ -27,9 +28,9 @@ MOST_SHIFT = 10.0  # times the largest measured force
 def predicted_forces(
     data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, series: Series, residual: Numbers
 ) -> list[FitRecording]:
-    """The recordings with forces, and tendon positions that go with them, so that angles stay as measured.
+    """Return the recordings with predicted forces, and with tendon positions that keep the joint angles as measured.
 
-    data: the fitted description. residual: [B, n] N·m of it, bias taken off.
+    `data` is the fitted description. `residual` [B, n], N·m, is what it leaves, with the bias removed.
     """
     arms = moment_arms(data)
     spread = np.linalg.pinv(arms)
@@ -44,7 +45,7 @@ def predicted_forces(
         predicted = np.where(pulls & (force > 0), np.maximum(force - shift, 0.0), force - shift)
         groups["tendon_force"] = predicted
         if "tendon_position" in groups:
-            # a description with a delay pairs the position of now with the force of `delay` s later
+            # a description with a delay pairs the present position with the force `delay` s later
             change = _shifted(recording, (predicted - force) / stiffness, _delay(data))
             groups["tendon_position"] = groups["tendon_position"] + change
         found.append(replace(recording, recording=replace(recording.recording, groups=groups)))
@@ -52,13 +53,13 @@ def predicted_forces(
 
 
 def _delay(data: Mapping[str, Any]) -> float:
-    """s by which the description says that forces come later than positions."""
+    """Return by how many seconds forces come later than positions, according to the description."""
     rows = data.get("extensions") or []
     return float(sum(row["delay"] for row in rows if row["effect"] == "time_delay"))
 
 
 def _shifted(recording: FitRecording, values: Numbers, delay: float) -> Numbers:
-    """[N, m] values of `delay` s later, within each part."""
+    """Return the values [N, m] of `delay` s later, within each part."""
     if not delay:
         return values
     found: Numbers = values.copy()
@@ -72,7 +73,7 @@ def _shifted(recording: FitRecording, values: Numbers, delay: float) -> Numbers:
 def _unexplained(
     data: Mapping[str, Any], recording: FitRecording, number: int, grid: Grid, series: Series, residual: Numbers
 ) -> Numbers:
-    """[N, n] N·m at every sample; 0 where nothing is learned from."""
+    """Return the unexplained torque at every sample [N, n], N·m; 0 at samples that are not trained on."""
     model = exact_model(data, recording)
     found = np.zeros_like(recording.target)
     for segment in grid.segments:

@@ -1,7 +1,9 @@
-"""How much of a residual could be explained at all, and where that part lives.
+"""How much of a residual is predictable, and what the predictable part depends on.
 
-Two looks: a flexible learner on everything that is known of the motion and its past (remainder_learner.py), and steady
-oscillations in time (statistics/spectral_line.py).
+Two methods look at it:
+
+- a flexible learner on everything that is known of the motion and its past (remainder_learner.py);
+- a search for steady oscillations in time (statistics/spectral_line.py).
 """
 
 from __future__ import annotations
@@ -24,18 +26,31 @@ if TYPE_CHECKING:
 
 Numbers = NDArray[np.float64]
 
-LEVEL = 0.01  # of a wrong "unknown", family-wise
+LEVEL = 0.01  # probability of a wrong "unknown", family-wise
 LEAST_SHARE = 0.02  # of the residual's variance: smaller parts are not reported
 CERTAIN = 2.0  # standard errors over the stretches
 
 
 @dataclass(frozen=True)
 class Remainder:
-    """What is explainable of a residual [B, n].
+    """The predictable part of a residual [B, n].
 
-    share: per joint, of its variance that is predicted on unseen stretches. gain: [stretches, n] the same by stretch,
-    (N·m)². square: [n] of the residual, (N·m)². p_value: of there being nothing, over all joints. unknown: whether
-    there is something for certain. prediction: [B, n] N·m, 0 where not used. findings: what is certain.
+    Attributes
+    ----------
+    share
+        Per joint, share of the variance that is predicted on unseen stretches.
+    gain
+        The same by stretch, (N·m)² [stretches, n].
+    square
+        Sum of squares of the residual, (N·m)² [n].
+    p_value
+        Probability of such a result if nothing is predictable, over all joints.
+    unknown
+        Whether some part is certainly predictable.
+    prediction
+        N·m [B, n], 0 where not used.
+    findings
+        The parts that are certain.
     """
 
     share: tuple[float, ...]
@@ -51,8 +66,15 @@ class Remainder:
 def measure_remainder(
     series: Series, residual: Numbers, splines: Splines, *, force: Numbers | None = None, seed: int = 0
 ) -> Remainder:
-    """residual: [B, n] N·m. splines: [B, s] of the bias, whose span was taken from it. force: [B, m] N predicted by the
-    model, for the learner; without it only what makes no torque of the measured one.
+    """Measure the predictable part of a residual [B, n], N·m.
+
+    Parameters
+    ----------
+    splines
+        Splines of the bias [B, s]; their span has been removed from the residual.
+    force
+        Forces for the learner that the model predicts, N [B, m]. Without them, the learner uses only the part of the
+        measured forces that makes no torque.
     """
     joints, folds = residual.shape[1], make_folds(series)
     residual = np.where(series.used[:, None], residual, 0.0)
@@ -89,21 +111,21 @@ def _share(target: Numbers, prediction: Numbers) -> float:
 
 
 def _p_value(gain: Numbers) -> float:
-    """Of gains by stretch [K] being chance: a one-sided t test."""
+    """Return the p-value of gains by stretch [K]: a one-sided t test."""
     if not np.any(gain):
         return 1.0
     return float(ttest_1samp(gain, 0.0, alternative="greater").pvalue)
 
 
 def _named(learner: Learner, tried: Sequence[Choice]) -> list[Choice]:
-    """Of each joint the set of columns with a name that predicts best."""
+    """Return for each joint the named set of columns that predicts best."""
     known = [each for each in tried if each.group != "interaction"]
     left = [np.sum((learner.target - learner.predicted(each.columns)) ** 2, axis=0) for each in known]
     return [known[k] for k in np.argmin(left, axis=0)]
 
 
 def _lines(series: Series, residual: Numbers, prediction: Numbers, findings: list[Finding]) -> list[float]:
-    """Adds steady oscillations to findings and prediction [B, n]; their p-values."""
+    """Add steady oscillations to `findings` and `prediction` [B, n]; return their p-values."""
     filters, found = whitener(series, residual - prediction), []
     joints = residual.shape[1]
     for joint in range(joints):

@@ -1,7 +1,7 @@
-"""What a flexible learner sees of a motion: many simple functions of the states, in groups with a name in plain words.
+"""What a flexible learner uses to describe a motion: many simple functions of the states, in groups with plain names.
 
-Linear in their weights on purpose: whatever is done to the residual (bias splines projected out, whitening) can be done
-to every column alike, and the null distribution of the learner's skill costs one small matrix (remainder.py).
+The learner is linear in its weights. So whatever is done to the residual (removing bias splines, whitening) can be done
+to every column as well, and the null distribution of the learner's skill takes only one small matrix (remainder.py).
 """
 
 from __future__ import annotations
@@ -25,16 +25,25 @@ Numbers = NDArray[np.float64]
 
 MEMORY = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)  # s: time constants of what friction may remember
 TRAVELS = (0.03, 0.1, 0.3, 1.0)  # scales of presliding, of the median stroke
-MOST_PAIRS = 30  # of tendons: neighbours by number first
+MOST_PAIRS = 30  # of tendons: those with neighbouring numbers first
 RANDOM = 100  # columns of random functions of two or three states
-MOVING = 0.03  # of the 95 % quantile of a speed: slower counts as rest
+MOVING = 0.03  # of the 95 % quantile of a speed: slower motion counts as rest
 
 
 @dataclass(frozen=True)
 class Finding:
     """One part of the remainder.
 
-    joint: from 1. group: key of GROUPS or "line". subject: "joint 2", "tendons 1 and 3", or "".
+    Attributes
+    ----------
+    joint
+        Number from 1.
+    group
+        Key of GROUPS, or "line".
+    subject
+        "joint 2", "tendons 1 and 3", or "".
+    line
+        The oscillation, for group "line".
     """
 
     joint: int
@@ -45,14 +54,24 @@ class Finding:
 
 @dataclass(frozen=True)
 class Features:
-    """values: [B, D]. group: of each column, a key of GROUPS. subject: of each column, the part it is about."""
+    """Columns of the learner.
+
+    Attributes
+    ----------
+    values
+        Columns [B, D].
+    group
+        Of each column, a key of GROUPS.
+    subject
+        Of each column, the part of the finger that it describes.
+    """
 
     values: Numbers
     group: NDArray[np.str_]
     subject: NDArray[np.str_]
 
 
-# name of a group → what the residual follows, in plain words
+# name of a group -> what the residual follows, in plain words
 GROUPS = {
     "angle": "the joint angle",
     "friction over angle": "direction of motion and joint angle together (friction that changes with the angle)",
@@ -72,11 +91,11 @@ GROUPS = {
 
 
 def features(series: Series, *, force: Numbers | None = None, seed: int = 0) -> Features:
-    """All columns for the blocks of a series, standardised; constant ones are left out.
+    """Compute all columns for the blocks of a series, standardised; constant columns are left out.
 
-    force: [B, m] N that knows nothing of the residual, predicted by the model. The measured one does: its torque
-    is what the residual is taken from, noise and all, and would explain it. Without a prediction only that part of the
-    measured force is used that makes no torque.
+    `force` [B, m], N, must be independent of the residual, so it is predicted by the model. The measured force is not
+    independent: the residual is computed from its torque, including the noise, so it would explain the residual.
+    Without a prediction, only the part of the measured force that makes no torque is used.
     """
     series = replace(series, force=_without_torque(series) if force is None else force)
     columns: list[Numbers] = []
@@ -109,7 +128,7 @@ def features(series: Series, *, force: Numbers | None = None, seed: int = 0) -> 
 
 
 def _without_torque(series: Series) -> Numbers:
-    """[B, m] the part of the forces that pulls against itself, N: off the moment arms that the motion shows."""
+    """Return the part of the forces that makes no torque, N [B, m], for the moment arms that the motion shows."""
     arms = np.linalg.lstsq(series.velocity, series.tendon_velocity[:, :, 0], rcond=1e-9)[0].T
     pulling = arms @ np.linalg.pinv(arms, rcond=1e-9)
     inner = series.force - series.force @ pulling
@@ -119,13 +138,27 @@ def _without_torque(series: Series) -> Numbers:
 
 @dataclass(frozen=True)
 class _States:
-    """side: sign of the last motion of the joints [B, n] (0 before any). rest: s, [B, n]."""
+    """States of the motion.
+
+    Attributes
+    ----------
+    side
+        Sign of the last motion of the joints [B, n]; 0 before any.
+    moving
+        The side, fading to 0 at rest [B, n].
+    rest
+        Length of the last rest, s [B, n].
+    speed
+        95 % quantile of |velocity|, rad/s [n].
+    tendon_speed
+        The same of the tendon's velocity at its first joint, m/s [m].
+    """
 
     side: Numbers
-    moving: Numbers  # [B, n] the side, fading to 0 at rest
+    moving: Numbers
     rest: Numbers
-    speed: Numbers  # [n] 95 % quantile of |velocity|, rad/s
-    tendon_speed: Numbers  # [m] of the tendon's velocity at its first joint, m/s
+    speed: Numbers
+    tendon_speed: Numbers
 
 
 _Made = Iterator[tuple[str, str, Numbers]]
@@ -146,12 +179,12 @@ def _states(series: Series) -> _States:
 
 
 def run_starts(label: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Index of the first block of each stretch of equal labels [B], and B at the end."""
+    """Return the index of the first block of each stretch of equal labels [B], and B at the end."""
     return np.concatenate([[0], np.flatnonzero(np.diff(label)) + 1, [len(label)]]).astype(np.int64)
 
 
 def _last_side(velocity: Numbers, threshold: Numbers, starts: NDArray[np.int64]) -> Numbers:
-    """Sign of the last motion faster than the threshold, [B, k]."""
+    """Return the sign of the last motion faster than the threshold [B, k]."""
     moving = np.abs(velocity) > threshold
     index = np.where(moving, np.arange(len(velocity))[:, None], -1)
     index[starts[:-1]] = np.where(moving[starts[:-1]], index[starts[:-1]], -1)
@@ -162,7 +195,7 @@ def _last_side(velocity: Numbers, threshold: Numbers, starts: NDArray[np.int64])
 
 
 def _rest_before(velocity: Numbers, threshold: Numbers, step: float, starts: NDArray[np.int64]) -> Numbers:
-    """Length of the last rest, s: of the present one while at rest, else of the one before this motion, [B, k]."""
+    """Return the length of the last rest, s [B, k]: the present one while at rest, else the one before this motion."""
     result = np.zeros_like(velocity)
     for joint in range(velocity.shape[1]):
         still = np.abs(velocity[:, joint]) <= threshold[joint]
@@ -176,14 +209,14 @@ def _rest_before(velocity: Numbers, threshold: Numbers, step: float, starts: NDA
 
 
 def _filtered(signal: Numbers, time_constant: float, step: float, starts: NDArray[np.int64]) -> Numbers:
-    """Signal low-passed with a time constant, s, from 0 in each recording."""
+    """Return the signal, low-passed with a time constant in s, starting from 0 in each recording."""
     share = 1.0 - np.exp(-step / time_constant)
     parts = [lfilter([share], [1.0, share - 1.0], signal[first:end], axis=0) for first, end in pairwise(starts)]
     return np.concatenate(parts)
 
 
 def _spline(signal: Numbers, knots: int) -> Numbers:
-    """Cubic splines over a signal [B]; [B, 0] where it is constant."""
+    """Return cubic splines over a signal [B]; [B, 0] if it is constant."""
     if np.ptp(signal) <= 1e-12 * max(1.0, float(np.abs(signal).max())):
         return np.empty((len(signal), 0))
     places = np.unique(np.quantile(signal, np.linspace(0.01, 0.99, knots)))
@@ -202,7 +235,10 @@ def _spline(signal: Numbers, knots: int) -> Numbers:
 
 
 def _bends(one: Numbers, two: Numbers) -> Numbers:
-    """Smooth functions of two signals together [B, 9]: products of Legendre polynomials 1 to 3 of their ranges."""
+    """Return smooth functions of two signals together [B, 9].
+
+    They are products of Legendre polynomials 1 to 3 of the signals' ranges.
+    """
 
     def polynomials(signal: Numbers) -> Numbers:
         low, high = np.quantile(signal, (0.01, 0.99))
@@ -285,7 +321,7 @@ def _of_memory(series: Series, states: _States) -> _Made:
 
 
 def _of_slides(series: Series, states: _States) -> _Made:
-    """Friction of a tendon that remembers how much and how fast it slid lately."""
+    """Yield columns for friction of a tendon that depends on how much and how fast it slid recently."""
     starts = run_starts(series.segment)
     level = np.abs(series.force).mean(axis=0)
     for tendon in range(series.force.shape[1]):
@@ -332,7 +368,7 @@ def _of_tendons(series: Series, states: _States) -> _Made:
 
 
 def _interactions(series: Series, states: _States, rng: np.random.Generator) -> Numbers:
-    """Random waves of two or three states at a time, half of them with the sign of a motion."""
+    """Return random waves of two or three states at a time, half of them with the sign of a motion."""
     starts = run_starts(series.segment)
     ratio = series.velocity / states.speed
     recent = [_filtered(states.side, each, series.step, starts) for each in (0.3, 3.0)]

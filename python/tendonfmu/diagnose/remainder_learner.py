@@ -1,4 +1,4 @@
-"""A flexible learner without physics: ridge regression on many simple functions, judged on unseen stretches."""
+"""How well a flexible learner without physics predicts a residual: ridge regression, judged on unseen stretches."""
 
 from __future__ import annotations
 
@@ -14,12 +14,22 @@ from tendonfmu.statistics import Folds, Span, Splines
 Numbers = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-PENALTIES = (1e-3, 1e-2, 1e-1)  # of the rows: standard columns of so small a weight are noise
+PENALTIES = (1e-3, 1e-2, 1e-1)  # of the number of rows: a standardised column with a smaller weight is noise
 
 
 @dataclass(frozen=True)
 class Choice:
-    """A set of columns. group: key of GROUPS, "" for all. subject: "" for the whole group. columns: indices."""
+    """A set of columns.
+
+    Attributes
+    ----------
+    group
+        Key of GROUPS; "" for all groups.
+    subject
+        Subject within the group; "" for the whole group.
+    columns
+        Indices of the columns.
+    """
 
     group: str
     subject: str
@@ -27,7 +37,7 @@ class Choice:
 
 
 def choices(seen: Features) -> list[Choice]:
-    """All columns, those of each group, and those of each of its subjects."""
+    """Return all columns, those of each group, and those of each subject of each group."""
     pairs = list(dict.fromkeys(zip(seen.group.tolist(), seen.subject.tolist(), strict=True)))
     names = list(dict.fromkeys(group for group, _ in pairs))
     found = [Choice("", "", np.arange(len(seen.group)))]
@@ -41,10 +51,10 @@ def choices(seen: Features) -> list[Choice]:
 
 
 class Learner:
-    """Residuals of all joints, and the columns that may predict them; the slow bias taken off both."""
+    """Residuals of all joints and the columns that may predict them, both without the slow bias."""
 
     def __init__(self, seen: Features, residual: Numbers, splines: Splines, folds: Folds) -> None:
-        """residual: [B, n] N·m. splines: [B, s] of the bias."""
+        """Prepare the residual [B, n], N·m, with the splines [B, s] of the bias."""
         span = Span(splines[folds.rows])
         table = span.without(seen.values[folds.rows]).astype(np.float32)
         spread = table.std(axis=0)
@@ -58,7 +68,7 @@ class Learner:
         self._score = [self._table[each].T.astype(np.float64) @ self.target[each] for each in own]
 
     def predicted(self, columns: Indices) -> Numbers:
-        """[R, n] N·m on unseen folds, of each joint by its best penalty."""
+        """Return predictions of unseen folds [R, n], N·m, with the best penalty for each joint."""
         gram, score = np.sum(self._gram, axis=0)[np.ix_(columns, columns)], np.sum(self._score, axis=0)[columns]
         found = np.zeros((len(PENALTIES), *self.target.shape))
         for rows, own, part in zip(self._rows, self._gram, self._score, strict=True):
@@ -72,7 +82,7 @@ class Learner:
         return np.stack([found[best[j], :, j] for j in range(self.target.shape[1])], axis=1)
 
     def gains(self, prediction: Numbers) -> Numbers:
-        """[stretches, n] by how much a prediction [R, n] lowers the squares, (N·m)²."""
+        """Return by how much a prediction [R, n] lowers the squares, (N·m)² [stretches, n]."""
         change = self.target**2 - (self.target - prediction) ** 2
         return np.stack(
             [np.bincount(self.folds.stretch, values, minlength=self.folds.stretches) for values in change.T], axis=1

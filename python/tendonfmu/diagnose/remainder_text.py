@@ -1,4 +1,4 @@
-"""The remainder in plain words: which joint, what it follows, at which angles, when, how fast."""
+"""How the remainder reads in plain words: which joint, what it follows, at which angles, when, how fast."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 
 Numbers = NDArray[np.float64]
 
-CONCENTRATED = 1.6  # times as much of the prediction's power as of the time
+CONCENTRATED = 1.6  # times as much of the prediction's power as of the time, to report a concentration
 
 
 def described(
     series: Series, residual: Numbers, prediction: Numbers, findings: Sequence[Finding], share: Sequence[float]
 ) -> str:
-    """One sentence for each joint that has findings, those of the greatest share first."""
+    """Return one sentence for each joint that has findings, the joint with the greatest share first."""
     joints = sorted({finding.joint for finding in findings}, key=lambda joint: -share[joint - 1])
     sentences = []
     for joint in joints:
@@ -35,12 +35,12 @@ def described(
 
 def _part(share: float) -> str:
     if share < 0.01:
-        return "a small but certain part of what is left, in its quick changes,"
+        return "a small but certain, fast-changing part of what is left"
     return f"{100.0 * share:.0f} % of the variance of what is left"
 
 
 def _what(findings: Sequence[Finding]) -> Iterator[str]:
-    """What each follows; oscillations together, in the place of the first."""
+    """Yield what each finding follows; all oscillations are listed together, at the first one."""
     lines = [finding.line for finding in findings if finding.line is not None]
     told = False
     for finding in findings:
@@ -57,16 +57,16 @@ def _what(findings: Sequence[Finding]) -> Iterator[str]:
                 )
             )
             steady = "a steady oscillation" if len(lines) == 1 else "steady oscillations"
-            yield f"{steady} at {frequencies} Hz of {sizes} mN·m, whatever the motion"
+            yield f"{steady} at {frequencies} Hz of {sizes} mN·m, independent of the motion"
 
 
 def _listed(values: Sequence[str]) -> str:
-    """Such as "1, 2 and 3"."""
+    """Join values as in "1, 2 and 3"."""
     return " and ".join(filter(None, [", ".join(values[:-1]), values[-1]]))
 
 
 def _where(series: Series, part: Numbers, joint: int, findings: Sequence[Finding]) -> str:
-    """Where and when most of it is, as far as it is not everywhere."""
+    """Return where and when most of the prediction is, unless it is everywhere."""
     used = series.used
     power = part[used] ** 2
     if all(finding.line is not None for finding in findings) or not power.sum():
@@ -85,7 +85,7 @@ def _where(series: Series, part: Numbers, joint: int, findings: Sequence[Finding
 
 
 def _stretch(coordinate: Numbers, power: Numbers) -> tuple[float, float] | None:
-    """The third of the time, by the coordinate, with most of the power; None if that is not much more than a third."""
+    """Return the third of the time, sorted by the coordinate, with most of the power; None if it is spread evenly."""
     order = np.argsort(coordinate)
     summed = np.concatenate([[0.0], np.cumsum(power[order])]) / power.sum()
     width = len(order) // 3

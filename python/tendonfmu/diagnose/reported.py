@@ -1,4 +1,4 @@
-"""The causes that a report lists: those with a term in the extended model; then contact and unknown, without one."""
+"""Which causes a report lists: those with a term in the extended model, then contact and unknown, which have none."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tendonfmu.diagnose.result import Cause, Diagnosis, Where
 from tendonfmu.diagnose.size import quantity
 
 CONTACT, UNKNOWN = "contact", "unknown"
-LOAD = "load"  # a contact that lasts: of a change
+LOAD = "load"  # a contact that lasts for the whole recording; only in a comparison with a reference
 TITLES = {
     LOAD: "a load on the finger that was not there, or a sensor's zero that has moved",
     CONTACT: "something touches the finger, or stops it",
@@ -26,12 +26,26 @@ _EXPLANATIONS = {
     UNKNOWN: "What is left can be predicted in part from what was recorded, but it has the shape of no effect on the "
     "list. The gain is what predicting it takes away from the error in unseen stretches.",
 }
-LEAST_GAIN = 0.1  # of a contact, for certain: it is judged on the recordings that it was found in
-LEAST_PEAK = 6.0  # rms of what the extended model leaves, that the peak of a contact is at least
+LEAST_GAIN = 0.1  # lower end of a contact's gain: contact is judged on the recordings in which it was found
+LEAST_PEAK = 6.0  # least peak of a contact, in rms of what the extended model leaves
 
 
 def reported_causes(found: Diagnosis) -> list[Cause]:
-    """In order of gain; contact and unknown at the end, each only where its gain is above 0 for certain."""
+    """Return the causes that a report lists, in order of gain.
+
+    Contact and unknown come last. Each is listed only if its gain is certainly above 0: the lower end of its 95 %
+    interval is positive, for contact at least LEAST_GAIN.
+
+    Parameters
+    ----------
+    found
+        The result of `diagnose`.
+
+    Returns
+    -------
+    list of Cause
+        The causes of `found`, then a steady load, contact and unknown where they apply.
+    """
     return [*found.causes, *_load(found), *_contact(found), *_unknown(found)]
 
 
@@ -66,7 +80,7 @@ def _contact(found: Diagnosis) -> Iterator[Cause]:
         where=Where(CONTACT, joint),
         title=TITLES[CONTACT],
         explanation=_EXPLANATIONS[CONTACT],
-        p_value=SCAN_LEVEL,  # of any event where there is none
+        p_value=SCAN_LEVEL,  # probability of any event in recordings without one
         gain=gain,
         confusable_with=(),
         parameters={},

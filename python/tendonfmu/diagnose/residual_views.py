@@ -1,4 +1,4 @@
-"""The residual from all sides: over time, angle, velocity, tendon force, load, travel; its spectrum and whiteness."""
+"""How the residual looks from all sides: over time, angle, velocity, force, load and travel; spectrum and whiteness."""
 
 from __future__ import annotations
 
@@ -25,8 +25,15 @@ LONGEST_LAG = 1.0  # s
 def residual_views(
     series: Series, before: Numbers, after: Numbers, *, load: Numbers | None = None
 ) -> tuple[ResidualView, ...]:
-    """before, after: [B, n] residual of the nominal and of the extended model, N·m. load: [B, n] torque of the tendons
-    (or known load), N·m; without it the view over the load is left out."""
+    """Return all pictures of the residual, joint after joint.
+
+    Parameters
+    ----------
+    before, after
+        Residual of the nominal and of the extended model, N·m [B, n].
+    load
+        Torque of the tendons, or known load, N·m [B, n]; without it the view over the load is left out.
+    """
     return tuple(view for joint in range(before.shape[1]) for view in _of_joint(series, before, after, load, joint))
 
 
@@ -48,7 +55,7 @@ def _of_joint(
 
 
 def _over_time(series: Series, before: Numbers, after: Numbers, joint: int) -> ResidualView:
-    """Means over equal pieces, recordings one after another; a gap of NaN between them and where nothing is used."""
+    """Average over equal pieces, recordings one after another; NaN between them and where nothing is used."""
     size = max(1, -(-len(before) // POINTS))
     pieces = -(-len(before) // size)
     piece = np.arange(len(before)) // size
@@ -64,7 +71,7 @@ def _over_time(series: Series, before: Numbers, after: Numbers, joint: int) -> R
 
 
 def _running_time(series: Series) -> Numbers:
-    """Time of each block, every recording beginning where the one before ended."""
+    """Return the time of each block; every recording starts where the one before ended."""
     new = np.flatnonzero(np.diff(series.recording, prepend=series.recording[:1] - 1))
     ends = np.append(new[1:], len(series.time)) - 1
     lengths = series.time[ends] - series.time[new] + series.step
@@ -74,7 +81,7 @@ def _running_time(series: Series) -> Numbers:
 
 
 def _binned(kind: str, label: str, unit: str, x: Numbers, before: Numbers, after: Numbers, joint: int) -> ResidualView:
-    """Means over bins of equal count; before_std is the scatter within the bin."""
+    """Average over bins of equal count; `before_std` is the scatter within the bin."""
     order = np.argsort(x, kind="stable")
     parts = [part for part in np.array_split(order, BINS) if len(part)]
 
@@ -86,7 +93,7 @@ def _binned(kind: str, label: str, unit: str, x: Numbers, before: Numbers, after
 
 
 def _spectrum(series: Series, before: Numbers, after: Numbers, joint: int) -> ResidualView:
-    """Welch's power density in N²m²/Hz, runs without a gap averaged by their length."""
+    """Return Welch's power density, N²m²/Hz; runs without a gap are averaged by their length."""
     rate, plan = 1.0 / series.step, make_folds(series)
     ends = np.flatnonzero(np.diff(plan.run, append=-1)) + 1
     runs = [plan.rows[begin:end] for begin, end in zip(np.append(0, ends[:-1]), ends, strict=True)]
@@ -109,7 +116,7 @@ def _autocorrelation(series: Series, before: Numbers, after: Numbers, joint: int
 
 
 def _correlations(series: Series, values: Numbers, lags: NDArray[np.int64]) -> Numbers:
-    """Correlation of values [B] with themselves a few blocks later, pairs without a gap between them only."""
+    """Return the correlation of values [B] with themselves a few blocks later, without pairs across a gap."""
     plan = make_folds(series)
     seen = values[plan.rows] - (values[plan.rows].mean() if len(plan.rows) else 0.0)
     variance = float(np.mean(seen**2)) if len(seen) else 0.0
@@ -123,7 +130,7 @@ def _correlations(series: Series, values: Numbers, lags: NDArray[np.int64]) -> N
 
 
 def whiteness(series: Series, before: Numbers, after: Numbers) -> tuple[tuple[float, float], ...]:
-    """Per joint: correlation of neighbouring blocks, before and after; 0 for white noise."""
+    """Return, for each joint, the correlation of neighbouring blocks before and after; 0 for white noise."""
     one = np.array([1])
     return tuple(
         (float(_correlations(series, before[:, j], one)[0]), float(_correlations(series, after[:, j], one)[0]))

@@ -20,7 +20,15 @@ NO_GAIN = Interval(0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Where:
-    """An effect at a place. joint, tendon: from 1, None where it has none."""
+    """An effect at a place.
+
+    Attributes
+    ----------
+    effect
+        Name of the effect.
+    joint, tendon
+        Number from 1; None if the place has none.
+    """
 
     effect: str
     joint: int | None = None
@@ -31,9 +39,21 @@ class Where:
 class Evidence:
     """The residual over a cause's own coordinate, before and after the model is extended by it.
 
-    joint: from 1, whose residual it is. label, unit: of the coordinate. coordinate: [K] centres of bins of equal
-    count. before, after: [K] mean residual, N·m; before_std, after_std: [K] standard error of that mean, N·m.
-    reference, reference_std: [K] of the reference, where it is a change that is shown; NaN where it has not been.
+    Attributes
+    ----------
+    joint
+        Joint whose residual it is, from 1.
+    label, unit
+        Of the coordinate.
+    coordinate
+        Centres of bins of equal count [K].
+    before, after
+        Mean residual without and with the cause, N·m [K].
+    before_std, after_std
+        Standard error of that mean, N·m [K].
+    reference, reference_std
+        For a change: mean residual in the reference and its standard error, N·m [K]. NaN where the reference has no
+        data.
     """
 
     joint: int
@@ -50,7 +70,15 @@ class Evidence:
 
 @dataclass(frozen=True)
 class FoundPlace:
-    """One place of a cause. joint, tendon: from 1, None where it has none. parameters: path -> (value, unit)."""
+    """One place of a cause.
+
+    Attributes
+    ----------
+    joint, tendon
+        Number from 1; None if the place has none.
+    parameters
+        Numbers of the cause at this place: path -> (value, unit).
+    """
 
     joint: int | None
     tendon: int | None
@@ -59,10 +87,20 @@ class FoundPlace:
 
 @dataclass(frozen=True)
 class ChangedSize:
-    """How large a cause was in the reference, and is now. number: its name, such as "coulomb"; unit: of both.
+    """How large a cause was in the reference, and how large it is now.
 
-    A term that the description lacks is 0 in the reference: what is the same in both recordings is no change. by: its
-    size in each of the new recordings, in their order, where there are several.
+    A term that the description lacks is 0 in the reference: what is the same in both recordings is no change.
+
+    Attributes
+    ----------
+    number
+        Name of the number, such as "coulomb".
+    unit
+        Unit of all values.
+    reference, now, change
+        Size in the reference, size now, and difference, with 95 % intervals.
+    by
+        Size in each of the new recordings, in their order, if there are several.
     """
 
     number: str
@@ -77,10 +115,28 @@ class ChangedSize:
 class Cause:
     """An effect that was found, at one place or several.
 
-    p_value: family-wise, over all effects and places that were tested. gain: of this cause alone on unseen data,
-    1 − rms with / rms without, the other causes kept. confusable_with: what the data cannot tell from it.
-    parameters: its numbers in the extended description by path, with units as (value, unit); of all places.
-    size: in plain words with physical units. changed: then and now, of a change.
+    Attributes
+    ----------
+    where
+        Effect and place; None everywhere or at several places.
+    title, explanation
+        The effect in plain words, and what to look at on the hand.
+    p_value
+        Family-wise, over all effects and places that were tested.
+    gain
+        Of this cause alone on unseen data: 1 − rms with / rms without, the other causes kept.
+    confusable_with
+        What the data cannot distinguish from it.
+    parameters
+        Its numbers in the extended description, of all places: path -> (value, unit).
+    size
+        In plain words with physical units.
+    places
+        Every place of the cause with its numbers.
+    evidence
+        Pictures of the residual with and without the cause.
+    changed
+        For a change: the size in the reference and now.
     """
 
     where: Where
@@ -98,9 +154,18 @@ class Cause:
 
 @dataclass(frozen=True)
 class Invisible:
-    """An effect that these data cannot show: share of its variance that survives the refit of the nominal model.
+    """An effect that these data cannot show.
 
-    experiment: what would show it, in a sentence; motion: the same as `Experiment.motion` has it, empty if none would.
+    Attributes
+    ----------
+    where, title
+        Effect and place, and the effect in plain words.
+    surviving_share
+        Share of its variance that survives the refit of the nominal model.
+    experiment
+        What would show it, in a sentence.
+    motion
+        The same in the form of `Experiment.motion`; empty if no experiment would show it.
     """
 
     where: Where
@@ -112,7 +177,21 @@ class Invisible:
 
 @dataclass(frozen=True)
 class Event:
-    """A stretch of the recordings that no friction explains (contact, a stall): left out of the fit."""
+    """A stretch of the recordings that no friction explains (contact, a stall); it is left out of the fit.
+
+    Attributes
+    ----------
+    recording
+        Name of the file.
+    start, end
+        Times in the recording, s.
+    joints
+        Joints that feel it, from 1.
+    peak
+        Largest unexplained torque, N·m.
+    description
+        In plain words.
+    """
 
     recording: str
     start: float  # s
@@ -124,10 +203,18 @@ class Event:
 
 @dataclass(frozen=True)
 class SteadyLoad:
-    """A torque that is there all the time now and was not in the reference.
+    """A torque that is present all the time now and was not in the reference.
 
-    joint: from 1. size: N·m, of the mean torque that the model leaves, then and now. gain: 1 − rms about its own level
-    / rms about that of the reference, of the new recordings. p_value: of both levels being the same, for all joints.
+    Attributes
+    ----------
+    joint
+        Number from 1.
+    size
+        Mean torque that the model leaves, in the reference and now, N·m.
+    gain
+        Of the new recordings: 1 − rms about their own level / rms about the level of the reference.
+    p_value
+        Of both levels being the same, for all joints.
     """
 
     joint: int
@@ -140,9 +227,18 @@ class SteadyLoad:
 class Unexplained:
     """What no effect explains.
 
-    share: of the residual variance above the noise floor; by_joint: of each. p_value: of there being nothing,
-    family-wise. unknown: whether there is something material and certain. gain: 1 − rms without what can be predicted
-    / rms with it, on unseen stretches.
+    Attributes
+    ----------
+    share
+        Of the residual variance above the noise floor.
+    by_joint
+        The same for each joint.
+    p_value
+        Of there being nothing to explain, family-wise.
+    unknown
+        Whether something material and certain is left.
+    gain
+        On unseen stretches: 1 − rms without what can be predicted / rms with it.
     """
 
     share: float
@@ -155,7 +251,7 @@ class Unexplained:
 
 @dataclass(frozen=True)
 class ModelErrors:
-    """rms per joint, N·m, of the residual before the bias has seen the sample."""
+    """Rms per joint of the residual before the bias update, N·m, on training and test samples."""
 
     train_rms: tuple[float, ...]
     test_rms: tuple[float, ...]
@@ -165,8 +261,20 @@ class ModelErrors:
 class ResidualView:
     """One picture of the residual of the refitted nominal model at one joint.
 
-    kind: "time", "angle", "velocity", "tendon_force", "load", "travel", "spectrum", "autocorrelation".
-    x: [K]; before, after: [K] (spectrum: N²m²/Hz; else N·m or 1). unit: of x. before_std [K]: scatter within the bin.
+    Attributes
+    ----------
+    joint
+        Number from 1.
+    kind
+        "time", "angle", "velocity", "tendon_force", "load", "travel", "spectrum" or "autocorrelation".
+    label, unit
+        Of `x`.
+    x
+        Coordinate [K].
+    before, after
+        Nominal and extended model [K]; N²m²/Hz for a spectrum, 1 for an autocorrelation, else N·m.
+    before_std
+        Scatter within the bin [K].
     """
 
     joint: int
@@ -181,7 +289,21 @@ class ResidualView:
 
 @dataclass(frozen=True)
 class DetectionGain:
-    """What the extended model means for contact detection on labelled recordings, at thresholds tuned alike."""
+    """What the extended model changes for contact detection on labelled recordings, at thresholds tuned alike.
+
+    Attributes
+    ----------
+    events
+        Number of labelled contacts.
+    found_before, found_after
+        How many of them the nominal and the extended model detect.
+    false_alarms_before, false_alarms_after
+        Number of false alarms.
+    median_delay_before, median_delay_after
+        s; None if no event was found.
+    thresholds_before, thresholds_after
+        Per joint, N·m.
+    """
 
     events: int
     found_before: int
@@ -196,11 +318,20 @@ class DetectionGain:
 
 @dataclass(frozen=True)
 class Experiment:
-    """A further experiment, from a menu, chosen by computation.
+    """A further experiment, chosen from a menu by computation.
 
-    sentence: which motion, load or pretension would tell. separates: what from what; makes_visible: what it shows.
-    distance: expected distance of the predictions over the noise (1: as large as the noise). motion: options of
-    `tendonfmu excite` and the rig that make it.
+    Attributes
+    ----------
+    sentence
+        Which motion, load or pretension to record, and what it distinguishes.
+    separates
+        Pairs of causes that it distinguishes.
+    makes_visible
+        Effects that it shows.
+    distance
+        Expected distance of the predictions over the noise; 1 is as large as the noise.
+    motion
+        Options of `tendonfmu excite` and the rig that make it.
     """
 
     sentence: str
@@ -212,18 +343,53 @@ class Experiment:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The result of `diagnosis.diagnose`.
+    """The result of `diagnose`.
 
-    verdict: "adequate", "explained", "partly explained" or "unexplained". recordings, tests: names of the files.
-    signals: what was estimated from, in words. least_gain: of a cause. nominal_data, extended_data: the fitted
-    descriptions. noise_floor: N·m per joint, what of the extended model's test_rms nothing predicts; floor_source: how
-    that is known. steps: rms over all joints on unseen data, N·m, of the nominal model and after each cause, in the
-    order of `causes`. gain: over all joints on the test data; held_out: whether those are parts of the training
-    recordings. too_small: seen for certain, but not material, or not on unseen data. event_gain: what leaving `events`
-    out takes away from the rms on the training recordings; None without events. smoothing: what `signals` says.
-    kind: "model", what the model lacks, or "change", what is different from the reference recordings
-    `references`; nominal is then the model of the reference, one set of numbers for both. repeated: motions of the
-    reference that were made again exactly. load: that is there now and was not.
+    Attributes
+    ----------
+    verdict
+        "adequate", "explained", "partly explained" or "unexplained".
+    recordings, tests
+        Names of the files.
+    held_out
+        Whether the test data are parts of the training recordings.
+    signals
+        What was estimated from, in words.
+    smoothing
+        The same as numbers.
+    least_gain
+        Share of the rms that a cause must remove.
+    nominal, extended
+        Rms of the two models per joint.
+    bias_only_rms
+        Test rms per joint if only the bias is removed, N·m.
+    noise_floor
+        Part of the extended model's test rms that nothing predicts, per joint, N·m.
+    floor_source
+        How the noise floor was determined.
+    gain
+        Over all joints on the test data: 1 − rms of the extended / rms of the nominal model.
+    steps
+        Rms over all joints on unseen data of the nominal model and after each cause, in the order of `causes`, N·m.
+    too_small
+        Causes that are certain, but not material or not confirmed on unseen data.
+    events
+        Stretches left out of the fit.
+    event_gain
+        Share of the rms on the training recordings that leaving `events` out removes; None without events.
+    nominal_data, extended_data
+        The fitted descriptions.
+    tested
+        Number of candidate causes (effects at places) that were tested.
+    kind
+        "model": what the model lacks. "change": what differs from the reference recordings; `nominal` is then the model
+        of the reference, with one set of numbers for both.
+    references
+        Names of the reference recordings.
+    repeated
+        Number of motions of the reference that were repeated exactly.
+    load
+        Torque that is present now and was not in the reference.
     """
 
     finger: str

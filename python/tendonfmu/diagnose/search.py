@@ -1,8 +1,8 @@
-"""From recordings to the causes that a description lacks: signals, starting point, and one cause after the other.
+"""How a search gets from recordings to the causes that a description lacks: signals, starting point, cause after cause.
 
-After each cause the extended description is fitted again with all its numbers, and everything is looked at anew around
-it: derivatives of a wrong model would ask for small pieces that mend the linearisation. The search ends at the first
-candidate that is not material and certain.
+After each cause, all numbers of the extended description are fitted again and everything is computed anew around it.
+The derivatives of a wrong model would otherwise ask for small pieces that only correct the linearisation. The search
+ends when no candidate is material and certain.
 """
 
 from __future__ import annotations
@@ -45,16 +45,29 @@ Flags = NDArray[np.bool_]
 
 MOST_CAUSES = 8
 SIGNIFICANCE = 0.01  # family-wise
-MOST_FITTED = 3  # effects that columns cannot tell apart
+MOST_FITTED = 3  # effects that columns cannot distinguish
 WIDESPREAD = {"presliding"}  # in every finger, and different from place to place
-MOST_REFUSED = 4  # effects that selection named and the fit, or the test, did not bear out
+MOST_REFUSED = 4  # selected effects that the fit or the test did not confirm
 
 
 @dataclass(frozen=True)
 class NamedCause:
-    """A cause as it was found. effect, joint, tendon: where, None for everywhere. accepted: its places, as a
-    description takes them. gain, error: 1 − rms with / rms without on held-out folds, and its standard error. alike:
-    what the data cannot tell from it.
+    """A cause as it was found.
+
+    Attributes
+    ----------
+    effect, joint, tendon
+        Where it is; None everywhere.
+    accepted
+        Its places, in the form that a description takes.
+    gain, error
+        1 − rms with / rms without on held-out folds, and its standard error.
+    alike
+        What the data cannot distinguish from it.
+    hypothesis
+        As it was selected; None if it is part of the start.
+    measured
+        Gain on unseen data as it runs online.
     """
 
     effect: str
@@ -65,8 +78,8 @@ class NamedCause:
     error: float
     p_value: float
     alike: tuple[Hypothesis, ...]
-    hypothesis: Hypothesis | None = None  # as it was selected; None: it is part of the start
-    measured: Interval | None = None  # on unseen data, as it runs online
+    hypothesis: Hypothesis | None = None
+    measured: Interval | None = None
 
     @property
     def key(self) -> Key:
@@ -74,16 +87,34 @@ class NamedCause:
 
     @property
     def interval(self) -> Interval:
-        """The measured gain, else that of the held-out folds, with 95 %."""
+        """The measured gain; without one, the gain on held-out folds with its 95 % interval."""
         return self.measured or Interval(self.gain, self.gain - 1.96 * self.error, self.gain + 1.96 * self.error)
 
 
 @dataclass(frozen=True)
 class Search:
-    """estimation: signals and recordings. nominal, extended: fitted descriptions, with the settings for estimating.
-    first, last: what each lacks and leaves. causes: in the order in which they were found; models: [causes + 1] after
-    each, the nominal one first. small: certain but not material. events: contact and stalls. out: [B] blocks in them.
-    fitted_to: recordings with forces that the model predicts, events left out.
+    """The result of a search.
+
+    Attributes
+    ----------
+    estimation
+        Signals and recordings.
+    nominal, extended
+        Fitted descriptions with the settings for estimation.
+    first, last
+        What each of them lacks and leaves.
+    causes
+        In the order in which they were found.
+    models
+        The nominal model, then the model after each cause [causes + 1].
+    small
+        Effects that are certain but not material.
+    events
+        Contact and stalls.
+    out
+        Blocks that lie in events [B].
+    fitted_to
+        Recordings with the forces that the model predicts, without events.
     """
 
     estimation: Estimation
@@ -100,7 +131,7 @@ class Search:
 
 
 def accepted_of(hypothesis: Hypothesis, magnitudes: Numbers) -> tuple[Accepted, ...]:
-    """The places of a hypothesis with its common magnitudes [d], as `extension_fit` takes them."""
+    """Return the places of a hypothesis with its common magnitudes [d], in the form that `extension_fit` takes."""
     return tuple(
         Accepted(
             member.proposal.candidate,
@@ -120,8 +151,10 @@ def search(
     seed: int,
     phases: Phases,
 ) -> Search:
-    """recordings: as they were measured; chosen: what is
-    estimated from; `train` says where to look."""
+    """Search for the causes that a description lacks.
+
+    `recordings` are as measured; their `train` says where to look. `chosen` holds what is estimated from.
+    """
     settings = chosen.settings
     with phases.start("contact"):
         events, out = events_of(chosen.model.data, chosen.recordings, chosen.grid, seed)
@@ -129,14 +162,14 @@ def search(
     own = [without_blocks(each, k, chosen.grid, out) for k, each in enumerate(chosen.recordings)]
     clean = predicted_of(nominal.data, own, chosen.grid, series_of(nominal.data, own, chosen.grid, out))
     nominal = fitted(nominal.data, clean, settings, given=nominal.given)
-    touched = chosen.recordings  # with the events in them
+    touched = chosen.recordings  # still including the events
     chosen = replace(chosen, nominal=nominal, recordings=own)
     online = OnlineError(chosen.online(nominal.data), [without_events(each, events) for each in recordings])
     with phases.start("causes", MOST_CAUSES) as step:
         rounds = _Rounds(chosen, out, online, least_gain, settings)
         rounds.run(step)
     if events:
-        # what the causes explain was no event
+        # drop events that the causes explain
         left, _ = events_of(rounds.models[-1].data, touched, chosen.grid, seed)
         events = tuple(event for event in events if any(_overlap(event, other) for other in left))
     return Search(
@@ -161,7 +194,26 @@ def _overlap(one: Event, other: Event) -> bool:
 def events_of(
     data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, seed: int
 ) -> tuple[tuple[Event, ...], Flags]:
-    """What no friction explains in the residual of a model, and the blocks [B] that lie in it."""
+    """Find the stretches that no friction explains in the residual of a model.
+
+    Parameters
+    ----------
+    data
+        Fitted description.
+    recordings
+        Prepared for it.
+    grid
+        Blocks of the recordings.
+    seed
+        Seed of the learner's random functions.
+
+    Returns
+    -------
+    tuple of Event
+        In order of recording and time.
+    array of bool
+        Blocks that lie in an event [B].
+    """
     series = series_of(data, recordings, grid)
     names = [str(recording.path) for recording in recordings]
     events = scan_events(series, residual_alone(data, series), bias_of(data, series), names, seed=seed)
@@ -169,7 +221,7 @@ def events_of(
 
 
 def without_events(recording: FitRecording, events: Sequence[Event]) -> FitRecording:
-    """The recording without the samples of events in it."""
+    """Return the recording without the samples that lie in its events."""
     inside = np.zeros(len(recording.time), dtype=bool)
     for event in events:
         if event.recording == str(recording.path):
@@ -178,7 +230,24 @@ def without_events(recording: FitRecording, events: Sequence[Event]) -> FitRecor
 
 
 def without_blocks(recording: FitRecording, number: int, grid: Grid, out: Flags) -> FitRecording:
-    """The recording without the samples of the blocks [B] that are out."""
+    """Return a recording that does not train on the samples of some blocks.
+
+    Parameters
+    ----------
+    recording
+        The recording.
+    number
+        Its number in the grid, from 0.
+    grid
+        Blocks of all recordings.
+    out
+        Blocks to leave out [B].
+
+    Returns
+    -------
+    FitRecording
+        With `train` False in these blocks.
+    """
     train = recording.train.copy()
     for segment in grid.segments:
         if segment.recording == number:
@@ -190,7 +259,10 @@ def without_blocks(recording: FitRecording, number: int, grid: Grid, out: Flags)
 
 @dataclass(frozen=True)
 class _Trial:
-    """A cause and the model fitted with it; None where there is none. error: [K] Σ e² on held-out folds, by stretch."""
+    """A cause and the model fitted with it; the model is None if there is none.
+
+    `error` is Σ e² on held-out folds by stretch [K].
+    """
 
     cause: NamedCause
     model: FittedModel | None
@@ -198,7 +270,7 @@ class _Trial:
 
 
 class _Rounds:
-    """Cause after cause; models and views after each."""
+    """Adds cause after cause; keeps models and views after each."""
 
     def __init__(
         self,
@@ -213,7 +285,7 @@ class _Rounds:
         self.models = [chosen.nominal]
         self._chosen, self._out, self._online = chosen, out, online
         self._least_gain, self._settings = least_gain, settings
-        # the start is fitted before anything is chosen: until then only what the nominal model leaves is asked for
+        # before the start is fitted, only the residual of the nominal model is needed
         self.view = self.first = self._look(chosen.nominal, () if chosen.start.causes else CANDIDATES)
 
     def run(self, step: Step) -> None:
@@ -228,8 +300,8 @@ class _Rounds:
     def _search(self, step: Step) -> None:
         while len(self.causes) < MOST_CAUSES and len(self.refused) < MOST_REFUSED:
             step(len(self.causes))
-            # what was refused explains something: no other effect is credited with that; but a correction of the torque
-            # itself lowers any error by shrinking the torque
+            # Refused effects explain something, so no other effect is credited with that. A correction of the torque
+            # itself is excluded: it lowers any error by shrinking the torque.
             known = {each.key for each in self.refused if each.effect not in SCALING}
             tried = {each.effect for each in self.refused}
             selection = self.view.beside(known)
@@ -241,13 +313,13 @@ class _Rounds:
                 self.refused.append(trial.cause)
 
     def _best_fitted(self, selection: Selection, picked: Pick) -> _Trial:
-        """Columns of a wrong model mislead: of the effects that they cannot tell apart, the fitted models decide."""
+        """Fit the effects that the columns cannot distinguish and take the best: columns of a wrong model mislead."""
         own = self._named(picked.judged, selection)
         rivals = [self._named(selection.refined(each.effect), selection) for each in _to_fit(picked)]
         trials = [self._tried(each) for each in (own, *(each for each in rivals if each.p_value < SIGNIFICANCE))]
         best = min(trials, key=lambda each: float(each.error.sum()))
         same = [each for each in trials if each.model is not None and is_alike(each.error, best.error)]
-        # what is there already explains the data without a new name
+        # an effect that is already present explains the data without a new name
         widespread = WIDESPREAD & {each.effect for each in self.causes}
         best = next((each for each in same if each.cause.effect in widespread), best)
         fitted_effects = {each.cause.effect for each in trials}
@@ -257,7 +329,10 @@ class _Rounds:
         return replace(best, cause=replace(best.cause, alike=tuple(alike)))
 
     def _at_best_place(self, trial: _Trial, selection: Selection) -> _Trial:
-        """Derivatives tell the places of a large effect apart less well than the models that are fitted with it."""
+        """Fit the effect at the nearly best places, too, and take the best.
+
+        Derivatives distinguish the places of a large effect less well than fitted models.
+        """
         judged = selection.refined(trial.cause.effect)
         if trial.cause.hypothesis is not judged.hypothesis:
             return trial
@@ -266,7 +341,10 @@ class _Rounds:
         return min(trials, key=lambda each: float(each.error.sum()))
 
     def _tries_presliding(self) -> bool:
-        """Where none was taken: its distance may be far below what the scan tries. True if it was taken."""
+        """Try presliding with a short distance if none was taken; return whether it was taken.
+
+        Its distance may be far below the scanned ones.
+        """
         chosen = self._chosen
         if any(each.effect == "presliding" for each in [*self.causes, *self.refused]):
             return False
@@ -282,17 +360,17 @@ class _Rounds:
         return NamedCause(own.effect, own.joint, own.tendon, accepted, gain, error, p_value, (), own)
 
     def _tried(self, cause: NamedCause) -> _Trial:
-        """Fits the description with a further cause."""
+        """Fit the description with a further cause."""
         everything = [each for known in [*self.causes, cause] for each in known.accepted]
         accepted = possible(self.models[0].data, everything)
         if len(accepted) < len(everything):
             return _Trial(cause, None, np.array([np.inf]))
         own = self._chosen.recordings
-        # forces that the model without a delay predicts are not late: no fit would find it in them
+        # predict with the cause: forces predicted without a delay are not late, so no fit would find a delay in them
         begin = extended_description(self.models[-1].data, cause.accepted)
         clean = predicted_of(begin, own, self._chosen.grid, series_of(begin, own, self._chosen.grid, self._out))
         model = fit_extended(self.models[0], accepted, clean, self._settings)
-        # again with the forces that the model with the cause predicts: those of the one before know nothing of it
+        # fit again with the forces predicted with the cause
         clean = predicted_of(
             model.data, own, self._chosen.grid, series_of(model.data, own, self._chosen.grid, self._out)
         )
@@ -302,13 +380,15 @@ class _Rounds:
         return _Trial(cause, model, self._look(model, ()).selection.base)
 
     def _take(self, trial: _Trial, candidates: Sequence[Candidate] = CANDIDATES) -> bool:
-        """Keeps a further cause where it lowers the error on unseen stretches materially and certainly, and that of
-        the model as it runs online. candidates: looked at around the new model."""
+        """Keep a further cause if it lowers the error on unseen stretches materially and certainly.
+
+        The error of the model that runs online must fall, too. `candidates` are computed around the new model.
+        """
         before, after, model, cause = self.view.selection.base, trial.error, trial.model, trial.cause
         gain, error = rms_gain(before, after) if model is not None else (0.0, 0.0)
         if model is None or gain < self._least_gain or gain <= CERTAIN * error or not self._runs_better(model):
             return False
-        if cause.p_value >= SIGNIFICANCE:  # of the start: a step that has no column in the view before
+        if cause.p_value >= SIGNIFICANCE:  # a cause of the start has no column in the view before
             cause = replace(cause, p_value=_step_p_value(before, after))
         self.causes.append(replace(cause, gain=gain, error=error))
         self.models.append(model)
@@ -316,13 +396,16 @@ class _Rounds:
         return True
 
     def _runs_better(self, model: FittedModel) -> bool:
-        """Whether it leaves less than the last model as both run online, with a slow bias taken off and of r."""
+        """Return whether the model runs better online than the last one.
+
+        Both its error without a slow bias and its r must be smaller.
+        """
         before, after = (self._chosen.online(each.data) for each in (self.models[-1], model))
         left, found = (self._online.by_stretch(each).sum() for each in (before, after))
         return bool(found < left and self._online.square(after) < self._online.square(before))
 
     def _resolved(self, cause: NamedCause, model: FittedModel) -> bool:
-        """Whether the sensors can show a fitted play or delay of this size, and presliding is no spring."""
+        """Return whether the sensors can show a play or delay of the fitted size, and presliding is no spring."""
         if cause.effect == "presliding" and is_spring(model.data, span_of(model.data, self._chosen.recordings)):
             return False
         own = [extended_row(model.data, cause.effect, each.place) for each in cause.accepted]
@@ -334,7 +417,7 @@ class _Rounds:
         return look(model.data, chosen.recordings, chosen.grid, chosen.least, self._out, candidates=candidates)
 
     def small(self) -> list[NamedCause]:
-        """Of every effect that is certain but not material the best place."""
+        """Return the best place of every effect that is certain but not material."""
         found = []
         known = {each.effect for each in self.refused}
         for judged in self.view.selection.ranked():
@@ -349,14 +432,16 @@ class _Rounds:
 
 
 def _to_fit(picked: Pick) -> list[Hypothesis]:
-    """What a pick cannot be told from and may be in its place. A correction of the torque itself may only stand for
-    another one: it lowers any error."""
+    """Return the effects that cannot be distinguished from a pick and may replace it.
+
+    A correction of the torque itself may replace only another such correction, because it lowers any error.
+    """
     scaling = picked.hypothesis.effect in SCALING
     return [each for each in picked.alike if scaling or each.effect not in SCALING][: MOST_FITTED - 1]
 
 
 def _together(places: tuple[Accepted, ...]) -> NamedCause:
-    """A cause of the start, at one place or at all."""
+    """Return a cause of the start, at one place or everywhere."""
     place = places[0].place if len(places) == 1 else Place()
     return NamedCause(places[0].candidate.name, place.joint, place.tendon, places, 0.0, 0.0, 1.0, ())
 
@@ -367,7 +452,7 @@ def _small(judged: Judged, gain: float, error: float, p_value: float) -> NamedCa
 
 
 def _step_p_value(before: Numbers, after: Numbers) -> float:
-    """Of a gain by stretch [K] being chance: a one-sided t test."""
+    """Return the p-value of a gain by stretch [K]: a one-sided t test."""
     from scipy.stats import ttest_1samp
 
     return float(ttest_1samp(before - after, 0.0, alternative="greater").pvalue) if len(before) > 1 else 1.0

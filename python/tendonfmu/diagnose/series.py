@@ -1,8 +1,8 @@
-"""Recordings and models as a diagnosis sees them: averaged over short blocks of time.
+"""How recordings and models look to a diagnosis: averaged over short blocks of time.
 
 The estimator's model of a joint is y_k = T_k + b_k + e_k with b_k = b_{k−1} + Δb_k + w_k (runtime/include/
-tendonfmu_estimation.h). With G_k = T_k + Σ Δb up to k, y − G is a slow bias plus noise. G and its derivatives by the
-numbers of the description are all that is looked at here.
+tendonfmu_estimation.h). With G_k = T_k + Σ Δb up to k, y − G is a slow bias plus noise. A diagnosis looks only at G and
+at its derivatives by the numbers of the description.
 """
 
 from __future__ import annotations
@@ -23,16 +23,25 @@ Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Array = NDArray[Any]
 
-SHORTEST_STEP = 0.01  # s, of a block
+SHORTEST_STEP = 0.01  # s; shortest block
 MOST_BLOCKS = 20_000
-_NEVER = 1e9  # N·m; no contact threshold is ever passed
+_NEVER = 1e9  # N·m; a contact threshold that is never passed
 
 
 @dataclass(frozen=True)
 class Segment:
-    """A stretch of a recording without a gap, cut into blocks of equally many samples.
+    """A stretch of a recording without a gap, cut into blocks with equally many samples.
 
-    recording: its number, from 0. part: its samples there. first, count: its blocks in the whole; samples: of a block.
+    Attributes
+    ----------
+    recording
+        Its number, from 0.
+    part
+        Its samples there.
+    first, count
+        First block in the whole series, and number of blocks.
+    samples
+        Samples of a block.
     """
 
     recording: int
@@ -46,14 +55,14 @@ class Segment:
         return slice(self.first, self.first + self.count)
 
     def mean(self, values: Array) -> Array:
-        """[count, ...] of values [samples of the part or as many as the blocks have, ...]."""
+        """Return block means [count, ...] of values [samples of the part, or as many as the blocks have, ...]."""
         whole = values[: self.count * self.samples]
         return np.asarray(whole.reshape(self.count, self.samples, *whole.shape[1:]).mean(axis=1))
 
 
 @dataclass(frozen=True)
 class Grid:
-    """All segments, one after another. step: s, of a block. The estimator's recordings are the segments."""
+    """All segments, one after another; they are the estimator's recordings. `step` is the length of a block, s."""
 
     segments: tuple[Segment, ...]
     step: float
@@ -65,11 +74,24 @@ class Grid:
 
 @dataclass(frozen=True)
 class Series(BlockSeries):
-    """All recordings one after another, block means; n joints, m tendons.
+    """Block means of all recordings, one after another; n joints, m tendons.
 
-    target: [B, n] y − G, N·m. angle [B, n] rad, velocity [B, n] rad/s,
-    acceleration [B, n] rad/s², force [B, m] N, tendon_velocity [B, m, n] m/s (ẋ_ij), travel [B, n] rad since the joint
-    last turned round.
+    Attributes
+    ----------
+    target
+        y − G, N·m [B, n].
+    angle
+        rad [B, n].
+    velocity
+        rad/s [B, n].
+    acceleration
+        rad/s² [B, n].
+    force
+        N [B, m].
+    tendon_velocity
+        ẋ_ij, m/s [B, m, n].
+    travel
+        Travel since the joint last reversed, rad [B, n].
     """
 
     angle: Numbers
@@ -82,7 +104,7 @@ class Series(BlockSeries):
 
 @dataclass(frozen=True)
 class Columns:
-    """Derivatives of G [B, n, c], averaged like the series; names [c]."""
+    """Derivatives of G, averaged like the series [B, n, c], and their names [c]."""
 
     values: Array
     names: tuple[str, ...]
@@ -90,10 +112,20 @@ class Columns:
 
 @dataclass(frozen=True)
 class Trial:
-    """A candidate at a place with one choice of its non-linear numbers: columns first .. first + count − 1 of a bank.
+    """A candidate at a place with one choice of its non-linear numbers.
 
-    effect, joint, tendon: as in the report. signs: expected of each magnitude, 0 either. shape: the choice. origin:
-    whatever made it (the candidate), for the caller.
+    Its columns in a bank are first .. first + count − 1.
+
+    Attributes
+    ----------
+    effect, joint, tendon
+        As in the report.
+    signs
+        Expected sign of each magnitude, 0 for either.
+    shape
+        The choice.
+    origin
+        What made it (the candidate), for the caller.
     """
 
     effect: str
@@ -112,14 +144,25 @@ class Trial:
 
 @dataclass(frozen=True)
 class Bank:
-    """Columns of all that may be missing."""
+    """Columns of all candidates."""
 
     columns: Columns
     trials: tuple[Trial, ...]
 
 
 def make_grid(recordings: Sequence[FitRecording]) -> Grid:
-    """Blocks of about 10 ms, longer where there would be very many, never shorter than a sample."""
+    """Cut recordings into blocks of about 10 ms.
+
+    Parameters
+    ----------
+    recordings
+        Recordings prepared for a fit.
+
+    Returns
+    -------
+    Grid
+        Blocks are longer if there would be more than MOST_BLOCKS, and never shorter than a sample.
+    """
     duration = sum(recording.duration for recording in recordings)
     step = max(SHORTEST_STEP, duration / MOST_BLOCKS)
     segments, first = [], 0
@@ -136,11 +179,11 @@ def make_grid(recordings: Sequence[FitRecording]) -> Grid:
 def exact_model(
     data: Mapping[str, Any], recording: FitRecording, *, entry_load: bool | None = None, jumps: bool = True
 ) -> Numbers:
-    """[N, n] N·m: G of a description by a run of the core, NaN outside the parts; T alone without the jumps, which
-    depend on how a recording begins.
+    """Return G of a description from a run of the core, N·m [N, n]; NaN outside of the parts.
 
-    entry_load: in place of what the description says. Less the delay of the measured torque, where the description
-    delays the forces: measured τ less this is what bias and noise are.
+    Without `jumps` it is T alone; the jumps depend on how a recording begins. `entry_load` replaces the description's
+    value. If the description delays the forces, the delay of the measured torque is subtracted: measured τ less the
+    result is bias plus noise.
     """
     given = data.get("bias") or {}
     joints = len(data["joints"])
@@ -160,7 +203,7 @@ def exact_model(
 
 
 def block_prediction(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid) -> Numbers:
-    """[B, n] N·m: block means of `exact_model`."""
+    """Return block means of `exact_model`, N·m [B, n]."""
     whole = {segment.recording: exact_model(data, recordings[segment.recording]) for segment in grid.segments}
     return np.concatenate([segment.mean(whole[segment.recording][segment.part]) for segment in grid.segments])
 
@@ -169,7 +212,10 @@ def block_prediction(data: Mapping[str, Any], recordings: Sequence[FitRecording]
 
 
 def make_series(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, torque: Numbers) -> Series:
-    """torque: [B, n] G of the description `data`. The angles and velocities are those the model uses."""
+    """Average the signals over the blocks of a grid.
+
+    `torque` [B, n] is G of the description. Angles and velocities are those that the model uses.
+    """
     whole = [recordings[segment.recording] for segment in grid.segments]
     pieces = list(zip(grid.segments, whole, strict=True))
     threshold = _joint_threshold(data)
@@ -209,13 +255,13 @@ def _slope(values: Numbers, step: float) -> Numbers:
 
 
 def _tendon_velocity(arms: Numbers, velocity: Numbers) -> Numbers:
-    """[B, m, n] ẋ_ij = Σ_{j'≥j} r_ij' q̇_j' (eq. 5). arms: [m, n]."""
+    """Return ẋ_ij = Σ_{j'≥j} r_ij' q̇_j' (eq. 5), m/s [B, m, n], for moment arms [m, n]."""
     products = velocity[:, None, :] * arms[None]
     return np.asarray(np.cumsum(products[:, :, ::-1], axis=2)[:, :, ::-1])
 
 
 def _travel(angle: Numbers, speed: Numbers, threshold: float, segment: Segment) -> Numbers:
-    """[count, n] rad since each joint last turned round; speeds below the threshold turn nothing."""
+    """Return the travel since each joint last reversed, rad [count, n]; speeds below the threshold do not count."""
     angle, speed = angle[segment.part], speed[segment.part]
     found = np.empty_like(angle)
     for j in range(angle.shape[1]):

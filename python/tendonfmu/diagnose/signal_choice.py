@@ -1,6 +1,6 @@
-"""Which signals to estimate from: smoothed ones or raw ones, by the error that is left on unseen stretches.
+"""Which signals the numbers are estimated from, smoothed or raw ones: those with the smaller error on unseen stretches.
 
-Both are compared where both can see: the residual of raw signals is smoothed like the others.
+Both are compared at frequencies that both contain: the residual of raw signals is smoothed like the other one.
 """
 
 from __future__ import annotations
@@ -30,19 +30,30 @@ from tendonfmu.statistics import Grams, make_folds
 
 Numbers = NDArray[np.float64]
 
-NOISIEST = 1000.0  # rad, that `position_filter` takes
-NOISE_CUTOFF = 15.0  # Hz: what positions of a hand do faster is noise
-ENOUGH = 90.0  # s of motion, to choose signals and a start by
-BETTER = 0.7  # of the error of smoothed signals, that raw ones have to be below: with them comes a filter's lag
+NOISIEST = 1000.0  # rad; the largest noise that `position_filter` accepts
+NOISE_CUTOFF = 15.0  # Hz: faster motion of the positions is noise
+ENOUGH = 90.0  # s of motion that suffice to choose signals and a starting point
+BETTER = 0.7  # of the error of smoothed signals, which raw ones must stay below, because they need a filter with a lag
 
 
 @dataclass(frozen=True)
 class Estimation:
-    """What is estimated from.
+    """The signals and models that the estimation starts from.
 
-    recordings: `train` says where. least: sizes that the sensors can show. nominal: the given structure fitted, with
-    these settings; start: delay and presliding that it begins with, model: fitted with them. given: the description as
-    it was given, with the filter that suits it online.
+    Attributes
+    ----------
+    recordings
+        `train` says which samples are used.
+    least
+        Sizes that the sensors can show.
+    nominal
+        The given structure, fitted with these settings.
+    start
+        Delay and presliding that the search starts with.
+    model
+        The model fitted with `start`.
+    given
+        The given description, with the filter that suits it online.
     """
 
     signals: Signals
@@ -56,7 +67,7 @@ class Estimation:
     given: Mapping[str, Any]
 
     def online(self, data: Mapping[str, Any]) -> dict[str, Any]:
-        """An estimated description with the settings with which it runs on raw samples."""
+        """Return an estimated description with the settings for raw samples."""
         return self.signals.restored(data, self.given)
 
     @property
@@ -67,7 +78,10 @@ class Estimation:
 
 
 def choose(given: FingerDescription, recordings: Sequence[FitRecording], settings: FitSettings) -> Estimation:
-    """recordings: as they were measured. Long ones are compared on a part. Raises InputError."""
+    """Choose signals and starting point for recordings as they were measured.
+
+    Of long recordings only a part is compared. Raises InputError.
+    """
     smoothing = smoothing_of([each.recording for each in recordings], given.data)
     raw = Signals()
     part = _part_of(given, recordings)
@@ -89,7 +103,10 @@ def choose(given: FingerDescription, recordings: Sequence[FitRecording], setting
 
 
 def _part_of(given: FingerDescription, recordings: Sequence[FitRecording]) -> list[FitRecording]:
-    """Of each recording the first seconds, all together ENOUGH; signals and the start differ little along the way."""
+    """Return the first seconds of each recording, ENOUGH in total.
+
+    Signals and starting point vary little along a recording.
+    """
     share = ENOUGH / max(sum(each.duration for each in recordings), 1e-300)
     if share >= 1.0:
         return list(recordings)
@@ -111,8 +128,11 @@ def _part_of(given: FingerDescription, recordings: Sequence[FitRecording]) -> li
 
 
 def _with_filter(chosen: Estimation, recordings: Sequence[FitRecording]) -> Estimation:
-    """With a position filter online, where the models that are estimated then leave less of the raw samples than with
-    the description's own velocity filter. Raw signals are estimated from through the description's own filter."""
+    """Add an online position filter if the estimated models then leave a smaller error on raw samples.
+
+    The comparison is with the description's own velocity filter. A model estimated from raw signals keeps its own
+    filter.
+    """
     long_enough = all(len(each.time) >= FEWEST_SAMPLES for each in recordings)
     if chosen.signals.cutoff is None or "position_filter" in chosen.given or not long_enough:
         return chosen
@@ -130,7 +150,7 @@ def _with_filter(chosen: Estimation, recordings: Sequence[FitRecording]) -> Esti
 
 @dataclass(frozen=True)
 class _Compared:
-    """A start with certain signals. error: rms on unseen stretches, N·m."""
+    """A starting point with certain signals; `error` is the rms on unseen stretches, N·m."""
 
     signals: Signals
     start: Start
@@ -144,7 +164,7 @@ def _compared(
     settings: FitSettings,
     known: _Compared | None,
 ) -> _Compared:
-    """known: with other signals, whose starting point is taken over."""
+    """Find the starting point with these signals, or take it from `known`, which used other signals."""
     finger = replace(given, data=signals.description(given.data))
     own = estimation_recordings(finger, recordings, signals)
     grid = make_grid(own)
@@ -152,7 +172,7 @@ def _compared(
     if known is None:
         least = least_sizes(given.data, recordings, float(np.median(np.diff(own[0].time))))
         starts = scan(nominal.data, own, grid, least.least("time_delay", None, None))
-        # of a known delay the two best distances: the derivative of one need not lead to the better
+        # with a known delay, try the two best distances: the derivative of one need not lead to the better
         tried = [starts[0], *[each for each in starts[1:] if each.presliding != starts[0].presliding][:1]]
     else:
         tried = [known.start]
@@ -161,7 +181,7 @@ def _compared(
     found = []
     for start in tried:
         model = fit_extended(nominal, start.accepted, own, settings) if start.causes else nominal
-        if is_spring(model.data, span):  # a spring is missing, and would not be found beside it
+        if is_spring(model.data, span):  # a spring is missing, and would not be found beside long presliding
             start = replace(start, presliding=())
             model = fit_extended(nominal, start.accepted, own, settings) if start.causes else nominal
         found.append(_Compared(signals, start, _error(model.data, own, grid, cutoff)))
@@ -171,7 +191,22 @@ def _compared(
 def estimation_recordings(
     finger: FingerDescription, recordings: Sequence[FitRecording], signals: Signals
 ) -> list[FitRecording]:
-    """The recordings with these signals; what is not trained on or judged in the measured ones is not in these."""
+    """Return recordings whose signals are smoothed as chosen.
+
+    Parameters
+    ----------
+    finger
+        Description that the recordings are prepared for.
+    recordings
+        As they were measured.
+    signals
+        The chosen signals; without a cutoff the recordings are returned unchanged.
+
+    Returns
+    -------
+    list of FitRecording
+        Samples that are not trained on or held out in `recordings` are not in these either.
+    """
     if signals.cutoff is None:
         return list(recordings)
     found = []
@@ -183,7 +218,7 @@ def estimation_recordings(
 
 
 def least_sizes(data: Mapping[str, Any], recordings: Sequence[FitRecording], step: float) -> LeastSizes:
-    """From measured recordings; step: s between the samples that are estimated from."""
+    """Measure the sensor noise of recordings; `step` is the time between the samples that are estimated from, s."""
     joints: list[Numbers] = []
     tendons: list[Numbers] = []
     stiffness = np.array([tendon["stiffness"] for tendon in data["tendons"]])
@@ -203,7 +238,10 @@ def least_sizes(data: Mapping[str, Any], recordings: Sequence[FitRecording], ste
 
 
 def _error(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, cutoff: float | None) -> float:
-    """rms, N·m, on held-out folds with the description's numbers refitted, both smoothed at a cutoff, Hz."""
+    """Return the rms on held-out folds, N·m, with the description's numbers refitted.
+
+    Target and derivatives are smoothed at the cutoff, Hz.
+    """
     plain = without_uncertainty(data)
     series = series_of(plain, recordings, grid)
     columns = candidate_columns(plain, recordings, blocks_of(grid, recordings), candidates=())

@@ -10,19 +10,19 @@ from tendonfmu.model import LEFT_OUT
 
 Thresholds = tuple[float, float]
 Parameters = Mapping[str, tuple[float, str]]  # path -> (value, unit)
-Numbers = dict[str, list[tuple[float, str]]]  # last part of the path -> (value, unit) of each
+Numbers = dict[str, list[tuple[float, str]]]  # last part of the path -> (value, unit) of each number
 
 NBSP = "\u00a0"
-_SHOWN = 3  # numbers of a size that has no words of its own
+_SHOWN = 3  # numbers that are listed for an effect without words of its own
 _PREFIXED = ("m", "N.m", "N", "s", "rad", "m/s", "rad/s", "m/rad", "N.m/rad", "N.m.s/rad")
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_STEPS = ((0.1, 1.0, ""), (1e-4, 1e3, "m"), (0.0, 1e6, "µ"))  # from that magnitude on: factor, prefix
+_STEPS = ((0.1, 1.0, ""), (1e-4, 1e3, "m"), (0.0, 1e6, "µ"))  # least magnitude, factor, prefix
 
 
 def size_of(effect: str, places: Sequence[FoundPlace], thresholds: Thresholds) -> str:
-    """Such as "a play of 0.32 mm"; of several places the largest, and how many there are.
+    """Return a size such as "a play of 0.32 mm"; for several places the largest one and their number.
 
-    thresholds: velocities at which tendons, m/s, and joints, rad/s, begin to move.
+    `thresholds` are the velocities at which tendons, m/s, and joints, rad/s, begin to move.
     """
     told = [each for each in places if each.parameters]
     if not told:
@@ -33,14 +33,29 @@ def size_of(effect: str, places: Sequence[FoundPlace], thresholds: Thresholds) -
     if len(sizes) == 1:
         return f"{sizes[0]}, at each of {len(told)} places"
     units = {_first(each)[1] for each in told}
-    if len(units) > 1:  # such as everywhere, and at a joint
+    if len(units) > 1:  # for example everywhere and at a joint
         return f"{sizes[0]}; other at {count_of(len(told) - 1, 'place')}"
     largest = max(told, key=lambda each: abs(_first(each)[0]))
     return f"{size_at(effect, largest.parameters, thresholds)} at the largest of {len(told)} places"
 
 
 def size_at(effect: str, parameters: Parameters, thresholds: Thresholds) -> str:
-    """The size at one place. parameters: of that place in the extended description."""
+    """Return the size of an effect at one place in plain words.
+
+    Parameters
+    ----------
+    effect
+        Name of the effect.
+    parameters
+        Numbers of that place in the extended description: path -> (value, unit).
+    thresholds
+        Velocities at which tendons, m/s, and joints, rad/s, begin to move.
+
+    Returns
+    -------
+    str
+        Such as "a play of 0.32 mm"; names and values if the effect has no words of its own.
+    """
     if effect == "presliding" and (told := _travel(parameters, thresholds)):
         return told
     numbers: Numbers = {}
@@ -49,12 +64,12 @@ def size_at(effect: str, parameters: Parameters, thresholds: Thresholds) -> str:
     words = _WORDS.get(effect)
     try:
         return words(numbers) if words is not None else _listed(parameters)
-    except (KeyError, ValueError):  # the effect has come as other numbers, such as a law instead of a row
+    except (KeyError, ValueError):  # the effect is given by other numbers, for example by a law instead of a row
         return _listed(parameters)
 
 
 def _travel(parameters: Parameters, thresholds: Thresholds) -> str:
-    """Of presliding everywhere, whose number is a time: it times the threshold of motion is a travel."""
+    """Return the travel of presliding at all places, whose number is a time: time × threshold of motion."""
     if [unit for _, unit in parameters.values()] != ["s"]:
         return ""
     ((time, _),) = parameters.values()
@@ -67,12 +82,40 @@ def _first(place: FoundPlace) -> tuple[float, str]:
 
 
 def count_of(number: int, what: str) -> str:
-    """Such as "3 causes"."""
+    """Return a number with a noun, such as "3 causes".
+
+    Parameters
+    ----------
+    number
+        How many.
+    what
+        Noun in the singular; an "s" makes the plural.
+
+    Returns
+    -------
+    str
+        Number and noun.
+    """
     return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 def quantity(value: float, unit: str, *, sign: bool = False) -> str:
-    """Three digits, a unit with a prefix that suits; a plain number in per cent. sign: + before what is positive."""
+    """Format a value with three digits and a suitable unit prefix.
+
+    Parameters
+    ----------
+    value
+        In `unit`.
+    unit
+        SI unit as in the FMU, such as "N.m"; "" or "1" for a plain number, which is shown in per cent.
+    sign
+        Whether positive values get a "+".
+
+    Returns
+    -------
+    str
+        Such as "+3.2 mN·m"; value and unit are joined by a no-break space.
+    """
     if unit in ("", "1"):
         text, told = f"{100 * value:.3g}", "%"
     else:
@@ -87,7 +130,7 @@ def quantity(value: float, unit: str, *, sign: bool = False) -> str:
 
 
 def _listed(parameters: Parameters) -> str:
-    """Name and value of the first few."""
+    """Return names and values of the first few numbers."""
     names = [path.rsplit(".", 1)[-1].replace("_", " ") for path in parameters]
     shown = [f"{name} {quantity(*number)}" for name, number in zip(names, parameters.values(), strict=True)]
     more = len(shown) - _SHOWN
@@ -102,12 +145,12 @@ def _one(numbers: Numbers, name: str) -> tuple[float, str]:
 
 
 def _of(text: str, name: str) -> Callable[[Numbers], str]:
-    """The text with the largest number of that name in it."""
+    """Return a function that fills the largest number of that name into the text."""
     return lambda numbers: text.format(quantity(*max(numbers[name], key=lambda number: abs(number[0]))))
 
 
 def _wave(text: str) -> Callable[[Numbers], str]:
-    """The text with the amplitude of a sine and a cosine in it."""
+    """Return a function that fills the amplitude of a sine and a cosine into the text."""
 
     def words(numbers: Numbers) -> str:
         (sine, unit), (cosine, _) = (numbers.get(name, [(0.0, "1")])[0] for name in ("sine", "cosine"))
@@ -118,7 +161,7 @@ def _wave(text: str) -> Callable[[Numbers], str]:
 
 
 def _with(words: Callable[[Numbers], str], name: str, more: str) -> Callable[[Numbers], str]:
-    """The words, and more where the mechanism's number is there and not the usual one."""
+    """Return a function that adds `more` to the words if the mechanism's number is given and not the default."""
 
     def found(numbers: Numbers) -> str:
         value = numbers.get(name, [(LEFT_OUT[name], "1")])[0][0]
@@ -128,7 +171,7 @@ def _with(words: Callable[[Numbers], str], name: str, more: str) -> Callable[[Nu
 
 
 def _correction(what: str) -> Callable[[Numbers], str]:
-    """More or less than what the description says."""
+    """Return a function that says whether a value is larger or smaller than described."""
 
     def words(numbers: Numbers) -> str:
         value, unit = _one(numbers, "correction")
@@ -138,7 +181,7 @@ def _correction(what: str) -> Callable[[Numbers], str]:
 
 
 def _per_force(whose: str) -> Callable[[Numbers], str]:
-    """A friction torque that grows with a force; its number is a length, N·m per N."""
+    """Return words for a friction torque that grows with a force; its number is a length, N·m per N."""
 
     def words(numbers: Numbers) -> str:
         value = max(number for number, _ in numbers["coulomb"])
@@ -171,7 +214,10 @@ def _delay(numbers: Numbers) -> str:
 
 
 def _sides(numbers: Numbers) -> str:
-    """Positive before negative, as in a description; of several working points where they differ most."""
+    """Return the two sides, positive before negative as in a description.
+
+    Of several working points, the one is used where the sides differ most.
+    """
     coulomb = numbers["coulomb"]
     pairs = list(zip(coulomb[::2], coulomb[1::2], strict=True))
     (one, unit), (other, _) = max(pairs, key=lambda pair: abs(pair[0][0] - pair[1][0]))

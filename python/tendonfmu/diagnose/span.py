@@ -1,4 +1,4 @@
-"""What range the recordings of a diagnosis cover: the grids of the candidates' non-linear numbers follow it."""
+"""What range the recordings of a diagnosis cover; the grids of the candidates' non-linear numbers follow from it."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from tendonfmu.recordings import FitRecording
 
 Numbers = NDArray[np.float64]
 
-_OUTER = 0.01  # share of samples beyond each end of a range: a stray one does not stretch it
-_FAST = 0.95  # quantile of what counts as fast
-_LOOKED_AT = 50_000  # samples, about
+_OUTER = 0.01  # share of samples outside of each end of a range, so that single outliers do not stretch it
+_FAST = 0.95  # quantile that counts as fast
+_LOOKED_AT = 50_000  # samples that are looked at, about
 _DEAD = 0.02  # of the range: smaller turns are noise, not reversals
 
 
@@ -24,11 +24,30 @@ _DEAD = 0.02  # of the range: smaller turns are noise, not reversals
 class Span:
     """Ranges of the signals over all samples that are used.
 
-    angle: [n, 2] rad, 1 % and 99 % quantiles. speed: [n] rad/s, 95 % quantile of |q̇|. tendon_speed: [m, n] m/s, the
-    same of |ẋ_ij|. position: [m, 2] m, of the joint-side tendon position x1 = R q. travel: [n] rad, tendon_travel: [m]
-    m, median distance from one reversal to the next. force: [m, 2] N. acceleration: [n] rad/s², 95 % quantile.
-    torque: [n] N·m, standard deviation of the torque to be explained. duration: s, of the longest part without a gap.
-    step: s, median time from sample to sample.
+    Attributes
+    ----------
+    angle
+        1 % and 99 % quantiles, rad [n, 2].
+    speed
+        95 % quantile of |q̇|, rad/s [n].
+    tendon_speed
+        95 % quantile of |ẋ_ij|, m/s [m, n].
+    position
+        1 % and 99 % quantiles of the joint-side tendon position x1 = R q, m [m, 2].
+    travel
+        Median distance of a joint between reversals, rad [n].
+    tendon_travel
+        Median distance of a tendon between reversals, m [m].
+    force
+        1 % and 99 % quantiles, N [m, 2].
+    acceleration
+        95 % quantile, rad/s² [n].
+    torque
+        Standard deviation of the torque to be explained, N·m [n].
+    duration
+        Length of the longest part without a gap, s.
+    step
+        Median time between samples, s.
     """
 
     angle: Numbers
@@ -45,7 +64,7 @@ class Span:
 
 
 def span_of(data: Mapping[str, Any], recordings: Sequence[FitRecording]) -> Span:
-    """Of a valid description and recordings made ready for it."""
+    """Measure the span of recordings that were prepared for a valid description."""
     arms = moment_arms(data)
     every = max(1, sum(len(each.time) for each in recordings) // _LOOKED_AT)
     rows = [np.flatnonzero(each.train)[::every] for each in recordings]
@@ -83,12 +102,12 @@ def _signals(recording: FitRecording, rows: NDArray[np.intp]) -> tuple[Numbers, 
 
 
 def _range(values: Numbers) -> Numbers:
-    """[k, 2] of [N, k]."""
+    """Return 1 % and 99 % quantiles [k, 2] of values [N, k]."""
     return np.asarray(np.quantile(values, [_OUTER, 1 - _OUTER], axis=0).T)
 
 
 def _travels(paths: Sequence[Numbers]) -> Numbers:
-    """[k] median distance between reversals, of [N, k] each; the range where there is none."""
+    """Return the median distance between reversals [k] of paths [N, k]; the range of the path if it has no reversal."""
     count = paths[0].shape[1]
     found = np.zeros(count)
     for k in range(count):
@@ -101,7 +120,7 @@ def _travels(paths: Sequence[Numbers]) -> Numbers:
 
 
 def _turning_points(path: Numbers, dead: float) -> Numbers:
-    """Positions at the path's start, end and reversals of more than `dead`."""
+    """Return the positions at the start, at the end and at reversals of more than `dead`."""
     if dead <= 0:
         return path[:1]
     thinned = path[:: max(1, len(path) // 20_000)]

@@ -1,9 +1,10 @@
-"""Where the search starts: the delay and the distance of presliding, which no derivative finds, looked for together.
+"""Where the search starts: a delay and a distance of presliding, scanned for together.
 
-A large delay is hidden by a fitted distance and the other way round. A delay that tendon positions and forces show
-without any friction is taken from them: the joint-side positions x0 − f0/k of more tendons than joints agree with each
-other only where both are of the same time. Otherwise a delay is a shift of the measured torque, judged on held-out
-folds like the distances.
+Derivatives find neither of the two, and a fitted distance hides a large delay (and the other way round).
+
+If tendon positions and forces show a delay without any friction, that delay is used. With more tendons than joints,
+the joint-side positions x0 − f0/k agree with each other only if positions and forces are of the same time. Otherwise a
+delay is a shift of the measured torque, judged on held-out folds like the distances.
 """
 
 from __future__ import annotations
@@ -27,11 +28,11 @@ from tendonfmu.statistics import Grams, make_folds
 
 Numbers = NDArray[np.float64]
 
-LONGEST_DELAY = 0.05  # s either way; docs/reference/semantics.md#extensions
+LONGEST_DELAY = 0.05  # s in either direction; docs/reference/semantics.md#extensions
 FINE = 0.001  # s
-LARGE = 0.008  # s: smaller ones compete with other causes, by their derivative
-CLEAR_GAIN = 0.1  # of the rms that a delay has to take away, to be a start: what else is missing looks like some delay
-CLEAR = 0.25  # of the median over all delays, that the best one leaves at most
+LARGE = 0.008  # s: smaller delays compete with other causes, by their derivative
+CLEAR_GAIN = 0.1  # of the rms that a starting delay must remove: any other missing effect looks a little like a delay
+CLEAR = 0.25  # error of the best delay, at most, over the median error of all delays
 _BY_NAME = {each.name: each for each in CANDIDATES}
 PRESLIDING, DELAY = _BY_NAME["presliding"], _BY_NAME["time_delay"]
 
@@ -40,7 +41,14 @@ PRESLIDING, DELAY = _BY_NAME["presliding"], _BY_NAME["time_delay"]
 class Start:
     """One point of the scan.
 
-    presliding: at all places, or () for none. delay: s by which forces are late. error: Σ e² on held-out folds, (N·m)².
+    Attributes
+    ----------
+    presliding
+        At all places; () for none.
+    delay
+        By how much forces are late, s.
+    error
+        Σ e² on held-out folds, (N·m)².
     """
 
     presliding: tuple[Accepted, ...]
@@ -49,7 +57,7 @@ class Start:
 
     @property
     def causes(self) -> list[tuple[Accepted, ...]]:
-        """By effect, its places."""
+        """Return the places of each effect."""
         late = [(Accepted(DELAY, Place(), {"delay": self.delay}, (1.0,)),)] if self.delay else []
         return [*late, *([self.presliding] if self.presliding else [])]
 
@@ -59,7 +67,7 @@ class Start:
 
 
 def scan(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, least_delay: float) -> list[Start]:
-    """Every distance, and none, with the delay that suits it best and without one; the best first."""
+    """Return every distance and none, each with its best delay and without a delay, the best first."""
     source = recordings[0].kinematics
     span = span_of(data, recordings)
     distances = [(), *presliding_everywhere(data, source, span)]
@@ -75,7 +83,7 @@ def scan(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid
         still = int(np.argmin(np.abs(delays)))
         found.append(Start(presliding, 0.0, float(errors[still])))
         best = int(np.argmin(errors))
-        # at the edge it is no minimum; a small one competes with other causes, by its derivative
+        # an optimum at the edge is no minimum; a small delay competes with other causes, by its derivative
         is_large = 0 < best < len(delays) - 1 and abs(delays[best]) >= LARGE
         if is_large and errors[best] < (1.0 - CLEAR_GAIN) ** 2 * errors[still]:
             found.append(Start(presliding, float(delays[best]), float(errors[best])))
@@ -88,8 +96,11 @@ def scan(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid
 
 
 def presliding_everywhere(data: Mapping[str, Any], source: int, span: Span) -> list[tuple[Accepted, ...]]:
-    """Presliding at all places with one distance, over a grid of distances: by one number, or, where a threshold of 0
-    gives that no scale, by a number of each place. Nothing where the description has some already."""
+    """Return presliding at all places with one distance, for each distance of a grid.
+
+    It is one number for all places, or a number for each place if a threshold of 0 sets no scale. The list is empty if
+    the description already has presliding.
+    """
     places = PRESLIDING.places(data, source)
     if any(row["effect"] == PRESLIDING.name for row in data.get("extensions") or []):
         return []
@@ -101,15 +112,18 @@ def presliding_everywhere(data: Mapping[str, Any], source: int, span: Span) -> l
 
 
 def _delays(step: float) -> Numbers:
-    """All that a description takes, 0 among them."""
+    """Return a grid of all delays that a description accepts, including 0."""
     grid = max(2 * FINE, step / 2)
     count = int(LONGEST_DELAY / grid)
     return np.asarray(grid * np.arange(-count, count + 1), dtype=np.float64)
 
 
 def delay_of_positions(data: Mapping[str, Any], recordings: Sequence[FitRecording]) -> float | None:
-    """s by which forces are later than positions, from what no joint angle can make of x0 − f0/k; None where there are
-    no more tendons than joints, or where the pretension does not change enough to tell."""
+    """Return by how many seconds forces are later than positions; None if the recordings do not show it.
+
+    The delay is found from the part of x0 − f0/k that no joint angles can produce. It needs more tendons than joints
+    and a pretension that changes enough.
+    """
     arms = moment_arms(data)
     apart = np.eye(len(arms)) - arms @ np.linalg.pinv(arms)
     if np.linalg.matrix_rank(apart) == 0:
@@ -133,7 +147,7 @@ def delay_of_positions(data: Mapping[str, Any], recordings: Sequence[FitRecordin
 
 
 def _errors(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, moved: Numbers) -> Numbers:
-    """[K] Σ e² on held-out folds, (N·m)², with the target changed by moved [B, n, K]."""
+    """Return Σ e² on held-out folds, (N·m)² [K], with the target changed by `moved` [B, n, K]."""
     plain = without_uncertainty(data)
     series = series_of(plain, recordings, grid)
     columns = candidate_columns(plain, recordings, blocks_of(grid, recordings), candidates=())
@@ -144,7 +158,7 @@ def _errors(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: G
 
 
 def _torque(recordings: Sequence[FitRecording], grid: Grid, delay: float) -> Numbers:
-    """[B, n] block means of the target, N·m, taken `delay` s later."""
+    """Return block means of the target `delay` s later, N·m [B, n]."""
     whole: dict[int, Numbers] = {}
     for segment in grid.segments:
         recording = recordings[segment.recording]

@@ -1,6 +1,7 @@
-"""Many diagnoses of recordings whose cause is known: run anywhere, resumed at any time, one table at the end.
+"""How often a diagnosis is right: many recordings whose cause is known, diagnosed and judged.
 
-Each case is a job (tasks/jobs.py), its row DIR/rows/NAME.json. The rows together are DIR/campaign.parquet.
+A campaign runs anywhere, can be resumed at any time, and ends in one table. Each case is a job (tasks/jobs.py) whose
+row is DIR/rows/NAME.json. All rows together are DIR/campaign.parquet.
 """
 
 from __future__ import annotations
@@ -30,8 +31,16 @@ TABLE = "campaign.parquet"
 
 @dataclass(frozen=True)
 class How:
-    """beside: FILE.py:FUNCTION, its file absolute, called as FUNCTION(case) -> name of a rival -> the causes that it
-    names. least_gain: of a cause, as `diagnose` takes it."""
+    """How the cases of a campaign are diagnosed.
+
+    Attributes
+    ----------
+    beside
+        FILE.py:FUNCTION with an absolute path, for rival methods. It is called as FUNCTION(case) and returns, for the
+        name of each rival, the causes that it names.
+    least_gain
+        Of a cause, as for `diagnose`.
+    """
 
     beside: str | None = None
     least_gain: float = 0.03
@@ -41,13 +50,13 @@ ALL_OF_IT = How()
 
 
 def run_case(case: Case, how: How = ALL_OF_IT) -> Row:
-    """Makes the recordings, diagnoses them untold, and judges the answer."""
+    """Make the recordings, diagnose them without the truth, and judge the answer."""
     with tempfile.TemporaryDirectory(prefix="tendonfmu-campaign-") as folder:
         return known_of(case) | _answered(made(case, Path(folder)), how)
 
 
 def known_of(case: Case) -> Row:
-    """What a row says of its case, however it ends."""
+    """Return what a row says of its case, even if the case fails."""
     return {"name": case.name, "group": case.group, "rig": case.rig, "seed": case.seed}
 
 
@@ -73,7 +82,10 @@ def _diagnosed(case: Case, how: How) -> Row:
 
 
 def named_after_experiment(case: Case, found: Diagnosis, how: How = ALL_OF_IT) -> bool:
-    """Whether the hidden effect is named once what the diagnosis asks for, for its sake, has been recorded as well."""
+    """Return whether the hidden effect is named once the requested experiment has been recorded, too.
+
+    The experiment is the one for the hidden effect if the diagnosis asks for it, else the first one.
+    """
     assert case.experiment is not None
     truth = case.truth[0]
     own = [each.motion for each in found.invisible if each.where.effect == truth.effect and each.motion]
@@ -101,7 +113,7 @@ def _diagnosis(case: Case, recordings: Sequence[Path], how: How) -> Diagnosis:
 
 
 def true_gain(nominal: Mapping[str, Any], extended: Mapping[str, Any], case: Case) -> float:
-    """1 − rms of the extended over that of the nominal model, over all joints of the case's gain recordings."""
+    """Return 1 − rms of the extended / rms of the nominal model, over all joints of the case's gain recordings."""
     from tendonfmu.diagnose.gain import residual_of
     from tendonfmu.model import read_finger
     from tendonfmu.recordings import Held, prepare, read_recording
@@ -124,7 +136,22 @@ def jobs_of(cases: Sequence[Case], how: How) -> list[Job]:
 
 
 def still_to_do(cases: Sequence[Case], folder: Path, failed_again: bool = False) -> list[Case]:
-    """Cases without a row; failed_again: also those whose row is an error."""
+    """Return the cases without a row.
+
+    Parameters
+    ----------
+    cases
+        All cases.
+    folder
+        Folder of the campaign.
+    failed_again
+        Whether cases whose row is an error are returned, too.
+
+    Returns
+    -------
+    list of Case
+        In the order of `cases`.
+    """
     waiting = {job.name for job in waiting_jobs(jobs_of(cases, ALL_OF_IT), folder, failed_again)}
     return [case for case in cases if case.name in waiting]
 
@@ -139,7 +166,30 @@ def run_campaign(
     failed_again: bool = False,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> int:
-    """Runs what has no row yet; as `jobs.run_jobs`. Returns how many ran."""
+    """Run the cases that have no row yet, as `jobs.run_jobs` does.
+
+    Parameters
+    ----------
+    cases
+        All cases.
+    folder
+        Folder of the campaign.
+    client
+        Of `jobs.workers_of`.
+    how
+        Options of the diagnoses.
+    stop_after
+        Time after which no further case starts, s.
+    failed_again
+        Whether cases whose row is an error run again.
+    progress
+        Called with the number of cases done and of all.
+
+    Returns
+    -------
+    int
+        How many cases ran.
+    """
     return run_jobs(
         run_case,
         jobs_of(cases, how),
@@ -152,9 +202,24 @@ def run_campaign(
 
 
 def collect(cases: Sequence[Case], folder: Path) -> list[Row]:
-    """All rows there are, in the order of the cases, also written to DIR/campaign.parquet.
+    """Collect all existing rows and write them to DIR/campaign.parquet.
 
-    Raises InputError where there is none.
+    Parameters
+    ----------
+    cases
+        All cases.
+    folder
+        Folder of the campaign, DIR.
+
+    Returns
+    -------
+    list of rows
+        In the order of the cases.
+
+    Raises
+    ------
+    InputError
+        If there is no row.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq

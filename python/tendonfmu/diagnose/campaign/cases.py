@@ -1,6 +1,6 @@
-"""The cases of a diagnosis campaign: recordings whose cause is known, and who makes them.
+"""Which cases a diagnosis campaign has: recordings whose cause is known, and what makes them.
 
-CASES.json:
+CASES.json::
 
     {"format": "tendonfmu-campaign-1", "cases": [
       {"name": "monday_3", "group": "single", "finger": "nominal.json", "recordings": ["a.parquet"], "kinematics": 2,
@@ -8,8 +8,8 @@ CASES.json:
       {"name": "seed_7", "group": "null", "maker": "cases.py:make", "arguments": {"seed": 7}}
     ]}
 
-Names of files are relative to CASES.json. A maker is a Python function FILE.py:NAME, called as NAME(folder,
-**arguments) on the machine that runs the case; it writes files into the folder and returns the keys of the first kind.
+File names are relative to CASES.json. A maker is a Python function FILE.py:NAME. The machine that runs the case calls
+it as NAME(folder, **arguments). It writes files into the folder and returns the keys of a case with files.
 """
 
 from __future__ import annotations
@@ -54,7 +54,15 @@ _MAKER = re.compile(r"(?P<file>.+\.py):(?P<function>[A-Za-z_]\w*)")
 
 @dataclass(frozen=True)
 class Truth:
-    """What is hidden. joint, tendon: from 1, None where it has none."""
+    """What is hidden.
+
+    Attributes
+    ----------
+    effect
+        Name of the effect.
+    joint, tendon
+        Number from 1; None if the place has none.
+    """
 
     effect: str
     joint: int | None = None
@@ -65,12 +73,31 @@ class Truth:
 class Case:
     """One diagnosis to make and to judge.
 
-    name: of its row's file. group: of `GROUPS`. rig: what made it, for the table. finger, recordings, test: as for
-    `tendonfmu diagnose`. gain_recordings: long recordings of the same finger, for the true gain of the extended model.
-    truth: empty for null. also: effects that the rig has although the description lacks them: naming them is neither
-    right nor false. facts: numbers and words that go into the row. maker, arguments: instead of files.
-    experiment: FILE.py:FUNCTION that carries out what a diagnosis asks for, FUNCTION(folder, motion, **arguments) ->
-    name of the recording; motion: as in `diagnosis.json`.
+    Attributes
+    ----------
+    name
+        Of its row's file.
+    group
+        Of `GROUPS`.
+    folder
+        Folder of the files.
+    rig
+        What made it, for the table.
+    finger, recordings, test
+        As for `tendonfmu diagnose`.
+    gain_recordings
+        Long recordings of the same finger, for the true gain of the extended model.
+    truth
+        What is hidden; empty for the group null.
+    also
+        Effects that the rig has although the description lacks them: naming them is neither right nor wrong.
+    facts
+        Numbers and words for the row.
+    maker, arguments
+        Function that makes the files, and its arguments.
+    experiment
+        FILE.py:FUNCTION that carries out what a diagnosis asks for. FUNCTION(folder, motion, **arguments) returns the
+        name of the recording; `motion` is as in `diagnosis.json`.
     """
 
     name: str
@@ -92,7 +119,23 @@ class Case:
 
 
 def read_cases(path: Path) -> list[Case]:
-    """All cases of a file, names unique. Raises InputError: file, key path, value, what was expected."""
+    """Read all cases of a file.
+
+    Parameters
+    ----------
+    path
+        CASES.json.
+
+    Returns
+    -------
+    list of Case
+        With unique names.
+
+    Raises
+    ------
+    InputError
+        If the file is not valid; the error names file, key path, value and what was expected.
+    """
     try:
         root = Node(read_json(path, "the cases of a campaign")).keys(("format", "cases"))
         root.member("format").choice(FORMAT)
@@ -103,7 +146,7 @@ def read_cases(path: Path) -> list[Case]:
         for k, node in enumerate(nodes, start=1):
             case = case_of(node, path.absolute().parent)
             if case.name in taken:
-                node.member("name").refuse(f"another name than that of cases[{taken[case.name]}]")
+                node.member("name").refuse(f"a name that differs from that of cases[{taken[case.name]}]")
             taken[case.name] = k
             cases.append(case)
     except Refusal as refused:
@@ -112,7 +155,7 @@ def read_cases(path: Path) -> list[Case]:
 
 
 def case_of(node: Node, folder: Path) -> Case:
-    """One case; folder: of its files. Raises Refusal."""
+    """Return one case; `folder` is that of its files. Raises Refusal."""
     node.keys(_KEYS)
     name = node.member("name").text("a name")
     if not _NAME.fullmatch(name):
@@ -198,7 +241,7 @@ def _facts(node: Node) -> dict[str, float | str]:
 
 
 def made(case: Case, folder: Path) -> Case:
-    """The case with its files; those of a maker are written into the folder. Raises InputError."""
+    """Return the case with its files; a maker writes them into the folder. Raises InputError."""
     if case.maker is None:
         return case
     found = python_function(case.maker, case.folder)(folder, **case.arguments)
@@ -212,10 +255,28 @@ def made(case: Case, folder: Path) -> Case:
 
 
 def python_function(name: str, folder: Path) -> Callable[..., Any]:
-    """FILE.py:FUNCTION, the file relative to a folder. Raises InputError."""
+    """Import a function of a Python file.
+
+    Parameters
+    ----------
+    name
+        FILE.py:FUNCTION.
+    folder
+        Folder that the file name is relative to.
+
+    Returns
+    -------
+    callable
+        The function.
+
+    Raises
+    ------
+    InputError
+        If the name has another form, or file or function are missing.
+    """
     match = _MAKER.fullmatch(name)
     if match is None:
-        raise InputError(f"{name!r}: no function of a Python file; expected FILE.py:FUNCTION")
+        raise InputError(f"{name!r}: not a function of a Python file; expected FILE.py:FUNCTION")
     module = _module((folder / match["file"]).resolve())
     function = getattr(module, match["function"], None)
     if not callable(function):
@@ -224,7 +285,7 @@ def python_function(name: str, folder: Path) -> Callable[..., Any]:
 
 
 def _module(file: Path) -> ModuleType:
-    """A Python file as a module, once a process. Its folder can be imported from, as when it is run."""
+    """Import a Python file as a module, once per process; it can import from its own folder, as when it is run."""
     name = f"tendonfmu_campaign_{hashlib.sha256(str(file).encode()).hexdigest()[:12]}"
     if name in sys.modules:
         return sys.modules[name]

@@ -1,4 +1,4 @@
-"""A diagnosis held against what was hidden: the answers of one case as columns of a campaign's table."""
+"""Whether a diagnosis names what was hidden: the answers of one case as columns of a campaign's table."""
 
 from __future__ import annotations
 
@@ -18,9 +18,16 @@ QUESTIONS = ("in_set", "first", "set_size", "place", "both", "exactly", "not_vis
 class Answer:
     """What a rival says of a case.
 
-    names: causes, the first one first. one_of: it says only that one of them is there, so none of several is first.
-    alarm: something is missing, with or without a name; None: it does not say. gain: 1 − rms ratio of its model and the
-    nominal one on the tests; None: it has no model.
+    Attributes
+    ----------
+    names
+        Causes, the first one first.
+    one_of
+        Whether it says only that one of them is present; none of several is then first.
+    alarm
+        Whether something is missing, with or without a name; None if it does not say.
+    gain
+        1 − rms ratio of its model and the nominal one on the tests; None if it has no model.
     """
 
     names: Sequence[Where] = ()
@@ -30,11 +37,14 @@ class Answer:
 
 
 def judge(case: Case, found: Diagnosis) -> dict[str, Any]:
-    """One row: what was reported, and how it stands to the truth. None where a question does not arise.
+    """Return a row with what was reported and how it compares with the truth; None for questions that do not apply.
 
-    Beyond what `judge_causes` says, detected: the verdict leaves something unexplained, too. not_visible: the effect is
-    listed as such, and not as a cause; experiment: with one. unknown: the verdict leaves something unexplained, or the
-    first cause's own set says unknown. wrong_name: an effect is named, and the verdict calls everything explained.
+    In addition to `judge_causes`:
+
+    - detected: also if the verdict leaves something unexplained;
+    - not_visible: the effect is listed as such and not as a cause; experiment: an experiment is given for it;
+    - unknown: the verdict leaves something unexplained, or the set of the first cause contains unknown;
+    - wrong_name: an effect is named and the verdict calls everything explained.
     """
     row = judge_causes(case, found.causes)
     unknown = found.verdict in ALARMS or any(_names(cause, "unknown") for cause in found.causes[:1])
@@ -57,11 +67,14 @@ def judge(case: Case, found: Diagnosis) -> dict[str, Any]:
 
 
 def judge_causes(case: Case, causes: Sequence[Cause]) -> dict[str, Any]:
-    """What the names alone answer.
+    """Return the answers that follow from the names alone.
 
-    detected: a cause is reported. in_set: the true effect is a cause or in the confusion set of one. first: it is the
-    first cause. set_size: effects of the set that has it, or of the first cause. place: the true joint and tendon are
-    among the places of the named effect; None for the whole finger. both, exactly: all that is hidden, and no more.
+    - detected: a cause is reported;
+    - in_set: the true effect is a cause or in the confusion set of one;
+    - first: it is the first cause;
+    - set_size: number of effects in the set that contains it, or in that of the first cause;
+    - place: the true joint and tendon are among the places of the named effect; None for the whole finger;
+    - both, exactly: everything hidden is named; exactly: and nothing else.
     """
     own = [cause for cause in causes if cause.where.effect not in NOT_IN_MODEL and not _is_there_anyway(cause, case)]
     row: dict[str, Any] = {
@@ -81,7 +94,7 @@ def judge_causes(case: Case, causes: Sequence[Cause]) -> dict[str, Any]:
 
 
 def judge_names(case: Case, said: Sequence[Where] | Answer) -> dict[str, Any]:
-    """The same questions for a rival. said: its answer, or the causes that it names alone."""
+    """Return the same answers for a rival; `said` is its answer, or only the causes that it names."""
     answer = said if isinstance(said, Answer) else Answer(said)
     names, effects = answer.names, list(dict.fromkeys(where.effect for where in answer.names))
     row: dict[str, Any] = {
@@ -107,7 +120,7 @@ def judge_names(case: Case, said: Sequence[Where] | Answer) -> dict[str, Any]:
 
 
 def _is_there_anyway(cause: Cause, case: Case) -> bool:
-    """The rig has the effect beside what is hidden."""
+    """Return whether the rig has the effect in addition to what is hidden."""
     effect = cause.where.effect
     return effect in case.also and effect not in (truth.effect for truth in case.truth)
 
@@ -151,7 +164,7 @@ def _single(truth: Truth, causes: Sequence[Cause]) -> dict[str, Any]:
     size = len({shown.where.effect, *(each.effect for each in shown.confusable_with)})
     row = {"in_set": holder is not None, "first": causes[0].where.effect == truth.effect, "set_size": size}
     if holder is not None and (truth.joint, truth.tendon) != (None, None):
-        # what a cause says first is what counts
+        # only the first statement of a cause counts
         own = holder.places if holder.where.effect == truth.effect else _of(holder.confusable_with, truth.effect)
         row["place"] = any(_is_at(each, truth) for each in own)
     return row

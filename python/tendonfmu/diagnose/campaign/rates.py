@@ -1,4 +1,4 @@
-"""What a campaign amounts to: every rate with its number of cases and its exact 95 % interval."""
+"""Which rates a campaign found: every rate with its number of cases and its exact 95 % interval."""
 
 from __future__ import annotations
 
@@ -11,14 +11,26 @@ from tendonfmu.statistics import intervals
 
 Row = Mapping[str, Any]
 STRENGTHS = (0.03, 0.1, 0.3, 1.0)
-NEAR = 1.4  # factor within which a case counts to one of these
+NEAR = 1.4  # a case counts as one of these strengths within this factor
 COVERAGE = "the gain's interval covers the true gain"
-SHOWN = 0.3  # strength from which a motion shows an absorbed effect: that at which each of two effects is to be named
+SHOWN = 0.3  # strength from which a motion shows an absorbed effect, and at which two effects must both be named
 
 
 @dataclass(frozen=True)
 class Rate:
-    """One line. value, low, high: shares, or the mean and its interval for a size; cases: how many it rests on."""
+    """One line of a table.
+
+    Attributes
+    ----------
+    what, goal
+        What is counted, and its goal, in words.
+    hits
+        Number of cases for which it holds; None for a mean.
+    cases
+        Number of cases that it is based on.
+    value, low, high
+        Share, or mean, and its interval.
+    """
 
     what: str
     goal: str
@@ -46,14 +58,17 @@ HEADINGS = ("rate", "goal", "found", "cases", "95 % interval")
 
 
 def rate(what: str, goal: str, rows: Iterable[Row], holds: Callable[[Row], Any]) -> Rate:
-    """Share of the rows for which it holds; rows where the question does not arise (None) are left out."""
+    """Return the share of the rows for which `holds` is true.
+
+    Rows for which the question does not apply (None) are left out.
+    """
     answers = [bool(answer) for answer in (holds(row) for row in rows) if answer is not None]
     found = intervals.share(sum(answers), len(answers))
     return Rate(what, goal, sum(answers), len(answers), found.value, found.low, found.high)
 
 
 def mean(what: str, goal: str, values: Sequence[float]) -> Rate:
-    """Mean with its normal interval."""
+    """Return a mean with its normal interval."""
     count = len(values)
     if not count:
         return Rate(what, goal, None, 0, math.nan, math.nan, math.nan)
@@ -67,7 +82,18 @@ def of_strength(rows: Iterable[Row], strength: float) -> list[Row]:
 
 
 def rates(rows: Sequence[Row]) -> list[Rate]:
-    """The lines of the table of docs/evidence/fit.md, for rows without an error."""
+    """Compute the lines of the table in docs/evidence/fit.md.
+
+    Parameters
+    ----------
+    rows
+        Rows of a campaign; rows with an error are left out.
+
+    Returns
+    -------
+    list of Rate
+        One line for each rate.
+    """
     good = [row for row in rows if not row.get("error")]
 
     def group(name: str) -> list[Row]:
@@ -103,7 +129,18 @@ def rates(rows: Sequence[Row]) -> list[Rate]:
 
 
 def rates_by_part(rows: Sequence[Row]) -> list[Rate]:
-    """The rates that differ most, by what made the recordings and by number of joints, where there are several."""
+    """Compute the rates that differ most, by what made the recordings and by number of joints.
+
+    Parameters
+    ----------
+    rows
+        Rows of a campaign; rows with an error are left out.
+
+    Returns
+    -------
+    list of Rate
+        Lines with at least one case; empty if all rows are of one kind.
+    """
     good = [row for row in rows if not row.get("error")]
     parts = [(f"{value}", [row for row in good if row["rig"] == value]) for value in _values(good, "rig")]
     counts = _values(good, "joints")
@@ -123,7 +160,7 @@ def rates_by_part(rows: Sequence[Row]) -> list[Rate]:
 
 
 def _values(rows: Sequence[Row], key: str) -> list[Any]:
-    """In order; none where all rows are alike."""
+    """Return the different values in order; none if all rows are alike."""
     found = sorted({row[key] for row in rows if row.get(key)})
     return found if len(found) > 1 else []
 
@@ -137,19 +174,25 @@ def _of_group(row: Row, group: str, answer: bool | None) -> bool | None:
 
 
 def _named_afterwards(row: Row) -> bool | None:
-    """None where by the rig's own computation no motion shows the effect."""
+    """Return whether the effect was named after the experiment.
+
+    None if, by the rig's own computation, no motion shows the effect.
+    """
     shown = row.get("shown_strength")
     return None if shown is not None and shown < SHOWN else row.get("named_after_experiment")
 
 
 def rivals_of(rows: Sequence[Row]) -> list[str]:
-    """Rivals that ran beside, by the columns that they left."""
+    """Return the rivals that ran, too, from the columns that they left."""
     keys = dict.fromkeys(key for row in rows for key in row if key.endswith(".cause_count"))
     return [key.rsplit(".", 1)[0] for key in keys]
 
 
 def seen_by(rows: Sequence[Row], rival: str) -> list[Row]:
-    """The rows with a rival's answers in place of the diagnosis's own; those without them are left out."""
+    """Return the rows with a rival's answers in place of those of the diagnosis.
+
+    Rows without answers of the rival are left out.
+    """
     silent = dict.fromkeys(("set_size", "not_visible", "experiment", "unknown", "true_gain"))
     own = [
         {key.removeprefix(f"{rival}."): value for key, value in row.items() if key.startswith(f"{rival}.")}
@@ -179,7 +222,18 @@ def _covered(row: Row) -> bool | None:
 
 
 def by_effect(rows: Sequence[Row]) -> list[list[str]]:
-    """A line for each hidden effect: effect, cases, detected, in the set, first, place."""
+    """Count the answers for each hidden effect.
+
+    Parameters
+    ----------
+    rows
+        Rows of a campaign; rows with an error are left out.
+
+    Returns
+    -------
+    list of lines
+        Cells of EFFECT_HEADINGS: effect, cases, detected, in the set, first, place.
+    """
     single = [row for row in rows if row["group"] == "single" and not row.get("error")]
     lines = []
     for effect in sorted({str(row["true_effect"]) for row in single}):
@@ -194,7 +248,18 @@ EFFECT_HEADINGS = ("hidden effect", "cases", "detected", "in the set", "first", 
 
 
 def markdown(rows: Sequence[Row]) -> str:
-    """All tables, for a page."""
+    """Format all tables of a campaign in Markdown.
+
+    Parameters
+    ----------
+    rows
+        Rows of a campaign.
+
+    Returns
+    -------
+    str
+        Rates, rates by part, those of each rival, a table by hidden effect, and the number of failed cases.
+    """
     parts = [_table(HEADINGS, [each.cells() for each in rates(rows)])]
     by_part = rates_by_part(rows)
     if by_part:
@@ -207,7 +272,7 @@ def markdown(rows: Sequence[Row]) -> str:
         parts.append(_table(EFFECT_HEADINGS, lines))
     failed = [row for row in rows if row.get("error")]
     if failed:
-        parts.append(f"{len(failed)} of {len(rows)} cases ended in an error and are in no rate.")
+        parts.append(f"{len(failed)} of {len(rows)} cases ended in an error and are not included in the rates.")
     return "\n\n".join(parts) + "\n"
 
 

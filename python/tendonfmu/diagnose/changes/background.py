@@ -1,8 +1,8 @@
 """What a model gets wrong in both recordings alike: functions of the motion that no change may be credited with.
 
-Ridge regression on simple functions of angle, velocity, force, acceleration and travel, of each joint its own, and on
-the columns of all that may be missing. Where a motion is repeated exactly, samples are subtracted instead
-(`repeated_motion`), and next to nothing of these columns is left.
+The background is a ridge regression on simple functions of angle, velocity, force, acceleration and travel, separate
+for each joint, and on the columns of all candidates. Where a motion is repeated exactly, samples are subtracted instead
+(`repeated_motion`), and almost nothing of these columns is left.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ GROUPS = (
     "memory of direction",
     "interaction",
 )
-SHARE = 0.3  # of the residual's standard deviation, that one function may be expected to take
-MISSING = 3.0  # times the residual's standard deviation, that an effect may take which is missing in both
+SHARE = 0.3  # of the residual's standard deviation: expected size of one function
+MISSING = 3.0  # times the residual's standard deviation: expected size of an effect that is missing in both
 
 
 def background_columns(
     data: Mapping[str, Any], series: Series, force: Numbers, columns: CandidateColumns, residual: Numbers, seed: int
 ) -> tuple[Array, Numbers]:
-    """[B, n, d] columns, and [d] how large each weight may be expected to be.
+    """Return the columns [B, n, d], and the expected size of each weight [d].
 
-    force: [B, m] N predicted by the model. residual: [B, n] N·m that the model leaves.
+    `force` is predicted by the model, N [B, m]; `residual` is what the model leaves, N·m [B, n].
     """
     seen = features(series, force=force, seed=seed)
     arms = moment_arms(data)
@@ -59,7 +59,7 @@ def background_columns(
 
 
 def _of_joint(seen: Features, joint: int, arms: Numbers) -> NDArray[np.int64]:
-    """Functions of this joint, or of a tendon that turns it."""
+    """Return the functions of this joint, or of a tendon that turns it."""
     tendons = [f"tendon {i + 1}" for i in np.flatnonzero(arms[:, joint])]
     names = {f"joint {joint + 1}", *tendons, *(f"{each} at joint {joint + 1}" for each in tendons)}
     names.add("")  # several states together
@@ -68,6 +68,6 @@ def _of_joint(seen: Features, joint: int, arms: Numbers) -> NDArray[np.int64]:
 
 
 def _sizes(columns: CandidateColumns, series: Series) -> Numbers:
-    """[c] standard deviation of each column, at the joint where it shows most."""
+    """Return the standard deviation of each column at the joint where it is largest [c]."""
     values = columns.values[series.used].astype(np.float64)
     return np.asarray(np.maximum(values.std(axis=0).max(axis=0, initial=0.0), 1e-300))

@@ -1,4 +1,4 @@
-"""Whether recordings of a reference and of now can be compared: refused or warned of by name."""
+"""Whether recordings of a reference and of now can be compared: they are refused, or a warning names the problem."""
 
 from __future__ import annotations
 
@@ -13,17 +13,20 @@ from tendonfmu.recordings import FitRecording
 
 Numbers = NDArray[np.float64]
 
-SHARED = 50  # samples in a row that no two recordings of a moving finger have in common
+SHARED = 50  # consecutive samples that two recordings of a moving finger never share by chance
 APART = 2.0  # times the spread of angles, forces
 
 
 def check_sides(finger: FingerDescription, then: Sequence[FitRecording], now: Sequence[FitRecording]) -> list[str]:
-    """Sentences of warning. Raises InputError where both hold the same samples, or one has nothing to learn from."""
+    """Return warnings about recordings of the reference and of now.
+
+    Raises InputError if both sides hold the same samples, or if one has nothing to learn from.
+    """
     for side, role in ((then, "reference"), (now, "recording")):
         for each in side:
             if not (each.train | each.held_out).any():
                 raise InputError(
-                    f"{each.path}: {role} without a sample of free motion: all are labelled contact or left out; "
+                    f"{each.path}: {role} has no sample of free motion: all are labelled contact or left out; "
                     "expected a recording of free motion"
                 )
     for one in then:
@@ -33,7 +36,7 @@ def check_sides(finger: FingerDescription, then: Sequence[FitRecording], now: Se
 
 
 def _refuse_overlap(then: FitRecording, now: FitRecording) -> None:
-    """Raises InputError where a stretch of one is in the other, also at other times."""
+    """Raise InputError if a stretch of one recording is in the other, also if it is at other times."""
     known = {row.tobytes(): k for k, row in enumerate(_rows(then))}
     at = np.array([known.get(row.tobytes(), -1) for row in _rows(now)])
     same = (at >= 0) & np.concatenate([[True], np.diff(at) == 1])
@@ -48,14 +51,14 @@ def _refuse_overlap(then: FitRecording, now: FitRecording) -> None:
 
 
 def _rows(recording: FitRecording) -> Numbers:
-    """[N, 2m] forces and positions."""
+    """Return forces and positions [N, 2m]."""
     groups = recording.recording.groups
     used = [groups[name] for name in ("tendon_force", "tendon_position", "joint_position") if name in groups]
     return np.ascontiguousarray(np.hstack(used))
 
 
 def _different_conditions(then: Sequence[FitRecording], now: Sequence[FitRecording]) -> Iterator[str]:
-    """What the reference has not seen cannot be held against it."""
+    """Yield warnings about new samples outside the range of the reference: no reference data exist for them."""
     for name, unit, of in (("tendon force", "N", _force), ("joint angle", "rad", _angle)):
         known = np.concatenate([of(each) for each in then])
         new = np.concatenate([of(each) for each in now])
@@ -66,8 +69,8 @@ def _different_conditions(then: Sequence[FitRecording], now: Sequence[FitRecordi
             kind = name.split()[0]
             yield (
                 f"{name} of {kind} {worst + 1}: {100 * outside[worst]:.0f} % of the new samples lie outside the "
-                f"{low[worst]:.3g} to {high[worst]:.3g} {unit} of the reference; what the model gets wrong there "
-                "cannot be told from a change: record at the load and over the range of the reference"
+                f"{low[worst]:.3g} to {high[worst]:.3g} {unit} of the reference; there, an error of the model "
+                "cannot be distinguished from a change: record at the load and over the range of the reference"
             )
 
 

@@ -1,7 +1,7 @@
 """What has changed since the reference: the same finger, recorded when it was well and recorded now.
 
-The model is fitted to the reference; what it gets wrong in both alike is nobody's fault. A cause is a change of one of
-its numbers, or a term that it lacks, in the new recordings alone.
+The model is fitted to the reference. Errors that it makes in both are not reported. A cause is a change of one of its
+numbers, or a term that it lacks, in the new recordings only.
 """
 
 from __future__ import annotations
@@ -55,15 +55,23 @@ Data = Mapping[str, Any]
 
 SIGNALS = "signals, delay and presliding"
 PHASES = {SIGNALS: 20.0, "contact": 8.0, "changes": 20.0, "gain on unseen data": 20.0}
-LEAST_UNKNOWN = 0.25  # of the rms: as much do recordings of a finger differ in which nothing has changed
-LEVEL = 0.001  # of that
-SPREAD = 2.0  # standard deviations of the stretches of the reference: other motions have another error
-FEWEST = 4  # stretches on either side
+LEAST_UNKNOWN = 0.25  # of the rms: recordings of an unchanged finger differ by this much
+LEVEL = 0.001  # significance level of this difference
+SPREAD = 2.0  # standard deviations over the stretches of the reference: other motions have another error
+FEWEST = 4  # least number of stretches on either side
 
 
 @dataclass(frozen=True)
 class ChangeCase:
-    """then, now: recordings; now with held-out stretches where there are no tests. warnings: about recordings."""
+    """Checked recordings of the reference and of now.
+
+    Attributes
+    ----------
+    then, now
+        Recordings; `now` has held-out stretches if there are no tests.
+    warnings
+        About recordings.
+    """
 
     finger: FingerDescription
     then: list[FitRecording]
@@ -78,7 +86,7 @@ class ChangeCase:
 
 
 def find_changes(case: ChangeCase, *, least_gain: float, seed: int, jobs: int, phases: Phases) -> Diagnosis:
-    """Without the time it took."""
+    """Return the diagnosis of a change; its duration is still 0."""
     settings = FitSettings(threads=jobs, path=case.finger.path)
     with phases.start(SIGNALS):
         chosen = choose(case.finger, case.then, settings)
@@ -86,14 +94,17 @@ def find_changes(case: ChangeCase, *, least_gain: float, seed: int, jobs: int, p
 
 
 def sizes_now(case: ChangeCase, keys: Sequence[Key], *, seed: int, jobs: int) -> list[tuple[Key, ChangedSize]]:
-    """How large these effects are in the new recordings, named or not; of those that the description can have."""
+    """Return how large these effects are in the new recordings, named or not.
+
+    Effects that the description cannot have are left out.
+    """
     settings = FitSettings(threads=jobs, path=case.finger.path)
     own = _Changes(case, choose(case.finger, case.then, settings), settings, 0.0, seed, Phases(PHASES))
     return own.sizes(keys)
 
 
 class _Changes:
-    """Everything that is reported."""
+    """Everything that is reported of a change."""
 
     def __init__(
         self,
@@ -125,7 +136,7 @@ class _Changes:
             return self._result(dropped, gains)
 
     def _without_events(self) -> Flags:
-        """[B] blocks that lie in contact or a stall."""
+        """Return the blocks that lie in contact or a stall [B]."""
         names = {str(each.path) for each in self._all[len(self._then) :]}
         events, out = events_of(self._chosen.model.data, self._all, self._grid, self._seed)
         self._events = tuple(each for each in events if each.recording in names)
@@ -138,7 +149,7 @@ class _Changes:
         return ChangeSearch(model, self._all, self._grid, least, now, tests, out, self._seed)
 
     def sizes(self, keys: Sequence[Key]) -> list[tuple[Key, ChangedSize]]:
-        """Of effects at places in the new recordings, all of them free."""
+        """Return the sizes of effects at places in the new recordings, all of them free."""
         search = self._search = self._made(self._without_events())
         search.free(keys)
         found = [search.certain(k) for k in range(len(search.changes))]
@@ -148,11 +159,11 @@ class _Changes:
 
     @property
     def _unseen(self) -> Flags | None:
-        """[B] blocks of tests; None: the held-out parts of the new recordings, in turn."""
+        """Blocks of tests [B]; None if the held-out parts of the new recordings are judged in turn."""
         return self._search.sides.test if self._case.tests else None
 
     def _verified(self) -> tuple[list[Change], list[Interval]]:
-        """What unseen data do not bear out, and the gains of what they do."""
+        """Return the changes that unseen data do not confirm, and the gains of the others."""
         search, dropped = self._search, list[Change]()
         while True:
             unseen = self._unseen
@@ -186,7 +197,7 @@ class _Changes:
     # --- the models ---
 
     def _learned(self) -> list[Change]:
-        """The changes as they are learned without what they are judged on."""
+        """Return the changes as learned without the samples that they are judged on."""
         search = self._search
         held = np.zeros(len(search.series.time), dtype=bool)
         for segment in self._grid.segments:
@@ -198,8 +209,10 @@ class _Changes:
         return search.moved_on(search.grams(unseen=held))
 
     def _online(self, changes: Sequence[Change]) -> Data:
-        """The model of the reference with changes, as it runs online, with the bias at which the new recordings begin:
-        that is no part of the model, and a sensor that is tared anew moves it."""
+        """Return the reference model with changes, as it runs online, with the bias at the start of the new recordings.
+
+        This bias is no part of the model: taring a sensor again moves it.
+        """
         data: Data = self._search.now_data(changes)
         if (data.get("bias") or {}).get("initial_torque") is not None:
             own = [
@@ -220,7 +233,7 @@ class _Changes:
         tests = [without_events(each, self._events) for each in case.tests]
         gain = measure_gain(nominal, extended, clean, tests, between=models[1:-1], seed=self._seed)
         harmful = [k for k, (one, other) in enumerate(pairwise(gain.steps)) if other > one]
-        if harmful:  # what helps beside what is wrong in both, but not alone
+        if harmful:  # it helps together with what is wrong in both, but not alone
             k = harmful[-1]
             dropped = [*dropped, search.changes[k]]
             search.keep([*search.changes[:k], *search.changes[k + 1 :]])
@@ -242,7 +255,7 @@ class _Changes:
             extended=gain.extended,
             bias_only_rms=gain.bias_only_rms,
             noise_floor=tuple(float(each) for each in np.minimum(self._floor(), gain.extended.test_rms)),
-            floor_source="what is left of unseen stretches with what is wrong in both recordings taken off",
+            floor_source="what remains on unseen stretches without the errors that both recordings share",
             gain=gain.value,
             steps=gain.steps,
             causes=causes,
@@ -271,7 +284,7 @@ class _Changes:
         return replace(series, used=series.used & self._search.sides.now)
 
     def _views(self) -> tuple[Numbers, Numbers]:
-        """[B, n] N·m that the model of the reference leaves of all recordings, without the changes and with them."""
+        """Return what the reference model leaves of all recordings, without the changes and with them, N·m [B, n]."""
         search, series = self._search, self._now_series()
         before = residual_alone(search.data, series)
         if not search.changes:
@@ -289,8 +302,11 @@ class _Changes:
         return found
 
     def _unexplained(self) -> Unexplained:
-        """Whether the new recordings are explained worse than the reference is by itself, with all changes: then
-        something is different that has no name. Within LEAST_UNKNOWN two recordings of a finger that is well differ."""
+        """Return whether the new recordings, with all changes, are explained worse than the reference is by itself.
+
+        If so, something is different that has no name. A difference below LEAST_UNKNOWN is normal for a finger that is
+        well.
+        """
         search = self._search
         squares, rows = search.grams().left()
         is_now = search.stretches_now
@@ -312,7 +328,7 @@ class _Changes:
             ends = [1.0 - (1.0 - float(worse[worst])) * np.exp(sign * 1.96 * spread) for sign in (1.0, -1.0)]
             gain = Interval(float(worse[worst]), float(ends[0]), float(ends[1]))
         words = (
-            f"at joint {worst + 1} the new recordings are explained worse than the reference, and no effect says why"
+            f"at joint {worst + 1} the new recordings are explained worse than the reference, and the cause is unknown"
         )
         whole = float(np.array(share) @ now**2 / max(float((now**2).sum()), 1e-300))
         return Unexplained(whole, words if unknown else "", share, p_value, unknown, gain)
@@ -323,7 +339,7 @@ class _Changes:
         return found if found is not None and found.gain.low > 0.0 else None
 
     def _floor(self) -> Numbers:
-        """[n] N·m rms of the new recordings."""
+        """Return the rms of the new recordings, N·m [n]."""
         squares, rows = self._search.selection.grams.left()
         is_now = self._search.stretches_now
         return np.asarray(np.sqrt(squares[is_now].sum(axis=0) / max(float(rows[is_now].sum()), 1.0)))
@@ -350,7 +366,7 @@ class _Changes:
         )
 
     def _invisible(self) -> tuple[Invisible, ...]:
-        """Of each effect and place that refitting and the background absorb the shape that comes nearest."""
+        """Return, for each effect and place that refitting and background absorb, the shape that comes nearest."""
         selection = self._search.selection
         best: dict[tuple[str, int | None, int | None], tuple[Hypothesis, float]] = {}
         for each, share in zip(selection.hypotheses, selection.shares, strict=True):
@@ -368,10 +384,10 @@ class _Changes:
         if any(cause.confusable_with for cause in causes) and pulls:
             return (
                 f"{REPEAT}, once as it was and once at half and at twice the pretension: what grows with the force is "
-                "then told from what does not"
+                "then distinguished from what does not"
             )
         if not search.repeated and (causes or self._invisible()):
-            return f"{REPEAT}: then nothing but the change is left of their difference"
+            return f"{REPEAT}: then only the change is left of their difference"
         return ""
 
 
@@ -379,14 +395,14 @@ REPEAT = "Make the motions of the reference again, exactly, at the same load and
 
 
 def _told(hypothesis: Hypothesis) -> tuple[str, str, str]:
-    """Title, explanation, and what the evidence is drawn over."""
+    """Return title, explanation, and the coordinate of the evidence."""
     candidate = next((each for each in CANDIDATES if each.name == hypothesis.effect), None)
     if candidate is None:
         return hypothesis.effect.replace("_", " "), "", "velocity"
     explanation = candidate.explanation
     if not hypothesis.members:
         _, look, where = explanation.partition("Look ")
-        explanation = f"The description has this; its number is another one now. {look}{where}".strip()
+        explanation = f"The description has this effect; its number is different now. {look}{where}".strip()
     return candidate.title, explanation, candidate.coordinate
 
 

@@ -1,5 +1,7 @@
-"""The picture of a change: what the model of the reference leaves, in the reference and now, over the effect's own
-coordinate; and now with the change in the model."""
+"""How a change shows: what the reference model leaves, in the reference and now, over the effect's own coordinate.
+
+The picture also has what is left now with the change in the model.
+"""
 
 from __future__ import annotations
 
@@ -17,10 +19,12 @@ Numbers = NDArray[np.float64]
 
 
 def change_evidence(search: ChangeSearch, number: int, coordinate: str) -> tuple[Evidence, ...]:
-    """Of the joint where the change shows most. Bins of equal count of the new recordings; in the reference NaN where
-    it has hardly been."""
+    """Return the picture at the joint where the change shows most.
+
+    The bins have equal counts of the new recordings. The reference is NaN in bins where it has few samples.
+    """
     change = search.changes[number]
-    left = search.left()  # with all changes, the background taken off
+    left = search.left()  # with all changes, without the background
     added = search.column(number) @ change.magnitudes
     added = added - added[search.series.used].mean(axis=0)
     now = search.told & search.sides.now
@@ -74,7 +78,7 @@ def _place(search: ChangeSearch, number: int, joint: int) -> Place:
 
 
 def _means(values: Numbers, parts: list[NDArray[np.int64]], search: ChangeSearch) -> tuple[Numbers, Numbers]:
-    """[K] means and their standard errors; NaN of fewer than FEWEST."""
+    """Return means and their standard errors [K]; NaN for bins with fewer than FEWEST blocks."""
     enough = [rows if len(rows) >= FEWEST else rows[:0] for rows in parts]
     means = np.array([values[rows].mean() if len(rows) else np.nan for rows in enough])
     errors = standard_errors(values, [rows for rows in enough if len(rows)], replace(search.series))

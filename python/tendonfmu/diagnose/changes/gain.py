@@ -1,8 +1,8 @@
-"""What a change is worth on unseen parts of the new recordings, the motion taken as it is.
+"""How much a change gains on unseen parts of the new recordings, with the motion taken as given.
 
-The difference that a change makes varies along a motion, however well it is known; what is uncertain is the noise that
-it is seen against. So the error of a gain is that of the product of difference and noise, by stretches: with a few
-cycles of a motion the spread of gains from stretch to stretch would say how uneven the motion is.
+The difference that a change makes varies along a motion, but it is known. What is uncertain is the noise on top of it.
+So the error of a gain is that of the product of difference and noise, by stretches. With only a few cycles of a motion,
+the spread of gains from stretch to stretch would measure how uneven the motion is.
 """
 
 from __future__ import annotations
@@ -17,9 +17,11 @@ Numbers = NDArray[np.float64]
 
 
 def gain_of(before: Numbers, after: Numbers, stretch: NDArray[np.int64]) -> tuple[float, float]:
-    """1 − rms after / rms before, and its standard error.
+    """Return 1 − rms after / rms before, and its standard error.
 
-    before, after: [r, n] N·m left on unseen rows without and with the change; stretch: [r]."""
+    `before` and `after` are what is left on unseen rows without and with the change, N·m [r, n]; `stretch` [r] numbers
+    the rows' stretches.
+    """
     whole, left = float(np.sum(before**2)), float(np.sum(after**2))
     if whole <= 0.0 or left <= 0.0:
         return 0.0, np.inf
@@ -28,12 +30,12 @@ def gain_of(before: Numbers, after: Numbers, stretch: NDArray[np.int64]) -> tupl
     pairs = cross[: len(cross) // 2 * 2].reshape(-1, 2).sum(axis=1)
     variance = 4.0 * max(float(cross @ cross), float(pairs @ pairs))
     ratio = np.sqrt(left / whole)
-    # of left / whole by the delta method: whole = left + 2 cross + difference², of which cross alone is uncertain
+    # delta method for left / whole: whole = left + 2 cross + difference², of which only cross is uncertain
     return float(1.0 - ratio), float(np.sqrt(variance) * ratio / (2.0 * whole))
 
 
 def interval_of(before: Numbers, after: Numbers, stretch: NDArray[np.int64]) -> Interval:
-    """The gain with its 95 % interval: Student's, by as many degrees of freedom as there are stretches less one."""
+    """Return the gain with its 95 % interval: Student's t with as many degrees of freedom as stretches less one."""
     gain, error = gain_of(before, after, stretch)
     count = len(np.unique(stretch))
     half = float(stats.t.ppf(0.975, max(count - 1, 1))) * error

@@ -1,8 +1,11 @@
-"""Many recordings of one finger, in order of time, each held against the reference: what grows, and how fast.
+"""How the causes develop over many recordings of one finger: which ones grow, and how fast.
+
+::
 
     found = diagnose_history("finger.json", ["2026-03-01.parquet", "2026-03-08.parquet", ...])
 
-Each recording is diagnosed by itself; the sizes of everything that was named in any of them are then estimated in all.
+The recordings are in order of time and each is compared with the reference. Each recording is diagnosed by itself; then
+the sizes of all causes that were named in any recording are estimated in all of them.
 """
 
 from __future__ import annotations
@@ -34,13 +37,23 @@ Numbers = NDArray[np.float64]
 File = str | os.PathLike[str]
 
 WEEK = 7.0 * 86400.0  # s
-FEWEST = 3  # recordings of a trend
+FEWEST = 3  # recordings needed for a trend
 _DATE = re.compile(r"(?<!\d)(\d{4})-?(\d{2})-?(\d{2})(?:[T_ -]?(\d{2})[-:h]?(\d{2})(?:[-:]?(\d{2}))?)?(?!\d)")
 
 
 @dataclass(frozen=True)
 class Size:
-    """A cause in one recording. named: whether its diagnosis names it. gain: there, 0 if not."""
+    """A cause in one recording.
+
+    Attributes
+    ----------
+    size
+        Size in the reference and in this recording.
+    named
+        Whether the diagnosis of the recording names it.
+    gain
+        Gain there, 0 if it is not named.
+    """
 
     recording: str
     size: ChangedSize
@@ -50,8 +63,19 @@ class Size:
 
 @dataclass(frozen=True)
 class Line:
-    """One cause over all recordings. trend: change of its size in a unit of time of the history, None of fewer than
-    FEWEST recordings. since: the first recording from which on its interval stays off the reference; None: never."""
+    """One cause over all recordings.
+
+    Attributes
+    ----------
+    where, title
+        Effect and place, and the effect in plain words.
+    sizes
+        Of each recording in which the cause could be estimated.
+    trend
+        Change of the size per unit of time of the history; None for fewer than FEWEST recordings.
+    since
+        First recording from which on the interval of the change excludes 0; None if there is none.
+    """
 
     where: Where
     title: str
@@ -62,8 +86,24 @@ class Line:
 
 @dataclass(frozen=True)
 class History:
-    """times: [K] of the recordings: weeks since the reference, or since the first where that has no date, if the names
-    have dates, else their number from 1. failed: (recording, why) of what could not be diagnosed."""
+    """All causes over all recordings.
+
+    Attributes
+    ----------
+    references, recordings
+        Names of the files.
+    times
+        Of the recordings [K]. If the names have dates: weeks since the reference, or since the first recording if the
+        reference has no date. Otherwise the number of the recording, from 1.
+    dated
+        Whether `times` are weeks.
+    lines
+        One for each cause, the most frequently named first.
+    verdicts
+        Of each recording.
+    failed
+        (recording, reason) for each recording that could not be diagnosed.
+    """
 
     finger: str
     references: tuple[str, ...]
@@ -76,6 +116,7 @@ class History:
 
     @property
     def unit(self) -> str:
+        """Unit of `times`: "week" or "recording"."""
         return "week" if self.dated else "recording"
 
 
@@ -91,9 +132,40 @@ def diagnose_history(
     seed: int = 0,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> History:
-    """reference: of when the finger was well; without one the first recording is. rows: folder of what is known of each
-    recording: the same call goes on where it was. client: of `jobs.workers_of`, None: here, one after another.
-    progress: called with steps done, of all. Raises InputError.
+    """Diagnose each recording against the reference and follow every cause over all of them.
+
+    A call with the same `rows` continues where an earlier one stopped.
+
+    Parameters
+    ----------
+    finger
+        Description, or its file.
+    recordings
+        Files in order of time.
+    reference
+        Recordings of the finger when it was well; without any, the first recording is the reference.
+    rows
+        Folder for the results of each recording.
+    client
+        Of `jobs.workers_of`; None to run here, one recording after another.
+    kinematics
+        Kinematics source, 1 to 3.
+    least_gain
+        Share of the remaining rms that a cause must remove.
+    seed
+        Seed of all random numbers.
+    progress
+        Called with the number of steps done and of all steps.
+
+    Returns
+    -------
+    History
+        Causes, sizes, trends and failed recordings.
+
+    Raises
+    ------
+    InputError
+        If a file or an option is at fault, or if there is nothing to compare with the reference.
     """
     given = finger if isinstance(finger, FingerDescription) else read_finger(Path(finger))
     files = [str(each) for each in recordings]
@@ -123,7 +195,7 @@ def diagnose_history(
 def named_in(
     finger: str, reference: Sequence[str], kinematics: int, least_gain: float, seed: int, recording: str
 ) -> dict[str, Any]:
-    """A row: what has changed in one recording."""
+    """Return a row: what has changed in one recording."""
     found = diagnose(finger, [recording], reference=reference, kinematics=kinematics, least_gain=least_gain, seed=seed)
     causes = {key_text(each.where): each.gain.value for each in found.causes}
     return {
@@ -138,7 +210,7 @@ def named_in(
 def sizes_in(
     finger: str, reference: Sequence[str], kinematics: int, least_gain: float, seed: int, recording: str, keys: str
 ) -> dict[str, Any]:
-    """A row: the sizes of these effects at these places in one recording, all free together."""
+    """Return a row: the sizes of these effects at these places in one recording, all of them free."""
     from tendonfmu.diagnose.changes.diagnosis import sizes_now
 
     case = change_case(finger, [recording], reference, [], kinematics, least_gain, True)
@@ -242,7 +314,7 @@ def _since(sizes: Sequence[Size]) -> str | None:
 
 
 def times_of(recordings: Sequence[str]) -> tuple[tuple[float, ...], bool]:
-    """Weeks since the first, where all names have a date and no two are in another order than given; else 1, 2, ..."""
+    """Return weeks since the first recording, if all names have dates in the given order; else 1, 2, ..."""
     dates = [_date(Path(each).stem) for each in recordings]
     known = [each for each in dates if each is not None]
     if len(known) == len(dates) > 0 and all(a <= b for a, b in pairwise(known)):
@@ -251,7 +323,7 @@ def times_of(recordings: Sequence[str]) -> tuple[tuple[float, ...], bool]:
 
 
 def _date(name: str) -> float | None:
-    """s of the date in a name, such as 2026-03-01 or 20260301T1230."""
+    """Return the date in a name, such as 2026-03-01 or 20260301T1230, in s."""
     matched = _DATE.search(name)
     if matched is None:
         return None
@@ -263,7 +335,10 @@ def _date(name: str) -> float | None:
 
 
 def _names(recordings: Sequence[str], options: Sequence[Any]) -> list[str]:
-    """Of rows: number, stem, and a mark of all that the row depends on, so that it is made again where that differs."""
+    """Return names of rows: number, stem, and a mark of all that the row depends on.
+
+    If any of this differs, the row is computed again.
+    """
     finger, references = str(options[0]), list(options[1])
     shared = [*options, *(_stamp(each) for each in (finger, *references))]
     return [
@@ -273,7 +348,7 @@ def _names(recordings: Sequence[str], options: Sequence[Any]) -> list[str]:
 
 
 def _mark(what: Any) -> str:
-    """A few letters, the same in every process."""
+    """Return a short hash that is the same in every process."""
     return f"{zlib.crc32(json.dumps(what).encode()):08x}"
 
 
@@ -286,7 +361,18 @@ def _stamp(file: str) -> list[int]:
 
 
 def share_of(line: Line) -> Interval | None:
-    """The trend as a share of the size in the reference; None where that is 0, or there is no trend."""
+    """Return the trend as a share of the size in the reference.
+
+    Parameters
+    ----------
+    line
+        One cause of a history.
+
+    Returns
+    -------
+    Interval or None
+        Share per unit of time with its 95 % interval; None if the reference size is 0 or there is no trend.
+    """
     base = line.sizes[0].size.reference.value
     if line.trend is None or not base or not math.isfinite(line.trend.low):
         return None

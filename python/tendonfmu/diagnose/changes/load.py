@@ -1,4 +1,4 @@
-"""A torque that is there all the time now and was not in the reference: a load, a touch, or a sensor's zero."""
+"""Whether a torque is present all the time now that was not in the reference: a load, a touch, or a sensor's zero."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from tendonfmu.statistics import Interval, gain_interval, make_folds
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-BEYOND = 2.0  # times what the reference itself leaves about its level, or how far its recordings lie apart
-LEVEL = 0.01  # that there is none: stretches whose mean is on the other side, at most
+BEYOND = 2.0  # times what the reference itself leaves about its level, or the distance between its recordings
+LEVEL = 0.01  # largest share of stretches whose mean is on the other side
 
 
 def steady_load(series: Series, left: Numbers, is_now: Flags, seed: int = 0) -> SteadyLoad | None:
-    """The joint where it is largest; None where no level moved far beyond what the reference does.
+    """Return the load at the joint where it is largest; None if no level moved far beyond the scatter of the reference.
 
-    left: [B, n] N·m measured less modelled torque, with all changes, bias and all.
+    `left` is measured less modelled torque, with all changes and including the bias, N·m [B, n].
     """
     found = []
     for joint in range(left.shape[1]):
@@ -38,8 +38,19 @@ def steady_load(series: Series, left: Numbers, is_now: Flags, seed: int = 0) -> 
 
 @dataclass(frozen=True)
 class _Side:
-    """level: N·m mean. spread: rms about the level. apart: largest distance of a recording's mean from the level.
-    means, squares, counts: by stretch of 2 s."""
+    """The mean torque of one side.
+
+    Attributes
+    ----------
+    level
+        Mean, N·m.
+    spread
+        Rms about the level, N·m.
+    apart
+        Largest distance of a recording's mean from the level, N·m.
+    means, squares, counts
+        By stretch of 2 s.
+    """
 
     level: float
     spread: float
@@ -74,7 +85,7 @@ class _Side:
         return float(np.std(self.means, ddof=1) / np.sqrt(len(self.means)))
 
     def about(self, level: float) -> Numbers:
-        """[K] Σ (x − level)² by stretch."""
+        """Return Σ (x − level)² by stretch [K]."""
         return np.asarray(self.squares - 2.0 * level * self.means * self.counts + level**2 * self.counts)
 
 

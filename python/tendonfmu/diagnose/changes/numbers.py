@@ -1,4 +1,4 @@
-"""The numbers that a description has, as what may have changed: each at its place, by the name of its effect."""
+"""Which numbers of a description may have changed: each at its place, under the name of its effect."""
 
 from __future__ import annotations
 
@@ -32,8 +32,19 @@ _OF_NUMBER = {"viscous": "viscous_friction", "static": "stribeck", "stribeck_vel
 
 @dataclass(frozen=True)
 class Number:
-    """One unknown of a description's fit. effect: its name. side: of its law, 0 where both are one. index: among
-    the unknowns. value: in the unit of the unknown."""
+    """One unknown of a description's fit.
+
+    Attributes
+    ----------
+    effect
+        Name of the effect.
+    side
+        Of its law: 1 or −1; 0 if both sides are one.
+    index
+        Among the unknowns.
+    value, low, high
+        Start and bounds in the unit of the unknown.
+    """
 
     effect: str
     place: Place
@@ -46,14 +57,14 @@ class Number:
 
 
 def estimator_of(data: Data) -> tuple[Estimator, list[str]]:
-    """Of all numbers that a fit estimates, and the paths of the description's parameters."""
+    """Return an estimator of all numbers that a fit estimates, and the paths of the description's parameters."""
     plain = {**data, "sensor_fault": None}
     image = native.image_from_json(json.dumps(plain))
     return Estimator(image), [parameter.path for parameter in native.Finger(image).parameters()]
 
 
 def numbers_of(data: Data) -> list[Number]:
-    """In the order of `derivative_passes.nominal_directions`."""
+    """Return the numbers in the order of `derivative_passes.nominal_directions`."""
     estimator, _ = estimator_of(data)
     unknowns = [each for each in estimator.unknowns if not each.path.startswith("bias.")]
     return [_number(data, k, each) for k, each in enumerate(unknowns)]
@@ -65,7 +76,7 @@ def _number(data: Data, index: int, unknown: Unknown) -> Number:
 
 
 def _owner(data: Data, path: str) -> tuple[str, Place, int]:
-    """Effect, place and side of a number."""
+    """Return effect, place and side of a number."""
     if law := _LAW.fullmatch(path):
         side = {"positive": 1, "negative": -1}.get(law["side"], 0)
         effect = _OF_NUMBER.get(law["number"]) or _OF_LAW.get(law["own"] or "") or law["along"]
@@ -83,10 +94,10 @@ def _owner(data: Data, path: str) -> tuple[str, Place, int]:
 
 
 def number_hypotheses(numbers: Sequence[Number], count: int, first: int) -> list[Hypothesis]:
-    """Each effect at each place, of one joint or tendon, and everywhere; the coarse ones first.
+    """Return each effect at each place, of one joint or tendon, and everywhere; the coarse ones first.
 
-    count: of all columns; first: that of the first number. Both sides of a law by as much of what each is, and one side
-    against the other (asymmetric friction).
+    Both sides of a law change by the same share, or one side against the other (asymmetric friction). `count` is the
+    number of all columns, `first` the index of the first number's column.
     """
     by_place: dict[tuple[str, Place], list[Number]] = {}
     for number in numbers:
@@ -105,7 +116,7 @@ def number_hypotheses(numbers: Sequence[Number], count: int, first: int) -> list
 
 
 def _free(effect: str, place: Place, own: Sequence[Number], count: int, first: int, level: int) -> Hypothesis:
-    """Each number by itself: of working points, or of a term with several."""
+    """Return a hypothesis in which each number is free: of working points, or of a term with several numbers."""
     mix = np.zeros((count, len(own)))
     for k, each in enumerate(own):
         mix[first + each.index, k] = 1.0
@@ -114,7 +125,7 @@ def _free(effect: str, place: Place, own: Sequence[Number], count: int, first: i
 
 
 def _bounds(own: Sequence[Number]) -> tuple[Numbers, Numbers]:
-    """[d] of what may be added."""
+    """Return the bounds of what may be added [d]."""
     value = np.array([each.value for each in own])
     low, high = np.array([each.low for each in own]), np.array([each.high for each in own])
     return low - value, high - value
@@ -137,7 +148,7 @@ def _two_sided(
 
 
 def _scaled(effect: str, place: Place, own: Sequence[Number], count: int, first: int, level: int) -> Hypothesis:
-    """All numbers by the same share of what they are."""
+    """Return a hypothesis in which all numbers change by the same share."""
     mix = np.zeros((count, 1))
     size = np.array([abs(each.value) for each in own])
     size = np.where(size > 0.0, size, size.max(initial=0.0) or 1.0)
@@ -149,7 +160,7 @@ def _scaled(effect: str, place: Place, own: Sequence[Number], count: int, first:
 
 
 def _groups(effect: str, places: Mapping[Place, Sequence[Number]], count: int, first: int) -> Iterator[Hypothesis]:
-    """Of all places, of those of each joint and of each tendon; only where that is more than one place and not all."""
+    """Yield hypotheses of all places, and of the places of each joint and tendon if these are several but not all."""
     if len(places) < 2:
         return
     groups: dict[tuple[int | None, int | None], list[Place]] = {(None, None): list(places)}
@@ -170,7 +181,7 @@ def _groups(effect: str, places: Mapping[Place, Sequence[Number]], count: int, f
 
 
 def changed(data: Data, added: Numbers) -> dict[str, Any]:
-    """The description with [u] added to its unknowns, within their boxes."""
+    """Return the description with `added` [u] added to its unknowns, within their bounds."""
     estimator, paths = estimator_of(data)
     z = estimator.start.copy()
     rows = [k for k, each in enumerate(estimator.unknowns) if not each.path.startswith("bias.")]

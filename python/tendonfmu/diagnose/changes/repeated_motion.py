@@ -1,4 +1,4 @@
-"""Motions of the reference that were made again exactly: what is different is the difference of aligned samples.
+"""Which motions of the reference were repeated exactly; there, the change is the difference of aligned samples.
 
 No model of what is wrong in both is needed then.
 """
@@ -20,9 +20,9 @@ Rows = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 Array = NDArray[Any]
 
-SAME = 0.02  # of the angles' spread: a controller follows the same reference as closely
+SAME = 0.02  # of the angles' spread: a controller follows the same reference this closely
 ALIKE = 0.1  # of the forces: friction that grows with them then differs by as little
-LEAST = 5.0  # s that both motions share
+LEAST = 5.0  # s; least length that both motions share
 NEAR = (
     0.3  # s: the later one motion is, the fewer samples their correlation sums, which moves its peak by less than this
 )
@@ -30,8 +30,17 @@ NEAR = (
 
 @dataclass(frozen=True)
 class Repeat:
-    """then, now: recordings by number. shift: s, of a time in `then` to the same place of the motion in `now`. begin,
-    end: s in `then`, of what both share."""
+    """A motion that was repeated.
+
+    Attributes
+    ----------
+    then, now
+        Recordings, by number.
+    shift
+        From a time in `then` to the same place of the motion in `now`, s.
+    begin, end
+        Times in `then` of what both share, s.
+    """
 
     then: int
     now: int
@@ -41,8 +50,10 @@ class Repeat:
 
 
 def find_repeats(series: Series, force: Numbers, then: Sequence[int], now: Sequence[int]) -> list[Repeat]:
-    """For each new recording the one of the reference whose motion it repeats, under the same load and pretension, if
-    there is one. force: [B, m] N that the model predicts from the motion, the load and the pretension."""
+    """Return the repeated motions: new recordings that follow the motion of a reference recording under the same load.
+
+    Pretension must be the same, too. `force` [B, m], N, is predicted by the model from motion, load and pretension.
+    """
     found = []
     for number in now:
         fits = [repeat for other in then if (repeat := _repeat(series, force, other, number)) is not None]
@@ -52,7 +63,7 @@ def find_repeats(series: Series, force: Numbers, then: Sequence[int], now: Seque
 
 
 def less_reference(values: Array, series: Series, repeats: Sequence[Repeat]) -> Array:
-    """Values [B, ...] of the new recordings less those of the reference at the same place of the motion."""
+    """Return values [B, ...] of the new recordings less those of the reference at the same place of the motion."""
     found = values.copy()
     for each in repeats:
         rows, first, share = _places(series, each)
@@ -62,8 +73,10 @@ def less_reference(values: Array, series: Series, repeats: Sequence[Repeat]) -> 
 
 
 def outside(series: Series, repeats: Sequence[Repeat]) -> Flags:
-    """[B] blocks that add nothing to the differences: of the reference's repeated motions all, of the
-    new recordings what lies before and after the motion."""
+    """Return the blocks that add nothing to the differences [B].
+
+    They are all of the repeated motions of the reference, and the new recordings before and after the motion.
+    """
     found = np.isin(series.recording, [each.then for each in repeats])
     for each in repeats:
         rows, first, _ = _places(series, each)
@@ -74,7 +87,7 @@ def outside(series: Series, repeats: Sequence[Repeat]) -> Flags:
 
 
 def _places(series: Series, repeat: Repeat) -> tuple[Rows, Rows, Numbers]:
-    """Blocks of the new recording; for each the block of the reference before it, and how far it is beyond that."""
+    """Return blocks of the new recording, the reference block before each, and how far each is beyond that block."""
     then, now = (np.flatnonzero(series.recording == number) for number in (repeat.then, repeat.now))
     when = series.time[now] - repeat.shift
     inside = (when >= repeat.begin) & (when < repeat.end)
@@ -115,13 +128,16 @@ def _same_load(force: Numbers, rows: Sequence[Flags], begin: int, end: int, lag:
 
 
 def _shared(one: int, other: int, lag: int) -> tuple[int, int]:
-    """Of the first motion: the first block that the second has, too, and the one after the last."""
+    """Return the first block of the first motion that the second one has, too, and the one after the last."""
     return max(0, -lag), min(one, other - lag)
 
 
 def _lags(one: Numbers, other: Numbers, near: int) -> Iterator[int]:
-    """Blocks by which the second may be later: recorded alike, and where the angles differ least, within `near` blocks
-    of where they go together best."""
+    """Yield possible delays of the second motion, in blocks.
+
+    These are 0, for recordings that start alike, and the delay at which the angles differ least. The latter is searched
+    within `near` blocks of the largest correlation.
+    """
     yield 0
     whole = np.zeros(len(one) + len(other) - 1)
     for a, b in zip((one - one.mean(axis=0)).T, (other - other.mean(axis=0)).T, strict=True):
@@ -132,7 +148,7 @@ def _lags(one: Numbers, other: Numbers, near: int) -> Iterator[int]:
 
 
 def _apart(one: Numbers, other: Numbers, lag: int) -> float:
-    """Mean square of the difference of the angles, over what both share."""
+    """Return the mean square difference of the angles over what both share."""
     begin, end = _shared(len(one), len(other), lag)
     if end <= begin:
         return np.inf

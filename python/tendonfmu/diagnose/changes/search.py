@@ -1,8 +1,8 @@
-"""What is different now: the changes that, put on the model of the reference, lower the error on new recordings.
+"""What is different now: the changes to the reference model that lower the error on new recordings.
 
-All recordings together; shared by them: the model's numbers, what it lacks in both, and a background of the motion
-(`background.py`). A hypothesis is free in the new recordings alone: a number that the description has, or a term
-that it lacks. The error is that of held-out parts of the new recordings.
+All recordings are explained together. They share the model's numbers, the effects that it lacks in both, and a
+background of the motion (`background.py`). A hypothesis is free in the new recordings only. It is a number that the
+description has, or a term that it lacks. The error is that on held-out parts of the new recordings.
 """
 
 from __future__ import annotations
@@ -44,9 +44,20 @@ STEPS = 3  # of Newton's method, with the derivatives of the reference
 
 @dataclass(frozen=True)
 class Change:
-    """hypothesis: what and where. magnitudes: [d] of it; covariance: [d, d]. gain, error: 1 − rms with / rms without on
-    held-out parts of the new recordings, and its standard error. p_value: family-wise. alike: what the data cannot tell
-    from it, best first.
+    """A change that was found.
+
+    Attributes
+    ----------
+    hypothesis
+        What and where.
+    magnitudes, covariance
+        [d] and [d, d].
+    gain, error
+        1 − rms with / rms without on held-out parts of the new recordings, and its standard error.
+    p_value
+        Family-wise.
+    alike
+        What the data cannot distinguish from it, best first.
     """
 
     hypothesis: Hypothesis
@@ -60,15 +71,22 @@ class Change:
 
 @dataclass(frozen=True)
 class Sides:
-    """Which blocks are of which recordings. now: [B] of the new ones; test: [B] of those of them that are not learned
-    from."""
+    """Which blocks belong to which recordings.
+
+    Attributes
+    ----------
+    now
+        Blocks of the new recordings [B].
+    test
+        Those of them that are not learned from [B].
+    """
 
     now: Flags
     test: Flags
 
 
 class ChangeSearch:
-    """Changes, one after the other."""
+    """A search that adds one change after the other."""
 
     def __init__(
         self,
@@ -81,8 +99,21 @@ class ChangeSearch:
         left_out: Flags | None = None,
         seed: int = 0,
     ) -> None:
-        """data: the model fitted to the reference. recordings: as estimated from. now: numbers of the new ones, tests:
-        of those that are not learned from. left_out: [B] blocks that are not looked at."""
+        """Prepare all columns.
+
+        Parameters
+        ----------
+        data
+            The model fitted to the reference.
+        recordings
+            As estimated from.
+        now
+            Numbers of the new recordings.
+        tests
+            Numbers of the new recordings that are not learned from.
+        left_out
+            Blocks that are ignored [B].
+        """
         self.data, self._recordings, self._grid, self._least = data, recordings, grid, least
         self.series = series_of(data, recordings, grid, left_out)
         self.sides = Sides(np.isin(self.series.recording, [*now, *tests]), np.isin(self.series.recording, tests))
@@ -130,8 +161,10 @@ class ChangeSearch:
         return sorted([*missing, *present], key=lambda each: each.level)
 
     def _level_shift(self) -> Numbers:
-        """[B, n] N·m by which the mean of what is left of each recording is off that of the reference: a load or a
-        zero that is no state of the motion."""
+        """Return by how much the mean residual of each recording differs from that of the reference, N·m [B, n].
+
+        This is a load or a sensor's zero, which is no state of the motion.
+        """
         left, series = self.torque_left(), self.series
         then = left[series.used & ~self.sides.now].mean(axis=0)
         found = np.zeros_like(left)
@@ -144,7 +177,7 @@ class ChangeSearch:
     # --- rounds ---
 
     def run(self, least_gain: float, step: Step = lambda done: None) -> None:
-        """Takes one change after the other, until none is material, certain and no chance."""
+        """Take one change after the other until none is material and certain."""
         while len(self.changes) < MOST_CHANGES and len(self.refused) < MOST_REFUSED:
             step(len(self.changes))
             named = [each.hypothesis.effect for each in self.changes]
@@ -159,20 +192,25 @@ class ChangeSearch:
                 self.refused.append(found)
 
     def _best(self, tried: Collection[str]) -> Judged | None:
-        """What lowers the error most, at the coarsest place that is as good. tried: effects that are left out."""
+        """Return the hypothesis that lowers the error most, at the coarsest place that is as good.
+
+        Effects in `tried` are left out.
+        """
         ranked = [each for each in self.selection.ranked() if each.hypothesis.effect not in tried]
         if not ranked:
             return None
         judged = self.selection.refined(ranked[0].hypothesis.effect)
-        if judged.hypothesis.members:  # a number that the description has goes before a term that it lacks
+        if judged.hypothesis.members:  # a number that the description has takes precedence over a term that it lacks
             present = (each for each in ranked if not each.hypothesis.members)
             same = next((each for each in present if is_alike(each.by_stretch, judged.by_stretch)), None)
             judged = judged if same is None else self.selection.refined(same.hypothesis.effect)
         return self._at_best_place(judged) if len(self.new_recordings) > 1 else judged
 
     def _at_best_place(self, judged: Judged) -> Judged:
-        """Of places that are nearly as good the one that leaves least where its size is free in each new recording: a
-        change that grows from one to the next is not everywhere as large as on average."""
+        """Return, of places that are nearly as good, the one with the smallest error.
+
+        The size is free in each new recording here, because a growing change differs from one recording to the next.
+        """
         options = [judged, *self.selection.near(judged)]
         if len(options) == 1:
             return judged
@@ -198,7 +236,7 @@ class ChangeSearch:
         return options[int(np.argmin(errors))]
 
     def _judged(self, judged: Judged) -> tuple[Change, bool]:
-        """The change, and whether it is certain: its gain by two standard errors, and no chance."""
+        """Return the change and whether it is certain: a gain of more than two standard errors and a small p-value."""
         grams, own = self.selection.grams, judged.hypothesis
         _, by_fold = grams.error(own.mix, own.low, own.high)
         gain, error = gain_of(grams.unseen_residual(), grams.unseen_residual(own.mix, by_fold), grams.counted_stretch)
@@ -210,12 +248,15 @@ class ChangeSearch:
 
     @property
     def error(self) -> float:
-        """Root of Σ e² on held-out parts of the new recordings, N·m, with the changes so far."""
+        """Root of Σ e² on held-out parts of the new recordings, with the changes so far, N·m."""
         return float(np.sqrt(self.selection.base.sum()))
 
     def matters(self, gain: float, before: float, effect: str, named: Sequence[str], least_gain: float) -> bool:
-        """Whether a change takes enough of what is left without it (`before`), each further name more than the one
-        before; and of the whole difference, so that no crumbs of a large change are named."""
+        """Return whether a change gains enough.
+
+        It must remove enough of what is left without it (`before`), each further name more than the one before. It must
+        also remove enough of the whole difference, so that small remnants of a large change are not named.
+        """
         return gain >= least_gain * names_with(effect, named) and gain * before >= least_gain * self._whole
 
     def _take(self, change: Change) -> None:
@@ -228,8 +269,10 @@ class ChangeSearch:
         self._selection = None
 
     def free(self, keys: Sequence[Key]) -> None:
-        """Frees these effects at these places in the new recordings, whether they are certain or not: each with the
-        form that fits best. Those that the description cannot have are left out."""
+        """Free these effects at these places in the new recordings, whether they are certain or not.
+
+        Each gets the form that fits best. Effects that the description cannot have are left out.
+        """
         for key in keys:
             grams = self.selection.grams
             own = [each for each in self.hypotheses if each.key == key]
@@ -240,17 +283,17 @@ class ChangeSearch:
                 self._settle()
 
     def certain(self, number: int) -> Change:
-        """A change with the covariance and p-value that it has beside all others."""
+        """Return a change with the covariance and p-value that it has together with all others."""
         change, grams = self.changes[number], self.grams(number)
         own = change.hypothesis
-        mix = own.mix[own.mix.any(axis=1)]  # its columns are the only candidates
+        mix = own.mix[own.mix.any(axis=1)]  # only its own columns are candidates
         _, by_fold = grams.error(mix, own.low, own.high)
         magnitudes = grams.magnitudes(mix, own.low, own.high)
         p_value, covariance = self.certainty_of(grams, mix, magnitudes, by_fold)
         return replace(change, covariance=covariance, p_value=p_value)
 
     def moved_on(self, grams: Grams) -> list[Change]:
-        """The changes, each with what is added to its magnitudes by a solution in which their columns are shared."""
+        """Return the changes with updated magnitudes, from a solution in which their columns are shared."""
         sizes = [len(each.magnitudes) for each in self.changes]
         steps = np.split(grams.refitted[-sum(sizes) :], np.cumsum(sizes)[:-1]) if sizes else []
         return [
@@ -259,7 +302,7 @@ class ChangeSearch:
         ]
 
     def keep(self, changes: Sequence[Change]) -> None:
-        """Goes on with these alone."""
+        """Continue with these changes only."""
         self.changes = list(changes)
         self.changes = self.moved_on(self.grams())
         self._selection = None
@@ -268,7 +311,7 @@ class ChangeSearch:
 
     @property
     def selection(self) -> Selection:
-        """Of all that may have changed beside the changes so far."""
+        """Everything else that may have changed, given the changes so far."""
         if self._selection is None:
             self._selection = self._look()
         return self._selection
@@ -282,20 +325,23 @@ class ChangeSearch:
 
     @property
     def new_recordings(self) -> list[int]:
-        """Numbers of those that are learned from."""
+        """Numbers of the new recordings that are learned from."""
         learned = self.sides.now & ~self.sides.test
         return [int(each) for each in np.unique(self.series.recording[learned])]
 
     def left(self) -> Numbers:
-        """[B, n] N·m that is left with all changes, what is shared by both taken off; 0 where nothing is used."""
+        """Return what is left with all changes and without what both share, N·m [B, n]; 0 where nothing is used."""
         grams = self.selection.grams
         found = np.zeros_like(self.series.target)
         found[grams.folds.rows] = grams.residual()
         return found
 
     def grams(self, without: int | None = None, unseen: Flags | None = None) -> Grams:
-        """Of the changes' own columns among the shared ones; `without` one of them, which alone is then a candidate.
-        unseen: [B] blocks that alone are judged, and not learned from."""
+        """Return the products with the changes' own columns among the shared ones.
+
+        The change `without` is left out and is the only candidate. Blocks in `unseen` [B] are the only ones judged;
+        they are not learned from.
+        """
         kept = [each for k, each in enumerate(self.changes) if k != without]
         used = np.zeros(0, dtype=np.intp)
         target = self._target_now()
@@ -307,7 +353,10 @@ class ChangeSearch:
         return Grams.of(products.chosen(self._together(kept), used), target, self._scales(kept), judged)
 
     def grams_of_recording(self, number: int, only: int) -> Grams:
-        """Of one change in one new recording alone, its only candidate; it is free in each of the others, too."""
+        """Return the products with one change in one new recording as the only candidate.
+
+        The change is free in each of the other new recordings, too.
+        """
         change = self.changes[number]
         column = (self._values @ self._mixed(change))[:, :, None]
         of = {each: column * (self.series.recording == each)[:, None, None] for each in self.new_recordings}
@@ -322,17 +371,17 @@ class ChangeSearch:
         return self._target - self.moved() if self.changes else self._target
 
     def _together(self, changes: Sequence[Change]) -> Numbers:
-        """[c, k] of all their columns."""
+        """Return all columns of the changes [c, k]."""
         empty = np.zeros((self._values.shape[2], 0))
         return np.concatenate([empty, *(each.hypothesis.mix for each in changes)], axis=1)
 
     def _scales(self, changes: Sequence[Change]) -> Numbers:
-        """Of the shared columns; those of changes are free."""
+        """Return the scales of the shared columns; columns of changes are free."""
         free = sum(each.hypothesis.mix.shape[1] for each in changes)
         return np.concatenate([self._scale, np.full(free, np.nan)])
 
     def _products(self, unseen: Flags | None) -> tuple[Products, Flags]:
-        """Made once for every way of judging."""
+        """Return the products, computed once for every way of judging."""
         key = b"" if unseen is None else unseen.tobytes()
         if key not in self._known:
             folds, judged = (self.folds, self.judged) if unseen is None else folds_of_unseen(self._told, unseen)
@@ -340,11 +389,11 @@ class ChangeSearch:
         return self._known[key]
 
     def accepted(self, changes: Sequence[Change]) -> list[Accepted]:
-        """Terms that changes add to the description of now."""
+        """Return the terms that changes add to the description of now."""
         return [part for each in changes for part in accepted_of(each.hypothesis, each.magnitudes)]
 
     def added(self, changes: Sequence[Change]) -> Numbers:
-        """[u] what changes add to the numbers that the description has."""
+        """Return what changes add to the numbers that the description has [u]."""
         first = self._columns.values.shape[2]
         parts = [np.zeros(len(self.numbers)), *(self._mixed(each)[first:] for each in changes)]
         return np.asarray(np.sum(parts, axis=0))
@@ -354,12 +403,12 @@ class ChangeSearch:
         return np.asarray(change.hypothesis.mix @ change.magnitudes)
 
     def now_data(self, changes: Sequence[Change] | None = None) -> dict[str, Any]:
-        """The description of now, from that of the reference."""
+        """Return the description of now, derived from that of the reference."""
         taken = self.changes if changes is None else changes
         return dict(extended_description(changed(self.data, self.added(taken)), self.accepted(taken)))
 
     def moved(self) -> Numbers:
-        """[B, n] N·m that the changes add to the model's torque; 0 in the reference."""
+        """Return what the changes add to the model's torque, N·m [B, n]; 0 in the reference."""
         found = np.zeros_like(self.series.target)
         segments = tuple(each for each in self._grid.segments if each.recording in self._new)
         rows = np.concatenate([np.arange(each.blocks.start, each.blocks.stop) for each in segments])
@@ -370,17 +419,19 @@ class ChangeSearch:
 
     @property
     def told(self) -> Flags:
-        """[B] blocks that something is learned from."""
+        """Blocks that something is learned from [B]."""
         return self._told.used
 
     @property
     def repeated(self) -> int:
-        """How many of the new recordings repeat a motion of the reference exactly."""
+        """Number of new recordings that repeat a motion of the reference exactly."""
         return len(self._repeats)
 
     def torque_left(self) -> Numbers:
-        """[B, n] N·m measured less modelled torque, bias and all, without the bias's own jumps; with all changes but
-        for their means, which no motion tells from a load or a zero."""
+        """Return measured less modelled torque, including the bias but without its own jumps, N·m [B, n].
+
+        The changes are included except for their means, which no motion can distinguish from a load or a sensor's zero.
+        """
         whole = [recording.target - exact_model(self.data, recording, jumps=False) for recording in self._recordings]
         left = np.concatenate([segment.mean(whole[segment.recording][segment.part]) for segment in self._grid.segments])
         if self.changes:
@@ -392,23 +443,24 @@ class ChangeSearch:
 
     @property
     def stretches_now(self) -> Flags:
-        """[stretches] whether they are of the new recordings."""
+        """Whether each stretch belongs to the new recordings [stretches]."""
         found = np.zeros(self.folds.stretches, dtype=bool)
         found[self.folds.stretch[self.judged[self.folds.fold]]] = True
         return found
 
     def column(self, number: int) -> Numbers:
-        """[B, n, d] of a change, also in the reference."""
+        """Return the columns of a change, also in the reference [B, n, d]."""
         both = np.concatenate([self._columns.values, self._columns.nominal], axis=2)
         return np.asarray(both @ self.changes[number].hypothesis.mix)
 
     # --- certainty ---
 
     def certainty_of(self, grams: Grams, mix: Numbers, magnitudes: Numbers, by_fold: Numbers) -> tuple[float, Numbers]:
-        """p-value of there being no change, corrected for all that was tried; [d, d] covariance of the magnitudes.
+        """Return the p-value of there being no change, corrected for all that was tried, and the covariance [d, d].
 
-        Hotelling's test on the scores of stretches of all recordings, taken together in twos where they vary
-        together: what wanders from stretch to stretch in the reference is no change."""
+        It is Hotelling's test on the scores of stretches of all recordings. Neighbouring stretches are summed in pairs
+        if they vary together: what wanders from stretch to stretch in the reference is no change.
+        """
         energy, scores = grams.scores(mix, by_fold)
         inverse = np.linalg.pinv(energy, hermitian=True)
         score = energy @ magnitudes
@@ -422,19 +474,19 @@ class ChangeSearch:
 
 
 def _in_twos(values: Numbers) -> Numbers:
-    """[K / 2, d] sums of neighbours."""
+    """Return sums of neighbours [K / 2, d]."""
     even = len(values) // 2 * 2
     return np.concatenate([values[:even].reshape(-1, 2, values.shape[1]).sum(axis=1), values[even:]])
 
 
 def folds_of_sides(series: Series, is_now: Flags) -> tuple[Folds, Flags]:
-    """Parts of the new recordings, then of the reference, and [f] which are of the new ones."""
+    """Return parts of the new recordings, then of the reference, and which of them are of the new ones [f]."""
     now, then = (make_folds(replace(series, used=series.used & side)) for side in (is_now, ~is_now))
     return _joined(now, then), np.arange(now.folds + then.folds) < now.folds
 
 
 def folds_of_unseen(series: Series, unseen: Flags) -> tuple[Folds, Flags]:
-    """What is unseen as one part, all else as the other, and [2] that the first is judged."""
+    """Return unseen blocks as one part and all others as the other, and that only the first is judged [2]."""
     both = [make_folds(replace(series, used=series.used & side)) for side in (unseen, ~unseen)]
     one, other = (replace(each, fold=np.zeros_like(each.fold), folds=1) for each in both)
     return _joined(one, other), np.array([True, False])

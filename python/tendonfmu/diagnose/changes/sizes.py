@@ -23,13 +23,23 @@ from tendonfmu.statistics import Interval
 Numbers = NDArray[np.float64]
 Data = Mapping[str, Any]
 TWO_SIDED = 1.96
-LEAST_OF_NOW = 0.05  # that a number was, for its change to be told as a share of it
+LEAST_OF_NOW = 0.05  # of the present value: a change from a smaller number is not reported as a share of it
 _OTHER_SIDE = {"positive": "negative", "negative": "positive"}
 
 
 @dataclass(frozen=True)
 class Sized:
-    """paths: of all numbers that changed, with their values now and units, by place. size: of the main one."""
+    """The size of a change.
+
+    Attributes
+    ----------
+    places
+        Values now and units of all numbers that changed, by place.
+    size
+        Of the main number.
+    words
+        The size in plain words.
+    """
 
     places: tuple[FoundPlace, ...]
     size: ChangedSize
@@ -37,7 +47,7 @@ class Sized:
 
 
 def sized(search: ChangeSearch, changes: Sequence[Change], number: int) -> Sized:
-    """Of one of the changes, beside all others."""
+    """Return the size of one of the changes, estimated together with all others."""
     now = search.now_data(changes)
     units = {each.path: each.unit for each in native.Finger.from_description(now).parameters()}
     if changes[number].hypothesis.members:
@@ -47,7 +57,7 @@ def sized(search: ChangeSearch, changes: Sequence[Change], number: int) -> Sized
 
 
 def _relative_error(change: Change) -> float:
-    """Standard error of the whole over its size; of the direction in which it was found."""
+    """Return the standard error of the whole change over its size, along the direction in which it was found."""
     value = float(np.linalg.norm(change.magnitudes))
     direction = change.magnitudes / max(value, 1e-300)
     return math.sqrt(max(float(direction @ change.covariance @ direction), 0.0)) / max(value, 1e-300)
@@ -89,7 +99,10 @@ _FORM = ("stribeck_velocity", "beyond", "turns", "time_constant", "reaction", "r
 
 
 def _main(paths: Sequence[str], now: Data, change: Change) -> list[str]:
-    """The number that says how large the term is: the largest that is no form of it; sine and cosine together."""
+    """Return the paths that say how large the term is.
+
+    It is the largest number that does not describe the term's form; sine and cosine count together.
+    """
     waves = [path for path in paths if path.rsplit(".", 1)[-1] in ("sine", "cosine")]
     if waves:
         return waves[:2]
@@ -101,7 +114,7 @@ def _main(paths: Sequence[str], now: Data, change: Change) -> list[str]:
 
 
 def _other_number(search: ChangeSearch, change: Change, then: Data, now: Data, units: Mapping[str, str]) -> Sized:
-    """then: the description of now without this change."""
+    """Return the size of a changed number; `then` is the description of now without this change."""
     first = change.hypothesis.mix.shape[0] - len(search.numbers)
     moved = np.flatnonzero(change.hypothesis.mix[first:].any(axis=1))
     by_place: dict[tuple[int | None, int | None], dict[str, tuple[float, str]]] = {}
@@ -127,7 +140,7 @@ def _other_number(search: ChangeSearch, change: Change, then: Data, now: Data, u
 
 
 def _difference(data: Data, path: str) -> float:
-    """Of a number of a law's two sides, half."""
+    """Return the difference between the two sides of a law in a number, positive less negative."""
     for side, other in _OTHER_SIDE.items():
         if f".{side}." in path:
             sign = 1.0 if side == "positive" else -1.0

@@ -1,4 +1,4 @@
-"""The size of a change in each of the new recordings: since when, and how fast it grows."""
+"""How large a change is in each of the new recordings: since when it is there, and how fast it grows."""
 
 from __future__ import annotations
 
@@ -18,7 +18,10 @@ Numbers = NDArray[np.float64]
 def sizes_by_recording(
     search: ChangeSearch, number: int, size: ChangedSize, recordings: Sequence[FitRecording]
 ) -> tuple[Interval, ...]:
-    """In the order and unit of the change's size; nothing for a single recording. recordings: the new ones."""
+    """Return the size of a change in each of the new recordings, in their order and in its unit.
+
+    The tuple is empty for a single recording.
+    """
     if len(recordings) < 2:
         return ()
     change = search.changes[number]
@@ -26,7 +29,7 @@ def sizes_by_recording(
 
 
 def shares_by_recording(search: ChangeSearch, number: int) -> list[tuple[float, float]]:
-    """(value, standard error) of each new recording: how much of the change is in it, 1 for all."""
+    """Return (value, standard error) for each new recording: which share of the change is in it, 1 for all of it."""
     found = []
     low, high = _bounds(search.changes[number])
     for recording in search.new_recordings:
@@ -40,7 +43,7 @@ def shares_by_recording(search: ChangeSearch, number: int) -> list[tuple[float, 
 
 
 def _bounds(change: Change) -> tuple[Numbers, Numbers]:
-    """[1] of the share, within which all magnitudes are within theirs."""
+    """Return the bounds of the share [1] within which all magnitudes are within theirs."""
     moved = change.magnitudes != 0.0
     size, own = change.magnitudes[moved], change.hypothesis
     ends = np.sort(np.stack([own.low[moved] / size, own.high[moved] / size]), axis=0)
@@ -54,7 +57,10 @@ def _in_unit(share: tuple[float, float], change: Change, size: ChangedSize) -> I
 
 
 def slope(times: Numbers, sizes: Sequence[Interval]) -> Interval:
-    """Per unit of time, by weighted least squares, with the larger of the sizes' own errors and their scatter."""
+    """Return the change per unit of time, by weighted least squares.
+
+    Its error is the larger of the sizes' own errors and their scatter.
+    """
     value = np.array([each.value for each in sizes])
     error = np.maximum(np.array([(each.high - each.low) / 3.92 for each in sizes]), 1e-300)
     weight = 1.0 / error**2

@@ -1,6 +1,6 @@
-"""The effects that a diagnosis knows, one module each, in the order of docs/reference/commands/diagnose.md.
+"""Which effects a diagnosis knows: one module each, in the order of docs/reference/commands/diagnose.md.
 
-`contact` and `unknown` are no terms of a model: an event of the recording, and what is left.
+`contact` and `unknown` are no terms of a model. They stand for an event in the recording and for what is left.
 """
 
 from __future__ import annotations
@@ -68,7 +68,10 @@ __all__ = ["CANDIDATES", "Candidate", "Column", "Place", "Variant", "by_name"]
 
 
 def by_name(name: str) -> Candidate:
-    """The candidate of an effect of docs/reference/commands/diagnose.md. Raises InputError."""
+    """Return the candidate of an effect of docs/reference/commands/diagnose.md.
+
+    Raises InputError if there is none of this name.
+    """
     for candidate in CANDIDATES:
         if candidate.name == name:
             return candidate

@@ -1,4 +1,4 @@
-"""A friction law where the description has none."""
+"""How a friction law is added where the description has none."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from tendonfmu.model import DEFAULT_THRESHOLD
 
 # ordinary Coulomb friction: share of the tendon force, N·m in a joint, N·m per N of load
 _ORDINARY = {"edge_friction": 0.02, "pulley_friction": 0.02, "friction": 0.005, "load_friction": 1e-4}
-_SLOW_SHARE = 0.3  # of the 100-fold threshold of motion's speed: where viscous friction adds as much as 30 %
+_SLOW_SHARE = 0.3  # of the Coulomb friction: viscous friction at 100 times the threshold of motion
 
 
 def absent_law(data: Data, path: str, shape: Mapping[str, float]) -> Variant:
-    """The law at a path as a variant: Coulomb and viscous friction, both at least 0."""
+    """Return the law at a path as a variant: Coulomb and viscous friction, both at least 0."""
     kind = path.rsplit(".", 1)[1].split("[")[0]
     coulomb = _ORDINARY[kind]
     speed = 100 * DEFAULT_THRESHOLD["tendon" if path.startswith("tendons") else "joint"]
@@ -27,7 +27,7 @@ def absent_law(data: Data, path: str, shape: Mapping[str, float]) -> Variant:
 
 
 def law_shares(data: Data, path: str) -> dict[str, float]:
-    """Direction in which all magnitudes of a law, given by its own path, grow by the same share."""
+    """Return the direction in which all magnitudes of the law at a path grow by the same share."""
     law = get_number(data, path)
     found: dict[str, float] = {}
     for side in ("",) if law.get("positive") is None else ("positive", "negative"):

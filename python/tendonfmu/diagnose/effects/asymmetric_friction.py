@@ -1,4 +1,4 @@
-"""Friction that differs between the two directions, in a law that is the same for both."""
+"""Whether friction differs between the two directions, where the law is the same for both."""
 
 from __future__ import annotations
 
@@ -26,7 +26,10 @@ def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
 
 
 def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
-    """Magnitude: the difference between the directions, in shares of the law; of viscous friction on its own."""
+    """Return the variant; its magnitude is the difference between the directions in shares of the law.
+
+    Viscous friction has a magnitude of its own.
+    """
     path = law_path(place, shape)
     edits = (Edit(SIDES, path),)
     split = apply_edits(data, edits, (), {})

@@ -1,4 +1,4 @@
-"""Play before a position passes on."""
+"""Whether there is play before a position passes on."""
 
 from __future__ import annotations
 
@@ -10,11 +10,14 @@ from tendonfmu.diagnose.effects.friction_law_places import all_joints, all_tendo
 from tendonfmu.diagnose.span import Span
 
 NAME = "backlash"
-_OF_RANGE = (0.0006, 0.005, 0.03)  # widths, of the range of the position; the least as good as a derivative
+_OF_RANGE = (0.0006, 0.005, 0.03)  # widths, of the range of the position; the smallest serves as a derivative
 
 
 def _places(data: Data, kinematics: int) -> list[Place]:
-    """At the tendons where their positions are used; source 3 brings velocities of its own, that no play changes."""
+    """Return joints, and tendons if their positions are used.
+
+    Kinematics source 3 brings its own velocities, which no play changes.
+    """
     tendons = all_tendons(data) if kinematics == 1 else []
     joints = all_joints(data) if kinematics != 3 else []
     return without_rows(data, NAME, joints + tendons)

@@ -1,8 +1,8 @@
-"""What a candidate for a cause is: where it can sit, which numbers it has, and how a description gets it.
+"""What a candidate for a cause is: where it can be, which numbers it has, and how it is added to a description.
 
-A candidate holds no formula. It says how to add its term to a finger description at a strength of zero; the columns
-that the diagnosis compares with the residual are the C core's own derivatives by the term's numbers there, or, where
-the term has no useful derivative at zero, the difference of the core's torque with and without it.
+A candidate holds no formula. It says how to add its term to a finger description at a strength of zero. The columns
+that the diagnosis compares with the residual are the C core's own derivatives by the term's numbers there. If the term
+has no useful derivative at zero, the column is the difference of the core's torque with and without it.
 """
 
 from __future__ import annotations
@@ -19,12 +19,18 @@ from tendonfmu.errors import InputError
 
 Data = Mapping[str, Any]
 
-LEAST_SHARE = 0.01  # of the expected size: with less a fit could not tell the number from an absent one
+LEAST_SHARE = 0.01  # of the expected size: a fit could not distinguish a smaller number from an absent one
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where an effect sits. joint, tendon: from 1; None where it has none."""
+    """Where an effect is.
+
+    Attributes
+    ----------
+    joint, tendon
+        Number from 1; None if the place has none.
+    """
 
     joint: int | None = None
     tendon: int | None = None
@@ -34,10 +40,17 @@ class Place:
 class Column:
     """One direction in the space of a description's numbers.
 
-    numbers: path -> how much of it a magnitude of 1 adds. `coulomb` moves with `static` − `coulomb` held, `static` is
-    that difference, as in `estimation.Unknown`. sign: the expected one of the magnitude, 0 either.
-    expected: magnitude of an ordinary effect, > 0: where a fit starts that knows nothing better. least: that the
-    description takes of the magnitude.
+    Attributes
+    ----------
+    numbers
+        Path -> how much a magnitude of 1 adds. `coulomb` moves with `static` − `coulomb` held constant; `static` is
+        that difference, as in `estimation.Unknown`.
+    sign
+        Expected sign of the magnitude, 0 for either.
+    expected
+        Magnitude of an ordinary effect, > 0; a fit without better knowledge starts there.
+    least
+        Smallest magnitude that the description accepts.
     """
 
     numbers: Mapping[str, float]
@@ -55,13 +68,30 @@ class Column:
 class Variant:
     """A candidate at one place and one point of the grid of its non-linear numbers.
 
-    base: the description without it. edits, rows: what is added, at a strength of zero: changes of laws and covers, and
-    rows of `extensions`. settings: numbers of laws that mean nothing at strength zero: path of the law -> Stribeck
-    velocity. shape: the non-linear numbers here. columns: derivatives to take. secant_rows: where there is no
-    derivative, the rows at full strength; the one column is then the difference that they make, magnitude 1.
-    scaled: keys of secant_rows that grow with the magnitude, up to `most` at either sign. only_joint: whose torque
-    alone the rows change, from 1. late: s by which forces come later than positions: the column is what that does to
-    measured forces, not what the row makes of them.
+    Attributes
+    ----------
+    base
+        The description without the term.
+    shape
+        The non-linear numbers here.
+    columns
+        Derivatives to compute.
+    edits, rows
+        What is added at a strength of zero: changes of laws and covers, and rows of `extensions`.
+    settings
+        Numbers of laws without a meaning at strength zero: path of the law -> Stribeck velocity.
+    secant_rows
+        The rows at full strength, if there is no derivative. The one column is then the difference that they make; its
+        magnitude is 1.
+    scaled
+        Keys of `secant_rows` that grow with the magnitude.
+    most
+        Largest value of these keys, of either sign.
+    only_joint
+        The only joint whose torque the rows change, from 1.
+    late
+        By how much forces come later than positions, s. The column is then the effect of this delay on measured forces,
+        not what the row makes of them.
     """
 
     base: Data
@@ -83,11 +113,11 @@ class Variant:
 
     @property
     def secant(self) -> dict[str, Any] | None:
-        """The description with the term, where its column is a difference of torques."""
+        """The description with the term, if its column is a difference of torques."""
         return self.with_secants([self]) if self.secant_rows else None
 
     def with_secants(self, variants: Sequence[Variant]) -> dict[str, Any]:
-        """The description with the terms of several variants of it at full strength."""
+        """Return the description with the terms of several of its variants at full strength."""
         return apply_edits(self.base, (), [row for variant in variants for row in variant.secant_rows], {})
 
     @property
@@ -102,14 +132,14 @@ class Variant:
 
     @property
     def count(self) -> int:
-        """How many columns it has."""
+        """Number of columns."""
         return 1 if self.secant_rows else len(self.columns)
 
     def extended(self, magnitudes: Sequence[float]) -> dict[str, Any]:
-        """The description with the term at these magnitudes, one per column, none of its numbers at zero.
+        """Return the description with the term at these magnitudes, one per column, none of its numbers at zero.
 
-        A magnitude of the wrong sign, or next to nothing, becomes a small one of the right sign: what a fit starts
-        from has to be present.
+        A magnitude of the wrong sign, or close to 0, becomes a small one of the right sign, because a fit can only
+        start from a number that is present.
         """
         if len(magnitudes) != self.count:
             raise InputError(f"magnitudes: {len(magnitudes)} numbers; expected {self.count}, one per column")
@@ -139,12 +169,32 @@ def _present(column: Column, magnitude: float) -> float:
 class Candidate:
     """One effect of docs/reference/commands/diagnose.md.
 
-    name: of the effect. title: a few plain words. explanation: what it is physically, and what to look at on the
-    hand. sign: expected one of its magnitudes, +1, −1 or 0 for either. excited_by: the motion or load that shows it.
-    confused_with: effects that look alike in many recordings. coordinate: what its evidence is drawn over: "velocity",
-    "angle", "force", "time", "travel", "acceleration" or "load". unit: of its main number. number: what that is called.
-    find_places(data, kinematics): where it is absent and can be. find_shapes(data, place, span): the grid of its
-    non-linear numbers. make(data, place, shape): the variant there.
+    Attributes
+    ----------
+    name
+        Name of the effect.
+    title
+        A few plain words.
+    explanation
+        What it is physically, and what to look at on the hand.
+    sign
+        Expected sign of its magnitudes: +1, −1, or 0 for either.
+    excited_by
+        Motion or load that shows it.
+    confused_with
+        Effects that look alike in many recordings.
+    coordinate
+        What its evidence is drawn over: "velocity", "angle", "force", "time", "travel", "acceleration" or "load".
+    unit
+        Of its main number.
+    number
+        What the main number is called.
+    find_places
+        (data, kinematics) -> places where it is absent and possible.
+    find_shapes
+        (data, place, span) -> the grid of its non-linear numbers.
+    make
+        (data, place, shape) -> the variant there.
     """
 
     name: str
@@ -161,27 +211,28 @@ class Candidate:
     make: Callable[[Data, Place, Mapping[str, float]], Variant]
 
     def places(self, data: Data, kinematics: int = 1) -> list[Place]:
-        """Where it can be proposed: absent there now. kinematics: source, 1 to 3."""
+        """Return the places where it is possible and absent now; `kinematics` is the source, 1 to 3."""
         return self.find_places(data, kinematics)
 
     def variants(self, data: Data, place: Place, span: Span) -> list[Variant]:
-        """Its grid at a place, for recordings of this span."""
+        """Return its grid at a place, for recordings of this span."""
         return [self.make(data, place, shape) for shape in self.find_shapes(data, place, span)]
 
     def variant(self, data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
-        """One point of the grid. shape: of a variant of before."""
+        """Return one point of the grid; `shape` comes from an earlier variant."""
         return self.make(data, place, shape)
 
     def extended(
         self, data: Data, place: Place, shape: Mapping[str, float], magnitudes: Sequence[float]
     ) -> dict[str, Any]:
-        """A description with the term at these magnitudes, ready for `check`, `build` and `fit`.
+        """Return a description with the term at these magnitudes, ready for `check`, `build` and `fit`.
 
-        shape: of the variant. magnitudes: one per column of it. Raises InputError for another number of them.
+        `shape` is that of the variant; `magnitudes` has one entry per column. Raises InputError if their number is
+        wrong.
         """
         return self.make(data, place, shape).extended(magnitudes)
 
 
 def no_shape(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
-    """Of an effect without non-linear numbers."""
+    """Return the grid of an effect without non-linear numbers."""
     return [{}]

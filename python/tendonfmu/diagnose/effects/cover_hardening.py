@@ -1,4 +1,4 @@
-"""The cubic part of a cover's spring."""
+"""Whether the spring of a cover has a cubic part."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A spring at a joint, such as a plastic cover, where the model has none."""
+"""Whether there is a spring at a joint, such as a plastic cover, where the model has none."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
-"""Changes of a finger description that add a term at a strength of zero: they leave its torque as it is.
+"""How a term at a strength of zero is added to a finger description, without a change of the torque.
 
-Laws that are absent get next to no friction (the estimator takes a law without any as a mistake); a law with two sides
-or with working points in place of a single one starts with equal sides and equal laws. Paths
-are those of the FMU's parameters.
+An absent law gets a negligible friction, because the estimator refuses a law without any. A law that is split into two
+sides or several working points starts with equal sides and equal laws. Paths are those of the FMU's parameters.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from tendonfmu.estimate import MAGNITUDES, get_number, own_copy, set_number
 
 Data = Mapping[str, Any]
 
-ABSENT, POINTS, SIDES, COVER = "absent", "points", "sides", "cover"  # kinds of edits, in the order of their making
+ABSENT, POINTS, SIDES, COVER = "absent", "points", "sides", "cover"  # kinds of edits, in their order
 _NEXT_TO_NONE = 1e-15  # of the force, or N·m
 _ORDER = (ABSENT, POINTS, SIDES, COVER)
 _LAW = re.compile(
@@ -28,8 +27,17 @@ _TENDON_LAW = re.compile(r"tendons\[(\d+)\]\.((?:edge|pulley)_friction)\[(\d+)\]
 
 @dataclass(frozen=True)
 class Edit:
-    """kind: "absent", a law where there was none; "points", working points at `angles` (rad) in place of a single edge
-    law; "sides", two sides in place of one; "cover", a cover without stiffness. path: of the effect or of the joint.
+    """A change of a description.
+
+    Attributes
+    ----------
+    kind
+        "absent": a law where there was none. "points": working points at `angles` in place of a single edge law.
+        "sides": two sides in place of one. "cover": a cover without stiffness.
+    path
+        Of the effect or of the joint.
+    angles
+        Of the working points, rad.
     """
 
     kind: str
@@ -40,9 +48,9 @@ class Edit:
 def apply_edits(
     data: Data, edits: Iterable[Edit], rows: Sequence[Mapping[str, Any]], settings: Mapping[str, float]
 ) -> dict[str, Any]:
-    """A copy with the edits made, rows added to `extensions` and Stribeck velocities set.
+    """Return a copy with the edits made, rows added to `extensions` and Stribeck velocities set.
 
-    settings: path of a law's effect -> Stribeck velocity of all of its laws, m/s or rad/s.
+    `settings` maps the path of a law's effect to the Stribeck velocity of all of its laws, m/s or rad/s.
     """
     result = own_copy(data)
     for edit in sorted(edits, key=lambda each: _ORDER.index(each.kind)):
@@ -96,12 +104,12 @@ _MAKE = {ABSENT: _add_law, POINTS: _add_points, SIDES: _add_sides, COVER: _add_c
 
 
 def laws_of(entry: Any) -> list[dict[str, Any]]:
-    """The laws of an effect: those of its working points, or the only one."""
+    """Return the laws of an effect: those of its working points, or the only one."""
     return list(entry["laws"]) if entry.get("laws") is not None else [entry]
 
 
 def sides_at(data: Data, path: str) -> list[dict[str, Any]]:
-    """All sides of all laws of the effect at a path."""
+    """Return all sides of all laws of the effect at a path."""
     found = []
     for law in laws_of(get_number(data, path)):
         found += [law] if law.get("positive") is None else [law["positive"], law["negative"]]
@@ -109,7 +117,7 @@ def sides_at(data: Data, path: str) -> list[dict[str, Any]]:
 
 
 def law_columns(data: Data, path: str, numbers: Iterable[str]) -> Iterator[tuple[str, str]]:
-    """(path, number) of each of `numbers` in all laws and sides of the effect at a path."""
+    """Yield (path, number) for each of `numbers` in all laws and sides of the effect at a path."""
     entry = get_number(data, path)
     pointed = entry.get("laws") is not None
     for k, law in enumerate(laws_of(entry), start=1):
@@ -120,9 +128,9 @@ def law_columns(data: Data, path: str, numbers: Iterable[str]) -> Iterator[tuple
 
 
 def finer_paths(data: Data, path: str) -> list[str]:
-    """The numbers of an edited description that make up a number of the one before: all working points and sides.
+    """Return the numbers of an edited description that make up a number of the one before.
 
-    data: the edited description. path: of a number before.
+    They are those of all working points and sides.
     """
     matched = _LAW.fullmatch(path)
     if matched is None:
@@ -142,7 +150,7 @@ def finer_paths(data: Data, path: str) -> list[str]:
 
 
 def is_law_number(path: str) -> bool:
-    """Whether a path is that of a number of a friction law."""
+    """Return whether a path is that of a number of a friction law."""
     return _LAW.fullmatch(path) is not None
 
 
@@ -150,7 +158,7 @@ def is_law_number(path: str) -> bool:
 
 
 def add_to_number(data: dict[str, Any], path: str, value: float) -> None:
-    """Adds to a number in place; `coulomb` of a law takes `static` along."""
+    """Add a value to a number in place; `coulomb` of a law moves `static` along."""
     matched = _LAW.fullmatch(path)
     if matched is not None and matched["number"] == "coulomb":
         static = f"{path.rsplit('.', 1)[0]}.static"
@@ -160,7 +168,7 @@ def add_to_number(data: dict[str, Any], path: str, value: float) -> None:
 
 
 def data_number(data: Data, path: str) -> float:
-    """A number of a description, 0 where its key is left out."""
+    """Return a number of a description, 0 if its key is left out."""
     try:
         value = get_number(data, path)
     except KeyError:
@@ -169,7 +177,7 @@ def data_number(data: Data, path: str) -> float:
 
 
 def raise_to(data: dict[str, Any], edits: Iterable[Edit], settings: Mapping[str, float], share: float) -> None:
-    """Keeps every number of the edited laws valid and present: at least `share` of its law's coulomb friction."""
+    """Keep every number of the edited laws valid and present: at least `share` of its law's Coulomb friction."""
     for path in {edit.path for edit in edits if edit.kind != COVER} | set(settings):
         sides = sides_at(data, path)
         largest = max(abs(float(side["static"])) for side in sides) or 1e-6
@@ -182,6 +190,6 @@ def raise_to(data: dict[str, Any], edits: Iterable[Edit], settings: Mapping[str,
 
 
 def magnitudes_of(side: Mapping[str, Any]) -> tuple[float, float, float]:
-    """Coulomb friction, static − coulomb and viscous friction of a side."""
+    """Return Coulomb friction, static − coulomb and viscous friction of a side."""
     static, coulomb, _, viscous = (float(side.get(key) or 0.0) for key in MAGNITUDES)
     return coulomb, static - coulomb, viscous

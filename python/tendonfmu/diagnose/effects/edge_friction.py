@@ -1,4 +1,4 @@
-"""Friction of a tendon before a joint: at an edge that the model lacks, or depending on the angle where it does not."""
+"""Whether a tendon rubs before a joint: at an edge that the model lacks, or at a known edge depending on the angle."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from tendonfmu.diagnose.effects.friction_law_places import law_path, passes
 from tendonfmu.diagnose.span import Span
 from tendonfmu.model import effects
 
-_NARROW = 0.02  # rad; less motion of the joint before says nothing of an angle's influence
-_FARTHEST = 1e5  # rad; no joint turns as far
+_NARROW = 0.02  # rad; with less motion of the joint before, the influence of its angle does not show
+_FARTHEST = 1e5  # rad; no joint turns this far
 _EXPECTED = 0.3  # of the friction, from the middle of the range to its end
 _ANGLES = ("angle_low", "angle_middle", "angle_high")
 
 
 def _edges(data: Data) -> dict[Place, bool]:
-    """Present edges -> whether they have working points."""
+    """Return the present edges and whether they have working points."""
     found = (effect for effect in effects(data) if effect.kind == "edge_friction")
     return {Place(effect.joint, effect.tendon): bool(effect.angles) for effect in found}
 
@@ -40,7 +40,7 @@ def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
 
 
 def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
-    """Without angles a new law; with angles the shares by which friction grows at the ends of the range."""
+    """Return a new law without angles; with angles, the shares by which friction grows at the ends of the range."""
     path = law_path(place, {})
     if not shape:
         return absent_law(data, path, shape)

@@ -1,4 +1,7 @@
-"""A row of the description's `extensions` as a variant; its numbers: docs/reference/semantics.md#extensions."""
+"""How a row of the description's `extensions` becomes a variant.
+
+The numbers of each effect are in docs/reference/semantics.md#extensions.
+"""
 
 from __future__ import annotations
 
@@ -19,10 +22,10 @@ def row_variant(
     fixed: Mapping[str, float] | None = None,
     least: float = -math.inf,
 ) -> Variant:
-    """A term that is linear in its magnitudes.
+    """Return the variant of a term that is linear in its magnitudes.
 
-    numbers: name of each magnitude -> expected sign. fixed: the row's other numbers. least: that the description takes
-    of the magnitudes.
+    `numbers` maps the name of each magnitude to its expected sign. `fixed` holds the other numbers of the row. `least`
+    is the smallest magnitude that the description accepts.
     """
     path = next_row(data)
     sizes = MAGNITUDES[effect]
@@ -42,10 +45,18 @@ def secant_variant(
     only_joint: int | None = None,
     most: float = math.inf,
 ) -> Variant:
-    """A term whose torque has no useful derivative at zero: its column is the difference at full strength.
+    """Return the variant of a term without a useful derivative at zero: its column is the difference at full strength.
 
-    number: of the row, with the shape's value. scaled: whether twice the number makes about twice the difference.
-    only_joint: whose torque alone it changes. most: the largest size of the number that the description takes.
+    Parameters
+    ----------
+    number
+        Key of the row that gets the shape's value.
+    scaled
+        Whether twice the number makes about twice the difference.
+    only_joint
+        The only joint whose torque it changes.
+    most
+        Largest size of the number that the description accepts.
     """
     rows = (row(effect, place, **{number: float(shape[number])}),)
     keys = (number,) if scaled else ()

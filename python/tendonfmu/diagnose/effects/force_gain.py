@@ -1,4 +1,4 @@
-"""A force sensor whose gain is off."""
+"""Whether the gain of a force sensor is off."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tendonfmu.diagnose.effects.extension_row import row_variant
 from tendonfmu.diagnose.effects.friction_law_places import all_tendons, without_rows
 
 NAME = "force_gain"
-_LEAST = -0.9  # of the gain; at −1 nothing is left of the force
+_LEAST = -0.9  # of the gain; at −1 there would be no force
 
 
 def _places(data: Data, kinematics: int) -> list[Place]:

@@ -1,4 +1,4 @@
-"""A force sensor whose zero is off."""
+"""Whether the zero of a force sensor is off."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Friction that changes in the course of time."""
+"""Whether friction changes in the course of time."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _LEAST = -0.85  # of the friction
 
 
 def _places(data: Data, kinematics: int) -> list[Place]:
-    """Each joint and tendon with friction; and everywhere, where there are several."""
+    """Return each joint and tendon with friction, and everywhere if there are several."""
     places = [*rubbing_joints(data), *rubbing_tendons(data)]
     return without_rows(data, NAME, ([Place()] if len(places) > 1 else []) + places)
 

@@ -1,4 +1,4 @@
-"""The weight of the link that a joint turns."""
+"""Whether the weight of the link that a joint turns is missing."""
 
 from __future__ import annotations
 

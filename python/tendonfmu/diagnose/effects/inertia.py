@@ -1,4 +1,4 @@
-"""The torque that it takes to accelerate a joint."""
+"""Whether the torque that accelerates a joint is missing."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ CANDIDATE = Candidate(
     title="the link's inertia",
     explanation=(
         "A torque in proportion to the joint's acceleration: the link's mass, or a motor's that is geared to it. "
-        "Negative where a known load has too much of it taken off."
+        "It is negative if too much inertia was subtracted with a known load."
     ),
     sign=0,
     excited_by="fast starts and stops of this joint, with the same travel at different accelerations",

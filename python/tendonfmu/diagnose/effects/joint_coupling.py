@@ -1,4 +1,4 @@
-"""A spring between a joint and the next one."""
+"""Whether there is a spring between a joint and the next one."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def _places(data: Data, kinematics: int) -> list[Place]:
 
 
 def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
-    """The next joint feels it too, or nothing of it."""
+    """Return two forms: the next joint feels the spring, too, or it does not."""
     return [{}, {"reaction": 0.0}]
 
 

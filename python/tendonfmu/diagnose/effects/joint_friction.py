@@ -1,4 +1,4 @@
-"""Friction in a joint itself, where the model has none."""
+"""Whether there is friction in a joint itself, where the model has none."""
 
 from __future__ import annotations
 

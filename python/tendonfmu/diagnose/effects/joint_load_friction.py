@@ -1,4 +1,4 @@
-"""Friction in a joint that grows with the forces of all its tendons, where the model has none."""
+"""Whether friction in a joint grows with the forces of all its tendons, where the model has no such part."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Friction in a joint that grows with the force of one tendon."""
+"""Whether friction in a joint grows with the force of one tendon."""
 
 from __future__ import annotations
 

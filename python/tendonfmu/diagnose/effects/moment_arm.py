@@ -1,4 +1,4 @@
-"""A moment arm that is not what the description says."""
+"""Whether a moment arm differs from the description."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A moment arm that changes with the joint's angle."""
+"""Whether a moment arm changes with the joint's angle."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Friction of a tendon that does not scale with its force."""
+"""Whether a tendon has friction that does not scale with its force."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ NAME = "preload_friction"
 
 
 def _places(data: Data, kinematics: int) -> list[Place]:
-    """Before each joint that the tendon reaches; not where a row says that it rubs before all of them."""
+    """Return each joint that the tendon reaches, unless a row says that the tendon rubs before all of them."""
     everywhere = row_places(data, NAME)
     return [
         place for place in without_rows(data, NAME, list(passes(data))) if Place(tendon=place.tendon) not in everywhere
@@ -21,7 +21,7 @@ def _places(data: Data, kinematics: int) -> list[Place]:
 
 
 def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
-    """The joints beyond feel it too, or, where there are some, nothing of it."""
+    """Return the forms: the joints beyond feel the friction, too; if there are some, also that they do not."""
     arms = data["tendons"][(place.tendon or 1) - 1]["moment_arms"]
     return [{}, {"beyond": 0.0}] if any(arms[place.joint or 0 :]) else [{}]
 
@@ -35,7 +35,7 @@ CANDIDATE = Candidate(
     title="a tendon rubs however little it pulls",
     explanation=(
         "The tendon loses the same force at every tension, as in a seal, a tight sheath or a clamped guide. Look "
-        "at whether friction is left when the pretension is taken off."
+        "at whether friction remains without pretension."
     ),
     sign=1,
     excited_by="the same strokes at pretensions as different as the hand allows, the lowest first of all",

@@ -1,4 +1,4 @@
-"""Friction that builds up over a distance after each reversal."""
+"""Whether friction builds up over a distance after each reversal."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from tendonfmu.diagnose.span import Span
 NAME = "presliding"
 EVERYWHERE = Place()
 OF_TRAVEL = (0.002, 0.008, 0.03, 0.12)  # distances that are tried, of the median travel between reversals
-LONGEST = 0.1  # of the median travel between reversals: what builds up over more is a spring
-_TIMES = (0.3, 3.0)  # distances at one place, times that of everywhere
+LONGEST = 0.1  # of the median travel between reversals: friction that builds up over more is a spring
+_TIMES = (0.3, 3.0)  # distances at one place, times the distance everywhere
 _SLOWEST = 1e-9  # m/s or rad/s: a threshold of 0 has no scale
 
 
@@ -24,7 +24,10 @@ def _single_places(data: Data) -> list[Place]:
 
 
 def _places(data: Data, kinematics: int) -> list[Place]:
-    """All at once where none has it, else single ones: a place's own row takes precedence there."""
+    """Return everywhere if no place has presliding, else the single places without it.
+
+    A place's own row takes precedence over the row for everywhere.
+    """
     taken = row_places(data, NAME)
     if not taken:
         return [EVERYWHERE] if _single_places(data) and min(thresholds(data)) > _SLOWEST else _single_places(data)
@@ -43,13 +46,13 @@ def _threshold(data: Data, place: Place) -> float:
 
 
 def usual_time(data: Data, span: Span) -> float:
-    """s: travel from reversal to reversal over the threshold of motion, median over the places with friction."""
+    """Return the travel between reversals over the threshold of motion, s: the median over the places with friction."""
     times = [_travel(place, span) / max(_threshold(data, place), _SLOWEST) for place in _single_places(data)]
     return float(np.median([each for each in times if each > 0] or [0.0]))
 
 
 def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
-    """Everywhere in s, times the threshold of motion; at a place in m or rad."""
+    """Return the grid: everywhere in s, which is multiplied by the threshold of motion; at a place in m or rad."""
     if place == EVERYWHERE:
         usual = usual_time(data, span)
         return [{"displacement": share * usual} for share in OF_TRAVEL] if usual > 0 else []
@@ -62,7 +65,7 @@ def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
 
 
 def is_spring(data: Data, span: Span) -> bool:
-    """Whether some presliding of a fitted description is so long that it stands for a spring."""
+    """Return whether some presliding of a fitted description is so long that it stands for a spring."""
     for row in data.get("extensions") or []:
         if row["effect"] == NAME:
             place = Place(row.get("joint"), row.get("tendon"))
@@ -73,7 +76,7 @@ def is_spring(data: Data, span: Span) -> bool:
 
 
 def is_everywhere(row: Mapping[str, object]) -> bool:
-    """Whether a row of `extensions` is presliding at all places."""
+    """Return whether a row of `extensions` is presliding at all places."""
     return row["effect"] == NAME and row.get("joint") is None and row.get("tendon") is None
 
 

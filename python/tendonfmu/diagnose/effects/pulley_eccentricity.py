@@ -1,4 +1,4 @@
-"""A pulley that turns about a point beside its centre."""
+"""Whether a pulley turns about a point beside its centre."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from tendonfmu.diagnose.effects.friction_law_places import passes, without_rows
 from tendonfmu.diagnose.span import Span
 
 NAME = "pulley_eccentricity"
-MOST_TURNS = 12.0  # of a pulley that the tendon turns, while the joint turns once: arm over radius
-_APART = 2.0  # rad, over the range of the joint, of neighbours in the grid: halfway both fit well
-_FEWEST = 1.5 * 2.0 * np.pi  # rad, over the range, of a pulley that the tendon turns: less looks like any function
+MOST_TURNS = 12.0  # of a pulley that the tendon turns, per turn of the joint: arm over radius
+_APART = 2.0  # rad, over the joint's range, between neighbours in the grid: halfway both fit well
+_FEWEST = 1.5 * 2.0 * np.pi  # rad, over the joint's range, of a fast pulley: less looks like any function
 
 
 def _places(data: Data, kinematics: int) -> list[Place]:
@@ -22,7 +22,7 @@ def _places(data: Data, kinematics: int) -> list[Place]:
 
 
 def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
-    """The pulley turns with the joint, or so much faster that it turns round more than once."""
+    """Return the forms: the pulley turns with the joint, or so much faster that it makes more than one turn."""
     low, high = span.angle[(place.joint or 1) - 1]
     reach = max(float(high - low), _APART / MOST_TURNS)
     fast = np.arange(_FEWEST / reach, MOST_TURNS, _APART / reach)

@@ -1,4 +1,4 @@
-"""Friction of a tendon at the pulley of a joint, where the model has none."""
+"""Whether a tendon rubs at the pulley of a joint, where the model has no friction."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
-"""Friction near standstill that is not what the law has there, in a law that has static equal to coulomb.
+"""Whether friction near standstill differs from that of the law, where the law has static equal to coulomb.
 
-Larger: the law's own `static`. Smaller, so that friction rises from rest with speed: no law says that (static >=
-coulomb), a row of `extensions` does; proposed in joints whose law has viscous friction, the simpler of the two.
+- Larger friction is the law's own `static`.
+- Smaller friction, which rises from rest with speed, is a row of `extensions`, because a law needs static >= coulomb.
+  It is proposed in joints whose law has viscous friction, the simpler of the two.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from tendonfmu.model import Effect, velocity_threshold
 
 NAME = "stribeck"
 _OF_SPEED = (0.03, 0.1, 0.3)  # Stribeck velocities, of the 95 % speed
-_LEAST = 1.0  # of the threshold of motion: below, nothing is left of it where the effect moves
+_LEAST = 1.0  # of the threshold of motion: a smaller velocity leaves nothing of the effect during motion
 _EXPECTED = 0.25  # of the Coulomb friction
 _LEAST_AMPLITUDE = -0.95  # of a row: friction does not change its sign
 
@@ -34,7 +35,7 @@ def _lacks(data: Data, effect: Effect) -> bool:
 
 
 def _can_rise(data: Data, effect: Effect) -> bool:
-    """Whether a row may say that friction of this joint rises from rest."""
+    """Return whether a row may let the friction of this joint rise from rest."""
     thick = all(viscous > 0 for _, _, viscous in all_sides(data, effect))
     return not effect.tendon and thick and Place(joint=effect.joint) not in row_places(data, NAME)
 

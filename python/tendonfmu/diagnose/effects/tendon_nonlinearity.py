@@ -1,4 +1,4 @@
-"""A tendon whose spring is progressive."""
+"""Whether the spring of a tendon is progressive."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _SHARES = (0.01, 0.2)  # hardening·e²/(k·e) at the largest force, e = f/k
 
 
 def _places(data: Data, kinematics: int) -> list[Place]:
-    """Stretch matters where the joint angles come from the tendon positions."""
+    """Return the tendons if the joint angles come from the tendon positions; otherwise stretch does not matter."""
     return without_rows(data, NAME, all_tendons(data)) if kinematics == 1 else []
 
 

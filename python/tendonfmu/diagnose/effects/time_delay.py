@@ -1,4 +1,4 @@
-"""Forces and positions that are not of the same time."""
+"""Whether forces and positions are of different times."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from tendonfmu.diagnose.effects.friction_law_places import without_rows
 from tendonfmu.diagnose.span import Span
 
 NAME = "time_delay"
-_DELAYS = (0.002, 0.01)  # s; larger ones are scanned for (starting_point.py)
+_DELAYS = (0.002, 0.01)  # s; larger delays are scanned for (starting_point.py)
 _LONGEST = 0.05  # s; docs/reference/semantics.md#extensions
-_LEAST_STEPS, _MOST_STEPS = 0.5, 60.0  # samples: what can be told, and what the model remembers
+_LEAST_STEPS, _MOST_STEPS = 0.5, 60.0  # samples: the smallest visible delay, and what the model remembers
 
 
 def _places(data: Data, kinematics: int) -> list[Place]:
@@ -27,9 +27,10 @@ def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
 
 
 def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
-    """Its column is what a delay does to forces that the model explains: they run ahead of it, or behind it.
+    """Return the variant; its column is the effect of a delay on forces that the model explains.
 
-    The row undoes that for measured forces; at a reversal the two differ in the sign of the time since.
+    The row of the description undoes this for measured forces. At a reversal the two differ in the sign of the time
+    since.
     """
     variant = secant_variant(data, NAME, place, shape, "delay", scaled=True, most=_LONGEST)
     return replace(variant, late=float(shape["delay"]))

@@ -1,4 +1,4 @@
-"""Friction that grows with speed, in a law that has none of it."""
+"""Whether friction grows with speed, where the law has no viscous part."""
 
 from __future__ import annotations
 

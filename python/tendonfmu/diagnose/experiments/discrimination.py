@@ -1,4 +1,4 @@
-"""The motion that a diagnosis asked for (`tendonfmu excite FINGER --discriminate DIR`)."""
+"""Which motion a diagnosis asked for (`tendonfmu excite FINGER --discriminate DIR`)."""
 
 from __future__ import annotations
 
@@ -24,25 +24,35 @@ RATE = 100.0  # rows per second
 
 @dataclass(frozen=True)
 class Discrimination:
-    """What to record next. sentence: what it tells. entry: of the menu; performed: its motion."""
+    """What to record next.
+
+    Attributes
+    ----------
+    sentence
+        What the recording distinguishes.
+    entry
+        Of the menu.
+    performed
+        The motion of the entry.
+    """
 
     sentence: str
     entry: Entry
     performed: Performed
 
     def columns(self) -> dict[str, Numbers]:
-        """Name -> [N], as `tendonfmu excite` writes a motion."""
+        """Return name -> values [N], as `tendonfmu excite` writes a motion."""
         return self.performed.columns()
 
     def lines(self) -> Iterator[str]:
-        """What it tells, how long it takes, and which known load belongs to which time."""
+        """Yield what the recording distinguishes, how long it takes, and which known load applies at which time."""
         time, load = self.performed.time, self.performed.load
         yield self.sentence
         yield f"{time[-1]:.0f} s: {self.entry.words}"
         if load.any():
             edges = np.flatnonzero(np.any(np.diff(load, axis=0) != 0, axis=1)) + 1
             for begin, end in zip([0, *edges], [*edges, len(time)], strict=True):
-                if end - begin > 1:  # standing, not changing
+                if end - begin > 1:  # constant load, not a transition
                     torques = ", ".join(f"{value:.3g}" for value in load[begin])
                     yield f"known load {torques} N·m from {time[begin]:.1f} to {time[end - 1]:.1f} s"
 
@@ -54,14 +64,34 @@ def discriminating_motion(
     limits: Sequence[tuple[float, float]] | None = None,
     rate: float = RATE,
 ) -> Discrimination:
-    """folder: of a diagnosis. data: the finger's description. limits: [n] of (low, high) rad that its joints have, if
-    they are known. rate: rows per second. Raises InputError.
+    """Read the experiment that a diagnosis asked for and compute its motion.
+
+    Parameters
+    ----------
+    folder
+        Folder of the diagnosis.
+    data
+        Description of the finger.
+    limits
+        (low, high) of each joint, rad [n], if known.
+    rate
+        Rows per second.
+
+    Returns
+    -------
+    Discrimination
+        Sentence, menu entry and motion.
+
+    Raises
+    ------
+    InputError
+        If the folder has no valid report, the report asks for no experiment, or a joint would leave its limits.
     """
     report = _read_report(folder / REPORT)
     experiment = report.get("experiment") or {}
     motion = experiment.get("motion") or {}
     if not motion:
-        said = report.get("next_experiment") or "nothing is left to tell apart"
+        said = report.get("next_experiment") or "nothing is left to distinguish"
         raise InputError(f"{folder / REPORT}: no further experiment to plan: {said}")
     try:
         found = performed_of(data, motion, rate)
@@ -72,7 +102,7 @@ def discriminating_motion(
 
 
 def performed_of(data: Mapping[str, Any], motion: Mapping[str, Any], rate: float = RATE) -> tuple[Entry, Performed]:
-    """The entry of `diagnosis_result.Experiment.motion` and its motion. Raises InputError."""
+    """Return the entry and its motion for `result.Experiment.motion`; raises InputError if it is not valid."""
     entry = entry_from_json(motion, len(data["joints"]))
     return entry, perform(data, entry, rate, int(motion.get("seed", 0)))
 

@@ -1,7 +1,7 @@
 """What else could be recorded: a menu of motions, pretensions and known loads, mostly in the range that was recorded.
 
-An entry is a list of sections, each a training motion of `excite/excitation.py` with a pretension and a load of its
-own; it is plain JSON (`Menu`), so that a report can carry it and `tendonfmu excite --discriminate` can write it.
+An entry is a list of sections. Each is a training motion of `excite/excitation.py` with its own pretension and load. An
+entry is plain JSON (`Entry.as_json`), so a report can carry it and `tendonfmu excite --discriminate` can write it.
 """
 
 from __future__ import annotations
@@ -29,17 +29,34 @@ LONG = 600.0  # s
 _SMALL = 0.08  # of a joint's range: small strokes
 _POSTURES = (0.2, 0.5, 0.8)  # of a joint's range: where small strokes are made
 _LEAST_RANGE, _LEAST_SPEED = 0.02, 0.05  # rad, rad/s
-_TAUT = 0.25  # of its pretension that every pulling tendon keeps under the known load
-_LOOP_LOAD = 3.0  # times the torque that was recorded: known load at a finger that holds no pretension
+_TAUT = 0.25  # of its pretension, which every pulling tendon keeps under the known load
+_LOOP_LOAD = 3.0  # times the recorded torque: known load on a finger that holds no pretension
 _SHARES = (0.5, 1.0, 2.0, 4.0)  # of a known load that holds the tendons
-_ALTERNATIONS = 2  # of a known load from one side to the other
+_ALTERNATIONS = 2  # from one side to the other, of a known load
 
 
 @dataclass(frozen=True)
 class Section:
-    """A stretch of motion. ranges: [n] of (low, high) rad. max_speed: rad/s. seconds. pretension: N, mean. swing: Hz,
-    at which the tensions swing between `lowest` and `highest` (N), from tendon to tendon; None: they stand. load: [n]
-    N·m, known, at the joints. max_acceleration: rad/s².
+    """A stretch of motion.
+
+    Attributes
+    ----------
+    ranges
+        (low, high) of each joint, rad [n].
+    max_speed
+        rad/s.
+    seconds
+        Duration, s.
+    pretension
+        Mean, N.
+    swing
+        Frequency at which the tensions swing, Hz, different from tendon to tendon; None for constant tensions.
+    lowest, highest
+        Limits of swinging tensions, N.
+    load
+        Known load at the joints, N·m [n].
+    max_acceleration
+        rad/s².
     """
 
     ranges: tuple[tuple[float, float], ...]
@@ -55,7 +72,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Entry:
-    """motion, tension, load: in words, for a sentence; tension, load: "" where they are as recorded."""
+    """One entry of the menu; `motion`, `tension` and `load` are words for a sentence, "" if as recorded."""
 
     motion: str
     sections: tuple[Section, ...]
@@ -75,7 +92,7 @@ class Entry:
 
 
 def entry_from_json(value: Mapping[str, Any], joints: int) -> Entry:
-    """Raises InputError unless it is an entry for a finger of that many joints."""
+    """Return the entry of a report; raise InputError unless it is for a finger with that many joints."""
     try:
         sections = tuple(
             Section(
@@ -93,7 +110,7 @@ def entry_from_json(value: Mapping[str, Any], joints: int) -> Entry:
     for k, section in enumerate(sections, start=1):
         if len(section.ranges) != joints or len(section.load) not in (0, joints):
             raise InputError(
-                f"experiment.motion.sections[{k}]: {len(section.ranges)} ranges, {len(section.load)} loads; "
+                f"experiment.motion.sections[{k}]: {len(section.ranges)} ranges and {len(section.load)} loads; "
                 f"expected {joints}, one per joint"
             )
     return entry
@@ -101,8 +118,22 @@ def entry_from_json(value: Mapping[str, Any], joints: int) -> Entry:
 
 @dataclass(frozen=True)
 class Recorded:
-    """What was recorded. ranges: [n, 2] rad; speed: rad/s, fastest; pretension: N, mean tendon force; torque: [n] N·m,
-    spread of the joint torque; seconds: of the longest stretch. load: [n] N·m, mean of the known load.
+    """What was recorded.
+
+    Attributes
+    ----------
+    ranges
+        rad [n, 2].
+    speed
+        Fastest, rad/s.
+    pretension
+        Mean tendon force, N.
+    torque
+        Spread of the joint torque, N·m [n].
+    seconds
+        Length of the longest stretch.
+    load
+        Mean of the known load, N·m [n].
     """
 
     ranges: Numbers
@@ -114,7 +145,7 @@ class Recorded:
 
 
 def recorded_of(span: Span, load: Numbers | None = None) -> Recorded:
-    """Ranges of less than a little are widened: every joint has to move. load: [n] N·m."""
+    """Return what was recorded; very small ranges are widened, because every joint must move. `load` is in N·m [n]."""
     middle, half = span.angle.mean(axis=1), np.maximum(0.5 * np.ptp(span.angle, axis=1), 0.5 * _LEAST_RANGE)
     return Recorded(
         ranges=np.column_stack([middle - half, middle + half]),
@@ -127,7 +158,7 @@ def recorded_of(span: Span, load: Numbers | None = None) -> Recorded:
 
 
 def own_tension(data: Data) -> Numbers:
-    """[m] tendon forces per newton of pretension; zeros where the finger holds none by itself."""
+    """Return tendon forces per newton of pretension [m]; zeros if the finger holds none by itself."""
     try:
         return pretension_vector(data)
     except InputError:
@@ -138,7 +169,7 @@ def own_tension(data: Data) -> Numbers:
 
 
 def motions(recorded: Recorded) -> Iterator[Entry]:
-    """At the tension that was recorded, the simplest first."""
+    """Yield the motions at the recorded tension, the simplest first."""
     whole = _as_ranges(recorded.ranges)
     held = () if recorded.load is None else tuple(recorded.load.tolist())
     usual = Section(whole, recorded.speed, SECONDS, recorded.pretension, load=held)
@@ -171,7 +202,7 @@ def _as_ranges(ranges: Numbers) -> tuple[tuple[float, float], ...]:
 
 
 def _long_enough(section: Section) -> Section:
-    """At least as long as a stroke through the whole range and back takes, twice."""
+    """Return a section that lasts at least two strokes through the whole range and back."""
     span = max(high - low for low, high in section.ranges)
     return replace(section, seconds=max(section.seconds, 10.0 + 8 * span / section.max_speed))
 
@@ -204,7 +235,10 @@ def _small_strokes(recorded: Recorded, usual: Section) -> Entry:
 
 
 def tensions(data: Data, entry: Entry) -> Iterator[Entry]:
-    """The entry at several pretensions, and with tensions that swing faster than a bias drifts, where it holds any."""
+    """Yield the entry at several pretensions, and with tensions that swing faster than a bias drifts.
+
+    Nothing is yielded if the finger holds no pretension.
+    """
     base = entry.sections[0].pretension
     if not own_tension(data).any() or base <= 0:
         return
@@ -225,7 +259,7 @@ def tensions(data: Data, entry: Entry) -> Iterator[Entry]:
 
 
 def loads(data: Data, entry: Entry, recorded: Recorded) -> Iterator[Entry]:
-    """The entry with a known load at the joints, on one side and on the other."""
+    """Yield the entry with a known load at the joints, on one side and on the other."""
     first = entry.sections[0]
     own = first.pretension * own_tension(data)
     least = own if first.swing is None else np.minimum(own, first.lowest)
@@ -251,14 +285,16 @@ def loads(data: Data, entry: Entry, recorded: Recorded) -> Iterator[Entry]:
 
 
 def _held_by_load(data: Data, recorded: Recorded) -> bool:
-    """Whether pulling tendons are held taut by a known load alone, which then has to stay on its side."""
+    """Return whether a known load alone keeps pulling tendons taut; it must then stay on its side."""
     pulls = any(not tendon.get("bidirectional") for tendon in data["tendons"])
     return pulls and not own_tension(data).any() and recorded.load is not None and bool(recorded.load.any())
 
 
 def known_load(data: Data, tension: Numbers, recorded: Recorded) -> Numbers:
-    """[n] N·m that leaves every pulling tendon taut at tensions (N, [m]), on either side; that of the recordings where
-    it holds the tendons, and some times the joint torque where cable loops carry any load.
+    """Return a load that leaves every pulling tendon taut at these tensions (N, [m]), on either side, N·m [n].
+
+    If the recorded load holds the tendons, it is that load. Cable loops carry any load; they get some times the joint
+    torque.
     """
     if _held_by_load(data, recorded):
         return np.asarray(recorded.load)
@@ -272,11 +308,11 @@ def known_load(data: Data, tension: Numbers, recorded: Recorded) -> Numbers:
 
 
 def _shortened(section: Section, count: int, **changes: Any) -> Section:
-    """One of `count` sections that together take about as long, none too short for a motion."""
+    """Return one of `count` sections that together last about as long; none is too short for a motion."""
     least = 8.0 + 4 * max(high - low for low, high in section.ranges) / section.max_speed
     return replace(section, seconds=max(section.seconds / count, least, 12.0), **changes)
 
 
 def combined(data: Data, motion: Entry, recorded: Recorded) -> Sequence[Entry]:
-    """A motion at several pretensions and with a known load."""
+    """Return a motion at several pretensions, each with a known load."""
     return [loaded for tense in tensions(data, motion) for loaded in loads(data, tense, recorded)]

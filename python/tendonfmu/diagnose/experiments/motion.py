@@ -1,5 +1,6 @@
-"""The motion of an experiment of the menu, sample by sample: for the table that a robot or a rig runs, and for the
-recording that the model expects of it.
+"""How an experiment of the menu moves, sample by sample.
+
+The motion is for the table that a robot or a rig runs, and for the recording that the model expects of it.
 """
 
 from __future__ import annotations
@@ -21,16 +22,28 @@ from tendonfmu.statistics import quintic
 Numbers = NDArray[np.float64]
 Data = Mapping[str, Any]
 
-_SPREAD = (0.75, 1.35)  # times the frequency of the swing, of the first and the last of the ways in which tensions can
-_CLOSE = 1e-9  # of the largest singular value: moment arms that are dependent
-_CHANGE = 2.0  # s, at least, from one section to the next
-_PEAK_OVER_MEAN = 1.875  # speed of a quintic stroke from rest to rest
+_SPREAD = (0.75, 1.35)  # times the frequency of the swing, of the first and last independent change of tensions
+_CLOSE = 1e-9  # of the largest singular value: smaller ones mean dependent moment arms
+_CHANGE = 2.0  # s; least time from one section to the next
+_PEAK_OVER_MEAN = 1.875  # of the speed of a quintic stroke from rest to rest
 
 
 @dataclass(frozen=True)
 class Performed:
-    """time: [N] s. position, velocity, acceleration: [N, n] rad, rad/s, rad/s². tension: [N, m] N, that holds itself.
-    load: [N, n] N·m, known. tendon_position: [N, m] m, motor side, without friction and load.
+    """The motion of an entry.
+
+    Attributes
+    ----------
+    time
+        s [N].
+    position, velocity, acceleration
+        rad, rad/s, rad/s² [N, n].
+    tension
+        Tendon forces in balance with each other, N [N, m].
+    load
+        Known load, N·m [N, n].
+    tendon_position
+        On the motor side, without friction and load, m [N, m].
     """
 
     time: Numbers
@@ -42,7 +55,7 @@ class Performed:
     tendon_position: Numbers
 
     def columns(self) -> dict[str, Numbers]:
-        """Name -> [N], as `tendonfmu excite` writes it."""
+        """Return name -> values [N], as `tendonfmu excite` writes them."""
         table = {"time": self.time}
         groups = {
             "joint_position": self.position,
@@ -56,7 +69,10 @@ class Performed:
 
 
 def perform(data: Data, entry: Entry, rate: float, seed: int = 0) -> Performed:
-    """An entry's sections one after the other, at rest between them. rate: 1/s. Raises InputError."""
+    """Return an entry's sections one after the other, at rest between them.
+
+    `rate` is in 1/s. Raises InputError if a section is not possible.
+    """
     pieces: list[Performed] = []
     for number, section in enumerate(entry.sections):
         piece = _section(data, section, rate, seed + number)
@@ -67,9 +83,9 @@ def perform(data: Data, entry: Entry, rate: float, seed: int = 0) -> Performed:
 
 
 def expected_recording(data: Data, performed: Performed, kinematics: int) -> FitRecording:
-    """What the model expects to be recorded: the forces that carry its friction and the load, all samples free motion.
+    """Return the recording that the model expects, with the forces that carry its friction and the load.
 
-    kinematics: source of the recordings to come, 1 to 3.
+    All samples are free motion. `kinematics` is the source of the future recordings, 1 to 3.
     """
     spread = np.linalg.pinv(moment_arms(data))
     motion = {
@@ -129,15 +145,17 @@ def _section(data: Data, section: Section, rate: float, seed: int) -> Performed:
 
 
 def _plannable(data: Data) -> Data:
-    """The finger as a plan takes it: tendons that a known load alone holds count as loops, which need no pretension."""
+    """Return the finger for planning: tendons held only by a known load count as loops, which need no pretension."""
     if own_tension(data).any():
         return data
     return {**data, "tendons": [{**tendon, "bidirectional": True} for tendon in data["tendons"]]}
 
 
 def _tension(data: Data, section: Section, motion: Excitation) -> Numbers:
-    """[N, m] N that hold themselves. Where they swing, each way in which tensions can change without turning a joint
-    has a frequency of its own, so that no two tendons swing alike; together they stay within the limits.
+    """Return tendon forces in balance with each other, N [N, m].
+
+    If they swing, each independent change of the tensions that turns no joint has its own frequency, so that no two
+    tendons swing alike. Together they stay within the limits.
     """
     if section.swing is None:
         return motion.tension
@@ -159,13 +177,16 @@ def _tension(data: Data, section: Section, motion: Excitation) -> Numbers:
 
 
 def _fit(limit: Numbers, shares: Numbers, worst: Any) -> float:
-    """Pretension at which every tendon's share keeps its limit."""
+    """Return the pretension at which every tendon's share keeps its limit."""
     used = shares > _CLOSE
     return float(worst(limit[used] / shares[used]))
 
 
 def _passage(before: Performed, after: Performed, speed: float, rate: float) -> Performed:
-    """From the end of one section to the beginning of the next, from rest to rest; its ends belong to these."""
+    """Return the motion from the end of one section to the beginning of the next, without its first and last sample.
+
+    It begins and ends at rest.
+    """
     way = float(np.abs(after.position[0] - before.position[-1]).max())
     rows = int(np.ceil(max(_CHANGE, _PEAK_OVER_MEAN * way / (0.5 * speed)) * rate))
     time = np.arange(1, rows) / rate
@@ -182,7 +203,7 @@ def _passage(before: Performed, after: Performed, speed: float, rate: float) -> 
 
 
 def _stroke(start: Numbers, end: Numbers, seconds: float, time: Numbers) -> tuple[Numbers, Numbers, Numbers]:
-    """[K, n] quintics from rest to rest, with their first and second derivatives."""
+    """Return quintics from rest to rest with their first and second derivatives [K, n]."""
     share, slope, bend = quintic.evaluate(np.array([[0.0, 0.0, 0.0, 0.0], [seconds, 1.0, 0.0, 0.0]]), time)
     way = (end - start)[None]
     return start[None] + share[:, None] * way, slope[:, None] * way, bend[:, None] * way

@@ -1,10 +1,11 @@
-"""Which further recording would tell what these cannot: two causes that look alike, or one that refitting absorbs.
+"""Which further recording answers a question that the present ones cannot.
 
-For every entry of a menu the model predicts a recording, and the columns of the causes in it come from the C core like
-those of a diagnosis. What is left of a cause when all numbers of the model, the slow bias and the other cause explain
-of it what they can, in the new recording and in the old ones together, is the Schur complement of their Gram matrix;
-over the noise it says how far the two predictions will be apart (the T-optimality of Atkinson and Fedorov, "The design
-of experiments for discriminating between two rival models", Biometrika 62 (1975)).
+The question is about two causes that look alike, or about one that refitting absorbs. The model predicts a recording
+for every entry of a menu. The columns of the causes in it come from the C core, as in a diagnosis. All numbers of the
+model, the slow bias and the other cause then explain as much of a cause as they can, in the new recording and in the
+old ones together. What is left is the Schur complement of their Gram matrix. Its ratio to the noise says how far apart
+the two predictions will be. This is the T-optimality of Atkinson and Fedorov, "The design of experiments for
+discriminating between two rival models", Biometrika 62 (1975).
 """
 
 from __future__ import annotations
@@ -38,23 +39,24 @@ Data = Mapping[str, Any]
 Progress = Callable[[int, int], None]
 
 VISIBLE = 0.33  # rms of what is left over that of the noise: about a tenth of its variance, found in 49 of 50 cases
-SHARE = 0.01  # of a cause that survives the refit; below it is not visible however large it is
+SHARE = 0.01  # of a cause that survives the refit: a smaller share is not visible, however large the cause is
 _RATE = 50.0  # 1/s, of a predicted recording
 _LEAST_RATE, _MOST_SAMPLES = 10.0, 3200
 _BLOCK = 0.02  # s
-_OLD_SECONDS = 60.0  # of each recording that is looked at again
-CLEAR = 1.0  # rms of what is left over that of the noise, beyond which no more is tried
-_BETTER = 1.5  # times what there is now
-_FAINTEST = 0.01  # times the noise: what is left of less is rounding
-_SIMPLER = 0.7  # of the largest distance is enough for a simpler entry
-_RANK = 1e-9  # of the largest direction of a Gram matrix of columns of length 1: what float32 columns can tell
+_OLD_SECONDS = 60.0  # of each old recording that is used, s
+CLEAR = 1.0  # rms of what is left over that of the noise: no more entries are tried beyond
+_BETTER = 1.5  # times the present distance
+_FAINTEST = 0.01  # times the noise: smaller values are rounding errors
+_SIMPLER = 0.7  # of the largest distance is sufficient for a simpler entry
+_RANK = 1e-9  # of the largest direction of a Gram matrix of columns of length 1: resolution of float32 columns
 
 
 @dataclass(frozen=True)
 class Question:
-    """What a recording is to tell: `rival` from `cause`; or, with rival None, whether `cause` is there at all.
+    """What a recording is to show: the difference between `cause` and `rival`, or whether `cause` is there at all.
 
-    Magnitudes of (): those of an ordinary effect; shape {}: the middle one of its grid.
+    Magnitudes of () are those of an ordinary effect; a shape {} is the middle one of its grid. `rival` is None for the
+    second question.
     """
 
     cause: Accepted
@@ -63,8 +65,16 @@ class Question:
 
 @dataclass(frozen=True)
 class Answer:
-    """Of one question. distance: what the entry adds to what is left of the cause, rms over that of the noise; now: the
-    same of the recordings that there are. share: of the cause's variance that survives bias and refit, in all.
+    """What an entry shows for one question.
+
+    Attributes
+    ----------
+    distance
+        Rms of what the entry adds to the remaining part of the cause, over that of the noise.
+    now
+        The same for the present recordings.
+    share
+        Share of the cause's variance that survives bias and refit, in all recordings together.
     """
 
     question: Question
@@ -75,8 +85,10 @@ class Answer:
 
     @property
     def tells(self) -> bool:
-        """Whether it is worth recording. How large an effect is that was never seen nobody knows: that a refit leaves
-        it, and more of it than before, is enough.
+        """Whether the entry is worth recording.
+
+        The size of an effect that was never seen is unknown. For such an effect it is enough that a refit leaves some
+        of it, and more than before.
         """
         better = self.distance >= max(_BETTER * self.now, _FAINTEST)
         return self.share >= SHARE and (self.distance >= VISIBLE or (self.question.rival is None and better))
@@ -88,19 +100,27 @@ class Answer:
 
 @dataclass(frozen=True)
 class Experiments:
-    """answers: for each question the entry that tells it best. best: what to do first, for most of them."""
+    """The planned experiments.
+
+    Attributes
+    ----------
+    answers
+        For each question, the entry that answers it best.
+    best
+        What to do first: the experiment that answers most questions.
+    """
 
     answers: tuple[Answer, ...]
     best: Experiment
     seed: int = 0
 
     def motion(self, number: int) -> dict[str, Any]:
-        """What answers one question, as `Experiment.motion`; empty where nothing of the menu does."""
+        """Return what answers one question in the form of `Experiment.motion`; empty if no entry of the menu does."""
         told = bool(self.answers) and self.answers[number].tells
         return {**self.answers[number].entry.as_json(), "seed": self.seed} if told else {}
 
     def sentence(self, number: int) -> str:
-        """For one question, in plain words."""
+        """Return the experiment for one question in plain words."""
         return _sentence([self.answers[number]]) if self.answers else self.best.sentence
 
 
@@ -114,10 +134,23 @@ def plan_experiments(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Experiments:
-    """Chooses from the menu. data: the fitted description, with the causes that are not in question.
+    """Choose experiments from the menu.
 
-    noise: [n] N·m, what a good model leaves in blocks of 20 ms; None: the description's bias.noise_std. span: of the
-    recordings. progress: (recordings predicted, all). Raises InputError.
+    Parameters
+    ----------
+    data
+        The fitted description, without the causes in question.
+    noise
+        What a good model leaves in blocks of 20 ms, N·m [n]; None for the description's `bias.noise_std`.
+    span
+        Of the recordings.
+    progress
+        Called with the number of recordings predicted and of all.
+
+    Raises
+    ------
+    InputError
+        If a recording or the description is at fault.
     """
     if not questions:
         return Experiments((), Experiment(""))
@@ -129,7 +162,7 @@ def plan_experiments(
     *plain, long = motions(recorded)
     varied = [*tensions(data, plain[0]), *loads(data, plain[0], recorded)]
     scores = []
-    # what changes in the course of time alone shows in long recordings, and these take long to predict
+    # effects that only change over time show in long recordings, which take long to predict
     slow = any(
         each is not None and each.candidate.coordinate == "time" for q in questions for each in (q.cause, q.rival)
     )
@@ -139,7 +172,7 @@ def plan_experiments(
         if progress is not None:
             progress(k + 1, len(first))
     if not scores:
-        return Experiments((), Experiment("The menu has no motion that this finger can make"))
+        return Experiments((), Experiment("No available motion is possible with this finger"))
     open_ = [q for q in range(len(questions)) if max(found[q].distance for found in scores) < VISIBLE]
     if open_:
         simple = [found for found in scores if not (found[0].entry.tension or found[0].entry.load)]
@@ -154,8 +187,18 @@ def plan_experiments(
 
 @dataclass(frozen=True)
 class _Seen:
-    """Of one or several recordings. gram: [c, c] of all columns over the noise, slow bias taken off; whole: the same
-    about their means; power: [c, n] of the columns by joint; blocks: how many there are.
+    """What one or several recordings show.
+
+    Attributes
+    ----------
+    gram
+        Products of all columns over the noise, without the slow bias [c, c].
+    whole
+        The same about their means.
+    power
+        Of the columns by joint [c, n].
+    blocks
+        Number of blocks.
     """
 
     gram: Numbers
@@ -170,7 +213,7 @@ class _Seen:
 
 
 class _Laboratory:
-    """Predicts recordings, and what they would tell of the questions."""
+    """Predicts recordings and what they would show for the questions."""
 
     def __init__(
         self,
@@ -194,16 +237,16 @@ class _Laboratory:
         )
 
     def answers_of(self, entries: Iterable[Entry]) -> list[list[Answer]]:
-        """For each entry that this finger can make, for each question."""
+        """Return the answers to all questions for each entry that this finger can make."""
         found = []
         for entry in entries:
-            # too short a stroke, a tendon that nothing holds taut, forces that no input can be
+            # skip entries with too short a stroke, a slack tendon, or forces outside the valid range
             with suppress(InputError, EstimationError, NativeError):
                 found.append(self.answers(entry))
         return found
 
     def answers(self, entry: Entry) -> list[Answer]:
-        """For each question. Raises InputError where the motion cannot be."""
+        """Return the answer to each question; raises InputError if the motion is not possible."""
         seconds = sum(section.seconds for section in entry.sections)
         rate = min(_RATE, max(_LEAST_RATE, _MOST_SAMPLES / seconds))
         performed = perform(self.data, entry, rate, self.seed)
@@ -234,7 +277,7 @@ class _Laboratory:
         )
 
     def _left(self, question: Question, gram: Numbers) -> float:
-        """Power of the cause at its magnitudes that neither the model nor the rival explains."""
+        """Return the power of the cause at its magnitudes that neither the model nor the rival explains."""
         explaining = list(range(self._offset))
         if question.rival is not None:
             explaining += self._all_columns(question.rival)
@@ -246,15 +289,15 @@ class _Laboratory:
         return len(self.columns.nominal_names)
 
     def _place(self, cause: Accepted) -> int:
-        """Which proposal is the cause's."""
+        """Return the index of the cause's proposal."""
         assert self.columns is not None
         for k, proposal in enumerate(self.columns.proposals):
             if proposal.candidate.name == cause.candidate.name and proposal.place == cause.place:
                 return k
-        raise InternalError(f"{_described(cause)}: cannot sit there in this finger; expected a place of the candidate")
+        raise InternalError(f"{_described(cause)}: not possible at this place; expected a place of the candidate")
 
     def _direction(self, cause: Accepted) -> Numbers:
-        """[c] magnitudes of the cause, in all columns."""
+        """Return the magnitudes of the cause in all columns [c]."""
         assert self.columns is not None
         shape = self.columns.proposals[self._place(cause)].shapes[0]
         given = list(cause.magnitudes) if len(cause.magnitudes) else list(shape.expected)
@@ -268,14 +311,14 @@ class _Laboratory:
         return list(range(self._offset + own.start, self._offset + own.stop))
 
     def _rows(self, cause: Accepted, seen: _Seen) -> float:
-        """Blocks times joints in which the cause makes torque worth mentioning."""
+        """Return the number of blocks times joints in which the cause makes a noticeable torque."""
         power = np.sum(np.square(self._direction(cause))[:, None] * seen.power, axis=0)
         joints = int(np.sum(power > 0.05 * power.max())) if power.max() > 0 else 1
         return float(seen.blocks * max(joints, 1))
 
 
 def _schur(gram: Numbers, direction: Numbers, explaining: Sequence[int]) -> float:
-    """Power of gram's columns along a direction that those `explaining` do not explain; at least 0."""
+    """Return the power of the columns along a direction that those `explaining` do not explain; at least 0."""
     length = np.sqrt(np.maximum(np.diag(gram), 0.0))
     used = [k for k in explaining if length[k] > 0]
     mixed = gram @ direction
@@ -291,7 +334,7 @@ def _schur(gram: Numbers, direction: Numbers, explaining: Sequence[int]) -> floa
 
 
 def _without_bias(time: Numbers, values: Numbers, constant: bool) -> Numbers:
-    """[B, n, c] less what a slow bias takes: a constant, or cubic splines with knots as those of the diagnosis."""
+    """Return values [B, n, c] without a slow bias: a constant, or cubic splines with the knots of the diagnosis."""
     flat = values.reshape(len(values), -1)
     if constant:
         return np.asarray((flat - flat.mean(axis=0)).reshape(values.shape))
@@ -305,7 +348,7 @@ def _without_bias(time: Numbers, values: Numbers, constant: bool) -> Numbers:
 
 
 def _asked(questions: Sequence[Question]) -> list[Accepted]:
-    """Every candidate at a place once, with the shape of its first mention."""
+    """Return every candidate at a place once, with the shape of its first mention."""
     found: dict[tuple[str, Any], Accepted] = {}
     for question in questions:
         for each in (question.cause, question.rival):
@@ -315,7 +358,7 @@ def _asked(questions: Sequence[Question]) -> list[Accepted]:
 
 
 def _restricted(cause: Accepted, data: Data, span: Span) -> Candidate:
-    """The candidate at that place alone; its own shape first, the grid of its other ones after it."""
+    """Return the candidate at that place only; its own shape comes first, then the others of its grid."""
     grid = cause.candidate.find_shapes(data, cause.place, span)
     own = dict(cause.shape) or (dict(grid[len(grid) // 2]) if grid else {})
     shapes = [own, *(shape for shape in grid if dict(shape) != own)]
@@ -325,7 +368,7 @@ def _restricted(cause: Accepted, data: Data, span: Span) -> Candidate:
 
 
 def _mean_load(data: Data, recordings: Sequence[FitRecording]) -> Numbers:
-    """[n] N·m that was known to act on the joints, on average."""
+    """Return the mean known load on the joints, N·m [n]."""
     arms = moment_arms(data)
     loads = [(each.recording.groups["tendon_force"] @ arms - each.target).mean(axis=0) for each in recordings]
     return (
@@ -336,7 +379,7 @@ def _mean_load(data: Data, recordings: Sequence[FitRecording]) -> Numbers:
 
 
 def _shortened(recording: FitRecording) -> FitRecording:
-    """The beginning of its longest part, with no more samples a second than a predicted recording needs."""
+    """Return the beginning of its longest part, thinned to the sample rate that a predicted recording needs."""
     part = max(recording.parts, key=lambda each: recording.time[each.stop - 1] - recording.time[each.start])
     time = recording.time[part]
     step = float(np.median(np.diff(time)))
@@ -361,15 +404,16 @@ def _shortened(recording: FitRecording) -> FitRecording:
 
 
 def _best(answers: Sequence[Answer]) -> Answer:
-    """The simplest entry that tells nearly as much as the best one: entries come simplest first."""
+    """Return the simplest entry that shows nearly as much as the best one; the simplest entries come first."""
     able = [answer for answer in answers if answer.tells] or answers
     largest = max(answer.distance for answer in able)
     return next(answer for answer in able if answer.distance >= _SIMPLER * largest)
 
 
 def _first_of_all(answers: Sequence[Answer], scores: Sequence[Sequence[Answer]], seed: int) -> Experiment:
-    """The entry that tells most pairs of causes, then most effects, and the simplest of these; one that changes tension
-    and load at once only where no other tells anything more that matters.
+    """Return the entry that distinguishes most pairs of causes, then shows most effects, and is the simplest of these.
+
+    An entry that changes tension and load at once is chosen only if no other one shows anything else that matters.
     """
 
     def told_by(found: Sequence[Answer]) -> tuple[int, int]:
@@ -397,21 +441,21 @@ def _first_of_all(answers: Sequence[Answer], scores: Sequence[Sequence[Answer]],
 
 
 def _sentence(told: Sequence[Answer]) -> str:
-    """told: answers of one entry, the first of them put into words."""
+    """Put the first of the answers of one entry into words."""
     first = told[0]
     cause, rival = _described(first.question.cause), first.question.rival
     if not first.tells:
         what = f"{cause} from {_described(rival)}" if rival is not None else f"{cause} from the model's own numbers"
         return (
-            f"No motion, pretension or known load of the menu tells {what}: at best {_times(first.distance)} the noise "
+            f"No available experiment can distinguish {what}: at best {_times(first.distance)} the noise "
             f"is left of it. {first.question.cause.candidate.explanation}"
         )
     what = f"{cause} from {_described(rival)}" if rival is not None else f"{cause} from the model's own numbers"
-    apart = "the predictions differ by" if rival is not None else "what is left of an ordinary one is"
+    apart = "the predictions then differ by" if rival is not None else "an ordinary effect then leaves"
     more = len(told) - 1
     others = f". It also answers {more} more such question{'s' * (more > 1)}" if more else ""
     return (
-        f"Record {first.entry.words}: it tells {what}; there {apart} {_times(first.distance)} the noise, here "
+        f"Record {first.entry.words}: it distinguishes {what}; {apart} {_times(first.distance)} the noise, now "
         f"{_times(first.now)}{others}"
     )
 
