@@ -18,13 +18,13 @@ TITLES = {
     UNKNOWN: "something that no effect on the list explains",
 }
 _EXPLANATIONS = {
-    LOAD: "The mean torque that the model leaves has moved, far beyond what it does in the reference. No friction does "
-    "that. Look whether something touches or pulls the finger, and what the sensors show without a tendon; the bias "
-    "takes it up at run time.",
-    CONTACT: "In some stretches a torque comes and goes that no friction explains. They are left out of the fit; the "
-    "gain is what leaving them out takes away from the error on the training recordings.",
-    UNKNOWN: "What is left can be predicted in part from what was recorded, but it has the shape of no effect on the "
-    "list. The gain is what predicting it takes away from the error in unseen stretches.",
+    LOAD: "The mean torque that the model does not explain has moved far beyond its scatter in the reference. Friction "
+    "cannot cause that. Look whether something touches or pulls the finger, and what the sensors show without a "
+    "tendon. At run time the bias follows it.",
+    CONTACT: "In some stretches a torque appears and disappears that no friction explains. They are left out of the "
+    "fit. The gain is the share of the error on the training recordings that leaving them out removes.",
+    UNKNOWN: "Part of the remaining error can be predicted from what was recorded, but it has the shape of no effect "
+    "on the list. The gain is the share of the error in unseen stretches that predicting it removes.",
 }
 LEAST_GAIN = 0.1  # lower end of a contact's gain: contact is judged on the recordings in which it was found
 LEAST_PEAK = 6.0  # least peak of a contact, in rms of what the extended model leaves

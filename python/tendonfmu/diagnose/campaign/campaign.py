@@ -84,7 +84,7 @@ def _diagnosed(case: Case, how: How) -> Row:
 def named_after_experiment(case: Case, found: Diagnosis, how: How = ALL_OF_IT) -> bool:
     """Return whether the hidden effect is named once the requested experiment has been recorded, too.
 
-    The experiment is the one for the hidden effect if the diagnosis asks for it, else the first one.
+    The experiment is the one for the hidden effect if the diagnosis has one, else its next experiment.
     """
     assert case.experiment is not None
     truth = case.truth[0]

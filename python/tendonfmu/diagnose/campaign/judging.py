@@ -74,7 +74,7 @@ def judge_causes(case: Case, causes: Sequence[Cause]) -> dict[str, Any]:
     - first: it is the first cause;
     - set_size: number of effects in the set that contains it, or in that of the first cause;
     - place: the true joint and tendon are among the places of the named effect; None for the whole finger;
-    - both, exactly: everything hidden is named; exactly: and nothing else.
+    - both: everything hidden is named; exactly: nothing else is named, either.
     """
     own = [cause for cause in causes if cause.where.effect not in NOT_IN_MODEL and not _is_there_anyway(cause, case)]
     row: dict[str, Any] = {
