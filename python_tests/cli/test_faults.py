@@ -22,7 +22,7 @@ from fmu_binary import FINGER
 from tendonfmu.cli.fault_report import write_fault_report
 from tendonfmu.errors import InputError, InternalError, line_of, own_fault
 from tendonfmu.files.writing import whole_file
-from tendonfmu.model import description, native
+from tendonfmu.model import native
 
 NAME = re.compile(r"tendonfmu-error-\d{8}-\d{6}(-\d+)?\.txt")
 
@@ -36,7 +36,7 @@ def failing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[BaseEx
         def fail(*_: Any) -> Any:
             raise error
 
-        monkeypatch.setattr(description, "read_finger", fail)
+        monkeypatch.setattr("tendonfmu.model.read_finger", fail)
 
     return put
 

@@ -22,7 +22,6 @@ import diagnosis_examples as examples
 from command import Call
 from repository_paths import ROOT, TESTS
 from tendonfmu.cli.several_values import several_values
-from tendonfmu.diagnose import diagnosis
 from tendonfmu.diagnose.effects import CANDIDATES
 from tendonfmu.diagnose.result import Diagnosis
 from tendonfmu.errors import InputError, InternalError
@@ -51,7 +50,7 @@ def answering(monkeypatch: pytest.MonkeyPatch) -> Callable[[Diagnosis], Called]:
             asked.append((finger.name, [each.name for each in recordings], [each.name for each in tests], options))
             return found
 
-        monkeypatch.setattr(diagnosis, "diagnose", answer)
+        monkeypatch.setattr("tendonfmu.diagnose.diagnose", answer)
         return asked
 
     return put

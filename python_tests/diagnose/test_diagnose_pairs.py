@@ -24,7 +24,6 @@ from command import Call
 from diagnose_pairs import COUNT, make_pair
 from diagnose_quirks import QUIRKS
 from odd_finger import Columns, Pair
-from tendonfmu.diagnose import diagnosis
 from tendonfmu.diagnose.diagnosis import diagnose
 from tendonfmu.errors import InputError
 from tendonfmu.files.tables import write_table
@@ -191,8 +190,8 @@ def answered(monkeypatch: pytest.MonkeyPatch) -> Callable[[], int]:
         assert 0 <= options["least_gain"] <= 0.5 and options["kinematics"] in (1, 2, 3) and 1 <= options["jobs"] <= 64
         return found
 
-    monkeypatch.setattr(diagnosis, "diagnose", answer)
-    monkeypatch.setattr("tendonfmu.report.diagnosis_files.write_diagnosis", lambda found, folder: {})
+    monkeypatch.setattr("tendonfmu.diagnose.diagnose", answer)
+    monkeypatch.setattr("tendonfmu.report.write_diagnosis", lambda found, folder: {})
     return lambda: calls
 
 
