@@ -17,6 +17,7 @@ from scipy import sparse
 
 from tendonfmu import native
 from tendonfmu.block_averages import Blocks, BlockSums
+from tendonfmu.description_defaults import LIMITS
 from tendonfmu.effects.candidate import Variant
 from tendonfmu.effects.description_edit import Edit, apply_edits, data_number, finer_paths, is_law_number
 from tendonfmu.estimation import Estimator
@@ -29,7 +30,7 @@ Stretch = tuple[int, Numbers, Numbers]  # first sample; derivatives of T and of 
 Direction = Mapping[str, float]  # path -> how much of it; of a description that may be coarser than the merged one
 Watch = Callable[[int], None]  # samples that were looked at since the last call
 
-MOST_ROWS = 1024  # of `extensions`; docs/extensions.md
+MOST_ROWS = LIMITS["extensions"]
 _MOST_NUMBERS = 1500  # of a pass: its derivatives of a stretch of samples stay in tens of megabytes
 _BYTES = 3e7  # of derivatives at a time: more does not stay near the processor
 _STRETCH, _LONGEST = 400, 2500  # samples at a time

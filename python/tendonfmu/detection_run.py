@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from tendonfmu import native
 from tendonfmu.description import FingerDescription, read_finger
+from tendonfmu.description_defaults import DEFAULTS, RANGES
 from tendonfmu.detection_score import DetectionScore, Signals, pooled, score_detection
 from tendonfmu.errors import InputError
 from tendonfmu.fit_residuals import model_alone
@@ -28,8 +29,11 @@ Flags = NDArray[np.bool_]
 THRESHOLDS = ("threshold", "threshold_per_force")
 SHARES = ("stuck_share", "jump_share")
 REST_BOUNDS = (*THRESHOLDS, "creep")
-UNCERTAINTY_LEVEL = ("uncertainty_level", 3.0)  # key and default
-LARGEST = {"stuck_share": 10.0, "jump_share": 10.0, "uncertainty_level": 100.0}
+UNCERTAINTY_LEVEL = "uncertainty_level"
+LARGEST = {
+    **{key: RANGES[f"contact.friction_bound.{key}"][1] for key in SHARES},
+    UNCERTAINTY_LEVEL: RANGES[f"contact.{UNCERTAINTY_LEVEL}"][1],
+}
 
 
 @dataclass(frozen=True)
@@ -190,8 +194,8 @@ def scaled_detection(data: Mapping[str, Any], factor: float) -> dict[str, Any]:
             contact[part] = dict(contact[part])
             _scale(contact[part], keys, factor)
     if contact.get("uncertainty") is not None:
-        contact.setdefault(*UNCERTAINTY_LEVEL)
-        _scale(contact, UNCERTAINTY_LEVEL[:1], factor)
+        contact.setdefault(UNCERTAINTY_LEVEL, DEFAULTS[f"contact.{UNCERTAINTY_LEVEL}"])
+        _scale(contact, (UNCERTAINTY_LEVEL,), factor)
     return {**data, "contact": contact}
 
 

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from tendonfmu import native
 from tendonfmu.balance import moment_arms
+from tendonfmu.description_numbers import number_of
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.fit_residuals import delayed_torque
-from tendonfmu.friction_places import DEFAULT_THRESHOLD
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -209,8 +209,7 @@ def make_series(data: Mapping[str, Any], recordings: Sequence[FitRecording], gri
 
 
 def _joint_threshold(data: Mapping[str, Any]) -> float:
-    given = (data.get("velocity_threshold") or {}).get("joint")
-    return DEFAULT_THRESHOLD["joint"] if given is None else float(given)
+    return number_of(data, "velocity_threshold.joint")
 
 
 def _slope(values: Numbers, step: float) -> Numbers:

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from tendonfmu.balance import moment_arms
 from tendonfmu.description import FingerDescription
+from tendonfmu.description_numbers import number_of
 from tendonfmu.errors import InputError
 from tendonfmu.fit_residuals import Model, model_alone
-from tendonfmu.friction_places import DEFAULT_THRESHOLD
 from tendonfmu.recording import Recording, check_numbers
 from tendonfmu.recording_faults import (
     SETTLING,
@@ -307,8 +307,7 @@ def refuse_stillness(finger: FingerDescription, recordings: list[FitRecording], 
             f"{', '.join(str(each.path) for each in recordings)}: no motion: nothing is ever faster than "
             "velocity_threshold; expected free motion of all joints (tendonfmu excite plans one)"
         )
-    given = (finger.data.get("velocity_threshold") or {}).get("joint")
-    threshold = DEFAULT_THRESHOLD["joint"] if given is None else float(given)
+    threshold = number_of(finger.data, "velocity_threshold.joint")
     fastest = np.max([np.abs(each.model.joint_speed[each.train]).max(axis=0) for each in recordings], axis=0)
     return [
         f"joint {j} ({finger.joint_names[j - 1]}) never moves faster than {threshold:g} rad/s: its own friction cannot "
@@ -319,9 +318,7 @@ def refuse_stillness(finger: FingerDescription, recordings: list[FitRecording], 
 
 def require_noise(finger: FingerDescription, recordings: list[FitRecording]) -> None:
     """Refuses a finger whose residuals would count infinitely much."""
-    bias = finger.data.get("bias") or {}
-    base = 0.01 if bias.get("noise_std") is None else float(bias["noise_std"])
-    per_force = float(bias.get("noise_std_per_force") or 0.0)
+    base, per_force = (number_of(finger.data, f"bias.{key}") for key in ("noise_std", "noise_std_per_force"))
     if base > 0:
         return
     if not per_force:

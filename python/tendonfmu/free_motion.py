@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tendonfmu import native
 from tendonfmu.description import FingerDescription
+from tendonfmu.description_numbers import number_of
 from tendonfmu.detection_score import sample_seconds
 from tendonfmu.errors import InputError
 from tendonfmu.fit_recordings import Held, prepare
@@ -133,8 +134,7 @@ def _smoothed(values: Numbers, time: Numbers) -> Numbers:
 
 
 def _refuse_stillness(finger: FingerDescription, recording: Recording, speed: Numbers) -> None:
-    given = (finger.data.get("velocity_threshold") or {}).get("joint")
-    least = 0.01 if given is None else float(given)
+    least = number_of(finger.data, "velocity_threshold.joint")
     share = float(np.nanmean((np.abs(speed) > least).any(axis=1)))
     if share < STILL:
         raise InputError(

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from tendonfmu.balance import moment_arms
 from tendonfmu.description import Law
+from tendonfmu.description_numbers import number_of
 
 Numbers = NDArray[np.float64]
-
-DEFAULT_THRESHOLD = {"tendon": 0.0005, "joint": 0.01}  # m/s, rad/s; where a description has none
 
 
 @dataclass(frozen=True)
@@ -66,9 +65,7 @@ def _at_tendons(data: Mapping[str, Any]) -> Iterator[Effect]:
 
 def velocity_threshold(data: Mapping[str, Any], effect: Effect) -> float:
     """v_min of an effect, m/s or rad/s."""
-    key = "tendon" if effect.tendon else "joint"
-    value = (data.get("velocity_threshold") or {}).get(key)
-    return DEFAULT_THRESHOLD[key] if value is None else float(value)
+    return number_of(data, f"velocity_threshold.{'tendon' if effect.tendon else 'joint'}")
 
 
 def sliding_velocity(data: Mapping[str, Any], effect: Effect, joint_velocity: Numbers) -> Numbers:

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 from tendonfmu import native
 from tendonfmu.balance import friction_probe
+from tendonfmu.description_defaults import DEFAULTS
+from tendonfmu.description_numbers import number_of
 from tendonfmu.extensions import extension_numbers
 from tendonfmu.friction_places import Effect, effects, working_point_weights
 
@@ -25,7 +27,6 @@ Progress = Callable[[int, int], None]
 
 STEP = 1e-4  # of a value: T is linear in three of the four numbers of a law, and nearly so in the fourth over this
 _ELEMENTS = 4_000_000  # sensitivities in memory at a time
-_DEFAULTS = {"noise_std": 0.01, "noise_std_per_force": 0.0, "drift_variance": 1e-6}  # as in the core
 
 
 @dataclass(frozen=True)
@@ -248,15 +249,13 @@ def noise_of(data: Mapping[str, Any], sample_time: float) -> Noise:
     A finger without noise is judged with the default noise_std: without any, everything could be seen.
     """
     bias = data.get("bias") or {}
-    value = {key: default if bias.get(key) is None else float(bias[key]) for key, default in _DEFAULTS.items()}
-    if not value["noise_std"] and not value["noise_std_per_force"]:
-        value["noise_std"] = _DEFAULTS["noise_std"]
+    std, per_force = (number_of(data, f"bias.{key}") for key in ("noise_std", "noise_std_per_force"))
     initial = bias.get("initial_variance")
     return Noise(
-        std=value["noise_std"],
-        per_force=value["noise_std_per_force"],
+        std=std if std or per_force else DEFAULTS["bias.noise_std"],
+        per_force=per_force,
         time=float(bias.get("noise_time") or sample_time),
-        drift=value["drift_variance"],
+        drift=number_of(data, "bias.drift_variance"),
         initial=None if initial is None else float(initial),
     )
 

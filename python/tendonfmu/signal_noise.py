@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.balance import moment_arms
+from tendonfmu.description_defaults import RANGES
 from tendonfmu.errors import InputError
 from tendonfmu.fit_recordings import FitRecording
 from tendonfmu.recording import Recording
@@ -27,7 +28,7 @@ NEIGHBOURS = (-2, -1, 1, 2)  # samples of the cubic
 BLOCK = 40  # samples
 FEWEST = 60  # samples: less says nothing
 GAP = 3.0  # times the median step: no cubic across a longer one
-LEAST = 1e-6  # rad, the least that the description takes
+LEAST = RANGES["position_filter.noise"][0]  # rad, the least that the description takes
 GRID = 1e-3  # of a step: how well differences must fit to be multiples of it
 MOST_LEVELS = 0.5  # of the samples may differ where values come in steps
 

@@ -19,6 +19,7 @@ from tendonfmu.balance import moment_arms
 from tendonfmu.block_grams import Grams
 from tendonfmu.candidate_columns import candidate_columns, without_uncertainty
 from tendonfmu.cause_search import bias_of, blocks_of, nominal_scale, series_of
+from tendonfmu.description_defaults import EFFECT_NUMBERS
 from tendonfmu.diagnosis_series import Grid
 from tendonfmu.diagnosis_span import Span, span_of
 from tendonfmu.effects import CANDIDATES, Place
@@ -28,7 +29,7 @@ from tendonfmu.held_out_folds import make_folds
 
 Numbers = NDArray[np.float64]
 
-LONGEST_DELAY = 0.05  # s either way; docs/extensions.md
+LONGEST_DELAY = EFFECT_NUMBERS["time_delay"]["delay"].most  # s either way
 FINE = 0.001  # s
 LARGE = 0.008  # s: smaller ones compete with other causes, by their derivative
 CLEAR_GAIN = 0.1  # of the rms that a delay has to take away, to be a start: what else is missing looks like some delay

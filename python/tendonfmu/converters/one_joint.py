@@ -21,11 +21,12 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from tendonfmu.converters.column_map import Joint
+from tendonfmu.description_defaults import DEFAULTS
 from tendonfmu.errors import InputError
 
 Series = NDArray[np.float64]
 
-CUTOFF = 20.0  # Hz; as of the runtime's own filter
+CUTOFF = DEFAULTS["velocity_filter_cutoff"]  # Hz
 SHARE_OF_RATE = 0.2  # the cut-off is at most this part of the sample rate: central differences fall off above it
 GAP = 10.0  # times the usual step: what is longer interrupts the log, and no filter passes over it
 LEAST = 20  # samples

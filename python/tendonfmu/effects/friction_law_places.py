@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.balance import moment_arms
+from tendonfmu.description_numbers import number_of
 from tendonfmu.effects.candidate import Place
 from tendonfmu.effects.description_edit import magnitudes_of, sides_at
-from tendonfmu.friction_places import DEFAULT_THRESHOLD, Effect, effects
+from tendonfmu.friction_places import Effect, effects
 
 Data = Mapping[str, Any]
 KINDS = ("friction", "load_friction", "edge_friction", "pulley_friction")
@@ -85,10 +86,7 @@ def rubbing_tendons(data: Data) -> list[Place]:
 
 def thresholds(data: Data) -> tuple[float, float]:
     """Velocity thresholds of motion of tendons, m/s, and of joints, rad/s."""
-    given = data.get("velocity_threshold") or {}
-    found = (DEFAULT_THRESHOLD[kind] if given.get(kind) is None else given[kind] for kind in ("tendon", "joint"))
-    tendon, joint = (float(value) for value in found)
-    return tendon, joint
+    return number_of(data, "velocity_threshold.tendon"), number_of(data, "velocity_threshold.joint")
 
 
 # --- extensions -------------------------------------------------------------------------------------------------------

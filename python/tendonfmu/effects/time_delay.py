@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from tendonfmu.description_defaults import EFFECT_NUMBERS
 from tendonfmu.diagnosis_span import Span
 from tendonfmu.effects.candidate import Candidate, Data, Place, Variant
 from tendonfmu.effects.extension_row import secant_variant
@@ -12,7 +13,7 @@ from tendonfmu.effects.friction_law_places import without_rows
 
 NAME = "time_delay"
 _DELAYS = (0.002, 0.01)  # s; larger ones are scanned for (starting_point.py)
-_LONGEST = 0.05  # s; docs/extensions.md
+_LONGEST = EFFECT_NUMBERS[NAME]["delay"].most  # s
 _LEAST_STEPS, _MOST_STEPS = 0.5, 60.0  # samples: what can be told, and what the model remembers
 
 
