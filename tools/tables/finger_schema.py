@@ -56,6 +56,11 @@ def finger_schema(facts: Facts) -> Schema:
         "$defs": {
             "name": NAME,
             "optional_name": {"anyOf": [{"$ref": "#/$defs/name"}, NULL]},
+            **{
+                row["path"][:-1]: _object(facts, {"path": row["path"], "required": True})
+                for row in facts.rows
+                if row.get("kind") == "list"
+            },
             **_laws(facts),
             "at_joint": {"required": ["joint"], "properties": {"joint": {"type": "integer"}, "tendon": NULL}},
             "at_tendon": {"required": ["tendon"], "properties": {"joint": NULL, "tendon": {"type": "integer"}}},
@@ -118,8 +123,7 @@ def _of_key(facts: Facts, row: Row) -> Schema:
         return _object(facts, row)
     if kind == "list":
         most = limits["tendons" if row["path"] == "tendons" else "joints"]
-        items = _object(facts, {"path": row["path"], "required": True})
-        return described | _list((1, most), items, "required" not in row)
+        return described | _list((1, most), {"$ref": f"#/$defs/{row['path'][:-1]}"}, "required" not in row)
     if kind == "word":
         return {"enum": [*row["words"], None]} | described | {"default": row["words"][0]}
     if kind == "flag":
