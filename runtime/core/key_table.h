@@ -81,8 +81,8 @@ typedef enum model_item_kind {
 /* Numbers of an item whose shape is in no shape word. */
 typedef enum key_count { KEY_ONE, KEY_PER_JOINT, KEY_PER_PART, KEY_THREE } key_count; /* parts: m + 3, of friction */
 
-/* A number of the finger description. In its path i is the tendon, j the joint, d the direction and k the number within
- * its item, all from 1; @ stands for .laws[…] where an edge has working points, ~ for the side of an asymmetric law. */
+/* A number of the finger description. In its path %i is the tendon, %j the joint, %d the direction and %k the number
+ * within its item, all from 1; %@ is .laws[…] where an edge has working points, %~ the side of an asymmetric law. */
 typedef struct key_row {
   const char* path;
   const char* unit; /* FMI notation */

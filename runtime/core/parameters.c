@@ -8,7 +8,7 @@
 
 /* --- paths -------------------------------------------------------------------------------------------------------- */
 
-/* an index of a path by its letter in the table of keys */
+/* an index by its letter in the path of a row */
 static uint32_t index_of(const model_item* item, uint32_t offset, char letter) {
   switch (letter) {
     case 'i': return item->tendon + 1;
@@ -18,25 +18,30 @@ static uint32_t index_of(const model_item* item, uint32_t offset, char letter) {
   }
 }
 
-/* writes the path of a row, whose letters key_row explains */
+/* writes what stands for %letter in the path of a row (key_row) */
+static void write_part(message_line path, const model_item* item, uint32_t offset, char letter) {
+  if (letter == '~') {
+    message_text(path, item->law != LAW_ASYMMETRIC ? "" : offset < 4 ? ".positive" : ".negative");
+  } else if (letter != '@') {
+    message_count(path, index_of(item, offset, letter));
+  } else if (item->has_angles) {
+    message_text(path, ".laws[");
+    message_count(path, item->point + 1);
+    message_text(path, "]");
+  }
+}
+
 static void write_path(message_line path, const model_item* item, uint32_t offset, const char* pattern) {
-  for (int inside = 0; *pattern; ++pattern) {
-    const char here[2] = {*pattern, '\0'};
-    inside = *pattern == '[' || (inside && *pattern != ']');
-    if (*pattern == '@') {
-      if (item->has_angles) {
-        message_text(path, ".laws[");
-        message_count(path, item->point + 1);
-        message_text(path, "]");
-      }
-    } else if (*pattern == '~') {
-      if (item->law == LAW_ASYMMETRIC) {
-        message_text(path, offset < 4 ? ".positive" : ".negative");
-      }
-    } else if (inside && *pattern != '[' && *pattern != ',') {
-      message_count(path, index_of(item, offset, *pattern));
-    } else {
-      message_text(path, here);
+  char plain[PARAMETER_PATH_BYTES];
+  while (*pattern) {
+    const size_t length = strcspn(pattern, "%");
+    memcpy(plain, pattern, length);
+    plain[length] = '\0';
+    message_text(path, plain);
+    pattern += length;
+    if (*pattern) {
+      write_part(path, item, offset, pattern[1]);
+      pattern += 2;
     }
   }
 }

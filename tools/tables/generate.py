@@ -9,6 +9,7 @@ The generated files are part of the repository; python_tests/test_generated_file
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -44,6 +45,11 @@ def c_number(value: float) -> str:
     return repr(float(value))
 
 
+def c_path(path: str) -> str:
+    """The path with a % before each index, as key_row explains it."""
+    return re.sub(r"(?<=[\[,])(?=\w)", "%", path)
+
+
 def key_items(facts: Facts) -> list[dict[str, Any]]:
     """The items in the order of the image: {name, what it is, the rows of its numbers}."""
     found = []
@@ -61,9 +67,9 @@ def parent_of_item(facts: Facts, item: str) -> str:
 
 
 def _law_rows(facts: Facts, place: Row) -> list[dict[str, Any]]:
-    points = "@" if "at_points" in place else ""
+    path = c_path(place["path"]) + ("%@" if "at_points" in place else "") + "%~."
     return [
-        _limits(number, unit) | {"path": f"{place['path']}{points}~.{number['key']}", "count": "KEY_ONE", "option": "0"}
+        _limits(number, unit) | {"path": path + number["key"], "count": "KEY_ONE", "option": "0"}
         for number, unit in zip(facts.law_numbers, place["units"], strict=True)
     ]
 
@@ -79,7 +85,7 @@ def _key_row(row: Row, facts: Facts) -> dict[str, Any]:
         count = "KEY_PER_JOINT"
     if is_list(row):  # the last index counts the numbers of the item
         path = path[:-2] + "k]"
-    return _limits(row, row["unit"]) | {"path": path, "count": count, "option": option_of(row, facts)}
+    return _limits(row, row["unit"]) | {"path": c_path(path), "count": count, "option": option_of(row, facts)}
 
 
 def _limits(row: Row, unit: str) -> dict[str, Any]:
