@@ -18,7 +18,8 @@ from fmu_binary import FINGER
 from random_fingers import random_case
 from tendonfmu.dependencies import Dependencies, dependencies, structure_of
 from tendonfmu.description import read_finger
-from tendonfmu.native import FLAGS, INPUTS, NUMBERS, Finger
+from tendonfmu.native import Finger
+from tendonfmu.signals import FLAGS, INPUTS, NUMBERS
 
 SEEDS = range(30)
 INDEX_FINGER = Path(__file__).parents[1] / "examples" / "fingers" / "index_finger.json"
