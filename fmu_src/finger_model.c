@@ -144,48 +144,6 @@ const char* model_set_tolerance(model* m, double tolerance) {
   return NULL;
 }
 
-/* --- inputs and outputs --------------------------------------------------------------------------------------------
- */
-
-tendonfmu_inputs variables_inputs(const variables* v) {
-  return (tendonfmu_inputs){.tendon_force = v->number[GROUP_TENDON_FORCE],
-                            .tendon_position = v->number[GROUP_TENDON_POSITION],
-                            .joint_position = v->number[GROUP_JOINT_POSITION],
-                            .joint_velocity = v->number[GROUP_JOINT_VELOCITY]};
-}
-
-tendonfmu_outputs variables_outputs(const variables* v) {
-  return (tendonfmu_outputs){.compensated_torque = v->number[GROUP_COMPENSATED_TORQUE],
-                             .joint_torque = v->number[GROUP_JOINT_TORQUE],
-                             .friction_torque = v->number[GROUP_FRICTION_TORQUE],
-                             .bias_torque = v->number[GROUP_BIAS_TORQUE],
-                             .joint_angle = v->number[GROUP_JOINT_ANGLE],
-                             .joint_speed = v->number[GROUP_JOINT_SPEED],
-                             .joint_contact = v->flag[GROUP_JOINT_CONTACT],
-                             .contact = v->flag[GROUP_CONTACT],
-                             .slack = v->flag[GROUP_SLACK],
-                             .compensated_torque_std = v->number[GROUP_COMPENSATED_TORQUE_STD],
-                             .fingertip_force = v->number[GROUP_FINGERTIP_FORCE],
-                             .fingertip_force_std = v->number[GROUP_FINGERTIP_FORCE_STD],
-                             .fingertip_force_observable = v->flag[GROUP_FINGERTIP_FORCE_OBSERVABLE],
-                             .fingertip_force_misfit = v->number[GROUP_FINGERTIP_FORCE_MISFIT],
-                             .contact_change = v->number[GROUP_CONTACT_CHANGE],
-                             .contact_at_rest = v->flag[GROUP_CONTACT_AT_REST],
-                             .sensor_fault = v->flag[GROUP_SENSOR_FAULT],
-                             .contact_observable = v->flag[GROUP_CONTACT_OBSERVABLE]};
-}
-
-void model_fetch_outputs(const model* m, variables* values) {
-  tendonfmu_outputs outputs = variables_outputs(values);
-  double* link = values->number[GROUP_CONTACT_LINK];
-  int contact_link = 0;
-  outputs.contact_link = link ? &contact_link : NULL;
-  tendonfmu_get_outputs(m->finger, &outputs);
-  if (link) {
-    *link = contact_link; /* the block of variables holds numbers of one type */
-  }
-}
-
 /* --- samples -------------------------------------------------------------------------------------------------------
  */
 

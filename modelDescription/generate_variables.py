@@ -68,7 +68,8 @@ static const char* const log_category_names[LOG_CATEGORY_COUNT] = {{{category_na
 
 def salt(table: dict[str, Any]) -> int:
     """Hash of the table's content, a 64-bit number: spaces and line ends of the file do not matter."""
-    text = json.dumps(table, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
+    facts = {key: value for key, value in table.items() if key != "$comment"}
+    text = json.dumps(facts, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
     return int.from_bytes(hashlib.sha256(text.encode("ascii")).digest()[:8], "big")
 
 

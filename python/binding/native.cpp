@@ -6,11 +6,14 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <cstring>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "output_table.h"
 #include "tendonfmu_description.h"
 
 namespace nb = nanobind;
@@ -40,85 +43,29 @@ std::string image_guid(const nb::bytes& image, unsigned long long salt) {
   return guid;
 }
 
-// A numpy array that owns `values`.
+// A new numpy array.
 template <typename Number>
-nb::object as_array(std::vector<Number> values, std::vector<std::size_t> shape) {
-  auto* kept = new std::vector<Number>(std::move(values));
-  nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<Number>*>(p); });
-  return nb::cast(nb::ndarray<nb::numpy, Number>(kept->data(), shape.size(), shape.data(), owner));
+nb::object new_array(const std::vector<std::size_t>& shape, void** data) {
+  std::size_t count = 1;
+  for (const std::size_t length : shape) count *= length;
+  auto values = std::make_unique<std::vector<Number>>(count);
+  *data = values->data();
+  nb::capsule owner(values.release(), [](void* p) noexcept { delete static_cast<std::vector<Number>*>(p); });
+  return nb::cast(nb::ndarray<nb::numpy, Number>(*data, shape.size(), shape.data(), owner));
 }
 
-struct output_rows {
-  std::vector<double> numbers[6], detection[6], parts;
-  std::vector<unsigned char> flags[3], observable;
-  std::vector<double> tip_force, tip_std, misfit; /* these and what follows: of fingers with links */
-  std::vector<int> contact_link;
-  std::vector<double> change; /* these two: of fingers with contact.rest */
-  std::vector<unsigned char> at_rest;
-  std::vector<unsigned char> sensor_fault, contact_observable; /* of fingers with sensor_fault */
+nb::object new_array(output_type type, const std::vector<std::size_t>& shape, void** data) {
+  switch (type) {
+    case output_type::number: return new_array<double>(shape, data);
+    case output_type::flag: return new_array<unsigned char>(shape, data);
+    default: return new_array<int>(shape, data);
+  }
+}
 
-  output_rows(std::size_t samples, std::size_t n, std::size_t m, bool with_parts, bool with_place, bool with_rest,
-              bool with_sensors) {
-    for (auto& row : numbers) {
-      row.resize(samples * n);
-    }
-    for (auto& row : detection) {
-      row.resize(samples * n);
-    }
-    if (with_parts) {
-      parts.resize(samples * n * (m + 3));
-    }
-    flags[0].resize(samples * n);
-    flags[1].resize(samples);
-    flags[2].resize(samples * m);
-    if (with_place) {
-      tip_force.resize(samples * 3);
-      tip_std.resize(samples * 3);
-      observable.resize(samples);
-      misfit.resize(samples);
-      contact_link.resize(samples);
-    }
-    if (with_rest) {
-      change.resize(samples * n);
-      at_rest.resize(samples);
-    }
-    if (with_sensors) {
-      sensor_fault.resize(samples * m);
-      contact_observable.resize(samples);
-    }
-  }
-  template <typename Number>
-  static Number* wanted(std::vector<Number>& rows) {
-    return rows.empty() ? nullptr : rows.data();
-  }
-  tendonfmu_outputs view() {
-    return {numbers[0].data(),
-            numbers[1].data(),
-            numbers[2].data(),
-            numbers[3].data(),
-            numbers[4].data(),
-            numbers[5].data(),
-            flags[0].data(),
-            flags[1].data(),
-            flags[2].data(),
-            detection[0].data(),
-            detection[1].data(),
-            detection[2].data(),
-            detection[3].data(),
-            detection[4].data(),
-            wanted(parts),
-            wanted(tip_force),
-            wanted(tip_std),
-            wanted(observable),
-            wanted(misfit),
-            wanted(contact_link),
-            wanted(change),
-            wanted(at_rest),
-            detection[5].data(),
-            wanted(sensor_fault),
-            wanted(contact_observable)};
-  }
-};
+// Sets the pointer of an output.
+void set_array(tendonfmu_outputs& outputs, const output_row& row, void* data) {
+  std::memcpy(reinterpret_cast<char*>(&outputs) + row.offset, &data, sizeof data);
+}
 
 class bound_finger {
  public:
@@ -175,69 +122,48 @@ class bound_finger {
   }
   void restore_state(const nb::bytes& bytes) { check(tendonfmu_restore_state(handle_, bytes.data(), bytes.size())); }
 
-  nb::tuple run(const time_row& time, const std::optional<number_rows>& force,
-                const std::optional<number_rows>& position, const std::optional<number_rows>& angle,
-                const std::optional<number_rows>& velocity, bool with_parts) {
+  // Name of each output to its rows.
+  nb::dict run(const time_row& time, const std::optional<number_rows>& force, const std::optional<number_rows>& position,
+               const std::optional<number_rows>& angle, const std::optional<number_rows>& velocity, bool with_parts) {
     const std::size_t samples = time.shape(0), n = joints(), m = tendons();
     const tendonfmu_inputs inputs = {
         rows(force, samples, m, "tendon_force"), rows(position, samples, m, "tendon_position"),
         rows(angle, samples, n, "joint_position"), rows(velocity, samples, n, "joint_velocity")};
-    output_rows outputs(samples, n, m, with_parts, has_links(), watches_rest(), watches_sensors());
-    const tendonfmu_outputs view = outputs.view();
+    tendonfmu_outputs outputs = {};
+    nb::dict arrays;
+    for (const output_row& row : output_table) {
+      if (row.need == output_need::parts ? with_parts : has(row.need)) {
+        void* data = nullptr;
+        arrays[row.name] = new_array(row.type, shape_of(row.size, samples), &data);
+        set_array(outputs, row, data);
+      }
+    }
     std::size_t done = 0;
     tendonfmu_status status;
     {
       nb::gil_scoped_release released;
-      status = tendonfmu_run(handle_, samples, time.data(), &inputs, &view, &done);
+      status = tendonfmu_run(handle_, samples, time.data(), &inputs, &outputs, &done);
     }
     if (status != TENDONFMU_OK) {
       throw nb::value_error(("row " + std::to_string(done + 1) + ": " + tendonfmu_last_error(handle_)).c_str());
-    }
-    nb::list arrays;
-    for (auto& row : outputs.numbers) {
-      arrays.append(as_array(std::move(row), {samples, n}));
-    }
-    arrays.append(as_array(std::move(outputs.flags[0]), {samples, n}));
-    arrays.append(as_array(std::move(outputs.flags[1]), {samples}));
-    arrays.append(as_array(std::move(outputs.flags[2]), {samples, m}));
-    for (auto& row : outputs.detection) {
-      arrays.append(as_array(std::move(row), {samples, n}));
-    }
-    if (with_parts) {
-      arrays.append(as_array(std::move(outputs.parts), {samples, n, m + 3}));
-    }
-    if (has_links()) {
-      arrays.append(as_array(std::move(outputs.tip_force), {samples, std::size_t{3}}));
-      arrays.append(as_array(std::move(outputs.tip_std), {samples, std::size_t{3}}));
-      arrays.append(as_array(std::move(outputs.observable), {samples}));
-      arrays.append(as_array(std::move(outputs.misfit), {samples}));
-      arrays.append(as_array(std::move(outputs.contact_link), {samples}));
-    }
-    if (watches_rest()) {
-      arrays.append(as_array(std::move(outputs.change), {samples, n}));
-      arrays.append(as_array(std::move(outputs.at_rest), {samples}));
-    }
-    if (watches_sensors()) {
-      arrays.append(as_array(std::move(outputs.sensor_fault), {samples, m}));
-      arrays.append(as_array(std::move(outputs.contact_observable), {samples}));
-    }
-    return nb::tuple(arrays);
+    return arrays;
   }
 
-  std::vector<std::vector<double>> directional_derivative(const std::vector<double>& force,
-                                                          const std::vector<double>& position,
-                                                          const std::vector<double>& angle,
-                                                          const std::vector<double>& velocity) {
+  // Name of each output that has a derivative to its n slopes.
+  nb::dict directional_derivative(const std::vector<double>& force, const std::vector<double>& position,
+                                  const std::vector<double>& angle, const std::vector<double>& velocity) {
     const std::size_t n = joints(), m = tendons();
     if (force.size() != m || position.size() != m || angle.size() != n || velocity.size() != n) {
       throw nb::value_error("directional_derivative: expected m, m, n and n numbers");
     }
-    std::vector<std::vector<double>> slopes(6, std::vector<double>(n));
     tendonfmu_outputs derivative = {};
-    double** const rows[] = {&derivative.compensated_torque, &derivative.joint_torque, &derivative.friction_torque,
-                             &derivative.bias_torque,        &derivative.joint_angle,  &derivative.joint_speed};
-    for (std::size_t k = 0; k < 6; ++k) {
-      *rows[k] = slopes[k].data();
+    nb::dict slopes;
+    for (const output_row& row : output_table) {
+      if (row.has_derivative) {
+        void* data = nullptr;
+        slopes[row.name] = new_array(row.type, {n}, &data);
+        set_array(derivative, row, data);
+      }
     }
     const tendonfmu_inputs direction = {force.data(), position.data(), angle.data(), velocity.data()};
     check(tendonfmu_get_directional_derivative(handle_, &direction, &derivative));
@@ -246,6 +172,24 @@ class bound_finger {
 
  private:
   tendonfmu_finger* handle_ = nullptr;
+
+  bool has(output_need need) const {
+    switch (need) {
+      case output_need::links: return has_links();
+      case output_need::rest: return watches_rest();
+      case output_need::sensor_fault: return watches_sensors();
+      default: return true;
+    }
+  }
+  std::vector<std::size_t> shape_of(output_size size, std::size_t samples) const {
+    switch (size) {
+      case output_size::joints: return {samples, joints()};
+      case output_size::tendons: return {samples, tendons()};
+      case output_size::vector: return {samples, 3};
+      case output_size::parts: return {samples, joints(), tendons() + 3};
+      default: return {samples};
+    }
+  }
 
   void check(tendonfmu_status status) const {
     if (status == TENDONFMU_OK) {

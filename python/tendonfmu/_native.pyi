@@ -1,6 +1,7 @@
 """Types of the compiled module (python/binding/native.cpp)."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +42,7 @@ class Finger:
         joint_position: NDArray[np.float64] | None,
         joint_velocity: NDArray[np.float64] | None,
         with_parts: bool,
-    ) -> tuple[NDArray[np.float64], ...]: ...
+    ) -> dict[str, NDArray[Any]]: ...
     def directional_derivative(
         self, force: Sequence[float], position: Sequence[float], angle: Sequence[float], velocity: Sequence[float]
-    ) -> list[list[float]]: ...
+    ) -> dict[str, NDArray[np.float64]]: ...

@@ -18,8 +18,9 @@ from fmu_binary import FINGER
 from random_fingers import random_case
 from repository_paths import ROOT
 from tendonfmu.model.description import read_finger
-from tendonfmu.model.native import FLAGS, INPUTS, NUMBERS, Finger
+from tendonfmu.model.native import Finger
 from tendonfmu.model.output_dependencies import Dependencies, dependencies, structure_of
+from tendonfmu.model.signals import FLAGS, INPUTS, NUMBERS
 
 SEEDS = range(30)
 INDEX_FINGER = ROOT / "examples" / "fingers" / "index_finger.json"

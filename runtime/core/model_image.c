@@ -69,104 +69,45 @@ uint32_t model_direction_count(const model_shape* shape) {
   return (shape->options & MODEL_UNCERTAINTY_DIRECTIONS) >> 10;
 }
 
-typedef struct item_size {
-  model_item_kind kind;
-  uint32_t count;
-} item_size;
+static void walk_directions(walk* w, uint32_t count) {
+  for (uint32_t j = 0; j < w->shape->joints; ++j) {
+    for (uint32_t d = 0; d < model_direction_count(w->shape); ++d) {
+      emit(w, (model_item){.kind = ITEM_UNCERTAINTY, .joint = j, .point = d}, count);
+    }
+  }
+}
 
-static void emit_all(walk* w, const item_size* items, size_t count) {
-  for (size_t i = 0; i < count; ++i) {
-    emit(w, (model_item){.kind = items[i].kind}, items[i].count);
+static void walk_links(walk* w, uint32_t count) {
+  for (uint32_t j = 0; j < w->shape->joints; ++j) {
+    emit(w, (model_item){.kind = ITEM_LINK_AXIS, .joint = j}, count);
+    emit(w, (model_item){.kind = ITEM_LINK_OFFSET, .joint = j}, count);
+  }
+}
+
+/* numbers of an item of the finger as a whole; 0 where the description has none */
+static uint32_t count_of(const model_shape* shape, model_item_kind kind) {
+  const key_row* row = key_row_of(kind, 0);
+  if ((shape->options & row->option) != row->option) {
+    return 0;
+  }
+  switch (row->count) {
+    case KEY_PER_JOINT: return shape->joints;
+    case KEY_PER_PART: return shape->tendons + MODEL_DIRECTION_SHARES;
+    case KEY_THREE: return 3;
+    default: return 1;
   }
 }
 
 static void walk_finger(walk* w) {
-  const uint32_t n = w->shape->joints, options = w->shape->options;
-  const item_size items[] = {
-      {ITEM_TENDON_THRESHOLD, 1},
-      {ITEM_JOINT_THRESHOLD, 1},
-      {ITEM_FILTER_CUTOFF, 1},
-      {ITEM_DRIFT_VARIANCE, 1},
-      {ITEM_NOISE_STD, 1},
-      {ITEM_NOISE_STD_PER_FORCE, 1},
-      {ITEM_INITIAL_VARIANCE, options & MODEL_HAS_INITIAL_VARIANCE ? 1 : 0},
-      {ITEM_FORGET_RATE, 1},
-      {ITEM_INITIAL_TORQUE, options & MODEL_HAS_INITIAL_TORQUE ? n : 0},
-      {ITEM_NOISE_TIME, options & MODEL_HAS_NOISE_TIME ? 1 : 0},
-      {ITEM_START_SHARE, options & MODEL_HAS_START_SHARE ? 1 : 0},
-      {ITEM_CONTACT_THRESHOLD, n},
-      {ITEM_CONTACT_PER_FORCE, n},
-      {ITEM_HYSTERESIS, options & MODEL_HAS_HYSTERESIS ? 1 : 0},
-      {ITEM_POSITION_NOISE, options & MODEL_HAS_POSITION_FILTER ? n : 0},
-      {ITEM_JERK_DENSITY, options & MODEL_HAS_POSITION_FILTER ? 1 : 0},
-  };
-  emit_all(w, items, sizeof items / sizeof items[0]);
-}
-
-/* the optional keys of the detection */
-static void walk_detection(walk* w) {
-  const uint32_t n = w->shape->joints, options = w->shape->options;
-  const uint32_t innovation = options & MODEL_DETECTS_BY_INNOVATION ? 1 : 0;
-  const uint32_t bound = options & MODEL_HAS_FRICTION_BOUND ? 1 : 0, deviation = options & MODEL_HAS_DEVIATION ? n : 0;
-  const uint32_t release = options & MODEL_HAS_RELEASE ? 1 : 0, rest = options & MODEL_HAS_REST ? 1 : 0;
-  const uint32_t of_late = options & MODEL_HAS_REST_INNOVATION ? 1 : 0, drift = options & MODEL_HAS_DRIFT ? 1 : 0;
-  const item_size before[] = {
-      {ITEM_INNOVATION_TIME, innovation},
-      {ITEM_INNOVATION_THRESHOLD, n * innovation},
-      {ITEM_INNOVATION_PER_FORCE, n * innovation},
-      {ITEM_EVIDENCE_TIME, options & MODEL_DETECTS_BY_CUSUM ? 1 : 0},
-      {ITEM_STUCK_SHARE, bound},
-      {ITEM_JUMP_SHARE, bound},
-      {ITEM_JUMP_TIME, bound},
-      {ITEM_STUCK_TIME, bound},
-  };
-  const item_size after[] = {
-      {ITEM_UNCERTAINTY_LEVEL, options & MODEL_HAS_UNCERTAINTY ? 1 : 0},
-      {ITEM_DEVIATION, deviation},
-      {ITEM_DEVIATION_PER_FORCE, deviation},
-      {ITEM_RELEASE_RATIO, release},
-      {ITEM_HOLD_TIME, release},
-      {ITEM_RELEASE_TIME, options & MODEL_HAS_RELEASE_TIME ? 1 : 0},
-      {ITEM_DRIFT_QUICK_TIME, drift},
-      {ITEM_DRIFT_SLOW_TIME, drift},
-      {ITEM_DRIFT_THRESHOLD, n * drift},
-      {ITEM_DRIFT_PER_FORCE, n * drift},
-      {ITEM_REST_TRAVEL, rest},
-      {ITEM_REST_SETTLE_TIME, rest},
-      {ITEM_REST_AVERAGING_TIME, rest},
-      {ITEM_REST_THRESHOLD, n * rest},
-      {ITEM_REST_PER_FORCE, n * rest},
-      {ITEM_REST_CREEP, n * rest},
-      {ITEM_REST_FALL_SHARE, rest},
-      {ITEM_REST_INNOVATION_TIME, of_late},
-      {ITEM_REST_INNOVATION_THRESHOLD, n * of_late},
-  };
-  emit_all(w, before, sizeof before / sizeof before[0]);
-  for (uint32_t j = 0; j < n; ++j) {
-    for (uint32_t d = 0; d < model_direction_count(w->shape); ++d) {
-      emit(w, (model_item){.kind = ITEM_UNCERTAINTY, .joint = j, .point = d},
-           w->shape->tendons + MODEL_DIRECTION_SHARES);
+  for (int kind = ITEM_EDGE_FRICTION + 1; kind < ITEM_EXTENSION; ++kind) {
+    const uint32_t count = count_of(w->shape, (model_item_kind)kind);
+    switch (kind) {
+      case ITEM_UNCERTAINTY: walk_directions(w, count); break;
+      case ITEM_LINK_AXIS: walk_links(w, count); break;
+      case ITEM_LINK_OFFSET: break; /* with the axes */
+      default: emit(w, (model_item){.kind = (model_item_kind)kind}, count); break;
     }
   }
-  emit_all(w, after, sizeof after / sizeof after[0]);
-}
-
-static void walk_links(walk* w) {
-  const uint32_t space = w->shape->options & MODEL_HAS_LINKS ? 3 : 0;
-  for (uint32_t j = 0; j < w->shape->joints; ++j) {
-    emit(w, (model_item){.kind = ITEM_LINK_AXIS, .joint = j}, space);
-    emit(w, (model_item){.kind = ITEM_LINK_OFFSET, .joint = j}, space);
-  }
-  emit(w, (model_item){.kind = ITEM_TIP}, space);
-}
-
-static void walk_sensors(walk* w) {
-  const uint32_t one = w->shape->options & MODEL_HAS_SENSOR_FAULT ? 1 : 0;
-  const item_size items[] = {
-      {ITEM_FAULT_HOLD_TIME, one},   {ITEM_FAULT_FORCE_RESOLUTION, one}, {ITEM_FAULT_POSITION_RESOLUTION, one},
-      {ITEM_FAULT_JUMP_MARGIN, one}, {ITEM_FAULT_RECOVERY_TIME, one},
-  };
-  emit_all(w, items, sizeof items / sizeof items[0]);
 }
 
 static effect_place place_of(uint32_t joint, uint32_t tendon) {
@@ -207,9 +148,6 @@ static uint32_t run_walk(walk* w) {
     word = walk_tendon(w, i, word);
   }
   walk_finger(w);
-  walk_detection(w);
-  walk_links(w);
-  walk_sensors(w);
   walk_extensions(w);
   return w->next;
 }

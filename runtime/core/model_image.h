@@ -26,7 +26,9 @@
 #include <stdint.h>
 
 #include "effect.h"
+#include "key_table.h" /* the kinds of items, and the largest numbers of things */
 #include "message.h"
+#include "model_options.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -34,40 +36,9 @@ extern "C" {
 
 enum {
   MODEL_VERSION = 1,
-  MODEL_MAX_JOINTS = 16,
-  MODEL_MAX_TENDONS = 64,
-  MODEL_MAX_POINTS = 256,
-  MODEL_MAX_EXTENSIONS = 1024,
   MODEL_HEADER_BYTES = 56,
   MODEL_EXTENSION_WORDS = 4,
-  MODEL_MAX_DIRECTIONS = 4,  /* of uncertainty, a joint */
-  MODEL_DIRECTION_SHARES = 3 /* of a direction, beyond one a tendon */
-};
-
-enum {
-  MODEL_HAS_INITIAL_VARIANCE = 1,
-  MODEL_HAS_INITIAL_TORQUE = 2,
-  MODEL_HAS_NOISE_TIME = 4,
-  MODEL_HAS_HYSTERESIS = 8,
-  MODEL_FORGETS_BY_ABSORPTION = 16,
-  MODEL_REMEMBERS_ENTRY_LOAD = 32,
-  MODEL_DETECTS_BY_INNOVATION = 64, /* methods "innovation" and "cusum" */
-  MODEL_DETECTS_BY_CUSUM = 128,     /* beside the bit before */
-  MODEL_HAS_FRICTION_BOUND = 256,
-  MODEL_HAS_UNCERTAINTY = 512,
-  MODEL_UNCERTAINTY_DIRECTIONS = 7 << 10, /* three bits: the largest number of directions of a joint, 0..4 */
-  MODEL_HAS_DEVIATION = 1 << 13,
-  MODEL_HAS_RELEASE = 1 << 14,
-  MODEL_HAS_RELEASE_TIME = 1 << 15,
-  MODEL_HAS_LINKS = 1 << 16,
-  MODEL_HAS_POSITION_FILTER = 1 << 17,
-  MODEL_HAS_REST = 1 << 18,
-  MODEL_HAS_REST_INNOVATION = 1 << 19, /* beside the bit before */
-  MODEL_HAS_START_SHARE = 1 << 20,
-  MODEL_HAS_DRIFT = 1 << 21,
-  MODEL_BOUNDS_PRESLIDING = 1 << 22, /* beside MODEL_HAS_FRICTION_BOUND */
-  MODEL_HAS_SENSOR_FAULT = 1 << 23,
-  MODEL_OPTION_BITS = (1 << 24) - 1
+  MODEL_DIRECTION_SHARES = 3 /* of a direction of uncertainty, beyond one a tendon */
 };
 
 #define MODEL_EDGE_HAS_ANGLES 0x80000000u
@@ -87,71 +58,7 @@ typedef struct model_shape {
   size_t extension_memory;                /* all that the extensions remember */
 } model_shape;
 
-/* The parameters come in items, in this order: joints, tendons, finger, extensions. */
-typedef enum model_item_kind {
-  ITEM_COVER,            /* stiffness, rest_angle */
-  ITEM_JOINT_FRICTION,   /* a law */
-  ITEM_LOAD_FRICTION,    /* a law */
-  ITEM_STIFFNESS,        /* 1 */
-  ITEM_MOMENT_ARMS,      /* n */
-  ITEM_PULLEY_FRICTION,  /* a law */
-  ITEM_EDGE_ANGLES,      /* K */
-  ITEM_EDGE_FRICTION,    /* a law, at one working point */
-  ITEM_TENDON_THRESHOLD, /* velocity_threshold.tendon */
-  ITEM_JOINT_THRESHOLD,  /* velocity_threshold.joint */
-  ITEM_FILTER_CUTOFF,    /* velocity_filter_cutoff */
-  ITEM_DRIFT_VARIANCE,   /* bias.… */
-  ITEM_NOISE_STD,
-  ITEM_NOISE_STD_PER_FORCE,
-  ITEM_INITIAL_VARIANCE,
-  ITEM_FORGET_RATE,
-  ITEM_INITIAL_TORQUE, /* n */
-  ITEM_NOISE_TIME,
-  ITEM_START_SHARE,
-  ITEM_CONTACT_THRESHOLD,    /* n */
-  ITEM_CONTACT_PER_FORCE,    /* n */
-  ITEM_HYSTERESIS,           /* velocity_threshold.hysteresis */
-  ITEM_POSITION_NOISE,       /* n, position_filter.noise */
-  ITEM_JERK_DENSITY,         /* position_filter.jerk_density */
-  ITEM_INNOVATION_TIME,      /* contact.… from here on */
-  ITEM_INNOVATION_THRESHOLD, /* n */
-  ITEM_INNOVATION_PER_FORCE, /* n */
-  ITEM_EVIDENCE_TIME,
-  ITEM_STUCK_SHARE,
-  ITEM_JUMP_SHARE,
-  ITEM_JUMP_TIME,
-  ITEM_STUCK_TIME,
-  ITEM_UNCERTAINTY, /* m + 3, one direction (`point`) of one joint */
-  ITEM_UNCERTAINTY_LEVEL,
-  ITEM_DEVIATION,           /* n */
-  ITEM_DEVIATION_PER_FORCE, /* n */
-  ITEM_RELEASE_RATIO,
-  ITEM_HOLD_TIME,
-  ITEM_RELEASE_TIME,
-  ITEM_DRIFT_QUICK_TIME, /* contact.drift.… */
-  ITEM_DRIFT_SLOW_TIME,
-  ITEM_DRIFT_THRESHOLD, /* n */
-  ITEM_DRIFT_PER_FORCE, /* n */
-  ITEM_REST_TRAVEL,     /* contact.rest.… */
-  ITEM_REST_SETTLE_TIME,
-  ITEM_REST_AVERAGING_TIME,
-  ITEM_REST_THRESHOLD, /* n */
-  ITEM_REST_PER_FORCE, /* n */
-  ITEM_REST_CREEP,     /* n */
-  ITEM_REST_FALL_SHARE,
-  ITEM_REST_INNOVATION_TIME,
-  ITEM_REST_INNOVATION_THRESHOLD, /* n */
-  ITEM_LINK_AXIS,                 /* 3, of one joint */
-  ITEM_LINK_OFFSET,               /* 3, of one joint */
-  ITEM_TIP,                       /* 3 */
-  ITEM_FAULT_HOLD_TIME,           /* sensor_fault.… */
-  ITEM_FAULT_FORCE_RESOLUTION,
-  ITEM_FAULT_POSITION_RESOLUTION,
-  ITEM_FAULT_JUMP_MARGIN,
-  ITEM_FAULT_RECOVERY_TIME,
-  ITEM_EXTENSION /* as many as the effect has */
-} model_item_kind;
-
+/* Some parameters that belong together. */
 typedef struct model_item {
   model_item_kind kind;
   uint32_t first, count; /* parameter indices first .. first + count − 1 */

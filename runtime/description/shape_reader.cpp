@@ -4,6 +4,7 @@
 #include <string>
 
 #include "description_error.h"
+#include "description_keys.h"
 #include "extension_reader.h"
 
 namespace tendonfmu {
@@ -12,10 +13,21 @@ namespace {
 constexpr const char* format_name = "tendonfmu-finger-1";
 constexpr std::size_t max_name_bytes = 200;
 
-const std::vector<std::string> side_keys = {"static", "coulomb", "stribeck_velocity", "viscous"};
-const std::vector<std::string> law_keys = {"static", "coulomb", "stribeck_velocity", "viscous", "positive", "negative"};
-const std::vector<std::string> edge_keys = {"static", "coulomb", "stribeck_velocity", "viscous", "positive", "negative",
-                                            "angles", "laws"};
+const std::vector<std::string> sides = {"positive", "negative"};
+
+std::vector<std::string> with(std::vector<std::string> keys, const std::vector<std::string>& more) {
+  keys.insert(keys.end(), more.begin(), more.end());
+  return keys;
+}
+
+/* of a law, and of an edge, which may be working points in its place */
+std::vector<std::string> any_law_keys() {
+  return with(law_keys(), sides);
+}
+
+std::vector<std::string> edge_keys() {
+  return with(any_law_keys(), {"angles", "laws"});
+}
 
 /* names become file names and XML attributes */
 void check_name(const json_node& node) {
@@ -53,24 +65,24 @@ law_kind kind_of_law(const json_node& law) {
   if (positive.absent() && negative.absent()) {
     return LAW_SYMMETRIC;
   }
-  expect_none(law, side_keys, "positive and negative");
-  positive.expect_keys(side_keys);
-  negative.expect_keys(side_keys);
+  expect_none(law, law_keys(), "positive and negative");
+  positive.expect_keys(law_keys());
+  negative.expect_keys(law_keys());
   return LAW_ASYMMETRIC;
 }
 
 law_kind read_law(const json_node& law) {
-  return law.absent() ? LAW_ABSENT : kind_of_law(law.expect_keys(law_keys));
+  return law.absent() ? LAW_ABSENT : kind_of_law(law.expect_keys(any_law_keys()));
 }
 
 void read_working_points(const json_node& edge, std::vector<std::uint32_t>& words) {
-  expect_none(edge, law_keys, "angles and laws");
+  expect_none(edge, any_law_keys(), "angles and laws");
   const json_node angles = edge.member("angles"), laws = edge.member("laws");
   angles.expect_list(1, MODEL_MAX_POINTS, "angles in rad, strictly increasing");
   laws.expect_list(angles.size(), angles.size(), "laws, one per angle");
   words.push_back(static_cast<std::uint32_t>(angles.size()) | MODEL_EDGE_HAS_ANGLES);
   for (std::size_t k = 0; k < angles.size(); ++k) {
-    words.push_back(kind_of_law(laws.element(k).expect_keys(law_keys)));
+    words.push_back(kind_of_law(laws.element(k).expect_keys(any_law_keys())));
   }
 }
 
@@ -79,7 +91,7 @@ void read_edge(const json_node& edge, std::vector<std::uint32_t>& words) {
     words.push_back(0);
     return;
   }
-  edge.expect_keys(edge_keys);
+  edge.expect_keys(edge_keys());
   if (edge.member("angles").absent() && edge.member("laws").absent()) {
     words.push_back(1);
     words.push_back(kind_of_law(edge));
@@ -88,14 +100,35 @@ void read_edge(const json_node& edge, std::vector<std::uint32_t>& words) {
   read_working_points(edge, words);
 }
 
+/* --- numbers of an object ----------------------------------------------------------------------------------------- */
+
+/* the lists of an object that have one number per joint: those that are there, or must be, have so many */
+void check_lists(const json_node& parent, const std::string& object, std::uint32_t joints) {
+  for (const number_key& number : numbers_of(object)) {
+    const json_node list = parent.member(number.key);
+    if (number.per_joint && (number.required || !list.absent())) {
+      list.expect_list(joints, joints, "numbers in " + std::string(number.unit) + ", one per joint");
+    }
+  }
+}
+
+/* the option bits of the numbers that are there */
+std::uint32_t given_options(const json_node& parent, const std::string& object) {
+  std::uint32_t options = 0;
+  for (const number_key& number : numbers_of(object)) {
+    options |= parent.member(number.key).absent() ? 0u : number.option;
+  }
+  return options;
+}
+
 /* --- joints and tendons ------------------------------------------------------------------------------------------- */
 
 std::uint32_t read_joint(const json_node& joint) {
-  joint.expect_keys({"name", "cover", "friction", "load_friction"});
+  joint.expect_keys(keys_of("joints"));
   check_optional_name(joint);
   const json_node cover = joint.member("cover");
   if (!cover.absent()) {
-    cover.expect_keys({"stiffness", "rest_angle"});
+    cover.expect_keys(keys_of("joints.cover"));
   }
   return (cover.absent() ? 0u : 1u) | static_cast<std::uint32_t>(read_law(joint.member("friction"))) << 1 |
          static_cast<std::uint32_t>(read_law(joint.member("load_friction"))) << 3;
@@ -109,12 +142,12 @@ void check_friction_list(const json_node& list, std::uint32_t joints) {
 }
 
 void read_tendon(const json_node& tendon, std::uint32_t joints, std::vector<std::uint32_t>& words) {
-  tendon.expect_keys({"name", "stiffness", "moment_arms", "pulley_friction", "edge_friction", "bidirectional"});
+  tendon.expect_keys(keys_of("tendons"));
   check_optional_name(tendon);
   const json_node bidirectional = tendon.member("bidirectional");
   const json_node pulleys = tendon.member("pulley_friction"), edges = tendon.member("edge_friction");
   words.push_back(!bidirectional.absent() && bidirectional.boolean());
-  tendon.member("moment_arms").expect_list(joints, joints, "numbers in m, one per joint");
+  check_lists(tendon, "tendons", joints);
   check_friction_list(pulleys, joints);
   check_friction_list(edges, joints);
   const json_node last = pulleys.element(joints - 1);
@@ -131,21 +164,12 @@ void read_tendon(const json_node& tendon, std::uint32_t joints, std::vector<std:
 
 /* --- the finger as a whole ---------------------------------------------------------------------------------------- */
 
-void check_settings(const json_node& document, const char* name, const std::vector<std::string>& keys) {
+/* an object that may be left out */
+void check_settings(const json_node& document, const std::string& name) {
   const json_node settings = document.member(name);
   if (!settings.absent()) {
-    settings.expect_keys(keys);
+    settings.expect_keys(keys_of(name));
   }
-}
-
-/* `bit` where any of the keys is there */
-std::uint32_t given(const json_node& parent, const std::vector<std::string>& keys, unsigned bit) {
-  for (const std::string& key : keys) {
-    if (!parent.member(key).absent()) {
-      return bit;
-    }
-  }
-  return 0u;
 }
 
 /* position of a word among those allowed; the first one where it is left out */
@@ -164,33 +188,16 @@ std::size_t word_of(const json_node& node, const std::vector<std::string>& words
 }
 
 std::uint32_t read_bias_options(const json_node& bias, std::uint32_t joints) {
-  const json_node torque = bias.member("initial_torque");
-  if (!torque.absent()) {
-    torque.expect_list(joints, joints, "numbers in N.m, one per joint");
-  }
+  check_lists(bias, "bias", joints);
   const json_node entry_load = bias.member("entry_load");
-  return given(bias, {"initial_variance"}, MODEL_HAS_INITIAL_VARIANCE) |
-         given(bias, {"initial_torque"}, MODEL_HAS_INITIAL_TORQUE) | given(bias, {"noise_time"}, MODEL_HAS_NOISE_TIME) |
-         given(bias, {"start_share"}, MODEL_HAS_START_SHARE) |
-         (word_of(bias.member("forgetting"), {"time", "absorption"}) ? unsigned{MODEL_FORGETS_BY_ABSORPTION} : 0u) |
+  return given_options(bias, "bias") |
+         (word_of(bias.member("forgetting"), words_of("bias.forgetting")) ? unsigned{MODEL_FORGETS_BY_ABSORPTION}
+                                                                          : 0u) |
          (!entry_load.absent() && entry_load.boolean() ? unsigned{MODEL_REMEMBERS_ENTRY_LOAD} : 0u);
 }
 
-/* a list that may be left out */
-void check_optional_list(const json_node& list, std::uint32_t size, const std::string& meaning) {
-  if (!list.absent()) {
-    list.expect_list(size, size, meaning);
-  }
-}
-
-/* the thresholds of the residual, or of the innovation */
-void check_thresholds(const json_node& parent, std::uint32_t joints) {
-  parent.member("threshold").expect_list(joints, joints, "numbers in N.m, one per joint");
-  check_optional_list(parent.member("threshold_per_force"), joints, "numbers in N.m per N, one per joint");
-}
-
 std::uint32_t read_method(const json_node& contact, std::uint32_t joints) {
-  const std::size_t method = word_of(contact.member("method"), {"threshold", "innovation", "cusum"});
+  const std::size_t method = word_of(contact.member("method"), words_of("contact.method"));
   const json_node innovation = contact.member("innovation");
   if (method == 0) {
     if (!innovation.absent()) {
@@ -203,8 +210,8 @@ std::uint32_t read_method(const json_node& contact, std::uint32_t joints) {
   if (innovation.absent()) {
     innovation.refuse("an object with time and threshold, which contact.method needs");
   }
-  innovation.expect_keys({"time", "threshold", "threshold_per_force", "evidence_time"});
-  check_thresholds(innovation, joints);
+  innovation.expect_keys(keys_of("contact.innovation"));
+  check_lists(innovation, "contact.innovation", joints);
   if (method == 1) {
     expect_none(innovation, {"evidence_time"}, "contact.method \"innovation\"; it belongs to \"cusum\"");
     return MODEL_DETECTS_BY_INNOVATION;
@@ -244,16 +251,14 @@ std::uint32_t read_rest(const json_node& contact, std::uint32_t joints) {
   if (rest.absent()) {
     return 0u;
   }
-  rest.expect_keys({"travel", "settle_time", "averaging_time", "threshold", "threshold_per_force", "creep",
-                    "fall_share", "innovation"});
-  check_thresholds(rest, joints);
-  check_optional_list(rest.member("creep"), joints, "numbers in N.m, one per joint");
+  rest.expect_keys(keys_of("contact.rest"));
+  check_lists(rest, "contact.rest", joints);
   const json_node innovation = rest.member("innovation");
   if (innovation.absent()) {
     return MODEL_HAS_REST;
   }
-  innovation.expect_keys({"time", "threshold"});
-  innovation.member("threshold").expect_list(joints, joints, "numbers in N.m, one per joint");
+  innovation.expect_keys(keys_of("contact.rest.innovation"));
+  check_lists(innovation, "contact.rest.innovation", joints);
   return unsigned{MODEL_HAS_REST} | unsigned{MODEL_HAS_REST_INNOVATION};
 }
 
@@ -262,8 +267,8 @@ std::uint32_t read_drift(const json_node& contact, std::uint32_t joints) {
   if (drift.absent()) {
     return 0u;
   }
-  drift.expect_keys({"quick_time", "slow_time", "threshold", "threshold_per_force"});
-  check_thresholds(drift, joints);
+  drift.expect_keys(keys_of("contact.drift"));
+  check_lists(drift, "contact.drift", joints);
   return MODEL_HAS_DRIFT;
 }
 
@@ -272,32 +277,25 @@ std::uint32_t read_friction_bound(const json_node& contact) {
   if (bound.absent()) {
     return 0u;
   }
-  bound.expect_keys({"stuck_share", "stuck_time", "stuck_presliding", "jump_share", "jump_time"});
+  bound.expect_keys(keys_of("contact.friction_bound"));
   const json_node presliding = bound.member("stuck_presliding");
   const bool counts = !presliding.absent() && presliding.boolean();
   return unsigned{MODEL_HAS_FRICTION_BOUND} | (counts ? unsigned{MODEL_BOUNDS_PRESLIDING} : 0u);
 }
 
 std::uint32_t read_contact_options(const json_node& contact, std::uint32_t joints, std::uint32_t tendons) {
-  contact.expect_keys({"threshold", "threshold_per_force", "method", "innovation", "friction_bound", "uncertainty",
-                       "uncertainty_level", "deviation", "deviation_per_force", "release_ratio", "hold_time",
-                       "release_time", "drift", "rest"});
-  check_thresholds(contact, joints);
-  check_optional_list(contact.member("deviation"), joints, "numbers in N.m, one per joint");
-  check_optional_list(contact.member("deviation_per_force"), joints, "numbers in N.m per N, one per joint");
+  contact.expect_keys(keys_of("contact"));
+  check_lists(contact, "contact", joints);
   return read_method(contact, joints) | read_uncertainty(contact, joints, tendons) | read_friction_bound(contact) |
-         given(contact, {"deviation", "deviation_per_force"}, MODEL_HAS_DEVIATION) |
-         given(contact, {"release_ratio", "hold_time"}, MODEL_HAS_RELEASE) |
-         given(contact, {"release_time"}, MODEL_HAS_RELEASE_TIME) | read_drift(contact, joints) |
-         read_rest(contact, joints);
+         given_options(contact, "contact") | read_drift(contact, joints) | read_rest(contact, joints);
 }
 
 std::uint32_t read_position_filter(const json_node& filter, std::uint32_t joints) {
   if (filter.absent()) {
     return 0u;
   }
-  filter.expect_keys({"noise", "jerk_density"});
-  filter.member("noise").expect_list(joints, joints, "numbers in rad, one per joint");
+  filter.expect_keys(keys_of("position_filter"));
+  check_lists(filter, "position_filter", joints);
   return MODEL_HAS_POSITION_FILTER;
 }
 
@@ -311,9 +309,11 @@ std::uint32_t read_links(const json_node& document, std::uint32_t joints) {
   }
   links.expect_list(joints, joints, "links, one per joint");
   for (std::uint32_t j = 0; j < joints; ++j) {
-    const json_node link = links.element(j).expect_keys({"axis", "offset"});
+    const json_node link = links.element(j).expect_keys(keys_of("links"));
     link.member("axis").expect_list(3, 3, "numbers, the direction of the joint's axis");
-    check_optional_list(link.member("offset"), 3, "numbers in m");
+    if (!link.member("offset").absent()) {
+      link.member("offset").expect_list(3, 3, "numbers in m");
+    }
   }
   tip.expect_list(3, 3, "numbers in m, the fingertip in the last link's frame");
   return MODEL_HAS_LINKS;
@@ -323,22 +323,19 @@ std::uint32_t read_sensor_fault(const json_node& fault) {
   if (fault.absent()) {
     return 0u;
   }
-  fault.expect_keys({"hold_time", "force_resolution", "position_resolution", "jump_margin", "recovery_time"});
+  fault.expect_keys(keys_of("sensor_fault"));
   return MODEL_HAS_SENSOR_FAULT;
 }
 
 void check_top(const json_node& document) {
-  document.expect_keys({"format", "name", "joints", "tendons", "velocity_threshold", "velocity_filter_cutoff",
-                        "position_filter", "bias", "contact", "extensions", "links", "tip", "sensor_fault"});
+  document.expect_keys(keys_of(""));
   const json_node format = document.member("format");
   if (format.absent() || format.value() != format_name) {
     format.refuse("\"" + std::string(format_name) + "\"");
   }
   check_name(document.member("name"));
-  check_settings(document, "velocity_threshold", {"tendon", "joint", "hysteresis"});
-  check_settings(document, "bias",
-                 {"drift_variance", "noise_std", "noise_std_per_force", "initial_variance", "forget_rate",
-                  "initial_torque", "noise_time", "start_share", "forgetting", "entry_load"});
+  check_settings(document, "velocity_threshold");
+  check_settings(document, "bias");
 }
 
 }  // namespace
@@ -359,7 +356,7 @@ finger_shape read_shape(const json_node& document) {
   }
   finger.shape.options = read_bias_options(document.member("bias"), finger.shape.joints) |
                          read_contact_options(document.member("contact"), finger.shape.joints, finger.shape.tendons) |
-                         given(document.member("velocity_threshold"), {"hysteresis"}, MODEL_HAS_HYSTERESIS) |
+                         given_options(document.member("velocity_threshold"), "velocity_threshold") |
                          read_position_filter(document.member("position_filter"), finger.shape.joints) |
                          read_links(document, finger.shape.joints) | read_sensor_fault(document.member("sensor_fault"));
   read_extensions(document.member("extensions"), finger.shape.joints, finger.shape.tendons, finger.extensions);

@@ -23,6 +23,8 @@
 
 #include <stddef.h>
 
+#include "tendonfmu_outputs.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -108,40 +110,6 @@ typedef struct tendonfmu_inputs {
   const double* joint_position;  /* [n] rad  q */
   const double* joint_velocity;  /* [n] rad/s */
 } tendonfmu_inputs;
-
-/* Outputs of one sample, or of many. A NULL array is not wanted. Flags are 0 or 1. Begin with = {0} and set what is
- * wanted by name: later versions add arrays at the end, so a program is compiled with the header of its library. */
-typedef struct tendonfmu_outputs {
-  double* compensated_torque;   /* [n] N·m   τ − T_eff */
-  double* joint_torque;         /* [n] N·m   τ = Rᵀ f0 (eq. 3) */
-  double* friction_torque;      /* [n] N·m   T_eff (eq. 10 and fig. 5) */
-  double* bias_torque;          /* [n] N·m   b_eff */
-  double* joint_angle;          /* [n] rad   the kinematics in use */
-  double* joint_speed;          /* [n] rad/s */
-  unsigned char* joint_contact; /* [n] */
-  unsigned char* contact;       /* [1] any of joint_contact */
-  unsigned char* slack;         /* [m] a modelled tendon force came out negative */
-  /* docs/reference/semantics.md#outputs */
-  double* compensated_torque_std; /* [n] N·m   standard deviation of compensated_torque */
-  double* residual;               /* [n] N·m   τ − T_eff before the bias is updated */
-  double* innovation;             /* [n] N·m   what the residual has of late beyond its slow part; 0 by "threshold" */
-  double* stuck_friction;         /* [n] N·m   H, what stiction can hold; 0 without contact.friction_bound */
-  double* friction_jump;          /* [n] N·m   J, how the modelled friction has jumped of late; 0 without it */
-  double* friction_parts; /* [n × (m + 3)] N·m  by tendons, T_jv0, T_jvf·Σ f_B, T_jq; with contact.uncertainty */
-  /* of fingers with links; computed when one of them is asked for */
-  double* fingertip_force;                   /* [3] N     on the tip from outside, base frame */
-  double* fingertip_force_std;               /* [3] N     its standard deviation; 0 without contact.deviation */
-  unsigned char* fingertip_force_observable; /* [1]       all three directions of it follow from the torques */
-  double* fingertip_force_misfit;            /* [1]       χ² per degree of freedom of one force at the tip */
-  int* contact_link;                         /* [1]       contact on this link or beyond; 0 none, −1 not observable */
-  /* of fingers with contact.rest, else 0 */
-  double* contact_change;         /* [n] N·m   change of the joint torque since the motors came to rest; 0 in motion */
-  unsigned char* contact_at_rest; /* [1]       a change of some joint exceeds its bound */
-  double* drift;                  /* [n] N·m   d, how far a slow load may have come; 0 without contact.drift */
-  /* of fingers with sensor_fault, else 0 */
-  unsigned char* sensor_fault;       /* [m]    the force or the position of the tendon contradicts its spring */
-  unsigned char* contact_observable; /* [1]    no failing sensor keeps contact at any joint from being seen */
-} tendonfmu_outputs;
 
 /* Chooses where joint angles and velocities come from. Default 1. Before tendonfmu_initialise() only. */
 tendonfmu_status tendonfmu_set_kinematics_source(tendonfmu_finger* finger, int source);

@@ -17,11 +17,11 @@ from scipy.signal import lfilter
 
 from tendonfmu.detect.alarm_level import allowed_alarms, rate_limit
 from tendonfmu.detect.free_motion import NEVER, FreePart
-from tendonfmu.model import native
+from tendonfmu.model import DEFAULTS, native, number_of
 
 Numbers = NDArray[np.float64]
 
-SETTLE_TIME = 0.3  # s; the default of contact.rest.settle_time
+SETTLE_TIME = DEFAULTS["contact.rest.settle_time"]  # s
 INNOVATION_TIME = 0.5  # s; a touch rises within that, and what creeps meanwhile is little
 LEAST_REST = 0.5  # s; shorter rests are not learned from: a stop in passing
 LEFT_OUT = "contact.rest is left out: "  # and why
@@ -144,8 +144,7 @@ def standing_travel(data: Mapping[str, Any], parts: Sequence[FreePart]) -> float
     if not spans or not np.isfinite(resolution):
         return None
     span = float(np.quantile(np.concatenate(spans), STANDING_SHARE))
-    given = (data.get("velocity_threshold") or {}).get("tendon")
-    slowest = SLOWEST * (0.0005 if given is None else float(given)) * SETTLE_TIME
+    slowest = SLOWEST * number_of(data, "velocity_threshold.tendon") * SETTLE_TIME
     if span > max(slowest, resolution):
         return None
     return float(f"{TRAVEL_SPANS * max(span, resolution):.3g}")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.detect.counting import sample_seconds
 from tendonfmu.errors import InputError
-from tendonfmu.model import FingerDescription, native
+from tendonfmu.model import FingerDescription, native, number_of
 from tendonfmu.recordings import Held, Recording, prepare
 
 Numbers = NDArray[np.float64]
@@ -131,8 +131,7 @@ def _smoothed(values: Numbers, time: Numbers) -> Numbers:
 
 
 def _refuse_stillness(finger: FingerDescription, recording: Recording, speed: Numbers) -> None:
-    given = (finger.data.get("velocity_threshold") or {}).get("joint")
-    least = 0.01 if given is None else float(given)
+    least = number_of(finger.data, "velocity_threshold.joint")
     share = float(np.nanmean((np.abs(speed) > least).any(axis=1)))
     if share < STILL:
         raise InputError(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tendonfmu.detect.counting import DetectionScore, Signals, pooled, score_detection
 from tendonfmu.errors import InputError
 from tendonfmu.fmu import check_model, run_model
-from tendonfmu.model import FingerDescription, inputs_used, native, read_finger, watches_motors
+from tendonfmu.model import DEFAULTS, RANGES, FingerDescription, inputs_used, native, read_finger, watches_motors
 from tendonfmu.recordings import Recording, model_alone
 
 Numbers = NDArray[np.float64]
@@ -25,8 +25,11 @@ Flags = NDArray[np.bool_]
 THRESHOLDS = ("threshold", "threshold_per_force")
 SHARES = ("stuck_share", "jump_share")
 REST_BOUNDS = (*THRESHOLDS, "creep")
-UNCERTAINTY_LEVEL = ("uncertainty_level", 3.0)  # key and default
-LARGEST = {"stuck_share": 10.0, "jump_share": 10.0, "uncertainty_level": 100.0}
+UNCERTAINTY_LEVEL = "uncertainty_level"
+LARGEST = {
+    **{key: RANGES[f"contact.friction_bound.{key}"][1] for key in SHARES},
+    UNCERTAINTY_LEVEL: RANGES[f"contact.{UNCERTAINTY_LEVEL}"][1],
+}
 
 
 @dataclass(frozen=True)
@@ -187,8 +190,8 @@ def scaled_detection(data: Mapping[str, Any], factor: float) -> dict[str, Any]:
             contact[part] = dict(contact[part])
             _scale(contact[part], keys, factor)
     if contact.get("uncertainty") is not None:
-        contact.setdefault(*UNCERTAINTY_LEVEL)
-        _scale(contact, UNCERTAINTY_LEVEL[:1], factor)
+        contact.setdefault(UNCERTAINTY_LEVEL, DEFAULTS[f"contact.{UNCERTAINTY_LEVEL}"])
+        _scale(contact, (UNCERTAINTY_LEVEL,), factor)
     return {**data, "contact": contact}
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.detect.free_motion import FreePart
-from tendonfmu.model import native
+from tendonfmu.model import DEFAULTS, native
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -23,7 +23,7 @@ Flags = NDArray[np.bool_]
 # s, and so many samples at slow rates. Shorter than the default of sensor_fault.hold_time: free motion shows that
 # channels that are read at different times make no fault of it.
 HOLD_TIME, HOLD_SAMPLES = 0.02, 5
-RECOVERY_TIME = 0.5  # s, the default
+RECOVERY_TIME = DEFAULTS["sensor_fault.recovery_time"]  # s
 WINDOW = 0.1  # s, within which a spring is compared with its force: longer than a sound force stands in motion
 AMPLE = 2.0  # times the largest difference that was seen: what is to come may be twice as far off
 TAUT = 1.0  # N; below, a tendon may be slack, and the others do not tell its length

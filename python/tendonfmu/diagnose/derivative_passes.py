@@ -18,7 +18,7 @@ from scipy import sparse
 from tendonfmu.diagnose.effects.candidate import Variant
 from tendonfmu.diagnose.effects.description_edit import Edit, apply_edits, data_number, finer_paths, is_law_number
 from tendonfmu.estimate import Estimator, unknown_names
-from tendonfmu.model import native
+from tendonfmu.model import LIMITS, native
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import BlockSums, SampleBlocks
 
@@ -28,7 +28,7 @@ Stretch = tuple[int, Numbers, Numbers]  # first sample; derivatives of T and of 
 Direction = Mapping[str, float]  # path -> share; the description may be coarser than the merged one
 Watch = Callable[[int], None]  # samples processed since the last call
 
-MOST_ROWS = 1024  # of `extensions`; docs/reference/semantics.md#extensions
+MOST_ROWS = LIMITS["extensions"]
 _MOST_NUMBERS = 1500  # in a pass: keeps the derivatives of a stretch within tens of megabytes
 _BYTES = 3e7  # of derivatives at a time: more does not stay in the processor's cache
 _STRETCH, _LONGEST = 400, 2500  # samples at a time

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.model import DEFAULT_THRESHOLD, moment_arms, native
+from tendonfmu.model import moment_arms, native, number_of
 from tendonfmu.recordings import FitRecording, delayed_torque
 from tendonfmu.statistics import BlockSeries
 
@@ -246,8 +246,7 @@ def make_series(data: Mapping[str, Any], recordings: Sequence[FitRecording], gri
 
 
 def _joint_threshold(data: Mapping[str, Any]) -> float:
-    given = (data.get("velocity_threshold") or {}).get("joint")
-    return DEFAULT_THRESHOLD["joint"] if given is None else float(given)
+    return number_of(data, "velocity_threshold.joint")
 
 
 def _slope(values: Numbers, step: float) -> Numbers:

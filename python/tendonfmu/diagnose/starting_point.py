@@ -22,13 +22,14 @@ from tendonfmu.diagnose.effects import CANDIDATES, Place
 from tendonfmu.diagnose.extension_fit import Accepted, extended_description
 from tendonfmu.diagnose.series import Grid
 from tendonfmu.diagnose.span import Span, span_of
-from tendonfmu.model import moment_arms
+from tendonfmu.model import EFFECT_NUMBERS, moment_arms
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import Grams, make_folds
 
 Numbers = NDArray[np.float64]
 
-LONGEST_DELAY = 0.05  # s in either direction; docs/reference/semantics.md#extensions
+LONGEST_DELAY = EFFECT_NUMBERS["time_delay"]["delay"].most  # s in either direction
+
 FINE = 0.001  # s
 LARGE = 0.008  # s: smaller delays compete with other causes, by their derivative
 CLEAR_GAIN = 0.1  # of the rms that a starting delay must remove: any other missing effect looks a little like a delay

@@ -15,14 +15,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.model import Effect, effects, extension_numbers, friction_probe, native, working_point_weights
+from tendonfmu.model import (
+    DEFAULTS,
+    Effect,
+    effects,
+    extension_numbers,
+    friction_probe,
+    native,
+    number_of,
+    working_point_weights,
+)
 
 Numbers = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
 STEP = 1e-4  # of a value: T is linear in three of the four numbers of a law, and nearly so in the fourth over this
 _ELEMENTS = 4_000_000  # sensitivities in memory at a time
-_DEFAULTS = {"noise_std": 0.01, "noise_std_per_force": 0.0, "drift_variance": 1e-6}  # as in the core
 
 
 @dataclass(frozen=True)
@@ -245,15 +253,13 @@ def noise_of(data: Mapping[str, Any], sample_time: float) -> Noise:
     A finger without noise is judged with the default noise_std: without any, everything could be seen.
     """
     bias = data.get("bias") or {}
-    value = {key: default if bias.get(key) is None else float(bias[key]) for key, default in _DEFAULTS.items()}
-    if not value["noise_std"] and not value["noise_std_per_force"]:
-        value["noise_std"] = _DEFAULTS["noise_std"]
+    std, per_force = (number_of(data, f"bias.{key}") for key in ("noise_std", "noise_std_per_force"))
     initial = bias.get("initial_variance")
     return Noise(
-        std=value["noise_std"],
-        per_force=value["noise_std_per_force"],
+        std=std if std or per_force else DEFAULTS["bias.noise_std"],
+        per_force=per_force,
         time=float(bias.get("noise_time") or sample_time),
-        drift=value["drift_variance"],
+        drift=number_of(data, "bias.drift_variance"),
         initial=None if initial is None else float(initial),
     )
 

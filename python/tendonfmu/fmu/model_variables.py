@@ -210,12 +210,16 @@ def _outputs(
     """Yield index and dependencies of the outputs.
 
     late: forces may be those of earlier samples, so that no dependency has a fixed factor.
+
+    An output that `structure` does not know may depend on all elements of the inputs that its group names.
     """
     groups = {group["name"]: group for group in present}
     for group in present:
         if group["causality"] != "output":
             continue
-        for name, inputs in zip(_names(group, sizes), structure[group["name"]], strict=True):
+        names = _names(group, sizes)
+        everything = {of: list(range(sizes[groups[of]["size"]])) for of in group["dependencies"]}
+        for name, inputs in zip(names, structure.get(group["name"], [everything] * len(names)), strict=True):
             known = {
                 index[_names(groups[of], sizes)[i]]: "dependent" if late else group["dependencies"][of]["kind"]
                 for of, elements in inputs.items()

@@ -6,30 +6,17 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from tendonfmu.model.description_defaults import EFFECT_NUMBERS
+
 # By effect, in the order of the FMU's parameters: magnitudes that matter on a hand of human size, SI units.
 MAGNITUDES: Mapping[str, Mapping[str, float]] = {
-    "cover_hardening": {"stiffness": 0.05},
-    "gravity": {"sine": 0.005, "cosine": 0.005},
-    "inertia": {"inertia": 1e-5},
-    "joint_coupling": {"stiffness": 0.02, "reaction": 1.0},
-    "preload_friction": {"coulomb": 0.2, "beyond": 1.0},
-    "load_friction": {"coulomb": 1e-4},
-    "force_gain": {"correction": 0.05},
-    "force_offset": {"correction": 0.5},
-    "moment_arm": {"correction": 5e-4},
-    "moment_arm_variation": {"slope": 5e-4},
-    "pulley_eccentricity": {"sine": 5e-4, "cosine": 5e-4, "turns": 1.0},
-    "presliding": {"displacement": 1e-4},
-    "friction_drift": {"amplitude": 0.3, "time_constant": 100.0},
-    "tendon_nonlinearity": {"hardening": 1e5},
-    "backlash": {"width": 1e-4},
-    "time_delay": {"delay": 2e-3},
-    "stribeck": {"amplitude": 0.3, "stribeck_velocity": 0.01},
+    effect: {name: number.scale for name, number in numbers.items()} for effect, numbers in EFFECT_NUMBERS.items()
 }
 
-
 # What is taken where the description leaves a number out, if not 0. As long as it is that, a fit leaves it alone.
-LEFT_OUT: Mapping[str, float] = {"turns": 1.0, "reaction": 1.0, "beyond": 1.0}
+LEFT_OUT: Mapping[str, float] = {
+    name: number.missing for numbers in EFFECT_NUMBERS.values() for name, number in numbers.items() if number.missing
+}
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from tendonfmu.model.balance import moment_arms
 from tendonfmu.model.description import Law
+from tendonfmu.model.description_numbers import number_of
 
 Numbers = NDArray[np.float64]
-
-DEFAULT_THRESHOLD = {"tendon": 0.0005, "joint": 0.01}  # m/s, rad/s; used if a description has none
 
 
 @dataclass(frozen=True)
@@ -101,9 +100,7 @@ def velocity_threshold(data: Mapping[str, Any], effect: Effect) -> float:
     float
         m/s for a tendon's effect, rad/s for a joint's.
     """
-    key = "tendon" if effect.tendon else "joint"
-    value = (data.get("velocity_threshold") or {}).get(key)
-    return DEFAULT_THRESHOLD[key] if value is None else float(value)
+    return number_of(data, f"velocity_threshold.{'tendon' if effect.tendon else 'joint'}")
 
 
 def sliding_velocity(data: Mapping[str, Any], effect: Effect, joint_velocity: Numbers) -> Numbers:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu import _native
-from tendonfmu.model.signals import DETECTION, FLAGS, INPUTS, NUMBERS, PLACE, REST, SENSORS
+from tendonfmu.model.signals import INPUTS
 
 Array = NDArray[Any]
 
@@ -354,12 +354,7 @@ class Finger:
         ]
         with _refusals():
             time = np.ascontiguousarray(recording["time"], dtype=np.float64)
-            arrays = self._finger.run(time, inputs[0], inputs[1], inputs[2], inputs[3], parts)
-        place, rest = PLACE if self.has_links else (), REST if self.watches_rest else ()
-        sensors = SENSORS if self.watches_sensors else ()
-        optional = (*(("friction_parts",) if parts else ()), *place, *rest, *sensors)
-        names = (*NUMBERS, *FLAGS, *DETECTION, *optional)
-        outputs: dict[str, Array] = dict(zip(names, arrays, strict=True))
+            outputs: dict[str, Array] = self._finger.run(time, inputs[0], inputs[1], inputs[2], inputs[3], parts)
         flags = (name for name in outputs if outputs[name].dtype == np.uint8)
         return outputs | {name: outputs[name].astype(bool) for name in flags}
 
@@ -387,8 +382,7 @@ class Finger:
             for name, size in zip(INPUTS, sizes, strict=True)
         ]
         with _refusals():
-            slopes = self._finger.directional_derivative(*seeds)
-        return {name: np.array(slope) for name, slope in zip(NUMBERS, slopes, strict=True)}
+            return self._finger.directional_derivative(*seeds)
 
 
 def run_recording(

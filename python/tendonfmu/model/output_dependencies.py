@@ -18,13 +18,11 @@ import numpy as np
 from tendonfmu.model import native
 from tendonfmu.model.description import FingerDescription
 from tendonfmu.model.extensions import extension_rows
-from tendonfmu.model.signals import PLACE, REST, SENSORS
+from tendonfmu.model.signals import PLACE, REST, SENSORS, VECTORS
 
 # Extensions whose torque at their joint follows from its angle, or from its velocity.
 BY_OWN_ANGLE = frozenset({"cover_hardening", "moment_arm_variation", "pulley_eccentricity"})
 BY_OWN_VELOCITY = frozenset({"inertia", "load_friction"})
-
-VECTORS = frozenset({"fingertip_force", "fingertip_force_std"})
 
 Dependencies = dict[str, list[dict[str, list[int]]]]
 

@@ -1,32 +1,37 @@
-"""Which inputs and outputs the FMU has (docs/reference/recordings.md), in the order in which they are passed."""
+"""Names of the FMU's inputs and outputs (docs/reference/fmu_variables.md), and which inputs a finger uses."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
-INPUTS = ("tendon_force", "tendon_position", "joint_position", "joint_velocity")
-NUMBERS = ("compensated_torque", "joint_torque", "friction_torque", "bias_torque", "joint_angle", "joint_speed")
-FLAGS = ("joint_contact", "contact", "slack")
-
-# needed for tuning (docs/reference/semantics.md#outputs); the FMU has the first one only
-OPTIONAL_NUMBERS = ("compensated_torque_std",)  # older FMUs lack it
-DETECTION = ("compensated_torque_std", "residual", "innovation", "stuck_friction", "friction_jump", "drift")
-
-# only of fingers with links, and of their FMUs
-PLACE = (
-    "fingertip_force",
-    "fingertip_force_std",
-    "fingertip_force_observable",
-    "fingertip_force_misfit",
-    "contact_link",
+from tendonfmu.model.output_names import (
+    DETECTION,
+    FLAGS,
+    INPUTS,
+    NUMBERS,
+    OPTIONAL_NUMBERS,
+    PLACE,
+    REST,
+    SENSORS,
+    VECTORS,
 )
 
-# only of fingers with contact.rest, and of their FMUs
-REST = ("contact_change", "contact_at_rest")
+__all__ = [
+    "DETECTION",
+    "FLAGS",
+    "INPUTS",
+    "INPUTS_OF_SOURCE",
+    "NUMBERS",
+    "OPTIONAL_NUMBERS",
+    "PLACE",
+    "REST",
+    "SENSORS",
+    "VECTORS",
+    "inputs_used",
+    "watches_motors",
+]
 
-# only of fingers with sensor_fault, and of their FMUs
-SENSORS = ("sensor_fault", "contact_observable")
 
 # inputs that a kinematics source uses
 INPUTS_OF_SOURCE = {

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
 from tendonfmu.model import (
-    DEFAULT_THRESHOLD,
     INPUTS_OF_SOURCE,
     FingerDescription,
     inputs_used,
     moment_arms,
+    number_of,
     watches_motors,
 )
 from tendonfmu.recordings.faults import (
@@ -417,8 +417,7 @@ def refuse_stillness(finger: FingerDescription, recordings: list[FitRecording], 
             f"{', '.join(str(each.path) for each in recordings)}: no motion: nothing is ever faster than "
             "velocity_threshold; expected free motion of all joints (tendonfmu excite plans one)"
         )
-    given = (finger.data.get("velocity_threshold") or {}).get("joint")
-    threshold = DEFAULT_THRESHOLD["joint"] if given is None else float(given)
+    threshold = number_of(finger.data, "velocity_threshold.joint")
     fastest = np.max([np.abs(each.model.joint_speed[each.train]).max(axis=0) for each in recordings], axis=0)
     return [
         f"joint {j} ({finger.joint_names[j - 1]}) never moves faster than {threshold:g} rad/s: its own friction cannot "
@@ -442,9 +441,7 @@ def require_noise(finger: FingerDescription, recordings: list[FitRecording]) -> 
     InputError
         `bias.noise_std` is 0, and either `bias.noise_std_per_force` is 0 too or a sample has no tendon force.
     """
-    bias = finger.data.get("bias") or {}
-    base = 0.01 if bias.get("noise_std") is None else float(bias["noise_std"])
-    per_force = float(bias.get("noise_std_per_force") or 0.0)
+    base, per_force = (number_of(finger.data, f"bias.{key}") for key in ("noise_std", "noise_std_per_force"))
     if base > 0:
         return
     if not per_force:

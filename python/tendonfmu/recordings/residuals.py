@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.model import native
+from tendonfmu.model import native, number_of
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -25,7 +25,6 @@ LAGS = 20  # of the Ljung-Box test; even, so that the chi-square tail is a finit
 CONFIDENCE = 0.95
 _BLOCK, _SMALL = 64, 1e-30
 _NEVER = 1e9  # N·m; no contact threshold is ever passed
-_BIAS = {"noise_std": 0.01, "noise_std_per_force": 0.0, "drift_variance": 1e-6}  # defaults of the finger description
 
 
 @dataclass(frozen=True)
@@ -191,15 +190,14 @@ def bias_settings(data: Mapping[str, Any]) -> BiasSettings:
         With the defaults of docs/reference/finger_description.md where the description gives none.
     """
     given = data.get("bias") or {}
-    value = {key: default if given.get(key) is None else float(given[key]) for key, default in _BIAS.items()}
     optional = {
         key: None if given.get(key) is None else float(given[key]) for key in ("noise_time", "initial_variance")
     }
     torque = given.get("initial_torque")
     return BiasSettings(
-        drift=value["drift_variance"],
-        noise=value["noise_std"],
-        per_force=value["noise_std_per_force"],
+        drift=number_of(data, "bias.drift_variance"),
+        noise=number_of(data, "bias.noise_std"),
+        per_force=number_of(data, "bias.noise_std_per_force"),
         **optional,
         initial_torque=None if torque is None else np.array(torque, dtype=float),
     )

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.model import moment_arms
+from tendonfmu.model import RANGES, moment_arms
 from tendonfmu.recordings.prepared import FitRecording
 from tendonfmu.recordings.recording import Recording
 
@@ -27,7 +27,7 @@ NEIGHBOURS = (-2, -1, 1, 2)  # samples of the cubic
 BLOCK = 40  # samples
 FEWEST = 60  # samples; fewer give no useful estimate
 GAP = 3.0  # times the median step; no cubic spans a longer step
-LEAST = 1e-6  # rad, the smallest noise that the description accepts
+LEAST = RANGES["position_filter.noise"][0]  # rad, the smallest noise that the description accepts
 GRID = 1e-3  # of a step; differences this near to a multiple of the step count as multiples
 MOST_LEVELS = 0.5  # distinct values per sample, at most, where values come in steps
 

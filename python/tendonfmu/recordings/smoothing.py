@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt, welch
 
-from tendonfmu.model import moment_arms
+from tendonfmu.model import moment_arms, number_of
 from tendonfmu.recordings.faults import gaps
 from tendonfmu.recordings.recording import Recording
 
@@ -106,9 +106,8 @@ class Signals:
             return dict(data)
         bias = dict(data.get("bias") or {})
         if bias.get("noise_time") is None:
-            for key, default in (("noise_std", 0.01), ("noise_std_per_force", 0.0)):
-                value = default if bias.get(key) is None else float(bias[key])
-                bias[key] = value / np.sqrt(self.every)
+            for key in ("noise_std", "noise_std_per_force"):
+                bias[key] = number_of(data, f"bias.{key}") / np.sqrt(self.every)
         kept = {key: value for key, value in data.items() if key != "position_filter"}
         return {**kept, "velocity_filter_cutoff": 0.0, "bias": bias}
 

@@ -1,20 +1,10 @@
 #include "floating_point.h"
 
-#include "backlash.h"
+#include "effect_facts.h"
 
 /* Play: what is behind it follows a position at half the width (Krasnosel'skii and Pokrovskii 1989). */
 
 enum { BEHIND, BY_WIDTH, FOLLOWS, MEMORY_COUNT };
-
-static const effect_parameter parameters[] = {
-    {.name = "width",
-     .unit = "m",
-     .unit_at_joint = "rad",
-     .minimum = 0.0,
-     .maximum = 1e9,
-     .required = 1,
-     .scale = 1e-4},
-};
 
 static size_t state_count(size_t joints, size_t tendons, effect_place place) {
   (void)joints;
@@ -82,16 +72,9 @@ static void signal_pass(effect_place place, const double* values, const double* 
 }
 
 const effect_type effect_backlash = {
-    .name = "backlash",
-    .id = 23,
+    BACKLASH_FACTS,
     .kind = EFFECT_SIGNAL,
     .order = 1,
-    .joint = PLACE_OPTIONAL,
-    .tendon = PLACE_OPTIONAL,
-    .rule = PLACES_EXACTLY_ONE,
-    .once = 1,
-    .parameter_count = 1,
-    .parameters = parameters,
     .state_count = state_count,
     .signal = signal,
     .signal_slope = signal_slope,

@@ -1,19 +1,10 @@
 #include "floating_point.h"
 
-#include "cover_hardening.h"
+#include "effect_facts.h"
 
 #include "effect_parts.h"
 
 /* T_j = stiffness·(q_j − rest)³: the cubic part of the plastic cover's spring, beside the linear T_jq of eq. (8). */
-
-static const effect_parameter numbers[] = {
-    {.name = "stiffness",
-     .unit = "N.m/rad3",
-     .minimum = -EFFECT_LARGE,
-     .maximum = EFFECT_LARGE,
-     .required = 1,
-     .scale = 0.05},
-};
 
 static void torque(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                    double* torque) {
@@ -30,12 +21,8 @@ static void slope(effect_place place, const double* parameters, const effect_sam
 }
 
 const effect_type effect_cover_hardening = {
-    .name = "cover_hardening",
-    .id = 1,
+    COVER_HARDENING_FACTS,
     .kind = EFFECT_TORQUE,
-    .joint = PLACE_REQUIRED,
-    .parameter_count = 1,
-    .parameters = numbers,
     .torque = torque,
     .slope = slope,
 };

@@ -4,8 +4,6 @@
 
 #include "effect.h"
 
-#define EFFECT_LARGE 1e9 /* limit of numbers that have no other */
-
 /* component of a direction's row; 0 where there is none */
 static inline double along(const double* row, size_t i) {
   return row ? row[i] : 0.0;

@@ -1,20 +1,10 @@
 #include "floating_point.h"
 
-#include "force_gain.h"
+#include "effect_facts.h"
 
 #include "effect_parts.h"
 
 /* The true force of a tendon is (1 + correction)·f0: T_j = −correction·r_ij·f0 at every joint. */
-
-static const effect_parameter numbers[] = {
-    {.name = "correction",
-     .unit = "1",
-     .minimum = -1.0,
-     .maximum = EFFECT_LARGE,
-     .above_minimum = 1,
-     .required = 1,
-     .scale = 0.05},
-};
 
 static void add_to_joints(effect_place place, const effect_sample* sample, double force, double* torque) {
   for (size_t j = 0; j < sample->joints; ++j) {
@@ -35,12 +25,8 @@ static void slope(effect_place place, const double* parameters, const effect_sam
 }
 
 const effect_type effect_force_gain = {
-    .name = "force_gain",
-    .id = 7,
+    FORCE_GAIN_FACTS,
     .kind = EFFECT_TORQUE,
-    .tendon = PLACE_REQUIRED,
-    .parameter_count = 1,
-    .parameters = numbers,
     .torque = torque,
     .slope = slope,
 };

@@ -1,6 +1,6 @@
 #include "floating_point.h"
 
-#include "friction_drift.h"
+#include "effect_facts.h"
 
 #include "friction_law.h"
 
@@ -9,17 +9,6 @@
 enum { AMPLITUDE, TIME_CONSTANT };
 /* what has come of it, 1 − e^−age, and how fast it comes with age, −age·e^−age, for the time constant it was told */
 enum { FIRST_TIME, ELAPSED, TOLD_CONSTANT, COME, BY_AGE, MEMORY_COUNT };
-
-static const effect_parameter parameters[] = {
-    {.name = "amplitude", .unit = "1", .minimum = -0.9, .maximum = 1e9, .required = 1, .scale = 0.3},
-    {.name = "time_constant",
-     .unit = "s",
-     .minimum = 0.0,
-     .maximum = 1e9,
-     .above_minimum = 1,
-     .required = 1,
-     .scale = 100.0},
-};
 
 static size_t state_count(size_t joints, size_t tendons, effect_place place) {
   (void)joints;
@@ -56,15 +45,5 @@ static effect_grip grip(effect_place place, const double* values, const double* 
 }
 
 const effect_type effect_friction_drift = {
-    .name = "friction_drift",
-    .id = 21,
-    .kind = EFFECT_FRICTION,
-    .joint = PLACE_OPTIONAL,
-    .tendon = PLACE_OPTIONAL,
-    .rule = PLACES_AT_MOST_ONE,
-    .parameter_count = 2,
-    .parameters = parameters,
-    .state_count = state_count,
-    .advance = advance,
-    .grip = grip,
+    FRICTION_DRIFT_FACTS, .kind = EFFECT_FRICTION, .state_count = state_count, .advance = advance, .grip = grip,
 };

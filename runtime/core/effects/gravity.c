@@ -1,17 +1,12 @@
 #include "floating_point.h"
 
-#include "gravity.h"
+#include "effect_facts.h"
 
 #include "effect_parts.h"
 #include "sine_cosine.h"
 
 /* T_j = w_j·(sine·sin θ + cosine·cos θ) for all j up to the joint l that turns the link, θ = Σ_{k<=l} w_k q_k: its
  * weight, exact where the axes are parallel (w = ±1); w_k is the cosine of the angle between the axes of k and l. */
-
-static const effect_parameter numbers[] = {
-    {.name = "sine", .unit = "N.m", .minimum = -EFFECT_LARGE, .maximum = EFFECT_LARGE, .scale = 0.005},
-    {.name = "cosine", .unit = "N.m", .minimum = -EFFECT_LARGE, .maximum = EFFECT_LARGE, .scale = 0.005},
-};
 
 static double axis_cosine(const effect_sample* sample, size_t joint, size_t link) {
   return sample->axis_cosine[joint * sample->joints + link];
@@ -48,12 +43,8 @@ static void slope(effect_place place, const double* parameters, const effect_sam
 }
 
 const effect_type effect_gravity = {
-    .name = "gravity",
-    .id = 2,
+    GRAVITY_FACTS,
     .kind = EFFECT_TORQUE,
-    .joint = PLACE_REQUIRED,
-    .parameter_count = 2,
-    .parameters = numbers,
     .torque = torque,
     .slope = slope,
 };

@@ -1,19 +1,10 @@
 #include "floating_point.h"
 
-#include "inertia.h"
+#include "effect_facts.h"
 
 #include "effect_parts.h"
 
 /* T_j = inertia·a, a the backward difference of the joint's velocity; 0 at the first sample. */
-
-static const effect_parameter numbers[] = {
-    {.name = "inertia",
-     .unit = "kg.m2",
-     .minimum = -EFFECT_LARGE,
-     .maximum = EFFECT_LARGE,
-     .required = 1,
-     .scale = 1e-5},
-};
 
 enum { VELOCITY, ACCELERATION, STEP, NUMBERS_REMEMBERED }; /* STEP: 0 at the first sample */
 
@@ -59,15 +50,7 @@ static void slope(effect_place place, const double* parameters, const effect_sam
 }
 
 const effect_type effect_inertia = {
-    .name = "inertia",
-    .id = 3,
-    .kind = EFFECT_TORQUE,
-    .joint = PLACE_REQUIRED,
-    .parameter_count = 1,
-    .parameters = numbers,
-    .state_count = state_count,
-    .advance = advance,
-    .advance_slope = advance_slope,
-    .torque = torque,
+    INERTIA_FACTS,      .kind = EFFECT_TORQUE,          .state_count = state_count,
+    .advance = advance, .advance_slope = advance_slope, .torque = torque,
     .slope = slope,
 };

@@ -1,6 +1,6 @@
 #include "floating_point.h"
 
-#include "joint_coupling.h"
+#include "effect_facts.h"
 
 #include "effect_parts.h"
 
@@ -9,16 +9,6 @@
  * does not: a strap that ends before it, a hose that its motion stiffens. */
 
 enum { STIFFNESS, REACTION };
-
-static const effect_parameter numbers[] = {
-    {.name = "stiffness",
-     .unit = "N.m/rad",
-     .minimum = -EFFECT_LARGE,
-     .maximum = EFFECT_LARGE,
-     .required = 1,
-     .scale = 0.02},
-    {.name = "reaction", .unit = "1", .minimum = -10.0, .maximum = 10.0, .missing_value = 1.0, .scale = 1.0},
-};
 
 static double bend_of(effect_place place, const effect_sample* sample) {
   const size_t j = place.joint;
@@ -56,14 +46,5 @@ static void slope(effect_place place, const double* parameters, const effect_sam
 }
 
 const effect_type effect_joint_coupling = {
-    .name = "joint_coupling",
-    .id = 4,
-    .kind = EFFECT_TORQUE,
-    .joint = PLACE_REQUIRED,
-    .rule = PLACES_NOT_LAST_JOINT,
-    .parameter_count = 2,
-    .parameters = numbers,
-    .torque = torque,
-    .by_parameter = by_parameter,
-    .slope = slope,
+    JOINT_COUPLING_FACTS, .kind = EFFECT_TORQUE, .torque = torque, .by_parameter = by_parameter, .slope = slope,
 };

@@ -1,6 +1,6 @@
 #include "floating_point.h"
 
-#include "load_friction.h"
+#include "effect_facts.h"
 
 #include <math.h>
 
@@ -8,10 +8,6 @@
 
 /* T_j = coulomb·|f0|·s: Coulomb friction in a joint that grows with the force of one tendon, s the sign of the joint's
  * velocity when it last moved. */
-
-static const effect_parameter numbers[] = {
-    {.name = "coulomb", .unit = "m", .minimum = -EFFECT_LARGE, .maximum = EFFECT_LARGE, .required = 1, .scale = 1e-4},
-};
 
 static size_t state_count(size_t joints, size_t tendons, effect_place place) {
   (void)joints;
@@ -38,15 +34,6 @@ static void slope(effect_place place, const double* parameters, const effect_sam
 }
 
 const effect_type effect_load_friction = {
-    .name = "load_friction",
-    .id = 6,
-    .kind = EFFECT_TORQUE,
-    .joint = PLACE_REQUIRED,
-    .tendon = PLACE_REQUIRED,
-    .parameter_count = 1,
-    .parameters = numbers,
-    .state_count = state_count,
-    .advance = advance,
-    .torque = torque,
-    .slope = slope,
+    LOAD_FRICTION_FACTS, .kind = EFFECT_TORQUE, .state_count = state_count,
+    .advance = advance,  .torque = torque,      .slope = slope,
 };

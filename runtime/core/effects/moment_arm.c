@@ -1,19 +1,10 @@
 #include "floating_point.h"
 
-#include "moment_arm.h"
+#include "effect_facts.h"
 
 #include "effect_parts.h"
 
 /* The true moment arm is r_ij + correction: T_j = −correction·f0. Joint angles still come from the described arms. */
-
-static const effect_parameter numbers[] = {
-    {.name = "correction",
-     .unit = "m",
-     .minimum = -EFFECT_LARGE,
-     .maximum = EFFECT_LARGE,
-     .required = 1,
-     .scale = 5e-4},
-};
 
 static void torque(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                    double* torque) {
@@ -29,13 +20,8 @@ static void slope(effect_place place, const double* parameters, const effect_sam
 }
 
 const effect_type effect_moment_arm = {
-    .name = "moment_arm",
-    .id = 9,
+    MOMENT_ARM_FACTS,
     .kind = EFFECT_TORQUE,
-    .joint = PLACE_REQUIRED,
-    .tendon = PLACE_REQUIRED,
-    .parameter_count = 1,
-    .parameters = numbers,
     .torque = torque,
     .slope = slope,
 };

@@ -1,14 +1,10 @@
 #include "floating_point.h"
 
-#include "moment_arm_variation.h"
+#include "effect_facts.h"
 
 #include "effect_parts.h"
 
 /* The true moment arm is r_ij + slope·q_j, as where a tendon lifts off its guide: T_j = −slope·q_j·f0. */
-
-static const effect_parameter numbers[] = {
-    {.name = "slope", .unit = "m/rad", .minimum = -EFFECT_LARGE, .maximum = EFFECT_LARGE, .required = 1, .scale = 5e-4},
-};
 
 static void torque(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                    double* torque) {
@@ -25,13 +21,8 @@ static void slope(effect_place place, const double* parameters, const effect_sam
 }
 
 const effect_type effect_moment_arm_variation = {
-    .name = "moment_arm_variation",
-    .id = 10,
+    MOMENT_ARM_VARIATION_FACTS,
     .kind = EFFECT_TORQUE,
-    .joint = PLACE_REQUIRED,
-    .tendon = PLACE_REQUIRED,
-    .parameter_count = 1,
-    .parameters = numbers,
     .torque = torque,
     .slope = slope,
 };

@@ -1,6 +1,6 @@
 #include "floating_point.h"
 
-#include "preload_friction.h"
+#include "effect_facts.h"
 
 #include "effect_parts.h"
 
@@ -10,11 +10,6 @@
  * With beyond 0 it rubs within the joint, and the next ones feel nothing of it. */
 
 enum { COULOMB, BEYOND };
-
-static const effect_parameter numbers[] = {
-    {.name = "coulomb", .unit = "N", .minimum = -EFFECT_LARGE, .maximum = EFFECT_LARGE, .required = 1, .scale = 0.2},
-    {.name = "beyond", .unit = "1", .minimum = -10.0, .maximum = 10.0, .missing_value = 1.0, .scale = 1.0},
-};
 
 static size_t state_count(size_t joints, size_t tendons, effect_place place) {
   (void)tendons;
@@ -73,16 +68,7 @@ static void slope(effect_place place, const double* parameters, const effect_sam
 }
 
 const effect_type effect_preload_friction = {
-    .name = "preload_friction",
-    .id = 5,
-    .kind = EFFECT_TORQUE,
-    .joint = PLACE_OPTIONAL,
-    .tendon = PLACE_REQUIRED,
-    .parameter_count = 2,
-    .parameters = numbers,
-    .state_count = state_count,
-    .advance = advance,
-    .torque = torque,
-    .by_parameter = by_parameter,
+    PRELOAD_FRICTION_FACTS, .kind = EFFECT_TORQUE, .state_count = state_count,
+    .advance = advance,     .torque = torque,      .by_parameter = by_parameter,
     .slope = slope,
 };

@@ -1,6 +1,6 @@
 #include "floating_point.h"
 
-#include "presliding.h"
+#include "effect_facts.h"
 
 #include <float.h>
 #include <math.h>
@@ -12,19 +12,6 @@
 
 /* per velocity of the place */
 enum { SHARE, BY_DISPLACEMENT, BY_MOTION, KEPT, MEMORY_ROWS }; /* motion: velocity, or travel by a position filter */
-
-static const effect_parameter parameters[] = {
-    {.name = "displacement",
-     .unit = "m",
-     .unit_at_joint = "rad",
-     .unit_everywhere = "s",
-     .minimum = 0.0,
-     .maximum = 1e9,
-     .above_minimum = 1,
-     .required = 1,
-     .scale = 1e-4,
-     .scale_everywhere = 0.05},
-};
 
 static size_t member_count(effect_place place, size_t joints, size_t tendons) {
   return place.joint != EFFECT_NOWHERE ? 1 : is_everywhere(place) ? joints * (tendons + 1) : joints;
@@ -132,18 +119,6 @@ static effect_grip grip(effect_place place, const double* values, const double* 
 }
 
 const effect_type effect_presliding = {
-    .name = "presliding",
-    .id = 20,
-    .kind = EFFECT_FRICTION,
-    .joint = PLACE_OPTIONAL,
-    .tendon = PLACE_OPTIONAL,
-    .rule = PLACES_AT_MOST_ONE,
-    .once = 1,
-    .yields = 1,
-    .parameter_count = 1,
-    .parameters = parameters,
-    .state_count = state_count,
-    .advance = advance,
-    .advance_slope = advance_slope,
-    .grip = grip,
+    PRESLIDING_FACTS,   .kind = EFFECT_FRICTION,        .yields = 1,  .state_count = state_count,
+    .advance = advance, .advance_slope = advance_slope, .grip = grip,
 };

@@ -1,6 +1,6 @@
 #include "floating_point.h"
 
-#include "pulley_eccentricity.h"
+#include "effect_facts.h"
 
 #include "effect_parts.h"
 #include "sine_cosine.h"
@@ -10,12 +10,6 @@
  * by arm over radius as often. */
 
 enum { SINE, COSINE, TURNS };
-
-static const effect_parameter numbers[] = {
-    {.name = "sine", .unit = "m", .minimum = -EFFECT_LARGE, .maximum = EFFECT_LARGE, .scale = 5e-4},
-    {.name = "cosine", .unit = "m", .minimum = -EFFECT_LARGE, .maximum = EFFECT_LARGE, .scale = 5e-4},
-    {.name = "turns", .unit = "1", .minimum = 0.0, .maximum = 1000.0, .missing_value = 1.0, .scale = 1.0},
-};
 
 static sine_cosine pulley_at(effect_place place, const double* parameters, const effect_sample* sample) {
   return sine_cosine_of(parameters[TURNS] * sample->angle[place.joint]);
@@ -54,14 +48,5 @@ static void slope(effect_place place, const double* parameters, const effect_sam
 }
 
 const effect_type effect_pulley_eccentricity = {
-    .name = "pulley_eccentricity",
-    .id = 11,
-    .kind = EFFECT_TORQUE,
-    .joint = PLACE_REQUIRED,
-    .tendon = PLACE_REQUIRED,
-    .parameter_count = 3,
-    .parameters = numbers,
-    .torque = torque,
-    .by_parameter = by_parameter,
-    .slope = slope,
+    PULLEY_ECCENTRICITY_FACTS, .kind = EFFECT_TORQUE, .torque = torque, .by_parameter = by_parameter, .slope = slope,
 };

@@ -1,6 +1,6 @@
 #include "floating_point.h"
 
-#include "stribeck.h"
+#include "effect_facts.h"
 
 #include <math.h>
 
@@ -12,18 +12,6 @@
 enum { AMPLITUDE, STRIBECK_VELOCITY };
 /* per velocity of the place */
 enum { SPEED, SIDE, MEMORY_ROWS };
-
-static const effect_parameter parameters[] = {
-    {.name = "amplitude", .unit = "1", .minimum = -0.99, .maximum = 1e9, .required = 1, .scale = 0.3},
-    {.name = "stribeck_velocity",
-     .unit = "m/s",
-     .unit_at_joint = "rad/s",
-     .minimum = 0.0,
-     .maximum = 1e9,
-     .above_minimum = 1,
-     .required = 1,
-     .scale = 0.01},
-};
 
 static size_t member_count(effect_place place, size_t joints) {
   return place.joint != EFFECT_NOWHERE ? 1 : joints;
@@ -59,15 +47,5 @@ static effect_grip grip(effect_place place, const double* values, const double* 
 }
 
 const effect_type effect_stribeck = {
-    .name = "stribeck",
-    .id = 25,
-    .kind = EFFECT_FRICTION,
-    .joint = PLACE_OPTIONAL,
-    .tendon = PLACE_OPTIONAL,
-    .rule = PLACES_EXACTLY_ONE,
-    .parameter_count = 2,
-    .parameters = parameters,
-    .state_count = state_count,
-    .advance = advance,
-    .grip = grip,
+    STRIBECK_FACTS, .kind = EFFECT_FRICTION, .state_count = state_count, .advance = advance, .grip = grip,
 };

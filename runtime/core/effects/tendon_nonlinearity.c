@@ -1,16 +1,12 @@
 #include "floating_point.h"
 
-#include "tendon_nonlinearity.h"
+#include "effect_facts.h"
 
 #include <math.h>
 
 /* A progressive spring: |f| = k e + hardening e². The position is corrected so that subtracting f/k leaves x0 − e. */
 
 enum { BY_HARDENING, BY_FORCE, MEMORY_COUNT }; /* of the correction: m³/N, m/N */
-
-static const effect_parameter parameters[] = {
-    {.name = "hardening", .unit = "N/m2", .minimum = 0.0, .maximum = 1e12, .required = 1, .scale = 1e5},
-};
 
 static size_t state_count(size_t joints, size_t tendons, effect_place place) {
   (void)joints;
@@ -55,17 +51,6 @@ static void signal_pass(effect_place place, const double* values, const double* 
 }
 
 const effect_type effect_tendon_nonlinearity = {
-    .name = "tendon_nonlinearity",
-    .id = 22,
-    .kind = EFFECT_SIGNAL,
-    .order = 2,
-    .joint = PLACE_REFUSED,
-    .tendon = PLACE_REQUIRED,
-    .once = 1,
-    .parameter_count = 1,
-    .parameters = parameters,
-    .state_count = state_count,
-    .signal = signal,
-    .signal_slope = signal_slope,
-    .signal_pass = signal_pass,
+    TENDON_NONLINEARITY_FACTS,    .kind = EFFECT_SIGNAL,      .order = 2, .state_count = state_count, .signal = signal,
+    .signal_slope = signal_slope, .signal_pass = signal_pass,
 };

@@ -1,6 +1,6 @@
 #include "floating_point.h"
 
-#include "time_delay.h"
+#include "effect_facts.h"
 
 #include <math.h>
 #include <string.h>
@@ -12,10 +12,6 @@ enum { KEPT = 64 };
 /* memory: the newest of the kept samples, how many there are, whether they are forces, the share of this sample in what
  * comes out; their times; slopes of the signals by the delay [width]; the samples [KEPT × width] */
 enum { NEWEST, COUNT, FORCES, SHARE, TIMES };
-
-static const effect_parameter parameters[] = {
-    {.name = "delay", .unit = "s", .minimum = -0.05, .maximum = 0.05, .required = 1, .scale = 2e-3},
-};
 
 /* room for what any kinematics source gives */
 static size_t width_of(size_t joints, size_t tendons) {
@@ -136,16 +132,6 @@ static void signal_pass(effect_place place, const double* values, const double* 
 }
 
 const effect_type effect_time_delay = {
-    .name = "time_delay",
-    .id = 24,
-    .kind = EFFECT_SIGNAL,
-    .joint = PLACE_REFUSED,
-    .tendon = PLACE_REFUSED,
-    .once = 1,
-    .parameter_count = 1,
-    .parameters = parameters,
-    .state_count = state_count,
-    .signal = signal,
-    .signal_slope = signal_slope,
-    .signal_pass = signal_pass,
+    TIME_DELAY_FACTS, .kind = EFFECT_SIGNAL,        .state_count = state_count,
+    .signal = signal, .signal_slope = signal_slope, .signal_pass = signal_pass,
 };

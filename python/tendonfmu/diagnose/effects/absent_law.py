@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from tendonfmu.diagnose.effects.candidate import Column, Data, Variant
 from tendonfmu.diagnose.effects.description_edit import ABSENT, Edit, magnitudes_of
 from tendonfmu.estimate import get_number
-from tendonfmu.model import DEFAULT_THRESHOLD
+from tendonfmu.model import DEFAULTS
 
 # ordinary Coulomb friction: share of the tendon force, N·m in a joint, N·m per N of load
 _ORDINARY = {"edge_friction": 0.02, "pulley_friction": 0.02, "friction": 0.005, "load_friction": 1e-4}
@@ -18,7 +18,7 @@ def absent_law(data: Data, path: str, shape: Mapping[str, float]) -> Variant:
     """Return the law at a path as a variant: Coulomb and viscous friction, both at least 0."""
     kind = path.rsplit(".", 1)[1].split("[")[0]
     coulomb = _ORDINARY[kind]
-    speed = 100 * DEFAULT_THRESHOLD["tendon" if path.startswith("tendons") else "joint"]
+    speed = 100 * DEFAULTS[f"velocity_threshold.{'tendon' if path.startswith('tendons') else 'joint'}"]
     columns = (
         Column({f"{path}.coulomb": 1.0}, 1, coulomb),
         Column({f"{path}.viscous": 1.0}, 1, _SLOW_SHARE * coulomb / speed),

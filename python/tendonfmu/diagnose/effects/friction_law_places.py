@@ -9,7 +9,7 @@ import numpy as np
 
 from tendonfmu.diagnose.effects.candidate import Place
 from tendonfmu.diagnose.effects.description_edit import magnitudes_of, sides_at
-from tendonfmu.model import DEFAULT_THRESHOLD, Effect, effects, moment_arms
+from tendonfmu.model import Effect, effects, moment_arms, number_of
 
 Data = Mapping[str, Any]
 KINDS = ("friction", "load_friction", "edge_friction", "pulley_friction")
@@ -100,10 +100,7 @@ def thresholds(data: Data) -> tuple[float, float]:
     joint
         Threshold of joints, rad/s.
     """
-    given = data.get("velocity_threshold") or {}
-    found = (DEFAULT_THRESHOLD[kind] if given.get(kind) is None else given[kind] for kind in ("tendon", "joint"))
-    tendon, joint = (float(value) for value in found)
-    return tendon, joint
+    return number_of(data, "velocity_threshold.tendon"), number_of(data, "velocity_threshold.joint")
 
 
 # --- extensions -------------------------------------------------------------------------------------------------------

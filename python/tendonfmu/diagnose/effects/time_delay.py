@@ -9,10 +9,11 @@ from tendonfmu.diagnose.effects.candidate import Candidate, Data, Place, Variant
 from tendonfmu.diagnose.effects.extension_row import secant_variant
 from tendonfmu.diagnose.effects.friction_law_places import without_rows
 from tendonfmu.diagnose.span import Span
+from tendonfmu.model import EFFECT_NUMBERS
 
 NAME = "time_delay"
 _DELAYS = (0.002, 0.01)  # s; larger delays are scanned for (starting_point.py)
-_LONGEST = 0.05  # s; docs/reference/semantics.md#extensions
+_LONGEST = EFFECT_NUMBERS[NAME]["delay"].most  # s
 _LEAST_STEPS, _MOST_STEPS = 0.5, 60.0  # samples: the smallest visible delay, and what the model remembers
 
 

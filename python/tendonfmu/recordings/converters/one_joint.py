@@ -23,11 +23,12 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from tendonfmu.errors import InputError
+from tendonfmu.model import DEFAULTS
 from tendonfmu.recordings.converters.column_map import Joint
 
 Series = NDArray[np.float64]
 
-CUTOFF = 20.0  # Hz; as of the runtime's own filter
+CUTOFF = DEFAULTS["velocity_filter_cutoff"]  # Hz
 SHARE_OF_RATE = 0.2  # of the sample rate; the cut-off is at most this, since central differences fall off above it
 GAP = 10.0  # times the usual step; a longer step interrupts the log, and no filter spans it
 LEAST = 20  # samples

@@ -1,0 +1,101 @@
+/* Generated from the tables in runtime/description by `python tools/tables/generate.py`: do not edit. */
+/* clang-format off */
+#ifndef TENDONFMU_KEY_TABLE_H
+#define TENDONFMU_KEY_TABLE_H
+
+#include <stdint.h>
+
+enum {
+  MODEL_MAX_JOINTS = 16,
+  MODEL_MAX_TENDONS = 64,
+  MODEL_MAX_POINTS = 256,
+  MODEL_MAX_DIRECTIONS = 4,
+  MODEL_MAX_EXTENSIONS = 1024
+};
+
+/* The parameters come in items, in this order: joints, tendons, finger, extensions. */
+typedef enum model_item_kind {
+  ITEM_COVER, /* joints[j].cover */
+  ITEM_JOINT_FRICTION, /* joints[j].friction */
+  ITEM_LOAD_FRICTION, /* joints[j].load_friction */
+  ITEM_STIFFNESS, /* tendons[i].stiffness */
+  ITEM_MOMENT_ARMS, /* tendons[i].moment_arms[j] */
+  ITEM_PULLEY_FRICTION, /* tendons[i].pulley_friction[j] */
+  ITEM_EDGE_ANGLES, /* tendons[i].edge_friction[j].angles[k] */
+  ITEM_EDGE_FRICTION, /* tendons[i].edge_friction[j] */
+  ITEM_TENDON_THRESHOLD, /* velocity_threshold.tendon */
+  ITEM_JOINT_THRESHOLD, /* velocity_threshold.joint */
+  ITEM_FILTER_CUTOFF, /* velocity_filter_cutoff */
+  ITEM_DRIFT_VARIANCE, /* bias.drift_variance */
+  ITEM_NOISE_STD, /* bias.noise_std */
+  ITEM_NOISE_STD_PER_FORCE, /* bias.noise_std_per_force */
+  ITEM_INITIAL_VARIANCE, /* bias.initial_variance */
+  ITEM_FORGET_RATE, /* bias.forget_rate */
+  ITEM_INITIAL_TORQUE, /* bias.initial_torque[j] */
+  ITEM_NOISE_TIME, /* bias.noise_time */
+  ITEM_START_SHARE, /* bias.start_share */
+  ITEM_CONTACT_THRESHOLD, /* contact.threshold[j] */
+  ITEM_CONTACT_PER_FORCE, /* contact.threshold_per_force[j] */
+  ITEM_HYSTERESIS, /* velocity_threshold.hysteresis */
+  ITEM_POSITION_NOISE, /* position_filter.noise[j] */
+  ITEM_JERK_DENSITY, /* position_filter.jerk_density */
+  ITEM_INNOVATION_TIME, /* contact.innovation.time */
+  ITEM_INNOVATION_THRESHOLD, /* contact.innovation.threshold[j] */
+  ITEM_INNOVATION_PER_FORCE, /* contact.innovation.threshold_per_force[j] */
+  ITEM_EVIDENCE_TIME, /* contact.innovation.evidence_time */
+  ITEM_STUCK_SHARE, /* contact.friction_bound.stuck_share */
+  ITEM_JUMP_SHARE, /* contact.friction_bound.jump_share */
+  ITEM_JUMP_TIME, /* contact.friction_bound.jump_time */
+  ITEM_STUCK_TIME, /* contact.friction_bound.stuck_time */
+  ITEM_UNCERTAINTY, /* contact.uncertainty[j,d,k] */
+  ITEM_UNCERTAINTY_LEVEL, /* contact.uncertainty_level */
+  ITEM_DEVIATION, /* contact.deviation[j] */
+  ITEM_DEVIATION_PER_FORCE, /* contact.deviation_per_force[j] */
+  ITEM_RELEASE_RATIO, /* contact.release_ratio */
+  ITEM_HOLD_TIME, /* contact.hold_time */
+  ITEM_RELEASE_TIME, /* contact.release_time */
+  ITEM_DRIFT_QUICK_TIME, /* contact.drift.quick_time */
+  ITEM_DRIFT_SLOW_TIME, /* contact.drift.slow_time */
+  ITEM_DRIFT_THRESHOLD, /* contact.drift.threshold[j] */
+  ITEM_DRIFT_PER_FORCE, /* contact.drift.threshold_per_force[j] */
+  ITEM_REST_TRAVEL, /* contact.rest.travel */
+  ITEM_REST_SETTLE_TIME, /* contact.rest.settle_time */
+  ITEM_REST_AVERAGING_TIME, /* contact.rest.averaging_time */
+  ITEM_REST_THRESHOLD, /* contact.rest.threshold[j] */
+  ITEM_REST_PER_FORCE, /* contact.rest.threshold_per_force[j] */
+  ITEM_REST_CREEP, /* contact.rest.creep[j] */
+  ITEM_REST_FALL_SHARE, /* contact.rest.fall_share */
+  ITEM_REST_INNOVATION_TIME, /* contact.rest.innovation.time */
+  ITEM_REST_INNOVATION_THRESHOLD, /* contact.rest.innovation.threshold[j] */
+  ITEM_LINK_AXIS, /* links[j].axis[c] */
+  ITEM_LINK_OFFSET, /* links[j].offset[c] */
+  ITEM_TIP, /* tip[c] */
+  ITEM_FAULT_HOLD_TIME, /* sensor_fault.hold_time */
+  ITEM_FAULT_FORCE_RESOLUTION, /* sensor_fault.force_resolution */
+  ITEM_FAULT_POSITION_RESOLUTION, /* sensor_fault.position_resolution */
+  ITEM_FAULT_JUMP_MARGIN, /* sensor_fault.jump_margin */
+  ITEM_FAULT_RECOVERY_TIME, /* sensor_fault.recovery_time */
+  ITEM_EXTENSION /* as many as the effect has */
+} model_item_kind;
+
+/* Numbers of an item whose shape is in no shape word. */
+typedef enum key_count { KEY_ONE, KEY_PER_JOINT, KEY_PER_PART, KEY_THREE } key_count; /* parts: m + 3, of friction */
+
+/* A number of the finger description. In its path %i is the tendon, %j the joint, %d the direction and %k the number
+ * within its item, all from 1; %@ is .laws[…] where an edge has working points, %~ the side of an asymmetric law. */
+typedef struct key_row {
+  const char* path;
+  const char* unit; /* FMI notation */
+  double minimum, maximum;
+  int above_minimum; /* the minimum itself is not allowed */
+  int tunable;
+  int has_default;
+  double default_value;
+  key_count count;
+  uint32_t option; /* the bit of the model image (model_options.h) without which it is not there; 0: always there */
+} key_row;
+
+/* The row of number `offset` of an item; not of ITEM_EXTENSION. */
+const key_row* key_row_of(model_item_kind kind, uint32_t offset);
+
+#endif
