@@ -1,51 +1,8 @@
 // tendonfmu_learner.h on recordings whose truth is known.
 #include <limits>
 
+#include "allocation_count.h"
 #include "made_recording.h"
-
-#if defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-#define UNDER_SANITIZER 1
-#endif
-#endif
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define UNDER_SANITIZER 1
-#endif
-
-namespace {
-[[maybe_unused]] long allocations = 0; /* calls of malloc, calloc, realloc, aligned_alloc and free */
-}
-
-#if defined(__GLIBC__) && !defined(UNDER_SANITIZER)
-#define COUNTS_ALLOCATIONS 1
-extern "C" {
-void* __libc_malloc(size_t);
-void* __libc_calloc(size_t, size_t);
-void* __libc_realloc(void*, size_t);
-void* __libc_memalign(size_t, size_t);
-void __libc_free(void*);
-void* malloc(size_t size) {
-  ++allocations;
-  return __libc_malloc(size);
-}
-void* calloc(size_t count, size_t size) {
-  ++allocations;
-  return __libc_calloc(count, size);
-}
-void* realloc(void* block, size_t size) {
-  ++allocations;
-  return __libc_realloc(block, size);
-}
-void* aligned_alloc(size_t alignment, size_t size) {
-  ++allocations;
-  return __libc_memalign(alignment, size);
-}
-void free(void* block) {
-  ++allocations;
-  __libc_free(block);
-}
-}
-#endif
 
 namespace {
 
@@ -454,7 +411,7 @@ TEST(Learner, StepAllocatesNothing) {
     const tendonfmu_inputs inputs = c.recording.inputs(k);
     if (k == 0) {
       tendonfmu_learner_initialise(l, c.recording.time[0], &inputs, 3, c.recording.load(0), 1);
-      allocations = 0;
+      count_allocations_anew();
       continue;
     }
     tendonfmu_learner_step(l, c.recording.time[k], &inputs, c.recording.load(k), 1);
@@ -464,7 +421,7 @@ TEST(Learner, StepAllocatesNothing) {
       tendonfmu_learner_get_bias(l, bias.data(), nullptr);
     }
   }
-  const long counted = allocations;
+  const long counted = counted_allocations();
   EXPECT_EQ(counted, 0);
   EXPECT_GT(errors[values.size() / 2] + values[0], 0.0);
 #else

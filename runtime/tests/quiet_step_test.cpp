@@ -8,6 +8,7 @@
 #include <cstring>
 #include <vector>
 
+#include "allocation_count.h"
 #include "test_finger.h"
 
 #if defined(__linux__)
@@ -18,54 +19,9 @@
 #include <unistd.h>
 #endif
 
-#if defined(__has_feature)
-#if __has_feature(address_sanitizer)
-#define UNDER_SANITIZER 1
-#endif
-#endif
-#if defined(__SANITIZE_ADDRESS__)
-#define UNDER_SANITIZER 1
-#endif
-
 using test_finger::Finger;
 using test_finger::Motion;
 using test_finger::Outputs;
-
-namespace {
-[[maybe_unused]] long allocations =
-    0; /* calls of malloc, calloc, realloc, aligned_alloc and free since it was set to 0 */
-}
-
-#if defined(__GLIBC__) && !defined(UNDER_SANITIZER)
-#define COUNTS_ALLOCATIONS 1
-extern "C" {
-void* __libc_malloc(size_t);
-void* __libc_calloc(size_t, size_t);
-void* __libc_realloc(void*, size_t);
-void* __libc_memalign(size_t, size_t);
-void __libc_free(void*);
-void* malloc(size_t size) {
-  ++allocations;
-  return __libc_malloc(size);
-}
-void* calloc(size_t count, size_t size) {
-  ++allocations;
-  return __libc_calloc(count, size);
-}
-void* realloc(void* block, size_t size) {
-  ++allocations;
-  return __libc_realloc(block, size);
-}
-void* aligned_alloc(size_t alignment, size_t size) {
-  ++allocations;
-  return __libc_memalign(alignment, size);
-}
-void free(void* block) {
-  ++allocations;
-  __libc_free(block);
-}
-}
-#endif
 
 namespace {
 
@@ -125,13 +81,13 @@ TEST(QuietStep, AllocatesNothing) {
     }
     Outputs outputs(motion.time.size());
     std::vector<unsigned char> state(tendonfmu_state_size(finger));
-    allocations = 0;
+    count_allocations_anew();
     void* volatile block = std::malloc(1);
     std::free(block);
-    ASSERT_EQ(allocations, 2) << "the counter does not count";
-    allocations = 0;
+    ASSERT_EQ(counted_allocations(), 2) << "the counter does not count";
+    count_allocations_anew();
     const int wrong = exercise(finger, motion, outputs, state);
-    const long counted = allocations;
+    const long counted = counted_allocations();
     EXPECT_EQ(wrong, 0);
     EXPECT_EQ(counted, 0) << kernel;
   }
