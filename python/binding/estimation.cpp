@@ -3,9 +3,10 @@
 
 namespace {
 
-class Estimator {
+class bound_estimator {
  public:
-  Estimator(const nb::bytes& image, const std::optional<Groups>& group, const std::optional<Numbers>& scale) {
+  bound_estimator(const nb::bytes& image, const std::optional<group_row>& group,
+                  const std::optional<number_row>& scale) {
     if (group || scale) {
       create(image, nullptr, nullptr); /* how many numbers are expected, before they are read */
       check_length(group ? group->shape(0) : parameters(), "group");
@@ -25,24 +26,25 @@ class Estimator {
     return as_tuple(u);
   }
 
-  nb::object values(const Numbers& z) const {
+  nb::object values(const number_row& z) const {
     expect_unknowns(z);
     std::vector<double> values(parameters());
     expect(tendonfmu_estimator_get_values(get(), z.data(), values.data()));
     return as_array(std::move(values), {parameters()});
   }
 
-  nb::object unknown_values(const Numbers& values) const {
+  nb::object unknown_values(const number_row& values) const {
     check_length(values.shape(0), "values");
     std::vector<double> z(unknowns());
     expect(tendonfmu_estimator_get_unknowns(get(), values.data(), z.data()));
     return as_array(std::move(z), {unknowns()});
   }
 
-  std::size_t add_recording(const Numbers& time, const Rows& force, const std::optional<Rows>& position,
-                            const std::optional<Rows>& angle, const std::optional<Rows>& velocity, int source,
-                            const std::optional<Rows>& external, const std::optional<Flags>& use) {
-    const Samples samples{time, force, position, angle, velocity, external, use};
+  std::size_t add_recording(const number_row& time, const number_rows& force,
+                            const std::optional<number_rows>& position, const std::optional<number_rows>& angle,
+                            const std::optional<number_rows>& velocity, int source,
+                            const std::optional<number_rows>& external, const std::optional<flag_row>& use) {
+    const sample_arrays samples{time, force, position, angle, velocity, external, use};
     samples.check(joints(), tendons());
     const tendonfmu_inputs inputs = samples.inputs();
     std::size_t index = 0;
@@ -52,21 +54,21 @@ class Estimator {
     return index;
   }
 
-  void set_weights(std::size_t recording, const Numbers& weight) {
+  void set_weights(std::size_t recording, const number_row& weight) {
     if (weight.shape(0) != joints()) {
       throw nb::value_error(("weight: expected " + std::to_string(joints()) + " numbers, one a joint").c_str());
     }
     expect(tendonfmu_estimator_set_weights(get(), recording, weight.data()));
   }
 
-  void set_known(const Rows& information) {
+  void set_known(const number_rows& information) {
     if (information.shape(0) != unknowns() || information.shape(1) != unknowns()) {
       throw nb::value_error("information: expected a row and a column for each unknown");
     }
     expect(tendonfmu_estimator_set_known(get(), information.data()));
   }
 
-  nb::tuple evaluate(const Numbers& z, std::size_t stride, unsigned threads) const {
+  nb::tuple evaluate(const number_row& z, std::size_t stride, unsigned threads) const {
     expect_unknowns(z);
     const std::size_t u = unknowns();
     double cost = 0.0;
@@ -81,7 +83,7 @@ class Estimator {
     return nb::make_tuple(cost, as_array(std::move(gradient), {u}), as_array(std::move(information), {u, u}));
   }
 
-  nb::tuple jacobian(std::size_t recording, const Numbers& z, std::size_t first, std::size_t count) const {
+  nb::tuple jacobian(std::size_t recording, const number_row& z, std::size_t first, std::size_t count) const {
     expect_unknowns(z);
     const std::size_t u = unknowns(), n = joints();
     std::vector<double> torque(count * n), jump(count * n), by_torque(count * n * u), by_jump(count * n * u);
@@ -91,7 +93,7 @@ class Estimator {
                           as_array(std::move(by_torque), {count, n, u}), as_array(std::move(by_jump), {count, n, u}));
   }
 
-  nb::tuple innovations(std::size_t recording, const Numbers& z) const {
+  nb::tuple innovations(std::size_t recording, const number_row& z) const {
     expect_unknowns(z);
     const std::size_t samples = recording < lengths_.size() ? lengths_[recording] : 0, n = joints();
     std::vector<double> innovation(samples * n), variance(samples), bias(samples * n);
@@ -102,18 +104,18 @@ class Estimator {
   }
 
   // watch(pass, stride, samples_done, samples, cost, best) -> bool
-  nb::dict fit(const Numbers& start, double prior_std, double tolerance, std::size_t passes, std::size_t stride,
+  nb::dict fit(const number_row& start, double prior_std, double tolerance, std::size_t passes, std::size_t stride,
                unsigned threads, const nb::object& watch) const {
     expect_unknowns(start);
     const std::size_t u = unknowns();
     std::vector<double> z(u), gradient(u), information(u * u), covariance(u * u);
     tendonfmu_fit_result result{z.data(), gradient.data(), information.data(), covariance.data(), 0, 0, 0, 0, 0, 0};
     const tendonfmu_fit_options options{prior_std, tolerance, passes, stride, threads};
-    FitWatch watching{Watching(watch), u};
+    fit_watch watching{python_watch(watch), u};
     tendonfmu_status status;
     {
       const nb::gil_scoped_release without_gil;
-      status = tendonfmu_estimator_fit(get(), start.data(), &options, &FitWatch::call, &watching, &result);
+      status = tendonfmu_estimator_fit(get(), start.data(), &options, &fit_watch::call, &watching, &result);
     }
     watching.watch.rethrow();
     expect(status);
@@ -132,12 +134,12 @@ class Estimator {
   }
 
  private:
-  struct FitWatch {
-    Watching watch;
+  struct fit_watch {
+    python_watch watch;
     std::size_t unknowns;
 
     static int call(void* context, const tendonfmu_fit_progress* p) {
-      auto* self = static_cast<FitWatch*>(context);
+      auto* self = static_cast<fit_watch*>(context);
       return self->watch.ask([&] {
         const nb::object best = as_array(std::vector<double>(p->best, p->best + self->unknowns), {self->unknowns});
         return nb::make_tuple(p->pass, p->stride, p->samples_done, p->samples, p->cost, best);
@@ -145,7 +147,7 @@ class Estimator {
     }
   };
 
-  struct Deleter {
+  struct estimator_deleter {
     void operator()(tendonfmu_estimator* e) const { tendonfmu_estimator_destroy(e); }
   };
 
@@ -162,7 +164,7 @@ class Estimator {
       throw nb::value_error(tendonfmu_estimator_last_error(get()));
     }
   }
-  void expect_unknowns(const Numbers& z) const {
+  void expect_unknowns(const number_row& z) const {
     if (z.shape(0) != unknowns()) {
       throw nb::value_error(("z: expected " + std::to_string(unknowns()) + " unknowns").c_str());
     }
@@ -173,7 +175,7 @@ class Estimator {
     }
   }
 
-  std::unique_ptr<tendonfmu_estimator, Deleter> estimator_;
+  std::unique_ptr<tendonfmu_estimator, estimator_deleter> estimator_;
   std::vector<std::size_t> lengths_;
 };
 
@@ -181,25 +183,25 @@ class Estimator {
 
 NB_MODULE(_estimation, m) {
   bind_learner(m);
-  nb::class_<Estimator>(m, "Estimator")
-      .def(nb::init<const nb::bytes&, const std::optional<Groups>&, const std::optional<Numbers>&>(), nb::arg("image"),
-           nb::arg("group") = nb::none(), nb::arg("scale") = nb::none())
-      .def_prop_ro("joints", &Estimator::joints)
-      .def_prop_ro("tendons", &Estimator::tendons)
-      .def_prop_ro("unknown_count", &Estimator::unknowns)
-      .def_prop_ro("parameter_count", &Estimator::parameters)
-      .def("unknown", &Estimator::unknown)
-      .def("values", &Estimator::values)
-      .def("unknown_values", &Estimator::unknown_values)
-      .def("add_recording", &Estimator::add_recording, nb::arg("time"), nb::arg("tendon_force"),
+  nb::class_<bound_estimator>(m, "Estimator")
+      .def(nb::init<const nb::bytes&, const std::optional<group_row>&, const std::optional<number_row>&>(),
+           nb::arg("image"), nb::arg("group") = nb::none(), nb::arg("scale") = nb::none())
+      .def_prop_ro("joints", &bound_estimator::joints)
+      .def_prop_ro("tendons", &bound_estimator::tendons)
+      .def_prop_ro("unknown_count", &bound_estimator::unknowns)
+      .def_prop_ro("parameter_count", &bound_estimator::parameters)
+      .def("unknown", &bound_estimator::unknown)
+      .def("values", &bound_estimator::values)
+      .def("unknown_values", &bound_estimator::unknown_values)
+      .def("add_recording", &bound_estimator::add_recording, nb::arg("time"), nb::arg("tendon_force"),
            nb::arg("tendon_position") = nb::none(), nb::arg("joint_position") = nb::none(),
            nb::arg("joint_velocity") = nb::none(), nb::arg("kinematics_source") = 1,
            nb::arg("external_torque") = nb::none(), nb::arg("use") = nb::none())
-      .def("set_weights", &Estimator::set_weights, nb::arg("recording"), nb::arg("weight"))
-      .def("set_known", &Estimator::set_known, nb::arg("information"))
-      .def("evaluate", &Estimator::evaluate, nb::arg("z"), nb::arg("stride") = 1, nb::arg("threads") = 0)
-      .def("jacobian", &Estimator::jacobian)
-      .def("innovations", &Estimator::innovations)
-      .def("fit", &Estimator::fit, nb::arg("start"), nb::arg("prior_std"), nb::arg("tolerance"), nb::arg("passes"),
-           nb::arg("stride"), nb::arg("threads"), nb::arg("watch") = nb::none());
+      .def("set_weights", &bound_estimator::set_weights, nb::arg("recording"), nb::arg("weight"))
+      .def("set_known", &bound_estimator::set_known, nb::arg("information"))
+      .def("evaluate", &bound_estimator::evaluate, nb::arg("z"), nb::arg("stride") = 1, nb::arg("threads") = 0)
+      .def("jacobian", &bound_estimator::jacobian)
+      .def("innovations", &bound_estimator::innovations)
+      .def("fit", &bound_estimator::fit, nb::arg("start"), nb::arg("prior_std"), nb::arg("tolerance"),
+           nb::arg("passes"), nb::arg("stride"), nb::arg("threads"), nb::arg("watch") = nb::none());
 }

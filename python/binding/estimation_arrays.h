@@ -17,10 +17,10 @@
 
 namespace nb = nanobind;
 
-using Rows = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Numbers = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Groups = nb::ndarray<const std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Flags = nb::ndarray<const unsigned char, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using number_rows = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using number_row = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using group_row = nb::ndarray<const std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using flag_row = nb::ndarray<const unsigned char, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
 // A numpy array that owns `values`.
 inline nb::object as_array(std::vector<double> values, std::vector<std::size_t> shape) {
@@ -29,7 +29,8 @@ inline nb::object as_array(std::vector<double> values, std::vector<std::size_t> 
   return nb::cast(nb::ndarray<nb::numpy, double>(kept->data(), shape.size(), shape.data(), owner));
 }
 
-inline void expect_rows(const std::optional<Rows>& rows, std::size_t samples, std::size_t columns, const char* name) {
+inline void expect_rows(const std::optional<number_rows>& rows, std::size_t samples, std::size_t columns,
+                        const char* name) {
   if (rows && (rows->shape(0) != samples || rows->shape(1) != columns)) {
     throw nb::value_error((std::string(name) + ": expected " + std::to_string(samples) + " rows of " +
                            std::to_string(columns) + " columns")
@@ -37,16 +38,16 @@ inline void expect_rows(const std::optional<Rows>& rows, std::size_t samples, st
   }
 }
 
-inline const double* data(const std::optional<Rows>& rows) {
+inline const double* data(const std::optional<number_rows>& rows) {
   return rows ? rows->data() : nullptr;
 }
 
 // What a recording's arrays have in common for estimator and learner.
-struct Samples {
-  Numbers time;
-  Rows tendon_force;
-  std::optional<Rows> tendon_position, joint_position, joint_velocity, external_torque;
-  std::optional<Flags> use;
+struct sample_arrays {
+  number_row time;
+  number_rows tendon_force;
+  std::optional<number_rows> tendon_position, joint_position, joint_velocity, external_torque;
+  std::optional<flag_row> use;
 
   void check(std::size_t joints, std::size_t tendons) const {
     const std::size_t count = time.shape(0);
@@ -72,9 +73,9 @@ inline nb::tuple as_tuple(const tendonfmu_unknown& u) {
 }
 
 // A Python callable that may stop a long call, also by Ctrl-C or by what it raises.
-class Watching {
+class python_watch {
  public:
-  explicit Watching(const nb::object& watch) : watch_(watch.is_none() ? nullptr : &watch) {}
+  explicit python_watch(const nb::object& watch) : watch_(watch.is_none() ? nullptr : &watch) {}
 
   // Without the GIL; `arguments` are made with it. Returns 0 to stop.
   template <typename Arguments>

@@ -3,10 +3,10 @@
 
 namespace {
 
-class Learner {
+class bound_learner {
  public:
-  Learner(const nb::bytes& image, const std::optional<Groups>& group, const std::optional<Numbers>& scale,
-          double prior_std, std::size_t block, double parameter_drift) {
+  bound_learner(const nb::bytes& image, const std::optional<group_row>& group, const std::optional<number_row>& scale,
+                double prior_std, std::size_t block, double parameter_drift) {
     const tendonfmu_learner_options options{prior_std, block, parameter_drift};
     if (group || scale) {
       create(image, nullptr, nullptr, options); /* how many numbers are expected, before they are read */
@@ -29,16 +29,17 @@ class Learner {
   }
 
   // innovation and variance [N, n], samples taken; watch(samples_done, samples) -> bool
-  nb::tuple run(const Numbers& time, const Rows& force, const std::optional<Rows>& position,
-                const std::optional<Rows>& angle, const std::optional<Rows>& velocity, int source,
-                const std::optional<Rows>& external, const std::optional<Flags>& use, const nb::object& watch) {
-    const Samples rows{time, force, position, angle, velocity, external, use};
+  nb::tuple run(const number_row& time, const number_rows& force, const std::optional<number_rows>& position,
+                const std::optional<number_rows>& angle, const std::optional<number_rows>& velocity, int source,
+                const std::optional<number_rows>& external, const std::optional<flag_row>& use,
+                const nb::object& watch) {
+    const sample_arrays rows{time, force, position, angle, velocity, external, use};
     rows.check(joints(), tendons());
     const std::size_t samples = time.shape(0), n = joints();
     const tendonfmu_inputs inputs = rows.inputs();
     std::vector<double> innovation(samples * n), variance(samples * n);
     std::size_t done = 0;
-    Watching watching(watch);
+    python_watch watching(watch);
     tendonfmu_status status;
     {
       const nb::gil_scoped_release without_gil;
@@ -79,12 +80,12 @@ class Learner {
   }
 
  private:
-  struct Deleter {
+  struct learner_deleter {
     void operator()(tendonfmu_learner* l) const { tendonfmu_learner_destroy(l); }
   };
 
   static int look(void* context, std::size_t done, std::size_t samples) {
-    return static_cast<Watching*>(context)->ask([&] { return nb::make_tuple(done, samples); });
+    return static_cast<python_watch*>(context)->ask([&] { return nb::make_tuple(done, samples); });
   }
 
   void create(const nb::bytes& image, const std::int32_t* group, const double* scale,
@@ -108,29 +109,29 @@ class Learner {
     }
   }
 
-  std::unique_ptr<tendonfmu_learner, Deleter> learner_;
+  std::unique_ptr<tendonfmu_learner, learner_deleter> learner_;
 };
 
 }  // namespace
 
 void bind_learner(nb::module_& m) {
-  nb::class_<Learner>(m, "Learner")
-      .def(nb::init<const nb::bytes&, const std::optional<Groups>&, const std::optional<Numbers>&, double, std::size_t,
-                    double>(),
+  nb::class_<bound_learner>(m, "Learner")
+      .def(nb::init<const nb::bytes&, const std::optional<group_row>&, const std::optional<number_row>&, double,
+                    std::size_t, double>(),
            nb::arg("image"), nb::arg("group") = nb::none(), nb::arg("scale") = nb::none(), nb::arg("prior_std") = 1.0,
            nb::arg("block") = 8, nb::arg("parameter_drift") = 0.0)
-      .def_prop_ro("joints", &Learner::joints)
-      .def_prop_ro("tendons", &Learner::tendons)
-      .def_prop_ro("unknown_count", &Learner::unknowns)
-      .def_prop_ro("slack_samples", &Learner::slack_samples)
-      .def("unknown", &Learner::unknown)
-      .def("run", &Learner::run, nb::arg("time"), nb::arg("tendon_force"), nb::arg("tendon_position") = nb::none(),
-           nb::arg("joint_position") = nb::none(), nb::arg("joint_velocity") = nb::none(),
-           nb::arg("kinematics_source") = 1, nb::arg("external_torque") = nb::none(), nb::arg("use") = nb::none(),
-           nb::arg("watch") = nb::none())
-      .def("begin_pass", &Learner::begin_pass)
-      .def("values", &Learner::values)
-      .def("z", &Learner::z)
-      .def("covariance", &Learner::covariance)
-      .def("bias", &Learner::bias);
+      .def_prop_ro("joints", &bound_learner::joints)
+      .def_prop_ro("tendons", &bound_learner::tendons)
+      .def_prop_ro("unknown_count", &bound_learner::unknowns)
+      .def_prop_ro("slack_samples", &bound_learner::slack_samples)
+      .def("unknown", &bound_learner::unknown)
+      .def("run", &bound_learner::run, nb::arg("time"), nb::arg("tendon_force"),
+           nb::arg("tendon_position") = nb::none(), nb::arg("joint_position") = nb::none(),
+           nb::arg("joint_velocity") = nb::none(), nb::arg("kinematics_source") = 1,
+           nb::arg("external_torque") = nb::none(), nb::arg("use") = nb::none(), nb::arg("watch") = nb::none())
+      .def("begin_pass", &bound_learner::begin_pass)
+      .def("values", &bound_learner::values)
+      .def("z", &bound_learner::z)
+      .def("covariance", &bound_learner::covariance)
+      .def("bias", &bound_learner::bias);
 }

@@ -17,8 +17,8 @@ namespace nb = nanobind;
 
 namespace {
 
-using Rows = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Times = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using number_rows = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using time_row = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
 nb::bytes image_from_json(const nb::bytes& json) {
   void* image = nullptr;
@@ -48,7 +48,7 @@ nb::object as_array(std::vector<Number> values, std::vector<std::size_t> shape) 
   return nb::cast(nb::ndarray<nb::numpy, Number>(kept->data(), shape.size(), shape.data(), owner));
 }
 
-struct OutputRows {
+struct output_rows {
   std::vector<double> numbers[6], detection[6], parts;
   std::vector<unsigned char> flags[3], observable;
   std::vector<double> tip_force, tip_std, misfit; /* these and what follows: of fingers with links */
@@ -57,8 +57,8 @@ struct OutputRows {
   std::vector<unsigned char> at_rest;
   std::vector<unsigned char> sensor_fault, contact_observable; /* of fingers with sensor_fault */
 
-  OutputRows(std::size_t samples, std::size_t n, std::size_t m, bool with_parts, bool with_place, bool with_rest,
-             bool with_sensors) {
+  output_rows(std::size_t samples, std::size_t n, std::size_t m, bool with_parts, bool with_place, bool with_rest,
+              bool with_sensors) {
     for (auto& row : numbers) {
       row.resize(samples * n);
     }
@@ -120,18 +120,18 @@ struct OutputRows {
   }
 };
 
-class Finger {
+class bound_finger {
  public:
-  explicit Finger(const nb::bytes& image) {
+  explicit bound_finger(const nb::bytes& image) {
     char message[600] = "";
     handle_ = tendonfmu_create(image.data(), image.size(), message, sizeof message);
     if (handle_ == nullptr) {
       throw nb::value_error(message);
     }
   }
-  ~Finger() { tendonfmu_destroy(handle_); }
-  Finger(const Finger&) = delete;
-  Finger& operator=(const Finger&) = delete;
+  ~bound_finger() { tendonfmu_destroy(handle_); }
+  bound_finger(const bound_finger&) = delete;
+  bound_finger& operator=(const bound_finger&) = delete;
 
   std::size_t joints() const { return tendonfmu_joint_count(handle_); }
   std::size_t tendons() const { return tendonfmu_tendon_count(handle_); }
@@ -175,13 +175,14 @@ class Finger {
   }
   void restore_state(const nb::bytes& bytes) { check(tendonfmu_restore_state(handle_, bytes.data(), bytes.size())); }
 
-  nb::tuple run(const Times& time, const std::optional<Rows>& force, const std::optional<Rows>& position,
-                const std::optional<Rows>& angle, const std::optional<Rows>& velocity, bool with_parts) {
+  nb::tuple run(const time_row& time, const std::optional<number_rows>& force,
+                const std::optional<number_rows>& position, const std::optional<number_rows>& angle,
+                const std::optional<number_rows>& velocity, bool with_parts) {
     const std::size_t samples = time.shape(0), n = joints(), m = tendons();
     const tendonfmu_inputs inputs = {
         rows(force, samples, m, "tendon_force"), rows(position, samples, m, "tendon_position"),
         rows(angle, samples, n, "joint_position"), rows(velocity, samples, n, "joint_velocity")};
-    OutputRows outputs(samples, n, m, with_parts, has_links(), watches_rest(), watches_sensors());
+    output_rows outputs(samples, n, m, with_parts, has_links(), watches_rest(), watches_sensors());
     const tendonfmu_outputs view = outputs.view();
     std::size_t done = 0;
     tendonfmu_status status;
@@ -254,7 +255,7 @@ class Finger {
     throw nb::value_error(reason.empty() ? "bad argument" : reason.c_str());
   }
 
-  static const double* rows(const std::optional<Rows>& array, std::size_t samples, std::size_t columns,
+  static const double* rows(const std::optional<number_rows>& array, std::size_t samples, std::size_t columns,
                             const char* name) {
     if (!array) {
       return nullptr;
@@ -274,25 +275,26 @@ NB_MODULE(_native, m) {
   m.def("version", &tendonfmu_version);
   m.def("image_from_json", &image_from_json);
   m.def("image_guid", &image_guid);
-  nb::class_<Finger>(m, "Finger")
+  nb::class_<bound_finger>(m, "Finger")
       .def(nb::init<const nb::bytes&>())
-      .def_prop_ro("joints", &Finger::joints)
-      .def_prop_ro("tendons", &Finger::tendons)
-      .def_prop_ro("has_links", &Finger::has_links)
-      .def_prop_ro("watches_rest", &Finger::watches_rest)
-      .def_prop_ro("watches_sensors", &Finger::watches_sensors)
-      .def_prop_ro("parameter_count", &Finger::parameter_count)
-      .def_prop_rw("kernel", &Finger::kernel, &Finger::set_kernel)
-      .def_prop_rw("kinematics_source", &Finger::source, &Finger::set_source)
-      .def("reset", &Finger::reset)
-      .def("parameter_path", &Finger::parameter_path)
-      .def("parameter_info", &Finger::parameter_info)
-      .def("find_parameter", &Finger::find_parameter)
-      .def("get_parameters", &Finger::get_parameters)
-      .def("set_parameters", &Finger::set_parameters)
-      .def("save_state", &Finger::save_state)
-      .def("restore_state", &Finger::restore_state)
-      .def("run", &Finger::run, nb::arg("time"), nb::arg("tendon_force").none(), nb::arg("tendon_position").none(),
-           nb::arg("joint_position").none(), nb::arg("joint_velocity").none(), nb::arg("with_parts"))
-      .def("directional_derivative", &Finger::directional_derivative);
+      .def_prop_ro("joints", &bound_finger::joints)
+      .def_prop_ro("tendons", &bound_finger::tendons)
+      .def_prop_ro("has_links", &bound_finger::has_links)
+      .def_prop_ro("watches_rest", &bound_finger::watches_rest)
+      .def_prop_ro("watches_sensors", &bound_finger::watches_sensors)
+      .def_prop_ro("parameter_count", &bound_finger::parameter_count)
+      .def_prop_rw("kernel", &bound_finger::kernel, &bound_finger::set_kernel)
+      .def_prop_rw("kinematics_source", &bound_finger::source, &bound_finger::set_source)
+      .def("reset", &bound_finger::reset)
+      .def("parameter_path", &bound_finger::parameter_path)
+      .def("parameter_info", &bound_finger::parameter_info)
+      .def("find_parameter", &bound_finger::find_parameter)
+      .def("get_parameters", &bound_finger::get_parameters)
+      .def("set_parameters", &bound_finger::set_parameters)
+      .def("save_state", &bound_finger::save_state)
+      .def("restore_state", &bound_finger::restore_state)
+      .def("run", &bound_finger::run, nb::arg("time"), nb::arg("tendon_force").none(),
+           nb::arg("tendon_position").none(), nb::arg("joint_position").none(), nb::arg("joint_velocity").none(),
+           nb::arg("with_parts"))
+      .def("directional_derivative", &bound_finger::directional_derivative);
 }

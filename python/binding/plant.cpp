@@ -21,46 +21,46 @@ namespace nb = nanobind;
 
 namespace {
 
-using Vector = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Signals = tendonfmu_plant_signals;
+using number_row = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using plant_signals = tendonfmu_plant_signals;
 
-enum class Size { one, three, six, joints, tendons };
+enum class signal_size { one, three, six, joints, tendons };
 
-struct Number {
+struct number_signal {
   const char* name;
-  double* Signals::*place;
-  Size size;
+  double* plant_signals::*place;
+  signal_size size;
 };
-constexpr Number numbers[] = {
-    {"measured_tendon_force", &Signals::measured_tendon_force, Size::tendons},
-    {"measured_tendon_position", &Signals::measured_tendon_position, Size::tendons},
-    {"measured_joint_position", &Signals::measured_joint_position, Size::joints},
-    {"measured_joint_velocity", &Signals::measured_joint_velocity, Size::joints},
-    {"measured_external_torque", &Signals::measured_external_torque, Size::joints},
-    {"tendon_force", &Signals::tendon_force, Size::tendons},
-    {"tendon_position", &Signals::tendon_position, Size::tendons},
-    {"joint_position", &Signals::joint_position, Size::joints},
-    {"joint_velocity", &Signals::joint_velocity, Size::joints},
-    {"joint_torque", &Signals::joint_torque, Size::joints},
-    {"friction_torque", &Signals::friction_torque, Size::joints},
-    {"external_torque", &Signals::external_torque, Size::joints},
-    {"inertial_torque", &Signals::inertial_torque, Size::joints},
-    {"stop_torque", &Signals::stop_torque, Size::joints},
-    {"contact_force", &Signals::contact_force, Size::three},
-    {"contact_point", &Signals::contact_point, Size::three},
-    {"tip_position", &Signals::tip_position, Size::three},
-    {"friction_level", &Signals::friction_level, Size::one},
-    {"energy", &Signals::energy, Size::six},
+constexpr number_signal numbers[] = {
+    {"measured_tendon_force", &plant_signals::measured_tendon_force, signal_size::tendons},
+    {"measured_tendon_position", &plant_signals::measured_tendon_position, signal_size::tendons},
+    {"measured_joint_position", &plant_signals::measured_joint_position, signal_size::joints},
+    {"measured_joint_velocity", &plant_signals::measured_joint_velocity, signal_size::joints},
+    {"measured_external_torque", &plant_signals::measured_external_torque, signal_size::joints},
+    {"tendon_force", &plant_signals::tendon_force, signal_size::tendons},
+    {"tendon_position", &plant_signals::tendon_position, signal_size::tendons},
+    {"joint_position", &plant_signals::joint_position, signal_size::joints},
+    {"joint_velocity", &plant_signals::joint_velocity, signal_size::joints},
+    {"joint_torque", &plant_signals::joint_torque, signal_size::joints},
+    {"friction_torque", &plant_signals::friction_torque, signal_size::joints},
+    {"external_torque", &plant_signals::external_torque, signal_size::joints},
+    {"inertial_torque", &plant_signals::inertial_torque, signal_size::joints},
+    {"stop_torque", &plant_signals::stop_torque, signal_size::joints},
+    {"contact_force", &plant_signals::contact_force, signal_size::three},
+    {"contact_point", &plant_signals::contact_point, signal_size::three},
+    {"tip_position", &plant_signals::tip_position, signal_size::three},
+    {"friction_level", &plant_signals::friction_level, signal_size::one},
+    {"energy", &plant_signals::energy, signal_size::six},
 };
 
-struct Flag {
+struct flag_signal {
   const char* name;
-  unsigned char* Signals::*place;
-  Size size;
+  unsigned char* plant_signals::*place;
+  signal_size size;
 };
-constexpr Flag flags[] = {
-    {"contact", &Signals::contact, Size::one},
-    {"slack", &Signals::slack, Size::tendons},
+constexpr flag_signal flags[] = {
+    {"contact", &plant_signals::contact, signal_size::one},
+    {"slack", &plant_signals::slack, signal_size::tendons},
 };
 
 template <typename Entry, std::size_t count>
@@ -82,18 +82,18 @@ std::pair<nb::object, Value*> new_array(std::size_t rows, std::size_t columns) {
   return {nb::cast(nb::ndarray<nb::numpy, Value>(kept->data(), 2, shape, owner)), kept->data()};
 }
 
-class Plant {
+class bound_plant {
  public:
-  explicit Plant(const nb::bytes& json) {
+  explicit bound_plant(const nb::bytes& json) {
     char message[600] = "";
     handle_ = tendonfmu_plant_create(static_cast<const char*>(json.data()), json.size(), message, sizeof message);
     if (handle_ == nullptr) {
       throw nb::value_error(message);
     }
   }
-  ~Plant() { tendonfmu_plant_destroy(handle_); }
-  Plant(const Plant&) = delete;
-  Plant& operator=(const Plant&) = delete;
+  ~bound_plant() { tendonfmu_plant_destroy(handle_); }
+  bound_plant(const bound_plant&) = delete;
+  bound_plant& operator=(const bound_plant&) = delete;
 
   std::size_t joints() const { return tendonfmu_plant_joint_count(handle_); }
   std::size_t tendons() const { return tendonfmu_plant_tendon_count(handle_); }
@@ -138,16 +138,16 @@ class Plant {
   }
 
   // The signals named, each an array of [samples, size].
-  nb::dict run(const Vector& time, const std::vector<std::string>& names) {
+  nb::dict run(const number_row& time, const std::vector<std::string>& names) {
     const std::size_t samples = time.shape(0);
-    Signals signals = {};
+    plant_signals signals = {};
     nb::dict found;
     for (const std::string& name : names) {
-      if (const Number* number = find(numbers, name)) {
+      if (const number_signal* number = find(numbers, name)) {
         auto [array, values] = new_array<double>(samples, size_of(number->size));
         signals.*(number->place) = values;
         found[name.c_str()] = array;
-      } else if (const Flag* flag = find(flags, name)) {
+      } else if (const flag_signal* flag = find(flags, name)) {
         auto [array, values] = new_array<unsigned char>(samples, size_of(flag->size));
         signals.*(flag->place) = values;
         found[name.c_str()] = array;
@@ -179,7 +179,7 @@ class Plant {
     return array;
   }
   // [1, order] and, when wanted, [order, order]
-  nb::tuple derivative(double time, const Vector& state, bool with_jacobian) const {
+  nb::tuple derivative(double time, const number_row& state, bool with_jacobian) const {
     const std::size_t size = order();
     if (state.shape(0) != size) {
       throw nb::value_error(("derivative: expected a state of " + std::to_string(size) + " numbers").c_str());
@@ -216,13 +216,13 @@ class Plant {
     throw nb::value_error(reason.c_str());
   }
 
-  std::size_t size_of(Size size) const {
+  std::size_t size_of(signal_size size) const {
     switch (size) {
-      case Size::one: return 1;
-      case Size::three: return 3;
-      case Size::six: return 6;
-      case Size::joints: return joints();
-      case Size::tendons: return tendons();
+      case signal_size::one: return 1;
+      case signal_size::three: return 3;
+      case signal_size::six: return 6;
+      case signal_size::joints: return joints();
+      case signal_size::tendons: return tendons();
     }
     return 0;
   }
@@ -231,24 +231,25 @@ class Plant {
 }  // namespace
 
 NB_MODULE(_plant, m) {
-  nb::class_<Plant>(m, "Plant")
+  nb::class_<bound_plant>(m, "Plant")
       .def(nb::init<const nb::bytes&>())
-      .def_prop_ro("joints", &Plant::joints)
-      .def_prop_ro("tendons", &Plant::tendons)
-      .def_prop_ro("order", &Plant::order)
-      .def_prop_ro("time", &Plant::time)
-      .def_prop_ro("initialised", &Plant::initialised)
-      .def("settings", &Plant::settings)
-      .def("set_settings", &Plant::set_settings)
-      .def("set_inputs", &Plant::set_inputs, nb::arg("command").none(), nb::arg("pretension"), nb::arg("push_force"))
-      .def("initialise", &Plant::initialise)
-      .def("advance", &Plant::advance)
-      .def("reset", &Plant::reset)
-      .def("hold_command", &Plant::hold_command)
-      .def("run", &Plant::run)
-      .def("save_state", &Plant::save_state)
-      .def("restore_state", &Plant::restore_state)
-      .def("statistics", &Plant::statistics)
-      .def("continuous_state", &Plant::continuous_state)
-      .def("derivative", &Plant::derivative);
+      .def_prop_ro("joints", &bound_plant::joints)
+      .def_prop_ro("tendons", &bound_plant::tendons)
+      .def_prop_ro("order", &bound_plant::order)
+      .def_prop_ro("time", &bound_plant::time)
+      .def_prop_ro("initialised", &bound_plant::initialised)
+      .def("settings", &bound_plant::settings)
+      .def("set_settings", &bound_plant::set_settings)
+      .def("set_inputs", &bound_plant::set_inputs, nb::arg("command").none(), nb::arg("pretension"),
+           nb::arg("push_force"))
+      .def("initialise", &bound_plant::initialise)
+      .def("advance", &bound_plant::advance)
+      .def("reset", &bound_plant::reset)
+      .def("hold_command", &bound_plant::hold_command)
+      .def("run", &bound_plant::run)
+      .def("save_state", &bound_plant::save_state)
+      .def("restore_state", &bound_plant::restore_state)
+      .def("statistics", &bound_plant::statistics)
+      .def("continuous_state", &bound_plant::continuous_state)
+      .def("derivative", &bound_plant::derivative);
 }

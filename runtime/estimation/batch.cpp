@@ -25,27 +25,27 @@ double prior_weight(double prior_std) {
 }
 
 /* information of unknowns, of unknowns divided by their scales; empty: none */
-MatrixXd scaled(const MatrixXd& information, const ScaledBox& box) {
+MatrixXd scaled(const MatrixXd& information, const scaled_box& box) {
   return information.size() > 0 ? MatrixXd(box.scale.asDiagonal() * information * box.scale.asDiagonal()) : MatrixXd();
 }
 
 /* A point and what a pass over the data found there. */
-struct Point {
+struct search_point {
   VectorXd x;
-  Evaluation data;
+  cost_evaluation data;
   double cost = std::numeric_limits<double>::infinity(), prior_cost = 0.0;
 };
 
-class Search {
+class batch_search {
  public:
-  Search(const Problem& problem, const BatchOptions& options, const BatchWatch& watch)
+  batch_search(const fit_problem& problem, const batch_options& options, const batch_watch& watch)
       : problem_(problem),
         options_(options),
         watch_(watch),
         box_(problem.unknowns),
         prior_(prior_weight(options.prior_std), scaled(problem.known, box_)) {}
 
-  BatchResult run(const std::vector<double>& start) {
+  batch_result run(const std::vector<double>& start) {
     best_.x = box_.clip(
         Eigen::Map<const VectorXd>(start.data(), static_cast<Eigen::Index>(start.size())).cwiseQuotient(box_.scale));
     const std::size_t coarse =
@@ -69,20 +69,20 @@ class Search {
    * gives, a pass there. True: converged. */
   bool descend(std::size_t stride, double tolerance) {
     double share = first_share;
-    Point here; /* the costs so far are of another number of samples */
+    search_point here; /* the costs so far are of another number of samples */
     if (!look(best_.x, stride, &here)) {
       return false;
     }
     best_ = std::move(here);
     while (result_.passes < options_.most_passes) {
-      const LocalModel model(problem_, box_, best_.data, best_.x, prior_);
+      const local_model model(problem_, box_, best_.data, best_.x, prior_);
       const VectorXd step = model.best_step(box_.around(best_.x, share), 0.05 * tolerance * tolerance);
       const double expected = best_.cost - model.cost(step);
       ++result_.steps;
       if (2.0 * expected <= tolerance * tolerance) {
         return true;
       }
-      Point next;
+      search_point next;
       if (!look(box_.clip(best_.x + step), stride, &next)) {
         return false;
       }
@@ -102,9 +102,9 @@ class Search {
     return false;
   }
 
-  bool look(const VectorXd& x, std::size_t stride, Point* point) {
+  bool look(const VectorXd& x, std::size_t stride, search_point* point) {
     const std::vector<double> z = box_.unknowns(x);
-    const Watch watch = [this, stride](std::size_t done) {
+    const pass_watch watch = [this, stride](std::size_t done) {
       if (!watch_) {
         return true;
       }
@@ -112,7 +112,7 @@ class Search {
       const double cost = std::isfinite(best_.cost) ? best_.cost : std::numeric_limits<double>::quiet_NaN();
       return watch_({result_.passes + 1, stride, done, problem_.samples(), cost, &best});
     };
-    Evaluation found = evaluate(problem_, z, {stride, options_.threads}, watch);
+    cost_evaluation found = evaluate(problem_, z, {stride, options_.threads}, watch);
     if (!found.complete) {
       result_.stopped = true;
       return false;
@@ -125,38 +125,38 @@ class Search {
     return true;
   }
 
-  const Problem& problem_;
-  const BatchOptions& options_;
-  const BatchWatch& watch_;
-  const ScaledBox box_;
-  const Prior prior_;
-  Point best_;
-  BatchResult result_;
+  const fit_problem& problem_;
+  const batch_options& options_;
+  const batch_watch& watch_;
+  const scaled_box box_;
+  const gaussian_prior prior_;
+  search_point best_;
+  batch_result result_;
 };
 
 }  // namespace
 
-MatrixXd posterior_covariance(const Problem& problem, const MatrixXd& information, double prior_std) {
-  const ScaledBox box(problem.unknowns);
+MatrixXd posterior_covariance(const fit_problem& problem, const MatrixXd& information, double prior_std) {
+  const scaled_box box(problem.unknowns);
   /* never nothing: what neither data nor prior know must not come out as known exactly */
   const double weight = std::max(prior_weight(prior_std), least_prior_weight);
   const Eigen::Index p = information.rows();
   MatrixXd h = box.scale.asDiagonal() * information * box.scale.asDiagonal();
-  Prior(weight, scaled(problem.known, box)).add_to(&h);
+  gaussian_prior(weight, scaled(problem.known, box)).add_to(&h);
   const Eigen::LDLT<MatrixXd> factor(h);
   const MatrixXd inverse = factor.solve(MatrixXd::Identity(p, p));
   return box.scale.asDiagonal() * (0.5 * (inverse + inverse.transpose())) * box.scale.asDiagonal();
 }
 
-BatchResult fit_batch(const Problem& problem, const std::vector<double>& start, const BatchOptions& options,
-                      const BatchWatch& watch) {
+batch_result fit_batch(const fit_problem& problem, const std::vector<double>& start, const batch_options& options,
+                       const batch_watch& watch) {
   if (!(options.prior_std > 0.0)) {
     throw refused("prior_std = " + std::to_string(options.prior_std) + ": expected above 0");
   }
   if (problem.unknowns.count() == 0) {
     throw refused("nothing to estimate: expected at least one number that is not fixed");
   }
-  return Search(problem, options, watch).run(start);
+  return batch_search(problem, options, watch).run(start);
 }
 
 }  // namespace tendonfmu::estimation

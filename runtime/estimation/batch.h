@@ -7,7 +7,7 @@
 
 namespace tendonfmu::estimation {
 
-struct BatchOptions {
+struct batch_options {
   double prior_std = 1.0; /* of an unknown, in expected magnitudes; infinite: no prior */
   double tolerance = 0.3; /* a step this long ends it: in standard errors, all unknowns together */
   std::size_t most_passes = 60;
@@ -15,18 +15,18 @@ struct BatchOptions {
   unsigned threads = 0;
 };
 
-struct BatchProgress {
+struct batch_progress {
   std::size_t pass, stride, samples_done, samples;
   double cost; /* of the best so far, prior included; NaN before the first pass */
   const std::vector<double>* best;
 };
 /* false stops */
-using BatchWatch = std::function<bool(const BatchProgress&)>;
+using batch_watch = std::function<bool(const batch_progress&)>;
 
-struct BatchResult {
+struct batch_result {
   std::vector<double> z;
   double cost = 0.0, prior_cost = 0.0;
-  Evaluation at;              /* at z; over all samples unless stopped in the coarse passes */
+  cost_evaluation at;         /* at z; over all samples unless stopped in the coarse passes */
   Eigen::MatrixXd covariance; /* (information + prior)^-1; an unknown held by its bound is counted as if it were free */
   std::size_t passes = 0, steps = 0;
   bool converged = false, stopped = false;
@@ -34,11 +34,11 @@ struct BatchResult {
 
 /* start [unknowns]: where to begin, clipped to the bounds; the prior's mean is the description's start. Throws refused.
  */
-BatchResult fit_batch(const Problem& problem, const std::vector<double>& start, const BatchOptions& options,
-                      const BatchWatch& watch);
+batch_result fit_batch(const fit_problem& problem, const std::vector<double>& start, const batch_options& options,
+                       const batch_watch& watch);
 
 /* (information + prior)^-1, problem.known included */
-Eigen::MatrixXd posterior_covariance(const Problem& problem, const Eigen::MatrixXd& information, double prior_std);
+Eigen::MatrixXd posterior_covariance(const fit_problem& problem, const Eigen::MatrixXd& information, double prior_std);
 
 }  // namespace tendonfmu::estimation
 

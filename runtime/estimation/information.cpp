@@ -23,15 +23,15 @@ constexpr std::size_t residual_column = 0;
 constexpr std::size_t told_every = 256; /* samples, of what is done */
 
 /* What a segment of a recording adds up to, as if the bias held nothing at its start; see join(). */
-struct SegmentSum {
+struct segment_sum {
   MatrixXd information; /* [q × q] lower triangle */
-  std::vector<JointSegment> joints;
+  std::vector<joint_segment> joints;
 };
 
 /* One thread's finger and buffers. */
-class Worker {
+class pass_worker {
  public:
-  Worker(const Problem& problem, const std::vector<double>& numbers)
+  pass_worker(const fit_problem& problem, const std::vector<double>& numbers)
       : finger_(problem.image.data(), problem.image.size()),
         rows_(problem.unknowns, finger_.get()),
         columns_(problem.columns),
@@ -41,14 +41,14 @@ class Worker {
     }
   }
 
-  SegmentSum sum(const Recording& recording, const SegmentStates& states, const BiasGains& gains, std::size_t segment,
-                 std::atomic<std::size_t>* done, const std::atomic<bool>& stopped) {
+  segment_sum sum(const recording_track& recording, const segment_states& states, const bias_gains& gains,
+                  std::size_t segment, std::atomic<std::size_t>* done, const std::atomic<bool>& stopped) {
     const std::size_t first = segment * recording.segment_length();
     const std::size_t last = std::min(first + recording.segment_length(), recording.samples());
     const auto q = static_cast<Eigen::Index>(columns_.count);
-    SegmentSum result;
+    segment_sum result;
     result.information = MatrixXd::Zero(q, q);
-    for (JointSum& joint : joints_) {
+    for (joint_sum& joint : joints_) {
       joint.begin_segment();
     }
     finger_.resume(states[segment].finger, numbers_);
@@ -57,7 +57,7 @@ class Worker {
       finger_.step(k, recording.time(k), recording.inputs(k));
       take(recording, gains, k);
       if (joints_.front().full() || k + 1 == last) {
-        for (JointSum& joint : joints_) {
+        for (joint_sum& joint : joints_) {
           joint.end_block(&result.information);
         }
       }
@@ -65,14 +65,14 @@ class Worker {
         *done += (k - first) % told_every + 1;
       }
     }
-    for (JointSum& joint : joints_) {
+    for (joint_sum& joint : joints_) {
       result.joints.push_back(joint.end_segment(&result.information));
     }
     return result;
   }
 
  private:
-  void take(const Recording& recording, const BiasGains& gains, std::size_t k) {
+  void take(const recording_track& recording, const bias_gains& gains, std::size_t k) {
     const bool looked_at = gains.gain[k] > 0.0 || gains.weight[k] > 0.0;
     if (!looked_at && !rows_.sees_event()) {
       return;
@@ -83,10 +83,10 @@ class Worker {
         joints_[j].rows.jump(residual_column, rows_.jump(j));
       }
     }
-    for (const Term& term : rows_.terms()) {
+    for (const sensitivity_term& term : rows_.terms()) {
       add_term(term, looked_at);
     }
-    for (const PlainTerm& term : rows_.plain_terms()) {
+    for (const plain_slope& term : rows_.plain_terms()) {
       if (term.jump != 0.0) {
         joints_[term.joint].rows.jump(columns_.unknown[static_cast<std::size_t>(term.column)], -term.jump);
       }
@@ -94,7 +94,7 @@ class Worker {
     if (!looked_at) {
       return;
     }
-    for (const PlainTerm& term : rows_.plain_terms()) {
+    for (const plain_slope& term : rows_.plain_terms()) {
       joints_[term.joint].rows.add(columns_.unknown[static_cast<std::size_t>(term.column)], term.slope);
     }
     for (std::size_t j = 0; j < joints_.size(); ++j) {
@@ -104,7 +104,7 @@ class Worker {
     }
   }
 
-  void add_term(const Term& term, bool looked_at) {
+  void add_term(const sensitivity_term& term, bool looked_at) {
     for (std::size_t j = 0; j < joints_.size(); ++j) {
       if (looked_at && term.torque && term.torque[j] != 0.0) {
         add_row(term, term.torque[j], &joints_[j]);
@@ -115,7 +115,7 @@ class Worker {
     }
   }
 
-  void add_row(const Term& term, double factor, JointSum* joint) const {
+  void add_row(const sensitivity_term& term, double factor, joint_sum* joint) const {
     if (term.run_length > 0) {
       joint->rows.add_run(columns_.unknown[term.run_first], term.run_length, term.run_slope.data(), factor);
     } else {
@@ -131,7 +131,7 @@ class Worker {
     }
   }
 
-  void add_jump(const Term& term, double factor, JointSum* joint) const {
+  void add_jump(const sensitivity_term& term, double factor, joint_sum* joint) const {
     if (term.run_length > 0) {
       joint->rows.jump_run(columns_.unknown[term.run_first], term.run_length, term.run_slope.data(), -factor);
     } else {
@@ -149,23 +149,23 @@ class Worker {
 
   /* v²E and −v³E with sign and weight; that the forces carry changes along to second order, too, is left out: this only
    * guides the steps */
-  static std::array<double, 2> expanded(const Term& term) {
+  static std::array<double, 2> expanded(const sensitivity_term& term) {
     const double square = term.speed * term.speed * term.slope[1];
     return {square, -term.speed * square};
   }
 
-  FreeFinger finger_;
-  SampleRows rows_;
-  const Columns& columns_;
+  free_finger finger_;
+  sample_rows rows_;
+  const gram_columns& columns_;
   const std::vector<double>& numbers_;
-  std::vector<JointSum> joints_;
+  std::vector<joint_sum> joints_;
 };
 
 /* --- joining the segments of one recording, in order ---------------------------------------------------------------
  */
 
 /* what the bias holds of each column at the start of a recording: nothing, or bias.initial_torque and its derivative */
-std::vector<VectorXd> held_at_start(const Problem& problem, const std::vector<double>& z) {
+std::vector<VectorXd> held_at_start(const fit_problem& problem, const std::vector<double>& z) {
   const derived_numbers& derived = problem.finger.get()->derived;
   std::vector<VectorXd> held;
   for (std::size_t j = 0; j < problem.joints(); ++j) {
@@ -183,10 +183,10 @@ std::vector<VectorXd> held_at_start(const Problem& problem, const std::vector<do
 }
 
 /* adds a segment to the sum, at whose start the bias holds `held`; leaves there what it holds at its end */
-void join(const SegmentSum& segment, std::vector<VectorXd>* held, MatrixXd* sum) {
+void join(const segment_sum& segment, std::vector<VectorXd>* held, MatrixXd* sum) {
   *sum += segment.information;
   for (std::size_t j = 0; j < held->size(); ++j) {
-    const JointSegment& part = segment.joints[j];
+    const joint_segment& part = segment.joints[j];
     VectorXd& s = (*held)[j];
     auto block = sum->topLeftCorner(s.size(), s.size());
     block.selfadjointView<Eigen::Lower>().rankUpdate(s, part.cross, -1.0);
@@ -198,13 +198,13 @@ void join(const SegmentSum& segment, std::vector<VectorXd>* held, MatrixXd* sum)
 /* --- threads --------------------------------------------------------------------------------------------------------
  */
 
-struct Task {
+struct pass_task {
   std::size_t recording, segment;
 };
 
-class Pass {
+class data_pass {
  public:
-  Pass(const Problem& problem, const std::vector<double>& z, const PassOptions& options)
+  data_pass(const fit_problem& problem, const std::vector<double>& z, const pass_options& options)
       : problem_(problem), z_(z), numbers_(problem.unknowns.write(z.data())) {
     for (std::size_t r = 0; r < problem.recordings.size(); ++r) {
       gains_.emplace_back(problem.recordings[r], problem.finger.get()->derived.settings, options.stride);
@@ -213,9 +213,9 @@ class Pass {
       }
     }
     if (remembers_numbers(problem.finger.get())) {
-      FreeFinger finger(problem.image.data(), problem.image.size());
-      SampleRows rows(problem.unknowns, finger.get());
-      for (const Recording& recording : problem.recordings) {
+      free_finger finger(problem.image.data(), problem.image.size());
+      sample_rows rows(problem.unknowns, finger.get());
+      for (const recording_track& recording : problem.recordings) {
         states_.push_back(states_with(recording, &finger, &rows, numbers_));
       }
     }
@@ -227,11 +227,11 @@ class Pass {
   }
 
   /* false: stopped */
-  bool run(const Watch& watch) {
+  bool run(const pass_watch& watch) {
     if (watch && !watch(0)) { /* once at least, however short the pass */
       return false;
     }
-    const Team team(this); /* however this ends */
+    const pass_team team(this); /* however this ends */
     std::unique_lock<std::mutex> lock(mutex_);
     while (!finished_.wait_for(lock, std::chrono::milliseconds(50), [this] { return ended_ == threads_; })) {
       lock.unlock();
@@ -250,9 +250,9 @@ class Pass {
 
  private:
   /* The threads, ended with it: a thread that is destroyed while it runs ends the program. */
-  class Team {
+  class pass_team {
    public:
-    explicit Team(Pass* pass) : pass_(pass) {
+    explicit pass_team(data_pass* pass) : pass_(pass) {
       try {
         for (std::size_t k = 0; k < pass_->threads_; ++k) {
           threads_.emplace_back([pass] { pass->work(); });
@@ -265,7 +265,7 @@ class Pass {
         pass_->threads_ = threads_.size();
       }
     }
-    ~Team() {
+    ~pass_team() {
       {
         const std::lock_guard<std::mutex> lock(pass_->mutex_);
         pass_->stopped_ = pass_->stopped_ || pass_->ended_ < pass_->threads_;
@@ -274,26 +274,26 @@ class Pass {
         thread.join();
       }
     }
-    Team(const Team&) = delete;
-    Team& operator=(const Team&) = delete;
+    pass_team(const pass_team&) = delete;
+    pass_team& operator=(const pass_team&) = delete;
 
    private:
-    Pass* pass_;
+    data_pass* pass_;
     std::vector<std::thread> threads_;
   };
 
-  const SegmentStates& states(std::size_t recording) const {
+  const segment_states& states(std::size_t recording) const {
     return states_.empty() ? problem_.recordings[recording].states() : states_[recording];
   }
 
   void work() {
     try {
-      Worker worker(problem_, numbers_);
+      pass_worker worker(problem_, numbers_);
       for (std::size_t k = next_++; k < tasks_.size() && !stopped_; k = next_++) {
-        const Task& task = tasks_[k];
+        const pass_task& task = tasks_[k];
         auto segment =
-            std::make_unique<SegmentSum>(worker.sum(problem_.recordings[task.recording], states(task.recording),
-                                                    gains_[task.recording], task.segment, &done_, stopped_));
+            std::make_unique<segment_sum>(worker.sum(problem_.recordings[task.recording], states(task.recording),
+                                                     gains_[task.recording], task.segment, &done_, stopped_));
         const std::lock_guard<std::mutex> lock(mutex_);
         waiting_[k] = std::move(segment);
         join_waiting();
@@ -319,13 +319,13 @@ class Pass {
     }
   }
 
-  const Problem& problem_;
+  const fit_problem& problem_;
   const std::vector<double>& z_;
   const std::vector<double> numbers_;
-  std::vector<BiasGains> gains_;
-  std::vector<SegmentStates> states_; /* empty: those kept with the recordings */
-  std::vector<Task> tasks_;
-  std::vector<std::unique_ptr<SegmentSum>> waiting_;
+  std::vector<bias_gains> gains_;
+  std::vector<segment_states> states_; /* empty: those kept with the recordings */
+  std::vector<pass_task> tasks_;
+  std::vector<std::unique_ptr<segment_sum>> waiting_;
   std::vector<VectorXd> held_;
   MatrixXd sum_;
   std::size_t threads_ = 1, joined_ = 0, ended_ = 0;
@@ -338,13 +338,13 @@ class Pass {
 
 }  // namespace
 
-Problem::Problem(const void* data, std::size_t size, const std::int32_t* group, const double* scale)
+fit_problem::fit_problem(const void* data, std::size_t size, const std::int32_t* group, const double* scale)
     : image(static_cast<const unsigned char*>(data), static_cast<const unsigned char*>(data) + size),
       finger(data, size),
       unknowns(finger.get(), group, scale),
       columns(unknowns, finger.get()->joints) {}
 
-Columns::Columns(const Unknowns& unknowns, std::size_t joints) {
+gram_columns::gram_columns(const unknown_list& unknowns, std::size_t joints) {
   unknown.resize(unknowns.count());
   expansion.resize(unknowns.rates().size());
   for (std::size_t j = 0; j < joints; ++j) {
@@ -363,21 +363,21 @@ Columns::Columns(const Unknowns& unknowns, std::size_t joints) {
   }
 }
 
-std::size_t Problem::samples() const {
+std::size_t fit_problem::samples() const {
   std::size_t sum = 0;
-  for (const Recording& recording : recordings) {
+  for (const recording_track& recording : recordings) {
     sum += recording.samples();
   }
   return sum;
 }
 
-Evaluation evaluate(const Problem& problem, const std::vector<double>& z, const PassOptions& options,
-                    const Watch& watch) {
+cost_evaluation evaluate(const fit_problem& problem, const std::vector<double>& z, const pass_options& options,
+                         const pass_watch& watch) {
   if (problem.recordings.empty()) {
     throw refused("no recording: expected at least one");
   }
-  Pass pass(problem, z, options);
-  Evaluation result;
+  data_pass pass(problem, z, options);
+  cost_evaluation result;
   if (!pass.run(watch)) {
     return result;
   }

@@ -24,8 +24,8 @@ namespace tendonfmu::estimation {
  * estimate, with which its Stribeck part drop·exp(−v·rate) is known to third order in a change δ of the rate: drop·(E −
  * δ·v·E + δ²/2·v²E − δ³/6·v³E),  E = exp(−v·rate). Sorted by the first joint that they turn: those of joint j are a
  * prefix. */
-struct Columns {
-  explicit Columns(const Unknowns& unknowns, std::size_t joints);
+struct gram_columns {
+  explicit gram_columns(const unknown_list& unknowns, std::size_t joints);
 
   std::size_t count = 1;              /* q; column 0 is the residual */
   std::vector<std::size_t> unknown;   /* [u] */
@@ -34,14 +34,14 @@ struct Columns {
 };
 
 /* A finger, its unknowns, its recordings. */
-struct Problem {
-  Problem(const void* image, std::size_t image_size, const std::int32_t* group, const double* scale);
+struct fit_problem {
+  fit_problem(const void* image, std::size_t image_size, const std::int32_t* group, const double* scale);
 
   std::vector<unsigned char> image;
-  FreeFinger finger;
-  Unknowns unknowns;
-  Columns columns;
-  std::vector<Recording> recordings;
+  free_finger finger;
+  unknown_list unknowns;
+  gram_columns columns;
+  std::vector<recording_track> recordings;
   Eigen::MatrixXd known; /* information [u × u] about the start from before the recordings; empty: none */
 
   std::size_t joints() const { return finger.get()->joints; }
@@ -49,25 +49,25 @@ struct Problem {
 };
 
 /* ½ Σ w e²/S over all recordings, its derivative, and Σ w ν νᵀ; w the recordings' weights. */
-struct Evaluation {
+struct cost_evaluation {
   double cost = 0.0;
   Eigen::VectorXd gradient;
   Eigen::MatrixXd information; /* symmetric, both triangles */
-  Eigen::MatrixXd gram;        /* [q × q] of all Columns, both triangles */
+  Eigen::MatrixXd gram;        /* [q × q] of all gram_columns, both triangles */
   bool complete = false;       /* false: stopped */
 };
 
 /* Called on the caller's thread now and then; false stops. */
-using Watch = std::function<bool(std::size_t samples_done)>;
+using pass_watch = std::function<bool(std::size_t samples_done)>;
 
-struct PassOptions {
+struct pass_options {
   std::size_t stride = 1; /* only every stride-th sample, each for `stride` */
   unsigned threads = 0;   /* 0: all cores */
 };
 
 /* z [unknowns], within its bounds. The result does not depend on the number of threads. Throws refused. */
-Evaluation evaluate(const Problem& problem, const std::vector<double>& z, const PassOptions& options,
-                    const Watch& watch);
+cost_evaluation evaluate(const fit_problem& problem, const std::vector<double>& z, const pass_options& options,
+                         const pass_watch& watch);
 
 }  // namespace tendonfmu::estimation
 

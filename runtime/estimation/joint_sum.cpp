@@ -24,7 +24,7 @@ std::size_t stride_of(std::size_t columns) {
 
 }  // namespace
 
-BlockRows::BlockRows(std::size_t columns)
+block_rows::block_rows(std::size_t columns)
     : stride_(stride_of(columns)),
       local_(columns, -1),
       rows_(block_length * stride_, 0.0),
@@ -34,7 +34,7 @@ BlockRows::BlockRows(std::size_t columns)
   active_.reserve(columns);
 }
 
-void BlockRows::filter(double gain, double weight, std::size_t at) {
+void block_rows::filter(double gain, double weight, std::size_t at) {
   const std::size_t count = active_.size();
   double *now = row_.data(), *held = held_.data();
   if (weight > 0.0) {
@@ -54,7 +54,7 @@ void BlockRows::filter(double gain, double weight, std::size_t at) {
   }
 }
 
-void BlockRows::take_off_mean(const double* decay, double squares, std::size_t count) {
+void block_rows::take_off_mean(const double* decay, double squares, std::size_t count) {
   std::fill_n(mean_.begin(), active_.size(), 0.0);
   if (!(squares > 0.0)) { /* the bias has begun in this block: nothing from before it counts */
     return;
@@ -67,7 +67,7 @@ void BlockRows::take_off_mean(const double* decay, double squares, std::size_t c
   }
 }
 
-void BlockRows::clear() {
+void block_rows::clear() {
   std::fill_n(held_.begin(), active_.size(), 0.0);
   std::fill_n(row_.begin(), active_.size(), 0.0);
   for (const std::size_t column : active_) {
@@ -77,7 +77,7 @@ void BlockRows::clear() {
   stored_ = 0;
 }
 
-JointSum::JointSum(std::size_t columns)
+joint_sum::joint_sum(std::size_t columns)
     : rows(columns),
       held_(columns),
       cross_(columns),
@@ -87,7 +87,7 @@ JointSum::JointSum(std::size_t columns)
   begin_segment();
 }
 
-void JointSum::begin_segment() {
+void joint_sum::begin_segment() {
   for (std::vector<double>* values : {&held_, &cross_, &dense_sum_}) {
     std::fill(values->begin(), values->end(), 0.0);
   }
@@ -98,7 +98,7 @@ void JointSum::begin_segment() {
   rows.add(residual, 0.0); /* always the first of the active ones */
 }
 
-void JointSum::filter(double gain, double weight) {
+void joint_sum::filter(double gain, double weight) {
   rows.filter(gain, weight, used_);
   if (weight > 0.0) {
     decay_[used_] = block_kept_ * weight;
@@ -109,7 +109,7 @@ void JointSum::filter(double gain, double weight) {
 }
 
 /* z = √C·held − u/√C of all columns, and the block's share of Σ c_i ν_i */
-void JointSum::pass_on() {
+void joint_sum::pass_on() {
   const double root = std::sqrt(block_squares_), share = kept_ * block_squares_;
   double* z = dense_.data() + dense_count_ * held_.size();
   for (std::size_t c = 0; c < held_.size(); ++c) {
@@ -123,7 +123,7 @@ void JointSum::pass_on() {
   }
 }
 
-void JointSum::sum_block(Eigen::MatrixXd* sum) {
+void joint_sum::sum_block(Eigen::MatrixXd* sum) {
   rows.take_off_mean(decay_.data(), block_squares_, used_);
   const std::vector<std::size_t>& active = rows.active();
   const std::size_t count = active.size();
@@ -138,7 +138,7 @@ void JointSum::sum_block(Eigen::MatrixXd* sum) {
   }
 }
 
-void JointSum::end_block(Eigen::MatrixXd* sum) {
+void joint_sum::end_block(Eigen::MatrixXd* sum) {
   if (used_ > 0) {
     sum_block(sum);
     pass_on();
@@ -161,12 +161,12 @@ void JointSum::end_block(Eigen::MatrixXd* sum) {
   rows.add(residual, 0.0);
 }
 
-void JointSum::flush() {
+void joint_sum::flush() {
   add_outer_products(dense_sum_.data(), held_.size(), dense_.data(), dense_count_, held_.size(), 1.0);
   dense_count_ = 0;
 }
 
-JointSegment JointSum::end_segment(Eigen::MatrixXd* sum) {
+joint_segment joint_sum::end_segment(Eigen::MatrixXd* sum) {
   flush();
   const std::size_t columns = held_.size();
   for (std::size_t c = 0; c < columns; ++c) {

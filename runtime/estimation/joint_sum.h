@@ -12,9 +12,9 @@ namespace tendonfmu::estimation {
 constexpr std::size_t block_length = 128; /* samples whose rows are summed at a time */
 
 /* The filtered rows of a block, kept to the columns that appear in it. */
-class BlockRows {
+class block_rows {
  public:
-  explicit BlockRows(std::size_t columns);
+  explicit block_rows(std::size_t columns);
 
   /* to this sample's row */
   void add(std::size_t column, double value) { row_[activate(column)] += value; }
@@ -76,24 +76,24 @@ class BlockRows {
 };
 
 /* What a segment of a recording adds up to for one joint, as if the bias held nothing at its start. */
-struct JointSegment {
+struct joint_segment {
   Eigen::VectorXd held, cross;      /* [q_j] at the end; Σ c_i ν_i */
   double kept = 1.0, squares = 0.0; /* Π (1 − K), Σ c_i² */
 };
 
-class JointSum {
+class joint_sum {
  public:
   /* column 0 is the residual */
-  explicit JointSum(std::size_t columns);
+  explicit joint_sum(std::size_t columns);
 
-  BlockRows rows; /* they are given here, sample by sample */
+  block_rows rows; /* they are given here, sample by sample */
 
   void filter(double gain, double weight);
   bool full() const { return used_ == block_length; } /* the block must be ended */
   void begin_segment();
   /* adds the rows of the block to sum [q × q], lower triangle */
   void end_block(Eigen::MatrixXd* sum);
-  JointSegment end_segment(Eigen::MatrixXd* sum);
+  joint_segment end_segment(Eigen::MatrixXd* sum);
 
  private:
   void sum_block(Eigen::MatrixXd* sum);

@@ -7,7 +7,7 @@
 
 namespace tendonfmu::estimation {
 
-KalmanFilter::KalmanFilter(KalmanSettings settings, const std::vector<double>& start, double prior_std)
+kalman_filter::kalman_filter(kalman_settings settings, const std::vector<double>& start, double prior_std)
     : settings_(std::move(settings)), prior_std_(prior_std), start_(start) {
   const std::size_t p = settings_.unknowns, n = settings_.joints, most = settings_.block * n;
   bias_.assign(n, 0.0);
@@ -31,14 +31,14 @@ KalmanFilter::KalmanFilter(KalmanSettings settings, const std::vector<double>& s
   correction_.assign(order(), 0.0);
 }
 
-void KalmanFilter::set_prior() {
+void kalman_filter::set_prior() {
   std::fill(covariance_.begin(), covariance_.end(), 0.0);
   for (std::size_t i = 0; i < settings_.unknowns; ++i) {
     at(i, i) = prior_std_ * prior_std_;
   }
 }
 
-void KalmanFilter::begin_pass() {
+void kalman_filter::begin_pass() {
   anchor_ = z_;
   z_ = start_;
   settled_ = true;
@@ -46,14 +46,14 @@ void KalmanFilter::begin_pass() {
 }
 
 /* how far z is from where the samples are linearised */
-void KalmanFilter::find_offset() {
+void kalman_filter::find_offset() {
   for (std::size_t i = 0; settled_ && i < settings_.unknowns; ++i) {
     offset_[i] = (z_[i] - anchor_[i]) / settings_.scale[i];
   }
 }
 
 /* and what a row makes of it */
-double KalmanFilter::offset(const double* row) const {
+double kalman_filter::offset(const double* row) const {
   double sum = 0.0;
   for (std::size_t i = 0; settled_ && i < settings_.unknowns; ++i) {
     sum += row[i] * offset_[i];
@@ -62,14 +62,14 @@ double KalmanFilter::offset(const double* row) const {
 }
 
 /* row = (first + second)·scale; the bias columns are left alone */
-void KalmanFilter::scale_row(const double* first, const double* second, double* row) const {
+void kalman_filter::scale_row(const double* first, const double* second, double* row) const {
   const double* scale = settings_.scale.data();
   for (std::size_t i = 0; i < settings_.unknowns; ++i) {
     row[i] = (second ? first[i] + second[i] : first[i]) * scale[i];
   }
 }
 
-void KalmanFilter::start_bias(const double* bias, const double* rows, double variance) {
+void kalman_filter::start_bias(const double* bias, const double* rows, double variance) {
   const std::size_t p = settings_.unknowns, n = settings_.joints;
   for (std::size_t column = 0; column < order(); ++column) {
     for (std::size_t row = std::max(column, p); row < order(); ++row) {
@@ -94,7 +94,7 @@ void KalmanFilter::start_bias(const double* bias, const double* rows, double var
   }
 }
 
-void KalmanFilter::add(const KalmanSample& sample) {
+void kalman_filter::add(const kalman_sample& sample) {
   const std::size_t p = settings_.unknowns, n = settings_.joints;
   if (gathered_ == 0) {
     elapsed_ = 0.0;
@@ -126,7 +126,7 @@ void KalmanFilter::add(const KalmanSample& sample) {
   ++gathered_;
 }
 
-bool KalmanFilter::update() {
+bool kalman_filter::update() {
   if (gathered_ == 0) {
     return true;
   }
@@ -159,7 +159,7 @@ bool KalmanFilter::update() {
 
 /* The bias goes to the end of the block, in mean and covariance, and so do the products: they become the covariances of
  * the measurements with the state there. */
-void KalmanFilter::propagate(std::size_t rows) {
+void kalman_filter::propagate(std::size_t rows) {
   const std::size_t p = settings_.unknowns, n = settings_.joints, measured = gathered_ * n;
   for (std::size_t j = 0; j < n; ++j) {
     bias_[j] += jump_[j];
@@ -185,7 +185,7 @@ void KalmanFilter::propagate(std::size_t rows) {
 }
 
 /* the walk since the block's start, which later samples of a joint share, and the noise, to H P Hᵀ */
-void KalmanFilter::add_noise(std::size_t rows) {
+void kalman_filter::add_noise(std::size_t rows) {
   const std::size_t n = settings_.joints;
   for (std::size_t row = 0; row < gathered_ * n; ++row) {
     for (std::size_t before = row % n; before <= row; before += n) {
@@ -197,7 +197,7 @@ void KalmanFilter::add_noise(std::size_t rows) {
 
 /* Cholesky factor, row by row, in place of the innovations' covariance. A measurement that is not used has a row, which
  * tells its own variance, but no column: it says nothing about the others. */
-bool KalmanFilter::factor(std::size_t rows) {
+bool kalman_filter::factor(std::size_t rows) {
   const std::size_t n = settings_.joints;
   for (std::size_t row = 0; row < gathered_ * n; ++row) {
     double* l = inner_.data() + row * rows;
@@ -222,7 +222,7 @@ bool KalmanFilter::factor(std::size_t rows) {
 }
 
 /* What each sample leaves with all before it taken in, and L⁻¹ times the residuals. */
-void KalmanFilter::find_innovations(std::size_t rows) {
+void kalman_filter::find_innovations(std::size_t rows) {
   const std::size_t n = settings_.joints;
   for (std::size_t row = 0; row < gathered_ * n; ++row) {
     const double* l = inner_.data() + row * rows;
@@ -243,7 +243,7 @@ void KalmanFilter::find_innovations(std::size_t rows) {
 
 /* W = L⁻¹ times the products, in their place: a sample at a time, what the samples before it tell is taken away at once
  */
-void KalmanFilter::whiten(std::size_t rows) {
+void kalman_filter::whiten(std::size_t rows) {
   const std::size_t n = settings_.joints;
   double* w = product_.data();
   for (std::size_t first = 0; first < gathered_ * n; first += n) {
@@ -271,7 +271,7 @@ void KalmanFilter::whiten(std::size_t rows) {
 }
 
 /* z and b += W·L⁻¹(y − ŷ), within the bounds */
-void KalmanFilter::correct() {
+void kalman_filter::correct() {
   const std::size_t p = settings_.unknowns, n = settings_.joints;
   std::fill(correction_.begin(), correction_.end(), 0.0);
   add_weighted_rows(correction_.data(), order(), 1, white_.data(), white_.size(), product_.data(), gathered_ * n,
@@ -287,7 +287,7 @@ void KalmanFilter::correct() {
 
 /* Where a bound stops an unknown, the others go along as their covariances with it say: the most likely state on the
  * bound, not the one found by moving one number alone. Exact for one bound at a time; what several leave is cut off. */
-void KalmanFilter::keep_within_bounds() {
+void kalman_filter::keep_within_bounds() {
   for (int sweep = 0; sweep < 3; ++sweep) {
     bool moved = false;
     for (std::size_t i = 0; i < settings_.unknowns; ++i) {
@@ -308,15 +308,15 @@ void KalmanFilter::keep_within_bounds() {
   }
 }
 
-double KalmanFilter::covariance(std::size_t unknown, std::size_t other) const {
+double kalman_filter::covariance(std::size_t unknown, std::size_t other) const {
   return at(std::max(unknown, other), std::min(unknown, other)) * (settings_.scale[unknown] * settings_.scale[other]);
 }
 
-double KalmanFilter::bias_variance(std::size_t joint) const {
+double kalman_filter::bias_variance(std::size_t joint) const {
   return at(settings_.unknowns + joint, settings_.unknowns + joint);
 }
 
-void KalmanFilter::covariance(double* matrix) const {
+void kalman_filter::covariance(double* matrix) const {
   const std::size_t p = settings_.unknowns;
   for (std::size_t column = 0; column < p; ++column) {
     for (std::size_t row = 0; row < p; ++row) {

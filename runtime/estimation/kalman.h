@@ -16,7 +16,7 @@
 
 namespace tendonfmu::estimation {
 
-struct KalmanSettings {
+struct kalman_settings {
   std::size_t unknowns, joints;
   std::size_t block;         /* samples, at least 1 */
   double drift_variance;     /* of the bias, (N·m)²/s */
@@ -26,8 +26,8 @@ struct KalmanSettings {
   std::vector<double> upper; /* [p] */
 };
 
-/* One sample, linearised where KalmanFilter::linearise_at() says. Rows: [n × p] by z. */
-struct KalmanSample {
+/* One sample, linearised where kalman_filter::linearise_at() says. Rows: [n × p] by z. */
+struct kalman_sample {
   const double* torque;      /* [n] T, N·m */
   const double* torque_rows; /* ∂T/∂z */
   const double* jump;        /* [n] Δb, N·m; nullptr: none at this sample */
@@ -38,10 +38,10 @@ struct KalmanSample {
   bool use;                  /* false: only the walk and the jumps */
 };
 
-class KalmanFilter {
+class kalman_filter {
  public:
   /* z [p] at the start, prior_std: standard deviation of z/scale. */
-  KalmanFilter(KalmanSettings settings, const std::vector<double>& start, double prior_std);
+  kalman_filter(kalman_settings settings, const std::vector<double>& start, double prior_std);
 
   /* Begins again with the start and the prior, for the same samples once more: from now on they are linearised at what
    * has been found so far. That is a step of Gauss and Newton; the first pass is linearised at unknowns still on their
@@ -56,7 +56,7 @@ class KalmanFilter {
   void start_bias(const double* bias, const double* rows, double variance);
 
   /* Gathers a sample; at most a block of them. */
-  void add(const KalmanSample& sample);
+  void add(const kalman_sample& sample);
   std::size_t gathered() const { return gathered_; }
   bool full() const { return gathered_ == settings_.block; }
 
@@ -87,13 +87,15 @@ class KalmanFilter {
   /* the steps of an update; rows: measurements, and joints more where the bias jumped */
   void propagate(std::size_t rows);
   void add_noise(std::size_t rows);
+  /* Cholesky's factorisation, not Eigen's: it keeps every pivot, the variance of a measurement with all before it, and
+   * leaves out the rows of samples that are not used. */
   bool factor(std::size_t rows);
   void find_innovations(std::size_t rows);
   void whiten(std::size_t rows);
   void correct();
   void keep_within_bounds();
 
-  KalmanSettings settings_;
+  kalman_settings settings_;
   double prior_std_;
   std::vector<double> z_, bias_, start_;
   bool settled_ = false;                /* linearised at the anchor */

@@ -12,7 +12,7 @@ extern "C" {
 namespace tendonfmu::estimation {
 namespace {
 
-const LearnerOptions& checked(const LearnerOptions& options) {
+const learner_options& checked(const learner_options& options) {
   if (!(options.prior_std > 0.0) || !(options.prior_std <= 1e6)) {
     throw refused("prior_std = " + std::to_string(options.prior_std) + ": expected above 0, at most 1e6 scales");
   }
@@ -25,15 +25,16 @@ const LearnerOptions& checked(const LearnerOptions& options) {
   return options;
 }
 
-KalmanSettings settings_of(const Unknowns& unknowns, const tendonfmu_finger* finger, const LearnerOptions& options) {
-  KalmanSettings s{unknowns.count(),
-                   finger->joints,
-                   options.block,
-                   finger->derived.settings.drift_variance,
-                   options.parameter_drift,
-                   {},
-                   {},
-                   {}};
+kalman_settings settings_of(const unknown_list& unknowns, const tendonfmu_finger* finger,
+                            const learner_options& options) {
+  kalman_settings s{unknowns.count(),
+                    finger->joints,
+                    options.block,
+                    finger->derived.settings.drift_variance,
+                    options.parameter_drift,
+                    {},
+                    {},
+                    {}};
   for (std::size_t i = 0; i < unknowns.count(); ++i) {
     s.scale.push_back(unknowns[i].scale);
     s.lower.push_back(unknowns[i].lower);
@@ -42,7 +43,7 @@ KalmanSettings settings_of(const Unknowns& unknowns, const tendonfmu_finger* fin
   return s;
 }
 
-std::vector<double> start_of(const Unknowns& unknowns) {
+std::vector<double> start_of(const unknown_list& unknowns) {
   std::vector<double> start;
   for (std::size_t i = 0; i < unknowns.count(); ++i) {
     start.push_back(unknowns[i].start);
@@ -52,8 +53,8 @@ std::vector<double> start_of(const Unknowns& unknowns) {
 
 }  // namespace
 
-Learner::Learner(const void* image, std::size_t image_size, const std::int32_t* group, const double* scale,
-                 const LearnerOptions& options)
+finger_learner::finger_learner(const void* image, std::size_t image_size, const std::int32_t* group,
+                               const double* scale, const learner_options& options)
     : finger_(image, image_size),
       unknowns_(finger_.get(), group, scale),
       rows_(unknowns_, finger_.get()),
@@ -91,7 +92,7 @@ Learner::Learner(const void* image, std::size_t image_size, const std::int32_t* 
 }
 
 /* R of the bias filter (docs/model.md, step 6); a first sample has no time step, its noise is that of one sample */
-double Learner::noise_of(const tendonfmu_inputs& inputs, double step) const {
+double finger_learner::noise_of(const tendonfmu_inputs& inputs, double step) const {
   const finger_settings& s = finger_.get()->derived.settings;
   const std::size_t m = finger_.get()->tendons;
   double force = 0.0;
@@ -104,7 +105,7 @@ double Learner::noise_of(const tendonfmu_inputs& inputs, double step) const {
 }
 
 /* what the finger does not see; it checks the rest itself */
-void Learner::check(const LearnerSample& sample, double step) const {
+void finger_learner::check(const learner_sample& sample, double step) const {
   if (!sample.inputs.tendon_force) {
     throw refused("tendon_force: missing, expected [m] numbers");
   }
@@ -118,7 +119,7 @@ void Learner::check(const LearnerSample& sample, double step) const {
   }
 }
 
-void Learner::initialise(const LearnerSample& first, int kinematics_source) {
+void finger_learner::initialise(const learner_sample& first, int kinematics_source) {
   finish();
   initialised_ = false;
   check(first, 0.0);
@@ -137,7 +138,7 @@ void Learner::initialise(const LearnerSample& first, int kinematics_source) {
 }
 
 /* b = y − T at the first sample that is used, or bias.initial_torque; both depend on the unknowns */
-void Learner::begin_bias(const LearnerSample& sample) {
+void finger_learner::begin_bias(const learner_sample& sample) {
   const finger_settings& s = finger_.get()->derived.settings;
   const std::size_t n = torque_.size(), p = unknowns_.count();
   if (s.has_initial_torque) {
@@ -164,7 +165,7 @@ void Learner::begin_bias(const LearnerSample& sample) {
   bias_started_ = true;
 }
 
-bool Learner::step(const LearnerSample& sample) {
+bool finger_learner::step(const learner_sample& sample) {
   const double step = sample.time - tendonfmu_get_time(finger_.get());
   if (step == 0.0) {
     return false; /* the sample already taken, as in tendonfmu_step() */
@@ -193,7 +194,7 @@ bool Learner::step(const LearnerSample& sample) {
 
 /* What the unknowns say now, to the finger: samples are linearised there. Not by tendonfmu_set_parameters(), which
  * looks up every index for its range; the unknowns' bounds lie within the ranges, and hold static >= coulomb. */
-void Learner::write_unknowns() {
+void finger_learner::write_unknowns() {
   unknowns_.write(filter_.linearise_at(), numbers_.data());
   for (const std::size_t parameter : moved_) {
     finger_.get()->parameters[parameter] = numbers_[parameter];
@@ -202,7 +203,7 @@ void Learner::write_unknowns() {
   written_ = true;
 }
 
-void Learner::take(const LearnerSample& sample, double step) {
+void finger_learner::take(const learner_sample& sample, double step) {
   rows_.dense(torque_rows_.data(), rows_.has_jump() ? jump_rows_.data() : nullptr);
   for (std::size_t j = 0; j < torque_.size(); ++j) {
     torque_[j] = rows_.torque(j);
@@ -216,12 +217,12 @@ void Learner::take(const LearnerSample& sample, double step) {
                measured_.data(), step, noise_of(sample.inputs, step), sample.use && !slack});
 }
 
-bool Learner::is_slack() const {
+bool finger_learner::is_slack() const {
   const double* slack = finger_.get()->remembered.slack;
   return std::any_of(slack, slack + finger_.get()->tendons, [](double flag) { return flag != 0.0; });
 }
 
-void Learner::finish() {
+void finger_learner::finish() {
   if (filter_.gathered() == 0) {
     return;
   }
@@ -231,14 +232,14 @@ void Learner::finish() {
   written_ = false;
 }
 
-void Learner::begin_pass() {
+void finger_learner::begin_pass() {
   finish();
   filter_.begin_pass();
   initialised_ = bias_started_ = false;
   slack_samples_ = 0;
 }
 
-void Learner::standard_errors(double* errors) const {
+void finger_learner::standard_errors(double* errors) const {
   std::fill_n(errors, numbers_.size(), 0.0);
   const auto variance = [this](std::int32_t a, std::int32_t b) {
     return a < 0 || b < 0 ? 0.0 : filter_.covariance(static_cast<std::size_t>(a), static_cast<std::size_t>(b));

@@ -10,29 +10,29 @@
 
 namespace tendonfmu::estimation {
 
-struct LearnerOptions {
+struct learner_options {
   double prior_std = 1.0;       /* of an unknown about its start, in scales */
   std::size_t block = 8;        /* samples that are taken in at once */
   double parameter_drift = 0.0; /* of the unknowns: variance of z/scale, 1/s */
 };
 
 /* One sample as the caller has it. */
-struct LearnerSample {
+struct learner_sample {
   double time;
   tendonfmu_inputs inputs;
   const double* external_torque; /* [n] or nullptr */
   bool use;
 };
 
-class Learner {
+class finger_learner {
  public:
   /* Throws refused. */
-  Learner(const void* image, std::size_t image_size, const std::int32_t* group, const double* scale,
-          const LearnerOptions& options);
+  finger_learner(const void* image, std::size_t image_size, const std::int32_t* group, const double* scale,
+                 const learner_options& options);
 
   const tendonfmu_finger* finger() const { return finger_.get(); }
-  const Unknowns& unknowns() const { return unknowns_; }
-  const KalmanFilter& filter() const { return filter_; }
+  const unknown_list& unknowns() const { return unknowns_; }
+  const kalman_filter& filter() const { return filter_; }
   std::size_t block() const { return block_; }
   bool initialised() const { return initialised_; }
   bool bias_started() const { return bias_started_; }
@@ -40,16 +40,16 @@ class Learner {
 
   /* The first sample of a recording: what is remembered of the motion and the bias begin anew, the unknowns stay.
    * Throws refused; then nothing is initialised. */
-  void initialise(const LearnerSample& first, int kinematics_source);
+  void initialise(const learner_sample& first, int kinematics_source);
 
   /* The next sample. True where it completed a block. Allocates nothing unless it throws refused, and then the learner
    * is as it was. */
-  bool step(const LearnerSample& sample);
+  bool step(const learner_sample& sample);
 
   /* Takes in the samples of a block that is not full. */
   void finish();
 
-  /* See KalmanFilter::begin_pass(). The samples of an unfinished block are taken in first. */
+  /* See kalman_filter::begin_pass(). The samples of an unfinished block are taken in first. */
   void begin_pass();
 
   /* numbers of the description, and their standard errors (first order): [parameter_count]; 0 where fixed */
@@ -58,17 +58,17 @@ class Learner {
 
  private:
   double noise_of(const tendonfmu_inputs& inputs, double step) const;
-  void check(const LearnerSample& sample, double step) const;
+  void check(const learner_sample& sample, double step) const;
   void write_unknowns();
-  void take(const LearnerSample& sample, double step);
-  void begin_bias(const LearnerSample& sample);
+  void take(const learner_sample& sample, double step);
+  void begin_bias(const learner_sample& sample);
   bool is_slack() const;
 
-  FreeFinger finger_;
-  Unknowns unknowns_;
-  SampleRows rows_;
+  free_finger finger_;
+  unknown_list unknowns_;
+  sample_rows rows_;
   std::size_t block_;
-  KalmanFilter filter_;
+  kalman_filter filter_;
   bool initialised_ = false, bias_started_ = false, written_ = false;
   std::size_t slack_samples_ = 0;
   std::vector<double> numbers_;    /* [parameter_count] */

@@ -28,8 +28,8 @@ void add_pair(double rr, double rd, Index r, Index d, double sign, MatrixXd* h) 
 
 }  // namespace
 
-LocalModel::LocalModel(const Problem& problem, const ScaledBox& box, const Evaluation& evaluation, const VectorXd& x,
-                       Prior prior)
+local_model::local_model(const fit_problem& problem, const scaled_box& box, const cost_evaluation& evaluation,
+                         const VectorXd& x, gaussian_prior prior)
     : problem_(problem), box_(box), gram_(evaluation.gram), x_(x), prior_(std::move(prior)) {
   const auto column = [&problem](Index unknown) {
     return static_cast<Index>(problem.columns.unknown[static_cast<std::size_t>(unknown)]);
@@ -42,26 +42,26 @@ LocalModel::LocalModel(const Problem& problem, const ScaledBox& box, const Evalu
                       static_cast<Index>(problem.columns.expansion[k]), at, 0.0});
   } /* −δ·v·E has the drop at x in its column, which sides with one rate share: each stands for its part of it */
   std::vector<double> sharing(static_cast<std::size_t>(x.size()), 0.0);
-  for (const Stribeck& side : sides_) {
+  for (const stribeck_side& side : sides_) {
     ++sharing[static_cast<std::size_t>(side.rate)];
   }
-  for (Stribeck& side : sides_) {
+  for (stribeck_side& side : sides_) {
     side.per_drop = side.at > 0.0 ? 1.0 / (side.at * sharing[static_cast<std::size_t>(side.rate)]) : 0.0;
   }
 }
 
-double LocalModel::drop_of(const Stribeck& side, const VectorXd& step) const {
+double local_model::drop_of(const stribeck_side& side, const VectorXd& step) const {
   return side.drop < 0 ? side.at : side.at + step[side.drop] * box_.scale[side.drop];
 }
 
 /* w with e(x + step) = Σ w·columns: 1 for the residual, minus the change of what stands before each column */
-VectorXd LocalModel::weights(const VectorXd& step) const {
+VectorXd local_model::weights(const VectorXd& step) const {
   VectorXd w = VectorXd::Zero(gram_.rows());
   w[0] = 1.0;
   for (Index k = 0; k < step.size(); ++k) {
     w[static_cast<Index>(problem_.columns.unknown[static_cast<std::size_t>(k)])] = -step[k] * box_.scale[k];
   }
-  for (const Stribeck& side : sides_) {
+  for (const stribeck_side& side : sides_) {
     const double rate = step[side.rate] * box_.scale[side.rate], drop = drop_of(side, step);
     w[side.rate_column] -= rate * (drop - side.at) * side.per_drop;
     w[side.square_column] = -drop * rate * rate / 2.0;
@@ -71,13 +71,13 @@ VectorXd LocalModel::weights(const VectorXd& step) const {
 }
 
 /* matrix · ∂w/∂step, by unknowns divided by their scales */
-MatrixXd LocalModel::slopes(const MatrixXd& matrix, const VectorXd& step) const {
+MatrixXd local_model::slopes(const MatrixXd& matrix, const VectorXd& step) const {
   MatrixXd product(matrix.rows(), step.size());
   for (Index k = 0; k < step.size(); ++k) {
     product.col(k) =
         -box_.scale[k] * matrix.col(static_cast<Index>(problem_.columns.unknown[static_cast<std::size_t>(k)]));
   }
-  for (const Stribeck& side : sides_) {
+  for (const stribeck_side& side : sides_) {
     const double scale = box_.scale[side.rate], rate = step[side.rate] * scale, drop = drop_of(side, step);
     const auto linear = matrix.col(side.rate_column);
     const auto square = matrix.col(side.square_column), cubic = matrix.col(side.square_column + 1);
@@ -92,14 +92,14 @@ MatrixXd LocalModel::slopes(const MatrixXd& matrix, const VectorXd& step) const 
   return product;
 }
 
-double LocalModel::cost(const VectorXd& step) const {
+double local_model::cost(const VectorXd& step) const {
   const VectorXd w = weights(step);
   return 0.5 * w.dot(gram_ * w) + prior_.cost(x_ + step - box_.start);
 }
 
 /* second derivatives of the weights, times what pulls on them: what makes the cost more convex, and less */
-void LocalModel::add_curvature(const VectorXd& step, const VectorXd& pull, MatrixXd* convex, MatrixXd* concave) const {
-  for (const Stribeck& side : sides_) {
+void local_model::add_curvature(const VectorXd& step, const VectorXd& pull, MatrixXd* convex, MatrixXd* concave) const {
+  for (const stribeck_side& side : sides_) {
     const double scale = box_.scale[side.rate], rate = step[side.rate] * scale, drop = drop_of(side, step);
     const double square = pull[side.square_column], cubic = pull[side.square_column + 1];
     const double rr = -scale * scale * drop * (square + rate * cubic);
@@ -115,7 +115,7 @@ void LocalModel::add_curvature(const VectorXd& step, const VectorXd& pull, Matri
 }
 
 /* as much of the concave part as leaves the sum positive definite */
-MatrixXd LocalModel::positive(const MatrixXd& convex, const MatrixXd& concave) const {
+MatrixXd local_model::positive(const MatrixXd& convex, const MatrixXd& concave) const {
   for (const double share : {1.0, 0.8, 0.5}) {
     MatrixXd h = convex + share * concave;
     if (h.llt().info() == Eigen::Success) {
@@ -126,7 +126,7 @@ MatrixXd LocalModel::positive(const MatrixXd& convex, const MatrixXd& concave) c
 }
 
 /* gradient and Gauss-Newton matrix of the model, prior included */
-void LocalModel::linearise(const VectorXd& step, VectorXd* pull, VectorXd* gradient, MatrixXd* gauss) const {
+void local_model::linearise(const VectorXd& step, VectorXd* pull, VectorXd* gradient, MatrixXd* gauss) const {
   *pull = gram_ * weights(step);
   *gradient = slopes(pull->transpose(), step).transpose() + prior_.gradient(x_ + step - box_.start);
   const MatrixXd half = slopes(slopes(gram_, step).transpose(), step);
@@ -135,7 +135,7 @@ void LocalModel::linearise(const VectorXd& step, VectorXd* pull, VectorXd* gradi
 }
 
 /* the best of all unknowns but the rates: with these held the model is a parabola */
-VectorXd LocalModel::settled(const VectorXd& step, const ScaledBox& around) const {
+VectorXd local_model::settled(const VectorXd& step, const scaled_box& around) const {
   const VectorXd at = around.clip(x_ + step);
   VectorXd pull, gradient;
   MatrixXd gauss;
@@ -143,7 +143,7 @@ VectorXd LocalModel::settled(const VectorXd& step, const ScaledBox& around) cons
   return at - x_ + boxed_step(gauss, gradient, at, around.around(at, 0.0));
 }
 
-VectorXd LocalModel::best_step(const ScaledBox& around, double negligible) const {
+VectorXd local_model::best_step(const scaled_box& around, double negligible) const {
   VectorXd step = settled(VectorXd::Zero(x_.size()), around);
   double least = cost(step), damping = 1e-6;
   const double before = cost(VectorXd::Zero(x_.size()));

@@ -8,9 +8,9 @@
 namespace tendonfmu::estimation {
 
 /* In unknowns divided by their scales; d is how far they are from the start. */
-struct Prior {
+struct gaussian_prior {
   /* weight: 1/prior_std²; known: information of an earlier fit [u × u], or empty. Not explicit: a weight is a prior. */
-  Prior(double weight, Eigen::MatrixXd known = {}) : weight(weight), known(std::move(known)) {}
+  gaussian_prior(double weight, Eigen::MatrixXd known = {}) : weight(weight), known(std::move(known)) {}
 
   double cost(const Eigen::VectorXd& d) const {
     const double plain = 0.5 * weight * d.squaredNorm();

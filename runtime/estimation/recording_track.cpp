@@ -10,7 +10,7 @@ namespace tendonfmu::estimation {
 /* --- a finger without contact ---------------------------------------------------------------------------------------
  */
 
-FreeFinger::FreeFinger(const void* image, std::size_t image_size) {
+free_finger::free_finger(const void* image, std::size_t image_size) {
   char message[ERROR_BYTES] = "";
   finger_.reset(tendonfmu_create(image, image_size, message, sizeof message));
   if (!finger_) {
@@ -18,7 +18,7 @@ FreeFinger::FreeFinger(const void* image, std::size_t image_size) {
   }
 }
 
-void FreeFinger::set(const std::vector<double>& numbers) {
+void free_finger::set(const std::vector<double>& numbers) {
   free_ = numbers;
   model_visit(
       &finger_->shape,
@@ -49,7 +49,7 @@ void FreeFinger::set(const std::vector<double>& numbers) {
   }
 }
 
-void FreeFinger::begin(const std::vector<double>& numbers, int kinematics_source) {
+void free_finger::begin(const std::vector<double>& numbers, int kinematics_source) {
   tendonfmu_reset(finger_.get());
   if (tendonfmu_set_kinematics_source(finger_.get(), kinematics_source) != TENDONFMU_OK) {
     throw refused(tendonfmu_last_error(finger_.get()));
@@ -57,14 +57,14 @@ void FreeFinger::begin(const std::vector<double>& numbers, int kinematics_source
   set(numbers);
 }
 
-void FreeFinger::resume(const std::vector<unsigned char>& state, const std::vector<double>& numbers) {
+void free_finger::resume(const std::vector<unsigned char>& state, const std::vector<double>& numbers) {
   if (tendonfmu_restore_state(finger_.get(), state.data(), state.size()) != TENDONFMU_OK) {
     throw refused(tendonfmu_last_error(finger_.get()));
   }
   set(numbers);
 }
 
-void FreeFinger::step(std::size_t row, double time, const tendonfmu_inputs& inputs) {
+void free_finger::step(std::size_t row, double time, const tendonfmu_inputs& inputs) {
   const tendonfmu_status status = tendonfmu_is_initialised(finger_.get())
                                       ? tendonfmu_step(finger_.get(), time, &inputs)
                                       : tendonfmu_initialise(finger_.get(), time, &inputs);
@@ -73,7 +73,7 @@ void FreeFinger::step(std::size_t row, double time, const tendonfmu_inputs& inpu
   }
 }
 
-std::vector<unsigned char> FreeFinger::save() const {
+std::vector<unsigned char> free_finger::save() const {
   std::vector<unsigned char> state(tendonfmu_state_size(finger_.get()));
   tendonfmu_save_state(finger_.get(), state.data(), state.size());
   return state;
@@ -97,7 +97,7 @@ std::vector<double> copied(const double* values, std::size_t count) {
 
 }  // namespace
 
-Recording::Recording(FreeFinger* finger, const RecordingArrays& a)
+recording_track::recording_track(free_finger* finger, const recording_arrays& a)
     : joints_(finger->get()->joints),
       tendons_(finger->get()->tendons),
       weight_root_(finger->get()->joints, 1.0),
@@ -155,7 +155,7 @@ Recording::Recording(FreeFinger* finger, const RecordingArrays& a)
   }
 }
 
-void Recording::set_weights(const double* weight) {
+void recording_track::set_weights(const double* weight) {
   for (std::size_t j = 0; j < joints_; ++j) {
     if (!(weight[j] > 0.0 && weight[j] <= 1.0)) {
       throw refused("weight[" + std::to_string(j + 1) + "] = " + std::to_string(weight[j]) +
@@ -165,7 +165,7 @@ void Recording::set_weights(const double* weight) {
   std::transform(weight, weight + joints_, weight_root_.begin(), [](double share) { return std::sqrt(share); });
 }
 
-tendonfmu_inputs Recording::inputs(std::size_t row) const {
+tendonfmu_inputs recording_track::inputs(std::size_t row) const {
   const auto at = [](const std::vector<double>& values, std::size_t offset) {
     return values.empty() ? nullptr : values.data() + offset;
   };
@@ -173,7 +173,7 @@ tendonfmu_inputs Recording::inputs(std::size_t row) const {
           at(velocity_, row * joints_)};
 }
 
-BiasGains::BiasGains(const Recording& r, const finger_settings& settings, std::size_t stride)
+bias_gains::bias_gains(const recording_track& r, const finger_settings& settings, std::size_t stride)
     : gain(r.samples(), 0.0), weight(r.samples(), 0.0) {
   bool started = settings.has_initial_torque != 0;
   const double given = settings.initial_variance;

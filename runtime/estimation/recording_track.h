@@ -9,16 +9,16 @@
 
 namespace tendonfmu::estimation {
 
-struct FingerDeleter {
+struct finger_deleter {
   void operator()(tendonfmu_finger* finger) const { tendonfmu_destroy(finger); }
 };
-using FingerPointer = std::unique_ptr<tendonfmu_finger, FingerDeleter>;
+using finger_pointer = std::unique_ptr<tendonfmu_finger, finger_deleter>;
 
 /* A finger of the core that never detects contact. */
-class FreeFinger {
+class free_finger {
  public:
   /* throws refused */
-  FreeFinger(const void* image, std::size_t image_size);
+  free_finger(const void* image, std::size_t image_size);
 
   tendonfmu_finger* get() const { return finger_.get(); }
 
@@ -33,7 +33,7 @@ class FreeFinger {
  private:
   void set(const std::vector<double>& numbers);
 
-  FingerPointer finger_;
+  finger_pointer finger_;
   std::vector<double> free_; /* numbers with thresholds that nothing reaches */
 };
 
@@ -43,14 +43,14 @@ class FreeFinger {
 bool remembers_numbers(const tendonfmu_finger* finger);
 
 /* The beginning of a segment of a recording: the finger's state, and the sample_rows.h entries. */
-struct SegmentState {
+struct segment_state {
   std::vector<unsigned char> finger;
   std::vector<double> entries;
 };
-using SegmentStates = std::vector<SegmentState>;
+using segment_states = std::vector<segment_state>;
 
 /* Arrays of the caller, row-major. */
-struct RecordingArrays {
+struct recording_arrays {
   std::size_t samples;
   const double* time;            /* [N] s */
   tendonfmu_inputs inputs;       /* [N × m], [N × n] */
@@ -60,10 +60,10 @@ struct RecordingArrays {
 };
 
 /* One recording, copied. */
-class Recording {
+class recording_track {
  public:
   /* Throws refused: a sample that the finger refuses, fewer than 2 used samples, noise of 0. */
-  Recording(FreeFinger* finger, const RecordingArrays& arrays);
+  recording_track(free_finger* finger, const recording_arrays& arrays);
 
   std::size_t samples() const { return time_.size(); }
   int kinematics_source() const { return source_; }
@@ -85,12 +85,12 @@ class Recording {
   /* Rows at which the finger's state is kept: 0, length, 2·length, … */
   std::size_t segment_length() const { return segment_length_; }
   std::size_t segments() const { return states_.size(); }
-  const SegmentStates& states() const { return states_; }
+  const segment_states& states() const { return states_; }
 
  private:
   std::vector<double> time_, force_, position_, angle_, velocity_, external_, noise_, noise_scale_;
   std::vector<unsigned char> use_;
-  SegmentStates states_;
+  segment_states states_;
   std::size_t joints_, tendons_, used_count_ = 0, segment_length_ = 0;
   double mean_force_ = 0.0;
   std::vector<double> weight_root_;
@@ -99,9 +99,9 @@ class Recording {
 
 /* What the bias filter (docs/model.md, step 6) does at every sample; the same for all joints and all parameters.
  */
-struct BiasGains {
+struct bias_gains {
   /* stride: only every stride-th sample is looked at, for `stride` of them */
-  BiasGains(const Recording& recording, const finger_settings& settings, std::size_t stride);
+  bias_gains(const recording_track& recording, const finger_settings& settings, std::size_t stride);
 
   std::vector<double> gain;   /* [N] K; 0 where not used, 1 where the bias starts */
   std::vector<double> weight; /* [N] 1/√S; 0 where nothing is learned */

@@ -4,7 +4,7 @@
 
 namespace tendonfmu::estimation {
 
-SampleRows::SampleRows(const Unknowns& unknowns, const tendonfmu_finger* finger)
+sample_rows::sample_rows(const unknown_list& unknowns, const tendonfmu_finger* finger)
     : unknowns_(unknowns),
       finger_(finger),
       memory_((parameter_derivative_size(finger) + sizeof(double) - 1) / sizeof(double)) {
@@ -16,27 +16,27 @@ SampleRows::SampleRows(const Unknowns& unknowns, const tendonfmu_finger* finger)
   }
 }
 
-bool SampleRows::sees_event() const {
+bool sample_rows::sees_event() const {
   const double* event = finger_->remembered.event;
   return std::any_of(event, event + finger_->slots, [](double each) { return each != 0.0; });
 }
 
 /* slopes by static, coulomb, 1/vs, viscous to those by coulomb, drop, 1/vs, viscous: static = coulomb + drop */
-void SampleRows::add(const law_term& from, bool is_jump) {
-  const SideColumns& side = unknowns_.side(from.side);
+void sample_rows::add(const law_term& from, bool is_jump) {
+  const side_columns& side = unknowns_.side(from.side);
   const double coulomb = from.slope[SIDE_COULOMB] + (side.static_follows ? from.slope[SIDE_STATIC] : 0.0);
   const std::size_t row = from.place * derivative_.joints;
   const double* jump = is_jump ? derivative_.bias_factor + row : derivative_.jump_factor + row;
-  Term term{side.column,
-            {coulomb, from.slope[SIDE_STATIC], from.slope[SIDE_RATE], from.slope[SIDE_VISCOUS]},
-            0,
-            0,
-            {},
-            &side,
-            from.speed,
-            is_jump ? nullptr : derivative_.torque_factor + row,
-            derivative_.has_jump ? jump : nullptr,
-            from.place};
+  sensitivity_term term{side.column,
+                        {coulomb, from.slope[SIDE_STATIC], from.slope[SIDE_RATE], from.slope[SIDE_VISCOUS]},
+                        0,
+                        0,
+                        {},
+                        &side,
+                        from.speed,
+                        is_jump ? nullptr : derivative_.torque_factor + row,
+                        derivative_.has_jump ? jump : nullptr,
+                        from.place};
   if (side.run_length > 0) {
     term.run_first = side.run_first;
     term.run_length = side.run_length;
@@ -49,7 +49,7 @@ void SampleRows::add(const law_term& from, bool is_jump) {
   terms_.push_back(term);
 }
 
-void SampleRows::read() {
+void sample_rows::read() {
   parameter_derivative_read(finger_, &derivative_);
   extension_derivative_read(finger_, &derivative_);
   terms_.clear();
@@ -73,7 +73,7 @@ void SampleRows::read() {
 }
 
 /* −κ·e of every place that leaves rest, at all joints that it turns */
-void SampleRows::leave_rest() {
+void sample_rows::leave_rest() {
   const std::size_t n = joints(), ends = 2 * n * derivative_.tendons;
   for (std::size_t place = 0; place < derivative_.places; ++place) {
     const double kept = derivative_.left_share[place];
@@ -93,7 +93,7 @@ void SampleRows::leave_rest() {
 }
 
 /* ∂(acting·b) of every place that comes to rest: its own b, and what the friction before it makes of what acts */
-void SampleRows::come_to_rest() {
+void sample_rows::come_to_rest() {
   const std::size_t n = joints(), ends = 2 * n * derivative_.tendons;
   for (std::size_t place = 0; place < derivative_.places; ++place) {
     const double jump = derivative_.stop_jump[place];
@@ -116,7 +116,7 @@ void SampleRows::come_to_rest() {
   come_to_rest_by_signals();
 }
 
-void SampleRows::come_to_rest_by_signals() {
+void sample_rows::come_to_rest_by_signals() {
   for (std::size_t r = 0; r < finger_->extensions.signals; ++r) {
     const extension_row* row = signal_row(finger_, r);
     for (std::uint32_t k = 0; k < row->effect->parameter_count; ++k) {
@@ -135,11 +135,11 @@ void SampleRows::come_to_rest_by_signals() {
 }
 
 /* factor·∂F, or ∂b, of a place */
-void SampleRows::add_slopes(std::size_t place, bool is_jump, double factor, double* entry) const {
+void sample_rows::add_slopes(std::size_t place, bool is_jump, double factor, double* entry) const {
   if (factor == 0.0) {
     return;
   }
-  for (const Term& term : terms_) {
+  for (const sensitivity_term& term : terms_) {
     if (term.place == place && (term.torque == nullptr) == is_jump) {
       for (std::size_t k = 0; k < 4; ++k) {
         if (term.column[k] >= 0) {
@@ -161,13 +161,13 @@ void SampleRows::add_slopes(std::size_t place, bool is_jump, double factor, doub
   }
 }
 
-void SampleRows::dense(double* torque_rows, double* jump_rows) const {
+void sample_rows::dense(double* torque_rows, double* jump_rows) const {
   const std::size_t n = joints(), p = unknowns_.count();
   std::fill_n(torque_rows, n * p, 0.0);
   if (jump_rows) {
     std::fill_n(jump_rows, n * p, 0.0);
   }
-  for (const Term& term : terms_) {
+  for (const sensitivity_term& term : terms_) {
     for (std::size_t k = 0; k < 4; ++k) {
       if (term.column[k] < 0) {
         continue;
@@ -183,7 +183,7 @@ void SampleRows::dense(double* torque_rows, double* jump_rows) const {
       }
     }
   }
-  for (const PlainTerm& term : plain_) {
+  for (const plain_slope& term : plain_) {
     const std::size_t at = term.joint * p + static_cast<std::size_t>(term.column);
     torque_rows[at] += term.slope;
     if (jump_rows) {
@@ -192,9 +192,9 @@ void SampleRows::dense(double* torque_rows, double* jump_rows) const {
   }
 }
 
-SegmentStates states_with(const Recording& recording, FreeFinger* finger, SampleRows* rows,
-                          const std::vector<double>& numbers) {
-  SegmentStates states;
+segment_states states_with(const recording_track& recording, free_finger* finger, sample_rows* rows,
+                           const std::vector<double>& numbers) {
+  segment_states states;
   finger->begin(numbers, recording.kinematics_source());
   rows->forget();
   for (std::size_t k = 0; states.size() < recording.segments(); ++k) {

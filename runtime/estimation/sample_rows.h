@@ -16,13 +16,13 @@ extern "C" {
 namespace tendonfmu::estimation {
 
 /* One friction value, or one jump, as the unknowns move it: row j has slope[k]·factor[j] in column[k] (−1: none). */
-struct Term {
+struct sensitivity_term {
   std::array<std::int32_t, 4> column;
   std::array<double, 4> slope;
   /* the same as a run of columns that belong to this law alone; length 0 where some are shared */
   std::size_t run_first, run_length;
   std::array<double, 4> run_slope;
-  const SideColumns* side;
+  const side_columns* side;
   double speed; /* m/s or rad/s: ∂²/∂rate² = −speed·slope by rate, ∂²/∂rate∂drop = −speed·slope by drop */
   const double* torque; /* [n] ∂T_j; nullptr: a jump's own */
   const double* jump;   /* [n] ∂Δb_j; nullptr: no jump at this sample */
@@ -30,16 +30,16 @@ struct Term {
 };
 
 /* A number that enters a joint's torque as it is. */
-struct PlainTerm {
+struct plain_slope {
   std::int32_t column;
   std::size_t joint;
   double slope, jump;
 };
 
-class SampleRows {
+class sample_rows {
  public:
   /* both must outlive the rows */
-  SampleRows(const Unknowns& unknowns, const tendonfmu_finger* finger);
+  sample_rows(const unknown_list& unknowns, const tendonfmu_finger* finger);
 
   /* the sample that the finger last took, by a step; with entry_load none that sees_event() may be left out */
   void read();
@@ -61,8 +61,8 @@ class SampleRows {
   double jump(std::size_t joint) const { return finger_->scratch.bias_step[joint]; }     /* Δb_j, N·m */
   double measured(std::size_t joint) const { return finger_->remembered.torque[joint]; } /* τ_j, N·m */
   bool has_jump() const { return derivative_.has_jump != 0; }
-  const std::vector<Term>& terms() const { return terms_; }
-  const std::vector<PlainTerm>& plain_terms() const { return plain_; }
+  const std::vector<sensitivity_term>& terms() const { return terms_; }
+  const std::vector<plain_slope>& plain_terms() const { return plain_; }
 
   /* ∂T_j/∂z and ∂Δb_j/∂z: [joints × unknowns], rows; jump_rows may be nullptr */
   void dense(double* torque_rows, double* jump_rows) const;
@@ -75,20 +75,20 @@ class SampleRows {
   void add_slopes(std::size_t place, bool is_jump, double factor, double* entry) const;
   double* entry(std::size_t place) { return entries_.data() + place * unknowns_.count(); }
 
-  const Unknowns& unknowns_;
+  const unknown_list& unknowns_;
   const tendonfmu_finger* finger_;
   std::vector<double> memory_;
   parameter_derivative derivative_;
-  std::vector<Term> terms_;
-  std::vector<PlainTerm> plain_;
+  std::vector<sensitivity_term> terms_;
+  std::vector<plain_slope> plain_;
   std::vector<double> entries_;   /* [places × unknowns] of e of every place, as it came to rest */
   std::vector<double> by_signal_; /* [places] room */
 };
 
 /* The beginnings of a recording's segments with other numbers of the description than those it was added with; rows: of
  * that finger. */
-SegmentStates states_with(const Recording& recording, FreeFinger* finger, SampleRows* rows,
-                          const std::vector<double>& numbers);
+segment_states states_with(const recording_track& recording, free_finger* finger, sample_rows* rows,
+                           const std::vector<double>& numbers);
 
 }  // namespace tendonfmu::estimation
 

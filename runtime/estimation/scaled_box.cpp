@@ -10,14 +10,14 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-ScaledBox::ScaledBox(const Unknowns& unknowns) {
+scaled_box::scaled_box(const unknown_list& unknowns) {
   const auto p = static_cast<Index>(unknowns.count());
   scale.resize(p);
   start.resize(p);
   lower.resize(p);
   upper.resize(p);
   for (Index k = 0; k < p; ++k) {
-    const Unknown& u = unknowns[static_cast<std::size_t>(k)];
+    const unknown_item& u = unknowns[static_cast<std::size_t>(k)];
     scale[k] = u.scale;
     start[k] = u.start / u.scale;
     lower[k] = u.lower / u.scale;
@@ -28,8 +28,8 @@ ScaledBox::ScaledBox(const Unknowns& unknowns) {
   }
 }
 
-ScaledBox ScaledBox::around(const VectorXd& x, double share) const {
-  ScaledBox box = *this;
+scaled_box scaled_box::around(const VectorXd& x, double share) const {
+  scaled_box box = *this;
   for (const Index k : curved) {
     const double most = share * std::max(std::fabs(x[k]), 0.5);
     box.lower[k] = std::max(lower[k], x[k] - most);
@@ -38,7 +38,7 @@ ScaledBox ScaledBox::around(const VectorXd& x, double share) const {
   return box;
 }
 
-std::vector<double> ScaledBox::unknowns(const VectorXd& x) const {
+std::vector<double> scaled_box::unknowns(const VectorXd& x) const {
   std::vector<double> z(static_cast<std::size_t>(x.size()));
   for (Index k = 0; k < x.size(); ++k) {
     z[static_cast<std::size_t>(k)] = x[k] * scale[k];
@@ -62,14 +62,14 @@ Eigen::LLT<MatrixXd> factored(MatrixXd h) {
   return factor;
 }
 
-struct ActiveSet {
+struct active_set {
   const MatrixXd& h;
   const VectorXd &g, &x;
-  const ScaledBox& box;
+  const scaled_box& box;
   VectorXd step;
   std::vector<int> side; /* at which an unknown is held: −1 lower, 1 upper; 0 free */
 
-  ActiveSet(const MatrixXd& h_, const VectorXd& g_, const VectorXd& x_, const ScaledBox& box_)
+  active_set(const MatrixXd& h_, const VectorXd& g_, const VectorXd& x_, const scaled_box& box_)
       : h(h_), g(g_), x(x_), box(box_), step(VectorXd::Zero(x_.size())), side(static_cast<std::size_t>(x_.size())) {
     for (Index k = 0; k < x.size(); ++k) {
       if ((x[k] <= box.lower[k] && g[k] > 0.0) || !(box.lower[k] < box.upper[k])) {
@@ -188,13 +188,13 @@ struct ActiveSet {
 
 }  // namespace
 
-VectorXd boxed_step(const MatrixXd& h, const VectorXd& g, const VectorXd& x, const ScaledBox& box) {
-  ActiveSet set(h, g, x, box);
+VectorXd boxed_step(const MatrixXd& h, const VectorXd& g, const VectorXd& x, const scaled_box& box) {
+  active_set set(h, g, x, box);
   if (set.settle_quickly()) {
     return set.step;
   }
   if (!(set.value() < 0.0)) { /* worse than not to move */
-    ActiveSet anew(h, g, x, box);
+    active_set anew(h, g, x, box);
     anew.settle_surely();
     return anew.step;
   }

@@ -3,10 +3,10 @@
 namespace tendonfmu::estimation {
 namespace {
 
-struct Choice {
-  SymmetricUpdate list[4] = {};
+struct update_choice {
+  symmetric_update list[4] = {};
 
-  Choice() {
+  update_choice() {
     std::size_t count = 0;
 #if defined(TENDONFMU_ESTIMATION_AVX2)
     __builtin_cpu_init();
@@ -24,8 +24,8 @@ struct Choice {
 
 }  // namespace
 
-const SymmetricUpdate* symmetric_updates() {
-  static const Choice choice;
+const symmetric_update* symmetric_updates() {
+  static const update_choice choice;
   return choice.list;
 }
 

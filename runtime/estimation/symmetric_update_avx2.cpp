@@ -10,19 +10,19 @@ namespace tendonfmu::estimation {
 namespace {
 
 /* 12 sums, 3 factors and 1 spread number: all 16 registers */
-constexpr std::size_t LANES = 4, VECTORS = 3, COLUMNS = 4;
-using Vector = __m256d;
+constexpr std::size_t lanes = 4, tile_vectors = 3, tile_columns = 4;
+using lane_vector = __m256d;
 
-inline __attribute__((always_inline)) Vector load(const double* from) {
+inline __attribute__((always_inline)) lane_vector load(const double* from) {
   return _mm256_loadu_pd(from);
 }
-inline __attribute__((always_inline)) void store(double* to, Vector v) {
+inline __attribute__((always_inline)) void store(double* to, lane_vector v) {
   _mm256_storeu_pd(to, v);
 }
-inline __attribute__((always_inline)) Vector spread(double x) {
+inline __attribute__((always_inline)) lane_vector spread(double x) {
   return _mm256_set1_pd(x);
 }
-inline __attribute__((always_inline)) Vector multiply_add(Vector a, Vector b, Vector c) {
+inline __attribute__((always_inline)) lane_vector multiply_add(lane_vector a, lane_vector b, lane_vector c) {
   return _mm256_fmadd_pd(a, b, c);
 }
 
@@ -33,7 +33,7 @@ inline __attribute__((always_inline)) Vector multiply_add(Vector a, Vector b, Ve
 
 namespace tendonfmu::estimation {
 
-const SymmetricUpdate avx2_symmetric_update = {"avx2", add_products, multiply_rows, mix_rows, multiply_by_rows};
+const symmetric_update avx2_symmetric_update = {"avx2", add_products, multiply_rows, mix_rows, multiply_by_rows};
 
 }  // namespace tendonfmu::estimation
 

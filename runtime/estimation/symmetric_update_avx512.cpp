@@ -11,19 +11,19 @@ namespace tendonfmu::estimation {
 namespace {
 
 /* 24 sums and 3 factors of 32 registers */
-constexpr std::size_t LANES = 8, VECTORS = 3, COLUMNS = 8;
-using Vector = __m512d;
+constexpr std::size_t lanes = 8, tile_vectors = 3, tile_columns = 8;
+using lane_vector = __m512d;
 
-inline __attribute__((always_inline)) Vector load(const double* from) {
+inline __attribute__((always_inline)) lane_vector load(const double* from) {
   return _mm512_loadu_pd(from);
 }
-inline __attribute__((always_inline)) void store(double* to, Vector v) {
+inline __attribute__((always_inline)) void store(double* to, lane_vector v) {
   _mm512_storeu_pd(to, v);
 }
-inline __attribute__((always_inline)) Vector spread(double x) {
+inline __attribute__((always_inline)) lane_vector spread(double x) {
   return _mm512_set1_pd(x);
 }
-inline __attribute__((always_inline)) Vector multiply_add(Vector a, Vector b, Vector c) {
+inline __attribute__((always_inline)) lane_vector multiply_add(lane_vector a, lane_vector b, lane_vector c) {
   return _mm512_fmadd_pd(a, b, c);
 }
 
@@ -34,7 +34,7 @@ inline __attribute__((always_inline)) Vector multiply_add(Vector a, Vector b, Ve
 
 namespace tendonfmu::estimation {
 
-const SymmetricUpdate avx512_symmetric_update = {"avx512", add_products, multiply_rows, mix_rows, multiply_by_rows};
+const symmetric_update avx512_symmetric_update = {"avx512", add_products, multiply_rows, mix_rows, multiply_by_rows};
 
 }  // namespace tendonfmu::estimation
 

@@ -6,41 +6,41 @@
 namespace tendonfmu::estimation {
 namespace {
 
-constexpr std::size_t LANES = 2, VECTORS = 2, COLUMNS = 4;
+constexpr std::size_t lanes = 2, tile_vectors = 2, tile_columns = 4;
 
 #if defined(__GNUC__)
-using Vector = double __attribute__((vector_size(16)));
+using lane_vector = double __attribute__((vector_size(16)));
 
-Vector load(const double* from) {
-  Vector v;
+lane_vector load(const double* from) {
+  lane_vector v;
   std::memcpy(&v, from, sizeof v);
   return v;
 }
-void store(double* to, Vector v) {
+void store(double* to, lane_vector v) {
   std::memcpy(to, &v, sizeof v);
 }
-Vector spread(double x) {
-  return Vector{x, x};
+lane_vector spread(double x) {
+  return lane_vector{x, x};
 }
-Vector multiply_add(Vector a, Vector b, Vector c) {
+lane_vector multiply_add(lane_vector a, lane_vector b, lane_vector c) {
   return a * b + c;
 }
 #else
-struct Vector {
+struct lane_vector {
   double low, high;
 };
 
-Vector load(const double* from) {
+lane_vector load(const double* from) {
   return {from[0], from[1]};
 }
-void store(double* to, Vector v) {
+void store(double* to, lane_vector v) {
   to[0] = v.low;
   to[1] = v.high;
 }
-Vector spread(double x) {
+lane_vector spread(double x) {
   return {x, x};
 }
-Vector multiply_add(Vector a, Vector b, Vector c) {
+lane_vector multiply_add(lane_vector a, lane_vector b, lane_vector c) {
   return {a.low * b.low + c.low, a.high * b.high + c.high};
 }
 #endif
@@ -52,6 +52,7 @@ Vector multiply_add(Vector a, Vector b, Vector c) {
 
 namespace tendonfmu::estimation {
 
-const SymmetricUpdate portable_symmetric_update = {"portable", add_products, multiply_rows, mix_rows, multiply_by_rows};
+const symmetric_update portable_symmetric_update = {"portable", add_products, multiply_rows, mix_rows,
+                                                    multiply_by_rows};
 
 }  // namespace tendonfmu::estimation

@@ -7,10 +7,9 @@
 #include <cstdio>
 #include <cstring>
 #include <limits>
-#include <new>
 
 #include "batch.h"
-#include "refusal.h"
+#include "c_interface.h"
 #include "sample_rows.h"
 
 using namespace tendonfmu::estimation;
@@ -18,45 +17,23 @@ using namespace tendonfmu::estimation;
 struct tendonfmu_estimator {
   tendonfmu_estimator(const void* image, std::size_t size, const std::int32_t* group, const double* scale)
       : problem(image, size, group, scale) {}
-  Problem problem;
+  fit_problem problem;
   mutable std::string error;
   /* of a finger that remembers_numbers(): the states of one recording at the unknowns last asked for */
   struct {
     std::size_t recording = 0;
     std::vector<double> z;
-    tendonfmu::estimation::SegmentStates states;
+    tendonfmu::estimation::segment_states states;
   } last;
 };
 
 namespace {
 
-constexpr const char* missing = "an argument is missing: NULL";
-
-tendonfmu_status fail(const tendonfmu_estimator* e, tendonfmu_status status, const std::string& reason) {
-  e->error = reason;
-  return status;
-}
-
-/* runs what may throw */
-template <typename Body>
-tendonfmu_status guarded(const tendonfmu_estimator* e, tendonfmu_status refusal, const Body& body) {
-  try {
-    body();
-    return TENDONFMU_OK;
-  } catch (const refused& reason) {
-    return fail(e, refusal, reason.what());
-  } catch (const std::bad_alloc&) {
-    return fail(e, refusal, "out of memory");
-  } catch (const std::exception& reason) {
-    return fail(e, refusal, reason.what());
-  }
-}
-
 /* unknowns within their boxes, a rounding aside */
-std::vector<double> checked(const Problem& problem, const double* z) {
+std::vector<double> checked(const fit_problem& problem, const double* z) {
   std::vector<double> values(z, z + problem.unknowns.count());
   for (std::size_t k = 0; k < values.size(); ++k) {
-    const Unknown& u = problem.unknowns[k];
+    const unknown_item& u = problem.unknowns[k];
     const double slack = 1e-9 * u.scale;
     if (!(values[k] >= u.lower - slack && values[k] <= u.upper + slack)) {
       char text[200];
@@ -69,9 +46,9 @@ std::vector<double> checked(const Problem& problem, const double* z) {
   return values;
 }
 
-const SegmentStates& states_at(tendonfmu_estimator* estimator, std::size_t recording, const std::vector<double>& z,
-                               const std::vector<double>& numbers, FreeFinger* finger, SampleRows* rows) {
-  const Recording& r = estimator->problem.recordings[recording];
+const segment_states& states_at(tendonfmu_estimator* estimator, std::size_t recording, const std::vector<double>& z,
+                                const std::vector<double>& numbers, free_finger* finger, sample_rows* rows) {
+  const recording_track& r = estimator->problem.recordings[recording];
   if (!remembers_numbers(finger->get())) {
     return r.states();
   }
@@ -85,7 +62,7 @@ const SegmentStates& states_at(tendonfmu_estimator* estimator, std::size_t recor
   return last.states;
 }
 
-void known_recording(const Problem& problem, std::size_t recording) {
+void known_recording(const fit_problem& problem, std::size_t recording) {
   if (recording >= problem.recordings.size()) {
     throw refused("recording " + std::to_string(recording) + ": expected below " +
                   std::to_string(problem.recordings.size()));
@@ -110,10 +87,10 @@ Eigen::MatrixXd checked_information(const double* information, Eigen::Index u) {
 /* the finger over the samples of a recording from `first` on, with a call after each */
 template <typename Body>
 void replay(tendonfmu_estimator* estimator, std::size_t recording, const std::vector<double>& z, std::size_t first,
-            std::size_t count, FreeFinger* finger, SampleRows* rows, const Body& body) {
-  const Problem& problem = estimator->problem;
+            std::size_t count, free_finger* finger, sample_rows* rows, const Body& body) {
+  const fit_problem& problem = estimator->problem;
   known_recording(problem, recording);
-  const Recording& r = problem.recordings[recording];
+  const recording_track& r = problem.recordings[recording];
   if (first > r.samples() || count > r.samples() - first) {
     throw refused("samples up to " + std::to_string(first + count) + ": expected at most " +
                   std::to_string(r.samples()));
@@ -123,7 +100,7 @@ void replay(tendonfmu_estimator* estimator, std::size_t recording, const std::ve
   }
   const std::size_t segment = first / r.segment_length();
   const std::vector<double> numbers = problem.unknowns.write(z.data());
-  const SegmentState& state = states_at(estimator, recording, z, numbers, finger, rows)[segment];
+  const segment_state& state = states_at(estimator, recording, z, numbers, finger, rows)[segment];
   finger->resume(state.finger, numbers);
   rows->resume(state.entries);
   for (std::size_t k = segment * r.segment_length(); k < first + count; ++k) {
@@ -143,7 +120,7 @@ void put(double* to, std::size_t at, double value) {
 }
 
 /* the scalar bias filter of one joint */
-struct BiasFilter {
+struct bias_filter {
   double bias = 0.0;
   bool started = false;
 
@@ -165,24 +142,8 @@ extern "C" {
 
 tendonfmu_estimator* tendonfmu_estimator_create(const void* image, size_t image_size, const int32_t* group,
                                                 const double* scale, char* message, size_t message_size) {
-  const auto say = [message, message_size](const char* line) {
-    if (message && message_size) {
-      std::snprintf(message, message_size, "%s", line);
-    }
-  };
-  say("");
-  if (!image) {
-    say(missing);
-    return nullptr;
-  }
-  try {
-    return new tendonfmu_estimator(image, image_size, group, scale);
-  } catch (const std::bad_alloc&) {
-    say("out of memory");
-  } catch (const std::exception& reason) {
-    say(reason.what());
-  }
-  return nullptr;
+  return created(image, message, message_size,
+                 [&] { return new tendonfmu_estimator(image, image_size, group, scale); });
 }
 
 void tendonfmu_estimator_destroy(tendonfmu_estimator* estimator) {
@@ -209,30 +170,14 @@ size_t tendonfmu_estimator_unknown_count(const tendonfmu_estimator* estimator) {
 tendonfmu_status tendonfmu_estimator_get_unknown(const tendonfmu_estimator* estimator, size_t index,
                                                  tendonfmu_unknown* unknown) {
   if (!estimator || !unknown) {
-    return estimator ? fail(estimator, TENDONFMU_BAD_ARGUMENT, missing) : TENDONFMU_BAD_ARGUMENT;
+    return fail(estimator, TENDONFMU_BAD_ARGUMENT, missing);
   }
-  if (index >= estimator->problem.unknowns.count()) {
-    return fail(
-        estimator, TENDONFMU_BAD_ARGUMENT,
-        "unknown " + std::to_string(index) + ": expected below " + std::to_string(estimator->problem.unknowns.count()));
-  }
-  static const tendonfmu_role roles[] = {TENDONFMU_COULOMB, TENDONFMU_DROP, TENDONFMU_RATE, TENDONFMU_VISCOUS,
-                                         TENDONFMU_VALUE};
-  const Unknown& u = estimator->problem.unknowns[index];
-  *unknown = {roles[static_cast<int>(u.role)],
-              u.start,
-              u.lower,
-              u.upper,
-              u.scale,
-              u.parameters.size(),
-              u.parameters.data(),
-              u.path.c_str()};
-  return TENDONFMU_OK;
+  return describe_unknown(estimator, estimator->problem.unknowns, index, unknown);
 }
 
 tendonfmu_status tendonfmu_estimator_get_values(const tendonfmu_estimator* estimator, const double* z, double* values) {
   if (!estimator || !z || !values) {
-    return estimator ? fail(estimator, TENDONFMU_BAD_ARGUMENT, missing) : TENDONFMU_BAD_ARGUMENT;
+    return fail(estimator, TENDONFMU_BAD_ARGUMENT, missing);
   }
   return guarded(estimator, TENDONFMU_BAD_PARAMETER, [&] {
     const std::vector<double> numbers = estimator->problem.unknowns.write(checked(estimator->problem, z).data());
@@ -243,7 +188,7 @@ tendonfmu_status tendonfmu_estimator_get_values(const tendonfmu_estimator* estim
 tendonfmu_status tendonfmu_estimator_get_unknowns(const tendonfmu_estimator* estimator, const double* values,
                                                   double* z) {
   if (!estimator || !z || !values) {
-    return estimator ? fail(estimator, TENDONFMU_BAD_ARGUMENT, missing) : TENDONFMU_BAD_ARGUMENT;
+    return fail(estimator, TENDONFMU_BAD_ARGUMENT, missing);
   }
   return guarded(estimator, TENDONFMU_BAD_PARAMETER, [&] {
     const std::vector<double> unknowns = estimator->problem.unknowns.read(values);
@@ -256,12 +201,12 @@ tendonfmu_status tendonfmu_estimator_add_recording(tendonfmu_estimator* estimato
                                                    const double* external_torque, const unsigned char* use,
                                                    size_t* index) {
   if (!estimator || !time || !inputs) {
-    return estimator ? fail(estimator, TENDONFMU_BAD_ARGUMENT, missing) : TENDONFMU_BAD_ARGUMENT;
+    return fail(estimator, TENDONFMU_BAD_ARGUMENT, missing);
   }
   return guarded(estimator, TENDONFMU_BAD_SAMPLE, [&] {
-    Problem& problem = estimator->problem;
+    fit_problem& problem = estimator->problem;
     problem.recordings.emplace_back(&problem.finger,
-                                    RecordingArrays{samples, time, *inputs, external_torque, use, kinematics_source});
+                                    recording_arrays{samples, time, *inputs, external_torque, use, kinematics_source});
     if (index) {
       *index = problem.recordings.size() - 1;
     }
@@ -271,7 +216,7 @@ tendonfmu_status tendonfmu_estimator_add_recording(tendonfmu_estimator* estimato
 tendonfmu_status tendonfmu_estimator_set_weights(tendonfmu_estimator* estimator, size_t recording,
                                                  const double* weight) {
   if (!estimator || !weight) {
-    return estimator ? fail(estimator, TENDONFMU_BAD_ARGUMENT, missing) : TENDONFMU_BAD_ARGUMENT;
+    return fail(estimator, TENDONFMU_BAD_ARGUMENT, missing);
   }
   return guarded(estimator, TENDONFMU_BAD_ARGUMENT, [&] {
     known_recording(estimator->problem, recording);
@@ -292,11 +237,11 @@ tendonfmu_status tendonfmu_estimator_set_known(tendonfmu_estimator* estimator, c
 tendonfmu_status tendonfmu_estimator_evaluate(tendonfmu_estimator* estimator, const double* z, size_t stride,
                                               unsigned threads, double* cost, double* gradient, double* information) {
   if (!estimator || !z) {
-    return estimator ? fail(estimator, TENDONFMU_BAD_ARGUMENT, missing) : TENDONFMU_BAD_ARGUMENT;
+    return fail(estimator, TENDONFMU_BAD_ARGUMENT, missing);
   }
   return guarded(estimator, TENDONFMU_BAD_ARGUMENT, [&] {
     const std::size_t every = std::max<std::size_t>(stride, 1);
-    const Evaluation found = evaluate(estimator->problem, checked(estimator->problem, z), {every, threads}, {});
+    const cost_evaluation found = evaluate(estimator->problem, checked(estimator->problem, z), {every, threads}, {});
     put(cost, 0, found.cost);
     if (gradient) {
       std::copy_n(found.gradient.data(), found.gradient.size(), gradient);
@@ -311,16 +256,16 @@ tendonfmu_status tendonfmu_estimator_jacobian(tendonfmu_estimator* estimator, si
                                               size_t first, size_t count, double* torque, double* jump,
                                               double* torque_derivative, double* jump_derivative) {
   if (!estimator || !z) {
-    return estimator ? fail(estimator, TENDONFMU_BAD_ARGUMENT, missing) : TENDONFMU_BAD_ARGUMENT;
+    return fail(estimator, TENDONFMU_BAD_ARGUMENT, missing);
   }
   return guarded(estimator, TENDONFMU_BAD_ARGUMENT, [&] {
-    const Problem& problem = estimator->problem;
+    const fit_problem& problem = estimator->problem;
     const std::size_t n = problem.joints(), row = n * problem.unknowns.count();
-    FreeFinger finger(problem.image.data(), problem.image.size());
-    SampleRows rows(problem.unknowns, finger.get());
+    free_finger finger(problem.image.data(), problem.image.size());
+    sample_rows rows(problem.unknowns, finger.get());
     std::vector<double> by_torque(row), by_jump(row);
     replay(estimator, recording, checked(problem, z), first, count, &finger, &rows,
-           [&](const Recording&, std::size_t k) {
+           [&](const recording_track&, std::size_t k) {
              rows.read();
              rows.dense(by_torque.data(), by_jump.data());
              for (std::size_t j = 0; j < n; ++j) {
@@ -340,20 +285,20 @@ tendonfmu_status tendonfmu_estimator_jacobian(tendonfmu_estimator* estimator, si
 tendonfmu_status tendonfmu_estimator_innovations(tendonfmu_estimator* estimator, size_t recording, const double* z,
                                                  double* innovation, double* variance, double* bias) {
   if (!estimator || !z) {
-    return estimator ? fail(estimator, TENDONFMU_BAD_ARGUMENT, missing) : TENDONFMU_BAD_ARGUMENT;
+    return fail(estimator, TENDONFMU_BAD_ARGUMENT, missing);
   }
   return guarded(estimator, TENDONFMU_BAD_ARGUMENT, [&] {
-    const Problem& problem = estimator->problem;
+    const fit_problem& problem = estimator->problem;
     const std::vector<double> unknowns = checked(problem, z);
     const derived_numbers& derived = problem.finger.get()->derived;
     const std::size_t n = problem.joints(),
                       samples = recording < problem.recordings.size() ? problem.recordings[recording].samples() : 0;
-    FreeFinger finger(problem.image.data(), problem.image.size());
-    SampleRows rows(problem.unknowns, finger.get());
-    std::vector<BiasFilter> filters(n);
+    free_finger finger(problem.image.data(), problem.image.size());
+    sample_rows rows(problem.unknowns, finger.get());
+    std::vector<bias_filter> filters(n);
     std::vector<double> gain, weight;
     if (samples > 0) {
-      BiasGains gains(problem.recordings[recording], derived.settings, 1);
+      bias_gains gains(problem.recordings[recording], derived.settings, 1);
       gain = std::move(gains.gain);
       weight = std::move(gains.weight);
     }
@@ -362,7 +307,7 @@ tendonfmu_status tendonfmu_estimator_innovations(tendonfmu_estimator* estimator,
       filters[j] = {column < 0 ? derived.initial_torque[j] : unknowns[static_cast<std::size_t>(column)], true};
     }
     const double nan = std::numeric_limits<double>::quiet_NaN();
-    replay(estimator, recording, unknowns, 0, samples, &finger, &rows, [&](const Recording& r, std::size_t k) {
+    replay(estimator, recording, unknowns, 0, samples, &finger, &rows, [&](const recording_track& r, std::size_t k) {
       const finger_scratch& s = finger.get()->scratch;
       const bool starts = gain[k] == 1.0 && weight[k] == 0.0;
       for (std::size_t j = 0; j < n; ++j) {
@@ -377,7 +322,7 @@ tendonfmu_status tendonfmu_estimator_innovations(tendonfmu_estimator* estimator,
 }
 
 tendonfmu_fit_options tendonfmu_default_fit_options(void) {
-  const BatchOptions options;
+  const batch_options options;
   return {options.prior_std, options.tolerance, options.most_passes, options.stride, options.threads};
 }
 
@@ -385,10 +330,10 @@ tendonfmu_status tendonfmu_estimator_fit(tendonfmu_estimator* estimator, const d
                                          const tendonfmu_fit_options* options, tendonfmu_fit_watch watch, void* context,
                                          tendonfmu_fit_result* result) {
   if (!estimator || !options || !result || !result->z) {
-    return estimator ? fail(estimator, TENDONFMU_BAD_ARGUMENT, missing) : TENDONFMU_BAD_ARGUMENT;
+    return fail(estimator, TENDONFMU_BAD_ARGUMENT, missing);
   }
   return guarded(estimator, TENDONFMU_BAD_ARGUMENT, [&] {
-    const Problem& problem = estimator->problem;
+    const fit_problem& problem = estimator->problem;
     std::vector<double> begin;
     for (std::size_t k = 0; k < problem.unknowns.count(); ++k) {
       begin.push_back(start ? start[k] : problem.unknowns[k].start);
@@ -397,14 +342,14 @@ tendonfmu_status tendonfmu_estimator_fit(tendonfmu_estimator* estimator, const d
                       ") = nan: expected a finite number");
       }
     }
-    BatchWatch look;
+    batch_watch look;
     if (watch) {
-      look = [watch, context](const BatchProgress& p) {
+      look = [watch, context](const batch_progress& p) {
         const tendonfmu_fit_progress progress = {p.pass, p.stride, p.samples_done, p.samples, p.cost, p.best->data()};
         return watch(context, &progress) != 0;
       };
     }
-    const BatchResult found = fit_batch(
+    const batch_result found = fit_batch(
         problem, begin,
         {options->prior_std, options->tolerance, options->most_passes, options->stride, options->threads}, look);
     std::copy(found.z.begin(), found.z.end(), result->z);

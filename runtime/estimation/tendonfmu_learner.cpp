@@ -1,72 +1,32 @@
 /* The C interface of the learner, tendonfmu_learner.h. */
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
-#include <new>
-#include <string>
 
+#include "c_interface.h"
 #include "learner.h"
-#include "refusal.h"
-#include "tendonfmu_estimation.h"
 
 using namespace tendonfmu::estimation;
 
 struct tendonfmu_learner {
   tendonfmu_learner(const void* image, std::size_t size, const std::int32_t* group, const double* scale,
-                    const LearnerOptions& options)
+                    const learner_options& options)
       : learner(image, size, group, scale, options) {}
-  Learner learner;
+  finger_learner learner;
   mutable std::string error;
 };
 
 namespace {
 
-constexpr const char* missing = "an argument is missing: NULL";
 constexpr std::size_t rows_between_looks = 1000;
-
-tendonfmu_status fail(const tendonfmu_learner* l, tendonfmu_status status, const std::string& reason) {
-  if (l) {
-    l->error = reason;
-  }
-  return status;
-}
-
-/* runs what may throw */
-template <typename Body>
-tendonfmu_status guarded(const tendonfmu_learner* l, const Body& body) {
-  try {
-    body();
-    return TENDONFMU_OK;
-  } catch (const refused& reason) {
-    return fail(l, TENDONFMU_BAD_SAMPLE, reason.what());
-  } catch (const std::bad_alloc&) {
-    return fail(l, TENDONFMU_BAD_ARGUMENT, "out of memory");
-  } catch (const std::exception& reason) {
-    return fail(l, TENDONFMU_BAD_ARGUMENT, reason.what());
-  }
-}
-
-tendonfmu_unknown described(const Unknown& u) {
-  static const tendonfmu_role roles[] = {TENDONFMU_COULOMB, TENDONFMU_DROP, TENDONFMU_RATE, TENDONFMU_VISCOUS,
-                                         TENDONFMU_VALUE};
-  return {roles[static_cast<int>(u.role)],
-          u.start,
-          u.lower,
-          u.upper,
-          u.scale,
-          u.parameters.size(),
-          u.parameters.data(),
-          u.path.c_str()};
-}
 
 bool is_source(int kinematics_source) {
   return kinematics_source >= TENDONFMU_TENDON_POSITIONS && kinematics_source <= TENDONFMU_JOINT_VELOCITIES;
 }
 
 /* Arrays of a recording, and where its innovations go. */
-struct Run {
-  Learner& learner;
+struct learner_run {
+  finger_learner& learner;
   std::size_t samples;
   const double* time;
   const tendonfmu_inputs& inputs;
@@ -75,7 +35,7 @@ struct Run {
   const unsigned char* use;
   double *innovation, *variance;
 
-  LearnerSample sample(std::size_t row) const {
+  learner_sample sample(std::size_t row) const {
     const std::size_t n = learner.finger()->joints, m = learner.finger()->tendons;
     const auto at = [row](const double* values, std::size_t width) { return values ? values + row * width : nullptr; };
     return {time[row],
@@ -102,7 +62,7 @@ struct Run {
 
   /* of the block that ends before row `end` */
   void copy_innovations(std::size_t end) const {
-    const KalmanFilter& filter = learner.filter();
+    const kalman_filter& filter = learner.filter();
     const std::size_t n = learner.finger()->joints, first = (end - filter.updated()) * n;
     if (innovation) {
       std::copy_n(filter.innovation(), filter.updated() * n, innovation + first);
@@ -125,35 +85,20 @@ struct Run {
 extern "C" {
 
 tendonfmu_learner_options tendonfmu_default_learner_options(void) {
-  const LearnerOptions options;
+  const learner_options options;
   return {options.prior_std, options.block, options.parameter_drift};
 }
 
 tendonfmu_learner* tendonfmu_learner_create(const void* image, size_t image_size, const int32_t* group,
                                             const double* scale, const tendonfmu_learner_options* options,
                                             char* message, size_t message_size) {
-  const auto say = [message, message_size](const char* line) {
-    if (message && message_size) {
-      std::snprintf(message, message_size, "%s", line);
-    }
-  };
-  say("");
-  if (!image) {
-    say(missing);
-    return nullptr;
-  }
-  try {
-    LearnerOptions wanted;
+  return created(image, message, message_size, [&] {
+    learner_options wanted;
     if (options) {
       wanted = {options->prior_std, options->block, options->parameter_drift};
     }
     return new tendonfmu_learner(image, image_size, group, scale, wanted);
-  } catch (const std::bad_alloc&) {
-    say("out of memory");
-  } catch (const std::exception& reason) {
-    say(reason.what());
-  }
-  return nullptr;
+  });
 }
 
 void tendonfmu_learner_destroy(tendonfmu_learner* learner) {
@@ -182,13 +127,7 @@ tendonfmu_status tendonfmu_learner_get_unknown(const tendonfmu_learner* learner,
   if (!learner || !unknown) {
     return fail(learner, TENDONFMU_BAD_ARGUMENT, missing);
   }
-  const Unknowns& all = learner->learner.unknowns();
-  if (index >= all.count()) {
-    return fail(learner, TENDONFMU_BAD_ARGUMENT,
-                "unknown " + std::to_string(index) + ": expected below " + std::to_string(all.count()));
-  }
-  *unknown = described(all[index]);
-  return TENDONFMU_OK;
+  return describe_unknown(learner, learner->learner.unknowns(), index, unknown);
 }
 
 tendonfmu_status tendonfmu_learner_initialise(tendonfmu_learner* learner, double time, const tendonfmu_inputs* inputs,
@@ -196,7 +135,7 @@ tendonfmu_status tendonfmu_learner_initialise(tendonfmu_learner* learner, double
   if (!learner || !inputs || !is_source(kinematics_source)) {
     return fail(learner, TENDONFMU_BAD_ARGUMENT, inputs ? "kinematics_source: expected 1, 2 or 3" : missing);
   }
-  return guarded(learner, [&] {
+  return guarded(learner, TENDONFMU_BAD_SAMPLE, TENDONFMU_BAD_ARGUMENT, [&] {
     learner->learner.initialise({time, *inputs, external_torque, use != 0}, kinematics_source);
   });
 }
@@ -209,21 +148,23 @@ tendonfmu_status tendonfmu_learner_step(tendonfmu_learner* learner, double time,
   if (!learner->learner.initialised()) {
     return fail(learner, TENDONFMU_WRONG_ORDER, "a step before the first sample: expected initialise first");
   }
-  return guarded(learner, [&] { learner->learner.step({time, *inputs, external_torque, use != 0}); });
+  return guarded(learner, TENDONFMU_BAD_SAMPLE, TENDONFMU_BAD_ARGUMENT, [&] {
+    learner->learner.step({time, *inputs, external_torque, use != 0});
+  });
 }
 
 tendonfmu_status tendonfmu_learner_finish(tendonfmu_learner* learner) {
   if (!learner) {
     return TENDONFMU_BAD_ARGUMENT;
   }
-  return guarded(learner, [&] { learner->learner.finish(); });
+  return guarded(learner, TENDONFMU_BAD_SAMPLE, TENDONFMU_BAD_ARGUMENT, [&] { learner->learner.finish(); });
 }
 
 tendonfmu_status tendonfmu_learner_begin_pass(tendonfmu_learner* learner) {
   if (!learner) {
     return TENDONFMU_BAD_ARGUMENT;
   }
-  return guarded(learner, [&] { learner->learner.begin_pass(); });
+  return guarded(learner, TENDONFMU_BAD_SAMPLE, TENDONFMU_BAD_ARGUMENT, [&] { learner->learner.begin_pass(); });
 }
 
 tendonfmu_status tendonfmu_learner_run(tendonfmu_learner* learner, size_t samples, const double* time,
@@ -235,12 +176,13 @@ tendonfmu_status tendonfmu_learner_run(tendonfmu_learner* learner, size_t sample
   if (!learner || !time || !inputs || !is_source(kinematics_source)) {
     status = fail(learner, TENDONFMU_BAD_ARGUMENT, time && inputs ? "kinematics_source: expected 1, 2 or 3" : missing);
   } else {
-    Run run{learner->learner, samples, time, *inputs, kinematics_source, external_torque, use, innovation, variance};
+    learner_run run{learner->learner, samples, time,       *inputs, kinematics_source,
+                    external_torque,  use,     innovation, variance};
     for (double* rows : {innovation, variance}) {
       std::fill_n(rows, rows ? samples * learner->learner.finger()->joints : 0,
                   std::numeric_limits<double>::quiet_NaN());
     }
-    status = guarded(learner, [&] {
+    status = guarded(learner, TENDONFMU_BAD_SAMPLE, TENDONFMU_BAD_ARGUMENT, [&] {
       if (samples < 2) {
         throw refused(std::to_string(samples) + " samples: expected at least 2");
       }
@@ -291,7 +233,7 @@ tendonfmu_status tendonfmu_learner_get_bias(const tendonfmu_learner* learner, do
   if (!learner->learner.initialised() || !learner->learner.bias_started()) {
     return fail(learner, TENDONFMU_WRONG_ORDER, "no bias before the first sample that is used");
   }
-  const KalmanFilter& filter = learner->learner.filter();
+  const kalman_filter& filter = learner->learner.filter();
   for (std::size_t j = 0; j < learner->learner.finger()->joints; ++j) {
     if (bias) {
       bias[j] = filter.bias()[j];
@@ -308,7 +250,7 @@ tendonfmu_status tendonfmu_learner_get_innovations(const tendonfmu_learner* lear
   if (!learner) {
     return TENDONFMU_BAD_ARGUMENT;
   }
-  const KalmanFilter& filter = learner->learner.filter();
+  const kalman_filter& filter = learner->learner.filter();
   const std::size_t count = filter.updated() * learner->learner.finger()->joints;
   if (samples) {
     *samples = filter.updated();

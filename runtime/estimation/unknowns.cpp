@@ -17,23 +17,23 @@ constexpr double threshold_share =
     0.2; /* vs_min of v_min: below, nothing is left of the Stribeck effect where it moves */
 
 /* A number that can be estimated. */
-struct Candidate {
+struct column_candidate {
   std::uint32_t parameter;
-  Role role;
+  unknown_role role;
   model_item_kind kind;
   std::size_t joint;
 };
 
-struct Structure {
+struct finger_structure {
   const tendonfmu_finger* finger;
-  std::vector<Candidate> candidates;  /* in canonical order */
-  std::vector<std::uint32_t> statics; /* of every side */
-  std::vector<double> threshold;      /* v_min of every side */
+  std::vector<column_candidate> candidates; /* in canonical order */
+  std::vector<std::uint32_t> statics;       /* of every side */
+  std::vector<double> threshold;            /* v_min of every side */
   std::int64_t initial_first = -1;
 };
 
-void add_side(Structure* s, const model_item* item, std::uint32_t first, double threshold) {
-  const Role roles[] = {Role::drop, Role::coulomb, Role::rate, Role::viscous};
+void add_side(finger_structure* s, const model_item* item, std::uint32_t first, double threshold) {
+  const unknown_role roles[] = {unknown_role::drop, unknown_role::coulomb, unknown_role::rate, unknown_role::viscous};
   for (std::uint32_t k = 0; k < 4; ++k) {
     s->candidates.push_back({first + k, roles[k], item->kind, item->joint});
   }
@@ -42,7 +42,7 @@ void add_side(Structure* s, const model_item* item, std::uint32_t first, double 
 }
 
 int add_item(void* context, const model_item* item) {
-  auto* s = static_cast<Structure*>(context);
+  auto* s = static_cast<finger_structure*>(context);
   const finger_settings& settings = s->finger->derived.settings;
   switch (item->kind) {
     case ITEM_JOINT_FRICTION:
@@ -57,13 +57,13 @@ int add_item(void* context, const model_item* item) {
     case ITEM_INITIAL_TORQUE:
       s->initial_first = item->first;
       for (std::uint32_t k = 0; k < item->count; ++k) {
-        s->candidates.push_back({item->first + k, Role::value, item->kind, k});
+        s->candidates.push_back({item->first + k, unknown_role::value, item->kind, k});
       }
       break;
     case ITEM_COVER:
     case ITEM_EXTENSION:
       for (std::uint32_t k = 0; k < item->count; ++k) {
-        s->candidates.push_back({item->first + k, Role::value, item->kind, item->joint});
+        s->candidates.push_back({item->first + k, unknown_role::value, item->kind, item->joint});
       }
       break;
     default: break;
@@ -85,25 +85,26 @@ double scale_of(const model_item& item, std::uint32_t parameter) {
 }
 
 /* a number of an extension that is a property of the mechanism, not 0 where nobody says it */
-bool left_out(const Structure& s, std::uint32_t parameter) {
+bool left_out(const finger_structure& s, std::uint32_t parameter) {
   const model_item item = parameter_item(&s.finger->shape, parameter);
   const double missing = item.effect->parameters[parameter - item.first].missing_value;
   return missing != 0.0 && s.finger->start[parameter] == missing;
 }
 
 /* what is present is estimated, what is absent stays absent */
-std::vector<std::int32_t> present_groups(const Structure& s) {
+std::vector<std::int32_t> present_groups(const finger_structure& s) {
   const double* value = s.finger->start;
   std::vector<std::int32_t> group(s.finger->shape.parameter_count, -1);
-  for (const Candidate& c : s.candidates) {
+  for (const column_candidate& c : s.candidates) {
     const auto p = static_cast<std::int32_t>(c.parameter);
     const bool rest_angle =
         c.kind == ITEM_COVER && parameter_item(&s.finger->shape, c.parameter).first + 1 == c.parameter;
     const bool always = (c.kind == ITEM_EXTENSION && !left_out(s, c.parameter)) || c.kind == ITEM_INITIAL_TORQUE ||
-                        c.role == Role::coulomb;
-    const std::uint32_t first = c.parameter - (c.role == Role::rate ? 2 : 0);
-    const bool stribeck = (c.role == Role::rate || c.role == Role::drop) && value[first] != value[first + 1];
-    const bool other = c.role == Role::viscous || c.kind == ITEM_COVER;
+                        c.role == unknown_role::coulomb;
+    const std::uint32_t first = c.parameter - (c.role == unknown_role::rate ? 2 : 0);
+    const bool stribeck =
+        (c.role == unknown_role::rate || c.role == unknown_role::drop) && value[first] != value[first + 1];
+    const bool other = c.role == unknown_role::viscous || c.kind == ITEM_COVER;
     if (!rest_angle && (always || stribeck || (other && value[c.parameter] != 0.0))) {
       group[c.parameter] = p;
     }
@@ -117,21 +118,21 @@ std::vector<std::int32_t> present_groups(const Structure& s) {
 }
 
 /* value of an unknown, from the numbers of the description */
-double value_of(Role role, std::uint32_t parameter, const double* numbers) {
+double value_of(unknown_role role, std::uint32_t parameter, const double* numbers) {
   switch (role) {
-    case Role::drop: return numbers[parameter] - numbers[parameter + 1];
-    case Role::rate: return 1.0 / numbers[parameter];
+    case unknown_role::drop: return numbers[parameter] - numbers[parameter + 1];
+    case unknown_role::rate: return 1.0 / numbers[parameter];
     default: return numbers[parameter];
   }
 }
 
 /* Columns in the making. */
-class Columns {
+class column_maker {
  public:
-  Columns(const Structure& structure, const std::int32_t* group, const double* scale)
+  column_maker(const finger_structure& structure, const std::int32_t* group, const double* scale)
       : s_(structure), group_(group), scale_(scale), column_(structure.finger->shape.parameter_count, -1) {
     check_groups();
-    for (const Candidate& c : s_.candidates) {
+    for (const column_candidate& c : s_.candidates) {
       if (group[c.parameter] >= 0 && !follows_coulomb(c)) {
         add(c);
       }
@@ -147,12 +148,12 @@ class Columns {
     return group_[first + 1] >= 0 && (group_[first] == group_[first + 1] || (group_[first] < 0 && equal(first)));
   }
 
-  std::vector<Unknown> list;
+  std::vector<unknown_item> list;
 
  private:
   void check_groups() const {
     std::vector<bool> known(column_.size(), false);
-    for (const Candidate& c : s_.candidates) {
+    for (const column_candidate& c : s_.candidates) {
       known[c.parameter] = true;
     }
     for (std::uint32_t p = 0; p < column_.size(); ++p) {
@@ -167,15 +168,15 @@ class Columns {
   bool equal(std::uint32_t first) const { return s_.finger->start[first] == s_.finger->start[first + 1]; }
 
   /* the static friction of a law without Stribeck effect */
-  bool follows_coulomb(const Candidate& c) const { return c.role == Role::drop && tied(c.parameter); }
+  bool follows_coulomb(const column_candidate& c) const { return c.role == unknown_role::drop && tied(c.parameter); }
 
-  void add(const Candidate& c) {
+  void add(const column_candidate& c) {
     const auto [place, is_new] = by_group_.try_emplace(group_[c.parameter], list.size());
     if (is_new) {
       list.push_back({c.role, {}, 0.0, 0.0, 0.0, 0.0, c.joint, path_of(s_.finger, c.parameter), false});
       kinds_.push_back(c.kind);
     }
-    Unknown& unknown = list[place->second];
+    unknown_item& unknown = list[place->second];
     if (unknown.role != c.role) {
       throw refused(path_of(s_.finger, c.parameter) + ": shares its value with " + unknown.path +
                     "; expected numbers of the same kind");
@@ -186,7 +187,7 @@ class Columns {
   }
 
   /* start, bounds and scale of a column, from all that it moves */
-  void finish(Unknown* unknown, std::size_t column) {
+  void finish(unknown_item* unknown, std::size_t column) {
     const double* start = s_.finger->start;
     const double count = static_cast<double>(unknown->parameters.size());
     double scale = 0.0;
@@ -195,7 +196,7 @@ class Columns {
       scale += expected(unknown->role, p) / count;
       const model_item item = parameter_item(&s_.finger->shape, p);
       /* torques are linear in their numbers; what turns friction or the signals is not */
-      unknown->curved = unknown->curved || unknown->role == Role::rate ||
+      unknown->curved = unknown->curved || unknown->role == unknown_role::rate ||
                         (item.kind == ITEM_EXTENSION && item.effect->kind != EFFECT_TORQUE);
     }
     unknown->scale = scale > 0.0 ? scale : neighbours_scale(column);
@@ -205,12 +206,12 @@ class Columns {
 
   double given(std::uint32_t p) const { return scale_ && std::isfinite(scale_[p]) ? std::fabs(scale_[p]) : 0.0; }
 
-  double expected(Role role, std::uint32_t p) const {
+  double expected(unknown_role role, std::uint32_t p) const {
     if (given(p) > 0.0) {
-      if (role == Role::drop) {
+      if (role == unknown_role::drop) {
         return given(p + 1) < given(p) ? given(p) - given(p + 1) : given(p);
       }
-      return role == Role::rate ? 1.0 / given(p) : given(p);
+      return role == unknown_role::rate ? 1.0 / given(p) : given(p);
     }
     const double value = std::fabs(value_of(role, p, s_.finger->start));
     const model_item item = parameter_item(&s_.finger->shape, p);
@@ -236,10 +237,10 @@ class Columns {
     throw refused(list[column].path + " = 0: nothing says how large it may be; expected a scale, or a start above 0");
   }
 
-  void bound(Unknown* unknown) const {
+  void bound(unknown_item* unknown) const {
     unknown->lower = -std::numeric_limits<double>::infinity();
     unknown->upper = std::numeric_limits<double>::infinity();
-    if (unknown->role == Role::value) {
+    if (unknown->role == unknown_role::value) {
       for (const std::uint32_t p : unknown->parameters) {
         const model_item item = parameter_item(&s_.finger->shape, p);
         const parameter_range range = parameter_range_of(&item, p);
@@ -251,10 +252,10 @@ class Columns {
     }
     unknown->lower = smallest_share * unknown->scale;
     unknown->upper = 0.5e9; /* static = coulomb + drop <= 1e9, as parameters.c */
-    if (unknown->role == Role::rate) {
+    if (unknown->role == unknown_role::rate) {
       unknown->lower = slowest_share * unknown->scale;
       unknown->upper = fastest(*unknown);
-    } else if (unknown->role == Role::coulomb) {
+    } else if (unknown->role == unknown_role::coulomb) {
       for (const std::uint32_t p : unknown->parameters) {
         if (group_[p - 1] < 0 && !tied(p - 1)) { /* below a static friction that stays */
           unknown->upper = std::min(unknown->upper, s_.finger->start[p - 1]);
@@ -264,7 +265,7 @@ class Columns {
   }
 
   /* 1/vs_min */
-  double fastest(const Unknown& unknown) const {
+  double fastest(const unknown_item& unknown) const {
     double rate = unknown.scale / slowest_share;
     for (std::size_t k = 0; k < s_.statics.size(); ++k) {
       const bool among = std::count(unknown.parameters.begin(), unknown.parameters.end(), s_.statics[k] + 2) > 0;
@@ -281,7 +282,7 @@ class Columns {
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::stable_sort(order.begin(), order.end(),
                      [this](std::size_t a, std::size_t b) { return list[a].joint < list[b].joint; });
-    std::vector<Unknown> sorted;
+    std::vector<unknown_item> sorted;
     std::vector<std::int32_t> place(list.size());
     for (std::size_t k = 0; k < order.size(); ++k) {
       place[order[k]] = static_cast<std::int32_t>(k);
@@ -293,7 +294,7 @@ class Columns {
     }
   }
 
-  const Structure& s_;
+  const finger_structure& s_;
   const std::int32_t* group_;
   const double* scale_;
   std::vector<std::int32_t> column_;
@@ -303,13 +304,13 @@ class Columns {
 
 }  // namespace
 
-Unknowns::Unknowns(const tendonfmu_finger* finger, const std::int32_t* group, const double* scale) {
+unknown_list::unknown_list(const tendonfmu_finger* finger, const std::int32_t* group, const double* scale) {
   const std::size_t count = finger->shape.parameter_count;
-  Structure structure{finger, {}, {}, {}, -1};
+  finger_structure structure{finger, {}, {}, {}, -1};
   model_visit(&finger->shape, add_item, &structure);
   const std::vector<std::int32_t> present =
       group ? std::vector<std::int32_t>(group, group + count) : present_groups(structure);
-  Columns columns(structure, present.data(), scale);
+  column_maker columns(structure, present.data(), scale);
   list_ = std::move(columns.list);
   start_.assign(finger->start, finger->start + count);
   sides_.assign(count, {{-1, -1, -1, -1}, false, 0, 0, -1});
@@ -325,16 +326,16 @@ Unknowns::Unknowns(const tendonfmu_finger* finger, const std::int32_t* group, co
                      -1};
     find_run(first);
   }
-  for (const Candidate& c : structure.candidates) {
-    if (c.role == Role::value) {
+  for (const column_candidate& c : structure.candidates) {
+    if (c.role == unknown_role::value) {
       plain_[c.parameter] = columns.column(c.parameter);
     }
   }
 }
 
 /* whether the columns of a side follow each other and move nothing else */
-void Unknowns::find_run(std::uint32_t first) {
-  SideColumns& side = sides_[first];
+void unknown_list::find_run(std::uint32_t first) {
+  side_columns& side = sides_[first];
   std::vector<std::int32_t> columns;
   bool alone = true;
   for (const std::int32_t column : side.column) {
@@ -357,7 +358,7 @@ void Unknowns::find_run(std::uint32_t first) {
   }
 }
 
-std::vector<double> Unknowns::read(const double* parameters) const {
+std::vector<double> unknown_list::read(const double* parameters) const {
   std::vector<double> unknowns(count(), 0.0);
   for (std::size_t k = 0; k < count(); ++k) {
     for (const std::uint32_t p : list_[k].parameters) {
@@ -367,22 +368,22 @@ std::vector<double> Unknowns::read(const double* parameters) const {
   return unknowns;
 }
 
-std::vector<double> Unknowns::write(const double* unknowns) const {
+std::vector<double> unknown_list::write(const double* unknowns) const {
   std::vector<double> numbers(start_.size());
   write(unknowns, numbers.data());
   return numbers;
 }
 
-void Unknowns::write(const double* unknowns, double* numbers) const {
+void unknown_list::write(const double* unknowns, double* numbers) const {
   std::copy(start_.begin(), start_.end(), numbers);
   const auto at = [unknowns](std::int32_t column, double otherwise) {
     return column < 0 ? otherwise : unknowns[column];
   };
   for (std::uint32_t p = 0; p < start_.size(); ++p) {
-    const SideColumns& side = sides_[p];
+    const side_columns& side = sides_[p];
     if (plain_[p] >= 0) {
       /* scaling back and forth may round a number at its bound beyond it */
-      const Unknown& unknown = list_[static_cast<std::size_t>(plain_[p])];
+      const unknown_item& unknown = list_[static_cast<std::size_t>(plain_[p])];
       numbers[p] = std::clamp(unknowns[plain_[p]], unknown.lower, unknown.upper);
     }
     if (side.column[2] >= 0) {

@@ -12,8 +12,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using tendonfmu::estimation::block_length;
-using tendonfmu::estimation::JointSegment;
-using tendonfmu::estimation::JointSum;
+using tendonfmu::estimation::joint_segment;
+using tendonfmu::estimation::joint_sum;
 
 constexpr std::size_t run_first = 3, run_length = 3; /* columns that are always given together */
 
@@ -73,7 +73,7 @@ MatrixXd recursive(const std::vector<Sample>& samples, VectorXd* held) {
   return sum;
 }
 
-void give(const Sample& s, JointSum* joint) {
+void give(const Sample& s, joint_sum* joint) {
   const double *row = s.row.data() + run_first, *jump = s.jump.data() + run_first;
   for (Index c = 0; c < s.row.size(); ++c) {
     const bool of_run = c >= static_cast<Index>(run_first) && c < static_cast<Index>(run_first + run_length);
@@ -94,8 +94,8 @@ void give(const Sample& s, JointSum* joint) {
 }
 
 /* one segment; `blocks`: how long each may be */
-JointSegment summed(const std::vector<Sample>& samples, std::size_t first, std::size_t last, std::size_t blocks,
-                    JointSum* joint, MatrixXd* sum) {
+joint_segment summed(const std::vector<Sample>& samples, std::size_t first, std::size_t last, std::size_t blocks,
+                     joint_sum* joint, MatrixXd* sum) {
   joint->begin_segment();
   for (std::size_t k = first; k < last; ++k) {
     give(samples[k], joint);
@@ -107,7 +107,7 @@ JointSegment summed(const std::vector<Sample>& samples, std::size_t first, std::
 }
 
 /* what a segment adds if the bias holds s at its start: every ν is ν⁰ − c·s */
-void join(const JointSegment& part, VectorXd* held, MatrixXd* sum) {
+void join(const joint_segment& part, VectorXd* held, MatrixXd* sum) {
   const VectorXd s = *held;
   *sum += part.squares * s * s.transpose() - s * part.cross.transpose() - part.cross * s.transpose();
   *held = part.kept * s + part.held;
@@ -127,9 +127,9 @@ TEST(JointSum, IsTheFiltersAtAnyBlockBoundary) {
   VectorXd held = VectorXd::Zero(columns);
   const MatrixXd expected = recursive(samples, &held);
   for (const std::size_t blocks : {std::size_t{1}, std::size_t{7}, std::size_t{64}, block_length}) {
-    JointSum joint(columns);
+    joint_sum joint(columns);
     MatrixXd sum = MatrixXd::Zero(columns, columns);
-    const JointSegment end = summed(samples, 0, samples.size(), blocks, &joint, &sum);
+    const joint_segment end = summed(samples, 0, samples.size(), blocks, &joint, &sum);
     EXPECT_LT(difference(full(sum), expected), 1e-12) << "blocks of " << blocks;
     EXPECT_LT((end.held - held).norm() / held.norm(), 1e-12) << "blocks of " << blocks;
   }
@@ -141,9 +141,9 @@ TEST(JointSum, BiasMayStartAnywhereInABlock) {
     const std::vector<Sample> samples = made_samples(600, columns, start, 2 + static_cast<unsigned>(start));
     VectorXd held = VectorXd::Zero(columns);
     const MatrixXd expected = recursive(samples, &held);
-    JointSum joint(columns);
+    joint_sum joint(columns);
     MatrixXd sum = MatrixXd::Zero(columns, columns);
-    const JointSegment end = summed(samples, 0, samples.size(), block_length, &joint, &sum);
+    const joint_segment end = summed(samples, 0, samples.size(), block_length, &joint, &sum);
     EXPECT_LT(difference(full(sum), expected), 1e-12) << "start " << start;
     EXPECT_LT((end.held - held).norm() / held.norm(), 1e-12) << "start " << start;
     EXPECT_EQ(end.kept, 0.0) << "nothing from before the start counts";
@@ -156,12 +156,12 @@ TEST(JointSum, SegmentsJoinToTheWhole) {
   VectorXd expected_held = VectorXd::LinSpaced(columns, -0.4, 0.7); /* as with bias.initial_torque */
   VectorXd held = expected_held;
   const MatrixXd expected = recursive(samples, &expected_held);
-  JointSum joint(columns);
+  joint_sum joint(columns);
   MatrixXd total = MatrixXd::Zero(columns, columns);
   std::size_t first = 0;
   for (const std::size_t last : {std::size_t{1}, std::size_t{400}, std::size_t{777}, std::size_t{1500}}) {
     MatrixXd sum = MatrixXd::Zero(columns, columns);
-    const JointSegment part = summed(samples, first, last, 100, &joint, &sum);
+    const joint_segment part = summed(samples, first, last, 100, &joint, &sum);
     total += full(sum);
     join(part, &held, &total);
     first = last;
@@ -179,9 +179,9 @@ TEST(JointSum, BlocksWithoutAUsedSampleKeepTheJumps) {
   }
   VectorXd held = VectorXd::Zero(columns);
   const MatrixXd expected = recursive(samples, &held);
-  JointSum joint(columns);
+  joint_sum joint(columns);
   MatrixXd sum = MatrixXd::Zero(columns, columns);
-  const JointSegment end = summed(samples, 0, samples.size(), 64, &joint, &sum);
+  const joint_segment end = summed(samples, 0, samples.size(), 64, &joint, &sum);
   EXPECT_LT(difference(full(sum), expected), 1e-12);
   EXPECT_LT((end.held - held).norm() / held.norm(), 1e-12);
 }
@@ -190,16 +190,16 @@ TEST(JointSum, BlocksWithoutAUsedSampleKeepTheJumps) {
 TEST(JointSum, ASegmentBegunAnewForgetsWhatWasLeftUnfinished) {
   constexpr std::size_t columns = 8;
   const std::vector<Sample> samples = made_samples(400, columns, 0, 5);
-  JointSum fresh(columns), used(columns);
+  joint_sum fresh(columns), used(columns);
   MatrixXd expected = MatrixXd::Zero(columns, columns), sum = expected, thrown_away = expected;
-  const JointSegment first = summed(samples, 0, samples.size(), 128, &fresh, &expected);
+  const joint_segment first = summed(samples, 0, samples.size(), 128, &fresh, &expected);
   for (std::size_t k = 0; k < 200; ++k) {
     give(samples[k], &used);
     if (k == 99) {
       used.end_block(&thrown_away);
     }
   }
-  const JointSegment second = summed(samples, 0, samples.size(), 128, &used, &sum);
+  const joint_segment second = summed(samples, 0, samples.size(), 128, &used, &sum);
   EXPECT_EQ(full(sum), full(expected));
   EXPECT_EQ(first.held, second.held);
   EXPECT_EQ(first.cross, second.cross);

@@ -11,14 +11,14 @@
 
 namespace {
 
-using tendonfmu::estimation::KalmanFilter;
-using tendonfmu::estimation::KalmanSample;
-using tendonfmu::estimation::KalmanSettings;
+using tendonfmu::estimation::kalman_filter;
+using tendonfmu::estimation::kalman_sample;
+using tendonfmu::estimation::kalman_settings;
 using Numbers = std::vector<double>;
 
-KalmanSettings some_settings(std::size_t unknowns, std::size_t joints, std::size_t block) {
+kalman_settings some_settings(std::size_t unknowns, std::size_t joints, std::size_t block) {
   const double infinity = std::numeric_limits<double>::infinity();
-  KalmanSettings s{
+  kalman_settings s{
       unknowns, joints, block, 0.03, 0.0, Numbers(unknowns), Numbers(unknowns, -infinity), Numbers(unknowns, infinity)};
   for (std::size_t i = 0; i < unknowns; ++i) {
     s.scale[i] = 0.1 + 3.0 * static_cast<double>(i % 5);
@@ -30,7 +30,7 @@ KalmanSettings some_settings(std::size_t unknowns, std::size_t joints, std::size
  */
 class Model {
  public:
-  Model(const KalmanSettings& settings, double curvature, unsigned seed)
+  Model(const kalman_settings& settings, double curvature, unsigned seed)
       : s_(settings), curvature_(curvature), random_(seed), truth(s_.unknowns), bias_(s_.joints, 0.2) {
     for (std::size_t i = 0; i < s_.unknowns; ++i) {
       truth[i] = s_.scale[i] * (1.0 + 0.5 * normal());
@@ -55,7 +55,7 @@ class Model {
   }
 
   /* linearised at z */
-  KalmanSample at(const double* unknowns) {
+  kalman_sample at(const double* unknowns) {
     const Numbers z(unknowns, unknowns + s_.unknowns);
     torque_ = apply(torque_factor_, z);
     jump_ = apply(jump_factor_, z);
@@ -105,7 +105,7 @@ class Model {
     return all;
   }
 
-  KalmanSettings s_;
+  kalman_settings s_;
   double curvature_;
   std::mt19937_64 random_;
 
@@ -121,10 +121,10 @@ class Model {
 /* both filters, side by side */
 class Pair {
  public:
-  Pair(const KalmanSettings& s, double curvature, unsigned seed)
+  Pair(const kalman_settings& s, double curvature, unsigned seed)
       : settings(s), model(s, curvature, seed), filter(s, s.scale, 1.0), naive(s, s.scale, 1.0) {
     model.next();
-    const KalmanSample first = model.at(s.scale.data());
+    const kalman_sample first = model.at(s.scale.data());
     Numbers bias(s.joints), rows(first.torque_rows, first.torque_rows + s.joints * s.unknowns);
     for (std::size_t j = 0; j < s.joints; ++j) {
       bias[j] = first.measured[j] - first.torque[j];
@@ -170,9 +170,9 @@ class Pair {
     }
   }
 
-  KalmanSettings settings;
+  kalman_settings settings;
   Model model;
-  KalmanFilter filter;
+  kalman_filter filter;
   naive::Filter naive;
   double worst = 0.0; /* largest difference of innovations, and of their variances */
 
@@ -239,7 +239,7 @@ TEST_P(KalmanBlocks, StayNearTheTextbookForACurvedModel) {
 INSTANTIATE_TEST_SUITE_P(Samples, KalmanBlocks, testing::Values(1, 2, 8, 33));
 
 TEST(Kalman, LetsUnknownsDrift) {
-  KalmanSettings s = some_settings(7, 2, 1);
+  kalman_settings s = some_settings(7, 2, 1);
   s.parameter_drift = 0.5;
   Pair pair(s, 0.0, 24);
   pair.run(300);
@@ -249,12 +249,12 @@ TEST(Kalman, LetsUnknownsDrift) {
 }
 
 TEST(Kalman, ASecondPassOverALinearModelFindsTheSame) {
-  const KalmanSettings s = some_settings(8, 2, 4);
-  KalmanFilter filter(s, s.scale, 1.0);
+  const kalman_settings s = some_settings(8, 2, 4);
+  kalman_filter filter(s, s.scale, 1.0);
   const auto pass = [&](std::size_t samples) {
     Model model(s, 0.0, 30); /* the same samples each time */
     model.next();
-    const KalmanSample first = model.at(filter.linearise_at());
+    const kalman_sample first = model.at(filter.linearise_at());
     Numbers bias(2), rows(first.torque_rows, first.torque_rows + 16);
     for (std::size_t j = 0; j < 2; ++j) {
       bias[j] = first.measured[j] - first.torque[j];
@@ -287,10 +287,10 @@ TEST(Kalman, ASecondPassOverALinearModelFindsTheSame) {
 
 /* the same samples to a filter that is bounded and to one that is not */
 struct Bounded {
-  explicit Bounded(const KalmanSettings& s)
+  explicit Bounded(const kalman_settings& s)
       : settings(s), free_settings(s), free(prepare(), s.scale, 1.0), filter(s, s.scale, 1.0) {}
 
-  const KalmanSettings& prepare() {
+  const kalman_settings& prepare() {
     free_settings.lower.assign(settings.unknowns, -1e300);
     free_settings.upper.assign(settings.unknowns, 1e300);
     return free_settings;
@@ -315,12 +315,12 @@ struct Bounded {
     }
   }
 
-  KalmanSettings settings, free_settings;
-  KalmanFilter free, filter;
+  kalman_settings settings, free_settings;
+  kalman_filter free, filter;
 };
 
 TEST(Kalman, FindsTheMostLikelyStateOnABound) {
-  KalmanSettings s = some_settings(6, 1, 4);
+  kalman_settings s = some_settings(6, 1, 4);
   Model model(s, 0.0, 25);
   model.truth[2] = 3.0 * s.scale[2];
   s.upper[2] = s.scale[2]; /* where it starts */
@@ -337,7 +337,7 @@ TEST(Kalman, FindsTheMostLikelyStateOnABound) {
 }
 
 TEST(Kalman, KeepsWithinSeveralBounds) {
-  KalmanSettings s = some_settings(12, 2, 8);
+  kalman_settings s = some_settings(12, 2, 8);
   Model model(s, 0.02, 29);
   for (std::size_t i = 0; i < 12; ++i) {
     s.lower[i] = 0.9 * s.scale[i];
@@ -348,17 +348,17 @@ TEST(Kalman, KeepsWithinSeveralBounds) {
 }
 
 TEST(Kalman, LearnsNothingFromSamplesThatAreNotUsed) {
-  const KalmanSettings s = some_settings(8, 2, 8);
+  const kalman_settings s = some_settings(8, 2, 8);
   Model model(s, 0.0, 26);
   model.next();
-  KalmanFilter filter(s, s.scale, 1.0);
+  kalman_filter filter(s, s.scale, 1.0);
   const Numbers zero(16, 0.0);
   filter.start_bias(zero.data(), zero.data(), 0.01);
   const Numbers before(filter.z(), filter.z() + 8);
   double elapsed = 0.0;
   for (std::size_t k = 0; k < 8; ++k) {
     model.next();
-    KalmanSample sample = model.at(filter.z());
+    kalman_sample sample = model.at(filter.z());
     sample.use = false;
     sample.jump = nullptr;
     elapsed += sample.step;
@@ -376,16 +376,16 @@ TEST(Kalman, LearnsNothingFromSamplesThatAreNotUsed) {
 
 // Twenty samples were enough for P − K H P to lose nine digits.
 TEST(Kalman, CovarianceStaysPositiveDefiniteOverTenThousandSamples) {
-  KalmanSettings s = some_settings(60, 4, 8);
+  kalman_settings s = some_settings(60, 4, 8);
   s.drift_variance = 1e-6;
   Model model(s, 0.0, 27);
   model.next();
-  KalmanFilter filter(s, s.scale, 1.0);
+  kalman_filter filter(s, s.scale, 1.0);
   const Numbers zero(240, 0.0);
   filter.start_bias(zero.data(), zero.data(), 1.0);
   for (std::size_t k = 0; k < 10000; ++k) {
     model.next();
-    KalmanSample sample = model.at(filter.z());
+    kalman_sample sample = model.at(filter.z());
     sample.noise *= 1e-6; /* as hard as it gets: 1e-5 of the torque */
     filter.add(sample);
     if (filter.full()) {
@@ -402,12 +402,12 @@ TEST(Kalman, CovarianceStaysPositiveDefiniteOverTenThousandSamples) {
 }
 
 TEST(Kalman, RefusesNumbersThatAreNotFinite) {
-  const KalmanSettings s = some_settings(3, 1, 1);
+  const kalman_settings s = some_settings(3, 1, 1);
   Model model(s, 0.0, 28);
   model.next();
-  KalmanFilter filter(s, s.scale, 1.0);
+  kalman_filter filter(s, s.scale, 1.0);
   Numbers rows(3, std::nan(""));
-  KalmanSample sample = model.at(s.scale.data());
+  kalman_sample sample = model.at(s.scale.data());
   sample.torque_rows = rows.data();
   filter.add(sample);
   EXPECT_FALSE(filter.update());

@@ -18,12 +18,12 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using made::Json;
 using tendonfmu::estimation::boxed_step;
+using tendonfmu::estimation::cost_evaluation;
 using tendonfmu::estimation::evaluate;
-using tendonfmu::estimation::Evaluation;
-using tendonfmu::estimation::LocalModel;
-using tendonfmu::estimation::Problem;
-using tendonfmu::estimation::Role;
-using tendonfmu::estimation::ScaledBox;
+using tendonfmu::estimation::fit_problem;
+using tendonfmu::estimation::local_model;
+using tendonfmu::estimation::scaled_box;
+using tendonfmu::estimation::unknown_role;
 using Groups = std::vector<std::int32_t>;
 
 /* --- the model of the cost ------------------------------------------------------------------------------------------
@@ -40,21 +40,21 @@ class Case {
         prior_(prior) {
     made::Recording r = made::made(truth_, 2500, 0.004, 7);
     problem_.recordings.emplace_back(
-        &problem_.finger, tendonfmu::estimation::RecordingArrays{r.samples, r.time.data(), r.inputs(), r.load(),
-                                                                 nullptr, TENDONFMU_JOINT_VELOCITIES});
+        &problem_.finger, tendonfmu::estimation::recording_arrays{r.samples, r.time.data(), r.inputs(), r.load(),
+                                                                  nullptr, TENDONFMU_JOINT_VELOCITIES});
     x = box_.start;
     at = pass(x);
   }
 
-  const Problem& problem() const { return problem_; }
-  const ScaledBox& box() const { return box_; }
-  LocalModel model() const { return {problem_, box_, at, x, prior_}; }
-  Evaluation pass(const VectorXd& where) const { return evaluate(problem_, box_.unknowns(where), {1, 1}, {}); }
+  const fit_problem& problem() const { return problem_; }
+  const scaled_box& box() const { return box_; }
+  local_model model() const { return {problem_, box_, at, x, prior_}; }
+  cost_evaluation pass(const VectorXd& where) const { return evaluate(problem_, box_.unknowns(where), {1, 1}, {}); }
   double cost(const VectorXd& step) const {
     return pass(x + step).cost + 0.5 * prior_ * (x + step - box_.start).squaredNorm();
   }
   double error(const VectorXd& step) const { return std::fabs(model().cost(step) - cost(step)); }
-  std::vector<Index> with(Role role) const {
+  std::vector<Index> with(unknown_role role) const {
     std::vector<Index> found;
     for (std::size_t k = 0; k < problem_.unknowns.count(); ++k) {
       if (problem_.unknowns[k].role == role) {
@@ -65,7 +65,7 @@ class Case {
   }
 
   VectorXd x;
-  Evaluation at;
+  cost_evaluation at;
 
  private:
   static Json guess() {
@@ -75,8 +75,8 @@ class Case {
 
   Json truth_;
   std::vector<unsigned char> image_;
-  Problem problem_;
-  ScaledBox box_;
+  fit_problem problem_;
+  scaled_box box_;
   double prior_;
 };
 
@@ -94,7 +94,8 @@ TEST(LocalModel, IsTheCostWhereItStands) {
 /* e is linear in the friction of a place, and that in all numbers of its law but the rate */
 TEST(LocalModel, IsExactInWhatEntersLinearly) {
   const Case c(nullptr, 0.7);
-  for (const Role role : {Role::coulomb, Role::drop, Role::viscous, Role::value}) {
+  for (const unknown_role role :
+       {unknown_role::coulomb, unknown_role::drop, unknown_role::viscous, unknown_role::value}) {
     for (const Index k : c.with(role)) {
       const double truth = c.cost(along(c, k, 0.4));
       EXPECT_NEAR(c.model().cost(along(c, k, 0.4)), truth, 1e-9 * truth) << c.problem().unknowns[std::size_t(k)].path;
@@ -106,7 +107,7 @@ TEST(LocalModel, IsExactInWhatEntersLinearly) {
 TEST(LocalModel, ErrorFallsWithTheFourthPowerOfAStepInARate) {
   const Case c;
   std::size_t judged = 0;
-  for (const Index k : c.with(Role::rate)) {
+  for (const Index k : c.with(unknown_role::rate)) {
     const double whole = c.error(along(c, k, 0.2)), half = c.error(along(c, k, 0.1));
     if (half > 1e-10 * c.at.cost) { /* above rounding */
       EXPECT_GT(whole / half, 12.0) << c.problem().unknowns[std::size_t(k)].path;
@@ -140,7 +141,7 @@ TEST(LocalModel, ErrorFallsSoWhereLawsShareARateOrTheirDropIsFixed) {
   const Case all;
   Groups group(all.problem().finger.get()->shape.parameter_count, -1);
   std::vector<std::uint32_t> rates;
-  for (const Index k : all.with(Role::rate)) {
+  for (const Index k : all.with(unknown_role::rate)) {
     const auto& unknown = all.problem().unknowns[static_cast<std::size_t>(k)];
     if (unknown.path.find(".friction.stribeck") != std::string::npos) {
       rates.push_back(unknown.parameters[0]);
@@ -159,8 +160,8 @@ TEST(LocalModel, ErrorFallsSoWhereLawsShareARateOrTheirDropIsFixed) {
 
 TEST(LocalModel, ItsBestStepStaysInTheBoxAndNothingNearIsBetter) {
   const Case c(nullptr, 1.0);
-  const LocalModel model = c.model();
-  const ScaledBox around = c.box().around(c.x, 0.8);
+  const local_model model = c.model();
+  const scaled_box around = c.box().around(c.x, 0.8);
   const VectorXd best = model.best_step(around, 1e-6);
   const double least = model.cost(best);
   const double gained = c.at.cost - least;
@@ -187,16 +188,16 @@ TEST(LocalModel, ItsBestStepStaysInTheBoxAndNothingNearIsBetter) {
 struct Parabola {
   MatrixXd h;
   VectorXd g, x;
-  ScaledBox box;
+  scaled_box box;
 
   double at(const VectorXd& d) const { return g.dot(d) + 0.5 * d.dot(h * d); }
 };
 
 /* a box with nothing in it, to be filled */
-ScaledBox empty_box() {
+scaled_box empty_box() {
   static const std::vector<unsigned char> image = made::image_of(made::learnable_finger());
-  const tendonfmu::estimation::FreeFinger finger(image.data(), image.size());
-  return ScaledBox(tendonfmu::estimation::Unknowns(finger.get(), nullptr, nullptr));
+  const tendonfmu::estimation::free_finger finger(image.data(), image.size());
+  return scaled_box(tendonfmu::estimation::unknown_list(finger.get(), nullptr, nullptr));
 }
 
 Parabola random_parabola(Index p, std::mt19937_64* random) {

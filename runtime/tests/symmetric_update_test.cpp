@@ -12,7 +12,7 @@
 
 namespace {
 
-using tendonfmu::estimation::SymmetricUpdate;
+using tendonfmu::estimation::symmetric_update;
 
 // What nobody may read: it would be seen in every result it reached.
 const double untouched = std::nan("");
@@ -69,7 +69,7 @@ class SymmetricUpdateTest : public testing::TestWithParam<int> {
       GTEST_SKIP() << "this processor or build has no further implementation";
     }
   }
-  const SymmetricUpdate* kernel_ = nullptr;
+  const symmetric_update* kernel_ = nullptr;
 };
 
 TEST_P(SymmetricUpdateTest, AddsOuterProductsToTheLowerTriangleAlone) {
@@ -193,7 +193,7 @@ TEST_P(SymmetricUpdateTest, DoesNothingForNoRowsAndZeroRows) {
 INSTANTIATE_TEST_SUITE_P(Kernels, SymmetricUpdateTest, testing::Values(0, 1, 2));
 
 TEST(SymmetricUpdate, GivesTheSameBitsOnAvx2AndAvx512) {
-  const SymmetricUpdate* list = tendonfmu::estimation::symmetric_updates();
+  const symmetric_update* list = tendonfmu::estimation::symmetric_updates();
   if (std::string(list[0].name) != "avx512") {
     GTEST_SKIP() << "no AVX-512 here";
   }
@@ -211,7 +211,7 @@ TEST(SymmetricUpdate, GivesTheSameBitsOnAvx2AndAvx512) {
 }
 
 TEST(SymmetricUpdate, TakesTheFastestFirstAndEndsWithThePortable) {
-  const SymmetricUpdate* list = tendonfmu::estimation::symmetric_updates();
+  const symmetric_update* list = tendonfmu::estimation::symmetric_updates();
   std::size_t last = 0;
   while (list[last + 1].name) {
     ++last;

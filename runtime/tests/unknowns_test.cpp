@@ -20,11 +20,11 @@ namespace {
 
 using made::Json;
 using made::Numbers;
-using tendonfmu::estimation::FreeFinger;
+using tendonfmu::estimation::free_finger;
 using tendonfmu::estimation::refused;
-using tendonfmu::estimation::Role;
-using tendonfmu::estimation::Unknown;
-using tendonfmu::estimation::Unknowns;
+using tendonfmu::estimation::unknown_item;
+using tendonfmu::estimation::unknown_list;
+using tendonfmu::estimation::unknown_role;
 using Groups = std::vector<std::int32_t>;
 
 const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -51,7 +51,7 @@ class Described {
   }
   std::string why_not(const Groups& group, const double* scale = nullptr) const {
     try {
-      Unknowns(finger(), group.data(), scale);
+      unknown_list(finger(), group.data(), scale);
     } catch (const refused& reason) {
       return reason.what();
     }
@@ -60,10 +60,10 @@ class Described {
 
  private:
   std::vector<unsigned char> image_;
-  FreeFinger free_;
+  free_finger free_;
 };
 
-std::size_t column_of(const Unknowns& unknowns, Role role, std::size_t parameter) {
+std::size_t column_of(const unknown_list& unknowns, unknown_role role, std::size_t parameter) {
   for (std::size_t k = 0; k < unknowns.count(); ++k) {
     const auto& moved = unknowns[k].parameters;
     if (unknowns[k].role == role && std::count(moved.begin(), moved.end(), parameter) > 0) {
@@ -85,7 +85,7 @@ TEST(Unknowns, AreTheNumbersThatArePresent) {
   Json description = small_finger();
   description["tendons"][0]["pulley_friction"][0]["coulomb"] = 0.02; /* as its static: no Stribeck effect */
   const Described d(description);
-  const Unknowns all(d.finger(), nullptr, nullptr);
+  const unknown_list all(d.finger(), nullptr, nullptr);
   std::size_t estimated = 0;
   const auto moved = [&](const std::string& path) {
     std::size_t times = 0;
@@ -109,12 +109,12 @@ TEST(Unknowns, AreTheNumbersThatArePresent) {
   EXPECT_EQ(moved("tendons[1].stiffness") + moved("bias.noise_std"), 0u);
   EXPECT_EQ(estimated, 6u);
   EXPECT_TRUE(std::is_sorted(&all[0], &all[0] + all.count(),
-                             [](const Unknown& a, const Unknown& b) { return a.joint < b.joint; }));
+                             [](const unknown_item& a, const unknown_item& b) { return a.joint < b.joint; }));
 }
 
 TEST(Unknowns, GoToTheDescriptionAndBack) {
   const Described d(made::learnable_finger());
-  const Unknowns all(d.finger(), nullptr, nullptr);
+  const unknown_list all(d.finger(), nullptr, nullptr);
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> uniform;
   const Numbers start = d.start(), first = all.read(start.data()), again = all.write(first.data());
@@ -138,7 +138,7 @@ TEST(Unknowns, GoToTheDescriptionAndBack) {
 TEST(Unknowns, BoundsAreWithinWhatTheCoreTakes) {
   for (const Json& description : {small_finger(), made::learnable_finger()}) {
     const Described d(description);
-    const Unknowns all(d.finger(), nullptr, nullptr);
+    const unknown_list all(d.finger(), nullptr, nullptr);
     std::mt19937_64 random(2);
     for (int corner = 0; corner < 100; ++corner) {
       Numbers z;
@@ -156,9 +156,9 @@ TEST(Unknowns, BoundsAreWithinWhatTheCoreTakes) {
 
 TEST(Unknowns, StribeckVelocitiesStayAboveAShareOfTheThreshold) {
   const Described d(small_finger());
-  const Unknowns all(d.finger(), nullptr, nullptr);
-  const Unknown& tendon = all[column_of(all, Role::rate, d.at(number(pulley, "stribeck_velocity")))];
-  const Unknown& joint = all[column_of(all, Role::rate, d.at("joints[1].friction.stribeck_velocity"))];
+  const unknown_list all(d.finger(), nullptr, nullptr);
+  const unknown_item& tendon = all[column_of(all, unknown_role::rate, d.at(number(pulley, "stribeck_velocity")))];
+  const unknown_item& joint = all[column_of(all, unknown_role::rate, d.at("joints[1].friction.stribeck_velocity"))];
   EXPECT_DOUBLE_EQ(tendon.upper, 1.0 / (0.2 * 0.0004));
   EXPECT_DOUBLE_EQ(joint.upper, 1.0 / (0.2 * 0.02));
   EXPECT_DOUBLE_EQ(tendon.lower, 1e-3 / 0.004);
@@ -170,7 +170,7 @@ TEST(Unknowns, SharedNumbersHaveOneColumn) {
   Groups group = d.fixed();
   const std::size_t a = d.at(number(pulley, "coulomb")), b = d.at("tendons[1].edge_friction[1].positive.coulomb");
   group[a] = group[b] = 7;
-  const Unknowns shared(d.finger(), group.data(), nullptr);
+  const unknown_list shared(d.finger(), group.data(), nullptr);
   ASSERT_EQ(shared.count(), 1u);
   EXPECT_EQ(shared[0].parameters.size(), 2u);
   EXPECT_DOUBLE_EQ(shared[0].start, 0.5 * (0.015 + 0.02));
@@ -190,9 +190,9 @@ TEST(Unknowns, StaticFrictionFollowsWhereItSharesWithCoulomb) {
   const std::size_t first = d.at(number(pulley, "static"));
   group[first] = group[first + 1] = 0;
   group[first + 2] = 1;
-  const Unknowns tied(d.finger(), group.data(), nullptr);
+  const unknown_list tied(d.finger(), group.data(), nullptr);
   ASSERT_EQ(tied.count(), 2u);
-  const std::size_t coulomb = column_of(tied, Role::coulomb, first + 1);
+  const std::size_t coulomb = column_of(tied, unknown_role::coulomb, first + 1);
   Numbers z = {0.0, 0.0};
   z[coulomb] = 0.031;
   z[1 - coulomb] = 200.0;
@@ -209,12 +209,12 @@ TEST(Unknowns, AFixedNumberOfALawBoundsOrMovesTheOther) {
   const std::size_t first = d.at(number(edge, "static"));
   Groups group = d.fixed();
   group[first + 1] = 0;
-  const Unknowns below(d.finger(), group.data(), nullptr);
+  const unknown_list below(d.finger(), group.data(), nullptr);
   EXPECT_EQ(below[0].upper, d.start()[first]);
   group = d.fixed();
   group[first] = 0;
-  const Unknowns drop(d.finger(), group.data(), nullptr);
-  EXPECT_EQ(drop[0].role, Role::drop);
+  const unknown_list drop(d.finger(), group.data(), nullptr);
+  EXPECT_EQ(drop[0].role, unknown_role::drop);
   const double z = 0.5;
   EXPECT_DOUBLE_EQ(drop.write(&z)[first], d.start()[first + 1] + 0.5);
   EXPECT_EQ(drop.write(&z)[first + 1], d.start()[first + 1]);
@@ -231,11 +231,11 @@ TEST(Unknowns, ScalesAreGivenOrTheStarts) {
   scale[first] = 0.5;
   scale[first + 1] = 0.4;
   scale[first + 2] = 0.01;
-  const Unknowns given(d.finger(), group.data(), scale.data());
-  EXPECT_DOUBLE_EQ(given[column_of(given, Role::drop, first)].scale, 0.1);
-  EXPECT_DOUBLE_EQ(given[column_of(given, Role::coulomb, first + 1)].scale, 0.4);
-  EXPECT_DOUBLE_EQ(given[column_of(given, Role::rate, first + 2)].scale, 100.0);
-  EXPECT_DOUBLE_EQ(given[column_of(given, Role::viscous, first + 3)].scale, 0.1);
+  const unknown_list given(d.finger(), group.data(), scale.data());
+  EXPECT_DOUBLE_EQ(given[column_of(given, unknown_role::drop, first)].scale, 0.1);
+  EXPECT_DOUBLE_EQ(given[column_of(given, unknown_role::coulomb, first + 1)].scale, 0.4);
+  EXPECT_DOUBLE_EQ(given[column_of(given, unknown_role::rate, first + 2)].scale, 100.0);
+  EXPECT_DOUBLE_EQ(given[column_of(given, unknown_role::viscous, first + 3)].scale, 0.1);
 }
 
 TEST(Unknowns, RefusalsNameTheNumber) {
@@ -265,7 +265,7 @@ TEST(Unknowns, RefusalsNameTheNumber) {
 
 TEST(Unknowns, MayBeNone) {
   const Described d(made::learnable_finger());
-  const Unknowns none(d.finger(), d.fixed().data(), nullptr);
+  const unknown_list none(d.finger(), d.fixed().data(), nullptr);
   EXPECT_EQ(none.count(), 0u);
   EXPECT_EQ(none.write(nullptr), d.start());
   EXPECT_TRUE(none.read(d.start().data()).empty());
