@@ -10,7 +10,7 @@
 typedef struct component {
   log_target log;
   char* instance_name;
-  model* model;
+  struct model* model; /* `struct` for C++, where the member hides the type */
   variables values;
 
   fmu_phase phase;

@@ -5,6 +5,10 @@
 
 #include "finger_memory.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct tip_force {
   double force[3];     /* N, base frame; 0 along what the torques do not tell */
   double deviation[3]; /* N, standard deviation of these; 0 where the torques' are not known */
@@ -29,5 +33,9 @@ typedef struct contact_place {
 
 /* Of the sample last taken, from its outputs alone; all 0 without links. */
 contact_place find_contact_place(const tendonfmu_finger* finger);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -4,11 +4,19 @@
 
 #include "finger_memory.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Recomputes finger->derived from finger->parameters: at creation, and after parameters were written or restored.
  * R⁺ is only computed again where `routing_changed`. */
 void derive_numbers(tendonfmu_finger* finger, int routing_changed);
 
 /* Makes the next sample look at all laws anew. */
 void forget_views(tendonfmu_finger* finger);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

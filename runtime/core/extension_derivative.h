@@ -4,6 +4,10 @@
 
 #include "parameter_derivative.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Appends the slopes by every number of every extension to the plain terms; the places are read already. */
 void extension_derivative_read(const tendonfmu_finger* finger, parameter_derivative* derivative);
 
@@ -19,5 +23,9 @@ void extension_place_slopes(const tendonfmu_finger* finger, const parameter_deri
 
 /* ∂(b·what acts) of every place [places] by number k of the row_number-th signal row. */
 void extension_entry_slopes(const tendonfmu_finger* finger, size_t row_number, uint32_t k, double* entry);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

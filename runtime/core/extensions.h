@@ -5,6 +5,10 @@
 
 #include "finger_memory.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Fills the table of rows and the cosines between the axes; whenever numbers were derived anew. */
 void find_extensions(tendonfmu_finger* finger);
 
@@ -81,5 +85,9 @@ void remember_extensions(tendonfmu_finger* finger);
 
 /* The sample as torque rows see it. */
 effect_sample remembered_sample(const tendonfmu_finger* finger);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -13,6 +13,10 @@
 #include "model_image.h"
 #include "tendonfmu.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 enum { ERROR_BYTES = 400 };
 
 /* What is remembered stays so small that a square of it, and a sum of some squares, is finite: sums of torques (N·m)
@@ -330,5 +334,9 @@ size_t finger_memory_size(const model_shape* shape);
 /* Lays a finger of a checked image header into memory of that size, all zeros; words receives room for the shape words.
  */
 tendonfmu_finger* finger_lay_out(const model_shape* shape, void* memory, uint32_t** words);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

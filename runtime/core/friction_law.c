@@ -1,9 +1,5 @@
 #include "floating_point.h"
 
-#include "quad_plain.h"
-
-#include "exponential.h"
-
 #include "friction_law.h"
 
 double law_exponential(double x) {

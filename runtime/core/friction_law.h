@@ -7,6 +7,12 @@
 #ifndef TENDONFMU_FRICTION_LAW_H
 #define TENDONFMU_FRICTION_LAW_H
 
+#include "exponential.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 enum { LAW_COULOMB, LAW_DROP, LAW_RATE, LAW_VISCOUS, LAW_SIDE_NUMBERS };
 
 enum { LAW_NUMBERS = 2 * LAW_SIDE_NUMBERS }; /* positive side, negative side */
@@ -31,14 +37,14 @@ double law_one_minus_exponential(double x);
 /* Fills one side of a law from the numbers of a description. */
 void law_pack_side(double* side, double fs, double fc, double vs, double fv);
 
-#ifdef TENDONFMU_EXPONENTIAL_H
-
 /* Fc + (Fs − Fc)·exp(−|v|/vs) + Fv·|v| for four sides at once; exponent(v) is the smooth part of eq. (1) */
 HOT_INLINE quad law_magnitude(const quad side[LAW_SIDE_NUMBERS], quad speed) {
   const quad stribeck = quad_mul(side[LAW_DROP], exp_of_minus(quad_mul(speed, side[LAW_RATE])));
   return quad_add(quad_add(side[LAW_COULOMB], stribeck), quad_mul(side[LAW_VISCOUS], speed));
 }
 
+#ifdef __cplusplus
+}
 #endif
 
 #endif

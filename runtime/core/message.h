@@ -4,6 +4,10 @@
 
 #include <stddef.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct message_line {
   char* text; /* may be NULL when size is 0 */
   size_t size;
@@ -17,5 +21,9 @@ void message_count(message_line line, size_t value);
 
 /* Starts with "<name>[<index>]". */
 void message_element(message_line line, const char* name, size_t index);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -28,6 +28,10 @@
 #include "effect.h"
 #include "message.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 enum {
   MODEL_VERSION = 1,
   MODEL_MAX_JOINTS = 16,
@@ -193,5 +197,9 @@ size_t model_image_size(const model_shape* shape);
 
 /* Writes an image [model_image_size] from a shape and its values [parameter_count]. */
 void model_write(const model_shape* shape, const double* values, void* image);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -14,6 +14,10 @@
 
 #include "finger_memory.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 enum { SIDE_STATIC, SIDE_COULOMB, SIDE_RATE, SIDE_VISCOUS };
 
 /* Slopes of F, or of b, at a place by one side of one law. */
@@ -66,5 +70,9 @@ void parameter_derivative_place(const tendonfmu_finger* finger, void* memory, pa
 /* Fills it, but for the extensions (extension_derivative.h), for the sample that the finger last took, by a step: a
  * restored state has no scratch. */
 void parameter_derivative_read(const tendonfmu_finger* finger, parameter_derivative* derivative);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -5,6 +5,10 @@
 
 #include "finger_memory.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* A row leaves R⁺, or is told by the others, where that makes the variance of the angles at most so many times larger:
  * 1/(1 − h) of its leverage h. */
 #define LEAST_FREEDOM 0.1
@@ -24,5 +28,9 @@ void weigh_forces(const tendonfmu_finger* finger, const double* fault, double* w
 
 /* Whether a joint was blind at the last sample; 0 without sensor_fault. */
 int any_joint_is_blind(const tendonfmu_finger* finger);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -5,6 +5,10 @@
 #include "finger_memory.h"
 #include "message.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Checks the time and copies the inputs that the kinematics source uses into scratch; their values are left to the
  * kernel. Returns 0, or −1 with one line in message. */
 int samples_take_inputs(tendonfmu_finger* finger, double time, const tendonfmu_inputs* inputs, message_line message);
@@ -18,5 +22,9 @@ void samples_give_outputs(const tendonfmu_finger* finger, const tendonfmu_output
 
 /* Row `row` of many samples. */
 tendonfmu_inputs samples_row(const tendonfmu_finger* finger, const tendonfmu_inputs* inputs, size_t row);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

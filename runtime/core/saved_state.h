@@ -14,6 +14,10 @@
 #include "finger_memory.h"
 #include "message.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 size_t saved_state_size(const tendonfmu_finger* finger);
 
 /* bytes [saved_state_size] */
@@ -21,5 +25,9 @@ void save_state(const tendonfmu_finger* finger, void* bytes);
 
 /* Takes over saved bytes, or refuses them, changes nothing, and returns −1 with one line in message. */
 int restore_state(tendonfmu_finger* finger, const void* bytes, message_line message);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

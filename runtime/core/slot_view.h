@@ -5,6 +5,10 @@
 
 #include "finger_memory.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Fills the view of four slots from `slot` on.
  *   angle         of the joint before (q_0 = 0); of no meaning to the slots of joints
  *   negative      one bit a lane: the law's side for v < 0 */
@@ -12,5 +16,9 @@ void slot_view_fill(const tendonfmu_finger* finger, size_t slot, double angle, i
 
 /* Segment of a grid in which an angle lies, as the number of working points at or below it. */
 size_t slot_segment(const tendonfmu_finger* finger, size_t joint, size_t tendon, double angle);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -3,11 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "refusal.h"
-
-extern "C" {
 #include "derived_numbers.h"
-}
+#include "refusal.h"
 
 namespace tendonfmu::estimation {
 namespace {

@@ -5,13 +5,10 @@
 #include <algorithm>
 #include <vector>
 
-#include "recording_track.h"
-#include "unknowns.h"
-
-extern "C" {
 #include "extension_derivative.h"
 #include "extensions.h"
-}
+#include "recording_track.h"
+#include "unknowns.h"
 
 namespace tendonfmu::estimation {
 

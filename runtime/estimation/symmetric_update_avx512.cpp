@@ -30,6 +30,7 @@ inline __attribute__((always_inline)) lane_vector multiply_add(lane_vector a, la
 }  // namespace
 }  // namespace tendonfmu::estimation
 
+#define TENDONFMU_OWN_LANES
 #include "symmetric_update_kernel.h"
 
 namespace tendonfmu::estimation {

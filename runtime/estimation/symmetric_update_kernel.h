@@ -1,6 +1,7 @@
-/* The products of symmetric_update.h on vectors of any width. The source that includes this first defines, in its own
- * unnamed namespace: lane_vector, lanes, load, store, spread (one number into all lanes), multiply_add(a, b, c) = a·b +
- * c; and the size of a tile, tile_vectors · lanes rows by tile_columns columns, that fits into its registers.
+/* The products of symmetric_update.h on vectors of any width. A source with vectors of its own
+ * defines TENDONFMU_OWN_LANES and, in its unnamed namespace, before it includes this: lane_vector, lanes, load, store,
+ * spread (one number into all lanes), multiply_add(a, b, c) = a·b + c; and the size of a tile, tile_vectors · lanes
+ * rows by tile_columns columns, that fits into its registers. Else portable_lanes.h has them.
  *
  * Everything here is in the unnamed namespace and uses no inline function of another header: compiled for different
  * processors, no two copies of it may be taken for the same function. */
@@ -8,6 +9,10 @@
 #define TENDONFMU_SYMMETRIC_UPDATE_KERNEL_H
 
 #include "symmetric_update.h"
+
+#if !defined(TENDONFMU_OWN_LANES)
+#include "portable_lanes.h"
+#endif
 
 #if defined(_MSC_VER)
 #define ALWAYS_INLINE __forceinline

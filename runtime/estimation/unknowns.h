@@ -12,10 +12,7 @@
 #include <vector>
 
 #include "core_inside.h"
-
-extern "C" {
 #include "finger_memory.h"
-}
 
 namespace tendonfmu::estimation {
 

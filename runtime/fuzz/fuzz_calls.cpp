@@ -6,11 +6,8 @@
 #include <string>
 
 #include "../tests/test_finger.h"
-#include "promises.h"
-
-extern "C" {
 #include "bytes.h"
-}
+#include "promises.h"
 
 namespace {
 

@@ -7,9 +7,7 @@
 #include <set>
 #include <vector>
 
-extern "C" {
 #include "bytes.h"
-}
 
 namespace {
 

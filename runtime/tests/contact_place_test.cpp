@@ -6,10 +6,8 @@
 #include <random>
 #include <vector>
 
-extern "C" {
 #include "contact_place.h"
 #include "link_geometry.h"
-}
 
 namespace {
 

@@ -8,10 +8,7 @@
 
 #include "described_finger.h"
 #include "model_inside.h"
-
-extern "C" {
 #include "sine_cosine.h"
-}
 
 namespace {
 

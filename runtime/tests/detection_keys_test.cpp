@@ -8,12 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "model_inside.h"
-
-extern "C" {
 #include "bytes.h"
 #include "finger_memory.h"
-}
+#include "model_inside.h"
 
 using test_finger::Finger;
 using test_finger::joints;

@@ -12,9 +12,7 @@
 
 #include "model_inside.h"
 
-extern "C" {
 #include "floating_point.h"
-}
 
 namespace {
 

@@ -10,10 +10,8 @@
 #pragma GCC target("avx2")
 #endif
 
-#include "quad_avx2.h"
-
+#define TENDONFMU_QUAD_AVX2
 #include "exponential.h"
-
 #include "exponential_kernels.h"
 
 void exponential_avx2(const double* x, double* result, size_t count) {

@@ -4,8 +4,16 @@
 
 #include <stddef.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 void exponential_plain(const double* x, double* result, size_t count);
 void exponential_sse2(const double* x, double* result, size_t count);
 void exponential_avx2(const double* x, double* result, size_t count);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -1,10 +1,7 @@
 /* exp(−x) of the plain kernel as a function, for exponential_test.cpp. */
 #include "floating_point.h"
 
-#include "quad_plain.h"
-
 #include "exponential.h"
-
 #include "exponential_kernels.h"
 
 void exponential_plain(const double* x, double* result, size_t count) {

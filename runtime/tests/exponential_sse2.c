@@ -3,10 +3,8 @@
 
 #if defined(__x86_64__) || defined(_M_X64)
 
-#include "quad_sse2.h"
-
+#define TENDONFMU_QUAD_SSE2
 #include "exponential.h"
-
 #include "exponential_kernels.h"
 
 void exponential_sse2(const double* x, double* result, size_t count) {

@@ -8,12 +8,9 @@
 #include <random>
 #include <vector>
 
-#include "test_finger.h"
-
-extern "C" {
 #include "exponential_kernels.h"
 #include "friction_law.h"
-}
+#include "test_finger.h"
 
 namespace {
 

@@ -10,12 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "test_finger.h"
-
-extern "C" {
 #include "bytes.h"
 #include "extension_signals.h"
-}
+#include "test_finger.h"
 
 namespace {
 

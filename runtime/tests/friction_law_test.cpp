@@ -4,9 +4,7 @@
 #include <cmath>
 #include <random>
 
-extern "C" {
 #include "friction_law.h"
-}
 
 namespace {
 

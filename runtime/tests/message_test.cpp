@@ -7,9 +7,7 @@
 #include <limits>
 #include <string>
 
-extern "C" {
 #include "message.h"
-}
 
 namespace {
 

@@ -4,12 +4,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "bytes.h"
 #include "core_inside.h"
 #include "test_finger.h"
-
-extern "C" {
-#include "bytes.h"
-}
 
 struct Model {
   model_shape shape{};

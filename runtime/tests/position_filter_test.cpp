@@ -8,11 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "test_finger.h"
-
-extern "C" {
 #include "finger_memory.h"
-}
+#include "test_finger.h"
 
 namespace {
 

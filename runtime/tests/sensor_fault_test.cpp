@@ -6,12 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "model_inside.h"
-
-extern "C" {
 #include "finger_memory.h"
+#include "model_inside.h"
 #include "rows_in_use.h"
-}
 
 using test_finger::Finger;
 using test_finger::joints;

@@ -4,11 +4,8 @@
 #include <limits>
 
 #include "core_inside.h"
-#include "test_finger.h"
-
-extern "C" {
 #include "slot_view.h"
-}
+#include "test_finger.h"
 
 namespace {
 

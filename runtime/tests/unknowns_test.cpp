@@ -12,10 +12,6 @@
 #include "recording_track.h"
 #include "refusal.h"
 
-extern "C" {
-#include "parameters.h"
-}
-
 namespace {
 
 using made::Json;

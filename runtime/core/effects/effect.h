@@ -12,6 +12,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 enum { EFFECT_MAX_PARAMETERS = 4, EFFECT_ALL_JOINTS = 16 };
 
 #define EFFECT_NOWHERE 0xffffffffu
@@ -156,5 +160,9 @@ const effect_type* effect_by_name(const char* name);
 
 /* Row by position 0.., NULL past the end. */
 const effect_type* effect_at(size_t position);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

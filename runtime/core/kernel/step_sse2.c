@@ -3,10 +3,7 @@
 
 #if defined(__x86_64__) || defined(_M_X64)
 
-#include "quad_sse2.h"
-
-#include "exponential.h"
-
+#define TENDONFMU_QUAD_SSE2
 #include "step_kernel.h"
 #include "step_kernels.h"
 

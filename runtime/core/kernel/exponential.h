@@ -3,7 +3,7 @@
 #ifndef TENDONFMU_EXPONENTIAL_H
 #define TENDONFMU_EXPONENTIAL_H
 
-/* include a quad_*.h first */
+#include "quad.h"
 
 HOT_INLINE quad exp_of_minus(quad x) {
   const quad y = quad_min(x, quad_set(708.0));

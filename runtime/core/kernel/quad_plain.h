@@ -1,11 +1,13 @@
 /* Four doubles side by side, in plain C: the fallback, and the definition of what the other quads must give bit by bit.
  */
-#ifndef TENDONFMU_QUAD_H
-#define TENDONFMU_QUAD_H
+#ifndef TENDONFMU_QUAD_PLAIN_H
+#define TENDONFMU_QUAD_PLAIN_H
 
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+
+#include "inlining.h"
 
 typedef struct quad {
   double lane[4];

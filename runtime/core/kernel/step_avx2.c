@@ -11,10 +11,7 @@
 #pragma GCC target("avx2")
 #endif
 
-#include "quad_avx2.h"
-
-#include "exponential.h"
-
+#define TENDONFMU_QUAD_AVX2
 #include "step_kernel.h"
 #include "step_kernels.h"
 

@@ -1,8 +1,10 @@
 /* Four doubles side by side in two SSE2 registers: baseline x86-64. The meaning of each call is in quad_plain.h. */
-#ifndef TENDONFMU_QUAD_H
-#define TENDONFMU_QUAD_H
+#ifndef TENDONFMU_QUAD_SSE2_H
+#define TENDONFMU_QUAD_SSE2_H
 
 #include <emmintrin.h>
+
+#include "inlining.h"
 
 typedef struct quad {
   __m128d low, high;

@@ -1,10 +1,6 @@
 /* The step in plain C, for any machine. */
 #include "floating_point.h"
 
-#include "quad_plain.h"
-
-#include "exponential.h"
-
 #include "step_kernel.h"
 #include "step_kernels.h"
 

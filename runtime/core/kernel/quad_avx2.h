@@ -1,8 +1,10 @@
 /* Four doubles side by side in one AVX2 register. The meaning of each call is in quad_plain.h. */
-#ifndef TENDONFMU_QUAD_H
-#define TENDONFMU_QUAD_H
+#ifndef TENDONFMU_QUAD_AVX2_H
+#define TENDONFMU_QUAD_AVX2_H
 
 #include <immintrin.h>
+
+#include "inlining.h"
 
 typedef __m256d quad;
 typedef __m256d quad_mask;

@@ -4,6 +4,10 @@
 
 #include "finger_memory.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Beyond this, in magnitude, no input is a measurement; below it no product in a step overflows for sane parameters. */
 #define LARGEST_INPUT 1e12
 
@@ -20,5 +24,9 @@ struct step_kernel {
 /* The fastest kernel that processor and operating system allow ("auto"), or the one of that name; NULL where it cannot
  * run or is not built in. */
 const step_kernel* kernel_choose(const char* name);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif
