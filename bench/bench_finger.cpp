@@ -55,8 +55,8 @@ std::string tendon(int i, int joints, int points) {
          list(joints, [&](int j) { return edge(i, j, points); }) + "}";
 }
 
-Recording record(int joints, int tendons, std::size_t samples, const std::function<double(int, double)>& angle) {
-  Recording r;
+made_recording record(int joints, int tendons, std::size_t samples, const std::function<double(int, double)>& angle) {
+  made_recording r;
   for (std::size_t k = 0; k < samples; ++k) {
     const double t = 1e-3 * static_cast<double>(k);
     r.time.push_back(t);
@@ -97,10 +97,10 @@ std::string row(const char* effect, const char* key, int place, const char* numb
          numbers + "}";
 }
 
-std::string extension_rows(int joints, int tendons, Keys keys) {
+std::string extension_rows(int joints, int tendons, key_choice keys) {
   std::vector<std::string> rows;
-  const bool presliding = keys == Keys::presliding || keys == Keys::presliding_filtered;
-  for (int j = 0; j < joints && keys == Keys::torques; ++j) {
+  const bool presliding = keys == key_choice::presliding || keys == key_choice::presliding_filtered;
+  for (int j = 0; j < joints && keys == key_choice::torques; ++j) {
     rows.push_back(row("gravity", "joint", j, R"("sine": 0.01, "cosine": 0.01)"));
     rows.push_back(row("inertia", "joint", j, R"("inertia": 1e-5)"));
     rows.push_back(row("cover_hardening", "joint", j, R"("stiffness": 0.01)"));
@@ -111,11 +111,11 @@ std::string extension_rows(int joints, int tendons, Keys keys) {
   for (int i = 0; i < tendons; ++i) {
     if (presliding) {
       rows.push_back(row("presliding", "tendon", i, R"("displacement": 4e-5)"));
-    } else if (keys == Keys::torques) {
+    } else if (keys == key_choice::torques) {
       rows.push_back(row("force_gain", "tendon", i, R"("correction": 0.02)"));
     }
   }
-  if (keys == Keys::delay) {
+  if (keys == key_choice::delay) {
     rows.push_back(R"({"effect": "time_delay", "delay": 0.002})");
   }
   return list(static_cast<int>(rows.size()), [&](int k) { return rows[static_cast<std::size_t>(k)]; });
@@ -123,10 +123,10 @@ std::string extension_rows(int joints, int tendons, Keys keys) {
 
 }  // namespace
 
-std::string description(int joints, int tendons, int points, Keys keys) {
-  const bool everything = keys == Keys::everything, calibrated = keys == Keys::calibrated;
-  const bool detects = everything || calibrated || keys == Keys::innovation;
-  const bool filtered = keys == Keys::filtered || keys == Keys::presliding_filtered;
+std::string description(int joints, int tendons, int points, key_choice keys) {
+  const bool everything = keys == key_choice::everything, calibrated = keys == key_choice::calibrated;
+  const bool detects = everything || calibrated || keys == key_choice::innovation;
+  const bool filtered = keys == key_choice::filtered || keys == key_choice::presliding_filtered;
   return R"({"format": "tendonfmu-finger-1", "name": "bench", "joints": )" +
          list(joints,
               [&](int j) {
@@ -160,12 +160,12 @@ std::vector<unsigned char> image(const std::string& json) {
   return copy;
 }
 
-Recording motion(int joints, int tendons, std::size_t samples) {
+made_recording motion(int joints, int tendons, std::size_t samples) {
   return record(joints, tendons, samples,
                 [](int j, double t) { return 0.8 * std::sin(t * (0.7 + 0.3 * j) + j) + 0.1 * std::sin(3.1 * t); });
 }
 
-Recording shaking(int joints, int tendons, std::size_t samples) {
+made_recording shaking(int joints, int tendons, std::size_t samples) {
   return record(joints, tendons, samples, [](int j, double t) {
     const auto k = static_cast<long>(std::lround(1e3 * t));
     return (k % 4 < 2 ? 0.01 : -0.01) * (k % 2 == 0 ? 1.0 : 1.2) * (1 + j);

@@ -11,7 +11,7 @@ namespace bench_finger {
 // Which keys of docs/contract-additions.md, or rows of docs/extensions.md, a description has: calibrated: all that
 // `tendonfmu calibrate` writes, presliding apart; torques: three a joint
 // and one a tendon; presliding: one at every place; presliding_filtered: the same with a position filter.
-enum class Keys {
+enum class key_choice {
   paper,
   innovation,
   calibrated,
@@ -24,20 +24,20 @@ enum class Keys {
 };
 
 // A description with n joints, m tendons and `points` working points at every edge, all laws different.
-std::string description(int joints, int tendons, int points, Keys keys = Keys::paper);
+std::string description(int joints, int tendons, int points, key_choice keys = key_choice::paper);
 
 std::vector<unsigned char> image(const std::string& json);
 
 // Inputs at 1 kHz, row-major.
-struct Recording {
+struct made_recording {
   std::vector<double> time, force, position;
   tendonfmu_inputs inputs() const { return {force.data(), position.data(), nullptr, nullptr}; }
 };
 
 // All joints move at once with different velocities; about one transition of fig. 5 in a hundred samples.
-Recording motion(int joints, int tendons, std::size_t samples);
+made_recording motion(int joints, int tendons, std::size_t samples);
 
 // Joint positions jump back and forth every other sample: sides, rests and working points change all the time.
-Recording shaking(int joints, int tendons, std::size_t samples);
+made_recording shaking(int joints, int tendons, std::size_t samples);
 
 }  // namespace bench_finger

@@ -7,29 +7,29 @@
 
 namespace {
 
-using bench_finger::Keys;
+using bench_finger::key_choice;
 
 constexpr std::size_t samples = 20000;
 
 // A finger with room for its outputs that runs over a recording again and again.
-class Runner {
+class finger_runner {
  public:
-  Runner(int joints, int tendons, int points, const char* kernel, Keys keys = Keys::paper)
+  finger_runner(int joints, int tendons, int points, const char* kernel, key_choice keys = key_choice::paper)
       : image_(bench_finger::image(bench_finger::description(joints, tendons, points, keys))) {
     char message[400];
     finger_ = tendonfmu_create(image_.data(), image_.size(), message, sizeof message);
     usable_ = tendonfmu_set_kernel(finger_, kernel) == TENDONFMU_OK;
     torque_.resize(static_cast<std::size_t>(joints));
   }
-  ~Runner() { tendonfmu_destroy(finger_); }
-  Runner(const Runner&) = delete;
-  Runner& operator=(const Runner&) = delete;
+  ~finger_runner() { tendonfmu_destroy(finger_); }
+  finger_runner(const finger_runner&) = delete;
+  finger_runner& operator=(const finger_runner&) = delete;
 
   bool usable() const { return usable_; }
   tendonfmu_finger* finger() { return finger_; }
 
   // steps one by one, as a control loop does
-  void run(const bench_finger::Recording& r) {
+  void run(const bench_finger::made_recording& r) {
     const std::size_t m = tendonfmu_tendon_count(finger_);
     tendonfmu_outputs outputs = {};
     outputs.compensated_torque = torque_.data();
@@ -53,13 +53,14 @@ class Runner {
   std::vector<double> torque_;
 };
 
-void steps(benchmark::State& state, const char* kernel, int joints, int tendons, int points, bool shaking, Keys keys) {
-  Runner runner(joints, tendons, points, kernel, keys);
+void steps(benchmark::State& state, const char* kernel, int joints, int tendons, int points, bool shaking,
+           key_choice keys) {
+  finger_runner runner(joints, tendons, points, kernel, keys);
   if (!runner.usable()) {
     state.SkipWithError("this kernel cannot run here");
     return;
   }
-  const bench_finger::Recording recording =
+  const bench_finger::made_recording recording =
       shaking ? bench_finger::shaking(joints, tendons, samples) : bench_finger::motion(joints, tendons, samples);
   for (auto _ : state) {
     runner.run(recording);
@@ -71,22 +72,22 @@ void steps(benchmark::State& state, const char* kernel, int joints, int tendons,
 // name, kernel, joints, tendons, points, shaking, keys
 const auto* const registered = [] {
   const auto add = [](const char* name, const char* kernel, int joints, int tendons, int points, bool shaking,
-                      Keys keys = Keys::paper) {
+                      key_choice keys = key_choice::paper) {
     return benchmark::RegisterBenchmark(
                name, [=](benchmark::State& state) { steps(state, kernel, joints, tendons, points, shaking, keys); })
         ->Unit(benchmark::kMillisecond);
   };
   add("step/avx2/4x8x5", "avx2", 4, 8, 5, false);
-  add("step/avx2/4x8x5/innovation", "avx2", 4, 8, 5, false, Keys::innovation);
-  add("step/avx2/4x8x5/calibrated", "avx2", 4, 8, 5, false, Keys::calibrated);
-  add("step/avx2/4x8x5/everything", "avx2", 4, 8, 5, false, Keys::everything);
-  add("step/plain/4x8x5/innovation", "plain", 4, 8, 5, false, Keys::innovation);
-  add("step/avx2/4x8x5/shaking/everything", "avx2", 4, 8, 5, true, Keys::everything);
-  add("step/avx2/4x8x5/torques", "avx2", 4, 8, 5, false, Keys::torques);
-  add("step/avx2/4x8x5/presliding", "avx2", 4, 8, 5, false, Keys::presliding);
-  add("step/avx2/4x8x5/filtered", "avx2", 4, 8, 5, false, Keys::filtered);
-  add("step/avx2/4x8x5/presliding_filtered", "avx2", 4, 8, 5, false, Keys::presliding_filtered);
-  add("step/avx2/4x8x5/delay", "avx2", 4, 8, 5, false, Keys::delay);
+  add("step/avx2/4x8x5/innovation", "avx2", 4, 8, 5, false, key_choice::innovation);
+  add("step/avx2/4x8x5/calibrated", "avx2", 4, 8, 5, false, key_choice::calibrated);
+  add("step/avx2/4x8x5/everything", "avx2", 4, 8, 5, false, key_choice::everything);
+  add("step/plain/4x8x5/innovation", "plain", 4, 8, 5, false, key_choice::innovation);
+  add("step/avx2/4x8x5/shaking/everything", "avx2", 4, 8, 5, true, key_choice::everything);
+  add("step/avx2/4x8x5/torques", "avx2", 4, 8, 5, false, key_choice::torques);
+  add("step/avx2/4x8x5/presliding", "avx2", 4, 8, 5, false, key_choice::presliding);
+  add("step/avx2/4x8x5/filtered", "avx2", 4, 8, 5, false, key_choice::filtered);
+  add("step/avx2/4x8x5/presliding_filtered", "avx2", 4, 8, 5, false, key_choice::presliding_filtered);
+  add("step/avx2/4x8x5/delay", "avx2", 4, 8, 5, false, key_choice::delay);
   add("step/sse2/4x8x5", "sse2", 4, 8, 5, false);
   add("step/plain/4x8x5", "plain", 4, 8, 5, false);
   add("step/avx2/4x8x5/shaking", "avx2", 4, 8, 5, true);
@@ -95,7 +96,7 @@ const auto* const registered = [] {
 }();
 
 void save_and_restore(benchmark::State& state) {
-  Runner runner(4, 8, 5, "auto");
+  finger_runner runner(4, 8, 5, "auto");
   runner.run(bench_finger::motion(4, 8, 100));
   std::vector<unsigned char> bytes(tendonfmu_state_size(runner.finger()));
   for (auto _ : state) {
@@ -106,7 +107,7 @@ void save_and_restore(benchmark::State& state) {
 BENCHMARK(save_and_restore)->Unit(benchmark::kMicrosecond);
 
 void write_a_parameter(benchmark::State& state) {
-  Runner runner(4, 8, 5, "auto");
+  finger_runner runner(4, 8, 5, "auto");
   const std::size_t index = tendonfmu_find_parameter(runner.finger(), "joints[1].friction.static");
   double value = 0.01;
   for (auto _ : state) {
@@ -117,8 +118,8 @@ void write_a_parameter(benchmark::State& state) {
 BENCHMARK(write_a_parameter)->Unit(benchmark::kMicrosecond);
 
 void one_directional_derivative(benchmark::State& state) {
-  Runner runner(4, 8, 5, "auto");
-  const bench_finger::Recording recording = bench_finger::motion(4, 8, 100);
+  finger_runner runner(4, 8, 5, "auto");
+  const bench_finger::made_recording recording = bench_finger::motion(4, 8, 100);
   runner.run(recording);
   double slope[4];
   tendonfmu_outputs derivative = {};

@@ -69,8 +69,8 @@ struct active_set {
   VectorXd step;
   std::vector<int> side; /* at which an unknown is held: −1 lower, 1 upper; 0 free */
 
-  active_set(const MatrixXd& h_, const VectorXd& g_, const VectorXd& x_, const scaled_box& box_)
-      : h(h_), g(g_), x(x_), box(box_), step(VectorXd::Zero(x_.size())), side(static_cast<std::size_t>(x_.size())) {
+  active_set(const MatrixXd& h, const VectorXd& g, const VectorXd& x, const scaled_box& box)
+      : h(h), g(g), x(x), box(box), step(VectorXd::Zero(x.size())), side(static_cast<std::size_t>(x.size())) {
     for (Index k = 0; k < x.size(); ++k) {
       if ((x[k] <= box.lower[k] && g[k] > 0.0) || !(box.lower[k] < box.upper[k])) {
         held(k) = -1;

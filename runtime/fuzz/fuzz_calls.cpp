@@ -11,7 +11,7 @@
 
 namespace {
 
-using promises::Bytes;
+using promises::byte_list;
 
 const char* const one_joint = R"({"format": "tendonfmu-finger-1", "name": "one",
   "joints": [{"friction": {"static": 0.004, "coulomb": 0.003, "stribeck_velocity": 0.1}}],
@@ -19,19 +19,19 @@ const char* const one_joint = R"({"format": "tendonfmu-finger-1", "name": "one",
   "bias": {"noise_time": 0.01, "noise_std": 0, "initial_variance": 0, "initial_torque": [0.1]},
   "contact": {"threshold": [0.03], "deviation": [0.002]}, "links": [{"axis": [0, 1, 0.5]}], "tip": [0.04, 0, 0]})";
 
-class Session {
+class call_session {
  public:
-  Session(FuzzedDataProvider& data, const Bytes& image)
+  call_session(FuzzedDataProvider& data, const byte_list& image)
       : data_(data), finger_(tendonfmu_create(image.data(), image.size(), nullptr, 0)) {
     PROMISE(finger_ != nullptr);
     kept_ = promises::saved(finger_);
   }
-  ~Session() { tendonfmu_destroy(finger_); }
-  Session(const Session&) = delete;
-  Session& operator=(const Session&) = delete;
+  ~call_session() { tendonfmu_destroy(finger_); }
+  call_session(const call_session&) = delete;
+  call_session& operator=(const call_session&) = delete;
 
   void call() {
-    const Bytes before = promises::saved(finger_);
+    const byte_list before = promises::saved(finger_);
     rows_taken_ = 0;
     const tendonfmu_status status = one_call();
     if (status != TENDONFMU_OK) {
@@ -112,7 +112,7 @@ class Session {
     for (std::size_t k = 1; k <= samples; ++k) {
       time[k] = time[k - 1] + 0.01 * number();
     }
-    promises::Outputs outputs(finger_, samples);
+    promises::output_room outputs(finger_, samples);
     const tendonfmu_outputs view = outputs.view();
     const tendonfmu_status status = tendonfmu_run(finger_, samples, time.data(), &all, &view, &rows_taken_);
     PROMISE(rows_taken_ <= samples);
@@ -148,7 +148,7 @@ class Session {
 
   // a saved state with some bytes changed, half the time under a checksum that fits
   tendonfmu_status restore_damaged() {
-    Bytes bytes = kept_;
+    byte_list bytes = kept_;
     for (int i = data_.ConsumeIntegralInRange(1, 4); i > 0; --i) {
       if (data_.ConsumeBool()) {
         bytes[data_.ConsumeIntegralInRange<std::size_t>(0, bytes.size() - 1)] = data_.ConsumeIntegral<unsigned char>();
@@ -169,7 +169,7 @@ class Session {
 
   tendonfmu_status derive() {
     const tendonfmu_inputs direction = inputs(1);
-    promises::Outputs derivative(finger_, 1);
+    promises::output_room derivative(finger_, 1);
     const tendonfmu_outputs view = derivative.view();
     return tendonfmu_get_directional_derivative(finger_, &direction, &view);
   }
@@ -181,7 +181,7 @@ class Session {
 
   FuzzedDataProvider& data_;
   tendonfmu_finger* finger_;
-  Bytes kept_;
+  byte_list kept_;
   std::vector<double> force_, position_, angle_, velocity_;
   std::size_t rows_taken_ = 0;
 };
@@ -189,11 +189,11 @@ class Session {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
-  static const Bytes images[] = {test_finger::image(), test_finger::image(one_joint),
-                                 test_finger::image(test_finger::every_key()),
-                                 test_finger::image(test_finger::every_effect())};
+  static const byte_list images[] = {test_finger::image(), test_finger::image(one_joint),
+                                     test_finger::image(test_finger::every_key()),
+                                     test_finger::image(test_finger::every_effect())};
   FuzzedDataProvider data(bytes, size);
-  Session session(data, data.PickValueInArray({&images[0], &images[1], &images[2], &images[3]})[0]);
+  call_session session(data, data.PickValueInArray({&images[0], &images[1], &images[2], &images[3]})[0]);
   while (data.remaining_bytes() > 0) {
     session.call();
   }

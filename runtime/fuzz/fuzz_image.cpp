@@ -56,7 +56,7 @@ extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t s
 }
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  const promises::Bytes image(data, data + size);
+  const promises::byte_list image(data, data + size);
   char message[400] = "";
   const std::size_t memory = tendonfmu_memory_size(image.data(), size);
   if (size == 0) {

@@ -19,7 +19,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   if (block) {
     const auto* bytes = static_cast<const unsigned char*>(block);
-    const promises::Bytes image(bytes, bytes + block_size);
+    const promises::byte_list image(bytes, bytes + block_size);
     PROMISE(tendonfmu_check_image(image.data(), image.size(), message, sizeof message) == TENDONFMU_OK);
     tendonfmu_finger* finger = tendonfmu_create(image.data(), image.size(), nullptr, 0);
     PROMISE(finger != nullptr); /* what the reader accepts, the core accepts */

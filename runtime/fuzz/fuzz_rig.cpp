@@ -13,8 +13,8 @@ extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, st
 
 namespace {
 
-using Json = nlohmann::json;
-using Clock = std::chrono::steady_clock;
+using json_tree = nlohmann::json;
+using steady_clock = std::chrono::steady_clock;
 
 constexpr double longest_settle = 0.003;         // s: work for nothing
 constexpr std::chrono::seconds patience{2};      // no more calls after that
@@ -39,8 +39,8 @@ bool moved(const tendonfmu_plant* plant, tendonfmu_plant_status status) {
   return status == TENDONFMU_PLANT_OK;
 }
 
-promises::Bytes saved_plant(const tendonfmu_plant* plant) {
-  promises::Bytes bytes(tendonfmu_plant_state_size(plant));
+promises::byte_list saved_plant(const tendonfmu_plant* plant) {
+  promises::byte_list bytes(tendonfmu_plant_state_size(plant));
   PROMISE(tendonfmu_plant_save_state(plant, bytes.data(), bytes.size()) == TENDONFMU_PLANT_OK);
   return bytes;
 }
@@ -71,20 +71,20 @@ void signals_are_finite(const tendonfmu_plant* plant) {
 }
 
 /* A few samples with a push; a failed call changes nothing, a restored state goes the same way. */
-void can_be_moved(tendonfmu_plant* plant, Clock::time_point begin) {
+void can_be_moved(tendonfmu_plant* plant, steady_clock::time_point begin) {
   const tendonfmu_plant_inputs push = {nullptr, 0.5, {0.1, -0.2, 0.3}};
   for (int k = 1; k <= 4; ++k) {
-    if (Clock::now() - begin > patience) {
+    if (steady_clock::now() - begin > patience) {
       return;
     }
     if (k == 2) {
       PROMISE(tendonfmu_plant_set_inputs(plant, &push) == TENDONFMU_PLANT_OK);
     }
-    const promises::Bytes before = saved_plant(plant);
+    const promises::byte_list before = saved_plant(plant);
     const double time = tendonfmu_plant_get_time(plant);
-    const Clock::time_point call = Clock::now();
+    const steady_clock::time_point call = steady_clock::now();
     const bool good = moved(plant, tendonfmu_plant_advance(plant, 1e-3 * k));
-    PROMISE(Clock::now() - call < longest_call);
+    PROMISE(steady_clock::now() - call < longest_call);
     if (!good) {
       PROMISE(tendonfmu_plant_get_time(plant) == time);
       PROMISE(saved_plant(plant) == before);
@@ -92,10 +92,10 @@ void can_be_moved(tendonfmu_plant* plant, Clock::time_point begin) {
     }
     signals_are_finite(plant);
   }
-  const promises::Bytes here = saved_plant(plant);
-  promises::Bytes ends[2];
-  for (promises::Bytes& end : ends) {
-    if (Clock::now() - begin > patience) {
+  const promises::byte_list here = saved_plant(plant);
+  promises::byte_list ends[2];
+  for (promises::byte_list& end : ends) {
+    if (steady_clock::now() - begin > patience) {
       return;
     }
     PROMISE(tendonfmu_plant_restore_state(plant, here.data(), here.size()) == TENDONFMU_PLANT_OK);
@@ -112,7 +112,7 @@ void can_be_used(const std::string& text) {
   tendonfmu_plant* plant = tendonfmu_plant_create(text.data(), text.size(), message, sizeof message);
   PROMISE(plant != nullptr); /* it was accepted before */
   for (const int integrator : {TENDONFMU_PLANT_CVODE, TENDONFMU_PLANT_FIXED_STEP}) {
-    const Clock::time_point begin = Clock::now();
+    const steady_clock::time_point begin = steady_clock::now();
     tendonfmu_plant_settings settings;
     PROMISE(tendonfmu_plant_reset(plant) == TENDONFMU_PLANT_OK);
     PROMISE(tendonfmu_plant_get_settings(plant, &settings) == TENDONFMU_PLANT_OK);
@@ -121,7 +121,7 @@ void can_be_used(const std::string& text) {
     settings.step = 1e-3;
     PROMISE(tendonfmu_plant_set_settings(plant, &settings) == TENDONFMU_PLANT_OK);
     const bool good = moved(plant, tendonfmu_plant_initialise(plant));
-    PROMISE(Clock::now() - begin < longest_call);
+    PROMISE(steady_clock::now() - begin < longest_call);
     PROMISE(tendonfmu_plant_is_initialised(plant) == good);
     if (!good) {
       continue;
@@ -135,7 +135,7 @@ void can_be_used(const std::string& text) {
 // --- mutations of JSON ---
 
 /* A value somewhere within `value`. */
-Json* anywhere(Json* value, std::mt19937& random) {
+json_tree* anywhere(json_tree* value, std::mt19937& random) {
   while (value->is_structured() && !value->empty() && random() % 12) {
     auto item = value->begin();
     std::advance(item, static_cast<std::ptrdiff_t>(random() % value->size()));
@@ -144,7 +144,7 @@ Json* anywhere(Json* value, std::mt19937& random) {
   return value;
 }
 
-void change_number(Json* value, std::mt19937& random) {
+void change_number(json_tree* value, std::mt19937& random) {
   const double special[] = {0.0,  -0.0, 1.0, -1.0, 1e-320, 5e-324, 1e-300, 1e-12, 1e-6, 0.05,
                             10.0, 1e3,  1e6, 1e9,  1e15,   1e300,  -1e300, 2.0,   3.0,  9007199254740993.0};
   const double x = value->get<double>();
@@ -157,7 +157,7 @@ void change_number(Json* value, std::mt19937& random) {
   }
 }
 
-void change(Json* value, std::mt19937& random) {
+void change(json_tree* value, std::mt19937& random) {
   if (value->is_number() && random() % 8) {
     return change_number(value, random);
   }
@@ -170,15 +170,26 @@ void change(Json* value, std::mt19937& random) {
   if (value->is_array() && !value->empty() && random() % 4) {
     const std::size_t k = random() % value->size();
     if (random() % 2) {
-      value->push_back(Json((*value)[k]));
+      value->push_back(json_tree((*value)[k]));
     } else {
       value->erase(k);
     }
     return;
   }
-  const Json other[] = {
-      nullptr,       true,           0,         1,     -1.5, "", "sine", "link", "capstan", "fixed_step",
-      Json::array(), Json::object(), {0, 0, 0}, {1, 2}};
+  const json_tree other[] = {nullptr,
+                             true,
+                             0,
+                             1,
+                             -1.5,
+                             "",
+                             "sine",
+                             "link",
+                             "capstan",
+                             "fixed_step",
+                             json_tree::array(),
+                             json_tree::object(),
+                             {0, 0, 0},
+                             {1, 2}};
   *value = other[random() % std::size(other)];
 }
 
@@ -187,14 +198,14 @@ void change(Json* value, std::mt19937& random) {
 extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t max_size,
                                                unsigned seed) {
   std::mt19937 random(seed);
-  Json rig = Json::parse(data, data + size, nullptr, false);
+  json_tree rig = json_tree::parse(data, data + size, nullptr, false);
   if (rig.is_discarded() || !rig.is_structured() || random() % 20 == 0) {
     return LLVMFuzzerMutate(data, size, max_size);
   }
   for (unsigned k = 1 + random() % 3; k > 0; --k) {
     change(anywhere(&rig, random), random);
   }
-  const std::string text = rig.dump(-1, ' ', false, Json::error_handler_t::replace);
+  const std::string text = rig.dump(-1, ' ', false, json_tree::error_handler_t::replace);
   if (text.size() > max_size) {
     return LLVMFuzzerMutate(data, size, max_size);
   }
@@ -217,8 +228,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (!is_small) {
     return 0;
   }
-  Json rig = Json::parse(text);
-  rig["settle"] = std::min(rig.value("settle", Json()).is_number() ? rig["settle"].get<double>() : 1.0, longest_settle);
+  json_tree rig = json_tree::parse(text);
+  rig["settle"] =
+      std::min(rig.value("settle", json_tree()).is_number() ? rig["settle"].get<double>() : 1.0, longest_settle);
   can_be_used(rig.dump());
   return 0;
 }

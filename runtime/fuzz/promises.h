@@ -19,24 +19,24 @@
 
 namespace promises {
 
-using Bytes = std::vector<unsigned char>;
+using byte_list = std::vector<unsigned char>;
 
-inline Bytes saved(const tendonfmu_finger* finger) {
-  Bytes bytes(tendonfmu_state_size(finger));
+inline byte_list saved(const tendonfmu_finger* finger) {
+  byte_list bytes(tendonfmu_state_size(finger));
   PROMISE(tendonfmu_save_state(finger, bytes.data(), bytes.size()) == TENDONFMU_OK);
   return bytes;
 }
 
 // Room for outputs of some samples; a check that the real ones are finite, the flags 0 or 1, the link one of the
 // finger.
-struct Outputs {
+struct output_room {
   std::size_t samples, joints, tendons;
   int last_link;
   std::vector<double> real;
   std::vector<unsigned char> flags;
   std::vector<int> links;
 
-  Outputs(const tendonfmu_finger* finger, std::size_t count)
+  output_room(const tendonfmu_finger* finger, std::size_t count)
       : samples(count),
         joints(samples * tendonfmu_joint_count(finger)),
         tendons(samples * tendonfmu_tendon_count(finger)),
@@ -80,7 +80,7 @@ struct Outputs {
 };
 
 inline void outputs_are_finite(const tendonfmu_finger* finger) {
-  Outputs outputs(finger, 1);
+  output_room outputs(finger, 1);
   const tendonfmu_outputs view = outputs.view();
   PROMISE(tendonfmu_get_outputs(finger, &view) == TENDONFMU_OK);
   outputs.check();
@@ -109,7 +109,7 @@ inline void parameters_are_sound(const tendonfmu_finger* finger) {
 }
 
 // A finger moved through some samples, back and forth and at rest, by each kinematics source.
-inline void finger_can_be_used(const Bytes& image) {
+inline void finger_can_be_used(const byte_list& image) {
   char message[400] = "";
   tendonfmu_finger* finger = tendonfmu_create(image.data(), image.size(), message, sizeof message);
   PROMISE((finger == nullptr) == (std::strlen(message) > 0));
@@ -126,7 +126,7 @@ inline void finger_can_be_used(const Bytes& image) {
       const std::vector<double> force(m, 10.0 + k), position(m, 0.003 + 1e-4 * sign * k);
       const std::vector<double> angle(n, 0.01 * sign * k), velocity(n, sign);
       const tendonfmu_inputs inputs = {force.data(), position.data(), angle.data(), velocity.data()};
-      const Bytes before = saved(finger);
+      const byte_list before = saved(finger);
       const tendonfmu_status status =
           k ? tendonfmu_step(finger, 0.01 * k, &inputs) : tendonfmu_initialise(finger, 0.0, &inputs);
       PROMISE(status == TENDONFMU_OK || status == TENDONFMU_BAD_SAMPLE); /* numbers at the ends may overflow */
@@ -138,7 +138,7 @@ inline void finger_can_be_used(const Bytes& image) {
       outputs_are_finite(finger);
     }
   }
-  const Bytes bytes = saved(finger);
+  const byte_list bytes = saved(finger);
   PROMISE(tendonfmu_reset(finger) == TENDONFMU_OK);
   PROMISE(tendonfmu_restore_state(finger, bytes.data(), bytes.size()) == TENDONFMU_OK);
   PROMISE(saved(finger) == bytes);

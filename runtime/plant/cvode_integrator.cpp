@@ -20,6 +20,7 @@
 /* The linker gives this to CVODE for pow() (cmake/Sundials.cmake), which takes its step sizes by it: the same bits on
  * every machine of one architecture. CVODE's bases are not negative. It stands here, and in no file of its own, so that
  * it is there before the archives of SUNDIALS ask for it. */
+// NOLINTNEXTLINE(readability-identifier-naming): the name that the linker asks for
 extern "C" double __wrap_pow(double base, double exponent);
 extern "C" double __wrap_pow(double base, double exponent) {
   if (base != base) {

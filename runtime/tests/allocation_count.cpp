@@ -15,11 +15,13 @@ long counted_allocations() {
 }
 
 extern "C" {
+// NOLINTBEGIN(readability-identifier-naming): names of glibc
 void* __libc_malloc(size_t);
 void* __libc_calloc(size_t, size_t);
 void* __libc_realloc(void*, size_t);
 void* __libc_memalign(size_t, size_t);
 void __libc_free(void*);
+// NOLINTEND(readability-identifier-naming)
 void* malloc(size_t size) {
   ++allocations;
   return __libc_malloc(size);
