@@ -2,7 +2,17 @@
 
 #if defined(COUNTS_ALLOCATIONS)
 
+namespace {
 long allocations = 0;
+}
+
+void count_allocations_anew() {
+  allocations = 0;
+}
+
+long counted_allocations() {
+  return allocations;
+}
 
 extern "C" {
 // NOLINTBEGIN(readability-identifier-naming): names of glibc

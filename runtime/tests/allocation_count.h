@@ -14,6 +14,8 @@
 
 #if defined(__GLIBC__) && !defined(UNDER_SANITIZER)
 #define COUNTS_ALLOCATIONS 1
-// calls of malloc, calloc, realloc, aligned_alloc and free since it was set to 0
-extern long allocations;
+// Functions, not a variable: the compiler takes malloc to change no variable of the program.
+void count_allocations_anew();
+// calls of malloc, calloc, realloc, aligned_alloc and free since then
+long counted_allocations();
 #endif

@@ -6,22 +6,22 @@
 namespace {
 
 using namespace tendonfmu::plant;
-using two = dual<2>;
+using Two = dual<2>;
 
-two along(double value, int direction) {
-  two x(value);
+Two along(double value, int direction) {
+  Two x(value);
   x.slope[static_cast<std::size_t>(direction)] = 1.0;
   return x;
 }
 
-void expect(const two& found, double value, double by_first, double by_second) {
+void expect(const Two& found, double value, double by_first, double by_second) {
   EXPECT_DOUBLE_EQ(found.value, value);
   EXPECT_DOUBLE_EQ(found.slope[0], by_first);
   EXPECT_DOUBLE_EQ(found.slope[1], by_second);
 }
 
 TEST(Dual, KnowsTheRulesOfDerivatives) {
-  const two x = along(1.5, 0), y = along(-0.7, 1);
+  const Two x = along(1.5, 0), y = along(-0.7, 1);
   expect(x + y, 0.8, 1.0, 1.0);
   expect(x - y, 2.2, 1.0, -1.0);
   expect(-x, -1.5, -1.0, 0.0);
@@ -33,9 +33,9 @@ TEST(Dual, KnowsTheRulesOfDerivatives) {
 }
 
 TEST(Dual, AddsInPlace) {
-  two sum = along(1.0, 0);
+  Two sum = along(1.0, 0);
   sum += along(2.0, 1);
-  sum -= two(0.5);
+  sum -= Two(0.5);
   expect(sum, 2.5, 1.0, 1.0);
   sum += sum;  // also to itself
   expect(sum, 5.0, 2.0, 2.0);
@@ -51,7 +51,7 @@ TEST(Dual, SineAndCosineTurnIntoEachOther) {
 TEST(Dual, FollowsALongFormula) {
   const auto f = [](auto x, auto y) { return square_root(x * x + sine_cosine(x * y).sine) / y; };
   const double x = 1.3, y = 0.6, h = 1e-6;
-  const two found = f(along(x, 0), along(y, 1));
+  const Two found = f(along(x, 0), along(y, 1));
   EXPECT_DOUBLE_EQ(found.value, f(x, y));
   EXPECT_NEAR(found.slope[0], (f(x + h, y) - f(x - h, y)) / (2 * h), 1e-9);
   EXPECT_NEAR(found.slope[1], (f(x, y + h) - f(x, y - h)) / (2 * h), 1e-9);

@@ -21,7 +21,7 @@ inline Matrix rows_of(const double* numbers, std::size_t n, std::size_t p) {
 
 class Filter {
  public:
-  Filter(const tendonfmu::estimation::KalmanSettings& settings, const std::vector<double>& start, double prior_std)
+  Filter(const tendonfmu::estimation::kalman_settings& settings, const std::vector<double>& start, double prior_std)
       : s(settings),
         p(static_cast<Eigen::Index>(s.unknowns)),
         n(static_cast<Eigen::Index>(s.joints)),
@@ -43,7 +43,7 @@ class Filter {
     state.tail(n) = rows_of(bias, s.joints, 1);
   }
 
-  void take(const tendonfmu::estimation::KalmanSample& sample) {
+  void take(const tendonfmu::estimation::kalman_sample& sample) {
     Matrix transition = Matrix::Identity(p + n, p + n), rows(n, p + n);
     for (Eigen::Index i = 0; i < p; ++i) {
       const long double scale = s.scale[static_cast<std::size_t>(i)];
@@ -67,7 +67,7 @@ class Filter {
     covariance = kept * covariance * kept.transpose() + sample.noise * gain * gain.transpose();
   }
 
-  tendonfmu::estimation::KalmanSettings s;
+  tendonfmu::estimation::kalman_settings s;
   Eigen::Index p, n;
   Vector state, innovation; /* (z, b) */
   Matrix covariance, innovation_covariance;

@@ -10,13 +10,13 @@ namespace {
 
 using namespace tendonfmu::plant;
 
-struct known {
+struct Known {
   std::uint32_t counter[4], key[2], answer[4];
 };
 
 // Random123 1.09, examples/kat_vectors: philox4x32 10
 TEST(Philox, GivesThePublishedAnswers) {
-  const known all[] = {
+  const Known all[] = {
       {{0, 0, 0, 0}, {0, 0}, {0x6627e8d5, 0xe169c58d, 0xbc57ac4c, 0x9b00dbd8}},
       {{0xffffffff, 0xffffffff, 0xffffffff, 0xffffffff},
        {0xffffffff, 0xffffffff},
@@ -25,7 +25,7 @@ TEST(Philox, GivesThePublishedAnswers) {
        {0xa4093822, 0x299f31d0},
        {0xd16cfe09, 0x94fdcceb, 0x5001e420, 0x24126ea1}},
   };
-  for (const known& one : all) {
+  for (const Known& one : all) {
     std::uint32_t counter[4];
     std::copy(one.counter, one.counter + 4, counter);
     philox(counter, one.key);

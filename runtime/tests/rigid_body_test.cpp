@@ -141,16 +141,16 @@ TEST_F(RigidBody, VelocitiesAreTheGrowthOfPlaces) {
 
 // Over duals the same formulas give the same values, and slopes along a direction.
 TEST_F(RigidBody, DualsAgreeWithNumbers) {
-  using one = dual<1>;
+  using One = dual<1>;
   draw();
-  one angle[max_joints], rate[max_joints], torque[max_joints];
+  One angle[max_joints], rate[max_joints], torque[max_joints];
   for (std::size_t j = 0; j < n; ++j) {
-    angle[j] = one(q[j]);
-    rate[j] = one(speed[j]);
+    angle[j] = One(q[j]);
+    rate[j] = One(speed[j]);
   }
   angle[1].slope[0] = 1.0;
   const double acceleration[max_joints] = {3.0, -2.0, 1.0}, h = 1e-6;
-  chain_motion<one> motion;
+  chain_motion<One> motion;
   move_chain(small, angle, rate, &motion);
   inverse_dynamics(small, motion, rate, acceleration, torque);
   double before[max_joints], after[max_joints], same[max_joints];
