@@ -47,7 +47,9 @@ std::string image_guid(const nb::bytes& image, unsigned long long salt) {
 template <typename Number>
 nb::object new_array(const std::vector<std::size_t>& shape, void** data) {
   std::size_t count = 1;
-  for (const std::size_t length : shape) count *= length;
+  for (const std::size_t length : shape) {
+    count *= length;
+  }
   auto values = std::make_unique<std::vector<Number>>(count);
   *data = values->data();
   nb::capsule owner(values.release(), [](void* p) noexcept { delete static_cast<std::vector<Number>*>(p); });
@@ -123,8 +125,9 @@ class bound_finger {
   void restore_state(const nb::bytes& bytes) { check(tendonfmu_restore_state(handle_, bytes.data(), bytes.size())); }
 
   // Name of each output to its rows.
-  nb::dict run(const time_row& time, const std::optional<number_rows>& force, const std::optional<number_rows>& position,
-               const std::optional<number_rows>& angle, const std::optional<number_rows>& velocity, bool with_parts) {
+  nb::dict run(const time_row& time, const std::optional<number_rows>& force,
+               const std::optional<number_rows>& position, const std::optional<number_rows>& angle,
+               const std::optional<number_rows>& velocity, bool with_parts) {
     const std::size_t samples = time.shape(0), n = joints(), m = tendons();
     const tendonfmu_inputs inputs = {
         rows(force, samples, m, "tendon_force"), rows(position, samples, m, "tendon_position"),
@@ -146,6 +149,7 @@ class bound_finger {
     }
     if (status != TENDONFMU_OK) {
       throw nb::value_error(("row " + std::to_string(done + 1) + ": " + tendonfmu_last_error(handle_)).c_str());
+    }
     return arrays;
   }
 

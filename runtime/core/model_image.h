@@ -34,10 +34,6 @@
 extern "C" {
 #endif
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 enum {
   MODEL_VERSION = 1,
   MODEL_HEADER_BYTES = 56,
