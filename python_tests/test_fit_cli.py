@@ -229,7 +229,7 @@ def test_ctrl_c_leaves_the_best_so_far_and_resume_goes_on(
     assert sys.platform != "linux" or spent_by_ended_ones() - before - until_then < 5.0
     assert method == "ekf" or b"cost" in seen + rest
     last = rest.decode().strip().splitlines()[-1]
-    assert "tendonfmu: interrupted; the best so far is in fitted.unfinished.json; --resume" in last
+    assert "tendonfmu: interrupted; the best estimate so far is in fitted.unfinished.json; continue with --resume" in last
     assert sorted(path.name for path in tmp_path.iterdir()) == ["fitted.unfinished.json"]
     left = json.loads((tmp_path / "fitted.unfinished.json").read_text())
     assert left["format"] == "tendonfmu-fit-unfinished-1" and len(left["z"]) == len(left["unknowns"]) == 468
