@@ -127,7 +127,7 @@ def evidence_line(search: Search, line: Line, parts: Sequence[FreePart], time: f
 
 
 def _sample_steps(cells: Cells, parts: Sequence[FreePart]) -> tuple[Numbers, Numbers, Index]:
-    """Return the time since the previous counted sample (s) and the mean force (N), [N] each, and the starts of parts."""
+    """Return [N] the time since the previous counted sample (s), [N] the mean force (N), and the starts of parts."""
     step = np.concatenate([part.seconds[rows] for part, rows in zip(parts, cells.rows, strict=True)])
     force = np.concatenate([part.mean_force[rows] for part, rows in zip(parts, cells.rows, strict=True)])
     lengths = [len(rows) for rows in cells.rows if len(rows)]

@@ -86,7 +86,7 @@ def _flat(value: Any) -> str:
 
 
 def _counted(tuning: ContactTuning, alarms: int, hours: float | None = None) -> dict[str, Any]:
-    """Return alarms, their rate (1/h) with its two-sided 95 % interval, and the upper limit at the confidence asked for."""
+    """Return alarms, their rate (1/h) with its two-sided 95 % interval, and its limit at the confidence asked for."""
     span = tuning.hours_ if hours is None else hours
     found = intervals.rate(alarms, span)
     return {
