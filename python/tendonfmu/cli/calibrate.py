@@ -58,11 +58,13 @@ def calibrate(
 ) -> None:
     """Make a tuned FMU from free motion: find missing effects, fit all numbers, tune contact detection.
 
-    DIR gets the page calibration.html, finger.json, finger.fmu, calibration.json and the diagnosis. A repeated call
-    with the same files continues where the previous one ended.
+    DIR gets the page calibration.html, finger.json, finger.fmu,
+    calibration.json and the diagnosis. A repeated call with the same files
+    continues where the previous one ended.
 
-    --test and --pushes take several files at once after the recordings. With --from the structure of the earlier model
-    stays and its numbers are the prior.
+    --test and --pushes take several files at once after the recordings. With
+    --from the structure of the earlier model stays and its numbers are the
+    prior.
     """
     from tendonfmu.calibrate import Options, check_folder, text, write_calibration
     from tendonfmu.calibrate import calibrate as run

@@ -41,8 +41,10 @@ def campaign(
 ) -> None:
     """Diagnose many recordings whose cause is known, and count how often the answer is right.
 
-    Each case writes its row when it ends. After an interruption the same command continues where it stopped.
-    All rows together are DIR/campaign.parquet. Each rate comes with its number of cases and its 95 % interval.
+    Each case writes its row when it ends. After an interruption the same
+    command continues where it stopped. All rows together are
+    DIR/campaign.parquet. Each rate comes with its number of cases and its 95 %
+    interval.
     """
     from tendonfmu.diagnose import (
         EFFECT_HEADINGS,

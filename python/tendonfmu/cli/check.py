@@ -28,8 +28,8 @@ def check(
 ) -> None:
     """Validate a finger description or a rig and describe it. Exit status 1 if it is refused.
 
-    With recordings: report whether they belong to the finger and, where they do not, what to write into the map of
-    columns. Exit status 1 if one does not.
+    With recordings: report whether they belong to the finger and, where they do
+    not, what to write into the map of columns. Exit status 1 if one does not.
     """
     from tendonfmu.files import check_format
     from tendonfmu.model import description_findings, read_finger

@@ -47,16 +47,18 @@ def tune(
     figures: Figures = None,
     kinematics: Kinematics = 1,
     strict: Annotated[
-        bool, typer.Option("--strict", help="write no file and exit with 1 if RECORDING is too short for RATE")
+        bool, typer.Option("--strict", help="write no file and exit with 1 if FREE is too short for RATE")
     ] = False,
     progress: Progress = None,
 ) -> None:
     """Tune contact detection on free motion for a stated rate of false alarms.
 
-    Sets noise and drift of the bias, the bounds of the detection and the standard deviation of the estimated torque.
+    Sets noise and drift of the bias, the bounds of the detection and the
+    standard deviation of the estimated torque.
 
-    With too little free motion for the rate, it tunes for the rate that the motion suffices for, and reports that rate
-    and how much more motion is needed. With --strict it exits with 1 and writes no file.
+    With too little free motion for the rate, it tunes for the rate that the
+    motion suffices for, and reports that rate and how much more motion is
+    needed. With --strict it exits with 1 and writes no file.
     """
     import warnings
 
@@ -117,8 +119,8 @@ def score(
 
     An event is a labelled contact; labels less than 100 ms apart are one event.
     It is found if an alarm begins in it and the 200 ms before it had no alarm.
-    An alarm that begins neither in an event nor in the 100 ms after one is false.
-    Every figure has its 95 % interval. Several recordings are pooled.
+    An alarm that begins neither in an event nor in the 100 ms after one is
+    false. Every figure has its 95 % interval. Several recordings are pooled.
     """
     from tendonfmu.detect import check_outputs, score_recordings, score_report
     from tendonfmu.files import write_text

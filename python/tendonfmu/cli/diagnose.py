@@ -58,14 +58,17 @@ def diagnose(
 ) -> None:
     """Show what the model gets wrong, name the cause, add it to the model and measure the gain.
 
-    The given structure is fitted first: a cause is what no fit of it can explain. --test and --reference take several
-    files at once after the recordings.
+    The given structure is fitted first: a cause is what no fit of it can
+    explain. --test and --reference take several files at once after the
+    recordings.
 
-    With --reference a cause is what has changed since. The reference may have another motion, pretension or length, but
-    the same motion tells most. Several recordings of now, in order of time, show how the change grows.
+    With --reference a cause is what has changed since. The reference may have
+    another motion, pretension or length, but the same motion tells most.
+    Several recordings of now, in order of time, show how the change grows.
 
-    DIR gets the page diagnosis.html, diagnosis.json, figures, and the model with its causes, extended.json and
-    extended.fmu. With --history it gets the page history.html, history.csv and history.png: a line per recording and
+    DIR gets the page diagnosis.html, diagnosis.json, figures, and the model
+    with its causes, extended.json and extended.fmu. With --history it gets the
+    page history.html, history.csv and history.png: a line per recording and
     cause, and how fast each cause grows.
     """
     from tendonfmu.diagnose import diagnose as find

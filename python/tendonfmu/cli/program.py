@@ -317,9 +317,7 @@ def fit(
         bool | None,
         typer.Option(help="count correlated residuals as fewer samples \\[default: with --from]"),
     ] = None,
-    passes: Annotated[
-        int | None, typer.Option(min=1, help="most passes over the data \\[default: 60; ekf: 2]")
-    ] = None,
+    passes: Annotated[int | None, typer.Option(min=1, help="most passes over the data \\[default: 60; ekf: 2]")] = None,
     tolerance: Annotated[float, typer.Option(min=1e-9, max=0.5, help="batch: last step, in standard errors")] = 0.3,
     drift: Annotated[float, typer.Option(min=0.0, max=1.0, help="ekf: relative variance of the numbers per s")] = 0.0,
     uncertainty: Annotated[
@@ -333,8 +331,9 @@ def fit(
 ) -> None:
     """Estimate the numbers of a finger from recordings of free motion, with their uncertainty.
 
-    PATTERN is a path of the description, such as tendons[*].edge_friction[2]*.viscous; * stands for anything. Ctrl-C
-    saves the best estimate so far in FITTED.unfinished.json.
+    PATTERN is a path of the description, such as
+    tendons[*].edge_friction[2]*.viscous; * stands for anything. Ctrl-C saves
+    the best estimate so far in FITTED.unfinished.json.
     """
     from tendonfmu.estimate import FitWarning, FrictionFit, check_outputs, fit_report, write_unfinished
     from tendonfmu.files import write_text

@@ -78,7 +78,13 @@ def chapter_lines(story: Story, chapter: str) -> Iterator[str]:
 
 
 def file_lines(story: Story) -> Iterator[str]:
-    """Yield a line for each file that the demo wrote, with its content."""
+    """Yield a line for each file that the demo wrote, with its content.
+
+    Parameters
+    ----------
+    story
+        The demo.
+    """
     for path, what in story.files.items():
         yield f"  {path}  {what}"
 

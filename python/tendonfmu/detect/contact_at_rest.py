@@ -67,7 +67,7 @@ class Rest:
 
 @dataclass(frozen=True)
 class Bounds:
-    """Bounds of a rest, [n] each (N·m): contact.rest.threshold, creep and innovation.threshold."""
+    """Bounds of a rest, [n] each (N·m): contact.rest.threshold, creep in the first second, and innovation.threshold."""
 
     threshold: Numbers
     creep: Numbers
@@ -93,7 +93,23 @@ def learn_rest(
 ) -> tuple[RestRule | None, list[str]]:
     """Learn the rule for a rate of false alarms per hour of rest.
 
-    Returns the rule or None, and sentences: why there is none, or which rate it supports.
+    Parameters
+    ----------
+    data
+        Finger description.
+    parts
+        Free motion.
+    kinematics
+        1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
+    rate, confidence
+        Highest rate of false alarms (1/h of rest), and the probability that it is not exceeded.
+
+    Returns
+    -------
+    rule : RestRule or None
+        The rule; None if the motion does not allow one.
+    sentences : list of str
+        Why there is no rule, or which rate it supports.
     """
     if not all("tendon_position" in part.arrays for part in parts):
         return None, [_left_out("there are no tendon positions")]

@@ -186,7 +186,13 @@ def with_uncertainty(
 
 
 def description_text(data: Mapping[str, Any]) -> str:
-    """Return a description as JSON with each law, or list of numbers, on one line."""
+    """Return a description as JSON with each law, or list of numbers, on one line.
+
+    Parameters
+    ----------
+    data
+        Parsed description.
+    """
     return _laid_out(data, "") + "\n"
 
 

@@ -79,7 +79,13 @@ class Unknown:
 
 
 def unknowns(data: Mapping[str, Any]) -> list[Unknown]:
-    """List the numbers that a fit estimates, without the biases, which are tracked."""
+    """List the numbers that a fit estimates, without the biases, which are tracked.
+
+    Parameters
+    ----------
+    data
+        Finger description.
+    """
     found = [number for effect in effects(data) for number in _numbers_of(effect)]
     for j, joint in enumerate(data["joints"], start=1):
         stiffness = (joint.get("cover") or {}).get("stiffness")

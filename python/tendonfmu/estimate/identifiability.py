@@ -50,6 +50,7 @@ class Verdict:
 
     @property
     def identifiable(self) -> bool:
+        """Whether the relative standard error is at most `LIMIT`."""
         return not self.cause
 
 
@@ -203,6 +204,11 @@ def _combinations(
 
 def counts_by_kind(verdicts: Sequence[Verdict]) -> dict[tuple[str, str], tuple[int, int, int]]:
     """Count the verdicts by kind and key of the number.
+
+    Parameters
+    ----------
+    verdicts
+        Verdicts of a judgement.
 
     Returns
     -------

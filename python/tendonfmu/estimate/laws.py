@@ -26,7 +26,17 @@ _LAST = {"coulomb": "coulomb", "drop": "static", "rate": "stribeck_velocity", "v
 
 @dataclass(frozen=True)
 class LawCurve:
-    """Friction of one side of a law along its abscissa, [N] each: fitted, lower and upper end of the band, start."""
+    """Friction of one side of a law, with its confidence band.
+
+    Attributes
+    ----------
+    fitted
+        [N] friction with the fitted numbers, in the unit of the law.
+    low, high
+        [N] ends of the band.
+    start
+        [N] friction with the numbers of the start.
+    """
 
     fitted: Numbers
     low: Numbers
@@ -153,10 +163,24 @@ def _mixed(effect: Effect, sign: int, speed: Numbers, weights: Numbers) -> Numbe
 
 
 def asymmetric(effect: Effect) -> bool:
-    """Tell whether any law of an effect has two sides."""
+    """Tell whether any law of an effect has two sides.
+
+    Parameters
+    ----------
+    effect
+        Friction effect.
+    """
     return any(law.get("positive") is not None for law in effect.laws)
 
 
 def numbers_of(effect: Effect, report: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Return the entries of the report for the estimated numbers of an effect."""
+    """Return the entries of the report for the estimated numbers of an effect.
+
+    Parameters
+    ----------
+    effect
+        Friction effect.
+    report
+        Report "tendonfmu-fit-1".
+    """
     return [entry for entry in report["parameters"] if entry["path"].startswith(f"{effect.path}.")]

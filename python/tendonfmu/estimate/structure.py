@@ -153,7 +153,13 @@ def _numbered(finger: FingerDescription, numbers: Sequence[Unknown]) -> list[Unk
 
 
 def own_copy(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Copy a description so that no two laws are the same object, as in JSON data built by a program."""
+    """Copy a description so that no two laws are the same object, as in JSON data built by a program.
+
+    Parameters
+    ----------
+    data
+        Parsed description.
+    """
     copied: dict[str, Any] = json.loads(json.dumps(data))
     return copied
 
@@ -405,7 +411,25 @@ def _value(data: Any, path: str) -> float:
 
 
 def get_number(data: Any, path: str) -> Any:
-    """Return a number of a parsed description by its path, indices from 1; raises KeyError if it is absent."""
+    """Return a number of a parsed description.
+
+    Parameters
+    ----------
+    data
+        Parsed description.
+    path
+        Path of the number, such as `tendons[1].edge_friction[2].coulomb`, indices from 1.
+
+    Returns
+    -------
+    float or None
+        The number in the unit of the description, or None where the key is null.
+
+    Raises
+    ------
+    KeyError
+        The description lacks a key of the path.
+    """
     for step in _steps(path):
         data = data[step]
     return data

@@ -86,10 +86,12 @@ class Fitted:
 
     @property
     def value(self) -> float:
+        """Fitted value in the unit of the description."""
         return self.number.value
 
     @property
     def identified(self) -> bool:
+        """Whether the standard error is at most `identifiability.LIMIT` of the value."""
         return not self.cause
 
 
