@@ -1,14 +1,14 @@
 """From recordings of free motion to a tuned finger: structure, numbers, thresholds, and their errors.
 
-Example::
-
-    from tendonfmu.calibrate.calibration import calibrate
-
-    found = calibrate("finger.json", ["free_10N.parquet", "free_30N.parquet"], "calibrated", pushes=["pushes.parquet"])
-    found.report["error"], found.report["detection"], found.data
-
 Its steps are those of `diagnose`, of a fit to all recordings, of `tune` and of `score`, in this order. Their results
 stay in the folder, so that a repeated call continues where the previous one ended.
+
+Examples
+--------
+>>> from tendonfmu.calibrate import calibrate
+>>> free = ["free_10N.parquet", "free_30N.parquet"]
+>>> found = calibrate("finger.json", free, "calibrated", pushes=["pushes.parquet"])
+>>> found.report["error"], found.report["detection"], found.data
 """
 
 from __future__ import annotations

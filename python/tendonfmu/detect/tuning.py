@@ -1,12 +1,12 @@
 """Tunes contact detection on free motion for a stated rate of false alarms, with an interface like scikit-learn's.
 
-Example::
-
-    tuning = ContactTuning("fitted.json", false_alarms_per_hour=6).tune(["free_10N.parquet", "free_40N.parquet"])
-    tuning.description_
-
 Bounds are chosen on runs without contact detection. Their alarms are counted on blocks that the bounds were not chosen
 on, and again with the tuned finger as it will run.
+
+Examples
+--------
+>>> tuning = ContactTuning("fitted.json", false_alarms_per_hour=6).tune(["free_10N.parquet", "free_40N.parquet"])
+>>> tuning.description_
 """
 
 from __future__ import annotations
@@ -106,40 +106,26 @@ class ContactTuning(ConstructorArguments):
     ----------
     description_
         Tuned description.
-    bias_
-        Noise of the bias.
+    bias_, deviation_
+        Noise of the bias, and standard deviation of the estimated torque.
     lines_, levels_, bounds_
         Bounds before and after scaling, and their levels, by "residual", "innovation" and "drift".
-    deviation_
-        Standard deviation of the estimated torque.
-    cells_, runs_
-        Counted time, and runs without contact detection.
-    pretensions_
-        Free motion by pretension.
-    rest_
-        Rule for contact at rest; None without enough rests.
-    sensors_
-        Rule for failing sensors (sensor_fault).
-    held_out_
-        Alarms on blocks that the bounds were not chosen on, and the upper limit of their rate (1/h).
-    loop_
-        Alarms of the finger as it runs.
-    rate_
-        Rate that it is tuned for (1/h).
-    more_minutes_
-        Time missing for the wished rate (min).
-    allowed_
-        Alarms in the recordings that the rate allows.
-    hours_
-        Counted time (h).
-    forces_
-        Lowest and highest recorded mean force (N).
+    cells_, runs_, pretensions_
+        Counted time, runs without contact detection, and free motion by pretension.
+    rest_, sensors_
+        Rules for contact at rest (None without enough rests) and for failing sensors (sensor_fault).
+    held_out_, loop_
+        Alarms on blocks that the bounds were not chosen on, with the upper limit of their rate (1/h); alarms of the
+        finger as it runs.
+    rate_, allowed_, more_minutes_
+        Rate that it is tuned for (1/h), the alarms in the recordings that it allows, and the time missing for the
+        wished rate (min).
+    hours_, forces_
+        Counted time (h), and lowest and highest recorded mean force (N).
     level_raised_
         Factor on the levels that the running finger needed.
-    warnings_
-        Sentences, each also raised as a TuneWarning.
-    seconds_
-        Time of the computation (s).
+    warnings_, seconds_
+        Sentences, each also raised as a TuneWarning, and the time of the computation (s).
     """
 
     def __init__(

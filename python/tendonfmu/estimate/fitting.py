@@ -1,13 +1,4 @@
-"""Estimates a finger's friction from contact-free motion, with an interface like that of scikit-learn.
-
-Example::
-
-    from tendonfmu.estimate.fitting import FrictionFit
-
-    fit = FrictionFit("finger.json", holdout=0.2).fit(["monday.parquet", "tuesday.parquet"])
-    fit.parameters_["tendons[1].edge_friction[2].coulomb"], fit.report_["residual"]["held_out"]["rms"]
-    fit.score("wednesday.parquet")
-"""
+"""Estimates a finger's friction from contact-free motion, with an interface like that of scikit-learn."""
 
 from __future__ import annotations
 
@@ -73,7 +64,7 @@ class FitWarning(UserWarning):
 
 
 class FrictionFit(ConstructorArguments):
-    """Estimates the numbers of a finger description.
+    """Estimates the numbers of a finger description (paper, sections V and VI).
 
     Parameters
     ----------
@@ -83,67 +74,43 @@ class FrictionFit(ConstructorArguments):
         "batch", maximum likelihood; or "ekf", the extended Kalman filter of the paper.
     kinematics
         1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
-    holdout
-        Share of the time that is not trained on, in evenly spread blocks.
-    holdout_block
-        Longest block held out (s).
+    holdout, holdout_block
+        Share of the time that is not trained on, in evenly spread blocks, and their greatest length (s).
     sides
         "given", "symmetric" (both sides of every law equal) or "asymmetric" (each side estimated separately).
-    only, fix
-        Patterns of the numbers to estimate, or not to estimate (see `estimate.structure`). One may be a string.
-    share
-        "tendons", "pulleys" or patterns of the laws that share their values.
-    prior
-        Standard deviation of the prior, in units of each number's expected magnitude.
-    scale
-        "PATTERN=VALUE": expected magnitudes that replace those of the description.
-    max_passes
-        Most passes over the data; None: 60 for "batch", 2 for "ekf".
-    tolerance
-        For "batch": length of the last step in standard errors.
-    threads
-        For "batch": threads, 0 for all cores.
+    only, fix, share
+        Patterns (`estimate.structure`) of the numbers to estimate, not to estimate, and of the laws that share their
+        values; `share` also takes "tendons" and "pulleys". A single pattern may be a string.
+    prior, scale
+        Standard deviation of the prior in units of each number's expected magnitude, and "PATTERN=VALUE": expected
+        magnitudes that replace those of the description.
+    max_passes, tolerance, threads
+        Most passes over the data (None: 60 for "batch", 2 for "ekf"). For "batch": length of the last step in standard
+        errors, and threads (0: all cores).
     uncertainty
         Whether the fitted description states the uncertainty of its friction (`contact.uncertainty`).
     parameter_drift
         For "ekf": relative variance per s with which the parameters may drift.
     effective_samples
-        Whether samples count as fewer (an effective number, `effective_number`) where the residuals are not white;
-        otherwise each counts as one. None: only with `previous`.
-    previous
-        Report of an earlier fit, or the description that it wrote. Its numbers and their errors are start and prior
-        (`previous_fit`); `prior` then applies to the numbers that it lacks.
-    change
-        With `previous`: relative standard deviation of what may have changed since.
-    start
-        File of an interrupted fit to continue.
-    progress
-        Called with a `FitProgress`; returns False to stop.
+        Whether samples count as fewer (`effective_number`) if the residuals are not white. None: only with `previous`.
+    previous, change
+        Report of an earlier fit, or the description that it wrote: its numbers and errors are start and prior (`prior`
+        applies to numbers that it lacks). And the relative standard deviation of what may have changed since.
+    start, progress
+        File of an interrupted fit to continue, and a function that gets each `FitProgress` and returns False to stop.
 
     Attributes
     ----------
-    description_
-        Fitted description.
-    parameters_, standard_errors_
-        Estimated numbers and their standard errors by path, in the units of the description.
-    covariance_
-        [p, p] covariance of `parameters_`, in their order.
-    report_
-        Report as of `tendonfmu fit --report`.
-    warnings_
-        Sentences, each also raised as a FitWarning.
-    finished_
-        Whether `fit` reached its end.
+    description_, report_, warnings_
+        Fitted description, report as of `tendonfmu fit --report`, and its warnings, also issued as FitWarning.
+    parameters_, standard_errors_, covariance_
+        Estimated numbers and standard errors by path, and [p, p] their covariance, in the units of the description.
+    finished_, unfinished_
+        Whether `fit` reached its end, and the state of an interrupted fit, else None.
     converged_, n_iter_, cost_
-        Whether and after how many iterations it converged, and the negative log likelihood with the prior.
+        Whether it converged, after how many iterations, and the negative log likelihood with the prior.
     unknowns_, z_, z_covariance_
         Unknowns of the estimation, [u] their estimate and [u, u] its covariance.
-    unfinished_
-        State of an interrupted fit, else None.
-
-    Notes
-    -----
-    The paper describes the filter in sections V and VI.
     """
 
     def __init__(
@@ -203,24 +170,17 @@ class FrictionFit(ConstructorArguments):
     def fit(
         self, recordings: Source | Sequence[Source], compare: Source | Sequence[Source] = (), *, checked: bool = False
     ) -> FrictionFit:
-        """Estimate the numbers from recordings, each with its own bias path.
+        """Estimate the numbers from recordings, each with its own bias path, and return the object itself.
 
         Ctrl-C, or `progress` returning False, leaves `finished_` False and the best estimate so far in `unfinished_`.
         After Ctrl-C the KeyboardInterrupt continues.
 
         Parameters
         ----------
-        recordings
-            Recordings of free motion, or their files.
-        compare
-            Recordings to judge only.
+        recordings, compare
+            Recordings of free motion, or their files, to train on; and recordings to judge only.
         checked
             Whether the caller has compared the recordings with the finger and reported the findings.
-
-        Returns
-        -------
-        FrictionFit
-            The object itself.
 
         Raises
         ------
@@ -351,7 +311,6 @@ class FrictionFit(ConstructorArguments):
         }
 
     def _conclude(self, learned: Learned, compared: list[FitRecording], found: list[str]) -> None:
-        """Set all learned attributes from the estimation."""
         self.unknowns_, self.z_, self.z_covariance_ = learned.estimator.unknowns, learned.z, learned.covariance
         self.description_ = with_values(self.structure_, np.asarray(learned.estimator.values(learned.z)))
         self.numbers_, self.covariance_ = judge_numbers(self.structure_, self._knowledge(learned))
@@ -412,11 +371,6 @@ class FrictionFit(ConstructorArguments):
     def predict(self, recording: Source) -> Numbers:
         """Predict the torque of a recording, before the bias learns from the sample itself.
 
-        Parameters
-        ----------
-        recording
-            Recording, or its file.
-
         Returns
         -------
         ndarray
@@ -427,18 +381,7 @@ class FrictionFit(ConstructorArguments):
         return np.asarray(prepared.target - left)
 
     def score(self, recording: Source) -> float:
-        """Compute 1 − Σ residual² / Σ (torque − mean)² of a recording.
-
-        Parameters
-        ----------
-        recording
-            Recording, or its file.
-
-        Returns
-        -------
-        float
-            Score over all joints and samples without contact; 1 is perfect.
-        """
+        """Compute 1 − Σ residual² / Σ (torque − mean)² over all joints and samples without contact; 1 is perfect."""
         prepared, left = self._left(recording)
         rows = prepared.tracked & ~np.isnan(left).any(axis=1)
         torque = prepared.target[rows]

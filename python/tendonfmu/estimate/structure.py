@@ -352,12 +352,12 @@ def _by_angle(number: Unknown) -> str:
 
 
 def _check_alike(numbers: Sequence[Unknown], owners: Sequence[int]) -> None:
-    """Check that shared numbers have the same magnitude, and that all or none have a Stribeck effect."""
+    """Check that shared numbers are of the same kind, and that all or none have a Stribeck effect."""
     for number, owner in zip(numbers, owners, strict=True):
         first = numbers[owner]
         if number.key != first.key:
             raise InputError(
-                f"--share: {number.path} and {first.path} would share a value; expected numbers of the same magnitude"
+                f"--share: {number.path} and {first.path} would share a value; expected numbers of the same kind"
             )
         if (number.with_path is None) != (first.with_path is None):
             having, lacking = (first, number) if first.with_path is None else (number, first)
