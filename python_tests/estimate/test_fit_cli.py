@@ -229,7 +229,9 @@ def test_ctrl_c_leaves_the_best_so_far_and_resume_goes_on(
     assert sys.platform != "linux" or spent_by_ended_ones() - before - until_then < 5.0
     assert method == "ekf" or b"cost" in seen + rest
     last = rest.decode().strip().splitlines()[-1]
-    assert "tendonfmu: interrupted; the best so far is in fitted.unfinished.json; --resume" in last
+    assert (
+        "tendonfmu: interrupted; the best estimate so far is in fitted.unfinished.json; continue with --resume" in last
+    )
     assert sorted(path.name for path in tmp_path.iterdir()) == ["fitted.unfinished.json"]
     left = json.loads((tmp_path / "fitted.unfinished.json").read_text())
     assert left["format"] == "tendonfmu-fit-unfinished-1" and len(left["z"]) == len(left["unknowns"]) == 468
@@ -249,4 +251,4 @@ def test_an_unfinished_file_is_no_finger(call: Call, files: tuple[Path, Path]) -
     expected = 'format = "tendonfmu-fit-unfinished-1": file of a fit; expected a finger description'
     assert f"left.unfinished.json: {expected}" in answer.err
     answer = call("fit", *files, "-o", "f.json", "--resume", "left.unfinished.json", *FIT)
-    assert answer.status == 2 and "an interrupted fit of 1 unknowns, 25 are asked for now" in answer.err
+    assert answer.status == 2 and "the interrupted fit has 1 unknowns, this fit has 25" in answer.err

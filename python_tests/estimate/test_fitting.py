@@ -463,7 +463,7 @@ def test_a_stopped_fit_is_marked_and_goes_on(tmp_path: Path) -> None:
     resumed = shared(moved_start(), start=file).fit(recording)
     assert resumed.cost_ == pytest.approx(whole.cost_, rel=1e-6)
     assert resumed.z_ == pytest.approx(whole.z_, rel=0.05)
-    with pytest.raises(InputError, match="an interrupted fit of 25 unknowns, 70 are asked for now"):
+    with pytest.raises(InputError, match="the interrupted fit has 25 unknowns, this fit has 70"):
         shared(moved_start(), start=file, share=[]).fit(recording)
 
 

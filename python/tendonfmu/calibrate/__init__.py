@@ -1,7 +1,7 @@
-"""From free motion to a tuned finger (`tendonfmu calibrate`).
+"""Makes a tuned finger from free motion (`tendonfmu calibrate`).
 
-`calibration` runs check, diagnosis, fit, tuning and score in resumable steps; `report`, `text` and `files` say and
-write what came of them.
+`calibration` runs check, diagnosis, fit, tuning and score in steps that can be resumed. `report`, `text` and `files`
+present and write the results.
 """
 
 import lazy_loader

@@ -1,12 +1,14 @@
-"""From recordings of free motion to a tuned finger: structure, numbers, thresholds, and what they are worth.
+"""From recordings of free motion to a tuned finger: structure, numbers, thresholds, and their errors.
 
-from tendonfmu.calibrate.calibration import calibrate
+Its steps are those of `diagnose`, of a fit to all recordings, of `tune` and of `score`, in this order. Their results
+stay in the folder, so that a repeated call continues where the previous one ended.
 
-found = calibrate("finger.json", ["free_10N.parquet", "free_30N.parquet"], "calibrated", pushes=["pushes.parquet"])
-found.report["error"], found.report["detection"], found.data
-
-Its steps are those of `diagnose`, of a fit to all recordings, of `tune` and of `score`, in this order; their results
-stay in the folder, so that a call that is repeated goes on where the one before ended.
+Examples
+--------
+>>> from tendonfmu.calibrate import calibrate
+>>> free = ["free_10N.parquet", "free_30N.parquet"]
+>>> found = calibrate("finger.json", free, "calibrated", pushes=["pushes.parquet"])
+>>> found.report["error"], found.report["detection"], found.data
 """
 
 from __future__ import annotations
@@ -40,9 +42,9 @@ Data = Mapping[str, Any]
 
 FORMAT = "tendonfmu-calibration-1"
 DIAGNOSIS = "diagnosis"  # folder of the full diagnosis
-HELD = Held(0.2, 10.0)  # of the recordings, for the errors, where there are no tests
+HELD = Held(0.2, 10.0)  # part of the recordings to measure the errors on if there are no tests
 NOTHING_ASKED: dict[str, Any] = {
-    "verdict": "not asked: the structure of the earlier calibration",
+    "verdict": "not done: the structure is that of the earlier calibration",
     "causes": [],
     "recordings": [],
     "tests": [],
@@ -61,8 +63,16 @@ PHASES = {
 
 @dataclass(frozen=True)
 class Calibration:
-    """data: the calibrated description. report: `calibration.json`, but for the files. diagnosis: None where it was
-    not made in this call, but repeated or not asked for.
+    """A finished calibration.
+
+    Attributes
+    ----------
+    data
+        The calibrated description.
+    report
+        `calibration.json`, without the list of files.
+    diagnosis
+        The diagnosis; None if this call did not make it, because it was resumed or not asked for.
     """
 
     data: Data
@@ -72,7 +82,19 @@ class Calibration:
 
 @dataclass(frozen=True)
 class Options:
-    """As `calibrate` takes them."""
+    """Options of `calibrate`.
+
+    Attributes
+    ----------
+    kinematics
+        1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
+    false_alarms_per_hour, confidence
+        Highest rate of false alarms (1/h), and the probability that it is not exceeded.
+    seed
+        Seed of the random numbers.
+    jobs
+        Processor cores to use; no effect on the result.
+    """
 
     kinematics: int = 1
     false_alarms_per_hour: float = 6.0
@@ -82,12 +104,12 @@ class Options:
 
     @property
     def of_alarms(self) -> dict[str, float]:
-        """What shapes the thresholds alone."""
+        """The options that affect the thresholds only."""
         return {"false_alarms_per_hour": self.false_alarms_per_hour, "confidence": self.confidence}
 
     @property
     def of_all(self) -> dict[str, int]:
-        """What shapes all results."""
+        """The options that affect all results."""
         return {"kinematics": self.kinematics, "seed": self.seed}
 
 
@@ -102,11 +124,38 @@ def calibrate(
     options: Options = Options(),
     progress: Callable[[PhaseState], None] | None = None,
 ) -> Calibration:
-    """finger: description, its structure as given. free: recordings of free motion. folder: for the results of the
-    steps and the page of the diagnosis. tests: free motion that errors are measured on; without them that is every
-    fifth stretch of 10 s of `free`, which no number is fitted to. pushes: recordings with labelled contact, to count
-    what is found. previous: description or fit report of an earlier calibration, for little data: its structure stays,
-    its numbers are the prior. progress: called with what is being done. Raises InputError.
+    """Calibrate a finger on free motion.
+
+    Parameters
+    ----------
+    finger
+        Description; its structure is kept, and extended by the causes that a diagnosis finds.
+    free
+        Recordings of free motion.
+    folder
+        Folder for the results of the steps and the page of the diagnosis.
+    tests
+        Free motion to measure the errors on. Without it, that is every fifth stretch of 10 s of `free`, which no number
+        is fitted to.
+    pushes
+        Recordings with labelled contact, to count what is found.
+    previous
+        Description or fit report of an earlier calibration, for little data: its structure stays, and its numbers are
+        the prior.
+    options
+        Further options.
+    progress
+        Called with the state of the computation.
+
+    Returns
+    -------
+    Calibration
+        Description and report.
+
+    Raises
+    ------
+    InputError
+        A file or an option does not allow a calibration.
     """
     begun = perf_counter()
     phases = Phases(PHASES, progress or (lambda state: None))
@@ -128,7 +177,7 @@ def calibrate(
 
 @dataclass(frozen=True)
 class _Start:
-    """finger: what to begin with. previous: file of an earlier calibration, or None."""
+    """The finger to begin with, and the file of an earlier calibration or None."""
 
     finger: FingerDescription
     previous: Path | None
@@ -150,7 +199,10 @@ def _start(finger: Path, previous: Path | None) -> _Start:
 
 @dataclass(frozen=True)
 class _Case:
-    """free: prepared, with held-out stretches where there are no tests. sentences: about the recordings."""
+    """The recordings of a calibration.
+
+    `free` has held-out stretches if there are no tests. `sentences` are remarks on the recordings.
+    """
 
     start: _Start
     free: list[FitRecording]
@@ -203,7 +255,7 @@ def _read(
 
 
 class _Run:
-    """One calibration: each step from the results of those before it."""
+    """One calibration: each step works on the results of the previous ones."""
 
     def __init__(self, case: _Case, folder: Path, options: Options, phases: Phases) -> None:
         self._case, self._folder, self._options, self._phases = case, folder, options, phases
@@ -212,7 +264,7 @@ class _Run:
         self.diagnosed: Diagnosis | None = None
 
     def report(self) -> tuple[dict[str, Any], Data]:
-        """And the calibrated description."""
+        """Return the report, and the calibrated description."""
         case, steps = self._case, self._steps
         if case.start.previous is None:
             page = self._folder / DIAGNOSIS / diagnosis_page.PAGE
@@ -310,7 +362,7 @@ class _Run:
         return {"finger": found.data, "error": error, "warnings": [*found.warnings, *touched]}
 
     def _refit(self) -> dict[str, Any]:
-        """The previous numbers are the prior; they stay where the new ones are no better on unseen motion."""
+        """Fit with the previous numbers as the prior; keep those if the new ones are no better on unseen motion."""
         case, options = self._case, self._options
         found = fit_again(
             case.finger,
@@ -331,8 +383,8 @@ class _Run:
         if sum(each**2 for each in after) <= sum(each**2 for each in before):
             return {"finger": found.data, "error": error, "warnings": list(found.warnings)}
         kept = (
-            f"the numbers fitted again leave {1e3 * rms_of(after):.3g} mN·m of motion that they were not fitted to, "
-            f"the earlier ones {1e3 * rms_of(before):.3g}: those are kept"
+            f"the new numbers leave an error of {1e3 * rms_of(after):.3g} mN·m on unseen motion, "
+            f"the earlier ones {1e3 * rms_of(before):.3g}: the earlier ones are kept"
         )
         return {
             "finger": case.finger.data,
@@ -341,7 +393,7 @@ class _Run:
         }
 
     def _fitted(self, lacks: dict[str, Any], name: str) -> CalibratedFit:
-        """The nominal or the extended description, to all recordings."""
+        """Fit the nominal or the extended description to all recordings."""
         case, options = self._case, self._options
         return fit_all(
             described(case.finger, lacks[name]),
@@ -363,7 +415,7 @@ class _Run:
             progress=lambda done, total: step(done / max(total, 1)),
         )
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", TuneWarning)  # they are in the report
+            warnings.simplefilter("ignore", TuneWarning)  # the report lists them
             tuning.tune([each.recording for each in (*case.free, *case.tests)], checked=True)
         return tuning_of(tuning)
 

@@ -27,21 +27,34 @@ from tendonfmu.report import fit_page
 
 FINGER, FMU, PAGE, REPORT = "finger.json", "finger.fmu", "calibration.html", "calibration.json"
 _WHAT = {
-    PAGE: "all of it, to be read in a browser",
+    PAGE: "the results, for a browser",
     FINGER: "the calibrated description",
     FMU: "the same as an FMU",
     REPORT: "the numbers of the page",
 }
-_DIAGNOSED = {f"{DIAGNOSIS}/diagnosis.html": "what the description lacked, and how that was found"}
+_DIAGNOSED = {f"{DIAGNOSIS}/diagnosis.html": "what the description lacked, and how it was found"}
 
 
 def files_of(report: Mapping[str, Any]) -> dict[str, str]:
-    """Name in the folder -> what is in it."""
+    """Return the name of each file in the folder, with its content in words."""
     return _WHAT | (_DIAGNOSED if report["structure"]["recordings"] else {})
 
 
 def check_folder(folder: Path, inputs: Sequence[Path]) -> None:
-    """Raises InputError where the folder cannot be, or a result would take the place of an input."""
+    """Check that the results can be written, before a long computation.
+
+    Parameters
+    ----------
+    folder
+        Folder for the results.
+    inputs
+        Files that no result may replace.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be written, or a result would replace an input.
+    """
     check_output_folder(folder)
     if folder.is_dir():
         for name in (FINGER, FMU, PAGE, REPORT):
@@ -49,7 +62,20 @@ def check_folder(folder: Path, inputs: Sequence[Path]) -> None:
 
 
 def write_calibration(found: Calibration, folder: Path) -> dict[Path, str]:
-    """Returns file -> what is in it, in order of use. Each appears whole or not at all, the report last."""
+    """Write the files of a calibration; each appears whole or not at all, the report last.
+
+    Parameters
+    ----------
+    found
+        Finished calibration.
+    folder
+        Folder for the results; made if missing.
+
+    Returns
+    -------
+    dict
+        Each file with its content in words, in order of use.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     write_text(folder / FINGER, description_text(dict(found.data)))
     build_fmu(folder / FINGER, folder / FMU)
@@ -62,7 +88,7 @@ def write_calibration(found: Calibration, folder: Path) -> dict[Path, str]:
 
 
 def calibration_page(report: Mapping[str, Any]) -> str:
-    """HTML text of the page."""
+    """Return the HTML text of the page."""
     tone, sentence = verdict(report)
     return fit_page.render(
         "calibration.html.jinja",

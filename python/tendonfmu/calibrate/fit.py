@@ -1,7 +1,7 @@
-"""The numbers of a diagnosed finger, fitted to all of its free motion, and what is not known of them.
+"""The numbers of a diagnosed finger, fitted to all of its free motion, with their uncertainty.
 
-A diagnosis finds the structure on a part of the recordings; its numbers are then worth more the more motion they are
-learned from. Where there is little motion, an earlier calibration is the prior.
+A diagnosis finds the structure on a part of the recordings. The numbers become more accurate with all of the motion. If
+there is little motion, an earlier calibration is the prior.
 """
 
 from __future__ import annotations
@@ -46,8 +46,10 @@ Data = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class CalibratedFit:
-    """data: the description as it runs online, with `contact.uncertainty`. events: what no friction explains in the
-    recordings, left out of the fit. warnings: sentences.
+    """A fit of all recordings.
+
+    `data` is the description as it runs online, with `contact.uncertainty`. `events` are stretches that no friction
+    explains, which the fit leaves out. `warnings` are sentences.
     """
 
     data: Data
@@ -65,9 +67,11 @@ def fit_all(
     seed: int,
     uncertainty: bool = True,
 ) -> CalibratedFit:
-    """finger: as a diagnosis extended it, with numbers to begin at. recordings: of free motion, as they were measured.
-    given: the description that says how large its numbers may be. uncertainty: whether to say what is not known of
-    them. Raises InputError.
+    """Fit a diagnosed finger to all recordings of free motion. Raises InputError.
+
+    `finger` is the description that the diagnosis extended, with its numbers as the start. `recordings` are as
+    measured. `given` is the description that gives the expected magnitudes. `uncertainty` asks for
+    `contact.uncertainty`.
     """
     data = signals.description(finger.data)
     if not unknowns(data):
@@ -89,7 +93,10 @@ def fit_all(
 
 
 def earlier_finger(given: FingerDescription, previous: Path) -> FingerDescription:
-    """The description of an earlier calibration; of a fit's report the given one with its values. Raises InputError."""
+    """Return the description of an earlier calibration; for a fit's report, the given one with its values.
+
+    Raises InputError.
+    """
     if read_json(previous, "an earlier calibration").get("format") == fit_report.FORMAT:
         return with_previous_values(given, read_previous_fit(previous))
     return read_finger(previous)
@@ -104,12 +111,12 @@ def fit_again(
     kinematics: int,
     threads: int,
 ) -> CalibratedFit:
-    """An earlier calibration fitted to new motion: its values and what is not known of them are the prior.
+    """Fit an earlier calibration to new motion; its values and their uncertainty are the prior. Raises InputError.
 
-    share: of the recordings' time that is held out. Raises InputError.
+    `share` is the share of the recordings' time that is held out.
     """
     fitting = FrictionFit(finger, previous=previous, kinematics=kinematics, holdout=share, threads=threads)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FitWarning)  # they are in the report
+        warnings.simplefilter("ignore", FitWarning)  # the report lists them
         fitting.fit([each.recording for each in recordings], checked=True)
     return CalibratedFit(fitting.description_.data, (), tuple(fitting.warnings_))

@@ -1,4 +1,4 @@
-"""Which stretches of free motion a diagnosis looks at: its structure is plain in some minutes, and long ones cost."""
+"""Which stretches of free motion a diagnosis uses: some minutes show the structure, and long ones cost time."""
 
 from __future__ import annotations
 
@@ -10,16 +10,18 @@ import numpy as np
 
 from tendonfmu.recordings import Recording
 
-DIAGNOSED = 90.0  # s of free motion, in all, that the structure is found in
-JUDGED = 45.0  # s, in all, that it is judged on
-SHORTEST = 15.0  # s, of a stretch
+DIAGNOSED = 90.0  # s of free motion, in all, to find the structure in
+JUDGED = 45.0  # s, in all, to judge it on
+SHORTEST = 15.0  # s, least length of a stretch
 
 
 def stretches_for_diagnosis(
     free: Sequence[Recording], tests: Sequence[Recording]
 ) -> tuple[list[Recording], list[Recording]]:
-    """Of each recording a stretch to find the structure in; of the tests, or of what is left of the recordings, one to
-    judge it on. Short recordings are taken whole, with nothing to judge on: a diagnosis then holds out parts of them.
+    """Choose stretches of the recordings to find the structure in, and stretches to judge it on.
+
+    The latter come from the tests, or from the rest of the recordings. Short recordings are used whole, with nothing to
+    judge on; a diagnosis then holds out parts of them.
     """
     whole = sum(_seconds(each) for each in free)
     if tests:
@@ -35,8 +37,10 @@ def _seconds(recording: Recording) -> float:
 
 
 def _cut(recordings: Sequence[Recording], begin: float, share: float) -> list[Recording]:
-    """Of each recording a share of its time, from a share on; all of it where that is all. Short ones are left out
-    where others are there."""
+    """Cut a share of the time of each recording, from a share on; the whole recording if the share is 1 or more.
+
+    Stretches that are too short are left out if there are others.
+    """
     if share >= 1.0:
         return list(recordings)
     found = [_stretch(each, begin, share) for each in recordings if share * _seconds(each) >= SHORTEST]

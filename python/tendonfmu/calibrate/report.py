@@ -1,4 +1,4 @@
-"""What a calibration reports of its steps, as JSON has it."""
+"""The results of a calibration's steps, as its JSON report holds them."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ OF_TUNING = (
 
 
 def structure_of(found: Diagnosis) -> dict[str, Any]:
-    """What the description lacked, with both models."""
+    """Report what the description lacked, with both models."""
     shown = ("title", "place", "size", "gain", "explanation")
     return {
         "verdict": found.verdict,
@@ -53,7 +53,10 @@ def structure_of(found: Diagnosis) -> dict[str, Any]:
 def errors_of(
     data: Data | None, recordings: Sequence[FitRecording], held_out: bool, settings: Data | None = None
 ) -> list[float]:
-    """[n] N·m: rms of r on the samples that nothing was fitted to. data None: of no friction, with these settings."""
+    """Compute [n] the rms of r on the samples that nothing was fitted to (N·m).
+
+    With `data` None it is that without friction, with the bias of `settings`.
+    """
     found, masks = [], []
     for each in recordings:
         left = residuals(settings or {}, each, None).residual if data is None else residual_of(data, each)
@@ -63,12 +66,23 @@ def errors_of(
 
 
 def rms_of(values: Sequence[float]) -> float:
-    """Of all joints together."""
+    """Combine the rms of all joints: the root of their mean square.
+
+    Parameters
+    ----------
+    values
+        [n] rms by joint.
+
+    Returns
+    -------
+    float
+        rms over all joints, in the same unit.
+    """
     return math.sqrt(sum(value**2 for value in values) / len(values))
 
 
 def tuning_of(tuning: ContactTuning) -> dict[str, Any]:
-    """What decides on contact, and what it is worth. That there were no rests to learn from is no warning here."""
+    """Report the tuned thresholds and their alarms, without the warning that there were no rests to learn from."""
     report = tune_report.build_report(tuning)
     return {
         "finger": tuning.description_.data,
@@ -79,8 +93,11 @@ def tuning_of(tuning: ContactTuning) -> dict[str, Any]:
 
 
 def smallest_torque(tuning: ContactTuning) -> dict[str, list[float]]:
-    """[n] N·m by joint: the sudden change that exceeds the bounds in half of the time, and in nine tenths of it; and
-    the slow one that exceeds those of contact.drift in half of the time."""
+    """Compute the smallest change of each joint torque that is reported, [n] each (N·m).
+
+    "median" and "nine_tenths" are the sudden changes that exceed the bounds in half and in nine tenths of the time;
+    "slow" is the slow change that exceeds those of contact.drift in half of the time.
+    """
     name = "innovation" if "innovation" in tuning.bounds_ else "residual"
     bound, search = tuning.bounds_[name], tuning.searches_[name]
     whole = bound.own(tuning.cells_.force)
@@ -92,22 +109,23 @@ def smallest_torque(tuning: ContactTuning) -> dict[str, list[float]]:
 
 
 def recording_of(each: FitRecording) -> dict[str, Any]:
+    """Report a recording: file, length (min) and mean tendon force (N)."""
     return {"path": str(each.path), "minutes": each.duration / 60.0, "mean_force": each.mean_force}
 
 
 def record_next(lacks: Mapping[str, Any], tuned: Mapping[str, Any]) -> list[str]:
-    """What to record, the most useful first."""
+    """List what to record, the most useful first."""
     found = []
     if tuned["more_minutes"]:
         found.append(
-            f"{tuned['more_minutes']:.0f} min more of free motion: thresholds are then for "
-            f"{tuned['false_alarms_per_hour']:g} false alarms an hour in place of {tuned['tuned_for_per_hour']:.3g}"
+            f"{tuned['more_minutes']:.0f} min more of free motion: thresholds then hold for "
+            f"{tuned['false_alarms_per_hour']:g} false alarms an hour instead of {tuned['tuned_for_per_hour']:.3g}"
         )
     if len(tuned["pretensions"]) == 1:
-        found.append("the same motion at another pretension: what grows with the force is not known yet")
+        found.append("the same motion at another pretension: the growth with the force is not known yet")
     if tuned["rest"] is None:
         found.append(
-            "rests of some seconds with standing motors, in all a few minutes: touches at rest can then be found"
+            "rests of some seconds with standing motors, a few minutes in all: touches at rest can then be found"
         )
     if lacks["next_experiment"]:
         found.append(lacks["next_experiment"])

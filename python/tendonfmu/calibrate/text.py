@@ -1,4 +1,4 @@
-"""What a calibration says, in sentences and rows: for the page and for the terminal."""
+"""The results of a calibration in sentences and rows, for the page and the terminal."""
 
 from __future__ import annotations
 
@@ -21,10 +21,23 @@ MODELS = {
 
 
 def verdict(report: Report) -> tuple[str, str]:
-    """Tone, "good", "" or "bad", and one sentence."""
+    """Judge a calibration.
+
+    Parameters
+    ----------
+    report
+        Report "tendonfmu-calibration-1".
+
+    Returns
+    -------
+    tone : str
+        "good", "" or "bad".
+    sentence : str
+        The result in one sentence.
+    """
     before, after = (rms_of(report["error"][name]) for name in (_first(report), "calibrated"))
     less = 1.0 - after / before if before > 0 else 0.0
-    error = f"The error on motion that no number was fitted to fell from {mnm(before)} to {mnm(after)} mN·m"
+    error = f"The error on unseen motion fell from {mnm(before)} to {mnm(after)} mN·m"
     causes = len(report["structure"]["causes"])
     built = f", with {'one cause' if causes == 1 else f'{causes} causes'} built into the model" if causes else ""
     alarms = f"; at most {per_hour(report)} false alarms an hour are expected in such motion."
@@ -38,22 +51,23 @@ def verdict(report: Report) -> tuple[str, str]:
 
 
 def _first(report: Report) -> str:
-    """What was there before: the description as given, or an earlier calibration."""
+    """Return the name of the model before: the description as given, or an earlier calibration."""
     return "previous" if "previous" in report["error"] else "as_given"
 
 
 def mnm(value: float) -> str:
+    """Write a torque in mN·m."""
     return rounded(1e3 * value)
 
 
 def per_hour(report: Report) -> str:
-    """The upper limit of the rate of false alarms."""
+    """Write the upper limit of the rate of false alarms (1/h)."""
     limit = report["detection"]["held_out"]["limit"]
     return "an unknown number of" if limit is None else f"{limit:.3g}"
 
 
 def tiles(report: Report) -> Iterator[tuple[str, str, str]]:
-    """(value, unit, meaning), those that matter first."""
+    """Yield (value, unit, meaning), the most important first."""
     error, detection = report["error"], report["detection"]
     before, after = (mnm(rms_of(error[name])) for name in (_first(report), "calibrated"))
     data = "held-out parts" if error["held_out"] else "test recordings"
@@ -69,7 +83,7 @@ def tiles(report: Report) -> Iterator[tuple[str, str, str]]:
 
 
 def error_rows(report: Report) -> list[Row]:
-    """A row per model: rms in mN·m by joint, and of all joints together."""
+    """Return a row per model: rms by joint, and of all joints together (mN·m)."""
     error = report["error"]
     return [
         (words, *(mnm(value) for value in error[name]), mnm(rms_of(error[name])))
@@ -82,7 +96,7 @@ TORQUE_HEADINGS = ("sudden, half of the time", "sudden, 9 of 10 times", "over se
 
 
 def torque_rows(report: Report) -> list[Row]:
-    """A row per joint: the smallest change that is reported (`TORQUE_HEADINGS`)."""
+    """Return a row per joint: the smallest change that is reported (`TORQUE_HEADINGS`, mN·m)."""
     smallest = report["detection"]["smallest_torque"]
     joints = report["joints"]
     columns = [[mnm(value) for value in smallest[key]] for key in ("median", "nine_tenths")]
@@ -91,7 +105,7 @@ def torque_rows(report: Report) -> list[Row]:
 
 
 def size_rows(report: Report) -> list[Row]:
-    """Labelled pushes by size; none without a reference sensor."""
+    """Return the labelled pushes by size; none without a reference sensor."""
     rows: list[Row] = []
     for each in (report["pushes"] or {}).get("sizes") or []:
         if each["below"] is None:
@@ -106,6 +120,7 @@ def size_rows(report: Report) -> list[Row]:
 
 
 def cause_rows(report: Report) -> list[Row]:
+    """Return a row per cause: title, place, size, gain."""
     return [
         (each["title"], each["place"], each["size"], each["gain"].split("\u00a0%")[0] + "\u00a0%")
         for each in report["structure"]["causes"]
@@ -113,7 +128,7 @@ def cause_rows(report: Report) -> list[Row]:
 
 
 def recording_rows(report: Report) -> list[Row]:
-    """(name, what for, minutes, mean tendon force)."""
+    """Return (name, purpose, minutes, mean tendon force) of each recording."""
     return [
         (
             each["path"].rsplit("/", 1)[-1].rsplit("\\", 1)[-1],
@@ -127,7 +142,7 @@ def recording_rows(report: Report) -> list[Row]:
 
 
 def sensor_sentence(report: Report) -> str:
-    """How far sensors and springs may differ before a fault is reported."""
+    """Say how far sensors and springs may differ before a fault is reported."""
     found = report["detection"]["sensor_fault"]
     if found["keys"] is None:
         return f"Sensor faults are not watched: {found['left_out']}."
@@ -138,11 +153,12 @@ def sensor_sentence(report: Report) -> str:
 
 
 def push_sentence(report: Report) -> str:
+    """Say how many labelled pushes are found, and with how many false alarms."""
     pushes = report["pushes"]
     alarms = pushes["false_alarms"]
     many = "no false alarm" if alarms == 0 else f"{alarms} false alarm{'s' if alarms > 1 else ''}"
     if not pushes["events"]:
-        return f"No push is labelled in them; {many} in {pushes['free_minutes']:.1f} min."
+        return f"The recordings have no labelled push; {many} in {pushes['free_minutes']:.1f} min."
     return (
         f"{pushes['found']} of {pushes['events']} labelled pushes are found, with {many} in "
         f"{pushes['free_minutes']:.1f} min without contact."
@@ -150,7 +166,13 @@ def push_sentence(report: Report) -> str:
 
 
 def lines(report: Report) -> Iterator[str]:
-    """For the terminal."""
+    """Yield the lines for the terminal.
+
+    Parameters
+    ----------
+    report
+        Report "tendonfmu-calibration-1".
+    """
     yield verdict(report)[1]
     if report["pushes"] is not None:
         yield push_sentence(report)
@@ -159,12 +181,23 @@ def lines(report: Report) -> Iterator[str]:
 
 
 def tables(report: Report) -> Iterator[tuple[str, Row, list[Row]]]:
-    """(title, headings, rows)."""
+    """Yield the tables.
+
+    Parameters
+    ----------
+    report
+        Report "tendonfmu-calibration-1".
+
+    Yields
+    ------
+    tuple
+        (title, headings, rows).
+    """
     yield "error, rms in mN·m", ("model", *report["joints"], "all"), error_rows(report)
     if report["structure"]["causes"]:
         yield (
             "built into the model",
-            ("cause", "place", "how much", "less error, the bias taken off"),
+            ("cause", "place", "size", "less error, without the bias"),
             cause_rows(report),
         )
     yield (
@@ -173,4 +206,4 @@ def tables(report: Report) -> Iterator[tuple[str, Row, list[Row]]]:
         torque_rows(report),
     )
     if sizes := size_rows(report):
-        yield "pushes found, by size over what free motion leaves", ("size", "found", "95 % interval"), sizes
+        yield "pushes found, by size relative to the error in free motion", ("size", "found", "95 % interval"), sizes

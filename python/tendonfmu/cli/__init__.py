@@ -1,4 +1,4 @@
-"""The command `tendonfmu`: one file a command parses, calls and prints; `program.py` puts them together."""
+"""The command `tendonfmu`: one file per command parses, calls and prints; `program.py` puts them together."""
 
 from tendonfmu.cli.program import main
 

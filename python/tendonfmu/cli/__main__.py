@@ -1,4 +1,4 @@
-"""`python -m tendonfmu.cli` is the command `tendonfmu`."""
+"""Run `python -m tendonfmu.cli` as the command `tendonfmu`."""
 
 from tendonfmu.cli.program import main
 

@@ -1,4 +1,4 @@
-"""The command that leads from free motion to a tuned FMU: `register` adds it to the program of `program.py`."""
+"""The command `calibrate`: from free motion to a tuned FMU."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tendonfmu.cli.several_values import SeveralValues
 
 
 def register(app: typer.Typer) -> None:
-    """Adds the command."""
+    """Add the command to the program."""
     app.command(cls=SeveralValues)(calibrate)
 
 
@@ -34,21 +34,19 @@ def calibrate(
         list[Path] | None,
         typer.Option(
             metavar="FREE",
-            help="free motion that the errors are measured on; may be repeated, or several at once after the "
-            "recordings \\[default: parts of the recordings]",
+            help="free motion to measure the errors on; may be repeated \\[default: parts of FREE]",
         ),
     ] = None,
     pushes: Annotated[
         list[Path] | None,
-        typer.Option(metavar="LABELLED", help="with labelled contact: what is found is counted; as --test"),
+        typer.Option(metavar="LABELLED", help="recordings with labelled contact, to count what is found; as --test"),
     ] = None,
     previous: Annotated[
         Path | None,
         typer.Option(
             "--from",
             metavar="PREVIOUS.json",
-            help="an earlier calibration's finger.json, or the report of a fit: its structure stays, its numbers are "
-            "the prior; for little data",
+            help="finger.json of an earlier calibration, or report of a fit, as the prior; for little data",
         ),
     ] = None,
     false_alarms_per_hour: FalseAlarms = 6.0,
@@ -58,10 +56,15 @@ def calibrate(
     jobs: Jobs = 1,
     progress: Progress = None,
 ) -> None:
-    """From free motion to a tuned FMU: what the model lacks, all its numbers, and what decides on contact.
+    """Make a tuned FMU from free motion: find missing effects, fit all numbers, tune contact detection.
 
-    DIR gets the page calibration.html, finger.json, finger.fmu, calibration.json and the diagnosis. A call that is
-    repeated with the same files goes on where the one before ended.
+    DIR gets the page calibration.html, finger.json, finger.fmu,
+    calibration.json and the diagnosis. A repeated call with the same files
+    continues where the previous one ended.
+
+    --test and --pushes take several files at once after the recordings. With
+    --from the structure of the earlier model stays and its numbers are the
+    prior.
     """
     from tendonfmu.calibrate import Options, check_folder, text, write_calibration
     from tendonfmu.calibrate import calibrate as run
@@ -85,7 +88,7 @@ def calibrate(
     for sentence in found.report["warnings"]:
         say(f"tendonfmu: warning: {sentence}")
     if found.report["steps"]["repeated"]:
-        say(f"unchanged, not done again: {', '.join(found.report['steps']['repeated'])}")
+        say(f"unchanged since the last call, not repeated: {', '.join(found.report['steps']['repeated'])}")
     print_tables(text.tables(found.report), text.lines(found.report), left="model")
     for path, what in written.items():
         say(f"{path}: {what}")

@@ -1,4 +1,4 @@
-"""The command `campaign`: `register` adds it to the program of `program.py`."""
+"""The command `campaign`: how often a diagnosis is right."""
 
 from __future__ import annotations
 
@@ -13,35 +13,38 @@ from tendonfmu.cli.options import LeastGain, Progress
 
 
 def register(app: typer.Typer) -> None:
+    """Add the command to the program."""
     app.command()(campaign)
 
 
 def campaign(
     cases: Annotated[
-        Path, typer.Argument(metavar="CASES.json", help="recordings whose cause is known, or their maker")
+        Path, typer.Argument(metavar="CASES.json", help="recordings whose cause is known, or a function for them")
     ],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder of the rows and their table")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder for rows and table")],
     scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="of a dask cluster \\[default: worker processes here]")
+        str | None, typer.Option(metavar="ADDRESS", help="dask cluster \\[default: worker processes here]")
     ] = None,
     workers: Annotated[
-        int | None, typer.Option(min=1, max=1024, help="worker processes here \\[default: one a processor]")
+        int | None, typer.Option(min=1, max=1024, help="worker processes here \\[default: one per processor]")
     ] = None,
     stop_after: Annotated[
-        float, typer.Option(min=0.0, metavar="SECONDS", help="begin no case after that time; go on another day")
+        float, typer.Option(min=0.0, metavar="SECONDS", help="start no case after this time; call again to continue")
     ] = math.inf,
     least_gain: LeastGain = 0.03,
     beside: Annotated[
-        str | None, typer.Option(metavar="FILE.py:FUNCTION", help="rivals, asked to name a cause for each case, too")
+        str | None, typer.Option(metavar="FILE.py:FUNCTION", help="other methods that also name a cause per case")
     ] = None,
-    again: Annotated[bool, typer.Option("--again", help="run cases that ended in an error once more")] = False,
+    again: Annotated[bool, typer.Option("--again", help="repeat cases that ended in an error")] = False,
     report: Annotated[Path | None, typer.Option(metavar="R.md", help="the tables as Markdown")] = None,
     progress: Progress = None,
 ) -> None:
     """Diagnose many recordings whose cause is known, and count how often the answer is right.
 
-    Each case writes its row as it ends; interrupted, the same command goes on where it was.
-    The rows together are DIR/campaign.parquet; every rate has its number of cases and its 95 % interval.
+    Each case writes its row when it ends. After an interruption the same
+    command continues where it stopped. All rows together are
+    DIR/campaign.parquet. Each rate comes with its number of cases and its 95 %
+    interval.
     """
     from tendonfmu.diagnose import (
         EFFECT_HEADINGS,

@@ -1,4 +1,4 @@
-"""The command `check`: is a description sound, and do recordings belong to it."""
+"""The command `check`: whether a description is sound, and whether recordings belong to it."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ if TYPE_CHECKING:
 
 
 def register(app: typer.Typer) -> None:
-    """Adds the command."""
+    """Add the command to the program."""
     app.command()(check)
 
 
 def check(
     file: Subject,
     recordings: Annotated[
-        list[Path] | None, typer.Argument(metavar="[RECORDING]...", help="of this finger, .csv or .parquet")
+        list[Path] | None, typer.Argument(metavar="[RECORDING]...", help="recordings of this finger, .csv or .parquet")
     ] = None,
 ) -> None:
-    """Validate a finger description or a rig and say what it is. Exit 1 when it is refused.
+    """Validate a finger description or a rig and describe it. Exit status 1 if it is refused.
 
-    With recordings: whether they belong to the finger, and what to write into the map of columns where they do not.
-    Exit 1 when one does not.
+    With recordings: report whether they belong to the finger and, where they do
+    not, what to write into the map of columns. Exit status 1 if one does not.
     """
     from tendonfmu.files import check_format
     from tendonfmu.model import description_findings, read_finger
@@ -41,12 +41,12 @@ def check(
     if rig:
         require_plant()
         if recordings:
-            raise InputError(f"{file}: a rig; expected a finger description to hold recordings against")
+            raise InputError(f"{file}: is a rig; expected a finger description to check recordings against")
     try:
         finger = None if rig else read_finger(file)
         lines = describe_rig(file) if finger is None else finger.summary()
     except InputError as refused:
-        # the question was whether the description is sound; a file that cannot be read is bad input
+        # An unsound description is the answer "no" (1); a file that cannot be read is bad input (2).
         say(f"tendonfmu: {refused}")
         raise typer.Exit(1 if file.is_file() else 2) from None
     for line in lines:
@@ -58,7 +58,7 @@ def check(
 
 
 def _check_recordings(finger: FingerDescription, files: list[Path]) -> None:
-    """Says of each whether it belongs to the finger. Exit 1 when one does not."""
+    """Print for each recording whether it belongs to the finger. Exit status 1 if one does not."""
     from tendonfmu.recordings import belongs, read_recording, verdict
 
     strangers = 0
@@ -71,5 +71,5 @@ def _check_recordings(finger: FingerDescription, files: list[Path]) -> None:
         strangers += any(finding.severity == "error" for finding in findings)
     if strangers:
         count = f"{strangers} of {len(files)} recordings" if len(files) > 1 else str(files[0])
-        say(f"tendonfmu: {count}: does not belong to {finger.path} as it is; what to change is said above")
+        say(f"tendonfmu: {count}: does not belong to {finger.path} as it is; see above for what to change")
         raise typer.Exit(1)

@@ -1,4 +1,7 @@
-"""The terminal: messages, tables and progress bars for the commands. With `program.py` the only module that prints."""
+"""How commands write to the terminal: messages, tables and progress bars.
+
+Only this module and `program.py` print.
+"""
 
 from __future__ import annotations
 
@@ -15,17 +18,17 @@ if TYPE_CHECKING:
 
 
 def say(message: str) -> None:
-    """A line on standard error."""
+    """Print a line on standard error."""
     print(message, file=sys.stderr)
 
 
 def show(line: str) -> None:
-    """A line of a result, on standard output."""
+    """Print a line of a result on standard output."""
     print(line)
 
 
 def leave(status: int) -> NoReturn:
-    """Ends the program, without waiting for threads that still compute."""
+    """End the program without waiting for threads that still compute."""
     if any(not thread.daemon for thread in threading.enumerate() if thread is not threading.main_thread()):
         sys.stdout.flush()
         sys.stderr.flush()
@@ -34,12 +37,15 @@ def leave(status: int) -> NoReturn:
 
 
 def print_tables(tables: Iterable[Any], lines: Iterable[str], left: str) -> None:
-    """Tables of (title, headings, rows), then lines. left: heading of a further column that is text."""
+    """Print tables of (title, headings, rows), then lines.
+
+    The first column and the column headed `left` are text, aligned left; the others are numbers, aligned right.
+    """
     from rich.console import Console
     from rich.table import Table
 
     console = Console()
-    if not console.is_terminal:  # nothing to fit into: no broken lines
+    if not console.is_terminal:  # a file has no width: keep each row on one line
         console.width = 160
     for title, headings, rows in tables:
         table = Table(title=title, title_justify="left")
@@ -53,7 +59,7 @@ def print_tables(tables: Iterable[Any], lines: Iterable[str], left: str) -> None
 
 
 def progress_bar(wanted: bool | None = None) -> Progress:
-    """A progress bar on standard error; unless it is said, only where that is a terminal."""
+    """Make a progress bar on standard error; by default (None) it shows on a terminal only."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -70,13 +76,13 @@ def progress_bar(wanted: bool | None = None) -> Progress:
 
 
 def phase_bar(bar: Progress) -> Callable[[str, int, int | None], None]:
-    """Shows where something of several phases is: called with the phase in words, done, and total or None."""
+    """Return a callback that shows a computation of several phases: phase in words, steps done, total or None."""
     task = bar.add_task("reading", total=None)
     now = ""
 
     def show(phase: str, done: int, total: int | None) -> None:
         nonlocal now, task
-        if phase != now:  # another task: a total, once given, cannot be taken back
+        if phase != now:  # rich cannot unset the total of a task, so each phase gets a new one
             bar.remove_task(task)
             task = bar.add_task(phase, total=total)
             now = phase
@@ -86,10 +92,10 @@ def phase_bar(bar: Progress) -> Callable[[str, int, int | None], None]:
 
 
 class PhaseDisplay:
-    """Shows where a computation of several phases is, on standard error: called with a `phases.PhaseState`.
+    """Progress of a computation of several phases, on standard error; call it with a `tendonfmu.tasks.PhaseState`.
 
-    On a terminal a bar for the phase, elsewhere a line for each phase and at most one every `EVERY` seconds. wanted:
-    None shows it on a terminal alone.
+    On a terminal it draws a bar for the phase. Elsewhere it prints a line per phase and at most one every `EVERY`
+    seconds. With `wanted` None it shows on a terminal only.
     """
 
     EVERY = 10.0
@@ -112,7 +118,7 @@ class PhaseDisplay:
         )
         self._task: Any = None
         self._phase: tuple[int, int] | None = None
-        self._said = 0.0  # s, of the last line
+        self._said = 0.0  # s, time of the last printed line
 
     def __enter__(self) -> PhaseDisplay:
         self._bar.start()
@@ -135,7 +141,7 @@ class PhaseDisplay:
             say(", ".join(part for part in (head, count, time_left(state.left_s)) if part))
 
     def note(self, words: str) -> None:
-        """Something after the last phase that takes a moment."""
+        """Show that a short step follows the last phase."""
         self._phase = None
         if self._shown and self._on_terminal:
             self._replace(words, None, "")
@@ -143,7 +149,7 @@ class PhaseDisplay:
             say(words)
 
     def refresh(self) -> None:
-        """Draws the bar now, not at its next moment."""
+        """Draw the bar now instead of at its next refresh."""
         self._bar.refresh()
 
     def _show(self, head: str, state: PhaseState, is_new: bool) -> None:
@@ -153,13 +159,13 @@ class PhaseDisplay:
         self._bar.update(self._task, completed=state.done, total=state.total, left=left)
 
     def _replace(self, description: str, total: int | None, left: str) -> None:
-        if self._task is not None:  # a total, once given, cannot be taken back
+        if self._task is not None:  # rich cannot unset the total of a task, so it is replaced
             self._bar.remove_task(self._task)
         self._task = self._bar.add_task(description, total=total, left=left)
 
 
 def time_left(seconds: float | None) -> str:
-    """In words, coarse: an estimate."""
+    """Say the estimated time left in words, rounded because it is an estimate."""
     if seconds is None:
         return ""
     if seconds < 90:
@@ -168,7 +174,7 @@ def time_left(seconds: float | None) -> str:
 
 
 def fit_bar(bar: Progress) -> Any:
-    """Shows where a fit is: its phase, cost and samples per second."""
+    """Return a callback that shows the phase, cost and samples per second of a fit."""
     task = bar.add_task("reading", total=None)
     phase = ""
 

@@ -1,4 +1,4 @@
-"""The command `convert`: recordings of others to ours."""
+"""The command `convert`: a third-party recording as a recording of tendonfmu."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from tendonfmu.errors import InputError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-TABLE = "table"  # the format that a map describes
+TABLE = "table"  # the format whose columns a map describes
 
 
 def register(app: typer.Typer) -> None:
-    """Adds the command."""
+    """Add the command to the program."""
     app.command()(convert)
 
 
 def convert(
     source: Annotated[str, typer.Argument(metavar="FORMAT", help="davinci, emps or table")],
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="third-party recording; of table any log, CSV or Parquet")
+        Path, typer.Argument(metavar="FILE", help="third-party recording; for table any log in CSV or Parquet")
     ],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="REC.csv", help="recording, .csv or .parquet")],
     radius: Annotated[
         float | None,
         typer.Option(
-            min=1e-6, max=1.0, help="m; davinci: of the pulley on which the recorded torque acts \\[default: 0.005]"
+            min=1e-6, max=1.0, help="m; davinci: radius of the pulley with the recorded torque \\[default: 0.005]"
         ),
     ] = None,
     pretension: Annotated[
@@ -39,28 +39,28 @@ def convert(
         typer.Option(
             min=0.0,
             max=1e6,
-            help="N; davinci: of the cable loop, to record its closing cable alone \\[default: 0, the net force]",
+            help="N; davinci: pretension of the loop, records the closing cable only \\[default: 0, net force]",
         ),
     ] = None,
     mass: Annotated[
         float | None,
         typer.Option(
-            min=0.0, max=1e6, help="kg; emps: moved mass, its inertial force is known load \\[default: 95.1089]"
+            min=0.0, max=1e6, help="kg; emps: moved mass, whose inertial force is known load \\[default: 95.1089]"
         ),
     ] = None,
     decimation: Annotated[
-        int | None, typer.Option(min=1, max=1000, help="emps: keep one sample in so many, smoothed \\[default: 10]")
+        int | None, typer.Option(min=1, max=1000, help="emps: keep one in so many samples, smoothed \\[default: 10]")
     ] = None,
     map_: Annotated[
         Path | None,
-        typer.Option("--map", metavar="MAP.json", help="table: which column is which, in which unit and sign"),
+        typer.Option("--map", metavar="MAP.json", help="table: name, unit and sign of each column"),
     ] = None,
     finger: Annotated[
         Path | None,
-        typer.Option(metavar="FINGER.json", help="table: also write the description of the one-joint machine"),
+        typer.Option(metavar="FINGER.json", help="table: description of the one-joint machine to write"),
     ] = None,
 ) -> None:
-    """Turn a third-party recording into one of ours."""
+    """Convert a third-party recording into a recording of tendonfmu."""
     given = {"radius": radius, "pretension": pretension, "mass": mass, "decimation": decimation}
     options = {name: value for name, value in given.items() if value is not None}
     if source == TABLE:
@@ -68,7 +68,7 @@ def convert(
         return
     for name, value in (("map", map_), ("finger", finger)):
         if value is not None:
-            raise InputError(f"convert {source}: no option --{name} for this format; expected convert {TABLE}")
+            raise InputError(f"convert {source}: --{name}: not an option of this format; expected convert {TABLE}")
     from tendonfmu.files import check_format, check_output, write_table
     from tendonfmu.recordings import convert_file
 
@@ -82,12 +82,12 @@ def convert(
 def _convert_table(
     file: Path, output: Path, options: Mapping[str, float], map_file: Path | None, finger: Path | None
 ) -> None:
-    """A log by its map, and the description of a one-joint machine."""
+    """Convert a log by its map, and write the description of a one-joint machine."""
     from tendonfmu.files import check_format, check_output, whole_file, write_table
     from tendonfmu.recordings import convert_table, describe_joint, description_text
 
     for name in options:
-        raise InputError(f"convert {TABLE}: no option --{name} for this format; expected --map or --finger")
+        raise InputError(f"convert {TABLE}: --{name}: not an option of this format; expected --map or --finger")
     if map_file is None:
         raise InputError(f"convert {TABLE}: --map: missing; expected a map of columns (JSON)")
     check_format(output)
@@ -105,7 +105,7 @@ def _convert_table(
     if finger is not None and description is not None:
         with whole_file(finger) as temporary:
             temporary.write_text(description, encoding="utf-8")
-        say(f"{finger}: the machine as a finger; `tendonfmu fit` estimates its numbers")
+        say(f"{finger}: the machine described as a finger; `tendonfmu fit` estimates its numbers")
 
 
 def _say_written(output: Path, time: NDArray[Any]) -> None:

@@ -1,4 +1,4 @@
-"""The commands about contact: `register` adds each to the program of `program.py`."""
+"""The commands about contact: `tune` chooses the thresholds, `score` measures how well they detect."""
 
 from __future__ import annotations
 
@@ -21,41 +21,44 @@ from tendonfmu.cli.options import (
 
 
 def register(app: typer.Typer) -> None:
-    """Adds the commands, in the order of the help page."""
+    """Add the commands to the program, in the order of the help page."""
     app.command()(tune)
     app.command()(score)
 
 
 def tune(
-    finger: Annotated[Path, typer.Argument(metavar="FINGER.json", help="finger description, fitted")],
+    finger: Annotated[Path, typer.Argument(metavar="FINGER.json", help="fitted finger description")],
     recordings: FreeAtPretensions,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="TUNED.json", help="description to write")],
     false_alarms_per_hour: FalseAlarms = 6.0,
     confidence: Confidence = 0.9,
     method: Annotated[
-        str, typer.Option(metavar="innovation|cusum|threshold", help="contact.method; threshold is the paper's")
+        str, typer.Option(metavar="innovation|cusum|threshold", help="contact.method; threshold is that of the paper")
     ] = "innovation",
     bias_time: Annotated[
         float | None,
-        typer.Option(min=1e-3, max=1e4, metavar="SECONDS", help="time constant of the bias \\[default: as it is]"),
+        typer.Option(min=1e-3, max=1e4, metavar="SECONDS", help="time constant of the bias \\[default: unchanged]"),
     ] = None,
     release_time: Annotated[
         float,
-        typer.Option(min=0.0, metavar="SECONDS", help="in contact until the bias learns again; inf: never"),
+        typer.Option(min=0.0, metavar="SECONDS", help="time in contact until the bias is tracked again; inf: never"),
     ] = 2.0,
     report: Report = None,
     figures: Figures = None,
     kinematics: Kinematics = 1,
     strict: Annotated[
-        bool, typer.Option("--strict", help="exit 1 and no file if there is too little free motion for RATE")
+        bool, typer.Option("--strict", help="write no file and exit with 1 if FREE is too short for RATE")
     ] = False,
     progress: Progress = None,
 ) -> None:
-    """Choose what decides on contact, from free motion, for a stated rate of false alarms.
+    """Tune contact detection on free motion for a stated rate of false alarms.
 
-    Noise and drift of the bias, bounds of the detection and the standard deviation of the estimated torque. With too
-    little free motion for the rate it tunes for the rate that there is enough for, and says which and how much more is
-    needed; with --strict it exits with 1 and writes no file.
+    Sets noise and drift of the bias, the bounds of the detection and the
+    standard deviation of the estimated torque.
+
+    With too little free motion for the rate, it tunes for the rate that the
+    motion suffices for, and reports that rate and how much more motion is
+    needed. With --strict it exits with 1 and writes no file.
     """
     import warnings
 
@@ -80,7 +83,7 @@ def tune(
         )
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore", TuneWarning)  # said below, a line each
+                warnings.simplefilter("ignore", TuneWarning)  # printed below, one line each
                 tuning.tune(list(recordings))
         except NotEnough as refused:
             say(f"tendonfmu: {refused}")
@@ -102,22 +105,22 @@ def score(
     recordings: Annotated[list[Path], typer.Argument(metavar="RECORDING", help="labelled or free, .csv or .parquet")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="SCORE.json", help="report to write")],
     labels: Annotated[
-        str | None, typer.Option(metavar="COLUMN", help="1 in contact, else 0 \\[default: contact, where it is there]")
+        str | None, typer.Option(metavar="COLUMN", help="1 in contact, else 0 \\[default: contact, if present]")
     ] = None,
     force: Annotated[
-        str | None, typer.Option(metavar="COLUMN", help="sensed force in N: told at each alarm, and drawn")
+        str | None, typer.Option(metavar="COLUMN", help="sensed force in N, reported at each alarm and drawn")
     ] = None,
     figures: Figures = None,
     kinematics: Kinematics = 1,
-    seed: Annotated[int, typer.Option(min=0, max=2**53, help="of the intervals' resampling")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=2**53, help="seed of the resampling for the intervals")] = 0,
     progress: Progress = None,
 ) -> None:
-    """Measure contact detection against labels: events found and missed, false alarms, delay, torque; a ROC.
+    """Measure contact detection against labels: events found and missed, false alarms, delay, torque, ROC.
 
-    An event is a labelled contact; labels closer than 100 ms are one.
-    It is found if an alarm begins in it and the 200 ms before it were silent.
-    An alarm that begins in no event, nor in the 100 ms after one, is false.
-    Everything has its 95 % interval; several recordings are pooled.
+    An event is a labelled contact; labels less than 100 ms apart are one event.
+    It is found if an alarm begins in it and the 200 ms before it had no alarm.
+    An alarm that begins neither in an event nor in the 100 ms after one is
+    false. Every figure has its 95 % interval. Several recordings are pooled.
     """
     from tendonfmu.detect import check_outputs, score_recordings, score_report
     from tendonfmu.files import write_text

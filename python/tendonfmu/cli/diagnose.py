@@ -1,4 +1,7 @@
-"""The command about causes: `register` adds it to the program of `program.py`, whose `excite` calls `discriminate`."""
+"""The command `diagnose`: what is wrong with the model or the finger.
+
+`register` adds it to the program; `excite` of `program.py` calls `discriminate`.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,7 @@ from tendonfmu.errors import InputError
 
 
 def register(app: typer.Typer) -> None:
-    """Adds the command."""
+    """Add the command to the program."""
     app.command(cls=SeveralValues)(diagnose)
 
 
@@ -26,29 +29,26 @@ def diagnose(
         list[Path] | None,
         typer.Option(
             metavar="RECORDING",
-            help="not trained on: the gain is measured here; may be repeated, or several at once after the recordings "
-            "\\[default: parts of the recordings]",
+            help="recordings to measure the gain on, not to fit; may be repeated \\[default: parts of RECORDING]",
         ),
     ] = None,
     reference: Annotated[
         list[Path] | None,
         typer.Option(
             metavar="RECORDING",
-            help="of the same finger when it was well: says what has changed since, instead of what the model lacks; "
-            "another motion, pretension or length will do, the same motion tells most",
+            help="recordings of the same finger when healthy, to find what has changed since; best the same motion",
         ),
     ] = None,
     history: Annotated[
         bool,
         typer.Option(
             "--history",
-            help="each recording, in order of time, held against the reference, by default the first: a line per "
-            "recording and cause, and how fast it grows",
+            help="compare each recording, in order of time, with the reference \\[default: the first recording]",
         ),
     ] = False,
     scheduler: Annotated[
         str | None,
-        typer.Option(metavar="ADDRESS", help="of a dask cluster, for --history \\[default: --jobs processes]"),
+        typer.Option(metavar="ADDRESS", help="dask cluster for --history \\[default: --jobs processes]"),
     ] = None,
     kinematics: Kinematics = 1,
     least_gain: LeastGain = 0.03,
@@ -56,27 +56,35 @@ def diagnose(
     jobs: Jobs = 1,
     progress: Progress = None,
 ) -> None:
-    """Show what the model gets wrong, name the cause, extend the model by it and measure the gain.
+    """Show what the model gets wrong, name the cause, add it to the model and measure the gain.
 
-    The given structure is fitted first: a cause is what that cannot mend. With --reference a cause is what has changed
-    since; several recordings of now, in order of time, show how it grows. DIR gets the page diagnosis.html,
-    diagnosis.json, figures, and the model with its causes, extended.json and extended.fmu; with --history the page
-    history.html, history.csv and history.png.
+    The given structure is fitted first: a cause is what no fit of it can
+    explain. --test and --reference take several files at once after the
+    recordings.
+
+    With --reference a cause is what has changed since. The reference may have
+    another motion, pretension or length, but the same motion tells most.
+    Several recordings of now, in order of time, show how the change grows.
+
+    DIR gets the page diagnosis.html, diagnosis.json, figures, and the model
+    with its causes, extended.json and extended.fmu. With --history it gets the
+    page history.html, history.csv and history.png: a line per recording and
+    cause, and how fast each cause grows.
     """
     from tendonfmu.diagnose import diagnose as find
     from tendonfmu.estimate import check_given_once
     from tendonfmu.report import check_folder, diagnosis_text, write_diagnosis
 
-    if not 0.0 <= least_gain <= 0.5:  # NaN passes the range
+    if not 0.0 <= least_gain <= 0.5:  # typer's range lets NaN pass
         raise InputError(f"--least-gain {least_gain:g}: expected 0 to 0.5")
     tests, before = test or [], reference or []
     if history:
         if tests:
-            raise InputError("--test: with --history; expected recordings in order of time alone")
+            raise InputError("--test: given with --history; expected recordings in order of time only")
         _history(finger, recordings, before, output, scheduler, kinematics, least_gain, seed, jobs, progress)
         return
     if scheduler is not None:
-        raise InputError("--scheduler: without --history; expected both or none")
+        raise InputError("--scheduler: given without --history; expected both or neither")
     check_folder(output, [finger, *recordings, *tests, *before])
     check_given_once(recordings, tests, "a test")
     check_given_once([*recordings, *tests], before, "the reference")
@@ -113,7 +121,7 @@ def _history(
     jobs: int,
     progress: bool | None,
 ) -> None:
-    """`diagnose --history`."""
+    """Run `diagnose --history`."""
     from contextlib import nullcontext
 
     from tendonfmu.diagnose import diagnose_history
@@ -146,13 +154,13 @@ def _history(
     rows = list(history_text.rows_of_lines(found, names))
     print_tables([(found.finger, headings, rows)] if rows else (), [history_text.headline(found)], left="trend")
     for name, why in found.failed:
-        say(f"tendonfmu: warning: {name} is left out: {why}")
+        say(f"tendonfmu: warning: {name}: left out: {why}")
     for path, what in written.items():
         say(f"{path}: {what}")
 
 
 def discriminate(context: typer.Context, finger: Path, folder: Path, output: Path, rate: float) -> None:
-    """`tendonfmu excite FINGER --discriminate DIR -o MOTION`: the motion that a diagnosis asked for."""
+    """Write the motion that a diagnosis asked for: `tendonfmu excite FINGER --discriminate DIR -o MOTION`."""
     from tendonfmu.diagnose import discriminating_motion
     from tendonfmu.excite import read_subject
     from tendonfmu.files import check_format, check_output, write_table
@@ -162,7 +170,7 @@ def discriminate(context: typer.Context, finger: Path, folder: Path, output: Pat
     for each in context.command.params:
         source = context.get_parameter_source(str(each.name))
         if each.name not in own and source is not None and source.name == "COMMANDLINE":
-            raise InputError(f"{each.opts[0]}: with --discriminate {folder}; expected no option but --rate beside it")
+            raise InputError(f"{each.opts[0]}: given with --discriminate {folder}; expected no other option but --rate")
     check_format(output)
     check_output(output, *(description_files(finger) if is_rig(finger) else [finger]))
     subject = read_subject(finger)

@@ -1,4 +1,4 @@
-"""The report of a fault of tendonfmu itself: a text file that the user can send."""
+"""What does a user send after an internal fault of tendonfmu? A text file."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ _PACKAGES = ("numpy", "scipy", "scikit-learn", "pyarrow", "fmpy", "typer", "rich
 
 
 def write_fault_report(error: BaseException, arguments: Sequence[str]) -> Path | None:
-    """Writes `tendonfmu-error-YYYYMMDD-HHMMSS.txt` and returns its path, or None where no folder takes it.
+    """Write `tendonfmu-error-YYYYMMDD-HHMMSS.txt` and return its path, or None if no folder is writable.
 
-    The file goes into the current folder, or into the folder for temporary files. It is written whole or not at all,
-    and takes the place of no other file. arguments: those of the command.
+    The file goes into the current folder, or else into the folder for temporary files. It is written whole or not at
+    all, and never replaces another file. `arguments` are those of the command.
     """
     text = _report(error, arguments)
     for folder in _folders():
@@ -34,7 +34,7 @@ def write_fault_report(error: BaseException, arguments: Sequence[str]) -> Path |
 
 
 def is_own_file(path: object) -> bool:
-    """Whether a path of an OSError lies within the installed package."""
+    """Tell whether the path of an OSError lies within the installed package."""
     return isinstance(path, str) and Path(path).is_absolute() and Path(__file__).parent.parent in Path(path).parents
 
 
@@ -47,7 +47,7 @@ def _folders() -> Iterator[Path]:
 
 
 def _written(folder: Path, text: str) -> Path:
-    """Under the first name of this second that is free. Raises OSError or InputError."""
+    """Write the text under the first free name of this second. Raises OSError or InputError."""
     stem = datetime.now().strftime("tendonfmu-error-%Y%m%d-%H%M%S")
     file = folder / f"{stem}.txt"
     number = 1
@@ -64,7 +64,7 @@ def _written(folder: Path, text: str) -> Path:
 
 
 def _taken(file: Path) -> bool:
-    """Takes a name that no file has. False where one has it. Raises OSError."""
+    """Create the file to reserve its name. Return False if it exists already. Raises OSError."""
     try:
         file.touch(exist_ok=False)
     except FileExistsError:
@@ -74,7 +74,7 @@ def _taken(file: Path) -> bool:
 
 def _report(error: BaseException, arguments: Sequence[str]) -> str:
     lines = [
-        "A fault of tendonfmu. Please send this file to its developers; it holds no measured data.",
+        "An internal error of tendonfmu. Please send this file to its developers; it holds no measured data.",
         "",
         f"command:  {shlex.join(['tendonfmu', *arguments])}",
         f"time:     {datetime.now().astimezone().isoformat(timespec='seconds')}",

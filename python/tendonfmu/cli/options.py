@@ -1,4 +1,4 @@
-"""Arguments and options that several commands share, each with its type, range and help: one place for one text."""
+"""Which arguments and options do several commands share? Type, range and help of each."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ import typer
 
 # --- files ------------------------------------------------------------------------------------------------------------
 
-FingerFile = Annotated[Path, typer.Argument(metavar="FINGER.json", help="finger description, its structure as given")]
-Model = Annotated[Path, typer.Argument(metavar="FINGER.json|FINGER.fmu", help="description, or FMU of one")]
+FingerFile = Annotated[Path, typer.Argument(metavar="FINGER.json", help="finger description; its structure is kept")]
+Model = Annotated[Path, typer.Argument(metavar="FINGER.json|FINGER.fmu", help="finger description, or its FMU")]
 FreeRecordings = Annotated[list[Path], typer.Argument(metavar="RECORDING", help="free motion, .csv or .parquet")]
 FreeAtPretensions = Annotated[
     list[Path], typer.Argument(metavar="FREE", help="free motion at several pretensions, .csv or .parquet")
 ]
 Subject = Annotated[Path, typer.Argument(metavar="FINGER.json|RIG.json", help="finger description, or rig")]
 Figures = Annotated[Path | None, typer.Option(metavar="DIR", help="folder for figures")]
-Report = Annotated[Path | None, typer.Option(metavar="R.json", help="everything that is known of it")]
+Report = Annotated[Path | None, typer.Option(metavar="R.json", help="report with all results, as JSON")]
 
 # --- how it is computed -----------------------------------------------------------------------------------------------
 
@@ -28,14 +28,14 @@ Kinematics = Annotated[
     ),
 ]
 FalseAlarms = Annotated[
-    float, typer.Option(min=1e-3, max=3600.0, metavar="RATE", help="at most, in free motion like the recorded one")
+    float, typer.Option(min=1e-3, max=3600.0, metavar="RATE", help="highest rate accepted in free motion like yours")
 ]
-Confidence = Annotated[float, typer.Option(min=0.5, max=0.9999, help="that the rate is at most that")]
+Confidence = Annotated[float, typer.Option(min=0.5, max=0.9999, help="probability that RATE is not exceeded")]
 LeastGain = Annotated[
-    float, typer.Option(min=0.0, max=0.5, metavar="SHARE", help="by which a cause has to lower the rms on unseen data")
+    float, typer.Option(min=0.0, max=0.5, metavar="SHARE", help="least drop of the rms on unseen data for a cause")
 ]
-Seed = Annotated[int, typer.Option(min=0, max=2**53, help="of all that is drawn at random")]
-Jobs = Annotated[int, typer.Option(min=1, max=64, help="processor cores to use; the result is the same")]
+Seed = Annotated[int, typer.Option(min=0, max=2**53, help="seed of the random numbers")]
+Jobs = Annotated[int, typer.Option(min=1, max=64, help="processor cores to use; no effect on the result")]
 Progress = Annotated[
-    bool | None, typer.Option("--progress/--no-progress", help="progress bar; by default on a terminal")
+    bool | None, typer.Option("--progress/--no-progress", help="show progress \\[default: on a terminal]")
 ]

@@ -1,8 +1,8 @@
-"""The command `tendonfmu`: parses, calls, prints.
-
-Exit status: 0 done, 1 the answer is no, 2 bad usage or input, 3 a fault of tendonfmu itself, 130 and 143 interrupted.
+"""What happens from the command line to the exit status: `tendonfmu` parses, calls and prints.
 
 Results go to files or standard output, messages to standard error.
+
+Exit status: 0 done, 1 the answer is no, 2 bad usage or input, 3 internal fault of tendonfmu, 130 and 143 interrupted.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
-    help="Friction of tendon-driven robot fingers: what the finger feels, without a tactile sensor.",
+    help="Model the friction of tendon-driven robot fingers, and detect contact without a tactile sensor.",
 )
 
 FAULT = 3
@@ -40,12 +40,15 @@ cli_check.register(app)
 
 
 def main() -> None:
-    """Entry point: every refusal is one line on standard error and exit status 2, every fault of its own one and 3."""
+    """Run the command.
+
+    A refusal is one line on standard error and exit status 2. An internal fault is one line and exit status 3.
+    """
     with ended_by_signals() as ending:
         try:
             status = app(standalone_mode=False)
         except (InputError, OSError) as refused:
-            if isinstance(refused, BrokenPipeError):  # the reader of standard output has seen enough
+            if isinstance(refused, BrokenPipeError):  # the reader of standard output has closed it, as `head` does
                 sys.stderr.close()
                 sys.exit(0)
             if isinstance(refused, OSError) and (refused.errno is None or is_own_file(refused.filename)):
@@ -54,11 +57,12 @@ def main() -> None:
         except (KeyboardInterrupt, typer.Abort):
             _interrupted(ending.status)
         except SystemExit as ended:
-            if ended.code == INTERRUPTED:  # the command has said what it leaves
+            if ended.code == INTERRUPTED:  # the command has already reported what it saved
                 leave(ending.status)
             raise
         except Exception as refused:
-            if not hasattr(refused, "format_message"):  # of bad usage; its class has moved between versions of typer
+            # Bad usage is recognised by this method: its class has moved between versions of typer.
+            if not hasattr(refused, "format_message"):
                 _fault(refused)
             elif type(refused).__name__ == "NoArgsIsHelpError":
                 say(refused.format_message())
@@ -80,7 +84,7 @@ def _refuse(reason: str) -> NoReturn:
 def _fault(error: BaseException) -> NoReturn:
     report = write_fault_report(error, sys.argv[1:])
     where = "no report could be written" if report is None else f"please send the report {report}"
-    say(f"tendonfmu: a fault of tendonfmu, not of its input ({type(error).__name__}); {where}")
+    say(f"tendonfmu: internal error ({type(error).__name__}), a fault of tendonfmu, not of its input; {where}")
     leave(FAULT)
 
 
@@ -100,10 +104,10 @@ def _show_version(wanted: bool) -> None:
 @app.callback()
 def options(
     version: Annotated[
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="show the version and exit")
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="print the version and exit")
     ] = False,
 ) -> None:
-    """Friction of tendon-driven robot fingers: what the finger feels, without a tactile sensor."""
+    """Model the friction of tendon-driven robot fingers, and detect contact without a tactile sensor."""
 
 
 @app.command()
@@ -112,12 +116,12 @@ def build(
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FINGER.fmu", help="FMU to write")],
     binaries: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="folder of binaries by FMI platform, instead of those of this installation"),
+        typer.Option(metavar="DIR", help="folder of binaries by FMI platform [default: those installed]"),
     ] = None,
 ) -> None:
-    """Pack an FMI 2.0 co-simulation FMU: of a finger its friction, of a rig the simulated finger.
+    """Pack an FMI 2.0 co-simulation FMU: the friction of a finger, or the simulated finger of a rig.
 
-    Needs no compiler; the same input gives the same bytes.
+    Needs no compiler. The same input gives the same bytes.
     """
     from tendonfmu.files import check_output
     from tendonfmu.fmu import build_fmu
@@ -132,10 +136,10 @@ def build(
 def run(
     model: Model,
     recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="recording, .csv or .parquet")],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT.csv", help="outputs, .csv or .parquet")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT.csv", help="table to write, .csv or .parquet")],
     kinematics: Kinematics = 1,
 ) -> None:
-    """Run the FMU over a recording: time and all outputs, one row per sample, each at its own sample's time."""
+    """Run the model over a recording and write all outputs, one row per sample at the time of that sample."""
     from tendonfmu.files import check_format, check_output, write_table
     from tendonfmu.fmu import check_model, run_model, summary
     from tendonfmu.recordings import read_recording
@@ -158,12 +162,12 @@ def simulate(
     rig: Annotated[Path, typer.Argument(metavar="RIG.json", help="rig of a simulated finger")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="REC.parquet", help="recording, .csv or .parquet")],
     truth: Annotated[
-        Path | None, typer.Option(metavar="TRUTH.parquet", help="true signals at the same times, .csv or .parquet")
+        Path | None, typer.Option(metavar="TRUTH.parquet", help="true signals to write, .csv or .parquet")
     ] = None,
-    integrator: Annotated[str | None, typer.Option(metavar="cvode|fixed_step", help="instead of the rig's own")] = None,
+    integrator: Annotated[str | None, typer.Option(metavar="cvode|fixed_step", help="\\[default: the rig's]")] = None,
     progress: Progress = None,
 ) -> None:
-    """A recording of the simulated finger. The same rig gives the same numbers."""
+    """Simulate a finger and write the recording. The same rig gives the same numbers."""
     from tendonfmu.files import check_format, check_output, write_table
     from tendonfmu.simulate import INTEGRATORS, read_rig
     from tendonfmu.simulate import simulate as simulate_rig
@@ -198,38 +202,38 @@ cli_convert.register(app)
 @app.command()
 def excite(
     context: typer.Context,
-    finger: Annotated[Path, typer.Argument(metavar="FINGER.json|RIG.json", help="finger description, or rig of one")],
+    finger: Annotated[Path, typer.Argument(metavar="FINGER.json|RIG.json", help="finger description, or rig")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="MOTION.csv", help="motion, .csv or .parquet")],
     duration: Annotated[
-        float, typer.Option(min=1.0, max=1e5, help="s; at each pretension, or of all with --alternate")
+        float, typer.Option(min=1.0, max=1e5, help="s; per pretension, in all with --alternate")
     ] = 400.0,
-    max_speed: Annotated[float, typer.Option(min=1e-3, max=100.0, help="rad/s; of every joint")] = 1.0,
+    max_speed: Annotated[float, typer.Option(min=1e-3, max=100.0, help="rad/s; limit for every joint")] = 1.0,
     range_: Annotated[
         list[str] | None,
-        typer.Option("--range", metavar="JOINT=LOW:HIGH", help="rad; joint by number or name; may be repeated"),
+        typer.Option("--range", metavar="JOINT=LOW:HIGH", help="rad; joint range by number or name; may be repeated"),
     ] = None,
     pretension: Annotated[
         list[float] | None,
-        typer.Option(min=1e-3, max=1e6, help="N; mean tendon force; may be repeated [default: 10]"),
+        typer.Option(min=1e-3, max=1e6, help="N; mean tendon force, default 10; may be repeated"),
     ] = None,
     alternate: Annotated[
-        float | None, typer.Option(min=1.0, metavar="SECONDS", help="change the pretension that often")
+        float | None, typer.Option(min=1.0, metavar="SECONDS", help="time between changes of the pretension")
     ] = None,
     vary_tension: Annotated[
         str | None,
-        typer.Option(metavar="LOW:HIGH", help="N; instead of a pretension, each tendon tight and loose in turn"),
+        typer.Option(metavar="LOW:HIGH", help="N; vary the tension of each tendon in turn, without a pretension"),
     ] = None,
-    vary_every: Annotated[float, typer.Option(min=2.0, max=1e5, help="s; other tensions that often")] = 10.0,
-    max_acceleration: Annotated[float, typer.Option(min=0.1, max=1e4, help="rad/s²; of every joint")] = 10.0,
+    vary_every: Annotated[float, typer.Option(min=2.0, max=1e5, help="s; time between changes of the tensions")] = 10.0,
+    max_acceleration: Annotated[float, typer.Option(min=0.1, max=1e4, help="rad/s²; limit for every joint")] = 10.0,
     rate: Annotated[float, typer.Option(min=20.0, max=10000.0, help="rows per second")] = 100.0,
-    seed: Annotated[int, typer.Option(min=0, max=2**53, help="of the strokes")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=2**53, help="seed of the random strokes")] = 0,
     report: Report = None,
     discriminate: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="the next experiment of a diagnosis instead; with --rate alone"),
+        typer.Option(metavar="DIR", help="write the next experiment of this diagnosis; only --rate applies"),
     ] = None,
 ) -> None:
-    """Plan a training motion, and say what it excites and which parameters it cannot identify."""
+    """Plan a training motion; report what it excites and which parameters it cannot identify."""
     if discriminate is not None:
         cli_diagnose.discriminate(context, finger, discriminate, output, rate)
         return
@@ -251,7 +255,7 @@ def excite(
     ranges = exciting.find_ranges(subject, range_ or [])
     for span in ranges:
         if span.guessed:
-            say(f"tendonfmu: warning: joint {span.name}: {span.source}; --range {span.name}=LOW:HIGH says better")
+            say(f"tendonfmu: warning: joint {span.name}: {span.source}; set it with --range {span.name}=LOW:HIGH")
     vary = exciting.find_variation(vary_tension, vary_every, pretension, alternate)
     levels = exciting.find_pretensions(subject, pretension or [])
     plan = Plan(exciting.as_array(ranges), max_speed, duration, levels, alternate, rate, seed, vary, max_acceleration)
@@ -272,65 +276,64 @@ def fit(
     finger: FingerFile,
     recordings: FreeRecordings,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FITTED.json", help="description to write")],
-    method: Annotated[str, typer.Option(metavar="batch|ekf", help="maximum likelihood, or Kalman filter")] = "batch",
+    method: Annotated[str, typer.Option(metavar="batch|ekf", help="maximum likelihood or Kalman filter")] = "batch",
     report: Report = None,
     figures: Annotated[Path | None, typer.Option(metavar="DIR", help="folder for figures and report.html")] = None,
     compare: Annotated[
-        list[Path] | None, typer.Option(metavar="RECORDING", help="judged, not trained on; may be repeated")
+        list[Path] | None, typer.Option(metavar="RECORDING", help="recording to judge, not to fit; may be repeated")
     ] = None,
     holdout: Annotated[
-        float, typer.Option(min=0.0, max=0.9, metavar="SHARE", help="of the time, not trained on")
+        float, typer.Option(min=0.0, max=0.9, metavar="SHARE", help="share of the time not used in the fit")
     ] = 0.0,
-    holdout_block: Annotated[float, typer.Option(min=1.0, metavar="SECONDS", help="longest block held out")] = 10.0,
+    holdout_block: Annotated[float, typer.Option(min=1.0, metavar="SECONDS", help="longest block left out")] = 10.0,
     kinematics: Kinematics = 1,
     only: Annotated[
-        list[str] | None, typer.Option(metavar="PATTERN", help="estimate these numbers alone; may be repeated")
+        list[str] | None, typer.Option(metavar="PATTERN", help="estimate only these numbers; may be repeated")
     ] = None,
     fix: Annotated[
-        list[str] | None, typer.Option(metavar="PATTERN", help="keep these numbers; may be repeated")
+        list[str] | None, typer.Option(metavar="PATTERN", help="keep these numbers fixed; may be repeated")
     ] = None,
     share: Annotated[
         list[str] | None,
-        typer.Option(metavar="tendons|pulleys|PATTERN", help="laws that share their values; may be repeated"),
+        typer.Option(metavar="tendons|pulleys|PATTERN", help="laws that share one set of values; may be repeated"),
     ] = None,
     asymmetric: Annotated[
-        bool | None, typer.Option("--asymmetric/--symmetric", help="each side of a law on its own, or both the same")
+        bool | None, typer.Option("--asymmetric/--symmetric", help="fit the two sides of a law apart, or as one")
     ] = None,
     prior: Annotated[
-        float, typer.Option(min=1e-6, max=1e6, help="what is known beforehand: standard deviation / magnitude")
+        float, typer.Option(min=1e-6, max=1e6, help="prior: standard deviation / expected magnitude")
     ] = 1.0,
     scale: Annotated[
-        list[str] | None, typer.Option(metavar="PATTERN=VALUE", help="expected magnitude, if not the description's")
+        list[str] | None, typer.Option(metavar="PATTERN=VALUE", help="expected magnitude, instead of the description's")
     ] = None,
     previous: Annotated[
         Path | None,
-        typer.Option("--from", metavar="PREVIOUS.json", help="report of an earlier fit, or its description: the prior"),
+        typer.Option("--from", metavar="PREVIOUS.json", help="report or description of an earlier fit, as the prior"),
     ] = None,
     change: Annotated[
-        float, typer.Option(min=1e-6, max=10.0, help="with --from: how much numbers may have changed since, relative")
+        float, typer.Option(min=1e-6, max=10.0, help="with --from: expected relative change of the numbers since")
     ] = 0.02,
     effective_samples: Annotated[
         bool | None,
-        typer.Option(help="residuals that last count as fewer samples, or as all \\[default: fewer with --from]"),
+        typer.Option(help="count correlated residuals as fewer samples \\[default: with --from]"),
     ] = None,
-    passes: Annotated[
-        int | None, typer.Option(min=1, help="most passes over the data \\[default: 60, of ekf 2]")
-    ] = None,
-    tolerance: Annotated[float, typer.Option(min=1e-9, max=0.5, help="last step in standard errors (batch)")] = 0.3,
-    drift: Annotated[float, typer.Option(min=0.0, max=1.0, help="relative variance of the numbers per s (ekf)")] = 0.0,
+    passes: Annotated[int | None, typer.Option(min=1, help="most passes over the data \\[default: 60; ekf: 2]")] = None,
+    tolerance: Annotated[float, typer.Option(min=1e-9, max=0.5, help="batch: last step, in standard errors")] = 0.3,
+    drift: Annotated[float, typer.Option(min=0.0, max=1.0, help="ekf: relative variance of the numbers per s")] = 0.0,
     uncertainty: Annotated[
         bool,
-        typer.Option("--uncertainty/--no-uncertainty", help="write what is not known of the friction, for detection"),
+        typer.Option("--uncertainty/--no-uncertainty", help="write the uncertainty of the friction, for detection"),
     ] = True,
     resume: Annotated[
-        Path | None, typer.Option(metavar="FITTED.unfinished.json", help="go on from an interrupted fit")
+        Path | None, typer.Option(metavar="FITTED.unfinished.json", help="continue an interrupted fit")
     ] = None,
     progress: Progress = None,
 ) -> None:
-    """Estimate the numbers of a finger from recordings of free motion, and say how well each is known.
+    """Estimate the numbers of a finger from recordings of free motion, with their uncertainty.
 
-    PATTERN is a path of the description, such as tendons[*].edge_friction[2]*.viscous; * stands for anything. Ctrl-C
-    leaves the best so far in FITTED.unfinished.json.
+    PATTERN is a path of the description, such as
+    tendons[*].edge_friction[2]*.viscous; * stands for anything. Ctrl-C saves
+    the best estimate so far in FITTED.unfinished.json.
     """
     from tendonfmu.estimate import FitWarning, FrictionFit, check_outputs, fit_report, write_unfinished
     from tendonfmu.files import write_text
@@ -363,14 +366,14 @@ def fit(
         )
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore", FitWarning)  # said below, a line each
+                warnings.simplefilter("ignore", FitWarning)  # printed below, one line each
                 fitting.fit(recordings, compare=compare or [])
         except KeyboardInterrupt:
             if fitting.unfinished_ is None:
                 raise
             bar.stop()
             left = write_unfinished(output, fitting.unfinished_)
-            say(f"tendonfmu: interrupted; the best so far is in {left}; --resume {left} goes on from there")
+            say(f"tendonfmu: interrupted; the best estimate so far is in {left}; continue with --resume {left}")
             sys.exit(INTERRUPTED)
     for sentence in fitting.warnings_:
         say(f"tendonfmu: warning: {sentence}")
@@ -398,9 +401,9 @@ def demo(
         "tendonfmu-demo"
     ),
 ) -> None:
-    """The whole story on built-in data, in a minute: calibrate, detect, diagnose what is hidden in the data, fit, run.
+    """Show every step on built-in data in a minute: calibrate, detect, diagnose, fit, run.
 
-    DIR gets story.html, which tells all of it, and all that it is made from.
+    DIR gets the page story.html and all the files that it is made from.
     """
     from tendonfmu.demo import Story, chapter_lines, chapter_tables, file_lines, write_story
 

@@ -1,4 +1,4 @@
-"""Options that take several values at once: `--test A B` for `--test A --test B`."""
+"""Which options take several values at once? `--test A B` means `--test A --test B`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ OPTIONS = ("--test", "--pushes")
 
 
 class SeveralValues(TyperCommand):
-    """Takes several values for each of `OPTIONS` that it has."""
+    """Command that takes several values for each of its options in `OPTIONS`."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         valued = {name for each in self.params if not getattr(each, "is_flag", False) for name in each.opts}
@@ -19,11 +19,13 @@ class SeveralValues(TyperCommand):
 
 
 def several_values(args: Sequence[str], valued: set[str]) -> list[str]:
-    """The arguments with the option before each of its values: once finger and a recording are given, all that follow
-    one of `OPTIONS` up to the next option are its values. valued: options that take a value.
+    """Repeat an option before each of its values.
+
+    Once a finger and a recording are given, all words after one of `OPTIONS`, up to the next option, are its values.
+    `valued` holds the options that take a value.
     """
     found: list[str] = []
-    free, option = 0, ""  # arguments of no option so far; which option the next one belongs to
+    free, option = 0, ""  # count of arguments without an option so far; the option of the next word
     rest = list(args)
     while rest and rest[0] != "--":
         word = rest.pop(0)

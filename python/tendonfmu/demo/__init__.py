@@ -1,4 +1,4 @@
-"""The demo: five chapters on built-in data, one page at the end (`tendonfmu demo`)."""
+"""The demo: five chapters on built-in data, and one page at the end (`tendonfmu demo`)."""
 
 import lazy_loader
 

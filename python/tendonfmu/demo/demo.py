@@ -1,9 +1,15 @@
-"""The demo: the whole story on built-in data, from free motion to a tuned FMU. Computes, prints nothing.
+"""The demo: every step on built-in data, from free motion to a tuned FMU. This module computes and prints nothing.
 
-Five chapters: a two-joint finger is calibrated on a minute of motion; pushes on an index finger are detected that was
-calibrated on 27 min; what the two-joint finger's model lacked, which the demo is not told, is looked at, with the gain
-on a recording that nobody has seen; its numbers are fitted alone; and the index finger's FMU runs over free motion. One
-page tells all of it. Where the installation cannot estimate, the chapters of the two-joint finger are left out.
+Five chapters:
+
+- calibrate: a two-joint finger is calibrated on a minute of motion;
+- detect: pushes on an index finger are detected, which was calibrated on 27 min of motion;
+- diagnose: what the model of the two-joint finger lacked, which the demo is not told, and the gain on an unseen
+  recording;
+- fit: the numbers of the two-joint finger alone;
+- run: the FMU of the index finger runs over free motion.
+
+One page shows all of them. If the installation cannot estimate, the chapters of the two-joint finger are left out.
 """
 
 from __future__ import annotations
@@ -28,15 +34,17 @@ if TYPE_CHECKING:
 TWO_JOINTS, TRAINING, UNSEEN = "two_joints.json", "two_joints_training.parquet", "two_joints_unseen.parquet"
 CALIBRATION, FIT = "calibration", "fit"  # folders of the full pages
 FITTED = "fitted.json"
-ESTIMATING = ("calibrate", "diagnose", "fit")  # chapters that need what not every installation has
+ESTIMATING = ("calibrate", "diagnose", "fit")  # chapters that need the estimation, which some installations lack
 
 Phase = Callable[[str, int, int | None], None]
 
 
 @dataclass(frozen=True)
 class Chapter:
-    """name: a word. title: what it is about. run: tells it; called with a function that
-    gets what is being done, how much of it is done, and of how much (None: unknown).
+    """A chapter of the demo.
+
+    `name` is one word and `title` its subject. `run` runs it, and is called with a function that receives the present
+    phase, the steps done, and the total (None: unknown).
     """
 
     name: str
@@ -45,10 +53,32 @@ class Chapter:
 
 
 class Story:
-    """The demo in a folder: the chapters are run one by one, in order; `write_story` (page.py) then makes the page.
+    """The demo in a folder: its chapters run in order, and `write_story` (page.py) then writes the page.
 
-    finger: of detect and run. calibration, fit: of theirs. diagnosis: of the calibration. files: path -> what is in it.
-    missing: why chapters are left out, empty if none is.
+    Parameters
+    ----------
+    folder
+        Folder for the results; made if missing.
+
+    Attributes
+    ----------
+    chapters
+        Chapters to run, in order.
+    finger
+        Results of detect and run.
+    calibration, fit
+        Results of these chapters.
+    diagnosis
+        Diagnosis of the calibration.
+    files
+        Each file with its content in words, the page first.
+    missing
+        Why chapters are left out; empty if none is.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be made.
     """
 
     calibration: Calibration
@@ -56,7 +86,6 @@ class Story:
     fit: FrictionFit
 
     def __init__(self, folder: Path) -> None:
-        """Raises InputError where the folder cannot be made."""
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -76,12 +105,18 @@ class Story:
 
     @property
     def files(self) -> dict[Path, str]:
-        """In the order of the story, the page first."""
+        """Each file with its content in words, in the order of the story, the page first."""
         return {**self._files, **self.finger.files}
 
     def add_page(self, page: Path) -> None:
-        """Puts the page of the whole story before all other files."""
-        self._files = {page: "the whole story, to be read in a browser", **self._files}
+        """Put the page of the whole story before all other files.
+
+        Parameters
+        ----------
+        page
+            File of the page.
+        """
+        self._files = {page: "the whole demo, for a browser", **self._files}
 
     def _calibrate(self, phase: Phase) -> None:
         from tendonfmu.calibrate import calibrate, write_calibration
@@ -91,7 +126,7 @@ class Story:
             phase(state.words, state.done, state.total)
 
         folder = self.folder / CALIBRATION
-        forget_steps(folder)  # of an earlier demo: this one shows the work
+        forget_steps(folder)  # of an earlier demo: this one shows every step
         with as_file(DATA) as data:
             found = calibrate(data / TWO_JOINTS, [data / TRAINING], folder, tests=[data / UNSEEN], progress=show)
         assert found.diagnosis is not None, "no step was there to be repeated"
@@ -103,7 +138,7 @@ class Story:
         self.finger.pushes(lambda done, total: phase("running the FMU", done, total))
 
     def _diagnose(self, phase: Phase) -> None:
-        """A closer look at what the calibration has found."""
+        """Do nothing: the chapter shows what the calibration has found."""
 
     def _fit(self, phase: Phase) -> None:
         from tendonfmu.estimate import FitWarning, FrictionFit
@@ -114,7 +149,7 @@ class Story:
             phase(f"fitting: {now.phase}", now.done, now.total)
 
         with as_file(DATA) as data, warnings.catch_warnings():
-            warnings.simplefilter("ignore", FitWarning)  # they are on the fit's page
+            warnings.simplefilter("ignore", FitWarning)  # the page of the fit lists them
             self.fit = FrictionFit(data / TWO_JOINTS, progress=show).fit(data / TRAINING, compare=data / UNSEEN)
         phase("drawing the fit", 0, None)
         folder = self.folder / FIT

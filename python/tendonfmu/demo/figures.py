@@ -1,4 +1,7 @@
-"""The figures of the demo's page, for `drawing/panels.py`: torques of the index finger, errors of the other."""
+"""The figures of the demo's page: torques of the index finger, errors of the two-joint finger.
+
+They are drawn by `drawing/panels.py`.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,7 @@ _HEIGHT = 270  # CSS pixels
 
 
 def story_sheets(story: Story) -> Iterator[Sheet]:
-    """All figures but those of the diagnosis, each in the section of its chapter."""
+    """Yield all figures except those of the diagnosis, each in the section of its chapter."""
     yield _push_sheet(story)
     yield _free_sheet(story)
     if story.missing:
@@ -47,13 +50,13 @@ def _free_sheet(story: Story) -> Sheet:
             figure.joints[0],
             samples,
             figure.title,
-            f"Joint {FLEXION.replace('_', ' ')}, {figure.title}: measured torque, what the FMU predicts of it, and "
+            f"Joint {FLEXION.replace('_', ' ')}, {figure.title}: measured torque, the FMU's prediction, and "
             "what is left",
             ("measured", "predicted", "compensated"),
         )
         for figure, samples in zip(figures, shown, strict=True)
     ]
-    keys = (("measured", "joint torque, as the tendons pull"), ("predicted", "friction and bias, predicted"))
+    keys = (("measured", "joint torque due to the tendons"), ("predicted", "friction and bias, predicted"))
     return Sheet("run", "run", "", "", (*keys, ("after", "what is left of it")), tuple(panels))
 
 
@@ -77,7 +80,7 @@ def _push_sheet(story: Story) -> Sheet:
         ("after", "joint torque, friction subtracted"),
         ("slow", "external torque, by a reference sensor that the FMU does not have"),
         ("standstill", "somebody pushes"),
-        ("negative", "the FMU says contact"),
+        ("negative", "the FMU reports contact"),
     )
     return Sheet("detect", "detect", "", "", keys, tuple(panels))
 
@@ -129,7 +132,7 @@ def _within(spans: Sequence[Interval], shown: Interval) -> Iterator[Interval]:
 
 
 def _alarm(spans: Sequence[Interval], height: float) -> list[Curve]:
-    """A line at this height wherever contact is reported."""
+    """Draw a line at this height wherever contact is reported."""
     ends = [np.array([begin, end]) for begin, end in _within(spans, SHOWN)]
     return [Curve("negative", each, np.full(2, height)) for each in ends]
 
@@ -138,7 +141,7 @@ def _alarm(spans: Sequence[Interval], height: float) -> list[Curve]:
 
 
 def _calibration_sheet(story: Story) -> Sheet:
-    """Error before and after the calibration, by joint."""
+    """Draw the error before and after the calibration, by joint."""
     report = story.calibration.report
     names = [*report["joints"], "all joints"]
     none, before, after = (
@@ -151,7 +154,7 @@ def _calibration_sheet(story: Story) -> Sheet:
 
 
 def _error_sheet(story: Story) -> Sheet:
-    """Error before and after the fit, by joint."""
+    """Draw the error before and after the fit, by joint."""
     tables = list(residual_tables(story.fit.picture()))
     panels = []
     for table, title in zip(tables, ("On the training recording", "On a recording that it has not seen"), strict=True):
@@ -170,7 +173,7 @@ def _error_sheet(story: Story) -> Sheet:
 
 
 def _error_panel(title: str, unit: str, names: Sequence[str], none: Numbers, before: Numbers, after: Numbers) -> Panel:
-    """rms of each joint [k]: without a friction model, before, and after."""
+    """Draw the rms of each joint [k]: without a friction model, before, and after."""
     places = np.arange(len(names), dtype=float)
     return Panel(
         title=title,
@@ -190,7 +193,7 @@ def _error_panel(title: str, unit: str, names: Sequence[str], none: Numbers, bef
 
 
 def _fit_sheets(story: Story) -> Iterator[Sheet]:
-    """Torque over time of the recording that was not trained on, and the friction in the joints."""
+    """Draw the torque over time of the recording that was not trained on, and the friction in the joints."""
     picture = story.fit.picture()
     *_, unseen = torque_sheets(picture)
     yield Sheet("fit", "fit_torque", "", "", unseen.keys, unseen.panels)

@@ -1,4 +1,4 @@
-"""The page of the demo: its chapters with their figures in one HTML file that needs nothing else."""
+"""The page of the demo: its chapters with their figures, in one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -36,7 +36,13 @@ PAGE = "story.html"
 
 
 def write_story(story: Story) -> None:
-    """All chapters of a story that was told to its end. The file appears whole or not at all."""
+    """Write the page with all chapters of a finished story; the file appears whole or not at all.
+
+    Parameters
+    ----------
+    story
+        A story whose chapters have all run.
+    """
     file = story.folder / PAGE
     text = story_page(story, [draw_sheet(sheet) for sheet in story_sheets(story)])
     with whole_file(file) as partial:
@@ -45,7 +51,7 @@ def write_story(story: Story) -> None:
 
 
 def story_page(story: Story, figures: list[PageFigure]) -> str:
-    """HTML text of the page."""
+    """Return the HTML text of the page."""
     by_section: dict[str, list[PageFigure]] = {}
     for figure in figures:
         by_section.setdefault(figure.sheet.section, []).append(figure)
@@ -66,7 +72,7 @@ def story_page(story: Story, figures: list[PageFigure]) -> str:
 
 
 def _tile(story: Story, chapter: str) -> Tile:
-    """The figure that matters in a chapter."""
+    """Return the most important figure of a chapter."""
     results = story.finger.results
     if chapter == "calibrate":
         return Tile(*next(calibration_text.tiles(story.calibration.report)))

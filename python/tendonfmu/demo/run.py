@@ -1,8 +1,8 @@
 """The demo's chapters `detect` and `run`: the calibrated index finger's FMU over its built-in recordings.
 
-The paper's story on a simulated finger whose truth is known: pushes on the fingertip, free motion at a low pretension,
-and the same motion at four times the pretension. The description was calibrated on 27 min of other motion of that
-finger (examples/demo_recording/make_calibrated.py); nothing is fitted to these recordings.
+As in the paper, but on a simulated finger whose truth is known: pushes on the fingertip, free motion at a low
+pretension, and the same motion at four times the pretension. The description was calibrated on 27 min of other motion
+of that finger (examples/demo_recording/make_calibrated.py); nothing is fitted to these recordings.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from tendonfmu.model import NUMBERS, Finger, FingerDescription, read_finger
 from tendonfmu.recordings import Recording, read_recording
 from tendonfmu.report import CompensationFigure, StoryFigure, compensation_figure
 
-FINGER, GIVEN = "index_finger_calibrated.json", "index_finger.json"  # and what it was calibrated from
+FINGER, GIVEN = "index_finger_calibrated.json", "index_finger.json"  # after and before the calibration
 MINUTES = 27  # of free motion that it was calibrated on
 FREE, FREE_X4, PUSHES = "index_finger_free", "index_finger_free_x4", "index_finger_pushes"
 ABDUCTION, FLEXION = "mcp_abduction", "mcp_flexion"  # the joints that are drawn
@@ -36,9 +36,11 @@ Outputs = Mapping[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class JointResult:
-    """rms in N·m. measured, left: joint torque and what compensation leaves of it, while nobody pushes.
+    """rms of one joint (N·m).
 
-    load, error: external torque, and compensated minus external, while somebody pushes; nan if nobody ever does.
+    `measured` and `left` are the joint torque and what compensation leaves of it, while nobody pushes. `load` and
+    `error` are the external torque, and compensated minus external torque, while somebody pushes; NaN if nobody ever
+    does.
     """
 
     name: str
@@ -50,7 +52,11 @@ class JointResult:
 
 @dataclass(frozen=True)
 class RecordingResult:
-    """mean_force: N, of all tendons over all samples. score: against the labels; without them all alarms are wrong."""
+    """Results of one recording.
+
+    `mean_force` is that of all tendons over all samples (N). `score` compares with the labels; without labels all
+    alarms are false.
+    """
 
     name: str
     seconds: float
@@ -60,16 +66,15 @@ class RecordingResult:
 
 
 class IndexFinger:
-    """The calibrated index finger in a folder: `pushes` first, then `free_motion`.
+    """The calibrated index finger in an existing folder: `pushes` runs first, then `free_motion`.
 
-    files: path -> what is in it. results: by recording. as_given: pushes, with the description as it was before it was
-    calibrated.
+    `files` has each file with its content in words, `results` the results by recording. `as_given` is the score of the
+    pushes with the description as it was before the calibration.
     """
 
     as_given: DetectionScore
 
     def __init__(self, folder: Path) -> None:
-        """folder: exists."""
         self.folder = folder
         self.files: dict[Path, str] = {}
         self.results: dict[str, RecordingResult] = {}
@@ -77,7 +82,7 @@ class IndexFinger:
         self._outputs: dict[str, Outputs] = {}
 
     def pushes(self, progress: Callable[[int, int], None]) -> None:
-        """Builds the FMU and runs it over the recording with pushes. progress: samples done, of how many."""
+        """Build the FMU and run it over the recording with pushes; `progress` receives samples done and samples."""
         with as_file(DATA / FINGER) as finger, as_file(DATA / GIVEN) as given:
             self.description, before = read_finger(finger), read_finger(given)
             build_fmu(finger, self.folder / FMU)
@@ -88,14 +93,14 @@ class IndexFinger:
         self.as_given = score_detection(recording.time, _label(recording), contact)
 
     def free_motion(self, progress: Callable[[int, int], None]) -> None:
-        """Runs the FMU over both recordings of free motion, and draws all three."""
+        """Run the FMU over both recordings of free motion, and draw all three recordings."""
         self._run((FREE, FREE_X4), progress)
         figure = self.folder / FIGURE
         _draw(self.description, self.results, self._recordings, self._outputs, figure)
         self.files[figure] = "torques, what is left of them, contacts"
 
     def curves(self, name: str, joints: Sequence[str], title: str) -> CompensationFigure:
-        """What is drawn of some joints of a recording that has been run."""
+        """Return the curves of some joints of a recording that has been run."""
         numbers = [self.description.joint_names.index(joint) for joint in joints]
         return _curves(self.description, self._recordings[name], self._outputs[name], title, numbers)
 
@@ -149,7 +154,7 @@ def _curves(
 
 
 def _rows(outputs: Outputs, name: str) -> NDArray[Any]:
-    """[N, n] the columns name[1], name[2], ..."""
+    """Join the columns name[1], name[2], ... to [N, n]."""
     count = sum(column.startswith(f"{name}[") for column in outputs)
     return np.column_stack([outputs[f"{name}[{i}]"] for i in range(1, count + 1)])
 
@@ -159,7 +164,7 @@ def _rms(values: NDArray[np.float64]) -> float:
 
 
 def _label(recording: Recording) -> NDArray[np.bool_]:
-    """[N] while somebody pushes."""
+    """Return [N] whether somebody pushes."""
     return np.zeros(len(recording), bool) if recording.contact is None else recording.contact
 
 

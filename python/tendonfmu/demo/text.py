@@ -1,4 +1,4 @@
-"""What the demo shows, in words: rows and lines that `cli/program.py` prints, and sentences of its page."""
+"""The results of the demo in words: the rows and lines that `cli/program.py` prints, and the sentences of its page."""
 
 from __future__ import annotations
 
@@ -25,7 +25,20 @@ Table = tuple[str, Row, list[Row]]
 
 
 def chapter_tables(story: Story, chapter: str) -> Iterator[Table]:
-    """(title, headings, rows) of a chapter that was run."""
+    """Yield the tables of a chapter that has run.
+
+    Parameters
+    ----------
+    story
+        The demo.
+    chapter
+        Name of the chapter.
+
+    Yields
+    ------
+    tuple
+        (title, headings, rows).
+    """
     results = story.finger.results
     if chapter == "calibrate":
         yield from calibration_text.tables(story.calibration.report)
@@ -38,7 +51,15 @@ def chapter_tables(story: Story, chapter: str) -> Iterator[Table]:
 
 
 def chapter_lines(story: Story, chapter: str) -> Iterator[str]:
-    """Its lines, after the tables."""
+    """Yield the lines of a chapter that has run, which follow its tables.
+
+    Parameters
+    ----------
+    story
+        The demo.
+    chapter
+        Name of the chapter.
+    """
     results = story.finger.results
     if chapter == "calibrate":
         report = story.calibration.report
@@ -57,7 +78,13 @@ def chapter_lines(story: Story, chapter: str) -> Iterator[str]:
 
 
 def file_lines(story: Story) -> Iterator[str]:
-    """What was written."""
+    """Yield a line for each file that the demo wrote, with its content.
+
+    Parameters
+    ----------
+    story
+        The demo.
+    """
     for path, what in story.files.items():
         yield f"  {path}  {what}"
 
@@ -103,7 +130,7 @@ def _fitted(tables: Sequence[ResidualTable]) -> Table:
 
 
 def fit_sentence(story: Story) -> str:
-    """How many numbers from how much motion, and what that does for a recording that was not trained on."""
+    """Say how many numbers were fitted to how much motion, and the effect on a recording that was not trained on."""
     report = story.fit.report_
     unseen = list(residual_tables(story.fit.picture()))[-1]
     seconds = sum(each["duration"] for each in report["recordings"])
@@ -115,18 +142,18 @@ def fit_sentence(story: Story) -> str:
 
 
 def detection_sentence(score: DetectionScore) -> str:
-    """Pushes found, and alarms without one."""
+    """Say how many pushes were found, and how many alarms there were without one."""
     return f"{push_sentence(score)}; alarms without a push: {alarms(score)}"
 
 
 def push_sentence(score: DetectionScore) -> str:
-    """How many pushes were found, and how soon."""
+    """Say how many pushes were found, and how soon."""
     text = f"{score.found} of {len(score.events)} pushes found"
     return f"{text}, half of them within {1e3 * np.median(score.delays):.0f} ms" if score.found else text
 
 
 def alarms(score: DetectionScore) -> str:
-    """Alarms without a push."""
+    """Say how many alarms there were without a push."""
     if not score.false_alarms:
         return "none"
     begin, end = max(score.false_alarms, key=lambda alarm: alarm[1] - alarm[0])
@@ -136,7 +163,7 @@ def alarms(score: DetectionScore) -> str:
 
 
 def cause_lines(story: Story) -> Iterator[str]:
-    """Verdict, each cause with its size, and the gain."""
+    """Yield the verdict, each cause with its size, and the gain."""
     found = story.diagnosis
     names = names_of(found)
     yield diagnosis_text.headline(found)

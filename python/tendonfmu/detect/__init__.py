@@ -1,7 +1,7 @@
-"""Contact: tuned on free motion, scored on labelled recordings (`tendonfmu tune`, `score`).
+"""Tunes contact detection on free motion, and scores it on labelled recordings (`tendonfmu tune`, `score`).
 
-`free_motion` runs a finger over free motion, `tuning` chooses the bounds for a stated rate of false alarms, `run` and
-`counting` hold decisions against labels, `summary` and `score_report` say what was found.
+`free_motion` runs a finger over free motion, and `tuning` chooses the bounds for a stated rate of false alarms. `run`
+and `counting` compare decisions with labels; `summary` and `score_report` report the result.
 """
 
 import lazy_loader

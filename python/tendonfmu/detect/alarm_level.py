@@ -1,6 +1,7 @@
-"""How high a bound must be for a number of alarms: cells of time, alarms that are one, levels, limits of rates.
+"""How high a bound must be for a number of alarms: cells of time, merged alarms, levels, and limits of rates.
 
-A cell is a short stretch of time of which only the largest excess over a bound counts: trying many bounds is cheap.
+A cell is a short stretch of time, of which only the largest excess over a bound counts. This makes it cheap to try many
+bounds.
 """
 
 from __future__ import annotations
@@ -22,32 +23,54 @@ Numbers = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 CELL = 0.02  # s
-_APART = round(MERGED / CELL)  # cells; alarms closer than that are one
-_LONG = round(1.0 / CELL)  # cells that an alarm may last on average: one that lasts for minutes is few alarms, too
-_FAR = 10**9  # cells between parts: their alarms are never one
-WINDOW = 10.0  # s over which a mean force is taken to say at which pretension a cell is
-SAME = 1.2  # factor between mean forces of one group
-WIDEST = 1.6  # factor across a group; wider ones are cut
-BLOCK = 60.0  # s; cross-validation takes every other one. Of short parts a smaller one, so that there are some:
-BLOCKS = 6
-OF_BOTH = 0.25  # of each pretension's time, at least, is in either half when whole recordings are held out
+_APART = round(MERGED / CELL)  # cells; alarms closer than this are one
+_LONG = round(1.0 / CELL)  # most cells per alarm on average; otherwise one alarm of minutes would count as few
+_FAR = 10**9  # cells between parts, so that their alarms are never merged
+WINDOW = 10.0  # s over which a mean force is computed to find the pretension of a cell
+SAME = 1.2  # largest factor between neighbouring mean forces of one group
+WIDEST = 1.6  # largest factor across a group; wider ones are divided
+BLOCK = 60.0  # s; cross-validation takes every second block. Short parts have shorter blocks:
+BLOCKS = 6  # at least so many per part
+OF_BOTH = 0.25  # least share of each pretension's time in either half if whole recordings are held out
 
 
 # --- rates ------------------------------------------------------------------------------------------------------------
 
 
 def rate_limit(alarms: float, hours: float, confidence: float) -> float:
-    """1/h: the exact upper limit of a Poisson rate, one-sided (Garwood 1936): Γ⁻¹(alarms + 1, confidence)/hours."""
+    """Compute the exact one-sided upper limit of a Poisson rate (1/h): Γ⁻¹(alarms + 1, confidence)/hours.
+
+    Parameters
+    ----------
+    alarms
+        Number of alarms.
+    hours
+        Time that they were counted in (h).
+    confidence
+        Probability that the rate is below the limit.
+
+    Notes
+    -----
+    Garwood 1936.
+    """
     return float(gammaincinv(alarms + 1.0, confidence)) / hours if hours > 0 else math.inf
 
 
 def least_hours(rate: float, confidence: float) -> float:
-    """h that support a rate if they are without any alarm: −ln(1 − confidence)/rate."""
+    """Compute the time without any alarm that supports a rate (h): −ln(1 − confidence)/rate.
+
+    Parameters
+    ----------
+    rate
+        Rate of alarms (1/h).
+    confidence
+        Probability that the rate is not exceeded.
+    """
     return -math.log1p(-confidence) / rate
 
 
 def allowed_alarms(hours: float, rate: float, confidence: float) -> int:
-    """The most alarms in that time whose upper limit is at most the rate; −1: none at all would be too many."""
+    """Return the most alarms whose upper limit is at most the rate; −1 if even no alarm would be too many."""
     count = -1
     while rate_limit(count + 1, hours, confidence) <= rate:
         count += 1
@@ -61,10 +84,10 @@ def allowed_alarms(hours: float, rate: float, confidence: float) -> int:
 class Cells:
     """The counted time of all parts, in [c] cells.
 
-    rows: for each part its counted samples. first: where among all of them, one part after the other, a cell begins.
-    order: number of each cell in time, far apart between parts. part, time: index of the part, and s of its own clock.
-    force: N, mean over all tendons. group: index of its pretension. fold: 0 or 1, the half of the time that it is in.
-    hours: h of each.
+    `rows` has for each part its counted samples, and `first` the index of each cell's first sample among all of them,
+    one part after the other. `order` numbers the cells in time, with large gaps between parts. `part` and `time` are
+    the index of the part and the time on its own clock (s). `force` is the mean over all tendons (N), `group` the index
+    of the pretension, `fold` 0 or 1 for the half of the time, and `hours` the length of each cell (h).
     """
 
     rows: Sequence[Index]
@@ -82,13 +105,13 @@ class Cells:
         return int(self.group.max()) + 1
 
     def mean(self, values: Signal) -> Numbers:
-        """[c, n] mean of each cell, of [n, N] counted samples."""
+        """Average [n, N] counted samples over each cell; the result is [c, n]."""
         size = np.diff(np.append(self.first, values.shape[1]))
         return np.asarray((np.add.reduceat(values, self.first, axis=1) / size).T, dtype=float)
 
 
 def cells_of(parts: Sequence[FreePart]) -> Cells:
-    """Cells of the counted samples; parts without any have none."""
+    """Divide the counted samples into cells; parts without any have none."""
     rows = [np.flatnonzero(part.counted) for part in parts]
     time = np.concatenate([part.time[each] - part.time[0] for part, each in zip(parts, rows, strict=True)])
     owner = np.repeat(np.arange(len(parts)), [len(each) for each in rows])
@@ -119,10 +142,10 @@ def cells_of(parts: Sequence[FreePart]) -> Cells:
 def _recordings_by_turns(
     parts: Sequence[FreePart], owner: Index, force: Numbers, group: Index, hours: Numbers
 ) -> Index | None:
-    """[c] 0 or 1: whole recordings in the order of their mean force, so that other motion is held out; None where a
-    pretension has too little in one of the halves. owner: [c] part of each cell.
+    """Assign whole recordings to halves in turn, in the order of their mean force, so that other motion is held out.
 
-    One motion repeats itself: its peaks are alike in all blocks, and say little of those of another motion.
+    Returns [c] 0 or 1, or None if a pretension has too little time in one of the halves. `owner` is [c] the part of
+    each cell. The blocks of a repeated motion have similar peaks, which tell little about another motion.
     """
     _, recording = np.unique([part.source for part in parts], return_inverse=True)
     of_cell = recording[owner]
@@ -133,17 +156,17 @@ def _recordings_by_turns(
 
 
 def _blocks(parts: Sequence[FreePart]) -> Numbers:
-    """[parts] s."""
+    """Return [parts] the length of a block (s)."""
     return np.array([min(BLOCK, max((part.time[-1] - part.time[0]) / BLOCKS, CELL)) for part in parts])
 
 
 def rows_of(values: Sequence[Signal], cells: Cells) -> Signal:
-    """[n, N] counted samples of all parts, of [N, n] of each."""
+    """Join the counted samples of all parts: [N, n] of each become [n, N]."""
     return np.concatenate([each[rows].T for each, rows in zip(values, cells.rows, strict=True)], axis=1)
 
 
 def _groups(force: Numbers, window: Index) -> Index:
-    """[c] pretension of each cell, in rising order: mean forces over `WINDOW` that are near each other are one."""
+    """Return [c] the pretension of each cell, in rising order: similar mean forces over `WINDOW` form one."""
     _, inverse = np.unique(window, return_inverse=True)
     mean = np.maximum(np.bincount(inverse, force) / np.bincount(inverse), 1e-9)
     ordered = np.sort(mean)
@@ -154,7 +177,7 @@ def _groups(force: Numbers, window: Index) -> Index:
         cuts = max(1, math.ceil(math.log(high / low) / math.log(WIDEST) - 1e-9))
         edges += [float(low * (high / low) ** (k / cuts)) for k in range(cuts)]
     label = np.searchsorted(np.array(edges[1:]), mean, side="right")
-    _, label = np.unique(label, return_inverse=True)  # those that hold a window
+    _, label = np.unique(label, return_inverse=True)  # drops groups without a window
     return np.asarray(label[inverse], dtype=np.int64)
 
 
@@ -162,19 +185,19 @@ def _groups(force: Numbers, window: Index) -> Index:
 
 
 def count_alarms(order: Index) -> int:
-    """Alarms of the cells [k] (increasing) that exceed."""
+    """Count the alarms of the cells [k] (increasing) that exceed their bound."""
     return 0 if not len(order) else 1 + int((np.diff(order) > _APART).sum())
 
 
 def alarms_above(order: Index, above: NDArray[np.bool_]) -> int:
-    """Alarms of cells [c] of which some [c] exceed."""
+    """Count the alarms of cells [c], given which of them [c] exceed their bound."""
     return count_alarms(order[above])
 
 
 def level_for(statistic: Numbers, order: Index, allowed: int, others: Index | None = None) -> float:
-    """The least level that no more than `allowed` alarms exceed, here and at every higher one, none for long.
+    """Find the smallest level that at most `allowed` alarms exceed, here and at every higher level, none for long.
 
-    statistic: [c] of each cell. order: [c]. others: cells that are in alarm anyway.
+    `statistic` and `order` are [c] by cell. `others` are cells that are in alarm anyway.
     """
     present: list[int] = [] if others is None else sorted(int(each) for each in others)
     alarms = count_alarms(np.array(present, dtype=np.int64))
@@ -194,7 +217,10 @@ def level_for(statistic: Numbers, order: Index, allowed: int, others: Index | No
 
 
 def _descending(statistic: Numbers, few: int = 4000) -> Iterator[int]:
-    """Cells from the largest statistic on; most levels are found among the first few, so the rest comes only then."""
+    """Yield the cells by falling statistic.
+
+    Most levels are found among the first few, so the others are sorted only when needed.
+    """
     if len(statistic) <= few:
         yield from np.argsort(-statistic, kind="stable").tolist()
         return
@@ -205,7 +231,7 @@ def _descending(statistic: Numbers, few: int = 4000) -> Iterator[int]:
 
 
 def _joins(present: list[int], cell: int) -> int:
-    """By how much a further cell changes the number of alarms: a new one, part of one, or two of them become one."""
+    """Return the change of the number of alarms by one more cell: a new alarm, part of one, or two merged into one."""
     k = bisect_left(present, cell)
     before = k > 0 and cell - present[k - 1] <= _APART
     after = k < len(present) and present[k] - cell <= _APART

@@ -1,8 +1,7 @@
 """Bounds of contact detection that free motion stays within: their shape by tails, their level by a number of alarms.
 
-A bound of joint j is base_j + per_force_j·f + c_H·H_j + c_J·J_j (docs/reference/semantics.md#contact-detector).
-Of all that let no more alarms through than allowed, the one that the lightest push passes is the most sensitive
-(`least_load`).
+A bound of joint j is base_j + per_force_j·f + c_H·H_j + c_J·J_j (docs/reference/semantics.md#contact-detector). Among
+the bounds with at most the allowed alarms, the best is the one that the lightest push exceeds (`least_load`).
 """
 
 from __future__ import annotations
@@ -22,22 +21,22 @@ from tendonfmu.detect.free_motion import FreeRun, Signal
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-# (c_H, c_J) that are tried. A push makes the model jump and ends stiction, and hides behind large shares:
+# Pairs (c_H, c_J) to try. A push makes the model jump and ends stiction, so large shares hide it:
 # docs/reference/commands/tune.md
 SHARES = ((0.4, 0.4),)
-TAILS = (4.0, 16.0)  # times the wished rate: how far out the tails are that shape a bound
-COMPARED = 12  # alarms at which bounds are compared, if fewer are allowed: single extremes say little of a shape
-_LEAST = 0.02  # of a signal's rms; the part of a bound that is not friction is nowhere smaller
-WORTH_STUCK, WORTH_JUMP = 0.25, 5.0  # parts of H and J that stand in the way of a push, see `Search.in_the_way`
-_EVERY = 10  # every so many'th cell for the mean logarithm
+TAILS = (4.0, 16.0)  # times the wished rate: the rates of the tails that shape a bound
+COMPARED = 12  # alarms at which bounds are compared, if fewer are allowed: single extremes tell little about a shape
+_LEAST = 0.02  # of a signal's rms: least value of the part of a bound that is not friction
+WORTH_STUCK, WORTH_JUMP = 0.25, 5.0  # weights of H and J that a push has to exceed, see `Search.in_the_way`
+_EVERY = 10  # one cell in so many for the mean logarithm
 _FACTORS = (0.9, 1.1)
-_NEAR = 0.4  # of a bound
-_FEW_ROUNDS, _ROUNDS = 2, 4  # over all joints: of every pair of shares, and of the best one
+_NEAR = 0.4  # of a bound: cells below it cannot exceed a refined bound
+_FEW_ROUNDS, _ROUNDS = 2, 4  # rounds over all joints: for every pair of shares, and for the best one
 
 
 @dataclass(frozen=True)
 class Bound:
-    """base [n] N·m, per_force [n] N·m per N, and the shares c_H, c_J."""
+    """A bound: base [n] (N·m), per_force [n] (N·m/N), and the shares c_H and c_J."""
 
     base: Numbers
     per_force: Numbers
@@ -45,21 +44,21 @@ class Bound:
     jump_share: float = 0.0
 
     def scaled(self, factor: float) -> Bound:
-        """Base and per_force times a factor; the shares stay."""
+        """Return the bound with base and per_force times a factor, and the same shares."""
         return replace(self, base=factor * self.base, per_force=factor * self.per_force)
 
     def own(self, force: Numbers) -> Numbers:
-        """[c, n] N·m: base + per_force·f, at mean forces [c]."""
+        """Compute [c, n] base + per_force·f at mean forces [c] (N·m)."""
         return np.asarray(self.base + force[:, None] * self.per_force)
 
     def at_least(self, least: Numbers, force: float) -> Bound:
-        """With bases raised until every joint's own part is at least `least` [n] N·m at a mean force and above it."""
+        """Raise the bases until base + per_force·f is at least `least` [n] (N·m) at and above a mean force."""
         return replace(self, base=np.maximum(self.base, least - force * self.per_force))
 
 
 @dataclass(frozen=True)
 class Tried:
-    """A pair of shares of the grid. mean_log: of `least_load` at the allowed number of alarms, log of N·m."""
+    """A pair of shares that was tried, and the mean logarithm of `least_load` (N·m) at the allowed number of alarms."""
 
     stuck_share: float
     jump_share: float
@@ -68,7 +67,7 @@ class Tried:
 
 @dataclass(frozen=True)
 class Choice:
-    """The best bound of a subset of cells, and all that was tried."""
+    """The best bound of a subset of cells, and all pairs that were tried."""
 
     bound: Bound
     mean_log: float
@@ -76,10 +75,10 @@ class Choice:
 
 
 def least_load(whole: Numbers) -> Numbers:
-    """[c] N·m, of the lightest push that passes bounds [c, n]: the mean logarithm over the link that is pushed.
+    """Compute [c] the lightest push that exceeds bounds [c, n] (N·m): the mean logarithm over the pushed link.
 
-    A force F across the middle of link k of a finger with equal links turns joint j ≤ k by (k − j + 1/2)·ℓ·F: a push
-    loads all joints before it, those near the base most. So a low bound at the base finds more than one at the tip.
+    A force F across the middle of link k of a finger with equal links turns joint j ≤ k by (k − j + 1/2)·ℓ·F. A push
+    loads all joints before it, those near the base most, so a low bound at the base detects more than one at the tip.
     """
     joints = whole.shape[1]
     total = np.zeros(len(whole))
@@ -94,11 +93,11 @@ def least_load(whole: Numbers) -> Numbers:
 
 @dataclass(frozen=True)
 class Search:
-    """What a search needs of all counted samples: [n, N] signal, H, J and L·u in N·m, and means [c, n] of
-    each cell; mean_square of the signal.
+    """All counted samples, as a search of bounds needs them.
 
-    rate: 1/h, of alarms. least: [n] N·m, of base + per_force·f at any recorded force f, the lowest of
-    which is lowest_force, N.
+    `signal`, `stuck`, `jump` and `uncertain` are [n, N] signal, H, J and L·u (N·m); the `mean_` values are [c, n] means
+    of each cell, `mean_square` that of the squared signal. `rate` is that of alarms (1/h). `least` [n] is the smallest
+    base + per_force·f (N·m) at any recorded force f, the lowest of which is `lowest_force` (N).
     """
 
     cells: Cells
@@ -115,7 +114,7 @@ class Search:
     lowest_force: float
 
     def excess(self, stuck_share: float, jump_share: float) -> Signal:
-        """[c, n] N·m: by how much |signal| exceeds c_H·H + c_J·J + L·u in each cell, at most."""
+        """Compute [c, n] the largest excess of |signal| over c_H·H + c_J·J + L·u in each cell (N·m)."""
         over = self.signal
         for share, part in ((stuck_share, self.stuck), (jump_share, self.jump)):
             if share:
@@ -125,27 +124,27 @@ class Search:
         return np.ascontiguousarray(np.maximum.reduceat(over, self.cells.first, axis=1).T)
 
     def statistic(self, bound: Bound) -> Numbers:
-        """[c] largest ratio over joints of the excess to base + per_force·f; above 1 is an alarm."""
+        """Compute [c] the largest ratio over joints of the excess to base + per_force·f; above 1 is an alarm."""
         return statistic(self.excess(bound.stuck_share, bound.jump_share), bound, self.cells.force)
 
     def sound(self, bound: Bound) -> Bound:
-        """The bound, raised where its own part falls below `least` at a recorded force."""
+        """Raise a bound where its own part falls below `least` at a recorded force."""
         return bound.at_least(self.least, self.lowest_force)
 
     def least_factor(self, bound: Bound) -> float:
-        """The smallest factor on a sound bound that keeps it sound, at most 1 but for rounding.
+        """Return the smallest factor that keeps a sound bound sound, at most 1 apart from rounding.
 
-        Where friction alone explains the signal the excess is negative, and so is the level that alarms ask for.
+        Where friction alone explains the signal, the excess is negative, and so is the level for a number of alarms.
         """
         return float(np.max(self.least / bound.own(np.array([self.lowest_force]))[0]))
 
     def in_the_way(self, bound: Bound, rows: Any) -> Numbers:
-        """[k, n] N·m: what a push has to pass in each of the cells in rows.
+        """Compute [k, n] the torque that a push has to exceed in each of the cells in `rows` (N·m).
 
-        A push worth feeling sets the finger in motion, and what moves has H = 0: a quarter of H counts. It makes the
-        model jump as well, when it is felt more than on average: J counts five times. With these parts the shapes come
-        in nearly the order in which they find pushes on the virtual hand (rank correlation 0.7 to 0.8; 0.2 to 0.3 if H
-        and J count as they are in free motion).
+        A push that matters moves the finger, and H = 0 in motion, so a quarter of H counts. It also makes the model
+        jump more than on average, so J counts five times. With these weights the shapes are in nearly the order in
+        which they find pushes on the virtual hand (rank correlation 0.7 to 0.8; 0.2 to 0.3 if H and J count as in free
+        motion).
         """
         added = WORTH_STUCK * bound.stuck_share * self.mean_stuck[rows]
         added = added + WORTH_JUMP * bound.jump_share * self.mean_jump[rows]
@@ -153,7 +152,10 @@ class Search:
 
 
 def search_for(runs: Sequence[FreeRun], cells: Cells, signal: str, rate: float, level: float = 0.0) -> Search:
-    """signal: "innovation" or "residual". level: L of the uncertainty, which counts for the residual alone."""
+    """Prepare a search for the signal "innovation" or "residual".
+
+    `level` is L of the uncertainty, which counts for the residual only.
+    """
 
     def laid_out(name: str) -> Signal:
         return rows_of([getattr(run, name) for run in runs], cells)
@@ -180,7 +182,7 @@ def search_for(runs: Sequence[FreeRun], cells: Cells, signal: str, rate: float, 
 
 
 def statistic(over: Signal, bound: Bound, force: Numbers) -> Numbers:
-    """[c] largest ratio over joints of the excess [c, n] to base + per_force·f; above 1 is an alarm."""
+    """Compute [c] the largest ratio over joints of the excess [c, n] to base + per_force·f; above 1 is an alarm."""
     return np.asarray(np.max(over / bound.own(force), axis=1), dtype=float)
 
 
@@ -190,9 +192,9 @@ def statistic(over: Signal, bound: Bound, force: Numbers) -> Numbers:
 def choose(
     search: Search, subsets: Sequence[Flags], allowed: Sequence[int], tick: Callable[[], None] | None = None
 ) -> list[Choice]:
-    """The best bound of every subset of cells [c], with at most `allowed` alarms in each.
+    """Choose the best bound of every subset of cells [c], with at most `allowed` alarms in each.
 
-    The bases of single joints are fitted to each pair of shares.
+    The bases of single joints are fitted for each pair of shares.
     """
     best: list[Choice | None] = [None] * len(subsets)
 
@@ -215,7 +217,7 @@ def choose(
 
 
 def choose_at(search: Search, pair: tuple[float, float], subset: Flags, allowed: int) -> Choice:
-    """The best bound of a subset of cells with given shares."""
+    """Choose the best bound of a subset of cells with given shares."""
     return _refined_whole(
         search, _best_tail(search, pair, search.excess(*pair)[subset], subset, allowed), subset, allowed
     )
@@ -234,7 +236,7 @@ def _best_tail(search: Search, pair: tuple[float, float], over: Signal, subset: 
 
 
 def _at_level(search: Search, shape: Bound, over: Signal, subset: Flags, allowed: int) -> tuple[Bound, float]:
-    """A shape at the least level with the allowed alarms, and the mean logarithm of what it finds."""
+    """Return a shape at the least level with the allowed alarms, and the mean logarithm of the lightest push found."""
     level = level_for(statistic(over, shape, search.cells.force[subset]), search.cells.order[subset], allowed)
     return _worth(search, shape.scaled(max(level, search.least_factor(shape))), subset)
 
@@ -250,9 +252,9 @@ def _refined_whole(search: Search, choice: Choice, subset: Flags, allowed: int) 
 
 
 def _refined(search: Search, choice: Choice, over: Signal, subset: Flags, allowed: int, rounds: int) -> Choice:
-    """The bases of single joints raised or lowered as long as that finds lighter pushes."""
+    """Raise or lower the bases of single joints as long as this finds lighter pushes."""
     best = choice
-    # what is far below the bound stays below all those near it
+    # a cell far below the bound stays below all bounds near it
     near = np.flatnonzero(statistic(over, choice.bound, search.cells.force[subset]) > _NEAR)
     over, force, order = over[near], search.cells.force[subset][near], search.cells.order[subset][near]
     for _ in range(rounds):
@@ -271,9 +273,25 @@ def _refined(search: Search, choice: Choice, over: Signal, subset: Flags, allowe
 
 
 def tail_levels(cells: Cells, over: Signal, subset: Flags, rate: float) -> tuple[Numbers, Numbers]:
-    """Mean force [g] N, and levels [g, n] N·m that each joint exceeds at a rate (1/h) of alarms of its own.
+    """Find the levels that each joint exceeds at a rate of alarms of its own, by pretension.
 
-    over: [k, n] of the cells of the subset.
+    Parameters
+    ----------
+    cells
+        Counted time.
+    over
+        [k, n] excess in the cells of the subset (N·m).
+    subset
+        [c] mask of the k cells.
+    rate
+        Rate of alarms (1/h).
+
+    Returns
+    -------
+    force : ndarray
+        [g] mean force of each pretension (N).
+    level : ndarray
+        [g, n] (N·m).
     """
     group, order = cells.group[subset], cells.order[subset]
     forces, levels = [], []
@@ -286,9 +304,9 @@ def tail_levels(cells: Cells, over: Signal, subset: Flags, rate: float) -> tuple
 
 
 def lines_through(force: Numbers, level: Numbers) -> tuple[Numbers, Numbers]:
-    """base, per_force [n], both ≥ 0, of a + b·f ≈ level [g, n] at forces [g], by least squares of the relative error.
+    """Fit base and per_force [n], both ≥ 0, with a + b·f ≈ level [g, n] at forces [g], by least relative squares.
 
-    One force alone tells nothing of b: 0.
+    With a single force b is unknown and set to 0.
     """
     if len(force) < 2:
         return level[0].astype(float), np.zeros(level.shape[1])

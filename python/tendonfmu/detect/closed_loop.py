@@ -1,4 +1,4 @@
-"""False alarms of a tuned finger as it runs, its bias standing still in contact."""
+"""False alarms of a tuned finger as it runs, with the bias frozen in contact."""
 
 from __future__ import annotations
 
@@ -15,9 +15,11 @@ from tendonfmu.detect.free_motion import SETTLING, FreePart, closed_loop
 
 @dataclass(frozen=True)
 class LoopAlarms:
-    """Of one part. part: its index. begins, ends: s of its own clock, of the alarms after it has settled.
+    """Alarms of one part.
 
-    at_start: alarms before. hours: counted. alarm_seconds: s in alarm, of all its time.
+    `part` is its index. `begins` and `ends` are the times of the alarms after it has settled, in s of its own clock.
+    `at_start` counts the alarms before. `hours` is the counted time, `seconds` all its time and `alarm_seconds` the
+    time in alarm.
     """
 
     part: int
@@ -35,11 +37,11 @@ class LoopAlarms:
 
     @property
     def longest(self) -> float:
-        """s, 0 without alarms."""
+        """Longest alarm (s); 0 without alarms."""
         return max((end - begin for begin, end in zip(self.begins, self.ends, strict=True)), default=0.0)
 
     def alarms_in(self, cells: Cells, group: int) -> int:
-        """Those at one pretension: by the nearest counted cell."""
+        """Count the alarms at one pretension, by the nearest counted cell."""
         own = np.flatnonzero(cells.part == self.part)
         if not len(own):
             return 0
@@ -48,7 +50,7 @@ class LoopAlarms:
 
 
 def count_loop(data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int) -> list[LoopAlarms]:
-    """Runs the finger over every part anew. An alarm counts where it begins: in counted time."""
+    """Run the finger over every part from its start. An alarm counts if it begins in counted time."""
     found = []
     for k, (part, contact) in enumerate(zip(parts, closed_loop(data, parts, kinematics), strict=True)):
         time = part.time - part.time[0]

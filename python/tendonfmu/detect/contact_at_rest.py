@@ -1,7 +1,7 @@
 """The rule for contact at rest, learned from the rests in free motion (docs/reference/semantics.md#contact-at-rest).
 
-How far a standing motor moves comes from its positions; how much the torques change at rest from the runtime, which
-decides what a rest is. Bounds are fitted to some of the rests and scaled until the others keep the rate.
+The positions show how far a standing motor moves. The runtime decides what a rest is, and shows how much the torques
+change at rest. Bounds are fitted to some of the rests, and scaled until the other rests keep the rate.
 """
 
 from __future__ import annotations
@@ -22,23 +22,26 @@ from tendonfmu.model import DEFAULTS, native, number_of
 Numbers = NDArray[np.float64]
 
 SETTLE_TIME = DEFAULTS["contact.rest.settle_time"]  # s
-INNOVATION_TIME = 0.5  # s; a touch rises within that, and what creeps meanwhile is little
-LEAST_REST = 0.5  # s; shorter rests are not learned from: a stop in passing
-LEFT_OUT = "contact.rest is left out: "  # and why
-LEAST_MINUTES, LEAST_RESTS = 2.0, 20  # in all; from fewer no bound can be held out
-STANDING_SHARE = 0.05  # of all windows; the span of positions at this quantile is that of standing motors
-TRAVEL_SPANS = 2.0  # spans of standing motors that a motor may be from the mark, which is a noisy sample itself
-SLOWEST = 0.5  # of velocity_threshold.tendon: a motor faster than this moves, and its span is not noise
-NOISE_LEVEL = 5.0  # σ: 100,000 independent averages an hour and joint pass it once in 17 hours
+INNOVATION_TIME = 0.5  # s; a touch rises within this time, creep hardly changes
+LEAST_REST = 0.5  # s; shorter rests are brief stops and are not used
+LEFT_OUT = "contact.rest is left out: "  # followed by the reason
+LEAST_MINUTES, LEAST_RESTS = 2.0, 20  # in all; with fewer no bound can be tested on other rests
+STANDING_SHARE = 0.05  # quantile over all windows: the span of positions of standing motors
+TRAVEL_SPANS = 2.0  # spans of standing motors; two, because the position of reference is noisy as well
+SLOWEST = 0.5  # of velocity_threshold.tendon: a faster motor moves, and its span is not noise
+NOISE_LEVEL = 5.0  # σ: 100,000 independent averages per hour and joint exceed it once in 17 hours
 FOLDS = 5
-BEYOND = 1.2  # beyond the largest change that was seen, where none may be above: the next hour's largest is not known
-_ROUNDS, _RAISE = 12, 1.1  # how often, and by how much, bounds are raised until the running finger keeps the rate
+BEYOND = 1.2  # margin over the largest change if no alarm is allowed: the next hour may have a larger one
+_ROUNDS, _RAISE = 12, 1.1  # most steps, and the factor of each, until the running finger keeps the rate
 
 
 @dataclass(frozen=True)
 class RestRule:
-    """keys: `contact.rest`. rests, hours: learned from. held_out: alarms in rests that the bounds were not fitted to.
-    alarms: of the finger as it runs. limit: 1/h of rest, upper, of their rate.
+    """The rule for contact at rest, and its evidence.
+
+    `keys` is `contact.rest`. `rests` and `hours` are the data that it was learned from. `held_out` counts the alarms in
+    rests that the bounds were not fitted to, `alarms` those of the finger as it runs. `limit` is the upper limit of
+    their rate (1/h of rest).
     """
 
     keys: Mapping[str, Any]
@@ -51,7 +54,10 @@ class RestRule:
 
 @dataclass(frozen=True)
 class Rest:
-    """One rest. time: [K] s since it began. change, sudden: [K, n] N·m, |c| and |y|. noise: [n] N·m, σ of c."""
+    """One rest.
+
+    `time` is [K] since it began (s); `change` and `sudden` are [K, n] |c| and |y| (N·m); `noise` is [n] σ of c (N·m).
+    """
 
     time: Numbers
     change: Numbers
@@ -61,17 +67,18 @@ class Rest:
 
 @dataclass(frozen=True)
 class Bounds:
-    """[n] N·m: contact.rest.threshold, creep and innovation.threshold."""
+    """Bounds of a rest, [n] each (N·m): contact.rest.threshold, creep in the first second, and innovation.threshold."""
 
     threshold: Numbers
     creep: Numbers
     sudden: Numbers
 
     def scaled(self, factor: float) -> Bounds:
+        """Return the bounds times a factor."""
         return Bounds(factor * self.threshold, factor * self.creep, factor * self.sudden)
 
     def keys(self, travel: float) -> dict[str, Any]:
-        """`contact.rest`."""
+        """Return `contact.rest` with these bounds and a travel (m)."""
         return {
             "travel": travel,
             "settle_time": SETTLE_TIME,
@@ -84,7 +91,26 @@ class Bounds:
 def learn_rest(
     data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int, rate: float, confidence: float
 ) -> tuple[RestRule | None, list[str]]:
-    """The rule for a rate of false alarms per hour of rest, or none; and sentences: why none, or what it supports."""
+    """Learn the rule for a rate of false alarms per hour of rest.
+
+    Parameters
+    ----------
+    data
+        Finger description.
+    parts
+        Free motion.
+    kinematics
+        1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
+    rate, confidence
+        Highest rate of false alarms (1/h of rest), and the probability that it is not exceeded.
+
+    Returns
+    -------
+    rule : RestRule or None
+        The rule; None if the motion does not allow one.
+    sentences : list of str
+        Why there is no rule, or which rate it supports.
+    """
     if not all("tendon_position" in part.arrays for part in parts):
         return None, [_left_out("there are no tendon positions")]
     travel = standing_travel(data, parts)
@@ -128,9 +154,9 @@ def _left_out(why: str) -> str:
 
 
 def standing_travel(data: Mapping[str, Any], parts: Sequence[FreePart]) -> float | None:
-    """m, within which a standing motor stays; None where no motor ever stands.
+    """Return the travel (m) that a standing motor stays within; None if no motor ever stands.
 
-    The span of the noisiest motor over windows of SETTLE_TIME, at the quantile STANDING_SHARE, or the resolution.
+    It is the span of the noisiest motor over windows of SETTLE_TIME, at the quantile STANDING_SHARE, or the resolution.
     """
     spans, resolution = [], np.inf
     for part in parts:
@@ -156,7 +182,7 @@ def standing_travel(data: Mapping[str, Any], parts: Sequence[FreePart]) -> float
 def find_rests(
     data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int, rule: Mapping[str, Any]
 ) -> list[Rest]:
-    """The rests of more than LEAST_REST in all parts, as the runtime has them."""
+    """Find the rests of more than LEAST_REST in all parts, as the runtime defines them."""
     found = []
     for part, outputs in _runs(data, parts, kinematics, rule):
         change = outputs["contact_change"]
@@ -171,15 +197,17 @@ def find_rests(
 
 
 def _innovation(time: Numbers, change: Numbers) -> Numbers:
-    """[K, n] y of a rest without contact: c less m, which follows it; at the median step, which the runtime takes each
-    for itself."""
+    """Compute [K, n] y of a rest without contact: c less m, which follows it.
+
+    It uses the median step, while the runtime uses each step.
+    """
     share = -np.expm1(-float(np.median(np.diff(time))) / INNOVATION_TIME)
     followed = lfilter([share], [1.0, share - 1.0], change, axis=0)
     return np.asarray(change - np.vstack([np.zeros((1, change.shape[1])), followed[:-1]]))
 
 
 def _noise(time: Numbers, change: Numbers) -> Numbers:
-    """[n] σ of c without what creeps: of second differences over 0.1 s, by their median."""
+    """Estimate [n] σ of c without creep: from second differences over 0.1 s, by their median."""
     lag = max(1, int(np.searchsorted(time, 0.1)))
     if len(time) <= 2 * lag:
         return np.zeros(change.shape[1])
@@ -189,10 +217,10 @@ def _noise(time: Numbers, change: Numbers) -> Numbers:
 
 
 def fit_bounds(rests: Sequence[Rest]) -> Bounds:
-    """The least that no change of these rests exceeds, noise apart.
+    """Fit the smallest bounds that no change of these rests exceeds, apart from noise.
 
-    Both thresholds hold the noise of a change, a difference of two averages; `threshold` also what changes within
-    SETTLE_TIME. Creep holds the rest, which grows with the root of the time as the runtime has it.
+    Both thresholds cover the noise of a change, which is a difference of two averages. `threshold` also covers the
+    change within SETTLE_TIME. `creep` covers the later change, which grows with the root of time as in the runtime.
     """
     noise = NOISE_LEVEL * np.sqrt(2.0) * np.median([each.noise for each in rests], axis=0)
     early = np.max([each.change[each.time <= SETTLE_TIME].max(axis=0) for each in rests], axis=0)
@@ -207,18 +235,18 @@ def fit_bounds(rests: Sequence[Rest]) -> Bounds:
 
 
 def _above_zero(values: Numbers) -> Numbers:
-    """[n] as the keys want them, at joints that feel nothing too."""
+    """Return [n] values above 0, as the keys require, also at joints that feel nothing."""
     return np.asarray(np.maximum(values, 1e-9 + 1e-3 * values.max()))
 
 
 def excess(rest: Rest, bounds: Bounds) -> float:
-    """The largest ratio of a change to its bound."""
+    """Compute the largest ratio of a change to its bound."""
     bound = bounds.threshold + bounds.creep * np.sqrt(rest.time)[:, None]
     return float(max((rest.change / bound).max(), (rest.sudden / bounds.sudden).max()))
 
 
 def level(rests: Sequence[Rest], allowed: int) -> tuple[float, int]:
-    """Factor on bounds fitted to all rests, at least 1, and the alarms that it leaves in rests held out in turn."""
+    """Return the factor, at least 1, on bounds fitted to all rests, and its alarms in rests held out in turn."""
     held = np.zeros(len(rests))
     for fold in range(FOLDS):
         bounds = fit_bounds([each for k, each in enumerate(rests) if k % FOLDS != fold])
@@ -231,7 +259,7 @@ def level(rests: Sequence[Rest], allowed: int) -> tuple[float, int]:
 
 
 def count_alarms(data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int, rule: Mapping[str, Any]) -> int:
-    """Begins of `contact_at_rest` of the finger with this rule, in counted time."""
+    """Count the starts of `contact_at_rest` of the finger with this rule, in counted time."""
     count = 0
     for part, outputs in _runs(data, parts, kinematics, rule):
         alarm = outputs["contact_at_rest"].ravel().astype(int)

@@ -1,7 +1,7 @@
-"""Detected contact against labelled contact: what was found, missed, said without contact, and how late.
+"""How detected contact compares with labelled contact: found, missed and false alarms, and delays.
 
-The one way of counting of the product: the commands `score` and `tune`, the demo and the campaigns of bench/ use it.
-What is counted here is only counted; `summary.py` has the shares, rates and intervals.
+All of the product counts this way: the commands `score` and `tune`, the demo and the campaigns of bench/. This module
+counts only; `summary.py` computes shares, rates and intervals.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ Flags = NDArray[np.bool_]
 Spans = NDArray[np.int64]
 
 MERGED = 0.1  # s; labelled stretches, or alarms, closer than this are one
-SILENT = 0.2  # s before an onset without any sample of contact, or the event is not found
-GRACE = 0.1  # s after an event in which an alarm is neither false nor free time
-BLOCK = 2.0  # s of free time; longer than residuals and alarms of free motion are correlated
-_EQUAL = 1e-9  # s; times of a CSV are decimal
+SILENT = 0.2  # s before the onset of a found event that must have no sample of contact
+GRACE = 0.1  # s after an event in which an alarm is not false and time is not free
+BLOCK = 2.0  # s of free time; longer than the correlation of residuals and alarms in free motion
+_EQUAL = 1e-9  # s; the times of a CSV are rounded to decimals
 
 
 @dataclass(frozen=True)
 class Signals:
-    """What else is known of each sample; None: not known.
+    """Further signals of each sample; None if unknown.
 
-    residual: [N, n] N·m before the bias update, NaN where there is none. compensated: [N, n] N·m, the estimate of the
-    external torque; deviation: [N, n] N·m, its standard deviation as told. external: [N, n] N·m of a reference sensor.
-    force: [N] N, sensed.
+    `residual` is [N, n] before the bias update (N·m), NaN where there is none. `compensated` is [N, n] the estimate of
+    the external torque and `deviation` [N, n] its stated standard deviation (N·m). `external` is [N, n] the torque of a
+    reference sensor (N·m), `force` [N] a sensed force (N).
     """
 
     residual: Numbers | None = None
@@ -44,12 +44,26 @@ class Signals:
 
 @dataclass(frozen=True)
 class Event:
-    """One labelled contact. Times in s, NaN where there is none.
+    """One labelled contact; times in s, NaN where there is none.
 
-    onset, end: first and last labelled sample. silent: no sample of contact in the `SILENT` time before. alarm: first
-    sample of the first alarm that begins in [onset, end]. held: that alarm lasts until less than `MERGED` before the
-    end. held_share: part of the time from alarm to end that is contact. overhang: s of free time in alarms that began
-    in the event or its grace. compensated, external: [n] N·m at the alarm; force: N at it.
+    Attributes
+    ----------
+    onset, end
+        First and last labelled sample.
+    silent
+        Whether no sample in the `SILENT` time before has contact.
+    alarm
+        First sample of the first alarm that begins in [onset, end].
+    held
+        Whether that alarm lasts until less than `MERGED` before the end.
+    held_share
+        Share of the time from alarm to end that is contact.
+    overhang
+        Free time in alarms that began in the event or its grace (s).
+    compensated, external
+        [n] torques at the alarm (N·m).
+    force
+        Force at the alarm (N).
     """
 
     onset: float
@@ -65,11 +79,12 @@ class Event:
 
     @property
     def found(self) -> bool:
+        """Whether the alarm begins in the event after silence."""
         return self.silent and not math.isnan(self.alarm)
 
     @property
     def delay(self) -> float:
-        """s; NaN unless found."""
+        """Time from onset to alarm (s); NaN unless found."""
         return self.alarm - self.onset if self.found else math.nan
 
 
@@ -77,7 +92,8 @@ class Event:
 class FreeBlocks:
     """Sums over [b] blocks of about `BLOCK` seconds of free time.
 
-    seconds, alarm_seconds: in all, and in alarm. samples: that have a residual. squares: [b, n] sum of its squares.
+    `seconds` and `alarm_seconds` are the time in all and in alarm, `samples` the number of samples with a residual, and
+    `squares` [b, n] the sum of its squares.
     """
 
     seconds: Numbers
@@ -88,10 +104,10 @@ class FreeBlocks:
 
 @dataclass(frozen=True)
 class ContactSums:
-    """Sums over the samples of [e] events with a reference sensor; x: reference, y: compensated torque, N·m.
+    """Sums over the samples of [e] events with a reference sensor; x: reference, y: compensated torque (N·m).
 
-    samples: [e]. The others [e, n]: of (y − x)², x, y, x², y², x·y; how many samples are `within` two of the standard
-    deviations that are told of y, NaN without these.
+    `samples` is [e]. The others are [e, n]: sums of (y − x)², x, y, x², y² and x·y, and the number of samples `within`
+    two of the stated standard deviations of y, NaN if none are stated.
     """
 
     samples: Numbers
@@ -106,9 +122,18 @@ class ContactSums:
 
 @dataclass(frozen=True)
 class DetectionScore:
-    """Of one recording, or of several pooled.
+    """Score of one recording, or of several pooled.
 
-    false_alarms: (begin, end) s, first and last sample of each. contact: None without a reference sensor.
+    Attributes
+    ----------
+    events
+        Labelled contacts.
+    false_alarms
+        (begin, end) of each, its first and last sample (s).
+    free
+        Sums over the free time.
+    contact
+        Sums over the events; None without a reference sensor.
     """
 
     events: list[Event]
@@ -118,34 +143,49 @@ class DetectionScore:
 
     @property
     def found(self) -> int:
+        """Number of found events."""
         return sum(event.found for event in self.events)
 
     @property
     def missed(self) -> int:
+        """Number of missed events."""
         return len(self.events) - self.found
 
     @property
     def free_seconds(self) -> float:
+        """Free time (s)."""
         return float(self.free.seconds.sum())
 
     @property
     def free_alarm_share(self) -> float:
-        """Part of the free time in alarm: false alarms and overhang; 0 without free time."""
+        """Share of the free time in alarm, by false alarms and overhang; 0 without free time."""
         return float(self.free.alarm_seconds.sum()) / self.free_seconds if self.free_seconds else 0.0
 
     @property
     def delays(self) -> Numbers:
-        """[found] s."""
+        """[found] delays (s)."""
         return np.array([event.delay for event in self.events if event.found], dtype=float)
 
 
 def score_detection(time: Numbers, label: Flags, alarm: Flags, signals: Signals | None = None) -> DetectionScore:
-    """Scores one recording.
+    """Score one recording.
 
-    time: [N] s, increasing. label, alarm: [N], whether there is contact and whether the detector says so.
-
-    An event is found if an alarm begins in [onset, end] and the 0.2 s before the onset were silent. An alarm that
+    An event is found if an alarm begins in [onset, end] and the 0.2 s before the onset have no alarm. An alarm that
     begins outside every [onset, end + 0.1 s] is false. Free time is the time outside all of these.
+
+    Parameters
+    ----------
+    time
+        [N] increasing times (s).
+    label, alarm
+        [N] whether there is contact, and whether the detector reports it.
+    signals
+        Further signals of each sample.
+
+    Returns
+    -------
+    DetectionScore
+        Counts and sums.
     """
     time = np.asarray(time, dtype=float)
     label, alarm = (np.asarray(flags).ravel().astype(bool) for flags in (label, alarm))
@@ -166,7 +206,7 @@ def score_detection(time: Numbers, label: Flags, alarm: Flags, signals: Signals 
 
 
 def stretches(time: Numbers, flags: Flags) -> Spans:
-    """[k, 2] first and last sample of each stretch of set flags, those closer than `MERGED` put together."""
+    """Return [k, 2] first and last sample of each stretch of set flags; stretches closer than `MERGED` are one."""
     edges = np.diff(np.concatenate([[0], np.asarray(flags).astype(np.int8), [0]]))
     first, last = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0) - 1
     apart = time[first[1:]] - time[last[:-1]] >= MERGED - _EQUAL
@@ -175,7 +215,7 @@ def stretches(time: Numbers, flags: Flags) -> Spans:
 
 
 def sample_seconds(time: Numbers) -> Numbers:
-    """[N] s that each sample stands for: until the next one; at a gap and at the end a usual step."""
+    """Compute [N] the time of each sample until the next one (s); the median step at a gap and at the end."""
     if len(time) < 2:
         return np.zeros(len(time))
     step = np.diff(time)
@@ -186,7 +226,7 @@ def sample_seconds(time: Numbers) -> Numbers:
 
 
 def _free(time: Numbers, spans: Spans) -> Flags:
-    """[N] samples outside every [onset, end + GRACE]."""
+    """Return [N] the samples outside every [onset, end + GRACE]."""
     free = np.ones(len(time), dtype=bool)
     for first, last in spans:
         free[first : np.searchsorted(time, time[last] + GRACE + _EQUAL)] = False
@@ -194,7 +234,7 @@ def _free(time: Numbers, spans: Spans) -> Flags:
 
 
 def _event(time: Numbers, alarm: Flags, alarms: Spans, span: Spans, hanging: Numbers, given: Signals) -> Event:
-    """hanging: [N + 1] s of free time in alarm before each sample."""
+    """Build an event. `hanging` is [N + 1] the free time in alarm before each sample (s)."""
     first, last = int(span[0]), int(span[1])
     before = int(np.searchsorted(time, time[first] - SILENT - _EQUAL))
     grace = int(np.searchsorted(time, time[last] + GRACE + _EQUAL))
@@ -259,7 +299,18 @@ def _contact_sums(spans: Spans, given: Signals) -> ContactSums | None:
 
 
 def pooled(scores: Sequence[DetectionScore]) -> DetectionScore:
-    """Several recordings as one; what only some of them have is of these."""
+    """Pool the scores of several recordings.
+
+    Parameters
+    ----------
+    scores
+        One per recording; sums over events come from those with a reference sensor.
+
+    Returns
+    -------
+    DetectionScore
+        Score of all recordings together.
+    """
     contacts = [score.contact for score in scores if score.contact is not None]
     return DetectionScore(
         events=[event for score in scores for event in score.events],
@@ -270,5 +321,5 @@ def pooled(scores: Sequence[DetectionScore]) -> DetectionScore:
 
 
 def _joined(parts: Sequence[FreeBlocks] | Sequence[ContactSums]) -> list[Numbers]:
-    """Every array of the parts, one after the other."""
+    """Concatenate every array of the parts."""
     return [np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])]

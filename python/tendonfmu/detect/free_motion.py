@@ -1,4 +1,4 @@
-"""Recordings of free motion to tune contact detection on: checked for contact, and what a finger leaves of them."""
+"""Recordings of free motion to tune contact detection on: the check for contact, and the residuals of a finger."""
 
 from __future__ import annotations
 
@@ -16,21 +16,32 @@ from tendonfmu.model import FingerDescription, native, number_of
 from tendonfmu.recordings import Held, Recording, prepare
 
 Numbers = NDArray[np.float64]
-Signal = NDArray[np.float32]  # of millions of samples; seven digits are enough to choose thresholds
+Signal = NDArray[np.float32]  # saves memory for millions of samples; seven digits suffice to choose thresholds
 Flags = NDArray[np.bool_]
 
-SETTLING = 2.0  # s after the start, while the bias forgets its initial variance: not counted
-NEVER = 1e9  # N·m; no threshold that anything passes
-BEYOND_NOISE = 6.0  # times the noise of a reference sensor, on average of `SMOOTHED`: then it feels something
+SETTLING = 2.0  # s after the start, while the bias forgets its initial variance; not counted
+NEVER = 1e9  # N·m, a threshold that is never exceeded
+BEYOND_NOISE = 6.0  # times the noise of a reference sensor: a larger mean over `SMOOTHED` is contact
 SMOOTHED = 0.05  # s
-STILL = 0.01  # share of time with motion; less says nothing of friction
+STILL = 0.01  # least share of the time with motion; less tells nothing about friction
 
 
 @dataclass(frozen=True)
 class FreePart:
-    """A stretch of a recording without a gap, over which a finger starts anew.
+    """A stretch of a recording without a gap; a finger starts anew at its beginning.
 
-    arrays: of `native.Finger.run`. counted: [N] settled, no stuck sensor. seconds: [N] s that each sample stands for.
+    Attributes
+    ----------
+    source
+        File of the recording.
+    arrays
+        Inputs of `native.Finger.run`.
+    mean_force
+        [N] mean tendon force (N).
+    counted
+        [N] samples after settling, without a stuck sensor.
+    seconds
+        [N] time that each sample stands for (s).
     """
 
     source: str
@@ -41,19 +52,31 @@ class FreePart:
 
     @property
     def time(self) -> Numbers:
+        """[N] times (s)."""
         return self.arrays["time"]
 
     @property
     def hours(self) -> float:
+        """Counted time (h)."""
         return float(self.seconds[self.counted].sum()) / 3600.0
 
 
 @dataclass(frozen=True)
 class FreeRun:
-    """What a finger that never sees contact leaves of a part, all [N, n] and in N·m.
+    """Residuals of a part for a finger with contact detection switched off, all [N, n] and in N·m.
 
-    residual, innovation, drift: r, y and d. stuck, jump: H and J. known: standard deviation that is known before any
-    tuning, of the bias and of the model's uncertainty; uncertain: u, of the latter alone.
+    Attributes
+    ----------
+    part
+        The stretch of free motion.
+    residual, innovation, drift
+        r, y and d.
+    stuck, jump
+        H and J.
+    known
+        Standard deviation that is known before any tuning: of the bias and of the model's uncertainty.
+    uncertain
+        u, the standard deviation of the model's uncertainty alone.
     """
 
     part: FreePart
@@ -68,7 +91,7 @@ class FreeRun:
 
 @dataclass(frozen=True)
 class Clock:
-    """Time constants of what is computed: innovation T, jump T_J and stuck T_H, s."""
+    """Time constants of the run: innovation T, jump T_J and stuck T_H (s)."""
 
     innovation: float
     jump: float
@@ -79,7 +102,29 @@ class Clock:
 
 
 def free_parts(finger: FingerDescription, recording: Recording, kinematics: int) -> tuple[list[FreePart], list[str]]:
-    """The parts of a recording, and sentences about it. Raises InputError: in contact, without motion, or unsound."""
+    """Divide a recording of free motion into parts without gaps.
+
+    Parameters
+    ----------
+    finger
+        Finger description.
+    recording
+        Recording of free motion.
+    kinematics
+        1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
+
+    Returns
+    -------
+    parts : list of FreePart
+        The parts.
+    sentences : list of str
+        Remarks on the recording.
+
+    Raises
+    ------
+    InputError
+        The recording has contact, no motion, or unsound values.
+    """
     require_no_contact(recording)
     groups = {name: values for name, values in recording.groups.items() if name != "external_torque"}
     prepared = prepare(finger, replace(recording, groups=groups, contact=None), kinematics, Held())
@@ -97,7 +142,18 @@ def free_parts(finger: FingerDescription, recording: Recording, kinematics: int)
 
 
 def require_no_contact(recording: Recording) -> None:
-    """Raises InputError where a label or a reference sensor says that something touches the finger."""
+    """Check that neither a label nor a reference sensor shows contact.
+
+    Parameters
+    ----------
+    recording
+        Recording of free motion.
+
+    Raises
+    ------
+    InputError
+        Something touches the finger.
+    """
     label = recording.contact
     if label is not None and label.any():
         first = int(np.flatnonzero(label)[0])
@@ -109,7 +165,7 @@ def require_no_contact(recording: Recording) -> None:
     if reference is None:
         return
     off = np.abs(_smoothed(reference - np.median(reference, axis=0), recording.time))
-    # of differences, so that contact does not count as noise; 90 % of a normal distribution lies within 1.645 σ
+    # from differences, so that contact does not count as noise; 90 % of a normal distribution lies within 1.645 σ
     step = np.diff(reference, axis=0) if len(reference) > 1 else np.zeros((1, reference.shape[1]))
     noise = np.quantile(np.abs(step), 0.9, axis=0) / (1.645 * np.sqrt(2.0))
     wrong = np.argwhere(off > BEYOND_NOISE * noise + 1e-9)
@@ -117,13 +173,13 @@ def require_no_contact(recording: Recording) -> None:
         row, j = wrong[0]
         raise InputError(
             f"{recording.path}: column external_torque[{j + 1}], row {row + 1}: {reference[row, j]:.4g} N.m at "
-            f"{recording.time[row]:.6g} s; expected at most {BEYOND_NOISE * noise[j]:.2g} N.m beside its median, "
-            f"{BEYOND_NOISE:g} times its noise, as in free motion"
+            f"{recording.time[row]:.6g} s; expected at most {BEYOND_NOISE * noise[j]:.2g} N.m from its median "
+            f"({BEYOND_NOISE:g} times its noise), as in free motion"
         )
 
 
 def _smoothed(values: Numbers, time: Numbers) -> Numbers:
-    """[N, n] running mean over about `SMOOTHED`."""
+    """Compute [N, n] the running mean over about `SMOOTHED`."""
     width = 1 if len(time) < 2 else max(1, min(len(time), round(SMOOTHED / float(np.median(np.diff(time))))))
     total = np.cumsum(np.vstack([np.zeros((1, values.shape[1])), values]), axis=0)
     begin = np.clip(np.arange(len(values)) - width // 2, 0, len(values) - width)
@@ -144,7 +200,7 @@ def _refuse_stillness(finger: FingerDescription, recording: Recording, speed: Nu
 
 
 def run_free(data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int, clock: Clock) -> list[FreeRun]:
-    """Every part with contact switched off."""
+    """Run the finger over every part with contact detection switched off."""
     probe = _finger(_open_loop(data, clock), kinematics)
     plain = _finger(_without_uncertainty(_open_loop(data, clock)), kinematics) if _is_uncertain(data) else None
     begin, plain_begin = probe.save_state(), None if plain is None else plain.save_state()
@@ -169,7 +225,7 @@ def _is_uncertain(data: Mapping[str, Any]) -> bool:
 
 
 def _open_loop(data: Mapping[str, Any], clock: Clock) -> dict[str, Any]:
-    """The description that computes all that decides on contact, and never decides for it."""
+    """Return the description with all signals of contact detection, and thresholds that are never exceeded."""
     never = [NEVER] * len(data["joints"])
     given = data["contact"].get("friction_bound") or {}
     contact: dict[str, Any] = {
@@ -206,7 +262,7 @@ def _run(finger: native.Finger, part: FreePart) -> dict[str, NDArray[Any]]:
 
 
 def closed_loop(data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int) -> list[Flags]:
-    """[N] `contact` of the finger as it is, over every part."""
+    """Return [N] `contact` of the finger as it is, for every part."""
     finger = _finger(data, kinematics)
     begin, found = finger.save_state(), []
     for part in parts:

@@ -1,4 +1,4 @@
-"""What free motion says of noise: the bias filter's, and the standard deviation of the estimated external torque."""
+"""What free motion tells about noise: that of the bias filter, and the error of the estimated external torque."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from tendonfmu.recordings import bias_settings
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-BINS = 8  # of mean force, within each pretension's cells
-_LEAST = 0.02  # of the residual's spread; a standard deviation is nowhere smaller at the recorded forces
+BINS = 8  # of mean force, divided among the pretensions
+_LEAST = 0.02  # of the residual's spread: least standard deviation at the recorded forces
 _TINY = 1e-30
 
 
 @dataclass(frozen=True)
 class BiasNoise:
-    """Of the bias: keys of the description in their units, and its time constant, s, at `force` N."""
+    """Noise of the bias: keys of the description in their units, and the time constant (s) at `force` (N)."""
 
     noise_std: float
     noise_std_per_force: float
@@ -35,29 +35,33 @@ class BiasNoise:
     force: float
 
     def keys(self) -> dict[str, float]:
-        """Of the description."""
+        """Return the keys of the description."""
         names = ("drift_variance", "noise_std", "noise_std_per_force")
         return {name: float(f"{getattr(self, name):.6g}") for name in names}
 
 
 def time_constant(drift: float, noise: float, noise_time: float) -> float:
-    """s in which the bias follows a step to 1 − 1/e.
+    """Compute the time in which the bias follows a step to 1 − 1/e (s).
 
-    drift: q, (N·m)²/s. noise: standard deviation σ of N·m. noise_time: T0, s; without it the step of the samples.
+    `drift` is q ((N·m)²/s), `noise` the standard deviation σ (N·m), and `noise_time` T0 (s), by default the step of the
+    samples.
 
-    A filter of variance P that takes samples of variance σ²·T0/dt a step dt apart obeys dP/dt = q − P²/(σ²·T0), so in
-    the steady state P = (q·σ²·T0)^½; it follows with the rate K/dt = P/(σ²·T0): τ = σ·(T0/q)^½.
+    A filter of variance P that takes samples of variance σ²·T0/dt a step dt apart obeys dP/dt = q − P²/(σ²·T0). In the
+    steady state P = (q·σ²·T0)^½. The bias follows with the rate K/dt = P/(σ²·T0), so τ = σ·(T0/q)^½.
     """
     return noise * float(np.sqrt(noise_time / drift))
 
 
 def drift_variance(noise: float, noise_time: float, time: float) -> float:
-    """(N·m)²/s that makes `time_constant` equal to a time (s): noise²·noise_time/time²."""
+    """Compute the drift ((N·m)²/s) with a given `time_constant` (s): noise²·noise_time/time²."""
     return noise**2 * noise_time / time**2
 
 
 def wanted_time(data: Mapping[str, Any], parts: Sequence[FreePart], bias_time: float | None) -> float:
-    """s: as asked for, else the description's own at the recordings' mean force. Raises InputError: it has none."""
+    """Return the time constant of the bias (s): as asked for, else that of the description at the mean force.
+
+    Raises InputError if the description has none.
+    """
     if bias_time is not None:
         return bias_time
     given = bias_settings(data)
@@ -69,19 +73,19 @@ def wanted_time(data: Mapping[str, Any], parts: Sequence[FreePart], bias_time: f
 
 
 def noise_time(data: Mapping[str, Any], parts: Sequence[FreePart]) -> float:
-    """s: bias.noise_time, or the usual step where the noise counts per sample."""
+    """Return bias.noise_time (s), or the median step if the noise counts per sample."""
     given = bias_settings(data).noise_time
     return float(np.median([np.median(np.diff(part.time)) for part in parts])) if given is None else given
 
 
 def mean_force(parts: Sequence[FreePart]) -> float:
-    """N, over the counted time."""
+    """Compute the mean force over the counted time (N)."""
     total = sum(part.hours for part in parts)
     return sum(float((part.mean_force * part.seconds)[part.counted].sum()) / 3600.0 for part in parts) / total
 
 
 def bias_noise(data: Mapping[str, Any], runs: Sequence[FreeRun], cells: Cells, time: float) -> BiasNoise:
-    """Noise as the spread of the residuals over the mean force, and the drift for a time constant at its mean."""
+    """Estimate the noise from the spread of the residuals over the mean force, and the drift for a time constant."""
     parts = [run.part for run in runs]
     square = cells.mean(rows_of([run.residual for run in runs], cells) ** 2).mean(axis=1)
     force, spread = _binned(cells, square)
@@ -92,7 +96,7 @@ def bias_noise(data: Mapping[str, Any], runs: Sequence[FreeRun], cells: Cells, t
 
 
 def _binned(cells: Cells, values: Numbers) -> tuple[Numbers, Numbers]:
-    """Mean force [b] and mean value [b] of bins of like mean force, about `BINS` in all, no bin across pretensions."""
+    """Return mean force [b] and mean value [b] of about `BINS` bins of similar mean force, none across pretensions."""
     forces, means = [], []
     each = max(1, BINS // cells.groups)
     for g in range(cells.groups):
@@ -105,7 +109,7 @@ def _binned(cells: Cells, values: Numbers) -> tuple[Numbers, Numbers]:
 
 
 def _line(force: Numbers, value: Numbers) -> tuple[float, float]:
-    """a, b ≥ 0 of a + b·f ≈ value, by least squares of the relative error; a alone where the force hardly changes."""
+    """Fit a, b ≥ 0 with a + b·f ≈ value by least relative squares; b = 0 if the force hardly changes."""
     if force.max() < 1.1 * force.min():
         return float(value.mean()), 0.0
     columns = np.column_stack([np.ones_like(force), force]) / value[:, None]
@@ -118,10 +122,10 @@ def _line(force: Numbers, value: Numbers) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Deviation:
-    """base [n] N·m, per_force [n] N·m per N: of compensated_torque beside what is known otherwise.
+    """Standard deviation of compensated_torque beside the parts that are known otherwise.
 
-    square: [g, n] mean square of r/std by pretension, on blocks that were not used. too_wide: [n] joints whose other
-    parts alone exceed what the residuals show.
+    `base` is [n] (N·m), `per_force` [n] (N·m/N). `square` is [g, n] the mean square of r/std by pretension, on blocks
+    that were not used. `too_wide` marks the joints [n] whose other parts alone exceed the residuals.
     """
 
     base: Numbers
@@ -131,7 +135,7 @@ class Deviation:
 
 
 def deviation(runs: Sequence[FreeRun], cells: Cells, bound: Bound) -> Deviation:
-    """Such that r²/std² is 1 on average (docs/reference/semantics.md#outputs)."""
+    """Choose the deviation for which r²/std² is 1 on average (docs/reference/semantics.md#outputs)."""
     left = cells.mean(rows_of([run.residual for run in runs], cells) ** 2)
     other = cells.mean(rows_of([run.known for run in runs], cells) ** 2)
     for share, name in ((bound.stuck_share, "stuck"), (bound.jump_share, "jump")):
@@ -152,7 +156,10 @@ def deviation(runs: Sequence[FreeRun], cells: Cells, bound: Bound) -> Deviation:
 
 
 def _calibrated(left: Numbers, other: Numbers, cells: Cells, rows: Flags) -> tuple[Numbers, Numbers, Flags]:
-    """base, per_force [n] with a mean of left/(other + (base + per_force·f)²) of 1, and where even 0 is too much."""
+    """Find base and per_force [n] for which left/(other + (base + per_force·f)²) is 1 on average.
+
+    The third result marks the joints where even 0 is too much.
+    """
     joints = left.shape[1]
     base, per_force, too_wide = np.zeros(joints), np.zeros(joints), np.zeros(joints, dtype=bool)
     group, force = cells.group[rows], cells.force[rows]
@@ -168,7 +175,7 @@ def _calibrated(left: Numbers, other: Numbers, cells: Cells, rows: Flags) -> tup
             return float(np.mean(square / (known + (scale * (shape[0] + shape[1] * force)) ** 2))) - 1.0
 
         too_wide[j] = surplus(0.0) <= 0
-        # with this scale the mean is 1 even if nothing else is known
+        # at this scale the mean is 1 even if all other parts are 0
         most = float(np.sqrt(np.mean(square / (shape[0] + shape[1] * force) ** 2)))
         scale = 0.0 if too_wide[j] else brentq(surplus, 0.0, most * (1.0 + 1e-9), xtol=1e-6 * most)
         base[j], per_force[j] = scale * shape[0], scale * shape[1]

@@ -1,4 +1,7 @@
-"""Which pushes are found, by their size: the torque that a reference sensor shows, over what free motion leaves."""
+"""Which share of the pushes is found, by size.
+
+The size of a push is the torque of a reference sensor over the residual of free motion.
+"""
 
 from __future__ import annotations
 
@@ -11,13 +14,23 @@ import numpy as np
 from tendonfmu.detect.score_report import Scored
 from tendonfmu.statistics import intervals
 
-SIZES = (1.5, 3.0, 6.0, math.inf)  # times the residual's rms of the joint, at the joint where it is the largest
+SIZES = (1.5, 3.0, 6.0, math.inf)  # times the rms of the joint's residual, at the joint with the largest ratio
 
 
 def by_size(scored: Scored, left: Sequence[float]) -> list[dict[str, Any]] | None:
-    """By class of size: how many pushes there are and how many are found; None without a reference sensor.
+    """Count the pushes, and those found, by class of size.
 
-    left: [n] N·m, rms of the residual in free motion.
+    Parameters
+    ----------
+    scored
+        Finished score.
+    left
+        [n] rms of the residual in free motion (N·m).
+
+    Returns
+    -------
+    list of dict or None
+        Classes with at least one push; None without a reference sensor.
     """
     sizes, found = [], []
     scale = np.maximum(np.array(left), 1e-12)

@@ -1,4 +1,4 @@
-"""Runs a finger, or its FMU, over recordings for a score: the decision of every sample and what it was made of."""
+"""What a finger, or its FMU, decides on each sample of a recording, and the signals behind the decision."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tendonfmu.recordings import Recording, model_alone
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-# what decides, in the description's `contact`
+# the keys of `contact` that decide
 THRESHOLDS = ("threshold", "threshold_per_force")
 SHARES = ("stuck_share", "jump_share")
 REST_BOUNDS = (*THRESHOLDS, "creep")
@@ -34,7 +34,17 @@ LARGEST = {
 
 @dataclass(frozen=True)
 class Subject:
-    """What is scored. path: as given. finger: its description. packed: it came as an FMU, which is what runs."""
+    """What is scored.
+
+    Attributes
+    ----------
+    path
+        File as given.
+    finger
+        Its description.
+    packed
+        Whether the file is an FMU; then the FMU runs.
+    """
 
     path: Path
     finger: FingerDescription
@@ -43,9 +53,20 @@ class Subject:
 
 @dataclass(frozen=True)
 class Track:
-    """A finger over a recording. label: [N], False throughout without labels. outputs: of `native.Finger.run`.
+    """A finger over a recording.
 
-    residual: [N, n] N·m before the bias update, NaN where it cannot be known. force: [N] N, sensed, or None.
+    Attributes
+    ----------
+    recording
+        The recording.
+    label
+        [N] label; False throughout if there is none.
+    outputs
+        Outputs of `native.Finger.run`.
+    residual
+        [N, n] residual before the bias update, NaN where it is unknown (N·m).
+    force
+        [N] sensed force (N), or None.
     """
 
     recording: Recording
@@ -56,14 +77,16 @@ class Track:
 
     @property
     def alarm(self) -> Flags:
+        """[N] whether the finger reports contact."""
         return np.asarray(self.outputs["contact"].ravel().astype(bool))
 
     @property
     def external(self) -> Numbers | None:
-        """[N, n] N·m of the reference sensor, or None."""
+        """[N, n] torque of the reference sensor (N·m), or None."""
         return self.recording.groups.get("external_torque")
 
     def score(self) -> DetectionScore:
+        """Score the recording with all its signals."""
         outputs = self.outputs
         signals = Signals(
             residual=self.residual,
@@ -75,12 +98,12 @@ class Track:
         return score_detection(self.recording.time, self.label, self.alarm, signals)
 
     def decisions(self) -> DetectionScore:
-        """The same of the decisions alone."""
+        """Score the decisions alone."""
         return score_detection(self.recording.time, self.label, self.alarm)
 
 
 def read_subject(model: Path) -> Subject:
-    """A description, or an FMU with the description it was made of. Raises InputError."""
+    """Read a description, or an FMU with the description it was made of. Raises InputError."""
     check_model(model)
     if model.suffix.lower() == ".json":
         return Subject(model, read_finger(model), packed=False)
@@ -90,7 +113,7 @@ def read_subject(model: Path) -> Subject:
     except (OSError, zipfile.BadZipFile):
         raise InputError(f"{model}: not an FMU; expected FINGER.json or FINGER.fmu") from None
     except KeyError:
-        raise InputError(f"{model}: no resources/finger.json in it; expected an FMU of `tendonfmu build`") from None
+        raise InputError(f"{model}: lacks resources/finger.json; expected an FMU of `tendonfmu build`") from None
     try:
         return Subject(
             model, FingerDescription(model, text, json.loads(text), native.image_from_json(text)), packed=True
@@ -100,7 +123,24 @@ def read_subject(model: Path) -> Subject:
 
 
 def run_track(subject: Subject, recording: Recording, kinematics: int, force: str | None) -> Track:
-    """force: column with the sensed force, or None. Raises InputError where the recording does not fit the finger."""
+    """Run the subject over a recording.
+
+    Parameters
+    ----------
+    subject
+        What is scored.
+    recording
+        The recording.
+    kinematics
+        1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
+    force
+        Column of the sensed force (N), or None.
+
+    Raises
+    ------
+    InputError
+        The recording does not fit the finger.
+    """
     data = subject.finger.data
     joints, tendons = len(data["joints"]), len(data["tendons"])
     recording.require(joints, tendons, inputs_used(kinematics, watches_motors(data)))
@@ -110,7 +150,7 @@ def run_track(subject: Subject, recording: Recording, kinematics: int, force: st
         outputs = _run(subject.finger.image, recording, kinematics)
     label = np.zeros(len(recording), dtype=bool) if recording.contact is None else recording.contact
     sensed = None if force is None else recording.others.get(force)
-    if "residual" in outputs:  # of `native.Finger.run`, 0 at the first sample
+    if "residual" in outputs:  # `native.Finger.run` gives it, with 0 at the first sample
         residual = outputs["residual"].copy()
         residual[0] = np.nan
     else:
@@ -126,7 +166,7 @@ def _run(image: bytes, recording: Recording, kinematics: int) -> dict[str, NDArr
 
 
 def _grouped(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """[N, n] of the columns name[1], name[2], ...; what has no index as it is."""
+    """Join the columns name[1], name[2], ... to [N, n]; columns without an index stay as they are."""
     groups: dict[str, list[NDArray[Any]]] = {}
     for name, column in columns.items():
         groups.setdefault(name.partition("[")[0], []).append(column)
@@ -136,11 +176,11 @@ def _grouped(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
 def residual_of(
     data: Mapping[str, Any], recording: Recording, outputs: Mapping[str, NDArray[Any]], kinematics: int
 ) -> Numbers:
-    """[N, n] residual before the bias has seen the sample, N·m, NaN for the first sample.
+    """Compute [N, n] the residual before the bias update (N·m), NaN for the first sample, from the outputs of an FMU.
 
-    What the update took from it is in the bias: r = compensated + (b − b before), wherever the bias did not jump by
-    itself. Where it did, at the start and end of stiction, r = compensated/(1 − K) with the gain between those of the
-    samples around it, in contact that of the last such sample.
+    The bias holds what the update took from the residual: r = compensated + (b − b before), wherever the bias did not
+    jump by itself. Where it jumped, at the start and the end of stiction, r = compensated/(1 − K). The gain K is
+    interpolated between the neighbouring samples; in contact it is that of the last sample before.
     """
     whole = slice(0, len(recording))
     jumps = model_alone(data, [recording.arrays()], [whole], len(recording), kinematics).jump
@@ -159,14 +199,14 @@ def residual_of(
 
 
 def _last_known(values: Numbers, chosen: Flags) -> Numbers:
-    """[N] the last finite value among the chosen up to each sample; 0 before any."""
+    """Return [N] the last finite value among the chosen samples so far; 0 before any."""
     known = chosen & np.isfinite(values)
     index = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))
     return np.where(index >= 0, values[index], 0.0)
 
 
 def _between_known(values: Numbers, chosen: Flags) -> Numbers:
-    """[N] interpolated between the finite values among the chosen; NaN without any."""
+    """Return [N] values interpolated between the finite ones of the chosen samples; NaN without any."""
     known = np.flatnonzero(chosen & np.isfinite(values))
     if not len(known):
         return np.full(len(values), np.nan)
@@ -177,11 +217,11 @@ def _between_known(values: Numbers, chosen: Flags) -> Numbers:
 
 
 def scaled_detection(data: Mapping[str, Any], factor: float) -> dict[str, Any]:
-    """The description with every bound that decides on contact times a factor, as far as its range goes.
+    """Return the description with every bound that decides on contact times a factor, within the range of each key.
 
-    These are the thresholds of the torque and of the innovation, with the parts that friction and its uncertainty add,
-    and of the change at rest (docs/reference/semantics.md#contact-detector): the whole right side of |r| > threshold,
-    of |y| > B and of |c| > D.
+    These are the thresholds of the torque and of the innovation, with the parts for friction and its uncertainty, and
+    of the change at rest (docs/reference/semantics.md#contact-detector): the whole right side of |r| > threshold, of
+    |y| > B and of |c| > D.
     """
     contact = dict(data["contact"])
     _scale(contact, THRESHOLDS, factor)
@@ -205,7 +245,7 @@ def _scale(part: dict[str, Any], keys: Iterable[str], factor: float) -> None:
 
 
 def score_scaled(subject: Subject, tracks: Sequence[Track], kinematics: int, factor: float) -> DetectionScore:
-    """All recordings again with scaled detection, pooled; without what the ROC does not show."""
+    """Score all recordings again with scaled detection, pooled, with only what the ROC shows."""
     image = native.image_from_json(json.dumps(scaled_detection(subject.finger.data, factor)))
     runs = (replace(track, outputs=_run(image, track.recording, kinematics)) for track in tracks)
     return pooled([run.decisions() for run in runs])

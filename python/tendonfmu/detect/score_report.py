@@ -1,4 +1,4 @@
-"""The report of a score, "tendonfmu-score-1", as JSON: docs/reference/commands/score.md."""
+"""The report of a score, "tendonfmu-score-1", as JSON (docs/reference/commands/score.md)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,29 @@ FORMAT = "tendonfmu-score-1"
 
 @dataclass(frozen=True)
 class Scored:
-    """A finished score. scores, summaries: of each track. roc: None with the reason in no_roc."""
+    """A finished score.
+
+    Attributes
+    ----------
+    subject
+        What was scored.
+    kinematics
+        1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
+    labels
+        Column of the label.
+    seed
+        Seed of the resampling.
+    tracks, scores, summaries
+        By recording.
+    summary
+        Summary of all recordings together.
+    roc
+        Points of the ROC, or None.
+    no_roc
+        Why there is no ROC, or None.
+    warnings
+        Sentences.
+    """
 
     subject: Subject
     kinematics: int
@@ -38,7 +60,18 @@ class Scored:
 
 
 def build_report(scored: Scored) -> dict[str, Any]:
-    """The whole report."""
+    """Build the report of a finished score; numbers that are not finite become None.
+
+    Parameters
+    ----------
+    scored
+        The finished score.
+
+    Returns
+    -------
+    dict
+        Report "tendonfmu-score-1" (schema/score_report.schema.json).
+    """
     report = {
         "format": FORMAT,
         "finger": scored.subject.finger.name,
@@ -61,7 +94,7 @@ def build_report(scored: Scored) -> dict[str, Any]:
 
 
 def report_text(report: Mapping[str, Any]) -> str:
-    """JSON with an event, a recording's other key, or a point of the ROC on one line each."""
+    """Return the report as JSON with one line per event, point of the ROC, and other key of a recording."""
     parts = []
     for key, value in report.items():
         text = _flat(value)

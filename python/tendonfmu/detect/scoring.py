@@ -1,4 +1,4 @@
-"""The command `tendonfmu score`, without printing: recordings in, a score out."""
+"""The score of a finger on labelled recordings: what the command `tendonfmu score` computes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,22 @@ NO_ROC_OF_FMU = "an FMU was scored: its thresholds are as packed; score FINGER.j
 
 
 def check_outputs(output: Path, figures: Path | None, inputs: Sequence[Path]) -> None:
-    """Raises InputError where a result cannot be written, or would take the place of an input."""
+    """Check that the results can be written, before a long computation.
+
+    Parameters
+    ----------
+    output
+        File of the report.
+    figures
+        Folder of the figures, or None.
+    inputs
+        Files that no result may replace.
+
+    Raises
+    ------
+    InputError
+        The report does not end in .json, cannot be written, or is an input.
+    """
     if output.suffix.lower() != ".json":
         raise InputError(f"{output}: expected a name that ends in .json")
     check_output(output, *inputs)
@@ -38,9 +53,34 @@ def score_recordings(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Scored:
-    """labels: column of the label, None: `contact` where there is one. force: column of the sensed force, N.
+    """Score a finger, or its FMU, on recordings.
 
-    progress: (runs done, all). Raises InputError.
+    Parameters
+    ----------
+    model
+        Finger description or FMU.
+    recordings
+        Labelled recordings, or recordings of free motion.
+    labels
+        Column of the label; None: `contact`, where there is one.
+    force
+        Column of the sensed force (N), or None.
+    kinematics
+        1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
+    seed
+        Seed of the resampling for the intervals.
+    progress
+        Called with runs done and runs.
+
+    Returns
+    -------
+    Scored
+        The score of each recording, and of all together.
+
+    Raises
+    ------
+    InputError
+        A file, a column or an option does not allow a score.
     """
     check_given_once(recordings, [])
     subject = read_subject(model)
@@ -91,7 +131,7 @@ def _read(path: Path, labels: str, force: str | None) -> Recording:
     for name in (labels, force):
         if name is not None and (name == "time" or name.partition("[")[0] in GROUP_PER):
             what = "a label, 0 or 1" if name == labels else "the sensed force in N"
-            raise InputError(f"{path}: column {name}: a signal of the finger; expected a column that holds {what}")
+            raise InputError(f"{path}: column {name}: is a signal of the finger; expected a column that holds {what}")
     if force is not None and force == labels:
         raise InputError(f"{path}: column {force}: both label and sensed force; expected two columns")
     recording = read_recording(path, label=labels, others=() if force is None else (force,))
@@ -101,11 +141,11 @@ def _read(path: Path, labels: str, force: str | None) -> Recording:
 
 
 def _unlabelled(read: Sequence[Recording], labels: str | None) -> list[str]:
-    """Which recordings count as free of contact. Raises InputError where a column that was named is nowhere."""
+    """Report the recordings without a label. Raises InputError if a named column is in none."""
     without = [str(recording.path) for recording in read if recording.contact is None]
     if labels is not None and len(without) == len(read):
-        raise InputError(f"{', '.join(without)}: no column {labels}; expected a label, 0 or 1, in one at least")
-    return [f"{path}: no column {labels or LABEL}: all of it counts as free of contact" for path in without]
+        raise InputError(f"{', '.join(without)}: no column {labels}; expected a label, 0 or 1, in at least one")
+    return [f"{path}: no column {labels or LABEL}: the whole recording counts as free of contact" for path in without]
 
 
 def _without_force(read: Sequence[Recording], force: str | None) -> list[str]:
@@ -113,7 +153,7 @@ def _without_force(read: Sequence[Recording], force: str | None) -> list[str]:
         return []
     without = [str(recording.path) for recording in read if force not in recording.others]
     if len(without) == len(read):
-        raise InputError(f"{', '.join(without)}: no column {force}; expected the sensed force (N) in one at least")
+        raise InputError(f"{', '.join(without)}: no column {force}; expected the sensed force (N) in at least one")
     return [f"{path}: no column {force}: no sensed force" for path in without]
 
 
@@ -124,6 +164,6 @@ def _gaps(recording: Recording) -> list[str]:
     first = found[0]
     more = f", and {len(found) - 1} more gaps" if len(found) > 1 else ""
     return [
-        f"{recording.path}: time goes on by {recording.time[first] - recording.time[first - 1]:.4g} s after row {first}"
-        f"{more}: the finger runs over it as an FMU would, and a gap is no free time"
+        f"{recording.path}: gap of {recording.time[first] - recording.time[first - 1]:.4g} s after row {first}"
+        f"{more}: the finger runs over it like an FMU, and a gap is no free time"
     ]

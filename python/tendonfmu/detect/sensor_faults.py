@@ -1,7 +1,8 @@
 """The rule for failing sensors, learned from free motion (docs/reference/semantics.md#sensor-faults).
 
-Resolutions are those of the sensors; the margin is what noise, sampling and springs that are not as described make of
-the difference between each force and its spring, with as much again. The finger as it runs must find no fault.
+The resolutions are those of the sensors. The margin is twice the largest difference between a force and its spring in
+free motion, due to noise, sampling and springs that differ from their description. The finger as it runs must find no
+fault.
 """
 
 from __future__ import annotations
@@ -20,23 +21,27 @@ from tendonfmu.model import DEFAULTS, native
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-# s, and so many samples at slow rates. Shorter than the default of sensor_fault.hold_time: free motion shows that
-# channels that are read at different times make no fault of it.
+# s, and a number of samples for slow rates. Shorter than the default of sensor_fault.hold_time: the check on free
+# motion shows that channels that are read at different times raise no fault.
 HOLD_TIME, HOLD_SAMPLES = 0.02, 5
 RECOVERY_TIME = DEFAULTS["sensor_fault.recovery_time"]  # s
-WINDOW = 0.1  # s, within which a spring is compared with its force: longer than a sound force stands in motion
-AMPLE = 2.0  # times the largest difference that was seen: what is to come may be twice as far off
-TAUT = 1.0  # N; below, a tendon may be slack, and the others do not tell its length
-WIDEST = 0.25  # of the mean tendon force; a wider margin would hide what it is for
-LEAST_FREEDOM = 0.1  # as the runtime has it: 1 − leverage of a row that the others can tell
-NOISE_SHARE = 0.5  # of the noise of a sample: what changes by less stands
-ROUNDING = 1e-9  # of the largest value: smaller steps are none of the sensor's
-RAISE = 1.5  # by which the margin is raised until no fault is found
+WINDOW = 0.1  # s in which a spring is compared with its force: a sound force changes within it in motion
+AMPLE = 2.0  # times the largest observed difference: later ones may be larger
+TAUT = 1.0  # N; below, a tendon may be slack, and the others do not give its length
+WIDEST = 0.25  # of the mean tendon force; a wider margin would hide faults
+LEAST_FREEDOM = 0.1  # as in the runtime: least 1 − leverage of a tendon whose length the others give
+NOISE_SHARE = 0.5  # of the noise of a sample: a smaller change counts as none
+ROUNDING = 1e-9  # of the largest value: smaller steps are rounding errors
+RAISE = 1.5  # factor on the margin until no fault is found
 
 
 @dataclass(frozen=True)
 class SensorRule:
-    """keys: `sensor_fault`; None: left out, and why. largest: N, the largest difference between force and spring."""
+    """The rule for failing sensors.
+
+    `keys` is `sensor_fault`; None if it is left out, with the reason in `why`. `largest` is the largest difference
+    between a force and its spring (N).
+    """
 
     keys: Mapping[str, float] | None
     largest: float
@@ -44,7 +49,7 @@ class SensorRule:
 
 
 def learn_sensors(data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int) -> SensorRule:
-    """The rule, with which the finger as it runs finds no fault in any part."""
+    """Learn the rule for which the finger as it runs finds no fault in any part."""
     if not all("tendon_position" in part.arrays for part in parts):
         return SensorRule(None, np.nan, "there are no tendon positions")
     gaps = [gap for part in parts for gap in _gaps(data, part, kinematics)]
@@ -68,7 +73,7 @@ def learn_sensors(data: Mapping[str, Any], parts: Sequence[FreePart], kinematics
     if AMPLE * largest > widest:
         why = (
             f"forces differ from their springs by up to {largest:.2g} N in free motion; expected at most "
-            f"{widest / AMPLE:.2g} N of springs and moment arms that are as described"
+            f"{widest / AMPLE:.2g} N if springs and moment arms are as described"
         )
     return SensorRule(None, largest, why)
 
@@ -76,7 +81,7 @@ def learn_sensors(data: Mapping[str, Any], parts: Sequence[FreePart], kinematics
 def finds_a_fault(
     data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int, keys: Mapping[str, float]
 ) -> bool:
-    """Whether the finger with these keys finds one in counted time."""
+    """Tell whether the finger with these keys finds a fault in counted time."""
     finger = native.Finger.from_description(json.dumps({**data, "sensor_fault": dict(keys)}), kinematics)
     begin = finger.save_state()
     for part in parts:
@@ -88,8 +93,11 @@ def finds_a_fault(
 
 @dataclass(frozen=True)
 class Gap:
-    """Of one tendon in one part. force, gap: [N] N, f0 and y − f0. stretched: [N − 1] N, k·(|Δx0| + |Δw|). known: [N]
-    the others tell w. window: samples."""
+    """Difference between force and spring of one tendon in one part.
+
+    `force` and `gap` are [N] f0 and y − f0 (N), `stretched` [N − 1] k·(|Δx0| + |Δw|) (N). `known` marks the samples [N]
+    at which the others give w. `window` is a number of samples.
+    """
 
     force: Numbers
     gap: Numbers
@@ -98,13 +106,13 @@ class Gap:
     window: int
 
     def jump(self) -> float:
-        """N, by which the force changes within a sample beyond its spring."""
+        """Return the largest change of the force within a sample beyond that of its spring (N)."""
         both = self.known[1:] & self.known[:-1]
         beyond = np.abs(np.diff(self.force)) - self.stretched
         return float(beyond[both].max(initial=0.0))
 
     def span(self) -> float:
-        """N, by which force and spring differ within a window."""
+        """Return the largest difference between force and spring within a window (N)."""
         whole = len(self.gap) // self.window * self.window
         inside = self.gap[:whole].reshape(-1, self.window)
         known = self.known[:whole].reshape(-1, self.window)
@@ -130,7 +138,7 @@ def _gaps(data: Mapping[str, Any], part: FreePart, kinematics: int) -> Iterator[
 
 
 def _joint_side(R: Numbers, spring_end: Numbers, angle: Numbers | None, kinematics: int) -> tuple[Numbers, Flags]:
-    """[N, m] m, R q of each tendon as the others, or the measured angles, have it; [m] whether they do."""
+    """Return [N, m] R q of each tendon (m), from the others or the measured angles, and [m] whether it is known."""
     if kinematics != 1 and angle is not None:
         return angle @ R.T, np.ones(len(R), dtype=bool)
     inverse = np.linalg.pinv(R)
@@ -142,7 +150,7 @@ def _joint_side(R: Numbers, spring_end: Numbers, angle: Numbers | None, kinemati
 
 
 def _resolution(arrays: Sequence[Numbers]) -> float:
-    """The smallest step of a sensor, or a share of its noise where that is more; in its unit."""
+    """Return the smallest step of a sensor, or a share of its noise if that is larger, in its unit."""
     smallest, noise = np.inf, np.inf
     for values in arrays:
         step = np.abs(np.diff(values, axis=0))

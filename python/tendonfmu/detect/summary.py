@@ -1,4 +1,4 @@
-"""What a counted score says: shares, rates, delays and errors with 95 % intervals, and the ROC over thresholds."""
+"""What a counted score means: shares, rates, delays and errors with 95 % intervals, and the ROC over thresholds."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from tendonfmu.statistics import Estimate, intervals
 Numbers = NDArray[np.float64]
 
 QUARTILES = {"lower_quartile": 0.25, "median": 0.5, "upper_quartile": 0.75, "ninety_percent": 0.9}
-FACTORS = tuple(2.0 ** (k / 4) for k in range(-8, 13))  # on the thresholds: 0.25 to 8, the description's own among them
+FACTORS = tuple(2.0 ** (k / 4) for k in range(-8, 13))  # on the thresholds: 0.25 to 8, with 1, those of the description
 
 
 @dataclass(frozen=True)
 class ContactError:
-    """Of the compensated torque against the reference during events, by joint [n]. rms in N·m.
+    """Errors of the compensated torque against the reference during events, by joint [n]; `rms` in N·m.
 
-    within: share of the samples within two of the standard deviations that are told, None without these.
+    `within` is the share of the samples within two stated standard deviations, None if none are stated.
     """
 
     rms: list[Estimate]
@@ -33,12 +33,34 @@ class ContactError:
 
 @dataclass(frozen=True)
 class Summary:
-    """Of a recording or of several pooled.
+    """Figures of a recording, or of several pooled.
 
-    masked: events missed because there was contact before. held: found events whose alarm lasts to their end.
-    delay: s, by name of `QUARTILES`. at_alarm: medians over the found events; force in N, compensated and external
-    torque [n] as magnitudes in N·m, None where it is not known. overhang_events, overhang_seconds, longest_overhang:
-    alarms that outlast their event. contact: None without a reference sensor or without an event.
+    Attributes
+    ----------
+    events, found
+        Number of labelled contacts, and of those found.
+    masked
+        Number of events that had contact before their onset.
+    held
+        Number of found events whose alarm lasts to their end.
+    false_alarms, false_alarm_count, false_alarms_per_minute
+        Number of false alarms, its interval, and their rate (1/min).
+    free_minutes, free_alarm_share
+        Free time (min), and the share of it in alarm.
+    found_share, held_share
+        Shares of the events, and of the found events.
+    delay
+        Quantiles of the delay (s) by name of `QUARTILES`.
+    force_at_alarm
+        Median force at the alarm of the found events (N); None if unknown.
+    compensated_at_alarm, external_at_alarm
+        [n] median magnitudes of the torques at the alarm (N·m); None if unknown.
+    overhang_events, overhang_seconds, longest_overhang, overhang
+        Alarms that outlast their event: number of events, times in all and at most (s), and mean per event (s).
+    free_rms
+        [n] rms of the residual in free time (N·m).
+    contact
+        Errors of the estimated torque; None without a reference sensor or without an event.
     """
 
     events: int
@@ -65,7 +87,7 @@ class Summary:
 
 
 def summarise(score: DetectionScore, seed: int = 0) -> Summary:
-    """seed: of the resampling."""
+    """Compute the figures of a score with their intervals; `seed` is that of the resampling."""
     found = [event for event in score.events if event.found]
     alarms, minutes = len(score.false_alarms), score.free_seconds / 60.0
     overhang = np.array([event.overhang for event in score.events], dtype=float)
@@ -101,20 +123,23 @@ def _force(found: Sequence[Event], seed: int) -> Estimate | None:
 
 
 def _torques(values: Sequence[Numbers | None], seed: int) -> list[Estimate] | None:
-    """Median magnitude of each joint."""
+    """Compute the median magnitude of each joint."""
     known = [np.abs(value) for value in values if value is not None]
     return [intervals.quantile(column, 0.5, seed) for column in np.array(known).T] if known else None
 
 
 def _mean(values: Numbers, seed: int) -> Estimate:
-    """Where all are 0, resampling sees nothing else: no interval."""
+    """Compute a mean. If all values are 0, resampling sees nothing else, so there is no interval."""
     if not values.any():
         return Estimate(0.0 if len(values) else math.nan)
     return intervals.of_sums(np.column_stack([np.ones(len(values)), values]), _ratio, seed)[0]
 
 
 def _alarm_share(free: FreeBlocks, seed: int) -> Estimate:
-    """Where no block has an alarm, resampling sees none either: then the exact bound of the share of such blocks."""
+    """Compute the share of the free time in alarm.
+
+    If no block has an alarm, resampling sees none either; the bound is then the exact one for the share of such blocks.
+    """
     if not free.seconds.sum():
         return Estimate(math.nan)
     if not free.alarm_seconds.any():
@@ -152,9 +177,9 @@ def _contact_error(sums: ContactSums | None, seed: int) -> ContactError | None:
 
 
 def _regression(sums: Numbers) -> tuple[Numbers, Numbers]:
-    """Correlation and slope of y on x, [r, n] each, NaN where x (or y) does not vary.
+    """Compute correlation and slope of y on x, [r, n] each; NaN where x (or y) does not vary.
 
-    sums: [r, 1 + 5 n] number of samples, and sums of x, y, x², y², x·y.
+    `sums` is [r, 1 + 5 n]: number of samples, and sums of x, y, x², y², x·y.
     """
     count = sums[:, :1]
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -164,7 +189,7 @@ def _regression(sums: Numbers) -> tuple[Numbers, Numbers]:
 
 
 def _varied(variance: Numbers, power: Numbers) -> Numbers:
-    """NaN in place of what is rounding alone."""
+    """Replace a variance that is only rounding by NaN."""
     return np.where(variance > 1e-12 * power, variance, np.nan)
 
 
@@ -173,7 +198,23 @@ def _varied(variance: Numbers, power: Numbers) -> Numbers:
 
 @dataclass(frozen=True)
 class RocPoint:
-    """The thresholds times `factor`: what is found, and how often there is an alarm without contact."""
+    """One point of the ROC.
+
+    Attributes
+    ----------
+    factor
+        Factor on all thresholds.
+    events, found, masked
+        Number of labelled contacts, of those found, and of those that had contact before.
+    false_alarms, false_alarms_per_hour
+        Number of false alarms, and their rate (1/h).
+    found_share
+        Share of the events that is found.
+    free_alarm_share
+        Share of the free time in alarm.
+    median_delay
+        Median delay (s); NaN if none is found.
+    """
 
     factor: float
     events: int
@@ -187,9 +228,11 @@ class RocPoint:
 
 
 def roc(score_at: Callable[[float], DetectionScore], factors: Sequence[float] = FACTORS) -> list[RocPoint]:
-    """score_at: the pooled score with all thresholds times a factor; the finger runs anew, as contact stops its bias.
+    """Compute the ROC over factors on the thresholds.
 
-    Few false alarms are no good sign where the free time is in alarm: one that never ends is one.
+    `score_at` returns the pooled score with all thresholds times a factor. The finger runs again for each factor, since
+    contact freezes its bias. Few false alarms are no success if the free time is in alarm: an alarm that never ends
+    counts once.
     """
     points = []
     for factor in factors:

@@ -1,4 +1,4 @@
-"""Which rate of false alarms the recordings' length supports, and what to record for the wished one."""
+"""Which rate of false alarms the recordings are long enough for, and what to record for the wished rate."""
 
 from __future__ import annotations
 
@@ -9,7 +9,15 @@ from tendonfmu.errors import InputError
 
 
 class NotEnough(InputError):
-    """Too little free motion: for the wished rate, where that is refused, or none at all. more: minutes missing."""
+    """There is too little free motion: for the wished rate, or any at all.
+
+    Parameters
+    ----------
+    message
+        Text of the error.
+    more
+        Missing time (min).
+    """
 
     def __init__(self, message: str, more: float) -> None:
         super().__init__(message)
@@ -18,11 +26,11 @@ class NotEnough(InputError):
 
 @dataclass(frozen=True)
 class Support:
-    """What a tuning is for.
+    """The rate that a tuning is for.
 
-    rate: 1/h, the wished one, or the lowest that so much free motion without any alarm supports if that is higher.
-    allowed: most alarms in the recordings for that rate. more: minutes missing for the wished rate, 0 if none are.
-    sentence: says so, empty if nothing is missing.
+    `rate` (1/h) is the wished one or, if that is higher, the lowest that this much free motion without any alarm
+    supports. `allowed` is the number of alarms in the recordings that this rate allows. `more` is the time missing for
+    the wished rate (min), 0 if none. `sentence` reports it, and is empty if nothing is missing.
     """
 
     rate: float
@@ -32,7 +40,10 @@ class Support:
 
 
 def supported(cells: Cells, hours: float, wished: float, confidence: float, strict: bool) -> Support:
-    """wished: 1/h. Raises NotEnough: the recordings do not support the wished rate, and `strict`."""
+    """Find the rate that the recordings support, for a wished rate (1/h).
+
+    Raises NotEnough if they do not support the wished rate and `strict` is set.
+    """
     allowed = allowed_alarms(hours, wished, confidence)
     if allowed >= 0:
         return Support(wished, allowed, 0.0, "")
@@ -43,7 +54,7 @@ def supported(cells: Cells, hours: float, wished: float, confidence: float, stri
     more, rate = 60 * (needed - hours), rate_limit(0, hours, confidence)
     if strict:
         raise NotEnough(
-            f"{60 * hours:.1f} min of free motion: even without any alarm in them the rate may be {rate:.3g} per hour "
+            f"{60 * hours:.1f} min of free motion: even without any alarm the rate may be {rate:.3g} per hour "
             f"at confidence {confidence:g}; expected {60 * needed:.1f} min for {wished:g} per hour, {more:.1f} min "
             f"more (evenly: {evenly})",
             more,
@@ -56,7 +67,7 @@ def supported(cells: Cells, hours: float, wished: float, confidence: float, stri
 
 
 def hours_by_pretension(cells: Cells) -> list[tuple[float, float]]:
-    """(mean force N, h) of each pretension."""
+    """Return the mean force (N) and the time (h) of each pretension."""
     return [
         (float(cells.force[cells.group == g].mean()), float(cells.hours[cells.group == g].sum()))
         for g in range(cells.groups)

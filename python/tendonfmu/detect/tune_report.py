@@ -1,4 +1,4 @@
-"""The report of a tuning, "tendonfmu-tune-1": what was chosen, on how much motion, and what it is worth."""
+"""The report of a tuning, "tendonfmu-tune-1": the chosen values, the motion they rest on, and the alarms they give."""
 
 from __future__ import annotations
 
@@ -16,11 +16,22 @@ from tendonfmu.files import finite
 from tendonfmu.statistics import intervals
 
 FORMAT = "tendonfmu-tune-1"
-FACTORS = np.round(np.geomspace(0.5, 2.0, 25), 6)  # on the chosen bases: the tail of the alarms
+FACTORS = np.round(np.geomspace(0.5, 2.0, 25), 6)  # on the chosen bases, for the tail of the alarms
 
 
 def build_report(tuning: ContactTuning) -> dict[str, Any]:
-    """Everything in SI units, null for what is not known."""
+    """Build the report of a tuning, in SI units with None for what is not known.
+
+    Parameters
+    ----------
+    tuning
+        The finished tuning.
+
+    Returns
+    -------
+    dict
+        Report "tendonfmu-tune-1" (schema/tune_report.schema.json).
+    """
     found = {
         "format": FORMAT,
         "finger": tuning.description_.name,
@@ -53,13 +64,13 @@ def build_report(tuning: ContactTuning) -> dict[str, Any]:
 
 
 def _holds_for(tuning: ContactTuning) -> dict[str, Any]:
-    """Mean tendon forces (N) that the thresholds were chosen on, and whether anything is known of their growth."""
+    """Return the mean tendon forces (N) that the thresholds were chosen on, and the number of pretensions."""
     low, high = tuning.forces_
     return {"lowest_force": low, "highest_force": high, "pretensions": len(tuning.pretensions_)}
 
 
 def report_text(report: Mapping[str, Any]) -> str:
-    """JSON with an entry of each list on a line of its own."""
+    """Return the report as JSON with one line per entry of a list."""
     parts = []
     for key, value in report.items():
         if isinstance(value, list) and value and isinstance(value[0], dict):
@@ -75,7 +86,7 @@ def _flat(value: Any) -> str:
 
 
 def _counted(tuning: ContactTuning, alarms: int, hours: float | None = None) -> dict[str, Any]:
-    """alarms, their rate in 1/h with its two-sided 95 % interval, and the upper limit at the tuning's confidence."""
+    """Return alarms, their rate (1/h) with its two-sided 95 % interval, and its limit at the confidence asked for."""
     span = tuning.hours_ if hours is None else hours
     found = intervals.rate(alarms, span)
     return {
@@ -88,7 +99,7 @@ def _counted(tuning: ContactTuning, alarms: int, hours: float | None = None) -> 
 
 
 def _rest(tuning: ContactTuning) -> dict[str, Any] | None:
-    """What contact.rest was learned from, and its alarms; None without rests."""
+    """Return the rests that contact.rest was learned from, and its alarms; None without rests."""
     rule = tuning.rest_
     if rule is None:
         return None
@@ -97,7 +108,7 @@ def _rest(tuning: ContactTuning) -> dict[str, Any] | None:
 
 
 def _sensors(tuning: ContactTuning) -> dict[str, Any]:
-    """The keys of sensor_fault (None: why) and the largest difference between a force and its spring, N."""
+    """Return the keys of sensor_fault, or why there are none, and the largest difference of force and spring (N)."""
     rule = tuning.sensors_
     keys = None if rule.keys is None else dict(rule.keys)
     return {"keys": keys, "largest_difference": rule.largest, "left_out": rule.why}

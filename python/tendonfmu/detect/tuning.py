@@ -1,10 +1,12 @@
-"""Contact detection tuned on free motion for a stated rate of false alarms, in the manner of scikit-learn.
+"""Tunes contact detection on free motion for a stated rate of false alarms, with an interface like scikit-learn's.
 
-    tuning = ContactTuning("fitted.json", false_alarms_per_hour=6).tune(["free_10N.parquet", "free_40N.parquet"])
-    tuning.description_
-
-Bounds are chosen on runs without contact detection; what they are worth is counted on blocks that they were not chosen
+Bounds are chosen on runs without contact detection. Their alarms are counted on blocks that the bounds were not chosen
 on, and again with the tuned finger as it will run.
+
+Examples
+--------
+>>> tuning = ContactTuning("fitted.json", false_alarms_per_hour=6).tune(["free_10N.parquet", "free_40N.parquet"])
+>>> tuning.description_
 """
 
 from __future__ import annotations
@@ -44,25 +46,29 @@ METHODS = ("innovation", "cusum", "threshold")
 INNOVATION_TIME = 0.05  # s, T
 JUMP_TIME = 0.06  # s, T_J
 STUCK_TIME = 0.25  # s, T_H
-STUCK_TIME_PRESLIDING = 0.06  # s, where presliding says how friction turns over after break-away
+STUCK_TIME_PRESLIDING = 0.06  # s, if presliding models how friction reverses after break-away
 EVIDENCE_TIME = 0.02  # s, τ_e
 RELEASE = {"release_ratio": 1.0, "hold_time": 0.05}  # 1, s
 RELEASE_TIME = 2.0  # s
 LEAST_DRIFT = (
-    10.0  # min of free motion: 60 of the slow means that contact.drift compares with, not a few that a fit knows
+    10.0  # min of free motion: 60 of the slow means that contact.drift compares with, more than a fit could adapt to
 )
-START_SHARE = 1.0  # bias.start_share: all friction may stand either way before the start
-_STEP, _STEPS = 1.05, 12  # by which the level is raised, and how often, until the running finger keeps the rate
+START_SHARE = 1.0  # bias.start_share: before the start all friction may point in either direction
+_STEP, _STEPS = 1.05, 12  # factor on the level, and most steps, until the running finger keeps the rate
 _DIGITS = 6
 
 
 class TuneWarning(UserWarning):
-    """What a tuning has to say about its recordings and its result."""
+    """A remark of a tuning on its recordings and its result."""
 
 
 @dataclass(frozen=True)
 class Pretension:
-    """Free motion at one pretension. alarms: false ones of the tuned finger; limit: 1/h, upper, of their rate."""
+    """Free motion at one pretension.
+
+    `force` is its mean (N), `hours` the time (h), `rms` [n] that of the residual (N·m). `alarms` counts the false
+    alarms of the tuned finger, and `limit` is the upper limit of their rate (1/h).
+    """
 
     force: float
     hours: float
@@ -72,24 +78,54 @@ class Pretension:
 
 
 class ContactTuning(ConstructorArguments):
-    """Chooses what decides on contact from recordings of free motion.
+    """Tunes contact detection from recordings of free motion.
 
-    finger: description: its file, parsed JSON, or as `read_finger` gives it.
-    false_alarms_per_hour, confidence: the rate of false alarms in free motion like that of the recordings is at most
-        that, with this confidence.
-    method: "innovation", "cusum" or "threshold" (contact.method).
-    bias_time: s, time constant of the bias; None: as in the description, at the recordings' mean force.
-    release_time: s in contact after which the bias learns again; math.inf: never.
-    kinematics: 1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
-    strict: too little free motion for the rate is refused; else the tuning is for the rate that it supports.
-    innovation_time, jump_time, stuck_time, evidence_time: s, written as such; stuck_time None: by whether it has
-        presliding. progress: called with (steps done, all).
+    Parameters
+    ----------
+    finger
+        Description: its file, parsed JSON, or the result of `read_finger`.
+    false_alarms_per_hour, confidence
+        Highest rate of false alarms in free motion like that of the recordings (1/h), and the probability that it is
+        not exceeded.
+    method
+        "innovation", "cusum" or "threshold" (contact.method).
+    bias_time
+        Time constant of the bias (s); None: that of the description, at the mean force of the recordings.
+    release_time
+        Time in contact after which the bias is tracked again (s); math.inf: never.
+    kinematics
+        1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
+    strict
+        Whether to refuse too little free motion for the rate. Otherwise the tuning is for the rate that it supports.
+    innovation_time, jump_time, stuck_time, evidence_time
+        Values of these keys (s). stuck_time None: chosen by whether the description has presliding.
+    progress
+        Called with steps done and steps.
 
-    After `tune`: description_ (tuned), bias_, lines_, levels_, bounds_ (by "residual", "innovation", "drift"),
-    deviation_, cells_, runs_, pretensions_, rest_ (None: no rests), sensors_ (of sensor_fault), held_out_ (alarms, 1/h
-    upper limit), loop_ (alarms of the finger as it runs), rate_ (1/h that it is tuned for), more_minutes_ (missing for
-    the wished rate), allowed_, hours_, forces_ (N, the lowest and the highest recorded mean force), level_raised_,
-    warnings_, seconds_.
+    Attributes
+    ----------
+    description_
+        Tuned description.
+    bias_, deviation_
+        Noise of the bias, and standard deviation of the estimated torque.
+    lines_, levels_, bounds_
+        Bounds before and after scaling, and their levels, by "residual", "innovation" and "drift".
+    cells_, runs_, pretensions_
+        Counted time, runs without contact detection, and free motion by pretension.
+    rest_, sensors_
+        Rules for contact at rest (None without enough rests) and for failing sensors (sensor_fault).
+    held_out_, loop_
+        Alarms on blocks that the bounds were not chosen on, with the upper limit of their rate (1/h); alarms of the
+        finger as it runs.
+    rate_, allowed_, more_minutes_
+        Rate that it is tuned for (1/h), the alarms in the recordings that it allows, and the time missing for the
+        wished rate (min).
+    hours_, forces_
+        Counted time (h), and lowest and highest recorded mean force (N).
+    level_raised_
+        Factor on the levels that the running finger needed.
+    warnings_, seconds_
+        Sentences, each also raised as a TuneWarning, and the time of the computation (s).
     """
 
     def __init__(
@@ -124,10 +160,26 @@ class ContactTuning(ConstructorArguments):
         self.progress = progress
 
     def tune(self, recordings: Source | Sequence[Source], *, checked: bool = False) -> ContactTuning:
-        """Learns from recordings of free motion. checked: they were held against the finger, and what is to be said of
-        them was said.
+        """Tune on recordings of free motion.
 
-        Raises InputError: contact in them, or not sound; NotEnough: no free motion, or with `strict` too little.
+        Parameters
+        ----------
+        recordings
+            Recordings, or their files.
+        checked
+            Whether the caller has compared the recordings with the finger and reported the findings.
+
+        Returns
+        -------
+        ContactTuning
+            The object itself.
+
+        Raises
+        ------
+        InputError
+            A recording has contact or is not sound, or an option is out of range.
+        NotEnough
+            There is no free motion, or with `strict` too little.
         """
         begin = perf_counter()
         self._check_options()
@@ -180,7 +232,7 @@ class ContactTuning(ConstructorArguments):
             parts += found
             self.warnings_ += [] if checked else [f"{recording.path}: {sentence}" for sentence in sentences]
         if not any(part.counted.any() for part in parts):
-            raise NotEnough("no free motion beyond the first 2 s of a recording; expected minutes of it", 0.0)
+            raise NotEnough("no free motion after the first 2 s of a recording; expected minutes of it", 0.0)
         return parts
 
     def _support(self) -> None:
@@ -191,10 +243,10 @@ class ContactTuning(ConstructorArguments):
     # --- bias, bounds, levels -----------------------------------------------------------------------------------------
 
     def _run(self, parts: Sequence[FreePart]) -> None:
-        """The bias, and runs with it: residuals depend on the bias, its noise on the residuals."""
+        """Find the noise of the bias, in rounds: residuals depend on the bias, and its noise on the residuals."""
         given = self.start_.data["contact"].get("friction_bound") or {}
         jump, stuck = self.jump_time, self._stuck_time()
-        if self.method == "threshold":  # whose friction bound stays as it is
+        if self.method == "threshold":  # this method keeps the friction bound
             jump, stuck = float(given.get("jump_time") or jump), float(given.get("stuck_time") or 0.0)
         clock = Clock(self.innovation_time, jump, stuck)
         time = wanted_time(self.start_.data, parts, self.bias_time)
@@ -214,13 +266,13 @@ class ContactTuning(ConstructorArguments):
         return any(row["effect"] == "presliding" for row in self.start_.data.get("extensions") or [])
 
     def _stuck_time(self) -> float:
-        """s, T_H."""
+        """Return T_H (s)."""
         if self.stuck_time is not None:
             return self.stuck_time
         return STUCK_TIME_PRESLIDING if self._slides() else STUCK_TIME
 
     def _choose(self) -> None:
-        """Lines of `contact.innovation` and `contact.threshold`, and their levels."""
+        """Choose the lines of `contact.innovation` and `contact.threshold`, and their levels."""
         contact = self.start_.data["contact"]
         uncertainty = contact.get("uncertainty_level")
         level = 3.0 if uncertainty is None else float(uncertainty)
@@ -253,11 +305,11 @@ class ContactTuning(ConstructorArguments):
         self.searches_["innovation"] = fast
 
     def _choose_drift(self, allowed: int) -> None:
-        """The line of `contact.drift`: slow loads, for which friction's jumps and stiction are no excuse."""
+        """Choose the line of `contact.drift` for slow loads; jumps of friction and stiction do not raise it."""
         if 60.0 * self.hours_ < LEAST_DRIFT:
             self.warnings_.append(
                 f"contact.drift is left out, so slow loads are not found: {60 * self.hours_:.1f} min of free motion; "
-                f"expected {LEAST_DRIFT:g} or more"
+                f"expected {LEAST_DRIFT:g} min or more"
             )
             return
         slow = search_for(self.runs_, self.cells_, "drift", self.rate_)
@@ -282,7 +334,7 @@ class ContactTuning(ConstructorArguments):
     # --- the finger as it runs ----------------------------------------------------------------------------------------
 
     def _close_the_loop(self, parts: Sequence[FreePart]) -> None:
-        """Raises the level until the tuned finger, whose bias stops in contact, keeps the rate too."""
+        """Raise the level until the tuned finger, whose bias stops in contact, also keeps the rate."""
         raised = 1.0
         for _ in range(_STEPS):
             self.bounds_ = self._bounds(raised)
@@ -298,7 +350,7 @@ class ContactTuning(ConstructorArguments):
         self.description_ = FingerDescription(self.start_.path, text, data, native.image_from_json(text))
 
     def _tuned(self) -> dict[str, Any]:
-        """The description with everything that was learned."""
+        """Return the description with everything that was learned."""
         data = own_copy(self._data)
         contact: dict[str, Any] = {**data["contact"], "method": self.method}
         for key in ("innovation", "threshold", "threshold_per_force", "drift"):
@@ -338,13 +390,24 @@ class ContactTuning(ConstructorArguments):
             data["sensor_fault"] = dict(self.sensors_.keys)
         return {**data, "contact": contact}
 
-    # --- what it is worth ---------------------------------------------------------------------------------------------
+    # --- counted alarms -----------------------------------------------------------------------------------------------
 
     def _factor(self, name: str) -> float:
         return self.level_raised_ * self.levels_[name].factor
 
     def tail(self, factors: Numbers) -> list[tuple[float, int, int]]:
-        """(factor, alarms in sample, alarms held out) with all bounds' bases at a factor on the chosen ones."""
+        """Count the alarms with the bases of all bounds times a factor.
+
+        Parameters
+        ----------
+        factors
+            Factors on the chosen bounds.
+
+        Returns
+        -------
+        list of tuple
+            (factor, alarms in sample, alarms held out).
+        """
         return [
             (float(factor), self._alarms("statistic", float(factor)), self._alarms("held", float(factor)))
             for factor in factors
@@ -377,7 +440,7 @@ class ContactTuning(ConstructorArguments):
             )
         if held > self.allowed_:
             self.warnings_.append(
-                f"{held} alarms in the held-out halves, where {self.allowed_} are allowed: the rate is not supported"
+                f"{held} alarms in the held-out halves, {self.allowed_} are allowed: the rate is not supported"
             )
         self.warnings_ += self._sentences()
 
@@ -388,26 +451,26 @@ class ContactTuning(ConstructorArguments):
             if each.hours < least and len(self.pretensions_) > 1:
                 found.append(
                     f"{60 * each.hours:.1f} min at {each.force:.3g} N: alone they support no rate below "
-                    f"{rate_limit(0, each.hours, self.confidence):.3g} per hour; with {60 * (least - each.hours):.1f} "
-                    "min more they might"
+                    f"{rate_limit(0, each.hours, self.confidence):.3g} per hour; {60 * (least - each.hours):.1f} "
+                    "min more are needed"
                 )
         if len(self.pretensions_) == 1:
             low, high = self.forces_
             found.append(
-                f"one pretension, {self.pretensions_[0].force:.3g} N: what grows with the force is not known, "
+                f"one pretension, {self.pretensions_[0].force:.3g} N: the growth with the force is not known, so "
                 f"thresholds are constants and hold for mean tendon forces of {low:.3g} to {high:.3g} N; below they "
                 "miss more, above they raise more false alarms; expected recordings at several pretensions"
             )
         start = sum(each.at_start for each in self.loop_)
         if start:
-            found.append(f"{start} alarms within 2 s of a start, which are not counted: bias.initial_variance is small")
+            found.append(f"{start} alarms within 2 s of a start are not counted: bias.initial_variance is too small")
         wide = [self.start_.joint_names[j] for j in np.flatnonzero(self.deviation_.too_wide)]
         if wide:
             found.append(f"compensated_torque_std is too large at {', '.join(wide)}: bounds alone exceed the residuals")
         return found
 
     def description_text(self) -> str:
-        """The tuned description as JSON, as `tendonfmu tune -o` writes it."""
+        """Return the tuned description as JSON, as `tendonfmu tune -o` writes it."""
         return description_text(self.description_.data)
 
 

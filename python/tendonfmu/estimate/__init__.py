@@ -1,7 +1,7 @@
-"""Learns the numbers of a finger from recordings (`tendonfmu fit`).
+"""Estimates the numbers of a finger from recordings (`tendonfmu fit`), and says how well each is known.
 
-`structure` chooses the numbers, `methods` runs the compiled estimator (`estimation`), `fitting` puts both together in
-the manner of scikit-learn; `verdicts`, `identifiability` and `uncertainty` say how well each number is known.
+`structure` chooses the numbers, `methods` runs the compiled estimator (`estimation`), and `fitting` combines both
+behind an interface like that of scikit-learn. `verdicts`, `identifiability` and `uncertainty` judge the result.
 """
 
 import lazy_loader

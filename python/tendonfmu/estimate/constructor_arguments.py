@@ -1,4 +1,4 @@
-"""Parameters in the manner of scikit-learn: those of the constructor, by name."""
+"""Constructor arguments by name: `get_params` and `set_params` as in scikit-learn."""
 
 from __future__ import annotations
 
@@ -9,14 +9,36 @@ Own = TypeVar("Own", bound="ConstructorArguments")
 
 
 class ConstructorArguments:
-    """For classes that keep each constructor argument as an attribute of its name."""
+    """Base of classes that store each constructor argument in an attribute of the same name."""
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
-        """Constructor arguments by name."""
+        """Return the constructor arguments by name.
+
+        Parameters
+        ----------
+        deep
+            Ignored; accepted for scikit-learn.
+
+        Returns
+        -------
+        dict
+            Name of each argument with its present value.
+        """
         return {name: getattr(self, name) for name in list(inspect.signature(type(self).__init__).parameters)[1:]}
 
     def set_params(self: Own, **params: Any) -> Own:
-        """Changes constructor arguments; raises ValueError for a name that is none."""
+        """Set constructor arguments by name and return the object itself.
+
+        Parameters
+        ----------
+        **params
+            New values by name.
+
+        Raises
+        ------
+        ValueError
+            A name is not a constructor argument.
+        """
         known = self.get_params()
         for name, value in params.items():
             if name not in known:

@@ -1,4 +1,4 @@
-"""What a motion visits: how long each friction effect slides to either side or sticks."""
+"""What a motion covers: how long each friction effect slides to either side, and how long it sticks."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Numbers = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Times:
-    """s; velocity above v_min, below −v_min, and between."""
+    """Times of an effect in s: velocity above v_min, below −v_min, and between."""
 
     positive: float
     negative: float
@@ -29,10 +29,21 @@ class Times:
 
 @dataclass(frozen=True)
 class EffectCoverage:
-    """Of one effect. points: [k] the same for each working point, weighted by its share of the interpolated value.
+    """How long a motion makes one effect slide or stick.
 
-    slowest, fastest: least and greatest |v| while it slides, m/s or rad/s, for (positive, negative) side; None where it
-    never does. threshold: v_min.
+    Attributes
+    ----------
+    effect
+        Friction effect of the description.
+    threshold
+        v_min (m/s or rad/s).
+    times
+        Times of the effect (s).
+    points
+        [k] times by working point (s), each sample weighted by the share of the point in the interpolated value.
+    slowest, fastest
+        Least and greatest |v| while it slides (m/s or rad/s), for the positive and the negative side. None where it
+        never slides to that side.
     """
 
     effect: Effect
@@ -44,7 +55,18 @@ class EffectCoverage:
 
 
 def durations(time: Numbers) -> Numbers:
-    """[N] s for which each sample stands, by the trapezoidal rule: together the whole motion."""
+    """Compute the time that each sample stands for, by the trapezoidal rule.
+
+    Parameters
+    ----------
+    time
+        [N] (s).
+
+    Returns
+    -------
+    ndarray
+        [N] (s); the sum is the duration of the motion.
+    """
     step = np.diff(time)
     result = np.zeros(len(time))
     result[:-1] += step / 2
@@ -55,15 +77,22 @@ def durations(time: Numbers) -> Numbers:
 def coverage_of(
     data: Mapping[str, Any], joint_position: Numbers, joint_velocity: Numbers, share: Numbers
 ) -> list[EffectCoverage]:
-    """Of every effect of a finger description, from samples in any order.
+    """Compute how long a motion makes every effect of a finger slide or stick.
 
-    joint_position, joint_velocity: [N, n]. share: [N] s each stands for.
+    Parameters
+    ----------
+    data
+        Finger description.
+    joint_position, joint_velocity
+        [N, n] (rad, rad/s), samples in any order.
+    share
+        [N] time that each sample stands for (s).
     """
     return [_cover(data, effect, joint_position, joint_velocity, share) for effect in effects(data)]
 
 
 def with_laws_of(data: Mapping[str, Any], coverage: Sequence[EffectCoverage]) -> list[EffectCoverage]:
-    """The same motion beside the laws of another description of the same structure."""
+    """Combine the coverage of a motion with the laws of another description of the same structure."""
     by_path = {effect.path: effect for effect in effects(data)}
     return [replace(cover, effect=by_path[cover.effect.path]) for cover in coverage]
 

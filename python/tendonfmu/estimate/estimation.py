@@ -1,6 +1,6 @@
-"""The binding of the estimation (runtime/include/tendonfmu_estimation.h), and only it.
+"""The Python binding of the estimation (runtime/include/tendonfmu_estimation.h).
 
-Where Eigen was not found when the package was built, there is no estimation: `Estimator` then raises
+If Eigen was not found when the package was built, there is no estimation: `Estimator` and `Learner` then raise
 `InputError(ESTIMATION_MISSING)`, and everything else works.
 """
 
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
 
-# a module that is there and does not load is a fault to be seen, not a missing one
+# find_spec, not try/except: a module that exists but does not load must raise its error
 HAS_ESTIMATION = find_spec("tendonfmu._estimation") is not None
 if HAS_ESTIMATION:
     from tendonfmu import _estimation
@@ -29,14 +29,17 @@ Array = NDArray[Any]
 ESTIMATION_MISSING = "this installation cannot estimate parameters (Eigen was not found when it was built)"
 ROLES = ("coulomb", "drop", "rate", "viscous", "value")
 
-# (samples done, samples) of the recording -> False to stop
+# (samples done, samples in the recording) -> False to stop
 LearnerWatch = Callable[[int, int], bool | None]
 # (pass, stride, samples done, samples, cost of the best so far, its unknowns) -> False to stop
 BatchWatch = Callable[[int, int, int, int, float, Numbers], bool | None]
 
 
 class EstimationError(ValueError):
-    """Refused by the estimation: a structure, a recording, unknowns. Who knows the file makes it an InputError."""
+    """The estimation refuses a structure, a recording or unknowns.
+
+    Callers that know the file turn it into an InputError.
+    """
 
 
 @contextmanager
@@ -49,11 +52,20 @@ def _refusals() -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Unknown:
-    """What is estimated.
+    """One unknown of the estimation.
 
-    path: of the first number of the description that it moves; parameters: indices of all of them.
-    role: `coulomb` Fc, `drop` Fs - Fc, `rate` 1/vs, `viscous` Fv, or `value`, a number as it is.
-    start, lower, upper: value at the start and the box it stays in. scale: expected magnitude.
+    Attributes
+    ----------
+    path
+        First number of the description that it moves.
+    role
+        "coulomb" (Fc), "drop" (Fs − Fc), "rate" (1/vs), "viscous" (Fv), or "value", a number as it is.
+    parameters
+        Indices of all numbers that it moves.
+    start, lower, upper
+        Value at the start, and the bounds that it stays within.
+    scale
+        Expected magnitude.
     """
 
     path: str
@@ -67,11 +79,30 @@ class Unknown:
 
 @dataclass(frozen=True)
 class BatchResult:
-    """A fit of all recordings at once, of u unknowns.
+    """A fit of all recordings at once, with u unknowns.
 
-    z: [u]. cost: ½ Σ e²/S + prior_cost. gradient [u], information [u, u]: of the data's part at z.
-    covariance: [u, u] inverse of information and prior; unknowns at a bound count as if they were free.
-    steps: of Levenberg and Marquardt; passes: over the data, coarse ones included. stopped: `progress` said so.
+    Attributes
+    ----------
+    z
+        [u] estimate.
+    cost
+        ½ Σ e²/S + prior_cost.
+    prior_cost
+        Part of the cost that is due to the prior.
+    gradient, information
+        [u], [u, u] of the data's part of the cost at z.
+    covariance
+        [u, u] inverse of the sum of information and prior; unknowns at a bound count as if they were free.
+    steps
+        Steps of Levenberg and Marquardt.
+    passes
+        Passes over the data, coarse ones included.
+    converged
+        Whether the last step was short enough.
+    stopped
+        Whether `progress` stopped the fit.
+    seconds
+        Time of the computation (s).
     """
 
     z: Numbers
@@ -106,11 +137,28 @@ def _unknowns(source: Any) -> list[Unknown]:
 
 
 class Estimator:
-    """A finger, what is unknown of it, and recordings.
+    """A finger, its unknown numbers, and recordings.
 
-    image: of the description (`native.image_from_json`); its numbers are the start and the prior's mean.
-    group: [p] by parameter: -1 fixed, others estimated, equal numbers share one value; None: all that is present.
-    scale: [p] expected magnitudes in the description's units, NaN or None where the start's is meant.
+    Parameters
+    ----------
+    image
+        Image of the description (`native.image_from_json`). Its numbers are the start and the mean of the prior.
+    group
+        [p] by parameter: −1 is fixed, others are estimated, equal numbers share one value. None: all that is present.
+    scale
+        [p] expected magnitudes in the units of the description; NaN or None: those of the start.
+
+    Attributes
+    ----------
+    unknowns
+        [u] what is estimated.
+
+    Raises
+    ------
+    InputError
+        The package was built without the estimation.
+    EstimationError
+        The estimation refuses an argument. All methods raise it, too.
     """
 
     def __init__(self, image: bytes, group: Array | None = None, scale: Array | None = None) -> None:
@@ -123,10 +171,12 @@ class Estimator:
 
     @property
     def joints(self) -> int:
+        """Number of joints n."""
         return int(self._estimator.joints)
 
     @property
     def tendons(self) -> int:
+        """Number of tendons m."""
         return int(self._estimator.tendons)
 
     @property
@@ -140,12 +190,34 @@ class Estimator:
         return np.array([unknown.scale for unknown in self.unknowns])
 
     def values(self, z: Array) -> Numbers:
-        """[p] numbers of the description for unknowns z within their boxes."""
+        """Convert unknowns within their bounds into the numbers of the description.
+
+        Parameters
+        ----------
+        z
+            [u] unknowns.
+
+        Returns
+        -------
+        ndarray
+            [p] numbers of the description, in its units.
+        """
         with _refusals():
             return np.asarray(self._estimator.values(_matrix(z)))
 
     def unknown_values(self, parameters: Array) -> Numbers:
-        """[u] unknowns of numbers of the description [p]."""
+        """Convert numbers of the description into unknowns.
+
+        Parameters
+        ----------
+        parameters
+            [p] numbers of the description.
+
+        Returns
+        -------
+        ndarray
+            [u] unknowns.
+        """
         with _refusals():
             return np.asarray(self._estimator.unknown_values(_matrix(parameters)))
 
@@ -156,11 +228,24 @@ class Estimator:
         external_torque: Array | None = None,
         use: Array | None = None,
     ) -> int:
-        """Takes over a recording and returns its number, from 0.
+        """Copy a recording into the estimator and return its number.
 
-        arrays: `time` [N] (s), `tendon_force`, `tendon_position` [N, m], `joint_position`, `joint_velocity` [N, n],
-            those that the kinematics source needs.
-        external_torque: [N, n] known load, N.m. use: [N] bool, where to learn.
+        Parameters
+        ----------
+        arrays
+            `time` [N] (s), `tendon_force` [N, m] (N), `tendon_position` [N, m] (m), `joint_position` [N, n] (rad) and
+            `joint_velocity` [N, n] (rad/s), those that the kinematics source needs.
+        kinematics_source
+            1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
+        external_torque
+            [N, n] known load (N·m), or None.
+        use
+            [N] bool: samples to learn from. None: all.
+
+        Returns
+        -------
+        int
+            Number of the recording, from 0.
         """
         with _refusals():
             return int(
@@ -173,42 +258,96 @@ class Estimator:
             )
 
     def set_weights(self, recording: int, weight: Array) -> None:
-        """Lets each sample of a recording count as a part of one in `evaluate` and `fit`.
+        """Let each sample of a recording count as a part of a sample in `evaluate` and `fit`.
 
-        weight: [n] by joint, above 0 and at most 1; 1 until set.
+        Parameters
+        ----------
+        recording
+            Number of the recording.
+        weight
+            [n] by joint, above 0 and at most 1; initially 1.
         """
         with _refusals():
             self._estimator.set_weights(recording, np.ascontiguousarray(weight, dtype=np.float64))
 
     def set_known(self, information: Array) -> None:
-        """What an earlier fit knows, which `fit` adds to its prior.
+        """Set the information of an earlier fit, which `fit` adds to its prior.
 
-        information: [u, u] of the unknowns about the description's numbers, symmetric, positive semidefinite.
+        Parameters
+        ----------
+        information
+            [u, u] of the unknowns about the numbers of the description, symmetric and positive semidefinite.
         """
         with _refusals():
             self._estimator.set_known(np.ascontiguousarray(information, dtype=np.float64))
 
     def evaluate(self, z: Array, stride: int = 1, threads: int = 0) -> tuple[float, Numbers, Numbers]:
-        """Cost ½ Σ w e²/S of the data at z, gradient [u], information [u, u]; without prior.
+        """Compute cost, gradient and information of the data at z, without the prior.
 
-        stride: only every stride-th sample is looked at, each for `stride`.
-        threads: 0 for all cores; any number gives the same result.
+        Parameters
+        ----------
+        z
+            [u] unknowns.
+        stride
+            Only every stride-th sample is evaluated, and counts `stride` times.
+        threads
+            0 for all cores; the result does not depend on it.
+
+        Returns
+        -------
+        cost : float
+            ½ Σ w e²/S.
+        gradient : ndarray
+            [u] derivative of the cost.
+        information : ndarray
+            [u, u] Fisher information.
         """
         with _refusals():
             cost, gradient, information = self._estimator.evaluate(_matrix(z), stride, threads)
         return float(cost), np.asarray(gradient), np.asarray(information)
 
     def jacobian(self, recording: int, z: Array, start: int, stop: int) -> tuple[Numbers, Numbers, Numbers, Numbers]:
-        """T of eq. (10) and the jumps Δb of fig. 5 [N, n] at samples start..stop-1, and their derivatives [N, n, u]."""
+        """Compute the friction torque, the bias jumps and their derivatives.
+
+        Parameters
+        ----------
+        recording
+            Number of the recording.
+        z
+            [u] unknowns.
+        start, stop
+            Samples start to stop − 1.
+
+        Returns
+        -------
+        torque, jump : ndarray
+            [N, n] T of eq. (10) and the jumps Δb of fig. 5 (N·m).
+        by_torque, by_jump : ndarray
+            [N, n, u] their derivatives by the unknowns.
+        """
         with _refusals():
             found = self._estimator.jacobian(recording, _matrix(z), start, max(stop - start, 0))
         torque, jump, by_torque, by_jump = (np.asarray(array) for array in found)
         return torque, jump, by_torque, by_jump
 
     def innovations(self, recording: int, z: Array) -> tuple[Numbers, Numbers, Numbers]:
-        """Residuals before the bias update [N, n] (N.m), their variance [N], and the bias after it [N, n].
+        """Compute the residuals of a recording before each bias update.
 
-        NaN where the bias has not started; the variance is NaN, too, at samples that are not used.
+        Parameters
+        ----------
+        recording
+            Number of the recording.
+        z
+            [u] unknowns.
+
+        Returns
+        -------
+        innovation : ndarray
+            [N, n] residuals before the bias update (N·m); NaN where the bias has not started.
+        variance : ndarray
+            [N] their variance ((N·m)²); NaN also at samples that are not used.
+        bias : ndarray
+            [N, n] bias after the update (N·m).
         """
         with _refusals():
             found = self._estimator.innovations(recording, _matrix(z))
@@ -226,12 +365,25 @@ class Estimator:
         stride: int = 0,
         progress: BatchWatch | None = None,
     ) -> BatchResult:
-        """Maximum likelihood under a Gaussian prior of prior_std · scale about the description's numbers.
+        """Maximise the likelihood under a Gaussian prior about the numbers of the description.
 
-        start: [u], None: the description's.
-        tolerance: it ends with a step this long in standard errors, all unknowns together.
-        stride: of the first, coarse passes; 0: by the number of samples.
-        progress: called now and then, returns False to stop.
+        Parameters
+        ----------
+        start
+            [u] unknowns to start from; None: those of the description.
+        prior_std
+            Standard deviation of the prior, in units of `scale`.
+        max_passes
+            Most passes over the data.
+        tolerance
+            The fit ends with a step of this length in standard errors, over all unknowns together.
+        threads
+            0 for all cores; the result does not depend on it.
+        stride
+            Stride of the first, coarse passes; 0: chosen by the number of samples.
+        progress
+            Called repeatedly with pass, stride, samples done, samples, best cost and its unknowns; returns False to
+            stop.
         """
         begun = perf_counter()
         first = self.start if start is None else start
@@ -241,11 +393,18 @@ class Estimator:
 
 
 class Learner:
-    """The paper's extended Kalman filter over recordings, one after another.
+    """The extended Kalman filter of the paper over recordings, one after another.
 
-    image, group, scale: as for `Estimator`. prior_std: standard deviation of an unknown about its start, in scales.
-    block: samples that are taken in at once, 1..64 (tendonfmu_learner.h says what it costs).
-    parameter_drift: variance that an unknown gains per second, in scales²; 0 for constants.
+    Parameters
+    ----------
+    image, group, scale
+        As for `Estimator`.
+    prior_std
+        Standard deviation of an unknown about its start, in units of `scale`.
+    block
+        Samples that are processed at once, 1 to 64 (tendonfmu_learner.h gives the cost).
+    parameter_drift
+        Variance that an unknown gains per second, in units of `scale`²; 0 for constants.
     """
 
     def __init__(
@@ -267,35 +426,35 @@ class Learner:
 
     @property
     def z(self) -> Numbers:
-        """[u] the unknowns as they are known now."""
+        """[u] present estimate of the unknowns."""
         return np.asarray(self._learner.z())
 
     @property
     def covariance(self) -> Numbers:
-        """[u, u] of z."""
+        """[u, u] covariance of z."""
         return np.asarray(self._learner.covariance())
 
     @property
     def bias(self) -> Numbers:
-        """[n] at the last sample, N.m."""
+        """[n] bias at the last sample (N·m)."""
         with _refusals():
             return np.asarray(self._learner.bias()[0])
 
     @property
     def slack_samples(self) -> int:
-        """Samples left out because the model found a tendon slack; since the pass began."""
+        """Number of samples skipped in this pass because the model found a tendon slack."""
         return int(self._learner.slack_samples)
 
     def values(self) -> Numbers:
-        """[p] numbers of the description."""
+        """Return [p] the numbers of the description."""
         return np.asarray(self._learner.values()[0])
 
     def standard_errors(self) -> Numbers:
-        """[p] of `values`; 0 where fixed."""
+        """Return [p] the standard errors of `values`; 0 where fixed."""
         return np.asarray(self._learner.values()[1])
 
     def begin_pass(self) -> None:
-        """Back to the start and the prior; the recordings that follow are linearised at what has been found so far."""
+        """Return to the start and the prior, but linearise the next recordings at the present estimate."""
         with _refusals():
             self._learner.begin_pass()
 
@@ -307,11 +466,20 @@ class Learner:
         use: Array | None = None,
         progress: LearnerWatch | None = None,
     ) -> dict[str, Numbers]:
-        """Learns from a recording; arguments as for `Estimator.add_recording`. The bias begins anew.
+        """Learn from a recording; the bias starts anew.
 
-        progress: called now and then, returns False to stop.
-        Returns `innovation` [N, n] (N.m), the residuals before each sample itself is taken in, and their
-        `innovation_variance` [N, n]: NaN where the bias has not started, and after a stop.
+        Parameters
+        ----------
+        arrays, kinematics_source, external_torque, use
+            As for `Estimator.add_recording`.
+        progress
+            Called repeatedly with samples done and samples; returns False to stop.
+
+        Returns
+        -------
+        dict
+            `innovation` [N, n] (N·m), the residuals before each sample is processed, and their `innovation_variance`
+            [N, n]. NaN where the bias has not started, and after a stop.
         """
         with _refusals():
             innovation, variance, _ = self._learner.run(

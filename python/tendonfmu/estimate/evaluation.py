@@ -1,4 +1,4 @@
-"""A fitted finger judged on a recording: what it leaves, what the bias alone leaves, what the model alone leaves."""
+"""How well a fitted finger explains a recording, compared with the bias alone and the model alone."""
 
 from __future__ import annotations
 
@@ -17,10 +17,22 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Evaluation:
-    """On one recording. The bias filter learns from every sample without contact, held out or not, as at run time.
+    """A recording under the fitted finger.
 
-    model: the fitted finger's T. fit, start: residuals with the fitted numbers and with those of the start. bias_only:
-    with the same bias filter and no friction at all. model_only: [N, n] y − T less a constant per part, N·m.
+    As at run time, the bias filter learns from every sample without contact, held out or not.
+
+    Attributes
+    ----------
+    recording
+        Prepared recording.
+    model
+        T of the fitted finger.
+    fit, start
+        Residuals with the fitted numbers and with those of the start.
+    bias_only
+        Residuals with the same bias filter and no friction at all.
+    model_only
+        [N, n] y − T less a constant per part (N·m).
     """
 
     recording: FitRecording
@@ -32,13 +44,28 @@ class Evaluation:
 
 
 def model_over(data: Mapping[str, Any], recording: FitRecording) -> Model:
-    """T of a description over the parts of a recording."""
+    """Compute T of a description over the parts of a recording."""
     arrays = [recording.arrays(part) for part in recording.parts]
     return model_alone(data, arrays, recording.parts, len(recording.time), recording.kinematics)
 
 
 def residuals(data: Mapping[str, Any], recording: FitRecording, model: Model | None) -> Residuals:
-    """With the description's bias filter. model None: no friction at all."""
+    """Compute the residuals of a recording with the bias filter of a description.
+
+    Parameters
+    ----------
+    data
+        Finger description.
+    recording
+        Prepared recording.
+    model
+        T over the recording; None: no friction at all.
+
+    Returns
+    -------
+    Residuals
+        Residuals before each bias update, with their variance.
+    """
     mean_force = np.abs(recording.recording.groups["tendon_force"]).mean(axis=1)
     remainder = recording.target if model is None else recording.target - model.torque
     jump = None if model is None else model.jump
@@ -47,7 +74,15 @@ def residuals(data: Mapping[str, Any], recording: FitRecording, model: Model | N
 
 
 def evaluate(start: Mapping[str, Any], fitted: Mapping[str, Any], recording: FitRecording) -> Evaluation:
-    """start, fitted: descriptions; `recording.model` is the start's."""
+    """Judge a fitted finger on a recording.
+
+    Parameters
+    ----------
+    start, fitted
+        Descriptions before and after the fit.
+    recording
+        Prepared recording; its `model` is that of `start`.
+    """
     model = model_over(fitted, recording)
     rest = recording.target - model.torque
     for part in recording.parts:
@@ -65,7 +100,7 @@ def evaluate(start: Mapping[str, Any], fitted: Mapping[str, Any], recording: Fit
 
 
 def residual_entry(found: Sequence[Evaluation], which: str) -> dict[str, list[float]] | None:
-    """rms [n] by joint over the samples that `which` names ("train", "held_out" or "tracked"); None without any."""
+    """Compute the rms [n] by joint over the samples of a flag ("train", "held_out" or "tracked"); None without any."""
     chosen = [np.asarray(getattr(each.recording, which)) for each in found]
     if not any(flags.any() for flags in chosen):
         return None

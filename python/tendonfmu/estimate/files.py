@@ -1,4 +1,4 @@
-"""The files of a fit: the fitted description, and what an interrupted fit leaves to go on from."""
+"""The files of a fit: the fitted description, and the state that an interrupted fit leaves to continue from."""
 
 from __future__ import annotations
 
@@ -22,12 +22,29 @@ from tendonfmu.recordings import Recording
 Numbers = NDArray[np.float64]
 
 UNFINISHED = "tendonfmu-fit-unfinished-1"
-DIGITS = 10  # of a fitted number; far below any standard error, and enough to keep static above coulomb friction
-_WIDTH = 160  # of a line of JSON that stays one line: a law with all digits does
+DIGITS = 10  # of a fitted number: far finer than any standard error, and static friction stays above coulomb
+_WIDTH = 160  # longest line of JSON that is not broken: a law with all digits fits
 
 
 def check_outputs(output: Path, report: Path | None, figures: Path | None, inputs: Sequence[Path]) -> None:
-    """Raises InputError where a result cannot be written, or would take the place of an input."""
+    """Check that the results of a command can be written, before a long computation.
+
+    Parameters
+    ----------
+    output
+        File of the description.
+    report
+        File of the report, or None.
+    figures
+        Folder of the figures, or None.
+    inputs
+        Files that no result may replace.
+
+    Raises
+    ------
+    InputError
+        A file does not end in .json, cannot be written, or is an input; report and description are the same file.
+    """
     for file in (output, *([report] if report is not None else [])):
         if file.suffix.lower() != ".json":
             raise InputError(f"{file}: expected a name that ends in .json")
@@ -39,10 +56,24 @@ def check_outputs(output: Path, report: Path | None, figures: Path | None, input
 
 
 def check_given_once(training: Iterable[object], compared: Iterable[object], role: str = "compared with") -> None:
-    """Raises InputError where a file is trained on twice, as if it were two measurements, or compared as if new.
+    """Check that no recording is given twice, as if it were two measurements, or trained on and compared with.
 
-    Files are the same when one name leads to the other, or when they hold the same bytes; `check_unseen` compares what
-    is measured. Recordings in memory may be pieces of one file. role: of those compared, in words.
+    Files are the same if one name leads to the other, or if they hold the same bytes. Recordings in memory are not
+    checked, since they may be pieces of one file. `check_unseen` compares the measured values.
+
+    Parameters
+    ----------
+    training
+        Recordings, or their files, to train on.
+    compared
+        Recordings, or their files, to compare with.
+    role
+        Name of the compared recordings in the error.
+
+    Raises
+    ------
+    InputError
+        A file is given twice.
     """
     seen: dict[Path, bool] = {}
     for sources, trained in ((training, True), (compared, False)):
@@ -60,7 +91,7 @@ def check_given_once(training: Iterable[object], compared: Iterable[object], rol
 
 
 def _same_bytes(one: Path, other: Path) -> bool:
-    """Whether two files hold the same; False where one is empty or cannot be read, which is said later."""
+    """Tell whether two files hold the same bytes; False if one is empty or unreadable, which is reported later."""
     try:
         return one.stat().st_size == other.stat().st_size > 0 and filecmp.cmp(one, other, shallow=False)
     except OSError:
@@ -68,9 +99,23 @@ def _same_bytes(one: Path, other: Path) -> bool:
 
 
 def check_unseen(training: Iterable[Recording], tests: Iterable[Recording], role: str = "a test") -> None:
-    """Raises InputError where a recording that is to be unseen holds the samples of one that is trained on.
+    """Check that no test recording holds the samples of a recording that is trained on.
 
-    Also when they begin at another time, or are in another format or order of columns.
+    Samples are compared by value, so another start time, file format or order of columns makes no difference.
+
+    Parameters
+    ----------
+    training
+        Recordings to train on.
+    tests
+        Recordings that the training must not have seen.
+    role
+        Name of the tests in the error.
+
+    Raises
+    ------
+    InputError
+        A test has the same samples as a training recording.
     """
     known = [(each, _measured(each)) for each in training]
     for test in tests:
@@ -84,7 +129,7 @@ def check_unseen(training: Iterable[Recording], tests: Iterable[Recording], role
 
 
 def _measured(recording: Recording) -> Numbers:
-    """[N, 2m] forces and positions."""
+    """Return [N, 2m] tendon forces and positions."""
     return np.hstack([recording.groups["tendon_force"], recording.groups["tendon_position"]])
 
 
@@ -92,9 +137,19 @@ def _measured(recording: Recording) -> Numbers:
 
 
 def with_values(structure: Structure, values: Numbers) -> FingerDescription:
-    """The start's description with the estimated numbers replaced; all else as it was.
+    """Replace the estimated numbers in the description of the start.
 
-    values: [p] of all parameters, in canonical order.
+    Parameters
+    ----------
+    structure
+        What was fitted.
+    values
+        [p] all parameters in canonical order, in the units of the description.
+
+    Raises
+    ------
+    InternalError
+        The core refuses the new description.
     """
     data = own_copy(structure.start.data)
     for number in structure.numbers:
@@ -106,16 +161,23 @@ def with_values(structure: Structure, values: Numbers) -> FingerDescription:
     text = description_text(data).encode()
     try:
         return FingerDescription(structure.start.path, text, data, native.image_from_json(text))
-    except native.NativeError as refused:  # a fit keeps every bound
+    except native.NativeError as refused:  # not the user's fault: a fit keeps within every bound
         raise InternalError(f"{structure.start.path}: the fitted description is refused: {refused}") from refused
 
 
 def with_uncertainty(
     finger: FingerDescription, directions: Sequence[Sequence[Sequence[float]]], level: float | None
 ) -> FingerDescription:
-    """The description with `contact.uncertainty`, and `contact.uncertainty_level` where one was given.
+    """Set `contact.uncertainty`, and `contact.uncertainty_level` if a level is given.
 
-    directions: by joint, up to four of m + 3 numbers each.
+    Parameters
+    ----------
+    finger
+        Description to copy.
+    directions
+        By joint, up to four lists of m + 3 numbers each.
+    level
+        `contact.uncertainty_level`, or None to keep that of the description.
     """
     contact = {**finger.data["contact"], "uncertainty": directions}
     data = {**finger.data, "contact": contact if level is None else {**contact, "uncertainty_level": level}}
@@ -124,7 +186,13 @@ def with_uncertainty(
 
 
 def description_text(data: Mapping[str, Any]) -> str:
-    """JSON as a person would lay it out: a law, or a list of numbers, on one line."""
+    """Return a description as JSON with each law, or list of numbers, on one line.
+
+    Parameters
+    ----------
+    data
+        Parsed description.
+    """
     return _laid_out(data, "") + "\n"
 
 
@@ -147,7 +215,25 @@ def _laid_out(value: Any, indent: str) -> str:
 
 @dataclass(frozen=True)
 class Unfinished:
-    """The best so far. z: [u]. unknowns: "path role" of each. cost: negative log likelihood with the prior, or NaN."""
+    """State of an interrupted fit: the best estimate so far.
+
+    Attributes
+    ----------
+    finger
+        Name of the finger.
+    method
+        "batch" or "ekf".
+    z
+        [u] unknowns.
+    unknowns
+        [u] "path role" of each unknown.
+    cost
+        Negative log likelihood with the prior, or NaN.
+    options
+        Options of the fit.
+    description
+        Description with the values of z.
+    """
 
     finger: str
     method: str
@@ -159,12 +245,25 @@ class Unfinished:
 
 
 def unfinished_path(output: Path) -> Path:
-    """Where an interrupted fit to `output` leaves what it has."""
+    """Return the file to which an interrupted fit to `output` writes its state."""
     return output.with_name(f"{output.stem}.unfinished.json")
 
 
 def write_unfinished(output: Path, found: Unfinished) -> Path:
-    """Beside `output`; returns the file."""
+    """Write the state of an interrupted fit next to its output.
+
+    Parameters
+    ----------
+    output
+        File that the finished fit would have written.
+    found
+        State to write.
+
+    Returns
+    -------
+    Path
+        `NAME.unfinished.json` in the folder of `output`.
+    """
     content = {
         "format": UNFINISHED,
         "finger": found.finger,
@@ -181,11 +280,14 @@ def write_unfinished(output: Path, found: Unfinished) -> Path:
 
 
 def read_unfinished(path: Path) -> Unfinished:
-    """Raises InputError: no such file, another format, a key that is missing or wrong."""
-    content = read_json(path, "what an interrupted fit left")
+    """Read the state of an interrupted fit.
+
+    Raises InputError if the file is missing, has another format, or lacks a key or holds a wrong value.
+    """
+    content = read_json(path, "the state of an interrupted fit")
     if not isinstance(content, dict) or content.get("format") != UNFINISHED:
         found = content.get("format") if isinstance(content, dict) else None
-        raise InputError(f'{path}: format = {json.dumps(found)}; expected "{UNFINISHED}", of an interrupted fit')
+        raise InputError(f'{path}: format = {json.dumps(found)}; expected "{UNFINISHED}", that of an interrupted fit')
     numbers, names, data = content.get("z"), content.get("unknowns"), content.get("description")
     if not isinstance(numbers, list) or not all(type(z) in (int, float) for z in numbers):
         raise InputError(f"{path}: z: expected a list of numbers")
@@ -205,13 +307,13 @@ def read_unfinished(path: Path) -> Unfinished:
 
 
 def resumed_start(path: Path, unknowns: Sequence[str]) -> Numbers:
-    """[u] where to go on. Raises InputError unless the interrupted fit estimated the same unknowns."""
+    """Return [u] the unknowns to continue from. Raises InputError unless both fits estimate the same unknowns."""
     found = read_unfinished(path)
     if list(found.unknowns) == list(unknowns):
         return found.z
     other = sorted(set(found.unknowns) ^ set(unknowns))
-    what = f"such as {other[0]}" if other else "in another order"
+    what = f"{other[0]} is not in both" if other else "in another order"
     raise InputError(
-        f"{path}: an interrupted fit of {len(found.unknowns)} unknowns, {len(unknowns)} are asked for now ({what} "
-        "is not in both); expected the same finger, --asymmetric, --only, --fix and --share"
+        f"{path}: the interrupted fit has {len(found.unknowns)} unknowns, this fit has {len(unknowns)} ({what}); "
+        "expected the same finger, --asymmetric, --only, --fix and --share"
     )

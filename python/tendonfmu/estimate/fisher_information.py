@@ -1,9 +1,9 @@
-"""What a motion can tell about a finger's friction parameters: Fisher information of the innovations of the model's own
-bias filter.
+"""What a motion tells about a finger's friction parameters: the Fisher information of the innovations.
 
-Assumed: the joint torques τ carry independent white noise of the description's `bias.noise_std` (+ per force), the bias
-is a random walk of `bias.drift_variance`, so slow changes tell little. The derivatives of
-T_eff by the parameters are differences of runs of the C core itself, with the jumps of fig. 5 in them.
+The innovations are those of the model's own bias filter. Assumed: the joint torques τ carry independent white noise of
+the description's `bias.noise_std` (plus a part per force), and the bias is a random walk of `bias.drift_variance`, so
+slow changes carry little information. The derivatives of T_eff by the parameters are differences between runs of the
+C core, with the jumps of fig. 5.
 """
 
 from __future__ import annotations
@@ -35,11 +35,24 @@ _ELEMENTS = 4_000_000  # sensitivities in memory at a time
 
 @dataclass(frozen=True)
 class Unknown:
-    """A number to be estimated.
+    """A number of the description to be estimated.
 
-    path: as in the description. value: SI. effect: of which it is, if any; point: which of its laws, from 0.
-    with_path: what moves by the same amount (static where it equals coulomb). extension: name of the effect whose
-    number it is in `extensions`. size: expected magnitude, where the value may be 0.
+    Attributes
+    ----------
+    path
+        Path in the description.
+    value
+        Value in SI units.
+    effect
+        Friction effect that the number belongs to, if any.
+    point
+        Which of the laws of the effect, from 0.
+    with_path
+        Number that moves by the same amount (static where it equals coulomb), if any.
+    extension
+        Name of the effect in `extensions` that the number belongs to, if any.
+    size
+        Expected magnitude, where the value may be 0.
     """
 
     path: str
@@ -52,7 +65,7 @@ class Unknown:
 
     @property
     def kind(self) -> str:
-        """Of what it is a number: edge_friction, cover, bias, extensions.gravity."""
+        """What the number belongs to: edge_friction, cover, bias, extensions.gravity."""
         if self.effect is not None:
             return self.effect.kind
         if self.extension is not None:
@@ -66,7 +79,7 @@ class Unknown:
 
     @property
     def reference(self) -> float:
-        """Size to which steps and errors are related: the value, or where that is 0 the static friction of its law."""
+        """Size that steps and errors are relative to: the value, or if that is 0 the static friction of its law."""
         if self.value or self.effect is None:
             return abs(self.value) or self.size
         law = self.effect.laws[self.point]
@@ -74,7 +87,13 @@ class Unknown:
 
 
 def unknowns(data: Mapping[str, Any]) -> list[Unknown]:
-    """The numbers that a fit estimates (`description.estimated_numbers`), but for the biases, which are tracked."""
+    """List the numbers that a fit estimates, without the biases, which are tracked.
+
+    Parameters
+    ----------
+    data
+        Finger description.
+    """
     found = [number for effect in effects(data) for number in _numbers_of(effect)]
     for j, joint in enumerate(data["joints"], start=1):
         stiffness = (joint.get("cover") or {}).get("stiffness")
@@ -107,10 +126,10 @@ def _numbers_of(effect: Effect) -> Iterator[Unknown]:
 
 @dataclass(frozen=True)
 class _Bundle:
-    """Numbers that one run perturbs together, since what each changes can be told apart afterwards.
+    """Numbers that one run changes together, because their effects can be separated afterwards.
 
-    members: the numbers; columns: the index of each. Friction in different joints turns different joints; of the
-    neighbouring working points of an edge every other one is never active at the same angle.
+    `members` are the numbers, `columns` their indices. Friction in different joints turns different joints. Of the
+    working points of an edge, every second one is never active at the same angle.
     """
 
     members: list[Unknown]
@@ -118,7 +137,7 @@ class _Bundle:
 
     @property
     def steps(self) -> list[tuple[str, float]]:
-        """Path and what is added to it."""
+        """Paths, and what is added to each."""
         return [
             (path, _sign(number) * STEP * number.reference)
             for number in self.members
@@ -127,7 +146,7 @@ class _Bundle:
         ]
 
     def shares(self, joint_position: Numbers) -> Iterator[tuple[int, Unknown, slice, Numbers]]:
-        """(column, number, whose torque, [N, 1] 1 where a sample's change is that number's)."""
+        """Yield (column, number, its joints as a slice, [N, 1] 1 where the change of a sample is due to the number)."""
         effect = self.members[0].effect
         active = np.ones((len(joint_position), len(self.members)))
         if effect is not None and len(effect.angles) > 1:
@@ -151,13 +170,13 @@ def _bundles(numbers: Sequence[Unknown]) -> list[_Bundle]:
 
 
 def _joint_of(number: Unknown) -> int | None:
-    """Joint whose own friction or cover it is, from 0."""
+    """Return the joint, from 0, whose own friction or cover the number belongs to, else None."""
     path = number.path
     return int(path[len("joints[") : path.index("]")]) - 1 if path.startswith("joints[") else None
 
 
 def _sign(number: Unknown) -> int:
-    """Coulomb friction may not exceed the static one, so it steps down where it can; a delay not its limit."""
+    """Return the direction of the step: coulomb friction and delays step down, since both have an upper limit."""
     down = number.key == "delay" or (number.key == "coulomb" and number.with_path is None)
     return -1 if down and number.value > 0 else 1
 
@@ -173,7 +192,7 @@ class _Run:
         self._bias = np.zeros((1, finger.joints))
 
     def advance(self, finger: native.Finger, part: Mapping[str, Numbers]) -> tuple[Numbers, Numbers]:
-        """[N, n] T of eq. (10) and the bias increments Δb over the part, N·m."""
+        """Return [N, n] T of eq. (10) and the bias increments Δb over the part (N·m)."""
         finger.restore_state(self._state)
         found = finger.run(part)
         self._state = finger.save_state()
@@ -189,9 +208,23 @@ def sensitivities(
     motion: Mapping[str, Numbers],
     progress: Progress | None = None,
 ) -> Iterator[Numbers]:
-    """[S, n, p] part by part: change of T_eff (N·m) per relative change of each number, the bias moved by fig. 5 alone.
+    """Compute the change of T_eff per relative change of each number; only fig. 5 moves the bias.
 
-    motion: `time` [N], `joint_position`, `joint_velocity` [N, n], `tendon_force` [N, m].
+    Parameters
+    ----------
+    data
+        Finger description.
+    numbers
+        The p numbers.
+    motion
+        `time` [N] (s), `joint_position`, `joint_velocity` [N, n] (rad, rad/s), `tendon_force` [N, m] (N).
+    progress
+        Called with steps done and steps.
+
+    Yields
+    ------
+    ndarray
+        [S, n, p] of successive parts of the motion (N·m).
     """
     finger = friction_probe(data)
     samples, joints = motion["joint_position"].shape
@@ -220,7 +253,7 @@ def _share_out(
     changes: Numbers,
     held: Numbers,
 ) -> None:
-    """Writes the columns of a bundle into `changes`, and what its bias holds at the end into `held`."""
+    """Write the columns of a bundle into `changes`, and what its bias holds at the end into `held`."""
     torque, jump = ((new - old) / STEP for new, old in zip(found, plain, strict=True))
     for column, number, joint, active in bundle.shares(joint_position):
         sign = _sign(number)
@@ -234,10 +267,20 @@ def _share_out(
 
 @dataclass(frozen=True)
 class Noise:
-    """What is assumed of the measured torque.
+    """Assumed noise of the measured torque.
 
-    std (N·m) and per_force (N·m per N of mean tendon force) of a sample that stands for `time` (s); drift of the bias
-    in (N·m)²/s; initial variance of the bias in (N·m)², None: that of one sample.
+    Attributes
+    ----------
+    std
+        Standard deviation of a sample that stands for `time` (N·m).
+    per_force
+        Standard deviation per mean tendon force (N·m/N).
+    time
+        Time that a sample stands for (s).
+    drift
+        Drift of the bias ((N·m)²/s).
+    initial
+        Initial variance of the bias ((N·m)²); None: that of one sample.
     """
 
     std: float
@@ -248,9 +291,16 @@ class Noise:
 
 
 def noise_of(data: Mapping[str, Any], sample_time: float) -> Noise:
-    """From `bias` of a description with its defaults. sample_time: s, for which noise per sample is meant.
+    """Return the noise of a description's `bias`, with its defaults.
 
-    A finger without noise is judged with the default noise_std: without any, everything could be seen.
+    A finger without noise gets the default noise_std; otherwise every number would be identifiable.
+
+    Parameters
+    ----------
+    data
+        Finger description.
+    sample_time
+        Time that a sample stands for, where the noise is per sample (s).
     """
     bias = data.get("bias") or {}
     std, per_force = (number_of(data, f"bias.{key}") for key in ("noise_std", "noise_std_per_force"))
@@ -265,10 +315,25 @@ def noise_of(data: Mapping[str, Any], sample_time: float) -> Noise:
 
 
 def information(parts: Iterable[Numbers], time: Numbers, mean_force: Numbers, noise: Noise) -> Numbers:
-    """[p, p] Fisher information of the innovations about relative changes of the numbers.
+    """Compute the Fisher information of the innovations about relative changes of the numbers.
 
-    parts: of `sensitivities`. time: [N] s. mean_force: [N] N. The bias filter of fig. 5 runs over
-    every column; it takes the first sample as it is.
+    The bias filter of fig. 5 runs over every column. It takes the first sample as it is.
+
+    Parameters
+    ----------
+    parts
+        From `sensitivities`.
+    time
+        [N] (s).
+    mean_force
+        [N] mean tendon force (N).
+    noise
+        Assumed noise.
+
+    Returns
+    -------
+    ndarray
+        [p, p].
     """
     step = np.diff(time, prepend=time[0])
     per_sample = (noise.std + noise.per_force * mean_force) ** 2

@@ -1,4 +1,4 @@
-"""The report of a fit, "tendonfmu-fit-1": everything that is known, as JSON with null for what is not a number."""
+"""The report of a fit, "tendonfmu-fit-1": all results as JSON, with null for what is not a number."""
 
 from __future__ import annotations
 
@@ -24,7 +24,10 @@ FORMAT = "tendonfmu-fit-1"
 
 @dataclass(frozen=True)
 class Run:
-    """How the estimation went. method: "batch" or "ekf". cost: negative log likelihood with the prior, or NaN."""
+    """How the estimation went.
+
+    `method` is "batch" or "ekf"; `cost` is the negative log likelihood with the prior, or NaN.
+    """
 
     method: str
     converged: bool
@@ -36,11 +39,32 @@ class Run:
 
 @dataclass(frozen=True)
 class Outcome:
-    """A finished fit.
+    """A finished fit, with all that its report contains.
 
-    names: [u] "path.role" of the unknowns. covariance: [u, u] of them. innovations: [N, n] standardised, of each
-    recording, NaN where not trained on. weights: [N, n] of each, what a sample counts for. training, comparisons:
-    judged recordings. uncertainty: of the modelled friction torque, None where not asked for.
+    Attributes
+    ----------
+    fitted
+        Fitted description.
+    run
+        How the estimation went.
+    options
+        Options that shape the result.
+    warnings
+        Sentences.
+    numbers
+        Every estimated number, judged.
+    names
+        [u] "path.role" of the unknowns.
+    covariance
+        [u, u] of the unknowns.
+    innovations
+        By recording, [N, n] standardised innovations; NaN where not trained on.
+    weights
+        By recording, [N, n] the weight of each sample.
+    training, comparisons
+        Judged recordings.
+    uncertainty
+        Uncertainty of the modelled friction torque; None if not asked for.
     """
 
     fitted: FingerDescription
@@ -58,7 +82,18 @@ class Outcome:
 
 
 def build_report(found: Outcome) -> dict[str, Any]:
-    """The whole report; numbers that are not finite are None."""
+    """Build the report of a finished fit; numbers that are not finite become None.
+
+    Parameters
+    ----------
+    found
+        The finished fit.
+
+    Returns
+    -------
+    dict
+        Report "tendonfmu-fit-1" (schema/fit_report.schema.json).
+    """
     run = found.run
     units = {parameter.path: parameter.unit for parameter in native.Finger(found.fitted.image).parameters()}
     report = {
@@ -93,7 +128,7 @@ def build_report(found: Outcome) -> dict[str, Any]:
 
 
 def report_text(report: Mapping[str, Any]) -> str:
-    """JSON, a parameter or a row of the correlation on one line each."""
+    """Return the report as JSON with one line per parameter and per row of the correlation."""
     parts = []
     for key, value in report.items():
         if key == "parameters":
@@ -127,7 +162,7 @@ def _parameter(number: Fitted, units: Mapping[str, str]) -> dict[str, Any]:
 
 
 def _innovations(found: Outcome) -> dict[str, Any]:
-    """What the residuals of the samples trained on are like, and how many independent ones they are worth."""
+    """Describe the residuals of the samples trained on, and how many independent samples they are worth."""
     samples, worth = effective_samples(found.innovations, found.weights)
     share = float(worth.sum() / samples.sum()) if samples.sum() else 1.0
     return {

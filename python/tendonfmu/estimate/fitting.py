@@ -1,11 +1,4 @@
-"""Learning a finger's friction from contact-free motion, in the manner of scikit-learn.
-
-from tendonfmu.estimate.fitting import FrictionFit
-
-fit = FrictionFit("finger.json", holdout=0.2).fit(["monday.parquet", "tuesday.parquet"])
-fit.parameters_["tendons[1].edge_friction[2].coulomb"], fit.report_["residual"]["held_out"]["rms"]
-fit.score("wednesday.parquet")
-"""
+"""Estimates a finger's friction from contact-free motion, with an interface like that of scikit-learn."""
 
 from __future__ import annotations
 
@@ -60,41 +53,64 @@ Numbers = NDArray[np.float64]
 Finger = FingerDescription | Mapping[str, Any] | str | os.PathLike[str]
 Source = Recording | str | os.PathLike[str]
 
-METHODS = {"batch": (learn_batch, 60), "ekf": (learn_ekf, 2)}  # with the passes over the data, at most
-LEAST_NIS, MOST_NIS, MOST_LAG_ONE = 0.5, 2.0, 0.3  # beyond, a warning
+METHODS = {"batch": (learn_batch, 60), "ekf": (learn_ekf, 2)}  # and the default of `max_passes`
+LEAST_NIS, MOST_NIS, MOST_LAG_ONE = 0.5, 2.0, 0.3  # values outside give a warning
 _MORE_PASSES = ": allow more (--passes), or estimate fewer numbers (--only, --fix, --share)"
 SIDES = ("given", "symmetric", "asymmetric")
 
 
 class FitWarning(UserWarning):
-    """Something about the recordings or the fit that a user should know; also in `FrictionFit.warnings_`."""
+    """A remark on the recordings or the fit that the user should read; also in `FrictionFit.warnings_`."""
 
 
 class FrictionFit(ConstructorArguments):
     """Estimates the numbers of a finger description (paper, sections V and VI).
 
-    finger: description: its file, parsed JSON, or as `read_finger` gives it. What is absent there stays absent.
-    method: "batch", maximum likelihood; or "ekf", the paper's extended Kalman filter.
-    kinematics: 1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
-    holdout: share of time not trained on, evenly spread blocks of `holdout_block` s or less.
-    sides: "given", "symmetric" (both sides of every law equal) or "asymmetric" (each on its own).
-    only, fix: patterns of the numbers to estimate, or not to; share: "tendons", "pulleys" or patterns of what
-        shares its values. Patterns are those of `estimate.structure`; a single one may be a string.
-    prior: standard deviation known beforehand, in units of each number's expected magnitude; scale: "PATTERN=VALUE",
-        expected magnitudes other than the description's own values.
-    max_passes: over the data, at most; None: 60 of "batch", 2 of "ekf". tolerance (length of the last step in standard
-        errors), threads (0: all cores): of "batch".
-    uncertainty: whether the fitted description says what is not known of its friction (`contact.uncertainty`).
-    parameter_drift: of the filter, relative variance per s with which the parameters may wander.
-    effective_samples: whether samples count for their share of an effective number where the residuals are not white
-        (`effective_number`); otherwise each counts as one. None: with `previous` alone.
-    previous: report of an earlier fit, or the description that it wrote: its numbers and their errors are start and
-        prior (`previous_fit`), and `prior` is for what it does not have. change: relative standard deviation of what
-        may have changed since.
-    start: file of an interrupted fit to go on from. progress: called with a `estimate.methods.Progress`; False stops.
+    Parameters
+    ----------
+    finger
+        Description: its file, parsed JSON, or the result of `read_finger`. Effects that are absent stay absent.
+    method
+        "batch", maximum likelihood; or "ekf", the extended Kalman filter of the paper.
+    kinematics
+        1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
+    holdout, holdout_block
+        Share of the time that is not trained on, in evenly spread blocks, and their greatest length (s).
+    sides
+        "given", "symmetric" (both sides of every law equal) or "asymmetric" (each side estimated separately).
+    only, fix, share
+        Patterns (`estimate.structure`) of the numbers to estimate, not to estimate, and of the laws that share their
+        values; `share` also takes "tendons" and "pulleys". A single pattern may be a string.
+    prior, scale
+        Standard deviation of the prior in units of each number's expected magnitude, and "PATTERN=VALUE": expected
+        magnitudes that replace those of the description.
+    max_passes, tolerance, threads
+        Most passes over the data (None: 60 for "batch", 2 for "ekf"). For "batch": length of the last step in standard
+        errors, and threads (0: all cores).
+    uncertainty
+        Whether the fitted description states the uncertainty of its friction (`contact.uncertainty`).
+    parameter_drift
+        For "ekf": relative variance per s with which the parameters may drift.
+    effective_samples
+        Whether samples count as fewer (`effective_number`) if the residuals are not white. None: only with `previous`.
+    previous, change
+        Report of an earlier fit, or the description that it wrote: its numbers and errors are start and prior (`prior`
+        applies to numbers that it lacks). And the relative standard deviation of what may have changed since.
+    start, progress
+        File of an interrupted fit to continue, and a function that gets each `FitProgress` and returns False to stop.
 
-    After `fit`: description_ (fitted), parameters_ and standard_errors_ (by path), covariance_ [p, p] in their order,
-    report_ (JSON of `tendonfmu fit --report`), warnings_, finished_, converged_, n_iter_, cost_, z_, unknowns_.
+    Attributes
+    ----------
+    description_, report_, warnings_
+        Fitted description, report as of `tendonfmu fit --report`, and its warnings, also issued as FitWarning.
+    parameters_, standard_errors_, covariance_
+        Estimated numbers and standard errors by path, and [p, p] their covariance, in the units of the description.
+    finished_, unfinished_
+        Whether `fit` reached its end, and the state of an interrupted fit, else None.
+    converged_, n_iter_, cost_
+        Whether it converged, after how many iterations, and the negative log likelihood with the prior.
+    unknowns_, z_, z_covariance_
+        Unknowns of the estimation, [u] their estimate and [u, u] its covariance.
     """
 
     def __init__(
@@ -154,11 +170,22 @@ class FrictionFit(ConstructorArguments):
     def fit(
         self, recordings: Source | Sequence[Source], compare: Source | Sequence[Source] = (), *, checked: bool = False
     ) -> FrictionFit:
-        """Learns from recordings, each with a bias path of its own. compare: recordings to judge only. checked: they
-        were held against the finger, and what is to be said of them was said.
+        """Estimate the numbers from recordings, each with its own bias path, and return the object itself.
 
-        Raises InputError where nothing sound can come of it. Ctrl-C, or progress returning False, leaves `finished_`
-        False and the best so far in `unfinished_`; Ctrl-C goes on as KeyboardInterrupt.
+        Ctrl-C, or `progress` returning False, leaves `finished_` False and the best estimate so far in `unfinished_`.
+        After Ctrl-C the KeyboardInterrupt continues.
+
+        Parameters
+        ----------
+        recordings, compare
+            Recordings of free motion, or their files, to train on; and recordings to judge only.
+        checked
+            Whether the caller has compared the recordings with the finger and reported the findings.
+
+        Raises
+        ------
+        InputError
+            An option, a file or a recording does not allow a sound fit.
         """
         self._check_options()
         self.finished_ = False
@@ -183,7 +210,7 @@ class FrictionFit(ConstructorArguments):
         learned = self._learn(previous, Watch(self.progress))
         if learned is None:
             return self
-        # what was estimated is not lost when judging it is interrupted
+        # an interruption while the result is judged must not lose the estimate
         self.unfinished_ = self._unfinished(Interrupted(learned.estimator, learned.z, learned.cost, by_user=True))
         self._conclude(learned, compared, found)
         self.unfinished_ = None
@@ -200,7 +227,7 @@ class FrictionFit(ConstructorArguments):
                 0 < self.prior <= 1e6,
                 "prior",
                 self.prior,
-                "above 0 and at most 1e6, in units of the expected magnitudes",
+                "above 0 and at most 1e6, in units of the expected magnitude",
             ),
             (self.max_passes is None or self.max_passes >= 1, "max_passes", self.max_passes, "at least 1"),
             (0 < self.tolerance < 1, "tolerance", self.tolerance, "between 0 and 1"),
@@ -210,7 +237,7 @@ class FrictionFit(ConstructorArguments):
                 self.parameter_drift == 0 or self.method == "ekf",
                 "parameter_drift",
                 self.parameter_drift,
-                f"0 with method {self.method}; only those of method ekf wander",
+                f"0 with method {self.method}; only method ekf lets parameters drift",
             ),
         )
         for sound, name, value, expectation in checks:
@@ -232,7 +259,7 @@ class FrictionFit(ConstructorArguments):
         return [*found, *refuse_stillness(self.start_, self.recordings_, moves)]
 
     def _learn(self, previous: PreviousFit | None, watch: Watch) -> Learned | None:
-        """None where it was stopped."""
+        """Run the estimation; None if it was stopped."""
         begin = perf_counter()
         learn, passes = METHODS[self.method]
         settings = Settings(
@@ -270,7 +297,7 @@ class FrictionFit(ConstructorArguments):
         )
 
     def _options(self) -> dict[str, Any]:
-        """Those that shape the result, as JSON has them."""
+        """Return the options that shape the result, as JSON values."""
         left_out = ("finger", "progress", "threads")
         given = {name: value for name, value in self.get_params().items() if name not in left_out}
         given |= {name: list(_listed_text(given[name])) for name in ("only", "fix", "share", "scale")}
@@ -284,7 +311,6 @@ class FrictionFit(ConstructorArguments):
         }
 
     def _conclude(self, learned: Learned, compared: list[FitRecording], found: list[str]) -> None:
-        """All learned values, from what was estimated."""
         self.unknowns_, self.z_, self.z_covariance_ = learned.estimator.unknowns, learned.z, learned.covariance
         self.description_ = with_values(self.structure_, np.asarray(learned.estimator.values(learned.z)))
         self.numbers_, self.covariance_ = judge_numbers(self.structure_, self._knowledge(learned))
@@ -323,7 +349,7 @@ class FrictionFit(ConstructorArguments):
             warnings.warn(sentence, FitWarning, stacklevel=3)
 
     def _tell_uncertainty(self, learned: Learned) -> dict[str, Any]:
-        """Writes `contact.uncertainty` into the fitted description; returns what the report says of it."""
+        """Write `contact.uncertainty` into the fitted description and return its entry in the report."""
         found = parameter_uncertainty(self.structure_, learned, self.description_.data, self.training_)
         level = (_read_finger(self.finger).data["contact"] or {}).get("uncertainty_level")
         self.description_ = with_uncertainty(self.description_, found.directions, level)
@@ -343,14 +369,19 @@ class FrictionFit(ConstructorArguments):
     # --- what was learned, on other recordings ------------------------------------------------------------------------
 
     def predict(self, recording: Source) -> Numbers:
-        """[N, n] N·m: T_eff before the bias learns from the sample itself; NaN where there is none, such as for the
-        first sample. τ, less external_torque where the recording has it, minus this is the residual.
+        """Predict the torque of a recording, before the bias learns from the sample itself.
+
+        Returns
+        -------
+        ndarray
+            [N, n] T_eff (N·m); NaN where there is none, such as for the first sample. The residual is τ, less
+            external_torque where the recording has it, minus this.
         """
         prepared, left = self._left(recording)
         return np.asarray(prepared.target - left)
 
     def score(self, recording: Source) -> float:
-        """1 − Σ residual² / Σ (torque − mean)² over all joints and samples without contact; 1 is perfect."""
+        """Compute 1 − Σ residual² / Σ (torque − mean)² over all joints and samples without contact; 1 is perfect."""
         prepared, left = self._left(recording)
         rows = prepared.tracked & ~np.isnan(left).any(axis=1)
         torque = prepared.target[rows]
@@ -367,7 +398,7 @@ class FrictionFit(ConstructorArguments):
             raise InputError("FrictionFit: not fitted yet; expected a call of fit that was not interrupted")
 
     def picture(self) -> FitPicture:
-        """What `fit_page.write_fit_page` draws."""
+        """Return the data that `write_fit_page` of `tendonfmu.report` draws."""
         self._require_fitted()
         return FitPicture(
             report=self.report_,
@@ -383,7 +414,7 @@ class FrictionFit(ConstructorArguments):
         )
 
     def description_text(self) -> str:
-        """The fitted description as JSON, as `tendonfmu fit -o` writes it."""
+        """Return the fitted description as JSON, as `tendonfmu fit -o` writes it."""
         self._require_fitted()
         return description_text(self.description_.data)
 
@@ -409,12 +440,12 @@ def _listed(sources: Source | Sequence[Source]) -> list[Source]:
 
 
 def _listed_text(patterns: str | Sequence[str]) -> Sequence[str]:
-    """A single pattern is meant as one, not as its letters."""
+    """Put a single pattern into a list, so that it is not read letter by letter."""
     return [patterns] if isinstance(patterns, str) else patterns
 
 
 def _trained(found: Evaluation) -> Numbers:
-    """[N, n] standardised innovations of the samples trained on, NaN elsewhere."""
+    """Return [N, n] standardised innovations of the samples trained on, NaN elsewhere."""
     return np.where(found.recording.train[:, None], found.fit.standardised, np.nan)
 
 
@@ -431,22 +462,22 @@ def _fit_sentences(learned: Learned, numbers: Sequence[Fitted]) -> list[str]:
 
 
 def _noise_sentences(innovations: Mapping[str, Any]) -> list[str]:
-    """Where the noise settings are far from what the residuals show, and the standard errors with them."""
+    """Warn if the residuals contradict the noise settings, since the standard errors depend on these."""
     nis, lag_one = innovations["nis"]["mean"], innovations["whiteness"]["lag_one"]
     found = []
     times = "-" if nis is None else f"{nis:.2g}" if nis < 100 else f"{nis:.0f}"
     if nis is not None and not LEAST_NIS <= nis <= MOST_NIS:
         found.append(
-            f"the residuals' variance is {times} times what bias.noise_std, noise_std_per_force, noise_time and "
-            "drift_variance say: standard errors are those of the settings, not of the data"
+            f"the residuals' variance is {times} times that of bias.noise_std, noise_std_per_force, noise_time and "
+            "drift_variance: standard errors are those of these settings, not of the data"
         )
     far = max((abs(value) for value in lag_one if value is not None), default=0.0)
     if far > MOST_LAG_ONE:
         samples, worth = (sum(innovations["effective"][key]) for key in ("samples", "worth"))
         counted = f"{samples:.0f} samples count as {worth:.0f}" if worth < samples else "each sample counts as new"
         found.append(
-            f"residuals are not white (autocorrelation {far:.2f} from one sample to the next): the model misses "
-            f"something, or the noise is not that of single samples; {counted}, take the standard errors with care"
+            f"residuals are not white (autocorrelation {far:.2f} from one sample to the next): the model lacks an "
+            f"effect, or the noise is correlated; {counted}, treat the standard errors with caution"
         )
     return found
 

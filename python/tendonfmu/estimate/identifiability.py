@@ -1,4 +1,4 @@
-"""Judges what a motion tells about each number of a finger: standard error, and why a number cannot be told."""
+"""Which numbers of a finger a motion identifies: standard errors, and why a number is not identifiable."""
 
 from __future__ import annotations
 
@@ -14,19 +14,31 @@ from tendonfmu.estimate.fisher_information import Unknown
 
 Numbers = NDArray[np.float64]
 
-LIMIT = 0.3  # relative standard error up to which a number counts as identifiable
-PRIOR = 10.0  # relative, known beforehand: next to nothing, yet every information can be inverted
+LIMIT = 0.3  # largest relative standard error of an identifiable number
+PRIOR = 10.0  # relative standard error of the prior: nearly nothing is known, but every information has an inverse
 PARTNERS = 3
 COMBINATIONS = 20
-_ALIKE = 0.3  # correlation of errors from which a number is named as a partner
-_MEMBER = 0.25  # share of the largest part from which a number is named in a combination
-_TIME = 1e-9  # s; less is rounding
+_ALIKE = 0.3  # least correlation of errors of a partner
+_MEMBER = 0.25  # least share of the largest weight of a member of a combination
+_TIME = 1e-9  # s; shorter times are rounding errors
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """On one number. error, error_alone: relative standard error, of all numbers together and with all others known;
-    at most `PRIOR`. cause: "" where identifiable, else a key of `CAUSES`; reason: in words. partners: paths.
+    """Whether one number is identifiable, and why not.
+
+    Attributes
+    ----------
+    number
+        The number.
+    error, error_alone
+        Relative standard error when all numbers are estimated, and when all others are known; at most `PRIOR`.
+    cause
+        "" if identifiable, else a key of `CAUSES`.
+    reason
+        The cause in words.
+    partners
+        Paths of the numbers that it can only be told in combination with.
     """
 
     number: Unknown
@@ -38,6 +50,7 @@ class Verdict:
 
     @property
     def identifiable(self) -> bool:
+        """Whether the relative standard error is at most `LIMIT`."""
         return not self.cause
 
 
@@ -45,16 +58,24 @@ CAUSES = {
     "side": "never slides, or never to that side",
     "working_point": "never slides near that working point",
     "slow": "never slides as slowly as its Stribeck velocity",
-    "noise": "too little torque beside noise and drift, even with all else known",
-    "combination": "seen, but only in combination with others",
+    "noise": "too little torque compared with noise and drift, even if all else is known",
+    "combination": "visible, but only in combination with others",
 }
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """verdicts: of all numbers, in order. directions: how many independent combinations of relative changes are known
-    within `LIMIT`. combinations: the least known ones of numbers that show by themselves: (relative standard error,
-    [(path, weight)]).
+    """What a motion identifies.
+
+    Attributes
+    ----------
+    verdicts
+        On all numbers, in order.
+    directions
+        Number of independent combinations of relative changes that are known within `LIMIT`.
+    combinations
+        The least known combinations of numbers that are visible on their own: (relative standard error,
+        [(path, weight)]).
     """
 
     verdicts: list[Verdict]
@@ -63,7 +84,17 @@ class Judgement:
 
 
 def judge(numbers: Sequence[Unknown], information: Numbers, coverage: Sequence[EffectCoverage]) -> Judgement:
-    """information: [p, p] about relative changes, of `identifiability.information`."""
+    """Judge which numbers a motion identifies.
+
+    Parameters
+    ----------
+    numbers
+        The p numbers.
+    information
+        [p, p] about relative changes, from `estimate.information`.
+    coverage
+        What the motion covers.
+    """
     if not numbers:
         return Judgement([], 0, [])
     known = information + np.eye(len(numbers)) / PRIOR**2
@@ -78,8 +109,23 @@ def judge(numbers: Sequence[Unknown], information: Numbers, coverage: Sequence[E
 def explain(
     numbers: Sequence[Unknown], error: Numbers, alone: Numbers, correlation: Numbers, coverage: Sequence[EffectCoverage]
 ) -> list[Verdict]:
-    """A verdict on each number. error, alone: [p] relative standard errors, of all numbers together and with all others
-    known. correlation: [p, p] of the errors.
+    """Explain for each number whether it is identifiable.
+
+    Parameters
+    ----------
+    numbers
+        The p numbers.
+    error, alone
+        [p] relative standard errors when all numbers are estimated, and when all others are known.
+    correlation
+        [p, p] of the errors.
+    coverage
+        What the motion covers.
+
+    Returns
+    -------
+    list of Verdict
+        One per number.
     """
     by_path = {cover.effect.path: cover for cover in coverage}
     verdicts = []
@@ -106,7 +152,7 @@ def _cause(number: Unknown, cover: EffectCoverage | None, alone: float) -> tuple
 
 
 def unvisited(number: Unknown, cover: EffectCoverage) -> tuple[str, str] | None:
-    """(cause, reason) where it is the motion that never does what shows the number."""
+    """Return (cause, reason) if the motion never does what reveals the number, else None."""
     part = number.path.split(".")[-2]
     sides = [part] if part in ("positive", "negative") else ["positive", "negative"]
     time = sum(getattr(cover.times, side) for side in sides)
@@ -134,7 +180,7 @@ def unvisited(number: Unknown, cover: EffectCoverage) -> tuple[str, str] | None:
 
 
 def _partners(k: int, correlation: Numbers, numbers: Sequence[Unknown]) -> list[str]:
-    """The numbers whose errors go along most with number k's, at least one."""
+    """Return the paths of the numbers whose errors correlate most with that of number k, at least one."""
     order = [int(i) for i in np.argsort(-np.abs(correlation)) if i != k]
     near = [i for i in order if abs(correlation[i]) >= _ALIKE][:PARTNERS] or order[:1]
     return [numbers[i].path for i in near]
@@ -143,7 +189,7 @@ def _partners(k: int, correlation: Numbers, numbers: Sequence[Unknown]) -> list[
 def _combinations(
     numbers: Sequence[Unknown], known: Numbers, alone: Numbers
 ) -> list[tuple[float, list[tuple[str, float]]]]:
-    """Eigenvectors of the information with the least eigenvalues, among the numbers that show by themselves."""
+    """Find the eigenvectors of least information among the numbers that are visible on their own."""
     seen = np.flatnonzero(alone <= LIMIT)
     values, vectors = np.linalg.eigh(known[np.ix_(seen, seen)])
     result = []
@@ -157,7 +203,18 @@ def _combinations(
 
 
 def counts_by_kind(verdicts: Sequence[Verdict]) -> dict[tuple[str, str], tuple[int, int, int]]:
-    """(kind, key) -> (numbers, identifiable, within `LIMIT` with all else known)."""
+    """Count the verdicts by kind and key of the number.
+
+    Parameters
+    ----------
+    verdicts
+        Verdicts of a judgement.
+
+    Returns
+    -------
+    dict
+        (kind, key) -> (numbers, identifiable, within `LIMIT` if all else is known).
+    """
     result: dict[tuple[str, str], tuple[int, int, int]] = {}
     for verdict in verdicts:
         place = (verdict.number.kind, verdict.number.key)
@@ -167,13 +224,13 @@ def counts_by_kind(verdicts: Sequence[Verdict]) -> dict[tuple[str, str], tuple[i
 
 
 def causes(verdicts: Sequence[Verdict]) -> dict[str, int]:
-    """Cause -> how many numbers, most first."""
+    """Count the verdicts by cause, the most frequent first."""
     found = [verdict.cause for verdict in verdicts if verdict.cause]
     return dict(sorted(((cause, found.count(cause)) for cause in set(found)), key=lambda item: -item[1]))
 
 
 def as_json(judgement: Judgement) -> dict[str, Any]:
-    """For the report."""
+    """Return the judgement as an entry of the report."""
     parameters: list[Mapping[str, Any]] = [
         {
             "path": verdict.number.path,

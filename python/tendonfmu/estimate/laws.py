@@ -1,9 +1,8 @@
-"""Friction laws of a fit with their confidence bands: the start's and the fitted curves over velocity, or over the
-angle where a law has working points.
+"""The friction laws of a fit with their confidence bands: start and fitted curves.
 
-The band is 1.96 standard errors of the curve, by the delta method in the fit's own unknowns (coulomb, drop = static −
-coulomb, rate = 1/stribeck_velocity, viscous), in all but the rate exactly linear. It is cut off below 0, where no
-friction is.
+A curve runs over velocity, or over the angle where a law has working points. The band is 1.96 standard errors of the
+curve, by the delta method in the unknowns of the fit (coulomb, drop = static − coulomb, rate = 1/stribeck_velocity,
+viscous). The curve is exactly linear in all but the rate. The band is cut off at 0, since friction is not negative.
 """
 
 from __future__ import annotations
@@ -27,7 +26,17 @@ _LAST = {"coulomb": "coulomb", "drop": "static", "rate": "stribeck_velocity", "v
 
 @dataclass(frozen=True)
 class LawCurve:
-    """Friction of one side over what it is drawn along, [N] each: fitted, confidence band, start."""
+    """Friction of one side of a law, with its confidence band.
+
+    Attributes
+    ----------
+    fitted
+        [N] friction with the fitted numbers, in the unit of the law.
+    low, high
+        [N] ends of the band.
+    start
+        [N] friction with the numbers of the start.
+    """
 
     fitted: Numbers
     low: Numbers
@@ -36,7 +45,7 @@ class LawCurve:
 
 
 def side_of(law: Law, sign: int) -> Law:
-    """The side of a law that serves a direction of sliding, +1 or −1."""
+    """Return the side of a law for a direction of sliding, +1 or −1."""
     if law.get("positive") is None:
         return law
     found: Law = law["positive" if sign > 0 else "negative"]
@@ -44,28 +53,34 @@ def side_of(law: Law, sign: int) -> Law:
 
 
 def side_path(path: str, law: Law, sign: int) -> str:
-    """Path of that side: the law's own where it is symmetric."""
+    """Return the path of that side: the law's own path if it is symmetric."""
     if law.get("positive") is None:
         return path
     return f"{path}.{'positive' if sign > 0 else 'negative'}"
 
 
 def magnitude(side: Law, speed: Numbers) -> Numbers:
-    """|F| at speed |v|, eq. (1)."""
+    """Compute |F| at the speeds |v| by eq. (1)."""
     drop = float(side["static"]) - float(side["coulomb"])
     viscous = float(side.get("viscous") or 0.0)
     return np.asarray(side["coulomb"] + drop * np.exp(-speed / side["stribeck_velocity"]) + viscous * speed)
 
 
 def slopes(side: Law, speed: Numbers) -> Mapping[str, Numbers]:
-    """Role of an unknown -> derivative of |F| by it, [N]."""
+    """Compute the derivatives [N] of |F| by the unknowns, by role."""
     drop, decay = float(side["static"]) - float(side["coulomb"]), np.exp(-speed / side["stribeck_velocity"])
     one = np.ones_like(speed)
     return {"coulomb": one, "static": one, "drop": decay, "rate": -drop * speed * decay, "viscous": speed}
 
 
 class LawBands:
-    """Curves of any law of a fit; the laws of both descriptions are found by their effect."""
+    """Curves of the laws of a fit, with their confidence bands.
+
+    Parameters
+    ----------
+    picture
+        The finished fit.
+    """
 
     def __init__(self, picture: FitPicture) -> None:
         parameters = Finger.from_description(json.dumps(picture.fitted)).parameters()
@@ -78,12 +93,44 @@ class LawBands:
         }
 
     def over_speed(self, start: Effect, fitted: Effect, sign: int, speed: Numbers) -> LawCurve:
-        """Of an effect with a single law, [N] speeds."""
+        """Compute the curve of an effect with a single law over speed.
+
+        Parameters
+        ----------
+        start, fitted
+            The effect before and after the fit.
+        sign
+            Direction of sliding, +1 or −1.
+        speed
+            [N] speeds (m/s or rad/s).
+
+        Returns
+        -------
+        LawCurve
+            [N] each.
+        """
         weights = np.ones((len(speed), 1))
         return self._curve(start, fitted, sign, speed, weights)
 
     def over_angle(self, start: Effect, fitted: Effect, sign: int, speed: float, angle: Numbers) -> LawCurve:
-        """Of an effect with working points at one speed, [N] angles of the joint before."""
+        """Compute the curve of an effect with working points over the angle, at one speed.
+
+        Parameters
+        ----------
+        start, fitted
+            The effect before and after the fit.
+        sign
+            Direction of sliding, +1 or −1.
+        speed
+            Speed (m/s or rad/s).
+        angle
+            [N] angles of the preceding joint (rad).
+
+        Returns
+        -------
+        LawCurve
+            [N] each.
+        """
         unit = np.eye(len(fitted.angles))
         weights = np.column_stack([np.interp(angle, fitted.angles, row) for row in unit])
         return self._curve(start, fitted, sign, np.full_like(angle, speed), weights)
@@ -95,7 +142,7 @@ class LawBands:
         return LawCurve(value, np.maximum(low, 0.0), high, _mixed(start, sign, speed, weights))
 
     def _standard_error(self, effect: Effect, sign: int, speed: Numbers, weights: Numbers) -> Numbers:
-        gradients: dict[int, Numbers] = {}  # column of z -> [N]; laws that share a value add up
+        gradients: dict[int, Numbers] = {}  # column of z -> [N]; the slopes of laws that share a value add up
         for share, law, path in zip(weights.T, effect.laws, effect.law_paths, strict=True):
             prefix = side_path(path, law, sign)
             for role, slope in slopes(side_of(law, sign), speed).items():
@@ -116,9 +163,24 @@ def _mixed(effect: Effect, sign: int, speed: Numbers, weights: Numbers) -> Numbe
 
 
 def asymmetric(effect: Effect) -> bool:
+    """Tell whether any law of an effect has two sides.
+
+    Parameters
+    ----------
+    effect
+        Friction effect.
+    """
     return any(law.get("positive") is not None for law in effect.laws)
 
 
 def numbers_of(effect: Effect, report: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """The report's entries of an effect's estimated numbers."""
+    """Return the entries of the report for the estimated numbers of an effect.
+
+    Parameters
+    ----------
+    effect
+        Friction effect.
+    report
+        Report "tendonfmu-fit-1".
+    """
     return [entry for entry in report["parameters"] if entry["path"].startswith(f"{effect.path}.")]

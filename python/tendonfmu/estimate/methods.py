@@ -1,9 +1,11 @@
-"""The two methods of a fit, over the estimator of `estimation.py`: what they are given, and what they leave.
+"""The two methods of a fit, maximum likelihood and Kalman filter, over the estimator of `estimation.py`.
 
-Both fit with each sample counting as one first. Where the residuals that this leaves are not white, each sample then
-counts for its share of an effective number of samples (`effective_number`), by joint and stretch of a recording, and
-the balance of data and prior, the estimates and their covariance follow. Residuals are measured once, at the first fit:
-those of a fit that the prior holds back are those of a wrong model, and more coloured for it.
+Both first fit with each sample counting as one. If the residuals are then not white, each sample counts for its share
+of an effective number of samples (`effective_number`), by joint and stretch of a recording, and the fit is repeated
+with these weights: they shift the balance of data and prior, the estimates and their covariance.
+
+The residuals are measured once, at the first fit. A fit that the prior holds back has residuals of a wrong model, which
+are more strongly correlated.
 """
 
 from __future__ import annotations
@@ -29,8 +31,18 @@ Start = Callable[[Sequence[str]], Numbers]
 
 @dataclass(frozen=True)
 class Settings:
-    """Options of `FrictionFit` by their names. effective: whether samples count for their share of an effective number.
-    previous: of the structure's start; change: what may have changed since, relative; noise: of the description, N·m.
+    """Options of a fit, named as those of `FrictionFit`.
+
+    Attributes
+    ----------
+    effective
+        Whether samples count for their share of an effective number.
+    previous
+        Previous fit that the start of the structure comes from, or None.
+    change
+        Relative standard deviation of what may have changed since.
+    noise
+        Torque noise of the description (N·m).
     """
 
     prior: float = 1.0
@@ -46,7 +58,19 @@ class Settings:
 
 @dataclass(frozen=True)
 class FitProgress:
-    """Where a fit is. phase: in words. done, total: samples of this phase. cost: so far, NaN where not known."""
+    """Progress of a fit.
+
+    Attributes
+    ----------
+    phase
+        Phase in words.
+    iteration
+        Number of the pass.
+    done, total
+        Samples of this phase.
+    cost
+        Cost so far; NaN if unknown.
+    """
 
     phase: str
     iteration: int
@@ -57,9 +81,30 @@ class FitProgress:
 
 @dataclass(frozen=True)
 class Learned:
-    """A finished estimation. covariance: [u, u] of z, prior included; information: [u, u] of the data alone.
-    weights: [N, n] by recording, what each sample counts for. innovations: standardised [N, n] by recording where the
-    method has its own, else empty. warnings: sentences.
+    """A finished estimation.
+
+    Attributes
+    ----------
+    estimator
+        Unknowns, and their conversion into numbers of the description.
+    z
+        [u] estimate.
+    covariance
+        [u, u] of z, prior included.
+    information
+        [u, u] of the data alone.
+    cost
+        Negative log likelihood with the prior; NaN for the filter.
+    iterations, passes
+        Number of steps, and of passes over the data.
+    converged
+        Whether the method converged.
+    weights
+        By recording, [N, n] the weight of each sample.
+    innovations
+        By recording, [N, n] standardised innovations, if the method computes them; else empty.
+    warnings
+        Sentences.
     """
 
     estimator: Estimator
@@ -76,7 +121,15 @@ class Learned:
 
 
 class Interrupted(Exception):
-    """The estimation was stopped; what it had. by_user: by Ctrl-C."""
+    """The estimation was stopped.
+
+    Attributes
+    ----------
+    estimator, z, cost
+        What it had found: [u] unknowns and their cost.
+    by_user
+        Whether Ctrl-C stopped it.
+    """
 
     def __init__(self, estimator: Estimator, z: Numbers, cost: float, by_user: bool) -> None:
         super().__init__("stopped")
@@ -84,14 +137,27 @@ class Interrupted(Exception):
 
 
 class Watch:
-    """Passes progress on, and remembers that somebody wants to stop: Ctrl-C while the library computes shows here."""
+    """Passes progress on, and records a wish to stop, such as a Ctrl-C while the library computes.
+
+    Parameters
+    ----------
+    progress
+        Called with each `FitProgress`; returns False to stop.
+
+    Attributes
+    ----------
+    stopped
+        Whether the fit was asked to stop.
+    by_user
+        Whether Ctrl-C asked for it.
+    """
 
     def __init__(self, progress: Callable[[FitProgress], bool | None] | None) -> None:
         self._progress = progress
         self.stopped, self.by_user = False, False
 
     def __call__(self, progress: FitProgress) -> bool:
-        """Whether to go on."""
+        """Report progress; return whether to continue."""
         try:
             answer = self._progress(progress) if self._progress is not None else None
         except KeyboardInterrupt:
@@ -102,7 +168,18 @@ class Watch:
 
 
 def unknown_names(estimator: Estimator) -> list[str]:
-    """[u] path of each unknown with its role: `….drop` is static − coulomb, `….rate` 1/stribeck_velocity."""
+    """Name the unknowns of an estimator.
+
+    Parameters
+    ----------
+    estimator
+        With u unknowns.
+
+    Returns
+    -------
+    list of str
+        [u] path of each unknown with its role: `….drop` is static − coulomb, `….rate` is 1/stribeck_velocity.
+    """
     return [
         unknown.path if unknown.role == "value" else f"{unknown.path.rsplit('.', 1)[0]}.{unknown.role}"
         for unknown in estimator.unknowns
@@ -110,7 +187,7 @@ def unknown_names(estimator: Estimator) -> list[str]:
 
 
 def _estimator(structure: Structure) -> Estimator:
-    """Raises InputError: a number whose size nothing tells."""
+    """Build the estimator. Raises InputError if nothing gives the size of a number."""
     try:
         return Estimator(structure.start.image, structure.group, structure.scale)
     except EstimationError as refused:
@@ -124,7 +201,7 @@ def _starting_point(estimator: Estimator, start: Start | None) -> Numbers:
 
 
 def _rows(recording: FitRecording, part: slice) -> dict[str, Any]:
-    """What the estimator takes of one part."""
+    """Return the arguments of the estimator for one part of a recording."""
     external = recording.external
     return {
         "arrays": recording.arrays(part),
@@ -135,7 +212,7 @@ def _rows(recording: FitRecording, part: slice) -> dict[str, Any]:
 
 
 def _add_recordings(estimator: Estimator, recordings: Sequence[FitRecording]) -> list[tuple[int, slice]]:
-    """Adds each stretch that has something to learn from; returns of each its recording's place and its rows."""
+    """Add each stretch with samples to learn from; return the index of its recording and its rows."""
     added = []
     for place, recording in enumerate(recordings):
         for part in recording.parts:
@@ -144,7 +221,7 @@ def _add_recordings(estimator: Estimator, recordings: Sequence[FitRecording]) ->
                 added.append((place, part))
     if not added:
         paths = ", ".join(str(recording.path) for recording in recordings)
-        raise InputError(f"{paths}: no two samples to learn from between two gaps; expected motion without contact")
+        raise InputError(f"{paths}: no two samples to learn from without a gap; expected motion without contact")
     return added
 
 
@@ -155,7 +232,7 @@ def _measured_weights(
     added: Sequence[tuple[int, slice]],
     settings: Settings,
 ) -> list[Numbers]:
-    """[N, n] by recording: the share of a sample that each counts for, by the residuals at z [u]."""
+    """Measure by recording [N, n] the weight of each sample from the residuals at z [u]."""
     weights = [np.ones_like(recording.target) for recording in recordings]
     most = 1.0 if settings.previous is None else settings.previous.share
     for number, (place, part) in enumerate(added):
@@ -172,14 +249,35 @@ def learn_batch(
     settings: Settings,
     start: Start | None,
 ) -> Learned:
-    """Maximum likelihood. Raises Interrupted."""
+    """Estimate by maximum likelihood.
+
+    Parameters
+    ----------
+    structure
+        What to fit.
+    recordings
+        Prepared recordings.
+    watch
+        Receives the progress, and may stop the fit.
+    settings
+        Options.
+    start
+        Called with [u] the names of the unknowns, returns [u] where to start. None: the description.
+
+    Raises
+    ------
+    Interrupted
+        The fit was stopped.
+    InputError
+        The recordings do not allow a fit.
+    """
     estimator = _estimator(structure)
     begin = _starting_point(estimator, start)
     added = _add_recordings(estimator, recordings)
     prior = settings.prior
     if settings.previous is not None:
         estimator.set_known(_known(estimator, settings))
-        prior = np.inf  # it is in what is known
+        prior = np.inf  # the known information contains the prior
     found = _fitted(estimator, begin, prior, settings, watch, "")
     steps, passes = found.steps, found.passes
     weights = [np.ones_like(recording.target) for recording in recordings]
@@ -206,7 +304,7 @@ def learn_batch(
 
 
 def _known(estimator: Estimator, settings: Settings) -> Numbers:
-    """[u, u] information of the previous fit."""
+    """Return [u, u] the information of the previous fit."""
     assert settings.previous is not None
     names = unknown_names(estimator)
     return known_information(estimator, names, settings.previous, settings.change, settings.prior, settings.noise)
@@ -215,7 +313,7 @@ def _known(estimator: Estimator, settings: Settings) -> Numbers:
 def _fitted(
     estimator: Estimator, begin: Numbers, prior: float, settings: Settings, watch: Watch, what: str
 ) -> BatchResult:
-    """Fits from `begin` [u]. what: behind each phase, in words. Raises Interrupted."""
+    """Fit from `begin` [u]. `what` is added to the words of each phase. Raises Interrupted."""
     best, best_cost = begin, float("nan")
 
     def show(number: int, stride: int, done: int, total: int, cost: float, z: Numbers) -> bool:
@@ -251,12 +349,14 @@ def learn_ekf(
     settings: Settings,
     start: Start | None,
 ) -> Learned:
-    """The extended Kalman filter over all recordings in their order, each pass but the first linearised where the one
-    before arrived. Raises Interrupted.
+    """Estimate by the extended Kalman filter over all recordings in order. Raises Interrupted.
 
-    Its noise is that of its bias filter too, so a sample's share cannot go into it. What the last pass says of the data
-    is a Gaussian: it is weighted as a whole, with the share of all samples together, and joined with the prior again.
-    Numbers that wander (`parameter_drift`) have no such sum, and stay as the filter has them.
+    Each pass after the first is linearised where the previous one ended.
+
+    The noise of the filter is also that of its bias filter, so samples cannot have weights in it. Instead, the Gaussian
+    that the last pass gives for the data is weighted as a whole, with the common share of all samples, and combined
+    with the prior again. Numbers that drift (`parameter_drift`) have no such Gaussian and keep the result of the
+    filter.
     """
     estimator = _estimator(structure)
     learner = _learner(structure, estimator, settings, start)
@@ -273,7 +373,7 @@ def learn_ekf(
         weights = _common_weight(estimator, z, recordings, settings)
     share = float(weights[0][0, 0])
     if share < 1 or settings.previous is not None:
-        # what the data alone say, about the prior's mean: on going on the filter began elsewhere
+        # information of the data alone about the prior's mean; a resumed filter started elsewhere
         first = np.array([unknown.start for unknown in learner.unknowns])
         mean = first if settings.previous is None else estimator.start
         pull = share * (np.linalg.solve(covariance, z - first) + information @ (first - mean))
@@ -299,7 +399,7 @@ def learn_ekf(
 def _common_weight(
     estimator: Estimator, z: Numbers, recordings: Sequence[FitRecording], settings: Settings
 ) -> list[Numbers]:
-    """[N, n] by recording, the same everywhere: the share of all samples trained on together."""
+    """Return by recording [N, n] one weight for all samples: the share of all samples trained on together."""
     found = _measured_weights(estimator, z, recordings, _add_recordings(estimator, recordings), settings)
     trained = np.concatenate([each[recording.train] for each, recording in zip(found, recordings, strict=True)])
     return [np.full_like(each, trained.mean()) for each in found]
@@ -313,7 +413,7 @@ def _within(estimator: Estimator, z: Numbers) -> Numbers:
 def _filter_once(
     learner: Learner, estimator: Estimator, recordings: Sequence[FitRecording], watch: Watch, number: int
 ) -> list[Numbers]:
-    """Standardised innovations [N, n] by recording, NaN where not trained on."""
+    """Return by recording [N, n] the standardised innovations, NaN where not trained on."""
     total, before = sum(len(recording.time) for recording in recordings), 0
 
     def show(done: int, _: int) -> bool:
@@ -325,7 +425,7 @@ def _filter_once(
         for part in recording.parts:
             try:
                 outputs = learner.run(**_rows(recording, part), progress=show)
-            except EstimationError as refused:  # the filter diverges: a unit is wrong, or a scale
+            except EstimationError as refused:  # the filter diverges: a unit or a scale is wrong
                 raise InputError(f"{recording.path}: {refused}") from None
             except KeyboardInterrupt:
                 raise Interrupted(estimator, learner.z, float("nan"), by_user=True) from None
@@ -338,7 +438,7 @@ def _filter_once(
 
 
 def _learner(structure: Structure, estimator: Estimator, settings: Settings, start: Start | None) -> Learner:
-    """It begins at its description's numbers: on going on, those of the interrupted fit, with the scale as it was."""
+    """Build the filter. It starts from the description, or from an interrupted fit with the original scale."""
     image, scale = structure.start.image, structure.scale
     if start is not None:
         own = np.abs(estimator.values(estimator.start))

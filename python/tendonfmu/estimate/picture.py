@@ -1,12 +1,14 @@
-"""What a finished fit hands over to be drawn: report, both descriptions, covariance, and the series of recordings.
+"""The data of a finished fit that its figures and its page show.
 
-    picture = FitPicture(report, start=description.data, fitted=fitted_data, unknowns=estimator.unknowns, z=result.z,
-                         covariance=result.covariance, series=[...])
-    write_fit_page(picture, Path("figures"))        # report/fit_page.py: PNG files and report.html
+There is one `FitSeries` per recording: those trained on (role "training"; held-out blocks of time have `used` False),
+and whole recordings that were held out or given to compare with (role "comparison", such as the motion at four times
+the pretension).
 
-One `FitSeries` per recording: those that were trained on (role "training"; held-out blocks of time have `used` False),
-whole recordings that were held out or given to compare with (role "comparison", such as the motion at four times the
-pretension).
+Examples
+--------
+>>> picture = FitPicture(report, start=description.data, fitted=fitted_data, unknowns=estimator.unknowns, z=result.z,
+...                      covariance=result.covariance, series=[...])
+>>> write_fit_page(picture, Path("figures"))  # report/fit_page.py: PNG files and report.html
 """
 
 from __future__ import annotations
@@ -23,11 +25,17 @@ Role = Literal["training", "comparison"]
 
 
 class FittedUnknown(Protocol):
-    """What is read of `estimation.Unknown`: one entry of z.
+    """The attributes of `estimation.Unknown` that are read here: one entry of z.
 
-    path: of its first parameter. role: "coulomb", "drop" (static − coulomb), "rate" (1/stribeck_velocity), "viscous",
-    "static" (static and coulomb move together) or "value". parameters: indices of the parameters that it moves, in the
-    order of `native.Finger.parameters()`.
+    Attributes
+    ----------
+    path
+        Path of its first parameter.
+    role
+        "coulomb", "drop" (static − coulomb), "rate" (1/stribeck_velocity), "viscous", "static" (static and coulomb
+        move together) or "value".
+    parameters
+        Indices of the parameters that it moves, in the order of `native.Finger.parameters()`.
     """
 
     @property
@@ -40,15 +48,30 @@ class FittedUnknown(Protocol):
 
 @dataclass(frozen=True)
 class FitSeries:
-    """One recording under the fitted model; all arrays have one row per sample, SI units.
+    """One recording under the fitted model; all arrays have one row per sample, in SI units.
 
-    label: for people, such as "free motion" or the file's name. mean_force: N, of all tendons over all samples.
-    time: [N] s. torque: [N, n] N·m, what the model has to explain: τ, or τ − external_torque where that was used.
-    residual: [N, n] N·m before the bias update, τ − T_eff (`Estimator.innovations(...)[0]`); NaN for the first sample.
-    model_torque: [N, n] N·m, T of eq. (10) without the bias (`friction_torque` − `bias_torque` of `native.Finger.run`).
-    joint_angle, joint_speed: [N, n] rad, rad/s, the kinematics in use.
-    used: [N] bool: trained on. Contact left out, or held out: False. All False in a comparison.
-    held_out: [N] bool: held out of training and judged, None where nothing was.
+    Attributes
+    ----------
+    label
+        Name for people, such as "free motion" or the name of the file.
+    role
+        "training" or "comparison".
+    mean_force
+        Mean of all tendon forces over all samples (N).
+    time
+        [N] (s).
+    torque
+        [N, n] torque that the model has to explain: τ, or τ − external_torque where that was used (N·m).
+    residual
+        [N, n] τ − T_eff before the bias update (`Estimator.innovations(...)[0]`); NaN for the first sample (N·m).
+    model_torque
+        [N, n] T of eq. (10) without the bias (`friction_torque` − `bias_torque` of `native.Finger.run`) (N·m).
+    joint_angle, joint_speed
+        [N, n] the kinematics in use (rad, rad/s).
+    used
+        [N] bool: trained on. False for contact and for held-out samples, and everywhere in a comparison.
+    held_out
+        [N] bool: held out of training and judged. None if nothing was.
     """
 
     label: str
@@ -66,12 +89,23 @@ class FitSeries:
 
 @dataclass(frozen=True)
 class FitPicture:
-    """A finished fit, all that its figures and its page are made of.
+    """A finished fit: all that its figures and its page are made of.
 
-    report: "tendonfmu-fit-1" as written by `--report`; a "start_rms" [n] beside "rms" in residual.train and
-        residual.held_out (the residual with the start's parameters) is shown where it is there.
-    start, fitted: descriptions as parsed JSON. unknowns, z: [p], covariance: [p, p] of z, prior included.
-    series: training first, in the order given.
+    Attributes
+    ----------
+    report
+        "tendonfmu-fit-1" as written by `--report`. If residual.train and residual.held_out have "start_rms" [n] beside
+        "rms" (the residual with the parameters of the start), it is shown.
+    start, fitted
+        Descriptions as parsed JSON.
+    unknowns
+        [p] unknowns of the estimation.
+    z
+        [p] their estimate.
+    covariance
+        [p, p] of z, prior included.
+    series
+        Recordings, training first, in the order given.
     """
 
     report: Mapping[str, Any]
@@ -84,10 +118,10 @@ class FitPicture:
 
     @property
     def joint_names(self) -> list[str]:
-        """[n] names, `joint 2` where there is none."""
+        """[n] names; `joint 2` where there is none."""
         return [joint.get("name") or f"joint {j}" for j, joint in enumerate(self.fitted["joints"], start=1)]
 
     @property
     def tendon_names(self) -> list[str]:
-        """[m] names, `tendon 2` where there is none."""
+        """[m] names; `tendon 2` where there is none."""
         return [tendon.get("name") or f"tendon {i}" for i, tendon in enumerate(self.fitted["tendons"], start=1)]

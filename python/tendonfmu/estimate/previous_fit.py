@@ -1,8 +1,8 @@
-"""A calibration that a new fit begins from: its numbers, how well they were known, and how far they may have changed.
+"""A previous calibration as the prior of a fit: its numbers, their errors, and their expected change.
 
-The prior of unknown k is a Gaussian about its previous value with the covariance C + D: C is that of the previous fit,
-where its report says it, and D is diagonal, (change · size)², what wear, temperature or another instrument of the type
-may have done since. A previous description alone has no C: its numbers count as known to within D.
+The prior of unknown k is a Gaussian about its previous value with covariance C + D. C is that of the previous fit, if
+its report has it. D is diagonal, (change · size)², for the change by wear, temperature or another instrument of the
+type since then. A previous description without a report has no C: its numbers count as known to within D.
 """
 
 from __future__ import annotations
@@ -24,15 +24,26 @@ from tendonfmu.model import FingerDescription, read_finger
 
 Numbers = NDArray[np.float64]
 
-CHANGE = 0.02  # of a number; docs/evidence/recalibration.md says what larger and smaller ones do
-_LEAST = 1e-3  # of an unknown's expected magnitude: one that ended at 0 may still leave it
+CHANGE = 0.02  # relative; docs/evidence/recalibration.md shows the effect of larger and smaller values
+_LEAST = 1e-3  # of an unknown's expected magnitude: lets an unknown that ended at 0 leave it
 
 
 @dataclass(frozen=True)
 class PreviousFit:
-    """values: by path of the description's numbers, SI. names: [k] of unknowns; covariance: [k, k] of them; none where
-    the previous fit did not say it. share: effective samples over samples of its residuals, the least of all joints; 1
-    where not known.
+    """Numbers of a previous fit.
+
+    Attributes
+    ----------
+    path
+        File of the report or of the description.
+    values
+        Numbers of the description by path (SI).
+    names
+        [k] unknowns with a known covariance; empty if the previous fit did not state it.
+    covariance
+        [k, k] of these unknowns.
+    share
+        Effective samples per sample of its residuals, the least of all joints; 1 if unknown.
     """
 
     path: Path
@@ -43,7 +54,18 @@ class PreviousFit:
 
 
 def read_previous_fit(path: Path) -> PreviousFit:
-    """Reads the report of a fit ("tendonfmu-fit-1"), or the description that a fit wrote. Raises InputError."""
+    """Read the report of a fit ("tendonfmu-fit-1"), or the description that a fit wrote.
+
+    Parameters
+    ----------
+    path
+        File of the report or of the description.
+
+    Raises
+    ------
+    InputError
+        The file is neither, or the report is incomplete.
+    """
     content = read_json(path, "a previous fit: its report, or the description that it wrote")
     if isinstance(content, dict) and content.get("format") == FORMAT:
         return _of_report(path, content)
@@ -74,7 +96,20 @@ def _of_report(path: Path, report: Mapping[str, Any]) -> PreviousFit:
 
 
 def with_previous_values(finger: FingerDescription, previous: PreviousFit) -> FingerDescription:
-    """The finger with the previous values of all numbers that both have. Raises InputError where none is."""
+    """Return the finger with the previous values of all numbers that both have.
+
+    Parameters
+    ----------
+    finger
+        The finger to fit.
+    previous
+        The previous fit.
+
+    Raises
+    ------
+    InputError
+        They have no number in common.
+    """
     numbers = [number for number in estimable_numbers(finger.data) if number.path in previous.values]
     if not numbers:
         raise InputError(
@@ -92,11 +127,11 @@ def with_previous_values(finger: FingerDescription, previous: PreviousFit) -> Fi
 def known_information(
     estimator: Estimator, names: Sequence[str], previous: PreviousFit, change: float, prior: float, noise: float
 ) -> Numbers:
-    """[u, u] information of the unknowns about the previous values, which are the estimator's start.
+    """Compute [u, u] the information of the prior about the previous values, which are the estimator's start.
 
-    names: [u] of the unknowns. change: standard deviation of what may have changed, relative. prior: standard deviation
-    of unknowns that the previous fit does not have, in expected magnitudes. noise: N·m; a bias.initial_torque counts as
-    at least that large.
+    `names` are those of the u unknowns, `change` the relative standard deviation of what may have changed since.
+    `prior` is the standard deviation of unknowns that the previous fit lacks, in expected magnitudes. With `noise`
+    (N·m) a bias.initial_torque counts as at least that large.
     """
     start, scale = estimator.start, estimator.scale
     size = np.maximum(np.abs(start), _LEAST * scale)
@@ -117,7 +152,7 @@ def _has(previous: PreviousFit, unknown: Any) -> bool:
 
 
 def _inverse(covariance: Numbers) -> Numbers:
-    """Of a covariance whose correlations were rounded: directions are known no better than by a relative 1e-6."""
+    """Invert a covariance with rounded correlations; no direction counts as known better than by a relative 1e-6."""
     root = np.sqrt(np.diag(covariance))
     value, turn = np.linalg.eigh(covariance / np.outer(root, root))
     turned = turn / root[:, None]

@@ -1,9 +1,9 @@
 """How far the residuals of a fit are from the white noise that its covariance assumes.
 
-The covariance of a fit counts each sample as new. What a model misses lasts for many, so the sum of the likelihood's
-gradient over a block of time (its score) varies more than the information says. The scores of blocks that are longer
-than the residuals remember give the true covariance of the estimates, C (Σ s sᵀ) C ("sandwich" with clusters in time:
-Liang and Zeger 1986, eq. 7), whatever the residuals' size and shape in time.
+The covariance of a fit counts each sample as new information. A model error lasts for many samples, so the sum of the
+likelihood's gradient over a block of time (its score) varies more than the information predicts. The scores of blocks
+longer than the correlation of the residuals give the true covariance of the estimates, C (Σ s sᵀ) C, whatever the size
+and the correlation of the residuals ("sandwich" with clusters in time: Liang and Zeger 1986, eq. 7).
 """
 
 from __future__ import annotations
@@ -22,16 +22,20 @@ from tendonfmu.recordings import BiasSettings, bias_settings, track
 
 Numbers = NDArray[np.float64]
 
-BLOCKS = 80  # about; few enough to be long, many enough for a sum of squares
-SHORTEST = 2.0  # s; several times what the bias filter remembers
-FEWEST = 10  # blocks, if they are shorter for it
-_SAMPLES, _SIZE = 8000, 15_000_000  # looked at in all; times joints and unknowns, at most
-_LEAST = 8  # samples of a block
+BLOCKS = 80  # approximate number: few enough to be long, many enough for a sum of squares
+SHORTEST = 2.0  # s; several times the memory of the bias filter
+FEWEST = 10  # blocks, which are shorter than SHORTEST if necessary
+_SAMPLES, _SIZE = 8000, 15_000_000  # most samples in all; most samples times joints times unknowns
+_LEAST = 8  # samples in a block
 
 
 @dataclass(frozen=True)
 class Scores:
-    """scores: [B, u] gradient of ½ Σ e²/S over each block, less their mean. block_time: s of a block."""
+    """Scores of blocks of time.
+
+    `scores` is [B, u] the gradient of ½ Σ e²/S over each block, less the mean of all blocks; `block_time` the length of
+    a block (s).
+    """
 
     scores: Numbers
     block_time: float
@@ -44,12 +48,11 @@ def block_scores(
     training: Sequence[Evaluation],
     weights: Sequence[Numbers],
 ) -> Scores:
-    """At the estimate z [u] of a fitted description, over the samples trained on.
+    """Compute the scores at the estimate z [u] of a fitted description, over the samples trained on.
 
-    estimator: of the start's description; the blocks are added to its recordings. weights: [N, n] by recording, what
-    each sample counts for.
-
-    Every so many'th sample is looked at, with the bias filter of that rate; each block's bias begins anew.
+    `estimator` is that of the start's description; the blocks are added to its recordings. `weights` are by recording
+    [N, n] the weights of the samples. Only every k-th sample is used, with a bias filter of that rate. The bias of each
+    block starts anew.
     """
     seconds = sum(found.recording.duration for found in training)
     samples = sum(len(found.recording.time) for found in training)
@@ -67,7 +70,7 @@ def block_scores(
 
 
 def _settings(data: Mapping[str, Any], every: int) -> BiasSettings:
-    """For every so many'th sample: noise said by sample averages out, noise said by time does so by itself."""
+    """Return the bias settings for every k-th sample: noise per sample is averaged, noise per time needs no change."""
     settings = replace(bias_settings(data), initial_torque=None)
     if settings.noise_time is not None:
         return settings
@@ -76,7 +79,7 @@ def _settings(data: Mapping[str, Any], every: int) -> BiasSettings:
 
 
 def _blocks(found: Evaluation, length: float, every: int) -> Iterator[NDArray[np.intp]]:
-    """Rows of each block that has some to learn from."""
+    """Yield the rows of each block that has enough samples to learn from."""
     recording = found.recording
     for part in recording.parts:
         rows = np.arange(part.start, part.stop, every)
@@ -94,7 +97,7 @@ def _score(
     rows: NDArray[np.intp],
     weights: Numbers,
 ) -> Numbers:
-    """[u] of one block. The filter is linear, so it takes y − T and its derivatives alike."""
+    """Compute [u] the score of one block. The bias filter is linear, so it takes y − T and its derivatives alike."""
     recording = found.recording
     time, learns = recording.time[rows], recording.train[rows]
     number = estimator.add_recording(sampled(found, rows, time), kinematics_source=3)
@@ -111,7 +114,7 @@ def _score(
 
 
 def sampled(found: Evaluation, rows: NDArray[np.intp], time: Numbers) -> dict[str, Numbers]:
-    """Rows of a recording as one with measured angles and speeds: T needs nothing of the samples between."""
+    """Return rows of a recording as a recording with measured angles and speeds; T needs no samples in between."""
     return {
         "time": np.ascontiguousarray(time),
         "tendon_force": np.ascontiguousarray(found.recording.recording.groups["tendon_force"][rows]),

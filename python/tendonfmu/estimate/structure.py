@@ -1,7 +1,7 @@
 """Which numbers of a finger a fit estimates, and which of them share one value.
 
 A pattern is a path of the description in which `*` stands for anything and `?` for one character; brackets are
-literal. It matches a number, or a part of the description and so all numbers in it: `tendons[*].edge_friction[2]`.
+literal. It matches a number, or a part of the description and thus all numbers in it: `tendons[*].edge_friction[2]`.
 """
 
 from __future__ import annotations
@@ -31,13 +31,23 @@ _INDEX = re.compile(r"\[(\d+)\]")
 
 @dataclass(frozen=True)
 class Structure:
-    """What is fitted. start: the description that the fit begins with, laws expanded or tied, shared values made equal,
-    without `contact.uncertainty`.
+    """What is fitted.
 
-    numbers: those estimated, in the order of identifiability.unknowns, `bias.initial_torque` last. group: [p] of all
-    parameters of the description in canonical order, −1 fixed, equal numbers share one value. scale: [p] expected
-    magnitudes, NaN where the start's own. index: path -> place among the p. sensor_fault: of the description, which the
-    start lacks.
+    Attributes
+    ----------
+    start
+        Description that the fit starts from: laws expanded or merged, shared values made equal, no
+        `contact.uncertainty`.
+    numbers
+        The estimated numbers in the order of `unknowns`, `bias.initial_torque` last.
+    group
+        [p] by parameter of the description in canonical order: −1 is fixed, equal numbers share one value.
+    scale
+        [p] expected magnitudes; NaN: that of the start.
+    index
+        Path -> index among the p parameters.
+    sensor_fault
+        `sensor_fault` of the description, which `start` lacks.
     """
 
     start: FingerDescription
@@ -50,8 +60,18 @@ class Structure:
 
 @dataclass(frozen=True)
 class Choice:
-    """What was asked for. sides: "given", "symmetric" or "asymmetric". only, fix: patterns; share: "tendons", "pulleys"
-    or patterns; scale: "PATTERN=VALUE", the expected magnitude in the description's unit.
+    """The options of a fit that shape its structure.
+
+    Attributes
+    ----------
+    sides
+        "given", "symmetric" or "asymmetric".
+    only, fix
+        Patterns of the numbers to estimate, or not to estimate.
+    share
+        "tendons", "pulleys" or patterns of the laws that share their values.
+    scale
+        "PATTERN=VALUE": expected magnitude in the unit of the description.
     """
 
     sides: str = "given"
@@ -62,7 +82,20 @@ class Choice:
 
 
 def build_structure(finger: FingerDescription, choice: Choice) -> Structure:
-    """Raises InputError where a pattern matches nothing, nothing is left to estimate, or shared laws differ in kind."""
+    """Choose the numbers of a finger that a fit estimates.
+
+    Parameters
+    ----------
+    finger
+        Description.
+    choice
+        Options of the fit.
+
+    Raises
+    ------
+    InputError
+        A pattern matches nothing, nothing is left to estimate, or shared laws differ in kind.
+    """
     data = _model_alone(with_sides(finger.data, choice.sides))
     numbers = estimable_numbers(data)
     if not numbers:
@@ -89,7 +122,11 @@ def build_structure(finger: FingerDescription, choice: Choice) -> Structure:
 
 
 def _model_alone(data: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Directions of uncertainty tell of numbers that are about to change; a watch over sensors is no part of them."""
+    """Remove `contact.uncertainty*` and `sensor_fault`.
+
+    The directions of uncertainty belong to numbers that are about to change; the watch over sensors is no part of the
+    friction model.
+    """
     if data.get("sensor_fault") is not None:
         data = {key: value for key, value in data.items() if key != "sensor_fault"}
     contact = data.get("contact") or {}
@@ -99,7 +136,7 @@ def _model_alone(data: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def values_of(structure: Structure, finger: FingerDescription) -> list[Unknown]:
-    """The estimated numbers as they are in another description of the same structure."""
+    """Return the estimated numbers with their values in another description of the same structure."""
     return _numbered(finger, structure.numbers)
 
 
@@ -116,18 +153,37 @@ def _numbered(finger: FingerDescription, numbers: Sequence[Unknown]) -> list[Unk
 
 
 def own_copy(data: Mapping[str, Any]) -> dict[str, Any]:
-    """A copy in which no law is the same object as another, as parsed JSON made by a program may have them."""
+    """Copy a description so that no two laws are the same object, as in JSON data built by a program.
+
+    Parameters
+    ----------
+    data
+        Parsed description.
+    """
     copied: dict[str, Any] = json.loads(json.dumps(data))
     return copied
 
 
 def estimable_numbers(data: Mapping[str, Any]) -> list[Unknown]:
-    """What a fit of a parsed description may estimate: all that is present, `bias.initial_torque` last."""
+    """List the numbers that a fit of a parsed description may estimate: all present, `bias.initial_torque` last."""
     return [*unknowns(data), *_initial_torques(data)]
 
 
 def described(finger: FingerDescription, data: Mapping[str, Any]) -> FingerDescription:
-    """The same finger with other numbers, seen by the native reader. Raises InputError."""
+    """Return the finger with another description, checked by the core.
+
+    Parameters
+    ----------
+    finger
+        The finger.
+    data
+        Its new description.
+
+    Raises
+    ------
+    InputError
+        The core refuses the description.
+    """
     if data is finger.data or data == finger.data:
         return finger
     text = json.dumps(data).encode()
@@ -146,9 +202,9 @@ def _initial_torques(data: Mapping[str, Any]) -> list[Unknown]:
 
 
 def with_sides(data: Mapping[str, Any], wanted: str) -> Mapping[str, Any]:
-    """The description with every law "symmetric", "asymmetric", or as "given".
+    """Return the description with every law "symmetric", "asymmetric", or as "given".
 
-    A symmetric law becomes two equal sides; two sides become one, the mean of their magnitudes.
+    A symmetric law becomes two equal sides. Two sides become one, the mean of their magnitudes.
     """
     if wanted == "given":
         return data
@@ -189,13 +245,13 @@ def _one_side(law: dict[str, Any]) -> dict[str, Any]:
 
 
 def matcher(pattern: str) -> re.Pattern[str]:
-    """Group 1 of a match is what the pattern itself stands for, group 2 what follows inside that part."""
+    """Compile a pattern. Group 1 of a match is what the pattern itself matches, group 2 the rest inside that part."""
     body = "".join({"*": ".*?", "?": "."}.get(letter, re.escape(letter)) for letter in pattern)
     return re.compile(rf"({body})((?:[.\[].*)?)")
 
 
 def _select(numbers: Sequence[Unknown], patterns: Iterable[str], option: str) -> set[str]:
-    """Paths of the numbers that match any pattern; each has to match at least one."""
+    """Return the paths of the numbers that match any pattern. Raises InputError if a pattern matches none."""
     found: set[str] = set()
     for pattern in patterns:
         match = matcher(pattern).fullmatch
@@ -243,7 +299,7 @@ def _scales(paths: list[str], chosen: Sequence[Unknown], given: Sequence[str]) -
 
 
 def _owners(numbers: Sequence[Unknown], data: Mapping[str, Any], share: Sequence[str]) -> list[int]:
-    """[numbers] group of each: its own, or the first that it shares a value with."""
+    """Return [numbers] the group of each: its own index, or that of the first number that it shares a value with."""
     owners = list(range(len(numbers)))
     for key in _shared_keys(numbers, data, share):
         first: dict[str, int] = {}
@@ -259,7 +315,7 @@ def _owners(numbers: Sequence[Unknown], data: Mapping[str, Any], share: Sequence
 def _shared_keys(
     numbers: Sequence[Unknown], data: Mapping[str, Any], share: Sequence[str]
 ) -> Iterator[list[str | None]]:
-    """For each thing to share by: [numbers] a name that is equal where values are, None where nothing is shared."""
+    """Yield per option [numbers] a key, equal where values are shared and None where nothing is shared."""
     for asked in share:
         if asked == "tendons":  # the same place of every tendon
             keys = [_place(number, keep=1) if number.path.startswith("tendons[") else None for number in numbers]
@@ -276,14 +332,14 @@ def _shared_keys(
 
 
 def _place(number: Unknown, keep: int) -> str:
-    """The number's path without the tendon (keep 1), or without the joint (keep 0); working points by their angle."""
+    """Return the path without the tendon (keep 1) or without the joint (keep 0); working points by their angle."""
     path = _by_angle(number)
     start, end = [match.span() for match in _INDEX.finditer(path)][1 - keep]
     return path[:start] + path[end:]
 
 
 def _rest(number: Unknown, rest: str) -> str:
-    """What follows a match, working points by their angle; the magnitude where the match is the whole path."""
+    """Return the part after a match, working points by their angle; the magnitude if the match is the whole path."""
     return re.sub(r"\.laws\[\d+\]", f".laws@{_angle(number)}", rest) if rest else number.key
 
 
@@ -296,12 +352,12 @@ def _by_angle(number: Unknown) -> str:
 
 
 def _check_alike(numbers: Sequence[Unknown], owners: Sequence[int]) -> None:
-    """Only numbers of one meaning share a value: the same magnitude, with or without a Stribeck effect."""
+    """Check that shared numbers are of the same kind, and that all or none have a Stribeck effect."""
     for number, owner in zip(numbers, owners, strict=True):
         first = numbers[owner]
         if number.key != first.key:
             raise InputError(
-                f"--share: {number.path} and {first.path} would share a value; expected the same magnitude of both"
+                f"--share: {number.path} and {first.path} would share a value; expected numbers of the same kind"
             )
         if (number.with_path is None) != (first.with_path is None):
             having, lacking = (first, number) if first.with_path is None else (number, first)
@@ -312,7 +368,7 @@ def _check_alike(numbers: Sequence[Unknown], owners: Sequence[int]) -> None:
 
 
 def _with_equal_values(data: Mapping[str, Any], numbers: Sequence[Unknown], owners: Sequence[int]) -> Mapping[str, Any]:
-    """Numbers that share a value start from their mean."""
+    """Start numbers that share a value from their mean."""
     if len(set(owners)) == len(owners):
         return data
     result = own_copy(data)
@@ -327,9 +383,16 @@ def _with_equal_values(data: Mapping[str, Any], numbers: Sequence[Unknown], owne
 
 
 def set_number(data: Any, path: str, value: float) -> None:
-    """Writes a number of a parsed description, in place.
+    """Set a number of a parsed description in place.
 
-    path: such as `tendons[1].edge_friction[2].coulomb`, indices from 1.
+    Parameters
+    ----------
+    data
+        Parsed description.
+    path
+        Path of the number, such as `tendons[1].edge_friction[2].coulomb`, indices from 1.
+    value
+        New value in the unit of the description.
     """
     *way, last = _steps(path)
     for step in way:
@@ -338,7 +401,7 @@ def set_number(data: Any, path: str, value: float) -> None:
 
 
 def _value(data: Any, path: str) -> float:
-    """Of an extension's number that is left out: what is taken for it."""
+    """Return a number; if an extension leaves it out, the value that the core assumes."""
     try:
         return float(get_number(data, path))
     except KeyError:
@@ -348,7 +411,25 @@ def _value(data: Any, path: str) -> float:
 
 
 def get_number(data: Any, path: str) -> Any:
-    """Reads a number of a parsed description."""
+    """Return a number of a parsed description.
+
+    Parameters
+    ----------
+    data
+        Parsed description.
+    path
+        Path of the number, such as `tendons[1].edge_friction[2].coulomb`, indices from 1.
+
+    Returns
+    -------
+    float or None
+        The number in the unit of the description, or None where the key is null.
+
+    Raises
+    ------
+    KeyError
+        The description lacks a key of the path.
+    """
     for step in _steps(path):
         data = data[step]
     return data

@@ -1,9 +1,11 @@
-"""What a fit does not know of the modelled friction torque, as `contact.uncertainty` has it: at most four directions
-per joint, each a relative error of every part of the joint's friction (tendons, joint friction, joint load friction,
-cover; docs/reference/semantics.md#uncertainty).
+"""How uncertain the modelled friction torque is after a fit, in the form of `contact.uncertainty`.
 
-With g the derivative of T_j by the unknowns and C their covariance, T_j has the variance gᵀ C g. C is the fit's, with
-the information of the data shrunk by as much as the residuals vary more than white noise (`estimate.scores`).
+The form has at most four directions per joint, each a relative error of every part of the joint's friction (tendons,
+joint friction, joint load friction, cover; docs/reference/semantics.md#uncertainty).
+
+With g the derivative of T_j by the unknowns and C their covariance, T_j has the variance gᵀ C g. C is that of the fit,
+with the information of the data reduced by the factor by which the residuals vary more than white noise
+(`estimate.scores`).
 """
 
 from __future__ import annotations
@@ -27,20 +29,20 @@ from tendonfmu.statistics import error_directions
 Numbers = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
-LOAD = 4.0  # times the recorded forces: the directions are to hold at other pretensions, too
-WORST = 0.99  # quantile of the error that is stated
+LOAD = 4.0  # times the recorded forces: the directions must also hold at other pretensions
+WORST = 0.99  # quantile of the error that is reported
 ROLES = ("train", "held_out")  # of samples
 DIGITS = 6  # of a written number
-_SAMPLES, _SIZE = 1000, 2_000_000  # looked at; times joints and unknowns, at most
-_CHUNK = 500_000  # numbers of a Jacobian at a time
-_STEP = 0.01  # s between samples that are looked at one by one; no result depends on it
-_ROUNDING = 1e-9  # of a variance: keeps a covariance with rounding errors positive
-_NEVER = 1e9  # N·m; no contact threshold is ever passed
+_SAMPLES, _SIZE = 1000, 2_000_000  # most samples; most samples times joints times unknowns
+_CHUNK = 500_000  # numbers of a Jacobian in memory
+_STEP = 0.01  # s between samples that are evaluated separately; no result depends on it
+_ROUNDING = 1e-9  # of a variance: keeps a covariance positive in spite of rounding errors
+_NEVER = 1e9  # N·m, a contact threshold that is never exceeded
 
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """directions: for each joint up to four lists of m + 3 numbers. entry: of the report."""
+    """Uncertainty of a fitted finger: by joint up to four lists of m + 3 numbers, and the entry of the report."""
 
     directions: list[list[list[float]]]
     entry: dict[str, Any]
@@ -48,8 +50,10 @@ class Uncertainty:
 
 @dataclass(frozen=True)
 class Seen:
-    """Samples of the motion, by joint. parts: [n, K, m + 3] N·m of the friction torque. slopes: [n, K, u] of T, N·m per
-    column of `Known.factor`.
+    """Samples of the motion, by joint.
+
+    `parts` is [n, K, m + 3] of the friction torque (N·m), `slopes` [n, K, u] the derivative of T by each column of
+    `Known.factor` (N·m).
     """
 
     parts: Numbers
@@ -58,24 +62,30 @@ class Seen:
 
 @dataclass(frozen=True)
 class Known:
-    """The covariance C of the unknowns as F Fᵀ, F [u, u], and what of each column is known by data: Fᵀ H F, H their
-    information, is diagonal, `share` [u], from 0 (prior alone) to 1 (data alone).
+    """The covariance C of the unknowns, and how much of it is due to the data.
+
+    `factor` is F [u, u] with C = F Fᵀ. Fᵀ H F is diagonal, H being the information of the data; its diagonal is `share`
+    [u], from 0 (prior alone) to 1 (data alone).
     """
 
     factor: Numbers
     share: Numbers
 
     def growth(self, inflation: float) -> Numbers:
-        """[u] of the variance along each column of F, when the data know so many times less. The prior, which is no
-        measurement, stays.
+        """Return [u] the growth of the variance along each column of F if the data know `inflation` times less.
+
+        The prior is no measurement and stays as it is.
         """
         return np.asarray(1 / (1 - self.share + self.share / inflation))
 
 
 @dataclass(frozen=True)
 class JointUncertainty:
-    """Of one joint. captured: share of the variance in the leading directions, before what they leave out is put back.
-    stated: for each set of samples rms standard deviation, rms error of the predicted one and its quantile `WORST`.
+    """Uncertainty of one joint.
+
+    `captured` is the share of the variance in the leading directions, before the remainder is added to them. `stated`
+    has for each set of samples the rms standard deviation, the rms error of the predicted one, and the quantile `WORST`
+    of that error.
     """
 
     directions: list[list[float]]
@@ -87,7 +97,24 @@ class JointUncertainty:
 def parameter_uncertainty(
     structure: Structure, learned: Learned, data: Mapping[str, Any], training: Sequence[Evaluation]
 ) -> Uncertainty:
-    """Of a finished fit. data: the fitted description. training: judged recordings."""
+    """Compute the uncertainty of the friction torque of a finished fit.
+
+    Parameters
+    ----------
+    structure
+        What was fitted.
+    learned
+        The finished estimation.
+    data
+        Fitted description.
+    training
+        Judged recordings.
+
+    Returns
+    -------
+    Uncertainty
+        Directions for `contact.uncertainty`, and the entry of the report.
+    """
     known = known_of(learned.covariance, learned.information)
     estimator = Estimator(structure.start.image, structure.group, structure.scale)
     blocks = block_scores(estimator, learned.z, data, training, learned.weights)
@@ -115,12 +142,12 @@ def parameter_uncertainty(
 
 
 def _of_joint(seen: Mapping[str, Seen], known: Known, scores: Numbers) -> JointUncertainty:
-    """seen: [K, m + 3] and [K, u] of the joint."""
+    """Compute the uncertainty of one joint from its parts [K, m + 3] and slopes [K, u]."""
     inflation = inflation_of(seen["train"].slopes, known, scores)
     growth = np.sqrt(known.growth(inflation))
     slopes = {which: each.slopes * growth for which, each in seen.items()}
     std = {which: np.sqrt(error_directions.squares(each)) for which, each in slopes.items()}
-    # so that the larger torques under more load do not count for more
+    # scaled, so that the larger torques under more load do not get more weight
     size = {which: _rms(std[which]) or 1.0 for which in ("train", "loaded")}
     directions, captured = error_directions.few_directions(
         np.concatenate([seen[which].parts / size[which] for which in size]),
@@ -146,9 +173,9 @@ def _stated(joints: Sequence[JointUncertainty], which: str) -> dict[str, list[fl
 
 
 def known_of(covariance: Numbers, information: Numbers) -> Known:
-    """covariance: [u, u], prior included; information: [u, u] of the data alone."""
+    """Factorise a covariance [u, u] (prior included) by the information [u, u] of the data alone."""
     scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    correlation = covariance / np.outer(scale, scale)  # units do not matter to it
+    correlation = covariance / np.outer(scale, scale)  # free of units
     correlation[np.diag_indices_from(correlation)] += _ROUNDING
     root = scale[:, None] * np.linalg.cholesky(correlation)
     share, turn = np.linalg.eigh(root.T @ information @ root)
@@ -156,10 +183,10 @@ def known_of(covariance: Numbers, information: Numbers) -> Known:
 
 
 def inflation_of(slopes: Numbers, known: Known, scores: Numbers) -> float:
-    """How many times the sampling variance of the torque exceeds what white residuals of the settings' size would give,
-    on average over samples. slopes: [K, u] by the columns of F; scores: [B, u] Fᵀ s of each block.
+    """Compute by how much the sampling variance of the torque exceeds that of white residuals, on average over samples.
 
-    1 where nothing of the torque is estimated, or where too few blocks say nothing.
+    White residuals have the size of the noise settings. `slopes` is [K, u] by the columns of F, `scores` is [B, u] Fᵀ s
+    of each block. The result is 1 if nothing of the torque is estimated or if there are too few blocks.
     """
     if len(scores) < 2:
         return 1.0
@@ -173,8 +200,9 @@ def inflation_of(slopes: Numbers, known: Known, scores: Numbers) -> float:
 
 @dataclass(frozen=True)
 class Motion:
-    """Looks at samples of recordings. estimator: of the start's description; z: [u] the estimate; data: the fitted
-    description.
+    """Evaluates samples of recordings.
+
+    `estimator` is that of the start's description, `z` [u] the estimate, `data` the fitted description.
     """
 
     estimator: Estimator
@@ -183,7 +211,7 @@ class Motion:
     known: Known
 
     def look(self, recordings: Sequence[Evaluation], rows: Sequence[Rows], load: float = 1.0) -> Seen:
-        """Every so many'th of the rows of each recording. load: times the recorded tendon forces."""
+        """Evaluate every k-th of the rows of each recording, at `load` times the recorded tendon forces."""
         joints, tendons, unknowns = len(self.data["joints"]), len(self.data["tendons"]), len(self.z)
         most = min(_SAMPLES, max(_SIZE // (joints * unknowns), _SAMPLES // 10))
         every = max(1, math.ceil(sum(map(len, rows)) / most))
@@ -202,15 +230,15 @@ class Motion:
         return seen
 
     def _slopes(self, arrays: Mapping[str, Numbers]) -> Numbers:
-        """[K, n, u] of T by the unknowns."""
+        """Compute [K, n, u] the derivative of T by the unknowns."""
         number = self.estimator.add_recording(arrays, kinematics_source=3)
         return self.estimator.jacobian(number, self.z, 0, len(arrays["time"]))[2]
 
 
 def friction_parts(data: Mapping[str, Any], arrays: Mapping[str, Numbers]) -> Numbers:
-    """[K, n, m + 3] N·m: what each tendon, the joint's friction, its load friction and its cover make of T.
+    """Compute [K, n, m + 3] the parts of T due to each tendon, joint friction, load friction and cover (N·m).
 
-    arrays: as `native.Finger.run` takes them, with measured angles and speeds.
+    `arrays` are those of `native.Finger.run`, with measured angles and speeds.
     """
     joints, tendons = len(data["joints"]), len(data["tendons"])
     none = [[[0.0] * (tendons + 3)]] * joints

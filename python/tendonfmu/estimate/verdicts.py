@@ -1,4 +1,4 @@
-"""How well a fit knows each number of the description, and what would tell those that it does not."""
+"""How well a fit knows each number of the description, and what would identify the others."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ CAUSES = {
     "side": "never slides to that side",
     "working_point": "never slides near that working point",
     "slow": "never slides as slowly as its Stribeck velocity",
-    "noise": "too little torque beside noise and drift, even with all else known",
-    "combination": "seen, but only in combination with others",
+    "noise": "too little torque compared with noise and drift, even if all else is known",
+    "combination": "visible, but only in combination with others",
 }
-_INSIDE = 1e-6  # of an unknown's size; step of the differences by which z becomes numbers of the description
+_INSIDE = 1e-6  # step of the finite differences of `slopes`, relative to the size of an unknown
 _AT_BOUND = 1e-6
 
 
 class FittedUnknown(Protocol):
-    """What is read of `estimation.Unknown`."""
+    """The attributes of `estimation.Unknown` that are read here."""
 
     @property
     def path(self) -> str: ...
@@ -47,7 +47,7 @@ class FittedUnknown(Protocol):
 
 
 class Estimates(Protocol):
-    """What is read of `estimation.Estimator`."""
+    """The attributes of `estimation.Estimator` that are read here."""
 
     @property
     def unknowns(self) -> Sequence[FittedUnknown]: ...
@@ -56,8 +56,24 @@ class Estimates(Protocol):
 
 @dataclass(frozen=True)
 class Fitted:
-    """One number after a fit. at_bound: "lower", "upper" or None. cause: "" where identified, else a key of `CAUSES`;
-    reason: in words; advice: which motion, load or option would tell it.
+    """One number after a fit.
+
+    Attributes
+    ----------
+    number
+        The number, with its fitted value.
+    start
+        Value before the fit.
+    standard_error
+        Standard error of the value.
+    at_bound
+        "lower", "upper" or None.
+    cause
+        "" if identified, else a key of `CAUSES`.
+    reason
+        The cause in words.
+    advice
+        Motion, load or option that would identify the number.
     """
 
     number: Unknown
@@ -70,18 +86,35 @@ class Fitted:
 
     @property
     def value(self) -> float:
+        """Fitted value in the unit of the description."""
         return self.number.value
 
     @property
     def identified(self) -> bool:
+        """Whether the standard error is at most `identifiability.LIMIT` of the value."""
         return not self.cause
 
 
 @dataclass(frozen=True)
 class Knowledge:
-    """What a fit knows. z: [u]. covariance: [u, u] of z, prior included. information: [u, u] of the data alone.
-    fitted: the description with the values at z. coverage: of the recorded motion. noise: N·m; a bias.initial_torque
-    counts as at least that large.
+    """What a fit knows.
+
+    Attributes
+    ----------
+    estimator
+        Unknowns, and their conversion into numbers of the description.
+    z
+        [u] estimate.
+    covariance
+        [u, u] of z, prior included.
+    information
+        [u, u] of the data alone.
+    fitted
+        Description with the values at z.
+    coverage
+        What the recorded motion covers.
+    noise
+        Torque noise (N·m); a bias.initial_torque counts as at least that large.
     """
 
     estimator: Estimates
@@ -94,9 +127,9 @@ class Knowledge:
 
 
 def slopes(estimator: Estimates, z: Numbers) -> Numbers:
-    """[p, u] derivative of all numbers of the description by the unknowns: the delta method's matrix.
+    """Compute [p, u] the derivatives of all numbers of the description by the unknowns, for the delta method.
 
-    static = coulomb + drop and vs = 1/rate: differences of the map itself, taken inside the bounds.
+    The map is static = coulomb + drop and vs = 1/rate. The derivatives are its finite differences within the bounds.
     """
     base = np.asarray(estimator.values(z))
     columns = []
@@ -110,7 +143,22 @@ def slopes(estimator: Estimates, z: Numbers) -> Numbers:
 
 
 def judge_numbers(structure: Structure, known: Knowledge) -> tuple[list[Fitted], Numbers]:
-    """All estimated numbers in order, and their covariance [p, p]."""
+    """Judge every estimated number.
+
+    Parameters
+    ----------
+    structure
+        What was fitted.
+    known
+        What the fit knows.
+
+    Returns
+    -------
+    numbers : list of Fitted
+        The estimated numbers in order.
+    covariance : ndarray
+        [p, p] of their values.
+    """
     numbers = values_of(structure, known.fitted)
     matrix = slopes(known.estimator, known.z)[[structure.index[number.path] for number in numbers]]
     covariance = matrix @ known.covariance @ matrix.T
@@ -140,7 +188,7 @@ def judge_numbers(structure: Structure, known: Knowledge) -> tuple[list[Fitted],
 
 
 def _size(number: Unknown, noise: float) -> float:
-    """What a standard error is related to: the value; a bias that starts at zero is not known the less."""
+    """Return the size that a standard error is relative to: the value, or for a bias at least the noise."""
     return max(abs(number.value), noise if number.path.startswith("bias.") else 1e-300)
 
 
@@ -155,7 +203,7 @@ def _bound(unknown: FittedUnknown, value: float) -> str | None:
 
 
 def _columns(structure: Structure, estimator: Estimates) -> list[int]:
-    """[numbers] the unknown whose own number it is: of a drop the static friction, of a rate the Stribeck velocity."""
+    """Return [numbers] the unknown of each: for a static friction its drop, for a Stribeck velocity its rate."""
     by_parameter: dict[int, int] = {}
     for column, unknown in enumerate(estimator.unknowns):
         for parameter in unknown.parameters:
@@ -164,7 +212,7 @@ def _columns(structure: Structure, estimator: Estimates) -> list[int]:
 
 
 def _deputies(numbers: Sequence[Unknown], columns: Sequence[int], coverage: Sequence[EffectCoverage]) -> list[int]:
-    """[unknowns] a number that stands for all that share its value, if possible one that the motion visits."""
+    """Return [unknowns] a number that represents all that share its value, if possible one that the motion visits."""
     by_path = {cover.effect.path: cover for cover in coverage}
     first: dict[int, int] = {}
     for k, (number, column) in enumerate(zip(numbers, columns, strict=True)):
@@ -183,7 +231,7 @@ def _verdicts(
     covariance: Numbers,
     size: Numbers,
 ) -> list[Verdict]:
-    """[unknowns] on the deputies' numbers: error from the whole, error_alone with all other numbers known."""
+    """Judge [unknowns] by their deputies: `error` from all numbers, `error_alone` with all others known."""
     own = covariance[np.ix_(deputies, deputies)]
     error = np.sqrt(np.maximum(np.diag(own), 1e-300))
     inverse = np.linalg.inv(matrix[deputies])
@@ -193,11 +241,11 @@ def _verdicts(
     return explain([numbers[k] for k in deputies], error / size[deputies], alone, correlation, known.coverage)
 
 
-# --- what would tell --------------------------------------------------------------------------------------------------
+# --- advice -----------------------------------------------------------------------------------------------------------
 
 
 def _cause(verdict: Verdict, cover: EffectCoverage | None) -> str:
-    """Of `judgement`, with friction that never slides to either side told apart."""
+    """Return the cause of `identifiability`, with a cause of its own for friction that never slides to either side."""
     if cover is not None and verdict.cause == "side" and cover.times.positive + cover.times.negative <= 0:
         return "never_moves"
     return verdict.cause or "combination"
@@ -223,10 +271,10 @@ def _advice(cause: str, verdict: Verdict, cover: EffectCoverage | None, finger: 
 
 
 def _more(verdict: Verdict, cover: EffectCoverage | None) -> str:
-    """What raises a number above the noise: load, or time (errors fall with its root)."""
+    """Name what raises a number above the noise: load, or time, since errors fall with its square root."""
     load = "" if cover is not None and cover.effect.kind == "friction" else "more pretension (tendon force), or "
     if verdict.error_alone >= PRIOR / 2:
-        return f"nothing in these recordings depends on it: {load}leave it out of the description, or --fix it"
+        return f"nothing in these recordings depends on it: {load}remove it from the description, or --fix it"
     longer = (verdict.error_alone / LIMIT) ** 2
     return f"{load}a recording at least {longer:.2g} times as long with the same motion, or less noise"
 
