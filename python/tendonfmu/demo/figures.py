@@ -1,4 +1,4 @@
-"""The figures of the demo's page, for `drawing/panels.py`: torques of the index finger, errors of the other."""
+"""The figures of the demo's page, ready to be drawn: torques of the index finger, errors of the other."""
 
 from __future__ import annotations
 
@@ -115,6 +115,7 @@ def _panel(
         x_limits=SHOWN,
         y_limits=limits,
         height=_HEIGHT,
+        zoom="pushes" if pushes else "free",
     )
 
 
