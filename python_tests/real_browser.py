@@ -71,12 +71,14 @@ addEventListener("load", () => {{
     frame.contentWindow.dispatchEvent(new Event("beforeprint"));
     const root = inside.documentElement, edge = root.clientWidth + 0.5;
     const out = [...inside.body.querySelectorAll("*")].filter(
-      e => !(e.closest(".scroll") && !e.matches(".scroll")) && !e.closest("svg") && e.getBoundingClientRect().right > edge);
+      e => !(e.closest(".scroll") && !e.matches(".scroll")) && !e.closest("svg")
+        && e.getBoundingClientRect().right > edge);
+    const plots = [...inside.querySelectorAll(".plot.drawn")];
     const found = {{
       width: root.clientWidth, scroll: root.scrollWidth, height: root.scrollHeight,
-      drawings: [...inside.querySelectorAll(".plot.drawn .main-svg:first-child")].map(e => e.getBoundingClientRect().width),
-      drawn: [...inside.querySelectorAll(".plot.drawn")].map(e => e.querySelectorAll("path.js-line, path.point, .hm image").length),
-      described: [...inside.querySelectorAll(".plot.drawn[role=img]")].map(e => e.getAttribute("aria-label")),
+      drawings: plots.map(e => e.querySelector(".main-svg").getBoundingClientRect().width),
+      drawn: plots.map(e => e.querySelectorAll("path.js-line, path.point, .hm image").length),
+      described: plots.filter(e => e.getAttribute("role") === "img").map(e => e.getAttribute("aria-label")),
       out: out.map(e => e.outerHTML.slice(0, 80)),
       scrolled: [...inside.querySelectorAll(".scroll")].filter(e => e.scrollWidth > e.clientWidth).length,
       requests: frame.contentWindow.performance.getEntriesByType("resource").map(e => e.name),

@@ -249,7 +249,7 @@ def test_the_page_needs_nothing_from_elsewhere(tmp_path: Path, history: Callable
     page = (tmp_path / "out" / "history.html").read_text("utf-8")
     needs_nothing_else(page)
     (figure,) = figures_of(page)
-    assert [trace["y"] for trace in figure["data"] if trace["mode"] == "markers"][0][0] == 1.3
+    assert next(trace["y"] for trace in figure["data"] if trace["mode"] == "markers")[0] == 1.3
     assert not re.search(r"[\s\"]nan|NaN|inf[\s\"]", page.split("<body>")[1].split("<script")[0])
     text = plain(page)
     assert "1 change in 4 recordings." in text and "grows 9.7 % a week" in text and "1 of 4" in text

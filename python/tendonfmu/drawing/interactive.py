@@ -29,6 +29,7 @@ _DASHES = {"-": "solid", "--": "dash", ":": "dot"}
 _INNER = 0.6  # decades that the linear part of a stretched axis takes on each side of 0
 _APART = 0.15  # of a stretched axis between its numbers
 _HISTOGRAM = 0.16  # of the height of the axes
+_MATRIX = 540  # CSS pixels, height
 _TITLE = 20  # CSS pixels that the title takes, which is a text of the page
 _MOST_POINTS = 2000  # of curves that share their x
 _MOST_CELLS = 400  # rows of a matrix; of more, neighbours are drawn as one
@@ -52,7 +53,7 @@ _TEMPLATE = {
         "margin": {"l": 58, "r": 12, "t": 6, "b": 42},
         "showlegend": False,
         "hovermode": "x unified",
-        "hoverlabel": {"font": {"size": 12}},
+        "hoverlabel": {"bgcolor": "#fff", "font": {"family": _FONT, "size": 12}},
         "xaxis": {**_AXIS, "showgrid": False, "ticklabelposition": "outside"},
         "yaxis": {**_AXIS, "showline": False, "ticks": "", "gridcolor": "#e6e6e6"},
     }
@@ -91,8 +92,8 @@ def dark_colours() -> Markup:
 
 
 def height_in_page(panel: Panel | MatrixPanel) -> int:
-    """CSS pixels, without the title."""
-    return size_of(panel)[1] - _TITLE
+    """CSS pixels, without the title; of a matrix so many that it is about square."""
+    return _MATRIX if isinstance(panel, MatrixPanel) else size_of(panel)[1] - _TITLE
 
 
 def figure_of(panel: Panel | MatrixPanel, names: dict[str, str]) -> Figure:

@@ -14,10 +14,10 @@ BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION = "#0072B2", "#E69F00", "#009E73", "
 DARK, GREY, LIGHT, SKIN = "#222222", "#8A8A8A", "#D5D8DC", "#F4F1EC"
 
 DIVERGING = ("#2166AC", "#6BAED6", "#FFFFFF", "#F4895F", "#B2182B")  # from −1 over 0 to 1
-# on a dark page; the others are told from both
+# on a dark page; the others are seen on both
 IN_DARK = {
     DARK: "#E4E8EC",
-    BLUE: "#58A9E0",
+    BLUE: "#6E95FF",
     GREY: "#A4ABB3",
     VERMILION: "#F0803C",
     GREEN: "#2FC79B",

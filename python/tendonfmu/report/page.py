@@ -67,11 +67,9 @@ def render(template: str, sheets: Iterable[Sheet] = (), **content: Any) -> str:
         figures.setdefault(sheet.section, []).append(_placed(sheet, len(panels)))
         panels += sheet.panels
         names += [dict(sheet.keys)] * len(sheet.panels)
-    if panels:
-        drawn = {"drawn": figures_json(panels, names), "plotly": packed_plotly(), "dark_colours": dark_colours()}
-    else:
-        drawn = {"drawn": ""}
-    return environment.get_template(template).render(figures=figures, **drawn, **content)
+    drawing = {"plotly": packed_plotly(), "dark_colours": dark_colours()} if panels else {}
+    drawn = figures_json(panels, names) if panels else ""
+    return environment.get_template(template).render(figures=figures, drawn=drawn, **drawing, **content)
 
 
 def _placed(sheet: Sheet, first: int) -> PageSheet:
