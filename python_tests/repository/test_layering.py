@@ -43,6 +43,7 @@ ONLY = {
     "tendonfmu._native": "model/native.py",
     "tendonfmu._plant": "simulate/plant.py",
     "tendonfmu._estimation": "estimate/estimation.py",
+    "plotly": "drawing/interactive.py",
     "rich": "cli/console.py",
     "dask": "tasks/jobs.py",
     "distributed": "tasks/jobs.py",

@@ -20,12 +20,13 @@ def find_browser() -> str | None:
 
 
 class Elements(HTMLParser):
-    """Start tags with their attributes, and text without that of the style sheet."""
+    """Start tags with their attributes, and text without that of style sheets and scripts."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
         self.tags: list[tuple[str, dict[str, str | None]]] = []
         self.words: list[str] = []
+        self.scripts: list[str] = []
         self._inside = ""
         self.feed(text)
 
@@ -34,8 +35,13 @@ class Elements(HTMLParser):
         self._inside = tag
 
     def handle_data(self, data: str) -> None:
-        if self._inside != "style":
+        if self._inside == "script":
+            self.scripts.append(data)
+        elif self._inside != "style":
             self.words.append(data)
+
+    def handle_endtag(self, tag: str) -> None:
+        self._inside = ""
 
     def all(self, tag: str) -> list[dict[str, str | None]]:
         return [attributes for name, attributes in self.tags if name == tag]
@@ -43,7 +49,13 @@ class Elements(HTMLParser):
 
 def visit(browser: str, file: Path, *options: str) -> subprocess.CompletedProcess[str]:
     words = [browser, "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--hide-scrollbars"]
-    words += ["--enable-logging=stderr", f"--user-data-dir={file.parent / 'profile'}", *options, file.as_uri()]
+    words += [
+        "--virtual-time-budget=60000",
+        "--enable-logging=stderr",
+        f"--user-data-dir={file.parent / 'profile'}",
+        *options,
+        file.as_uri(),
+    ]
     return subprocess.run(words, capture_output=True, text=True, check=True, timeout=180)
 
 
@@ -51,25 +63,52 @@ FRAME = """<!DOCTYPE html><meta charset="utf-8"><body style="margin:0">
 <iframe id="f" style="border:0;width:{width}px;height:2400px"
 srcdoc="{page}"></iframe><script>
 addEventListener("load", () => {{
-  const inside = document.getElementById("f").contentDocument;
-  if ({measure}) {{
+  const frame = document.getElementById("f"), inside = frame.contentDocument;
+  const measure = () => {{
+    if (inside.getElementById("plotly") && !frame.contentWindow.Plotly) return;
+    clearInterval(waiting);
     for (const each of inside.querySelectorAll("details")) each.open = true;
+    frame.contentWindow.dispatchEvent(new Event("beforeprint"));
     const root = inside.documentElement, edge = root.clientWidth + 0.5;
     const out = [...inside.body.querySelectorAll("*")].filter(
-      e => !(e.closest(".scroll") && !e.matches(".scroll")) && e.getBoundingClientRect().right > edge);
+      e => !(e.closest(".scroll") && !e.matches(".scroll")) && !e.closest("svg")
+        && e.getBoundingClientRect().right > edge);
+    const plots = [...inside.querySelectorAll(".plot.drawn")];
     const found = {{
       width: root.clientWidth, scroll: root.scrollWidth, height: root.scrollHeight,
-      images: [...inside.images].map(image => [image.naturalWidth, image.width]),
-      drawings: [...inside.querySelectorAll("svg.panel")].map(drawing => drawing.getBoundingClientRect().width),
+      drawings: plots.map(e => e.querySelector(".main-svg").getBoundingClientRect().width),
+      drawn: plots.map(e => e.querySelectorAll("path.js-line, path.point, .hm image").length),
+      described: plots.filter(e => e.getAttribute("role") === "img").map(e => e.getAttribute("aria-label")),
       out: out.map(e => e.outerHTML.slice(0, 80)),
       scrolled: [...inside.querySelectorAll(".scroll")].filter(e => e.scrollWidth > e.clientWidth).length,
-      requests: document.getElementById("f").contentWindow.performance.getEntriesByType("resource").map(e => e.name),
+      requests: frame.contentWindow.performance.getEntriesByType("resource").map(e => e.name),
       font: parseFloat(getComputedStyle(inside.body).fontSize),
     }};
     document.body.textContent = "MEASURED" + JSON.stringify(found) + "END";
-  }}
+  }};
+  const waiting = {measure} ? setInterval(measure, 100) : 0;
 }});
 </script></body>"""
+
+
+def figures_of(page: str) -> list[dict[str, Any]]:
+    """The figures that a page draws, as Plotly has them, in its order."""
+    found = re.search(r'id="panels">(.*?)</script>', page)
+    figures: list[dict[str, Any]] = [] if found is None else json.loads(found[1])["figures"]
+    return figures
+
+
+def needs_nothing_else(page: str) -> None:
+    """No file or address but those in it; the three scripts are the figures, packed plotly.js, and what draws them."""
+    elements = Elements(page)
+    assert not {name for name, _ in elements.tags} & {"iframe", "object", "embed", "base", "form"}
+    assert [each.get("id") for each in elements.all("script")] in ([], ["panels", "plotly", None])
+    for tag, attributes in elements.tags:
+        assert not [name for name in attributes if name.startswith("on")], tag
+        for name in ("src", "href"):
+            address = attributes.get(name)
+            assert address is None or not re.match(r"[a-z]+:(?!,)", address), (tag, address)
+    assert not re.search(r"url\(|@import|https?://", page)
 
 
 def framed(folder: Path, page: str, width: int, measure: bool) -> Path:

@@ -23,7 +23,7 @@ from tendonfmu.calibrate.text import (
 from tendonfmu.estimate import description_text
 from tendonfmu.files import check_output, check_output_folder, write_text
 from tendonfmu.fmu import build_fmu
-from tendonfmu.report import fit_page
+from tendonfmu.report import render
 
 FINGER, FMU, PAGE, REPORT = "finger.json", "finger.fmu", "calibration.html", "calibration.json"
 _WHAT = {
@@ -90,12 +90,12 @@ def write_calibration(found: Calibration, folder: Path) -> dict[Path, str]:
 def calibration_page(report: Mapping[str, Any]) -> str:
     """Return the HTML text of the page."""
     tone, sentence = verdict(report)
-    return fit_page.render(
+    return render(
         "calibration.html.jinja",
         report=report,
         tone=tone,
         verdict=sentence,
-        tiles=list(tiles(report)),
+        headline_numbers=list(tiles(report)),
         errors=error_rows(report),
         causes=cause_rows(report),
         torques=torque_rows(report),

@@ -1,7 +1,4 @@
-"""The figures of the demo's page: torques of the index finger, errors of the two-joint finger.
-
-They are drawn by `drawing/panels.py`.
-"""
+"""The figures of the demo's page: torques of the index finger, errors of the two-joint finger."""
 
 from __future__ import annotations
 
@@ -118,6 +115,7 @@ def _panel(
         x_limits=SHOWN,
         y_limits=limits,
         height=_HEIGHT,
+        zoom="pushes" if pushes else "free",
     )
 
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
+
+from markupsafe import Markup
 
 from tendonfmu.calibrate import DIAGNOSIS
 from tendonfmu.calibrate import PAGE as CALIBRATION_PAGE
@@ -10,22 +13,21 @@ from tendonfmu.calibrate import text as calibration_text
 from tendonfmu.demo.demo import CALIBRATION, FIT, TRAINING, TWO_JOINTS, UNSEEN, Story
 from tendonfmu.demo.figures import story_sheets
 from tendonfmu.demo.run import FLEXION, FREE, FREE_X4, MINUTES, PUSHES
-from tendonfmu.demo.text import alarms, chapter_tables, detection_sentence, fit_sentence
+from tendonfmu.demo.text import Table, alarms, chapter_tables, detection_sentence, fit_sentence
 from tendonfmu.diagnose import Diagnosis
 from tendonfmu.files import whole_file
 from tendonfmu.report import (
-    PageFigure,
     Tile,
     at_place,
     cards_of,
     diagnosis_page,
+    diagnosis_sheets,
     diagnosis_text,
-    draw_sheet,
-    drawn_sheets,
     error_sentence,
     fit_page,
     left_sentence,
     names_of,
+    render,
     residual_tables,
     rounded,
     unit_of,
@@ -44,31 +46,43 @@ def write_story(story: Story) -> None:
         A story whose chapters have all run.
     """
     file = story.folder / PAGE
-    text = story_page(story, [draw_sheet(sheet) for sheet in story_sheets(story)])
+    text = story_page(story)
     with whole_file(file) as partial:
         partial.write_text(text, encoding="utf-8")
     story.add_page(file)
 
 
-def story_page(story: Story, figures: list[PageFigure]) -> str:
+def story_page(story: Story) -> str:
     """Return the HTML text of the page."""
-    by_section: dict[str, list[PageFigure]] = {}
-    for figure in figures:
-        by_section.setdefault(figure.sheet.section, []).append(figure)
-    return fit_page.render(
+    evidence = [] if story.missing else [each for each in diagnosis_sheets(story.diagnosis) if each.section != "views"]
+    return render(
         "story.html.jinja",
+        [*story_sheets(story), *evidence],
         chapters=story.chapters,
         tiles=[(each.name, _tile(story, each.name)) for each in story.chapters],
-        tables={each.name: list(chapter_tables(story, each.name)) for each in story.chapters},
-        figures=by_section,
+        tables={each.name: [_readable(table) for table in chapter_tables(story, each.name)] for each in story.chapters},
         calibrate=None if story.missing else _calibrate(story),
         detect=_detect(story),
         diagnosis=None if story.missing else _diagnosis(story),
         fit=None if story.missing else {"sentence": fit_sentence(story), "page": f"{FIT}/{fit_page.PAGE}"},
         run=_run(story),
         missing=story.missing,
-        files=[(path.relative_to(story.folder).as_posix(), what) for path, what in story.files.items()],
+        files=[(_link(path.relative_to(story.folder).as_posix()), what) for path, what in story.files.items()],
     )
+
+
+def _readable(table: Table) -> Table:
+    """Names without underscores."""
+    title, headings, rows = table
+
+    def spaced(cells: Sequence[str]) -> tuple[str, ...]:
+        return tuple(each.replace("_", " ") for each in cells)
+
+    return title.replace("_", " "), spaced(headings), [spaced(row) for row in rows]
+
+
+def _link(name: str) -> Markup:
+    return Markup('<a href="{0}">{0}</a>').format(name)
 
 
 def _tile(story: Story, chapter: str) -> Tile:
@@ -151,7 +165,6 @@ def _diagnosis(story: Story) -> dict[str, Any]:
         "left": left_sentence(found),
         "fall": waterfall_of(found, names),
         "cards": cards_of(found, names),
-        "figures": drawn_sheets(found),
         "tested": found.tested,
         "page": f"{CALIBRATION}/{DIAGNOSIS}/{diagnosis_page.PAGE}",
     }

@@ -1,5 +1,9 @@
 from .finger_picture import EDGE_RED as EDGE_RED
 from .finger_picture import draw_finger as draw_finger
+from .interactive import dark_colours as dark_colours
+from .interactive import figures_json as figures_json
+from .interactive import height_in_page as height_in_page
+from .interactive import packed_plotly as packed_plotly
 from .panel_data import Band as Band
 from .panel_data import Bars as Bars
 from .panel_data import Curve as Curve
@@ -21,9 +25,7 @@ from .panel_styles import STYLES as STYLES
 from .panel_styles import VERMILION as VERMILION
 from .panel_styles import size_of as size_of
 from .panels import draw_panel as draw_panel
-from .panels import png as png
 from .panels import write_sheet as write_sheet
 from .plot_style import Target as Target
 from .plot_style import clean as clean
 from .plot_style import save as save
-from .svg import panel_svg as panel_svg

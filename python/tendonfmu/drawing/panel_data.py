@@ -1,7 +1,7 @@
-"""What the figures of a fit consist of: sheets of panels, ready to be drawn by `panels.py`.
+"""What figures consist of: sheets of panels, ready to be drawn.
 
-A panel is drawn once and used twice: alone in the page, where panels flow into as many columns as there is room for,
-and beside its neighbours in the sheet's PNG file.
+`interactive.py` draws a panel alone in a page, where panels flow into as many columns as there is room for; `panels.py`
+draws it beside its neighbours in the sheet's PNG file.
 """
 
 from __future__ import annotations
@@ -64,7 +64,8 @@ class Panel:
     stripes: shaded along x, in `stripe_style`. ticks: places and names along x. data: where samples are, bin edges
     [k + 1] and heights [k] from 0 to 1, along the bottom. rows: names of y = 0, 1, ... from the top; none: y is a
     number. line: a marked x. log_x, log_y: logarithmic. near_x: to either side of 0 up to here x is linear, beyond it
-    logarithmic; 0: linear. height: CSS pixels, 0: the size's.
+    logarithmic; 0: linear. height: CSS pixels, 0: the size's. zoom: panels of a page with the same word here are zoomed
+    together along x; "": by itself.
     """
 
     title: str
@@ -89,6 +90,7 @@ class Panel:
     rows: tuple[str, ...] = ()
     line: float | None = None
     height: int = 0
+    zoom: str = ""
 
 
 @dataclass(frozen=True)
@@ -96,6 +98,7 @@ class MatrixPanel:
     """A matrix of numbers from −1 to 1, [p, p]. groups: name, and the rows (from, to) that it spans, in order.
 
     marked: [k, 2] rows and columns of entries that are drawn larger than they are, where all are too small to be seen.
+    names: of the rows, [p], no two alike.
     """
 
     title: str
@@ -103,6 +106,7 @@ class MatrixPanel:
     matrix: Numbers
     groups: tuple[tuple[str, int, int], ...]
     marked: NDArray[np.intp]
+    names: tuple[str, ...]
     size: Size = "large"
 
 

@@ -13,6 +13,17 @@ from tendonfmu.drawing.panel_data import MatrixPanel, Panel
 BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION = "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00"
 DARK, GREY, LIGHT, SKIN = "#222222", "#8A8A8A", "#D5D8DC", "#F4F1EC"
 
+DIVERGING = ("#2166AC", "#6BAED6", "#FFFFFF", "#F4895F", "#B2182B")  # from −1 over 0 to 1
+# on a dark page; the others are seen on both
+IN_DARK = {
+    DARK: "#E4E8EC",
+    BLUE: "#6E95FF",
+    GREY: "#A4ABB3",
+    VERMILION: "#F0803C",
+    GREEN: "#2FC79B",
+    "#BDBDBD": "#7C858E",
+}
+
 SIZES = {"small": (370, 250), "medium": (560, 250), "large": (560, 400)}  # CSS pixels
 
 

@@ -22,7 +22,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
 from tendonfmu.drawing.panel_data import MatrixPanel, Panel, Sheet
-from tendonfmu.drawing.panel_styles import SIZES, STYLES, Style, size_of
+from tendonfmu.drawing.panel_styles import DIVERGING, SIZES, STYLES, Style, size_of
 from tendonfmu.drawing.plot_style import DARK, GREY, LIGHT, any_names, clean
 from tendonfmu.files import whole_file
 
@@ -36,7 +36,7 @@ _TITLE, _LABEL, _NUMBER = 10.0, 8.8, 8.4  # pt
 _WIDER = 1.12  # text of panels that narrow screens shrink
 
 
-_DIVERGING = LinearSegmentedColormap.from_list("diverging", ["#2166AC", "#6BAED6", "#FFFFFF", "#F4895F", "#B2182B"])
+_DIVERGING = LinearSegmentedColormap.from_list("diverging", DIVERGING)
 
 
 def draw_panel(panel: Panel | MatrixPanel) -> Pixels:

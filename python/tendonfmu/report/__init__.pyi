@@ -8,11 +8,10 @@ from . import score_files as score_files
 from . import score_text as score_text
 from . import tune_files as tune_files
 from . import tune_text as tune_text
+from .diagnosis_figures import diagnosis_sheets as diagnosis_sheets
 from .diagnosis_files import check_folder as check_folder
 from .diagnosis_files import write_diagnosis as write_diagnosis
-from .diagnosis_page import Tile as Tile
 from .diagnosis_page import cards_of as cards_of
-from .diagnosis_page import drawn_sheets as drawn_sheets
 from .diagnosis_text import Names as Names
 from .diagnosis_text import at_place as at_place
 from .diagnosis_text import confusion_sentence as confusion_sentence
@@ -27,11 +26,11 @@ from .figure_data import StoryFigure as StoryFigure
 from .figure_data import compensation_figure as compensation_figure
 from .fit_figures import torque_sheets as torque_sheets
 from .fit_law_figures import law_sheets as law_sheets
-from .fit_page import PageFigure as PageFigure
-from .fit_page import draw_sheet as draw_sheet
 from .fit_page import write_fit_page as write_fit_page
 from .fit_summary import ResidualTable as ResidualTable
 from .fit_summary import residual_tables as residual_tables
 from .fit_summary import rounded as rounded
 from .history_files import write_history as write_history
+from .page import Tile as Tile
+from .page import render as render
 from .plots import draw_story as draw_story

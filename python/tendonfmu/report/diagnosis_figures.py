@@ -195,7 +195,7 @@ def _view_panel(
         curves = (Curve("start", view.x, np.zeros_like(view.x)), *_curves(view, 1.0))
         return replace(panel, y_label="", curves=curves, y_limits=(min(-0.25, 1.1 * _least(view)), 1.05))
     if view.kind not in _BINNED:
-        return replace(panel, curves=_curves(view, factor))
+        return replace(panel, curves=_curves(view, factor), zoom=view.kind if view.kind == "time" else "")
     bands: tuple[Band, ...] = ()
     if view.before_std is not None:
         low, high = view.before - view.before_std, view.before + view.before_std

@@ -1,16 +1,10 @@
-"""The page of a diagnosis: one HTML file with its figures in it that needs nothing else.
-
-Without scripts and without anything from elsewhere; every text is escaped.
-"""
+"""The page of a diagnosis."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-from markupsafe import Markup
 
 from tendonfmu.diagnose import (
     CONTACT,
@@ -23,7 +17,6 @@ from tendonfmu.diagnose import (
     size_at,
     thresholds,
 )
-from tendonfmu.drawing import Panel, Sheet, panel_svg
 from tendonfmu.files import whole_file
 from tendonfmu.report.diagnosis_figures import diagnosis_sheets
 from tendonfmu.report.diagnosis_text import (
@@ -53,32 +46,13 @@ from tendonfmu.report.diagnosis_text import (
 )
 from tendonfmu.report.diagnosis_waterfall import waterfall_of
 from tendonfmu.report.diagnosis_words import words_of
-from tendonfmu.report.fit_page import keys_of, render
 from tendonfmu.report.fit_summary import rounded
+from tendonfmu.report.page import Tile, render
 
 PAGE = "diagnosis.html"
 _MOST = 4  # pairs that are listed
 _LONG = 90  # letters of a size that is a sentence
 _TONES = {"adequate": "good", "explained": "good", "partly explained": "", "unexplained": "bad"}
-
-
-@dataclass(frozen=True)
-class Tile:
-    """A figure that matters, and what it is."""
-
-    value: str
-    unit: str
-    meaning: str
-
-
-@dataclass(frozen=True)
-class DrawnSheet:
-    """A sheet as the page shows it. keys: (CSS class, CSS colour, opacity, meaning). size: of its panels."""
-
-    sheet: Sheet
-    keys: list[tuple[str, str, float, str]]
-    size: str
-    drawings: list[Markup]
 
 
 def write_diagnosis_page(found: Diagnosis, folder: Path) -> dict[Path, str]:
@@ -98,6 +72,7 @@ def diagnosis_page(found: Diagnosis) -> str:
     names, (factor, unit) = names_of(found), unit_of(found)
     return render(
         "diagnosis.html.jinja",
+        diagnosis_sheets(found),
         found=found,
         words=words_of(found.kind),
         unit=unit,
@@ -113,22 +88,7 @@ def diagnosis_page(found: Diagnosis) -> str:
             (each.title, names.place(each.where) or "everywhere", percent(each.surviving_share), each.experiment)
             for each in found.invisible
         ],
-        figures=drawn_sheets(found),
-    )
-
-
-def drawn_sheets(found: Diagnosis) -> dict[str, list[DrawnSheet]]:
-    """Section -> its figures: "cause_1" and so on, and "views"."""
-    figures: dict[str, list[DrawnSheet]] = {}
-    for sheet in diagnosis_sheets(found):
-        figures.setdefault(sheet.section, []).append(_drawn(sheet))
-    return figures
-
-
-def _drawn(sheet: Sheet) -> DrawnSheet:
-    panels = [panel for panel in sheet.panels if isinstance(panel, Panel)]
-    return DrawnSheet(
-        sheet, keys_of(sheet), panels[0].size if panels else "small", [panel_svg(each) for each in panels]
+        recordings=list(_recordings(found)),
     )
 
 
@@ -252,16 +212,17 @@ def _errors(found: Diagnosis, names: Names, factor: float) -> list[dict[str, Any
     return rows
 
 
-def _events(found: Diagnosis, names: Names, factor: float) -> list[dict[str, str]]:
+def _events(found: Diagnosis, names: Names, factor: float) -> list[tuple[str, ...]]:
+    """(recording, from, to, joints, peak, what)."""
     return [
-        {
-            "recording": event.recording,
-            "start": f"{event.start:.2f}",
-            "end": f"{event.end:.2f}",
-            "joints": ", ".join(names.joint(joint) for joint in event.joints),
-            "peak": rounded(factor * event.peak),
-            "description": event.description,
-        }
+        (
+            event.recording,
+            f"{event.start:.2f}",
+            f"{event.end:.2f}",
+            ", ".join(names.joint(joint) for joint in event.joints),
+            rounded(factor * event.peak),
+            event.description,
+        )
         for event in found.events
     ]
 
@@ -282,6 +243,15 @@ def _detection(found: DetectionGain, factor: float, unit: str) -> dict[str, Any]
             (f"thresholds ({unit})", levels(found.thresholds_before), levels(found.thresholds_after)),
         ],
     }
+
+
+def _recordings(found: Diagnosis) -> Iterator[tuple[str, str]]:
+    """(name, what it was used for)."""
+    now = "now, " if found.kind == "change" else ""
+    training = "training, parts held out" if found.held_out else "training"
+    yield from ((name, "reference") for name in found.references)
+    yield from ((name, now + training) for name in found.recordings)
+    yield from ((name, "test") for name in found.tests)
 
 
 def _method(found: Diagnosis) -> Iterator[str]:

@@ -153,6 +153,7 @@ def correlation_sheet(picture: FitPicture) -> Sheet:
         matrix=matrix,
         groups=groups,
         marked=_marked(matrix),
+        names=tuple(unknown_name(picture.unknowns[k].path, picture.unknowns[k].role) for k in order),
     )
     return Sheet(
         section="correlation",

@@ -1,4 +1,4 @@
-"""The figures of a fit, computed for `drawing/panels.py`: torque and modelled friction over time (figs. 6 and 7 of the
+"""The figures of a fit, ready to be drawn: torque and modelled friction over time (figs. 6 and 7 of the
 paper), and the residual over time, angle and velocity.
 
 The friction laws are in `fit_law_figures.py`, what comes of the covariance in `fit_error_figures.py`.
@@ -77,11 +77,12 @@ def torque_sheets(picture: FitPicture) -> Iterator[Sheet]:
         begin, end = float(series.time[shown][0]), float(series.time[shown][-1])
         if number == 1:
             first = begin - float(series.time[0])
-        joints = picture.joint_names
-        panels = [_torque_panel(series, shown, j, name, torque_unit([series])) for j, name in enumerate(joints)]
+        joints, name = picture.joint_names, f"torque_{number}"
+        scale = torque_unit([series])
+        panels = [_torque_panel(series, shown, j, joint, scale, name) for j, joint in enumerate(joints)]
         yield Sheet(
             section="torque",
-            name=f"torque_{number}",
+            name=name,
             title=f"{part}: {series.label}, {begin:.0f} to {end:.0f} s",
             caption=f"Mean tendon force {series.mean_force:.3g} N." + (explanation if number == 1 else ""),
             keys=_TORQUE_KEYS,
@@ -116,7 +117,7 @@ def _window(time: Numbers, where: Flags, first: float) -> NDArray[np.bool_]:
     return np.asarray((time >= begin) & (time <= min(end, begin + SHOWN)))
 
 
-def _torque_panel(series: FitSeries, shown: Flags, j: int, name: str, scale: tuple[float, str]) -> Panel:
+def _torque_panel(series: FitSeries, shown: Flags, j: int, name: str, scale: tuple[float, str], zoom: str) -> Panel:
     factor, unit = scale
     time, torque, residual = series.time[shown], series.torque[shown, j], series.residual[shown, j]
     predicted = torque - residual
@@ -138,6 +139,7 @@ def _torque_panel(series: FitSeries, shown: Flags, j: int, name: str, scale: tup
             for style, values in (("measured", torque), ("bias", bias), ("predicted", predicted))
         ),
         x_limits=(float(time[0]), float(time[-1])),
+        zoom=zoom,
     )
 
 
@@ -166,11 +168,14 @@ def residual_sheets(picture: FitPicture) -> Iterator[Sheet]:
 
 def _residual_sheet(picture: FitPicture, series: Sequence[FitSeries], title: str, number: int) -> Sheet:
     scale = torque_unit(series)
-    panels = [panel for j, name in enumerate(picture.joint_names) for panel in _residual_panels(series, j, name, scale)]
+    zoom = f"residual_{number}"
+    panels = [
+        panel for j, name in enumerate(picture.joint_names) for panel in _residual_panels(series, j, name, scale, zoom)
+    ]
     held_out = any(each.held_out is not None for each in series)
     return Sheet(
         section="residual",
-        name=f"residual_{number}",
+        name=zoom,
         title=title,
         caption=_RESIDUAL_CAPTION if number == 1 else "",
         keys=_RESIDUAL_KEYS if held_out else _RESIDUAL_KEYS[:2],
@@ -178,7 +183,9 @@ def _residual_sheet(picture: FitPicture, series: Sequence[FitSeries], title: str
     )
 
 
-def _residual_panels(series: Sequence[FitSeries], j: int, name: str, scale: tuple[float, str]) -> Iterator[Panel]:
+def _residual_panels(
+    series: Sequence[FitSeries], j: int, name: str, scale: tuple[float, str], zoom: str
+) -> Iterator[Panel]:
     factor, unit = scale
     residual = factor * np.concatenate([each.residual[:, j] for each in series])
     judged = np.isfinite(residual) & np.concatenate([_judged(each) for each in series])  # NaN: no kinematics there
@@ -206,6 +213,7 @@ def _residual_panels(series: Sequence[FitSeries], j: int, name: str, scale: tupl
             curves=(Curve("median", centre, middle),),
             stripes=tuple(stripes) if even else (),
             y_limits=(-limit, limit) if limit > 0 else None,
+            zoom=zoom if even else "",
         )
 
 

@@ -1,46 +1,33 @@
-"""The page of a fit: its figures as PNG files, and one HTML file with all of them in it that needs nothing else.
-
-Without scripts and without anything from elsewhere; every text is escaped.
-"""
+"""The page of a fit, and its figures as PNG files beside it."""
 
 from __future__ import annotations
 
-import base64
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from tendonfmu.drawing import STYLES, MatrixPanel, Sheet, size_of
+from tendonfmu.drawing import Sheet
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import FitPicture
 from tendonfmu.files import whole_file
 from tendonfmu.report.fit_error_figures import strongest_pairs
 from tendonfmu.report.fit_figures import fit_sheets
-from tendonfmu.report.fit_summary import Summary, rounded, summarise
+from tendonfmu.report.fit_summary import (
+    NumberGroup,
+    ResidualTable,
+    Summary,
+    Told,
+    UncertaintyRow,
+    rounded,
+    summarise,
+)
+from tendonfmu.report.page import render
 
 PAGE = "report.html"
 PAIRS = 20  # most strongly correlated, in a table
 
-
-@dataclass(frozen=True)
-class EmbeddedImage:
-    """A panel as the page shows it. source: data URI. width, height: CSS pixels."""
-
-    source: str
-    alt: str
-    width: int
-    height: int
-
-
-@dataclass(frozen=True)
-class PageFigure:
-    """A sheet as the page shows it. keys: (CSS class, CSS colour, opacity, meaning)."""
-
-    sheet: Sheet
-    size: str
-    keys: list[tuple[str, str, float, str]]
-    images: list[EmbeddedImage]
+Cells = tuple[str, ...]
+Entry = Mapping[str, Any]
 
 
 def write_fit_page(picture: FitPicture, folder: Path) -> dict[Path, str]:
@@ -48,70 +35,104 @@ def write_fit_page(picture: FitPicture, folder: Path) -> dict[Path, str]:
 
     Returns file -> what is in it. Files appear whole or not at all. Raises InputError where they cannot be written.
     """
+    from tendonfmu.drawing import draw_panel, write_sheet
+
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{folder}: cannot be made ({error.strerror})") from None
-    figures, written = [], {}
-    for sheet in fit_sheets(picture):
+    sheets, written = fit_sheets(picture), {}
+    for sheet in sheets:
         file = folder / f"{sheet.name}.png"
-        figures.append(draw_sheet(sheet, file))
+        write_sheet(sheet, [draw_panel(panel) for panel in sheet.panels], file)
         written[file] = sheet.title
     page = folder / PAGE
-    text = fit_page(picture, summarise(picture), figures)
+    text = fit_page(picture, summarise(picture), sheets)
     with whole_file(page) as partial:
         partial.write_text(text, encoding="utf-8")
     return {page: "all of it, to be read in a browser"} | written
 
 
-def draw_sheet(sheet: Sheet, file: Path | None = None) -> PageFigure:
-    """Its panels as the page shows them; with a file, the sheet is written there as PNG too."""
-    from tendonfmu.drawing import draw_panel, png, write_sheet
-
-    pixels = [draw_panel(panel) for panel in sheet.panels]
-    if file is not None:
-        write_sheet(sheet, pixels, file)
-    images = []
-    for panel, drawn in zip(sheet.panels, pixels, strict=True):
-        data = base64.b64encode(png(drawn, exact=isinstance(panel, MatrixPanel))).decode("ascii")
-        images.append(EmbeddedImage(f"data:image/png;base64,{data}", panel.alt, *size_of(panel)))
-    return PageFigure(sheet, sheet.panels[0].size, keys_of(sheet), images)
-
-
-def keys_of(sheet: Sheet) -> list[tuple[str, str, float, str]]:
-    """(CSS class, CSS colour, opacity, meaning) of what is drawn."""
-    return [(STYLES[style].shape, STYLES[style].colour, STYLES[style].alpha, meaning) for style, meaning in sheet.keys]
-
-
-def fit_page(picture: FitPicture, summary: Summary, figures: list[PageFigure]) -> str:
+def fit_page(picture: FitPicture, summary: Summary, sheets: Sequence[Sheet]) -> str:
     """HTML text of the page."""
-    by_section: dict[str, list[PageFigure]] = {}
-    for figure in figures:
-        by_section.setdefault(figure.sheet.section, []).append(figure)
+    pairs = [
+        (f"{each.correlation:+.3f}".replace("-", "−"), each.first, each.second)
+        for each in strongest_pairs(picture, PAIRS)
+    ]
     return render(
-        "fit_report.html.jinja",
+        "fit.html.jinja",
+        sheets,
         report=picture.report,
         joint_names=picture.joint_names,
         summary=summary,
-        figures=by_section,
-        pairs=strongest_pairs(picture, PAIRS),
+        residuals=[_residuals(each) for each in summary.residuals],
+        uncertainty=[tuple(_uncertainty(row)) for row in summary.uncertainty],
+        doubts=[(each.reason, [_doubtful(entry) for entry in each.numbers]) for each in summary.doubts],
+        pairs=pairs,
+        recordings=[_recording(each) for each in picture.report["recordings"]],
         options=_options(picture.report),
+        groups=[_group(each) for each in summary.groups],
     )
 
 
-def render(template: str, **content: Any) -> str:
-    """A template of the package with its content, every text escaped."""
-    import jinja2
+# --- tables -----------------------------------------------------------------------------------------------------------
 
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("tendonfmu"),
-        undefined=jinja2.StrictUndefined,
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {"number": _number, "rounded": rounded, "unit": _unit}
-    return environment.get_template(template).render(**content)
+
+def _residuals(table: ResidualTable) -> dict[str, Any]:
+    """(name, torque, fitted, left, before the fit, bias alone, friction alone)."""
+
+    def cells(values: Sequence[float | None]) -> Iterator[str]:
+        return (rounded(value) for value in values)
+
+    rows = [
+        (
+            row.name,
+            *cells((row.torque, row.fitted)),
+            "" if row.left is None else f"{rounded(100 * row.left, 2)} %",
+            *cells((row.start, row.bias_only, row.model_only)),
+        )
+        for row in table.rows
+    ]
+    return {"title": f"{table.title}: rms in {table.unit}", "rows": rows}
+
+
+def _uncertainty(row: UncertaintyRow) -> Iterator[str]:
+    yield from (row.joint, _number(row.inflation), str(row.directions), f"{rounded(100 * row.captured, 2)} %")
+    for told in row.sets:
+        known = told or Told(float("nan"), None, None)
+        yield rounded(known.std)
+        yield from ("–" if each is None else f"{rounded(100 * each, 2)} %" for each in (known.error, known.worst))
+
+
+def _doubtful(entry: Entry) -> Cells:
+    return entry["path"], *_value(entry), _unit(entry["unit"]), entry["advice"] or ""
+
+
+def _group(group: NumberGroup) -> dict[str, Any]:
+    """(number, start, fitted, standard error, unit, identified)."""
+    return {
+        "name": group.name,
+        "identified": group.identified,
+        "doubtful": [not entry["identified"] for _, entry in group.numbers],
+        "rows": [
+            (path, _number(entry["start"], 4), *_value(entry), _unit(entry["unit"]), _identified(entry))
+            for path, entry in group.numbers
+        ],
+    }
+
+
+def _value(entry: Entry) -> tuple[str, str]:
+    return _number(entry["value"], 4), _number(entry["standard_error"], 2)
+
+
+def _identified(entry: Entry) -> str:
+    bound = f", at its {entry['at_bound']} bound" if entry["at_bound"] else ""
+    return ("yes" if entry["identified"] else "no") + bound
+
+
+def _recording(each: Entry) -> Cells:
+    counts = (str(each[key]) for key in ("samples", "used", "held_out", "contact_left_out"))
+    return each["path"], _number(each["duration"], 4), *counts, _number(each["mean_force"]), str(each["kinematics"])
 
 
 def _options(report: Mapping[str, Any]) -> dict[str, str]:

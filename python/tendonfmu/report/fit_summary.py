@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from tendonfmu.estimate import FitPicture, identifiability, verdicts
+from tendonfmu.report.page import Tile
 
 _METHODS = {
     "batch": "Maximum likelihood over all samples at once (batch)",
@@ -19,14 +20,6 @@ _METHODS = {
 _LIMIT = f"{100 * identifiability.LIMIT:.0f}\u00a0%"
 _COMPARED = "Not trained on: "
 _GROUP = re.compile(r"(joints|tendons)\[(\d+)\]\.?(.*)")
-
-
-@dataclass(frozen=True)
-class Tile:
-    """A figure that matters, and what it is."""
-
-    value: str
-    meaning: str
 
 
 @dataclass(frozen=True)
@@ -266,15 +259,17 @@ def _known(report: Mapping[str, Any]) -> str:
 def _tiles(report: Mapping[str, Any], tables: Sequence[ResidualTable]) -> list[Tile]:
     few, many = _apart(tables)
     tiles = [
-        Tile(_percent(table.all.left), f"of the torque is left: {table.title[0].lower() + table.title[1:]}")
+        Tile(_percent(table.all.left), "", f"of the torque is left: {table.title[0].lower() + table.title[1:]}")
         for table in few
         if table.all.left is not None
     ]
     if many:
-        tiles.append(Tile(_range(many), f"of the torque is left in {len(many)} recordings not trained on"))
+        tiles.append(Tile(_range(many), "", f"of the torque is left in {len(many)} recordings not trained on"))
     if tables and tables[0].all.bias_only is not None and tables[0].all.torque:
-        tiles.append(Tile(_percent(tables[0].all.bias_only / tables[0].all.torque), "would be left by the bias alone"))
-    return [*tiles, Tile(f"{report['identified']['count']}/{report['identified']['of']}", "numbers identified")]
+        tiles.append(
+            Tile(_percent(tables[0].all.bias_only / tables[0].all.torque), "", "would be left by the bias alone")
+        )
+    return [*tiles, Tile(f"{report['identified']['count']}/{report['identified']['of']}", "", "numbers identified")]
 
 
 def _consistency(picture: FitPicture) -> list[str]:

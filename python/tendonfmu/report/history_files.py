@@ -7,12 +7,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from tendonfmu.diagnose import History
-from tendonfmu.drawing import Panel, Sheet, draw_panel, panel_svg, write_sheet
+from tendonfmu.drawing import Sheet, draw_panel, write_sheet
 from tendonfmu.files import whole_file
 from tendonfmu.report.diagnosis_text import Names
-from tendonfmu.report.fit_page import keys_of, render
 from tendonfmu.report.history_figures import history_sheet
 from tendonfmu.report.history_text import columns_of, headline, rows_of_lines, trend_sentence
+from tendonfmu.report.page import render
 
 TABLE, PICTURE, PAGE = "history.csv", "history.png", "history.html"
 
@@ -31,8 +31,7 @@ def write_history(found: History, names: Names, folder: Path) -> dict[Path, str]
         writer.writerows(zip(*columns.values(), strict=True))
     written[folder / TABLE] = "a row per recording and cause"
     if found.lines:
-        panels = [panel for panel in sheet.panels if isinstance(panel, Panel)]
-        write_sheet(sheet, [draw_panel(each) for each in panels], folder / PICTURE)
+        write_sheet(sheet, [draw_panel(each) for each in sheet.panels], folder / PICTURE)
         written[folder / PICTURE] = "sizes over time"
     return written
 
@@ -40,16 +39,18 @@ def write_history(found: History, names: Names, folder: Path) -> dict[Path, str]
 def _page(found: History, names: Names, sheet: Sheet) -> str:
     return render(
         "history.html.jinja",
+        [sheet] if found.lines else [],
         found=found,
         headline=headline(found),
         sentences=list(_sentences(found, names)),
         rows=list(rows_of_lines(found, names)),
         recordings=[
-            (Path(name).name, f"{time:.1f}" if found.dated else f"{time:.0f}", verdict)
-            for name, time, verdict in zip(found.recordings, found.times, found.verdicts, strict=True)
+            *(
+                (Path(name).name, f"{time:.1f}" if found.dated else f"{time:.0f}", verdict)
+                for name, time, verdict in zip(found.recordings, found.times, found.verdicts, strict=True)
+            ),
+            *((name, "–", f"not diagnosed: {why}") for name, why in found.failed),
         ],
-        keys=keys_of(sheet),
-        drawings=[panel_svg(each) for each in sheet.panels if isinstance(each, Panel)],
     )
 
 

@@ -1,0 +1,93 @@
+"""Makes a page from a template: one HTML file with its figures in it that needs nothing else; every text is escaped."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from tendonfmu.drawing import (
+    STYLES,
+    MatrixPanel,
+    Panel,
+    Sheet,
+    dark_colours,
+    figures_json,
+    height_in_page,
+    packed_plotly,
+    size_of,
+)
+
+
+class Tile(NamedTuple):
+    """A number that matters, and what it is."""
+
+    value: str
+    unit: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class PagePanel:
+    """A panel as a page shows it. number: of its figure in the page. width, height: CSS pixels."""
+
+    number: int
+    title: str
+    note: str
+    alt: str
+    width: int
+    height: int
+
+
+@dataclass(frozen=True)
+class PageSheet:
+    """A sheet as a page shows it. size: of its panels. keys: (CSS class, CSS colour, opacity, meaning)."""
+
+    sheet: Sheet
+    size: str
+    keys: list[tuple[str, str, float, str]]
+    panels: list[PagePanel]
+
+
+def render(template: str, sheets: Iterable[Sheet] = (), **content: Any) -> str:
+    """HTML text of a page. sheets: its figures, which the template finds by section in `figures`."""
+    import jinja2
+
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("tendonfmu"),
+        undefined=jinja2.StrictUndefined,
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    figures: dict[str, list[PageSheet]] = {}
+    panels: list[Panel | MatrixPanel] = []
+    names: list[dict[str, str]] = []
+    for sheet in sheets:
+        figures.setdefault(sheet.section, []).append(_placed(sheet, len(panels)))
+        panels += sheet.panels
+        names += [dict(sheet.keys)] * len(sheet.panels)
+    drawing = {"plotly": packed_plotly(), "dark_colours": dark_colours()} if panels else {}
+    drawn = figures_json(panels, names) if panels else ""
+    return environment.get_template(template).render(figures=figures, drawn=drawn, **drawing, **content)
+
+
+def _placed(sheet: Sheet, first: int) -> PageSheet:
+    panels = [
+        PagePanel(
+            number,
+            panel.title,
+            panel.note if isinstance(panel, Panel) else "",
+            panel.alt,
+            size_of(panel)[0],
+            height_in_page(panel),
+        )
+        for number, panel in enumerate(sheet.panels, start=first)
+    ]
+    return PageSheet(sheet, sheet.panels[0].size if sheet.panels else "small", _keys(sheet), panels)
+
+
+def _keys(sheet: Sheet) -> list[tuple[str, str, float, str]]:
+    """The correlation's have the name of their style as a class too, since a dark page turns its colours round."""
+    styles = [(name, STYLES[name], meaning) for name, meaning in sheet.keys]
+    return [(f"{style.shape} {name}", style.colour, style.alpha, meaning) for name, style, meaning in styles]
