@@ -3,7 +3,7 @@
     python tools/tables/generate.py          writes the files that differ, and names them
     python tools/tables/generate.py --check  writes nothing; exit code 1 where a file differs
 
-The generated files are part of the repository; python_tests/test_generated_files.py compares them.
+The generated files are part of the repository; python_tests/repository/test_generated_files.py compares them.
 """
 
 from __future__ import annotations

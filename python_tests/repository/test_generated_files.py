@@ -16,10 +16,10 @@ import pytest
 
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
+from repository_paths import ROOT
 from tendonfmu import native
 from tendonfmu.model.description_defaults import DEFAULTS, RANGES
 
-ROOT = Path(__file__).resolve().parent.parent
 TABLES = ROOT / "tools" / "tables"
 
 
