@@ -447,6 +447,14 @@ def test_a_browser_shows_it_at_any_width(browser: str, page: str, tmp_path: Path
     assert len(set(found["described"])) == 19 and min(map(len, found["described"])) > 40
 
 
+def test_a_page_is_dark_for_those_who_want_it(browser: str, tmp_path: Path) -> None:
+    """What is dark on a light page is light there."""
+    page = diagnosis_page(examples.changed())
+    found = measure(browser, tmp_path, page, 1280, "--blink-settings=preferredColorScheme=0")
+    assert found["paper"] == "rgb(20, 24, 28)" and set(found["ink"]) == {"rgb(228, 232, 236)"}
+    assert found["zoomed"] == ["time"] * 2
+
+
 def test_a_browser_has_nothing_to_complain_of(
     browser: str, written: tuple[Diagnosis, dict[Path, str]], page: str, tmp_path: Path
 ) -> None:

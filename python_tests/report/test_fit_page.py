@@ -282,6 +282,8 @@ def test_a_browser_shows_it_at_any_width(browser: str, page: str, tmp_path: Path
     assert len(found["drawings"]) == 82 and all(300 < shown <= width for shown in found["drawings"])
     assert min(found["drawn"]) > 0
     assert found["font"] >= 15
+    assert found["zoomed"] == ["torque_1"] * 4  # all joints of the recording, and no other
+    assert found["paper"] == "rgb(255, 255, 255)" and set(found["ink"]) == {"rgb(34, 34, 34)"}
     if width == 400:
         assert found["scrolled"] > 5
 

@@ -64,7 +64,16 @@ FRAME = """<!DOCTYPE html><meta charset="utf-8"><body style="margin:0">
 srcdoc="{page}"></iframe><script>
 addEventListener("load", () => {{
   const frame = document.getElementById("f"), inside = frame.contentDocument;
-  const measure = () => {{
+  const zoom = async plots => {{
+    if (!plots.length) return [];
+    const {{ figures }} = JSON.parse(inside.getElementById("panels").textContent);
+    const zooms = plots.map(e => figures[e.dataset.figure].zoom), first = plots[zooms.findIndex(name => name)];
+    if (!first) return [];
+    await frame.contentWindow.Plotly.relayout(first, {{ "xaxis.range": [1, 2] }});
+    await new Promise(done => setTimeout(done, 500));
+    return plots.flatMap((e, k) => `${{e._fullLayout.xaxis.range}}` === "1,2" ? [zooms[k]] : []);
+  }};
+  const measure = async () => {{
     if (inside.getElementById("plotly") && !frame.contentWindow.Plotly) return;
     clearInterval(waiting);
     for (const each of inside.querySelectorAll("details")) each.open = true;
@@ -83,6 +92,10 @@ addEventListener("load", () => {{
       scrolled: [...inside.querySelectorAll(".scroll")].filter(e => e.scrollWidth > e.clientWidth).length,
       requests: frame.contentWindow.performance.getEntriesByType("resource").map(e => e.name),
       font: parseFloat(getComputedStyle(inside.body).fontSize),
+      paper: getComputedStyle(inside.body).backgroundColor,
+      ink: plots.flatMap(e => [...e.querySelectorAll('[style*="stroke: rgb(34, 34, 34)"]')])
+        .map(e => getComputedStyle(e).stroke),
+      zoomed: await zoom(plots),
     }};
     document.body.textContent = "MEASURED" + JSON.stringify(found) + "END";
   }};
@@ -118,8 +131,9 @@ def framed(folder: Path, page: str, width: int, measure: bool) -> Path:
     return file
 
 
-def measure(browser: str, folder: Path, page: str, width: int) -> dict[str, Any]:
-    done = visit(browser, framed(folder, page, width, True), "--dump-dom")
+def measure(browser: str, folder: Path, page: str, width: int, *options: str) -> dict[str, Any]:
+    """Sizes, figures, requests; and which groups of figures are zoomed once the first of one is."""
+    done = visit(browser, framed(folder, page, width, True), "--dump-dom", *options)
     found = re.search(r"MEASURED(\{.*\})END", done.stdout)
     assert found is not None, done.stderr[-2000:]
     result: dict[str, Any] = json.loads(html.unescape(found[1]))
