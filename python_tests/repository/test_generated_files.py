@@ -17,7 +17,7 @@ import pytest
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
 from repository_paths import ROOT
-from tendonfmu import native
+from tendonfmu.model import native
 from tendonfmu.model.description_defaults import DEFAULTS, RANGES
 
 TABLES = ROOT / "tools" / "tables"
@@ -56,7 +56,7 @@ def test_a_default_is_a_fact_of_one_table(generator: ModuleType) -> None:
     found = changed(generator, lambda facts: facts.of_item("FILTER_CUTOFF")[0].update(row))
     assert found == {
         "docs/reference/description_keys.md",
-        "python/tendonfmu/description_defaults.py",
+        "python/tendonfmu/model/description_defaults.py",
         "python/tendonfmu/schema/finger.schema.json",
         "runtime/core/key_table.c",
     }
@@ -71,14 +71,14 @@ def test_an_output_is_a_fact_of_one_table(generator: ModuleType) -> None:
         "fmu_src/finger_signals.c",
         "modelDescription/variables.json",
         "python/binding/output_table.h",
-        "python/tendonfmu/output_names.py",
+        "python/tendonfmu/model/output_names.py",
         "runtime/include/tendonfmu_outputs.h",
     }
 
 
 def test_the_size_of_an_effect_is_a_fact_of_one_table(generator: ModuleType) -> None:
     found = changed(generator, lambda facts: facts.effects["effects"][0]["numbers"][0].update(scale=0.06))
-    assert found == {"python/tendonfmu/description_defaults.py", "runtime/core/effects/effect_facts.c"}
+    assert found == {"python/tendonfmu/model/description_defaults.py", "runtime/core/effects/effect_facts.c"}
 
 
 @pytest.mark.parametrize(

@@ -364,13 +364,26 @@ def tracked() -> list[str]:
     return [name for name in listed.stdout.split("\0") if name and (ROOT / name).is_file()]
 
 
+def lines_of(file: Path) -> int:
+    """Lines of a source; of Python without docstrings, whose lists of parameters are read apart from the code."""
+    text = file.read_text(encoding="utf-8")
+    count = len(text.splitlines())
+    if file.suffix != ".py":
+        return count
+    with_docstring = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, with_docstring) and ast.get_docstring(node) is not None:
+            count -= (node.body[0].end_lineno or 0) - node.body[0].lineno + 1
+    return count
+
+
 def test_no_source_is_too_long() -> None:
     code = [
         name
         for name in tracked()
         if Path(name).suffix in (".c", ".h", ".cpp", ".py", ".pyi", ".sh", ".cmake", ".jinja")
     ]
-    lengths = {name: len((ROOT / name).read_text(encoding="utf-8").splitlines()) for name in code}
+    lengths = {name: lines_of(ROOT / name) for name in code}
     assert {name: length for name, length in lengths.items() if length > LONGEST} == {}
 
 
