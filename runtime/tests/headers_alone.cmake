@@ -1,5 +1,5 @@
 # Compiles every header by itself, twice included: what it needs it includes, and its guard holds. The headers of C are
-# compiled as C and as C++.
+# compiled as C and as C++, but for those of the kernels.
 #
 #   headers_alone(NAME LANGUAGE FOLDER [libraries])   the headers of a folder, as C or CXX, with the includes of libraries
 function(headers_alone name language folder)
@@ -33,7 +33,6 @@ endfunction()
 foreach(language IN ITEMS C CXX)
   headers_alone(interface ${language} runtime/include)
   headers_alone(core ${language} runtime/core tendonfmu_core_inside)
-  headers_alone(kernel ${language} runtime/core/kernel tendonfmu_core_inside)
   headers_alone(effects ${language} runtime/core/effects tendonfmu_core_inside)
   if(TENDONFMU_BUILD_FMU)
     headers_alone(fmu ${language} fmu_src tendonfmu_core tendonfmu_fmi_headers)
@@ -45,6 +44,7 @@ foreach(language IN ITEMS C CXX)
     endforeach()
   endif()
 endforeach()
+headers_alone(kernel C runtime/core/kernel tendonfmu_core_inside) # the step alone includes them
 headers_alone(description CXX runtime/description tendonfmu_core_inside nlohmann_json::nlohmann_json)
 if(TARGET tendonfmu_estimation)
   headers_alone(estimation CXX runtime/estimation tendonfmu_core_inside Eigen3::Eigen)
