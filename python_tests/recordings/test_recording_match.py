@@ -18,7 +18,7 @@ from repository_paths import ROOT
 from tendonfmu.errors import InputError
 from tendonfmu.files.tables import write_table
 from tendonfmu.model.description import FingerDescription, read_finger
-from tendonfmu.recordings.match import admit, belongs, refuse_errors
+from tendonfmu.recordings.match import UNFIT_FOR_SEARCH, admit, belongs, refuse_errors
 from tendonfmu.recordings.prepared import Held, prepare
 from tendonfmu.recordings.recording import Recording, read_recording
 
@@ -203,6 +203,18 @@ def test_arms_of_another_finger(finger: FingerDescription, sound: Recording) -> 
     findings = belongs(finger, [with_group(sound, "tendon_position", mixed)])
     assert [finding.kind for finding in findings if finding.severity == "error"] == ["unfit"]
     assert all(not finding.entries for finding in findings)
+    with pytest.raises(InputError, match="moment_arms or stiffness of another finger"):
+        admit(finger, [with_group(sound, "tendon_position", mixed)], unfit=UNFIT_FOR_SEARCH)
+
+
+def test_a_search_of_causes_may_find_a_spring_that_stiffens(finger: FingerDescription, sound: Recording) -> None:
+    """It is refused by a fit of the numbers that there are, and only warned of where the cause can be named."""
+    force, stiffness = sound.groups["tendon_force"], finger.data["tendons"][0]["stiffness"]
+    stretched = sound.groups["tendon_position"] + 20.0 * force**2 / force.max() / stiffness
+    soft = with_group(sound, "tendon_position", stretched)
+    assert [finding.severity for finding in belongs(finger, [soft]) if finding.kind == "unfit"] == ["error"]
+    warnings = admit(finger, [soft], unfit=UNFIT_FOR_SEARCH)
+    assert any("38 % of the variance unexplained" in warning for warning in warnings)
 
 
 # --- clock and sensors ------------------------------------------------------------------------------------------------

@@ -33,7 +33,16 @@ from tendonfmu.errors import InputError
 from tendonfmu.estimate import check_given_once, check_unseen, described, description_text
 from tendonfmu.files import finite, write_text
 from tendonfmu.model import FingerDescription, read_finger
-from tendonfmu.recordings import FitRecording, Held, Signals, admit, prepare, read_recording, require_noise
+from tendonfmu.recordings import (
+    UNFIT_FOR_SEARCH,
+    FitRecording,
+    Held,
+    Signals,
+    admit,
+    prepare,
+    read_recording,
+    require_noise,
+)
 from tendonfmu.report import diagnosis_page, write_diagnosis
 from tendonfmu.tasks import FOLDER, Phases, PhaseState, Steps, digest_of, digest_of_file
 
@@ -243,7 +252,7 @@ def _read(
     read, others, touched = ([read_recording(each) for each in group] for group in (free, tests, pushes))
     for each in (*read, *others):
         require_no_contact(each)
-    sentences = admit(given, [*read, *others, *touched])
+    sentences = admit(given, [*read, *others, *touched], unfit=UNFIT_FOR_SEARCH)
     own = [prepare(given, each, options.kinematics, Held() if tests else HELD) for each in read]
     unseen = [prepare(given, each, options.kinematics, Held()) for each in others]
     require_noise(given, own)

@@ -46,7 +46,16 @@ from tendonfmu.diagnose.size import size_of
 from tendonfmu.errors import InputError, own_fault
 from tendonfmu.estimate import check_unseen
 from tendonfmu.model import FingerDescription, read_finger
-from tendonfmu.recordings import FitRecording, Held, Recording, admit, prepare, read_recording, require_noise
+from tendonfmu.recordings import (
+    UNFIT_FOR_SEARCH,
+    FitRecording,
+    Held,
+    Recording,
+    admit,
+    prepare,
+    read_recording,
+    require_noise,
+)
 from tendonfmu.statistics import Interval, standard_error
 from tendonfmu.tasks import Phases, PhaseState
 
@@ -181,7 +190,7 @@ def _case(
     given = finger if isinstance(finger, FingerDescription) else read_finger(Path(finger))
     held = Held() if tests else apart
     read, others = ([_read(each) for each in group] for group in (recordings, tests))
-    warnings = [] if checked else admit(given, [*read, *others])
+    warnings = [] if checked else admit(given, [*read, *others], unfit=UNFIT_FOR_SEARCH)
     training = [prepare(given, each, kinematics, held) for each in read]
     unseen = [prepare(given, each, kinematics, Held()) for each in others]
     require_noise(given, training)

@@ -3,6 +3,7 @@ from .converters.one_joint_description import describe_joint as describe_joint
 from .converters.one_joint_description import description_text as description_text
 from .converters.table import convert_table as convert_table
 from .faults import gaps as gaps
+from .match import UNFIT_FOR_SEARCH as UNFIT_FOR_SEARCH
 from .match import admit as admit
 from .match import belongs as belongs
 from .match_text import verdict as verdict

@@ -32,6 +32,7 @@ Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 UNFIT, POOR = 0.15, 0.03  # share of variance that the equations leave: above these an error, a warning
+UNFIT_FOR_SEARCH = 0.5  # the same error for a search of causes: a spring, arm or play may be what is to be found
 HALF = 0.5  # of the samples; a fit refuses a sensor that is stuck in more
 MUCH_CLIPPED = 0.2  # of the samples; more is an error
 NEGATIVE = 0.8  # of the samples; a tendon that pushes in more has a wrong sign or zero
@@ -47,7 +48,7 @@ LEAST_KEPT = 0.2  # of the samples; the equations use at least as many
 LEFT_TO_THE_FIT = ("gaps", "held")  # kinds of findings
 
 
-def belongs(finger: FingerDescription, recordings: Sequence[Recording]) -> list[Finding]:
+def belongs(finger: FingerDescription, recordings: Sequence[Recording], *, unfit: float = UNFIT) -> list[Finding]:
     """Find signs that recordings do not belong to a finger, or are poor.
 
     Parameters
@@ -56,6 +57,8 @@ def belongs(finger: FingerDescription, recordings: Sequence[Recording]) -> list[
         A valid description.
     recordings
         As `read_recording` returns them.
+    unfit
+        Share of variance that kinematics may leave unexplained before it is an error.
 
     Returns
     -------
@@ -64,12 +67,12 @@ def belongs(finger: FingerDescription, recordings: Sequence[Recording]) -> list[
     """
     found: list[Finding] = []
     for recording in recordings:
-        of_this = _findings(finger, recording)
+        of_this = _findings(finger, recording, unfit)
         found += sorted(of_this, key=lambda finding: finding.severity != "error")
     return found
 
 
-def admit(finger: FingerDescription, recordings: Sequence[Recording]) -> list[str]:
+def admit(finger: FingerDescription, recordings: Sequence[Recording], *, unfit: float = UNFIT) -> list[str]:
     """Check recordings before a fit, and refuse those that do not belong to the finger.
 
     Gaps and stuck sensors are left to `recordings.prepared.prepare`. It knows which columns are used, and reports which
@@ -81,6 +84,8 @@ def admit(finger: FingerDescription, recordings: Sequence[Recording]) -> list[st
         A valid description.
     recordings
         As `read_recording` returns them, or made in memory.
+    unfit
+        As of `belongs`.
 
     Returns
     -------
@@ -94,7 +99,9 @@ def admit(finger: FingerDescription, recordings: Sequence[Recording]) -> list[st
     """
     for recording in recordings:
         check_numbers(recording)
-    return refuse_errors([each for each in belongs(finger, recordings) if each.kind not in LEFT_TO_THE_FIT])
+    return refuse_errors(
+        [each for each in belongs(finger, recordings, unfit=unfit) if each.kind not in LEFT_TO_THE_FIT]
+    )
 
 
 def refuse_errors(findings: Sequence[Finding]) -> list[str]:
@@ -105,7 +112,7 @@ def refuse_errors(findings: Sequence[Finding]) -> list[str]:
     return [finding.line() for finding in findings]
 
 
-def _findings(finger: FingerDescription, recording: Recording) -> list[Finding]:
+def _findings(finger: FingerDescription, recording: Recording, unfit: float) -> list[Finding]:
     counts = {"tendon": len(finger.tendon_names), "joint": len(finger.joint_names)}
     wrong = [name for name, values in recording.groups.items() if values.shape[1] != counts[GROUP_PER[name]]]
     if wrong:
@@ -115,7 +122,7 @@ def _findings(finger: FingerDescription, recording: Recording) -> list[Finding]:
     unit = clock.entries.get("time", {}).get("scale") if clock else None
     if isinstance(unit, float):
         recording = replace(recording, time=recording.time * unit)
-    kinematic, mended = _of_kinematics(finger, recording)
+    kinematic, mended = _of_kinematics(finger, recording, unfit)
     stands = held_channels(mended, finger)
     held = [
         text.held(recording.path, each, "error" if each.share > HALF and each.value != 0.0 else "warning")
@@ -164,7 +171,7 @@ def _of_channels(finger: FingerDescription, recording: Recording, held: Sequence
 # --- what the columns say of each other -------------------------------------------------------------------------------
 
 
-def _of_kinematics(finger: FingerDescription, recording: Recording) -> tuple[list[Finding], Recording]:
+def _of_kinematics(finger: FingerDescription, recording: Recording, unfit: float) -> tuple[list[Finding], Recording]:
     """Return findings about signs, order and units of columns, and the recording with these corrected."""
     if len(recording) < FEWEST:
         return [], recording
@@ -173,7 +180,8 @@ def _of_kinematics(finger: FingerDescription, recording: Recording) -> tuple[lis
     if moves and tells(finger, recording.groups):
         done, left = repairs(balance)
         if left > UNFIT:  # a correction that removes only a part of the misfit is a guess
-            return [text.unfit(recording.path, done[0].misfit if done else left, "error", balance)], recording
+            worst = done[0].misfit if done else left
+            return [text.unfit(recording.path, worst, "error" if worst > unfit else "warning", balance)], recording
         if len(done) == 1:
             done = [_likeliest(finger, recording, done[0])]
         found = [text.repair(recording.path, each) for each in done]
