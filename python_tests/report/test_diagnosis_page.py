@@ -352,7 +352,7 @@ def test_figures_are_whole_and_described(page: str) -> None:
 
 
 def test_the_first_screens_say_it_all(written: tuple[Diagnosis, dict[Path, str]], page: str) -> None:
-    """Verdict, waterfall, each cause with places and size, what is left, what could not be told, what to do next."""
+    """Verdict, waterfall, each cause with places and size, what is left, what the data cannot show, what is next."""
     found, first = written[0], plain(page.split("<nav")[0])
     names = names_of(found)
     assert headline(found) in first and "5.68 → 2.41 mN·m" in first and "95 % interval 54 to 61 %" in first
@@ -384,7 +384,7 @@ def test_a_card_has_a_table_of_its_places(page: str) -> None:
 
 def test_what_is_too_small_is_folded(page: str) -> None:
     folded = plain(page.split('<details id="too_small">')[1].split("</details>")[0])
-    assert "takes away less than 3.0 % of the error" in folded and "The link's inertia joint 2 (pip) 1.1 %" in folded
+    assert "each removes less than 3.0 % of the error" in folded and "The link's inertia joint 2 (pip) 1.1 %" in folded
     assert "too small" not in plain(diagnosis_page(examples.adequate()))
 
 
