@@ -82,7 +82,7 @@ def test_it_writes_everything(call: Call, answering: Callable[[Diagnosis], Calle
         f"tendonfmu: warning: {sentence}" for sentence in found.warnings
     ]
     assert "Three causes together explain part of what the model gets wrong." in answer.out
-    assert "new/out/diagnosis.html: all of it, to be read in a browser" in answer.err
+    assert "new/out/diagnosis.html: all results, to be read in a browser" in answer.err
     assert json.loads(Path("new/out/extended.json").read_text()) == found.extended_data
     for name in ("extended.json", "nominal.json"):
         assert call("check", f"new/out/{name}").status == 0

@@ -352,13 +352,14 @@ def test_figures_are_whole_and_described(page: str) -> None:
 
 
 def test_the_first_screens_say_it_all(written: tuple[Diagnosis, dict[Path, str]], page: str) -> None:
-    """Verdict, waterfall, each cause with places and size, what is left, what could not be told, what to do next."""
+    """Verdict, waterfall, each cause with places and size, what is left, what the data cannot show, what is next."""
     found, first = written[0], plain(page.split("<nav")[0])
     names = names_of(found)
     assert headline(found) in first and "5.68 → 2.41 mN·m" in first and "95 % interval 54 to 61 %" in first
     order = ["error of the nominal model 5.68", "1. weight of a link that the model leaves out, at joint 2 (pip) −1.78"]
     order += ["3. friction changes in the course of time −0.14", "what is left 2.41", left_sentence(found)]
-    order += [found.warnings[2], "The causes, in order of gain", "Seen, too small to matter", "What could not be told"]
+    order += [found.warnings[2], "The causes, in order of gain", "Seen, too small to matter"]
+    order += ["What these data cannot show"]
     assert [first.find(words) for words in order] == sorted(first.find(words) for words in order)
     assert min(first.find(words) for words in order) > 0
     for cause in reported_causes(found):
@@ -383,7 +384,7 @@ def test_a_card_has_a_table_of_its_places(page: str) -> None:
 
 def test_what_is_too_small_is_folded(page: str) -> None:
     folded = plain(page.split('<details id="too_small">')[1].split("</details>")[0])
-    assert "takes away less than 3.0 % of the error" in folded and "The link's inertia joint 2 (pip) 1.1 %" in folded
+    assert "each removes less than 3.0 % of the error" in folded and "The link's inertia joint 2 (pip) 1.1 %" in folded
     assert "too small" not in plain(diagnosis_page(examples.adequate()))
 
 
@@ -392,7 +393,7 @@ def test_the_tables_hold_the_numbers(page: str) -> None:
     assert "joint 2 (pip) 9.80 6.30 2.10 6.20 2.20 2.08 0.95 0.42" in text
     assert "train_2.parquet 17.08 18.32 joint 2 (pip) 83.0" in text
     assert "extensions[1].sine 0.0121 N·m" in text and "extensions[1].cosine −0.0034 N·m" in text
-    assert "214 effects at places were tried" in text and "Seed 0." in text
+    assert "214 candidate causes were tested" in text and "Seed 0." in text
     assert "estimated from signals smoothed at 19.6 Hz, without lag" in text
 
 

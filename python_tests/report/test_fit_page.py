@@ -159,7 +159,7 @@ def test_what_is_missing_is_left_out(written: Written) -> None:
     innovations["whiteness"] = {"lag_one": [None] * 4, "ljung_box_p": [None] * 4}
     text = text_of(changed(picture, residual=residual, innovations=innovations))
     assert "Held out of training" not in text and "nan" not in text.lower().replace("finance", "")
-    assert "numbers it started from 3" not in text
+    assert "with the starting values 3" not in text
 
 
 def test_comparisons_stand_beside_the_training(written: Written) -> None:

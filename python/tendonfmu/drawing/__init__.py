@@ -1,7 +1,10 @@
-"""Draws what it is given; computes nothing.
+"""Draws figures from ready-made data; computes nothing.
 
-`panel_data` says what a figure shows, `interactive` draws it for pages, with Plotly, and `panels` as PNG files, with
-matplotlib; `panel_styles` and `plot_style` hold colours and sizes. `finger_picture` draws the routing of a finger.
+- `panel_data`: what a figure shows
+- `interactive`: draws it for pages, with Plotly
+- `panels`: draws it as PNG files, with matplotlib
+- `panel_styles`, `plot_style`: colours and sizes
+- `finger_picture`: draws the routing of a finger
 """
 
 import lazy_loader

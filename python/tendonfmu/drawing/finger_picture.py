@@ -1,4 +1,4 @@
-"""Draws the routing of a finger, ready-made by `model/routing_geometry.py`."""
+"""Draws the routing of a finger. Its geometry comes from `model/routing_geometry.py`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,17 @@ TENDON_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, "#5A5A5A", "#332288", "#9999
 
 
 def draw_finger(drawing: FingerDrawing, target: Target) -> None:
-    """Routing drawing as PNG: links, joints, tendons over and under them, pulleys, edges (red), as in fig. 3."""
+    """Draw the routing of a finger as PNG, as in fig. 3 of the paper.
+
+    It shows links, joints, tendons over and under them, pulleys, and edges (red).
+
+    Parameters
+    ----------
+    drawing
+        Geometry of the drawing.
+    target
+        File name or binary stream.
+    """
     longest = max(len(tendon.name) for tendon in drawing.tendons)
     labels = 0.5 + 0.115 * longest  # room for names on the left, in drawing units
     width, height = drawing.right - drawing.left + labels, 2.0 * drawing.height + 1.6

@@ -1,7 +1,7 @@
 """Turns panels (`panel_data.py`) into Plotly figures for a page: zoom, values under the pointer, light and dark.
 
-A page holds the figures of its panels as JSON and plotly.js once, packed; `templates/report.js` draws them. Colours
-are those of a light page; `dark_colours` gives the CSS that changes them for readers who prefer a dark one.
+A page contains the figures of its panels as JSON, and plotly.js once, compressed; `templates/report.js` draws them.
+Colours are those of a light page. `dark_colours` returns CSS that changes them for readers who prefer a dark page.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ Figure = dict[str, Any]
 
 _DASHES = {"-": "solid", "--": "dash", ":": "dot"}
 _INNER = 0.6  # decades that the linear part of a stretched axis takes on each side of 0
-_APART = 0.15  # of a stretched axis between its numbers
-_HISTOGRAM = 0.16  # of the height of the axes
+_APART = 0.15  # share of a stretched axis, least distance of its numbers
+_HISTOGRAM = 0.16  # share of the height of the axes
 _MATRIX = 540  # CSS pixels, height
-_TITLE = 20  # CSS pixels that the title takes, which is a text of the page
-_MOST_POINTS = 2000  # of curves that share their x
-_MOST_CELLS = 400  # rows of a matrix; of more, neighbours are drawn as one
+_TITLE = 20  # CSS pixels of the title, which is part of the page, not of the figure
+_MOST_POINTS = 2000  # of a curve; longer curves that share their x are thinned
+_MOST_CELLS = 400  # rows of a matrix; in larger ones neighbours are drawn as one
 _FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif'
 _AXIS = {
     "showline": True,
@@ -61,9 +61,19 @@ _TEMPLATE = {
 
 
 def figures_json(panels: Sequence[Panel | MatrixPanel], names: Sequence[dict[str, str]]) -> Markup:
-    """The figures of a page as JSON that may stand in a `script` element.
+    """Return the figures of a page as JSON that is safe inside a `script` element.
 
-    panels: all of the page, in its order. names: of each panel, style -> what is drawn so.
+    Parameters
+    ----------
+    panels
+        All panels of the page, in its order.
+    names
+        Of each panel: style -> meaning, shown under the pointer.
+
+    Returns
+    -------
+    Markup
+        The common template and the figures, with `<` escaped.
     """
     figures = [figure_of(panel, named) for panel, named in zip(panels, names, strict=True)]
     text = json.dumps({"template": _TEMPLATE, "figures": figures}, allow_nan=False, separators=(",", ":"))
@@ -72,14 +82,14 @@ def figures_json(panels: Sequence[Panel | MatrixPanel], names: Sequence[dict[str
 
 @cache
 def packed_plotly() -> Markup:
-    """plotly.js, gzip in base64: two fifths of its size."""
+    """Return plotly.js, compressed with gzip and encoded in base64: two fifths of its size."""
     from plotly.offline import get_plotlyjs
 
     return Markup(base64.b64encode(gzip.compress(get_plotlyjs().encode(), 6, mtime=0)).decode("ascii"))
 
 
 def dark_colours() -> Markup:
-    """CSS rules for a dark page: what is drawn in a colour of the light one has that of the dark one."""
+    """Return CSS rules that replace the colours of the light page by those of the dark page."""
     rules = []
     for light, dark in IN_DARK.items():
         red, green, blue = (int(light[k : k + 2], 16) for k in (1, 3, 5))
@@ -92,12 +102,15 @@ def dark_colours() -> Markup:
 
 
 def height_in_page(panel: Panel | MatrixPanel) -> int:
-    """CSS pixels, without the title; of a matrix so many that it is about square."""
+    """Return the height of a panel in CSS pixels, without its title; a matrix is about square."""
     return _MATRIX if isinstance(panel, MatrixPanel) else size_of(panel)[1] - _TITLE
 
 
 def figure_of(panel: Panel | MatrixPanel, names: dict[str, str]) -> Figure:
-    """data and layout as Plotly has them; zoom: panels of a page with the same one share their range along x."""
+    """Return data and layout of a panel as Plotly expects them.
+
+    Panels of a page with the same `zoom` share their range along x.
+    """
     if isinstance(panel, MatrixPanel):
         return _matrix(panel)
     drawing = _Drawing(panel, names)
@@ -116,7 +129,7 @@ def figure_of(panel: Panel | MatrixPanel, names: dict[str, str]) -> Figure:
 
 
 class _Drawing:
-    """Traces of a panel. x is stretched where the panel's axis is."""
+    """Traces of a panel. They are stretched along x if the panel's axis is."""
 
     def __init__(self, panel: Panel, names: dict[str, str]) -> None:
         self._panel = panel
@@ -137,7 +150,7 @@ class _Drawing:
         return found + [self._dots(dots) for dots in panel.dots]
 
     def _data(self, edges: Numbers, heights: Numbers) -> Figure:
-        """Where samples are, as a histogram along the bottom."""
+        """Show where samples are, as a histogram along the bottom."""
         style = STYLES["data"]
         filled = {"fill": "tozeroy", "fillcolor": _rgba(style), "line": {"width": 0, "shape": "hv"}}
         return _trace(self.x(edges), np.append(heights, heights[-1]), "lines", yaxis="y2", hoverinfo="skip", **filled)
@@ -161,7 +174,7 @@ class _Drawing:
         return _trace(self.x(dots.x), dots.y, "markers", marker=marker, cliponaxis=False, **hover)
 
     def _band(self, band: Band) -> Iterator[Figure]:
-        """The area of each stretch of numbers, and its limits under the pointer."""
+        """Draw the area of each stretch without gaps, and show its limits under the pointer."""
         x, low, high = self.x(band.x), np.asarray(band.low, dtype=float), np.asarray(band.high, dtype=float)
         known = np.isfinite(x + low + high)
         around: list[Numbers] = []
@@ -187,13 +200,13 @@ class _Drawing:
             yield self._limits(bars.style, bars.x, bars.low, bars.high)
 
     def _limits(self, name: str, x: Numbers, low: Numbers, high: Numbers) -> Figure:
-        """Both ends under the pointer, without a line of their own."""
+        """Show both ends under the pointer, without a line of their own."""
         hover = self._hover(name, x, "%{customdata:.4~g} to %{y:.4~g}")
         line = {"width": 0, "color": STYLES[name].colour}
         return _trace(self.x(x), high, "lines", line=line, customdata=_listed(low), **hover)
 
     def _hover(self, style: str, x: Numbers, value: str) -> Figure:
-        """Value, unit and name; the place along a stretched axis as it is in numbers."""
+        """Show value, unit and name; on a stretched axis also x as a plain number."""
         text = f"{value} {self._unit} {self._names.get(style, '')}".replace("  ", " ").rstrip()
         if self._panel.near_x > 0:
             return {"text": [f"{each:.4g}" for each in x], "hovertemplate": f"%{{text}}: {text}<extra></extra>"}
@@ -201,7 +214,7 @@ class _Drawing:
 
 
 def thinned(curves: Sequence[Curve]) -> Iterator[Curve]:
-    """Curves of many points with those that show: lowest and highest of each stretch, at the same x in all curves."""
+    """Thin long curves to the points that show: minimum and maximum of each stretch, at the same x in all curves."""
     same = [each for each in curves if len(each.x) == len(curves[0].x) and np.array_equal(each.x, curves[0].x, True)]
     if len(same) < len(curves) or not curves or len(curves[0].x) <= _MOST_POINTS:
         yield from curves
@@ -222,7 +235,7 @@ def _trace(x: Numbers, y: Numbers, mode: str, **settings: Any) -> Figure:
 
 
 def _listed(values: Numbers) -> list[float | None]:
-    """Six digits are more than a screen shows; None where there is no number."""
+    """Round to six digits, more than a screen shows; None where there is no number."""
     return [float(f"{each:.6g}") if math.isfinite(each) else None for each in np.asarray(values, dtype=float).tolist()]
 
 
@@ -232,7 +245,7 @@ def _rgba(style: Style) -> str:
 
 
 def _shapes(panel: Panel) -> Iterator[Figure]:
-    """Stripes, and the marked x."""
+    """Return the stripes and the marked x."""
     style = STYLES[panel.stripe_style]
     upright = {"yref": "paper", "y0": 0, "y1": 1, "layer": "below"}
     for begin, end in panel.stripes:
@@ -246,7 +259,7 @@ def _shapes(panel: Panel) -> Iterator[Figure]:
 
 
 def unit_of(label: str) -> str:
-    """What is in brackets at the end of an axis label."""
+    """Return what is in brackets at the end of an axis label."""
     _, bracket, rest = label.partition(" (")
     return html.escape(rest[:-1]) if bracket and rest.endswith(")") else ""
 
@@ -287,14 +300,14 @@ def _named_ticks(places: Sequence[float | None], names: Iterable[str]) -> Figure
 
 
 def stretched(values: Numbers, near: float) -> Numbers:
-    """Linear up to `near` on both sides of 0, logarithmic beyond."""
+    """Map numbers to an axis that is linear up to `near` on both sides of 0 and logarithmic beyond."""
     given = np.asarray(values, dtype=float)
     size = np.abs(given) / near
     return np.asarray(np.sign(given) * np.where(size <= 1, _INNER * size, _INNER + np.log10(np.maximum(size, 1.0))))
 
 
 def _spaced(panel: Panel) -> list[float]:
-    """0 and round numbers on both sides of it, as far as something is drawn, those that matter more first."""
+    """Choose 0 and round numbers on both sides of it within the range drawn, the more important ones first."""
     drawn = [each.x for part in (panel.curves, panel.bands, panel.dots, panel.bars) for each in part]
     values = np.concatenate([np.asarray(each, dtype=float) for each in drawn] or [np.zeros(1)])
     low, high = (float(end(values[np.isfinite(values)], initial=0.0)) for end in (np.min, np.max))
@@ -316,7 +329,7 @@ def _spaced(panel: Panel) -> list[float]:
 
 
 def _matrix(panel: MatrixPanel) -> Figure:
-    """Correlations as colours; of many, the strongest of neighbours, so that none is overlooked."""
+    """Show correlations as colours; in a large matrix the strongest of neighbours, so that none is overlooked."""
     matrix, every = pooled(panel.matrix)
     more = f" and {every - 1} more" if every > 1 else ""
     names = [f"{html.escape(name)}{more}" for name in panel.names[::every]]
@@ -349,7 +362,10 @@ def _matrix(panel: MatrixPanel) -> Figure:
 
 
 def pooled(matrix: Numbers) -> tuple[NDArray[np.int8], int]:
-    """Per cent, and how many rows are one: of them the entry that is furthest from 0."""
+    """Return a matrix in per cent, and how many of its rows each row stands for.
+
+    Of the entries pooled, the one furthest from 0 is kept.
+    """
     every = math.ceil(len(matrix) / _MOST_CELLS) or 1
     room = -len(matrix) % every
     whole = np.pad(matrix, ((0, room), (0, room)))

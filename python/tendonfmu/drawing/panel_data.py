@@ -1,7 +1,7 @@
 """What figures consist of: sheets of panels, ready to be drawn.
 
-`interactive.py` draws a panel alone in a page, where panels flow into as many columns as there is room for; `panels.py`
-draws it beside its neighbours in the sheet's PNG file.
+`interactive.py` draws each panel for a page, where panels fill as many columns as fit. `panels.py` draws all panels of
+a sheet side by side in one PNG file.
 """
 
 from __future__ import annotations
@@ -19,7 +19,15 @@ Size = Literal["small", "medium", "large"]
 
 @dataclass(frozen=True)
 class Curve:
-    """A line. style: a key of `panel_styles.STYLES`. x, y: [N], NaN breaks the line."""
+    """A line.
+
+    Attributes
+    ----------
+    style
+        Key of `panel_styles.STYLES`.
+    x, y : [N]
+        NaN breaks the line.
+    """
 
     style: str
     x: Numbers
@@ -28,7 +36,14 @@ class Curve:
 
 @dataclass(frozen=True)
 class Band:
-    """Between two curves. x, low, high: [N]."""
+    """The area between two curves.
+
+    Attributes
+    ----------
+    style
+        Key of `panel_styles.STYLES`.
+    x, low, high : [N]
+    """
 
     style: str
     x: Numbers
@@ -38,7 +53,14 @@ class Band:
 
 @dataclass(frozen=True)
 class Dots:
-    """Points, each by itself. x, y: [N]."""
+    """Single points.
+
+    Attributes
+    ----------
+    style
+        Key of `panel_styles.STYLES`.
+    x, y : [N]
+    """
 
     style: str
     x: Numbers
@@ -47,7 +69,17 @@ class Dots:
 
 @dataclass(frozen=True)
 class Bars:
-    """Error bars: at each x from low to high, all [N]; lying: at each y = x along the other axis."""
+    """Error bars.
+
+    Attributes
+    ----------
+    style
+        Key of `panel_styles.STYLES`.
+    x, low, high : [N]
+        At each x a bar from low to high.
+    lying
+        Bars lie along the horizontal axis; `x` is then their height.
+    """
 
     style: str
     x: Numbers
@@ -60,12 +92,38 @@ class Bars:
 class Panel:
     """One pair of axes.
 
-    alt: what it shows, in words, for those who do not see it. note: small, at the right end of the title's line.
-    stripes: shaded along x, in `stripe_style`. ticks: places and names along x. data: where samples are, bin edges
-    [k + 1] and heights [k] from 0 to 1, along the bottom. rows: names of y = 0, 1, ... from the top; none: y is a
-    number. line: a marked x. log_x, log_y: logarithmic. near_x: to either side of 0 up to here x is linear, beyond it
-    logarithmic; 0: linear. height: CSS pixels, 0: the size's. zoom: panels of a page with the same word here are zoomed
-    together along x; "": by itself.
+    Attributes
+    ----------
+    title, x_label, y_label
+        Texts. A unit is in brackets at the end of a label.
+    alt
+        What the panel shows, in words, for readers who cannot see it.
+    size
+        Key of `panel_styles.SIZES`.
+    note
+        Small text at the right end of the title's line.
+    curves, bands, dots, bars
+        What is drawn.
+    stripes
+        Intervals shaded along x, in `stripe_style`.
+    ticks
+        (place, name) along x.
+    data
+        Where samples are: bin edges [k + 1] and heights [k] from 0 to 1, drawn along the bottom.
+    x_limits, y_limits
+        Ends of the axes; None for those of the data.
+    log_x, log_y
+        Logarithmic axes.
+    near_x
+        x is linear up to this value on both sides of 0 and logarithmic beyond; 0: linear.
+    rows
+        Names of y = 0, 1, ... from the top; empty: y is a number.
+    line
+        A marked x.
+    height : CSS pixels
+        0: that of the size.
+    zoom
+        Panels of a page with the same word are zoomed together along x; empty: this one alone.
     """
 
     title: str
@@ -95,10 +153,23 @@ class Panel:
 
 @dataclass(frozen=True)
 class MatrixPanel:
-    """A matrix of numbers from −1 to 1, [p, p]. groups: name, and the rows (from, to) that it spans, in order.
+    """A matrix of numbers from −1 to 1.
 
-    marked: [k, 2] rows and columns of entries that are drawn larger than they are, where all are too small to be seen.
-    names: of the rows, [p], no two alike.
+    Attributes
+    ----------
+    title
+        Heading.
+    alt
+        What the panel shows, in words, for readers who cannot see it.
+    matrix : [p, p]
+    groups
+        (name, begin, end) of the rows of each group, in order.
+    marked : [k, 2]
+        Rows and columns of entries that are drawn enlarged where entries are too small to be seen.
+    names : [p]
+        Names of the rows, all different.
+    size
+        Key of `panel_styles.SIZES`.
     """
 
     title: str
@@ -114,8 +185,22 @@ class MatrixPanel:
 class Sheet:
     """Panels that belong together.
 
-    section: under which heading of the page. name: stem of the PNG file. caption: what to see, a sentence or two.
-    keys: style and meaning of what is drawn. folded: shown on demand only.
+    Attributes
+    ----------
+    section
+        Heading of the page under which the sheet is.
+    name
+        Stem of the PNG file.
+    title
+        Heading.
+    caption
+        What to see, in a sentence or two.
+    keys
+        (style, meaning) of what is drawn.
+    panels
+        The panels.
+    folded
+        Shown on demand only.
     """
 
     section: str

@@ -1,6 +1,6 @@
-"""Colours, styles and sizes of panels, however they are drawn.
+"""Colours, styles and sizes of panels, for every way of drawing them.
 
-Colours are those of Okabe and Ito, which colour-blind readers tell apart.
+The colours are those of Okabe and Ito, which colour-blind readers can distinguish.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION = "#0072B2", "#E69F00", "#009E73", "
 DARK, GREY, LIGHT, SKIN = "#222222", "#8A8A8A", "#D5D8DC", "#F4F1EC"
 
 DIVERGING = ("#2166AC", "#6BAED6", "#FFFFFF", "#F4895F", "#B2182B")  # from −1 over 0 to 1
-# on a dark page; the others are seen on both
+# Replacements on a dark page. The other colours are visible on both.
 IN_DARK = {
     DARK: "#E4E8EC",
     BLUE: "#6E95FF",
@@ -29,7 +29,21 @@ SIZES = {"small": (370, 250), "medium": (560, 250), "large": (560, 400)}  # CSS 
 
 @dataclass(frozen=True)
 class Style:
-    """Of a curve (colour, width, dashes), a band (alpha) or dots (marker, filled)."""
+    """How something is drawn.
+
+    Attributes
+    ----------
+    colour
+        As "#RRGGBB".
+    width, dash
+        Of a curve; a width of 0 means dots.
+    alpha
+        Opacity.
+    filled
+        Whether dots are filled.
+    patch
+        Whether its key is a patch, as for a band.
+    """
 
     colour: str
     width: float = 1.2
@@ -40,7 +54,7 @@ class Style:
 
     @property
     def shape(self) -> str:
-        """CSS class of its key in the page."""
+        """Return the CSS class of its key in the page."""
         if self.patch:
             return "patch"
         if self.width == 0:
@@ -85,6 +99,6 @@ STYLES = {
 
 
 def size_of(panel: Panel | MatrixPanel) -> tuple[int, int]:
-    """Width and height in CSS pixels."""
+    """Return width and height of a panel in CSS pixels."""
     width, height = SIZES[panel.size]
     return (width, panel.height) if isinstance(panel, Panel) and panel.height else (width, height)

@@ -1,6 +1,6 @@
-"""Draws the panels of a fit (`panel_data.py`). It computes nothing: what it draws comes ready-made.
+"""Draws panels (`panel_data.py`) as PNG files. It computes nothing: the data come ready-made.
 
-Panels have fixed margins, so that they align beside each other.
+Panels have fixed margins, so that they align with each other.
 """
 
 from __future__ import annotations
@@ -31,16 +31,27 @@ Pixels = NDArray[np.uint8]
 COLUMNS = {"small": 3, "medium": 2, "large": 1}
 _DPI, _CSS = 150, 100  # pixels and CSS pixels per inch of the drawing
 _LEFT, _RIGHT, _BOTTOM, _TOP = 62, 18, 44, 28  # CSS pixels
-_NAMES = 215.0  # CSS pixels, widest left margin with names in it
+_NAMES = 215.0  # CSS pixels, widest left margin with names
 _TITLE, _LABEL, _NUMBER = 10.0, 8.8, 8.4  # pt
-_WIDER = 1.12  # text of panels that narrow screens shrink
+_WIDER = 1.12  # factor on the text of medium panels, which narrow screens shrink
 
 
 _DIVERGING = LinearSegmentedColormap.from_list("diverging", DIVERGING)
 
 
 def draw_panel(panel: Panel | MatrixPanel) -> Pixels:
-    """[height, width, 3] the panel alone."""
+    """Draw a panel alone.
+
+    Parameters
+    ----------
+    panel
+        What to draw.
+
+    Returns
+    -------
+    ndarray
+        Pixels [height, width, 3].
+    """
     width, height = size_of(panel)
     figure = Figure(figsize=(width / _CSS, height / _CSS), facecolor="white")
     named = isinstance(panel, MatrixPanel) or bool(panel.rows)
@@ -56,14 +67,17 @@ def draw_panel(panel: Panel | MatrixPanel) -> Pixels:
 
 
 def _room_for_names(panel: Panel | MatrixPanel) -> float:
-    """CSS pixels, as much as the longest needs."""
+    """Return the room in CSS pixels that the longest name needs."""
     if isinstance(panel, MatrixPanel):
         return _NAMES
     return min(_NAMES, 18 + 6.4 * _enlarged(panel) * max(len(name) for name in panel.rows))
 
 
 def png(pixels: Pixels, *, exact: bool = False) -> bytes:
-    """The same pixels, the same bytes. Unless exact: 32 shades of each colour, which saves a third."""
+    """Encode pixels as PNG; the same pixels give the same bytes.
+
+    Unless `exact`, each colour has 32 shades, which saves a third.
+    """
     file = BytesIO()
     if not exact:
         pixels = ((pixels.astype(np.uint16) * 31 + 127) // 255 * 255 // 31).astype(np.uint8)
@@ -73,7 +87,22 @@ def png(pixels: Pixels, *, exact: bool = False) -> bytes:
 
 
 def write_sheet(sheet: Sheet, panels: list[Pixels], file: Path) -> None:
-    """All panels of a sheet side by side below its title and its keys, as PNG: whole or not at all."""
+    """Write all panels of a sheet side by side below its title and its keys, as PNG, whole or not at all.
+
+    Parameters
+    ----------
+    sheet
+        Sheet with title and keys.
+    panels
+        Its panels, drawn by `draw_panel`.
+    file
+        PNG file.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written.
+    """
     columns = min(COLUMNS[sheet.panels[0].size], len(panels))
     rows = [panels[k : k + columns] for k in range(0, len(panels), columns)]
     width = columns * panels[0].shape[1]
@@ -158,7 +187,7 @@ def _draw_axes(axes: Axes, panel: Panel) -> None:
     for wanted, axis in ((panel.log_x, "x"), (panel.log_y, "y")):
         if wanted:
             axes.set(**{f"{axis}scale": "log"})
-            # without mathematics, which is not parsed (names may hold a $)
+            # The default formatter writes mathematics, which is not parsed here, since names may contain a $.
             getattr(axes, f"{axis}axis").set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
             getattr(axes, f"{axis}axis").set_minor_formatter(NullFormatter())
     if panel.near_x > 0:
@@ -218,7 +247,7 @@ def _label(axes: Axes, panel: Panel) -> None:
 
 
 def _short(panel: Panel) -> str:
-    """The title, shortened where it would run into the note."""
+    """Return the title, shortened where it would overlap the note."""
     width, _ = SIZES[panel.size]
     room = int((width - _LEFT - 6.2 * len(panel.note)) / (8.6 * _enlarged(panel)))
     return panel.title if len(panel.title) <= room else f"{panel.title[: room - 1]}…"

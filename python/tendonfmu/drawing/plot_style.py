@@ -1,4 +1,4 @@
-"""What all drawings by matplotlib share: clean axes, and PNG files of the same bytes for the same drawing."""
+"""What all matplotlib drawings share: clean axes, and PNG files that are the same for the same drawing."""
 
 from __future__ import annotations
 
@@ -37,7 +37,22 @@ Target = Path | IO[bytes]
 
 
 def save(figure: Figure, target: Target, dpi: int) -> None:
-    """PNG without a date or version in it: the same drawing, the same bytes. A file appears whole or not at all."""
+    """Save a figure as PNG without date or version, so that the same drawing gives the same bytes.
+
+    Parameters
+    ----------
+    figure
+        What to save.
+    target
+        File, written whole or not at all; or binary stream.
+    dpi
+        Pixels per inch.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written.
+    """
     with any_names(figure):
         if isinstance(target, Path):
             with whole_file(target) as partial:
@@ -48,7 +63,7 @@ def save(figure: Figure, target: Target, dpi: int) -> None:
 
 @contextmanager
 def any_names(figure: Figure) -> Iterator[FigureCanvasAgg]:
-    """A canvas to draw a figure on whose texts may hold a $, and letters that the font lacks (drawn as boxes)."""
+    """Make a canvas for a figure whose texts may contain a $ or letters that the font lacks (drawn as boxes)."""
     canvas = FigureCanvasAgg(figure)
     for text in figure.findobj(Text):
         text.set_parse_math(False)
@@ -58,7 +73,15 @@ def any_names(figure: Figure) -> Iterator[FigureCanvasAgg]:
 
 
 def clean(axes: Axes, labels: float = 12.0) -> None:
-    """Two spines and a light grid of horizontal lines. labels: size of the numbers, pt."""
+    """Leave two spines and a light grid of horizontal lines.
+
+    Parameters
+    ----------
+    axes
+        The axes.
+    labels : pt
+        Size of the numbers.
+    """
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(axis="y", color="#E6E6E6", linewidth=0.8)
     axes.set_axisbelow(True)

@@ -9,8 +9,17 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class EffectNumber:
-    """A number of an extension. least, most: its range. missing: its value where it is left out; None: required.
-    scale: its expected magnitude."""
+    """A number of an extension, in SI units.
+
+    Attributes
+    ----------
+    least, most
+        Its range.
+    missing
+        Its value where it is left out; None if it is required.
+    scale
+        Its expected magnitude.
+    """
 
     least: float
     most: float
@@ -18,7 +27,7 @@ class EffectNumber:
     scale: float
 
 
-# By path: SI units.
+# Default by path: SI units.
 DEFAULTS: Mapping[str, float] = {
     "joints.cover.rest_angle": 0.0,
     "velocity_threshold.tendon": 0.0005,

@@ -1,7 +1,8 @@
-"""Pages, figures and texts of every command. Computes nothing that is not only for showing.
+"""Pages, figures and texts of every command. Computes only what is needed to show results.
 
-`*_text` are sentences and rows, `*_figures` ready-made figures, `*_plots` draw them, `*_page` and `*_files` write
-pages and folders.
+- `*_text`: sentences and table rows
+- `*_figures`: figures ready to be drawn; `*_plots` draws them
+- `*_page`, `*_files`: pages and folders of files
 """
 
 import lazy_loader

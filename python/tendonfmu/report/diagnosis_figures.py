@@ -35,11 +35,22 @@ _CHANGE_KEYS = (
     ("after_dots", "now, with the change in the model"),
     ("after", "95 % interval of the mean"),
 )
-_ROOM = 3.0  # times the largest mean: more of the scatter within bins would hide the means
+_ROOM = 3.0  # times the largest mean: the y axis shows no more of the scatter, so that the means stay visible
 
 
 def diagnosis_sheets(found: Diagnosis) -> list[Sheet]:
-    """The evidence for each cause, then the residual at each joint."""
+    """Make the sheets of a diagnosis: the evidence for each cause, then the residual at each joint.
+
+    Parameters
+    ----------
+    found
+        Result of a diagnosis. Causes without evidence get no sheet.
+
+    Returns
+    -------
+    list of Sheet
+        Sections `cause_1`, `cause_2`, ... in the order of the causes, then `views`, one sheet per joint.
+    """
     names = names_of(found)
     return [
         *(_cause_sheet(found, names, k, cause) for k, cause in enumerate(found.causes, start=1) if cause.evidence),
@@ -64,7 +75,7 @@ def _cause_sheet(found: Diagnosis, names: Names, number: int, cause: Cause) -> S
 
 
 def _by_recording(found: Diagnosis, cause: Cause) -> Iterator[Panel]:
-    """How large a change is in each of several new recordings."""
+    """Show how large a change is in each of several new recordings."""
     changed = cause.changed
     if changed is None or not changed.by:
         return
@@ -107,13 +118,13 @@ def _evidence_panel(found: Evidence, names: Names, factor: float, unit: str) -> 
 
 
 def _near(travel: Numbers) -> float:
-    """What happens after a reversal happens within a small part of the travel: there the axis is stretched."""
+    """Return the travel (rad) up to which the axis is linear: most happens right after a reversal."""
     size = np.abs(travel[np.isfinite(travel)])
     return float(np.quantile(size, 0.25)) if len(size) else 0.0
 
 
 def _same_scale(panels: Sequence[Panel]) -> tuple[Panel, ...]:
-    """Panels to be compared: all with the limits of the widest."""
+    """Give all panels the limits of the widest, so that they can be compared."""
     ends = [end for panel in panels for bars in panel.bars for end in (*bars.low, *bars.high) if math.isfinite(end)]
     if not ends:
         return tuple(panels)
@@ -164,7 +175,7 @@ def _before_after(found: Diagnosis) -> tuple[tuple[str, str], ...]:
 
 
 def _shared_limits(views: Sequence[ResidualView], factor: float) -> tuple[float, float] | None:
-    """Of all binned views of a joint, so that they can be compared: the means, and of the scatter what fits."""
+    """Return y limits for all binned views of a joint: all means, and the scatter up to `_ROOM` times the largest."""
     means = [value for view in views for value in (*view.before, *view.after) if math.isfinite(value)]
     if not means:
         return None

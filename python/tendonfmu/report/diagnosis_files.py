@@ -1,4 +1,4 @@
-"""The files of a diagnosis: a folder that holds all of them, or is as it was before."""
+"""Which files a diagnosis writes. The output folder gets all of them, or stays as it was."""
 
 from __future__ import annotations
 
@@ -19,12 +19,25 @@ from tendonfmu.report.diagnosis_page import PAGE, write_diagnosis_page
 from tendonfmu.report.diagnosis_report import EXTENDED, EXTENDED_FMU, NOMINAL, REPORT, build_report, report_text
 from tendonfmu.tasks import uninterrupted
 
-_SUFFIXES = (".html", ".json", ".fmu", ".png")  # figures of the versions that wrote them beside the page
+_SUFFIXES = (".html", ".json", ".fmu", ".png")  # .png: earlier versions wrote figures beside the page
 _NAMED = (REPORT, EXTENDED, EXTENDED_FMU, PAGE, NOMINAL)
 
 
 def check_folder(folder: Path, inputs: Sequence[Path]) -> None:
-    """Raises InputError where the folder cannot be, or a result would take the place of an input."""
+    """Check before a long computation that the results can be written to a folder.
+
+    Parameters
+    ----------
+    folder
+        Output folder; it need not exist.
+    inputs
+        Files that the command reads.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be made or written, or a result would replace an input.
+    """
     check_output_folder(folder)
     if folder.is_dir():
         for name in _NAMED:
@@ -32,10 +45,27 @@ def check_folder(folder: Path, inputs: Sequence[Path]) -> None:
 
 
 def write_diagnosis(found: Diagnosis, folder: Path) -> dict[Path, str]:
-    """Writes report, both descriptions, the FMU and the page. Returns file -> what is in it, in order of use.
+    """Write the report, both descriptions, the FMU and the page.
 
-    Everything is made beside the folder and then moved into it, at once also for Ctrl-C; files that an earlier
-    diagnosis left there are removed. Raises InputError where nothing can be written: the folder is then as before.
+    The files are made in a temporary folder beside the output folder and moved in one step, which Ctrl-C does not
+    interrupt. Files that an earlier diagnosis wrote to the folder are removed.
+
+    Parameters
+    ----------
+    found
+        Result of a diagnosis.
+    folder
+        Output folder; it is made if missing.
+
+    Returns
+    -------
+    dict of Path to str
+        What each file contains, the first to read first.
+
+    Raises
+    ------
+    InputError
+        The files cannot be written. The folder is then as before.
     """
     beside = folder.absolute().parent
     try:
@@ -55,7 +85,7 @@ def write_diagnosis(found: Diagnosis, folder: Path) -> dict[Path, str]:
 
 @contextmanager
 def _folder_beside(folder: Path) -> Iterator[Path]:
-    """A temporary folder on the same disk, whose removal is not interrupted."""
+    """Make a temporary folder on the same disk. Its removal is not interrupted."""
     name = tempfile.mkdtemp(dir=folder.absolute().parent, prefix=f".{folder.absolute().name}-")
     try:
         yield Path(name)
@@ -65,9 +95,9 @@ def _folder_beside(folder: Path) -> Iterator[Path]:
 
 
 def _move(files: Iterable[Path], folder: Path, old: Path) -> None:
-    """Moves files into a folder, the report last, and takes those of an earlier diagnosis out; on an error, back.
+    """Move files into a folder, the report last, and move those of an earlier diagnosis to `old`; undo all on an error.
 
-    old: folder to be made for what was there before.
+    `old` must not exist; it is made here.
     """
     is_new = not folder.exists()
     folder.mkdir(exist_ok=True)
@@ -89,13 +119,13 @@ def _move(files: Iterable[Path], folder: Path, old: Path) -> None:
 
 
 def _make(found: Diagnosis, folder: Path) -> dict[Path, str]:
-    """All files, in a folder of their own."""
+    """Write all files to an empty folder."""
     page = write_diagnosis_page(found, folder)
     causes = len(found.causes)
     added = "nothing added" if causes == 0 else "its cause" if causes == 1 else f"its {causes} causes"
     for name, data in ((NOMINAL, found.nominal_data), (EXTENDED, found.extended_data)):
         write_text(folder / name, description_text(dict(data)))
-    build_fmu(folder / EXTENDED, folder / EXTENDED_FMU, illustrated=False)  # a drawing takes longer than all the rest
+    build_fmu(folder / EXTENDED, folder / EXTENDED_FMU, illustrated=False)  # drawing takes longer than all the rest
     files = {
         folder / PAGE: page.pop(folder / PAGE),
         folder / REPORT: "the same numbers",
@@ -109,8 +139,7 @@ def _make(found: Diagnosis, folder: Path) -> dict[Path, str]:
 
 
 def _earlier(folder: Path) -> list[str]:
-    """Names of what the report of an earlier diagnosis lists, and nothing else: also figures of causes that are no
-    more."""
+    """List the files that the report of an earlier diagnosis names, including figures of causes no longer found."""
     try:
         listed = json.loads((folder / REPORT).read_bytes())["files"]
     except (OSError, ValueError, KeyError, TypeError):

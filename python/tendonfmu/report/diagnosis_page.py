@@ -1,4 +1,4 @@
-"""The page of a diagnosis."""
+"""What the page of a diagnosis, `diagnosis.html`, shows."""
 
 from __future__ import annotations
 
@@ -50,25 +50,40 @@ from tendonfmu.report.fit_summary import rounded
 from tendonfmu.report.page import Tile, render
 
 PAGE = "diagnosis.html"
-_MOST = 4  # pairs that are listed
-_LONG = 90  # letters of a size that is a sentence
+_MOST = 4  # pairs listed at most
+_LONG = 90  # characters; a longer size is set as a sentence
 _TONES = {"adequate": "good", "explained": "good", "partly explained": "", "unexplained": "bad"}
 
 
 def write_diagnosis_page(found: Diagnosis, folder: Path) -> dict[Path, str]:
-    """Writes `diagnosis.html` into a folder that exists.
+    """Write `diagnosis.html` to an existing folder, whole or not at all.
 
-    Returns file -> what is in it. It appears whole or not at all. Raises InputError where it cannot be written.
+    Parameters
+    ----------
+    found
+        Result of a diagnosis.
+    folder
+        Output folder.
+
+    Returns
+    -------
+    dict of Path to str
+        What the file contains.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written.
     """
     page = folder / PAGE
     text = diagnosis_page(found)
     with whole_file(page) as partial:
         partial.write_text(text, encoding="utf-8")
-    return {page: "all of it, to be read in a browser"}
+    return {page: "all results, to be read in a browser"}
 
 
 def diagnosis_page(found: Diagnosis) -> str:
-    """HTML text of the page."""
+    """Return the HTML text of the page of a diagnosis."""
     names, (factor, unit) = names_of(found), unit_of(found)
     return render(
         "diagnosis.html.jinja",
@@ -139,7 +154,7 @@ def _experiment(found: Diagnosis, names: Names) -> Iterator[str]:
     plan = found.experiment
     for one, other in plan.separates[:_MOST]:
         first, second = (at_place(title_of(each.effect), each, names) for each in (one, other))
-        yield f"Tells apart: {first}; and {second}."
+        yield f"Distinguishes: {first}; from {second}."
     if len(plan.separates) > _MOST:
         yield f"And {count_of(len(plan.separates) - _MOST, 'more pair')}."
     if plan.makes_visible:
@@ -153,25 +168,42 @@ def _experiment(found: Diagnosis, names: Names) -> Iterator[str]:
 
 
 def cards_of(found: Diagnosis, names: Names) -> list[dict[str, Any]]:
-    """What a page tells of each cause; contact and unknown, which have no term in the model, come last."""
+    """Return what a page shows of each cause.
+
+    Parameters
+    ----------
+    found
+        Result of a diagnosis.
+    names
+        Names of its joints and tendons.
+
+    Returns
+    -------
+    list of dict
+        What the macro `card` in templates/parts.html.jinja reads, in the order of the causes. Contact and unknown
+        come last, since they have no term in the model.
+    """
     return [_card(found, cause, names) for cause in reported_causes(found)]
 
 
 def _card(found: Diagnosis, cause: Cause, names: Names) -> dict[str, Any]:
-    """certainty: of the cause, small. places: (joint, tendon, size) where the cause has numbers."""
+    """Return what a page shows of one cause.
+
+    `certainty` is printed small. `places` has (joint, tendon, size) where the cause has numbers.
+    """
     certainty = f"p = {probability(cause.p_value)}".replace("= <", "<")
     where = cause.where.effect
     meaning = {
-        CONTACT: "less error about the level of now than about that of the reference"
+        CONTACT: "less error about the level of the new recordings than about that of the reference"
         if cause.changed
         else "less error on the training recordings without these stretches",
-        UNKNOWN: "less error if what can be predicted were known",
+        UNKNOWN: "less error if the predictable part were known",
     }
     others = "" if len(found.causes) < 2 else "; the other causes kept"
-    own = f"less error in means of 10 ms, the slow bias taken off{others}"
+    own = f"less error in means of 10 ms, without the slow bias{others}"
     if found.kind == "change":
         others = others.replace("causes", "changes")
-        own = f"less of what is left of the new recordings beside what is wrong in both{others}"
+        own = f"less of the error that only the new recordings have{others}"
     # the tiles and the waterfall show r itself
     numbers = thresholds(found.extended_data)
     sizes = [size_at(where, each.parameters, numbers) for each in cause.places]
@@ -202,7 +234,7 @@ def _too_small(found: Diagnosis, names: Names) -> dict[str, Any]:
 
 
 def _errors(found: Diagnosis, names: Names, factor: float) -> list[dict[str, Any]]:
-    """A row per joint, and one of all together: rms, then the whiteness."""
+    """List the errors: a row per joint, then one for all joints; rms values first, then the lag-one correlations."""
     rows = []
     for j, row in enumerate(error_rows(found, names, factor)):
         total = j == len(found.nominal.train_rms)
@@ -213,7 +245,7 @@ def _errors(found: Diagnosis, names: Names, factor: float) -> list[dict[str, Any
 
 
 def _events(found: Diagnosis, names: Names, factor: float) -> list[tuple[str, ...]]:
-    """(recording, from, to, joints, peak, what)."""
+    """List the events as (recording, from, to, joints, peak, what)."""
     return [
         (
             event.recording,
@@ -246,7 +278,7 @@ def _detection(found: DetectionGain, factor: float, unit: str) -> dict[str, Any]
 
 
 def _recordings(found: Diagnosis) -> Iterator[tuple[str, str]]:
-    """(name, what it was used for)."""
+    """List the recordings as (name, what it was used for)."""
     now = "now, " if found.kind == "change" else ""
     training = "training, parts held out" if found.held_out else "training"
     yield from ((name, "reference") for name in found.references)
@@ -255,7 +287,7 @@ def _recordings(found: Diagnosis) -> Iterator[tuple[str, str]]:
 
 
 def _method(found: Diagnosis) -> Iterator[str]:
-    """In sentences, with the numbers that count."""
+    """Describe the method and its main numbers in sentences."""
     yield words_of(found.kind).method.format(least=percent(found.least_gain))
     yield f"The numbers were estimated from {found.signals}; errors and gains are those of the raw signals."
     if text := tested_sentence(found):

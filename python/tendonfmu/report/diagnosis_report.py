@@ -1,4 +1,4 @@
-"""The report of a diagnosis, "tendonfmu-diagnosis-1", as JSON: docs/reference/commands/diagnose.md."""
+"""What `diagnosis.json` contains: the report "tendonfmu-diagnosis-1" of docs/reference/commands/diagnose.md."""
 
 from __future__ import annotations
 
@@ -30,11 +30,24 @@ from tendonfmu.statistics import Interval
 
 FORMAT = "tendonfmu-diagnosis-1"
 REPORT, NOMINAL, EXTENDED, EXTENDED_FMU = "diagnosis.json", "nominal.json", "extended.json", "extended.fmu"
-DIGITS = 6  # of what is drawn
+DIGITS = 6  # significant digits of the curves
 
 
 def build_report(found: Diagnosis, files: Sequence[str] = ()) -> dict[str, Any]:
-    """The whole report: the keys of docs/reference/semantics.md#diagnosis-report first. files: names of other files."""
+    """Make the report of a diagnosis.
+
+    Parameters
+    ----------
+    found
+        Result of a diagnosis.
+    files
+        Names of the other files in the folder.
+
+    Returns
+    -------
+    dict
+        The keys of docs/reference/semantics.md#diagnosis-report first.
+    """
     report = {
         "format": FORMAT,
         "kind": found.kind,
@@ -90,7 +103,7 @@ def build_report(found: Diagnosis, files: Sequence[str] = ()) -> dict[str, Any]:
 
 
 def report_text(report: Mapping[str, Any]) -> str:
-    """JSON with an entry of a list of objects, or a curve of what is drawn, on one line each."""
+    """Format a report as JSON. Each entry of a list of objects and each curve is on a line of its own."""
     parts = []
     for key, value in report.items():
         listed = isinstance(value, list) and any(isinstance(each, dict) for each in value)
@@ -137,7 +150,7 @@ def _cause(cause: Cause, kind: str) -> dict[str, Any]:
 
 
 def _changed(found: ChangedSize | None) -> dict[str, Any]:
-    """reference, now: the main number then and now; null of what has none, such as contact."""
+    """Return the main number in the reference and now; null where there is none, as for contact."""
     if found is None:
         return {"reference": None, "now": None}
     return {
@@ -163,7 +176,7 @@ def _numbers_of(parameters: Mapping[str, tuple[float, str]]) -> dict[str, Any]:
 
 
 def _waterfall(found: Diagnosis) -> list[dict[str, Any]]:
-    """rms over all joints on unseen data: of the nominal model, then after each cause."""
+    """List the rms over all joints on unseen data: of the nominal model, then after each cause."""
     names = names_of(found)
     steps = [(words_of(found.kind).nominal, Where("", None, None))]
     steps += [(at_place(cause.title, cause.where, names), cause.where) for cause in found.causes]

@@ -1,4 +1,4 @@
-"""A diagnosis in plain words: names of places, sentences for page and terminal, and the tables that are printed."""
+"""How a diagnosis reads in plain words: names of places, sentences for page and terminal, printed tables."""
 
 from __future__ import annotations
 
@@ -24,29 +24,35 @@ from tendonfmu.statistics import Interval
 
 NBSP = "\u00a0"
 _NUMBERS = ("No", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine", "Ten")
-_MOST_PLACES = 4  # that are listed
-_TOLD = 2  # effects that are told at length
+_MOST_PLACES = 4  # listed at most
+_TOLD = 2  # invisible effects described one by one; more share a sentence
 Row = tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class Names:
-    """Of joints and tendons, as the description has them; empty where it has none."""
+    """Names of joints and tendons.
+
+    Attributes
+    ----------
+    joints, tendons
+        As in the description; empty where it has none.
+    """
 
     joints: tuple[str, ...]
     tendons: tuple[str, ...]
 
     def place(self, where: Where) -> str:
-        """Such as "joint 2 (pip), tendon 1 (fdp)"; empty for the whole finger."""
+        """Name a place, such as "joint 2 (pip), tendon 1 (fdp)"; empty for the whole finger."""
         parts = (("joint", where.joint, self.joints), ("tendon", where.tendon, self.tendons))
         return ", ".join(_numbered(kind, number, names) for kind, number, names in parts if number is not None)
 
     def joint(self, number: int) -> str:
-        """Such as "joint 2 (pip)"."""
+        """Name a joint by its number (from 1), such as "joint 2 (pip)"."""
         return _numbered("joint", number, self.joints)
 
     def places(self, cause: Cause) -> str:
-        """Of a cause: its place, or how many it has; "everywhere" for the whole finger."""
+        """Name the place of a cause, or count its places; "everywhere" for the whole finger."""
         place = self.place(cause.where)
         if len(cause.places) < 2:
             return place or "everywhere"
@@ -60,7 +66,7 @@ def _numbered(kind: str, number: int, names: Sequence[str]) -> str:
 
 
 def names_of(found: Diagnosis) -> Names:
-    """From the fitted description."""
+    """Return the names of joints and tendons from the fitted description."""
     return Names(*(tuple(str(each.get("name") or "") for each in found.nominal_data[key]) for key in _KINDS))
 
 
@@ -68,7 +74,7 @@ _KINDS = ("joints", "tendons")
 
 
 def title_of(effect: str) -> str:
-    """A few plain words for an effect of docs/reference/commands/diagnose.md."""
+    """Describe an effect of docs/reference/commands/diagnose.md in a few plain words."""
     from tendonfmu.diagnose import CANDIDATES
 
     titles = {candidate.name: candidate.title for candidate in CANDIDATES} | TITLES
@@ -76,7 +82,7 @@ def title_of(effect: str) -> str:
 
 
 def at_place(title: str, where: Where, names: Names) -> str:
-    """Such as "friction grows with the force, at joint 1 (mcp)"."""
+    """Add the place to a title, such as "friction grows with the force, at joint 1 (mcp)"."""
     place = names.place(where)
     return f"{title}, at {place}" if place else title
 
@@ -85,20 +91,20 @@ def at_place(title: str, where: Where, names: Names) -> str:
 
 
 def unit_of(found: Diagnosis) -> tuple[float, str]:
-    """Factor and name of the unit in which torques are told, all alike."""
+    """Return factor and name of the unit in which all torques of a diagnosis are shown."""
     rms = [*found.nominal.train_rms, *found.nominal.test_rms, *found.bias_only_rms]
     largest = max((value for value in rms if math.isfinite(value)), default=0.0)
     return (1e3, "mN·m") if largest < 2.0 else (1.0, "N·m")
 
 
 def together(values: Sequence[float]) -> float:
-    """rms over all joints of the rms of each; NaN without any."""
+    """Return the rms over all joints from the rms of each; NaN without joints."""
     known = [value for value in values if math.isfinite(value)]
     return math.sqrt(sum(value * value for value in known) / len(known)) if known else math.nan
 
 
 def percent(share: float) -> str:
-    """Two digits where that is enough: 31 %, 4.2 %, −0.3 %."""
+    """Format a share with two digits where that is enough: 31 %, 4.2 %, −0.3 %."""
     if not math.isfinite(share):
         return "–"
     value = 100 * share
@@ -108,14 +114,14 @@ def percent(share: float) -> str:
 
 
 def percent_interval(found: Interval) -> str:
-    """Such as "31 % (27 to 35 %)"."""
+    """Format a share with its interval, such as "31 % (27 to 35 %)"."""
     if not (math.isfinite(found.low) and math.isfinite(found.high)):
         return percent(found.value)
     return f"{percent(found.value)} ({percent(found.low).removesuffix(f'{NBSP}%')} to {percent(found.high)})"
 
 
 def probability(p_value: float) -> str:
-    """A p-value: 0.008, 3.4e-5; bounded where it is below what a computer tells."""
+    """Format a p-value, such as 0.008 or 3.4e-5; an upper bound where it is below what floating point resolves."""
     if not math.isfinite(p_value):
         return "–"
     if p_value < 1e-12:
@@ -125,7 +131,7 @@ def probability(p_value: float) -> str:
 
 
 def magnitude(value: float, unit: str) -> str:
-    """A number of the description with its unit, as people write it."""
+    """Format a number of the description with its unit."""
     told = unit.replace(".", "·")
     return f"{value:.4g}".replace("-", "−") + ("" if unit in ("", "1") else f"{NBSP}{told}")
 
@@ -134,7 +140,7 @@ def magnitude(value: float, unit: str) -> str:
 
 
 def headline(found: Diagnosis) -> str:
-    """The verdict, in one sentence; a second one where something touches the finger."""
+    """Return the verdict in one sentence, and a second one where something touches the finger."""
     count = len(found.causes)
     what = "changes" if found.kind == "change" else "causes"
     many = f"{_NUMBERS[count] if count < len(_NUMBERS) else count} {what}"
@@ -153,7 +159,18 @@ def headline(found: Diagnosis) -> str:
 
 
 def error_sentence(found: Diagnosis) -> str:
-    """Error before and after on unseen data, with the interval of the gain, and what the bias alone would leave."""
+    """Return a sentence on the error on unseen data.
+
+    Parameters
+    ----------
+    found
+        Result of a diagnosis.
+
+    Returns
+    -------
+    str
+        Error before and after with the interval of the gain, and the error that the bias alone would leave.
+    """
     factor, unit = unit_of(found)
     nominal, extended = (together(each.test_rms) for each in (found.nominal, found.extended))
     where = unseen(found)
@@ -173,9 +190,20 @@ def error_sentence(found: Diagnosis) -> str:
 
 @dataclass(frozen=True)
 class Left:
-    """What is left on unseen data, in the unit of `unit_of`; the parts add up to the whole as they are shown.
+    """What is left on unseen data, in the unit of `unit_of`.
 
-    whole: rms over all joints. noise: what nothing recorded predicts. nameless: the rest. digits: behind the point.
+    The parts add up to the whole as they are shown, rounding included.
+
+    Attributes
+    ----------
+    whole
+        rms over all joints.
+    noise
+        The part that nothing recorded predicts.
+    nameless
+        The rest.
+    digits
+        Decimals shown.
     """
 
     whole: float
@@ -188,7 +216,7 @@ class Left:
 
 
 def left_of(found: Diagnosis) -> Left | None:
-    """None where the noise floor is not known."""
+    """Return what is left on unseen data; None where the noise floor is unknown."""
     factor, _ = unit_of(found)
     whole, noise = factor * together(found.extended.test_rms), factor * together(found.noise_floor)
     if not (math.isfinite(whole) and math.isfinite(noise)):
@@ -199,7 +227,18 @@ def left_of(found: Diagnosis) -> Left | None:
 
 
 def left_sentence(found: Diagnosis) -> str:
-    """How much is left, how much of that could be predicted, and how much is noise; empty where that is not known."""
+    """Return a sentence on what is left on unseen data.
+
+    Parameters
+    ----------
+    found
+        Result of a diagnosis.
+
+    Returns
+    -------
+    str
+        How much is left, how much of that could be predicted, and how much is noise; empty where that is unknown.
+    """
     left, (_, unit) = left_of(found), unit_of(found)
     if left is None:
         return ""
@@ -214,44 +253,54 @@ def left_sentence(found: Diagnosis) -> str:
 
 
 def unknown_sentence(found: Diagnosis) -> str:
-    """Where that lives which can be predicted and has no name; empty where it is too little to matter."""
+    """Say where the part is that can be predicted but has no name; empty where it is too little to matter."""
     where = found.unexplained.description.strip().rstrip(".") if found.unexplained.unknown else ""
     return f"{where[0].upper()}{where[1:]}." if where else ""
 
 
 def too_small_sentence(found: Diagnosis) -> str:
-    """What stands in the list of what is too small."""
+    """Introduce the list of effects that are too small to matter."""
     return words_of(found.kind).small.format(least=percent(found.least_gain))
 
 
 def unseen(found: Diagnosis) -> str:
-    """On which data the gain was measured."""
+    """Name the data on which the gain was measured."""
     if found.held_out:
         return "parts of the recordings that were held out"
     return "a recording that it has not seen" if len(found.tests) == 1 else "recordings that it has not seen"
 
 
 def tested_sentence(found: Diagnosis) -> str:
-    """How many were tried, and what the p-values mean."""
+    """Say how many candidate causes were tested, and what the p-values mean."""
     if not found.tested:
         return ""
     return (
-        f"{found.tested} effects at places were tried. A p-value says how often the strongest of all of them would "
-        "look like that by chance if nothing were missing."
+        f"{found.tested} candidate causes were tested. A p-value is the probability that the strongest of them looks "
+        "like this by chance if nothing is missing."
     )
 
 
 def confusion_sentence(cause: Cause, names: Names) -> str:
-    """What the data cannot tell it from; empty without any."""
+    """Name what the data cannot distinguish a cause from; empty if nothing."""
     if not cause.confusable_with:
         return ""
     others = [at_place(title_of(other.effect), other, names) for other in cause.confusable_with]
-    return f"These data cannot tell it from: {'; '.join(others)}."
+    return f"These data cannot distinguish it from: {'; '.join(others)}."
 
 
 @dataclass(frozen=True)
 class Hidden:
-    """One effect that cannot be seen, at all its places. share: the largest that survives the refit."""
+    """One effect that these data cannot show, at all its places.
+
+    Attributes
+    ----------
+    title, places
+        The effect and its places, in plain words.
+    share
+        Largest share that survives the refit.
+    experiment
+        Experiment that would show it.
+    """
 
     title: str
     places: str
@@ -260,7 +309,7 @@ class Hidden:
 
 
 def hidden(found: Diagnosis, names: Names) -> list[Hidden]:
-    """Effects that cannot be seen, one each: the experiment of the place that shows most."""
+    """List the effects that these data cannot show, each with the experiment of the place that shows most."""
     by_effect: dict[str, list[Invisible]] = {}
     for each in found.invisible:
         by_effect.setdefault(each.where.effect, []).append(each)
@@ -276,7 +325,7 @@ def hidden(found: Diagnosis, names: Names) -> list[Hidden]:
 
 
 def hidden_sentences(found: Diagnosis, names: Names) -> Iterator[str]:
-    """What cannot be seen: one or two effects with how they could be, more in one sentence."""
+    """Describe what these data cannot show: up to `_TOLD` effects with an experiment each, more in one sentence."""
     effects = hidden(found, names)
     if len(effects) > _TOLD:
         listed = "; ".join(f"{each.title} ({each.places})" if each.places else each.title for each in effects)
@@ -285,7 +334,7 @@ def hidden_sentences(found: Diagnosis, names: Names) -> Iterator[str]:
         return
     for each in effects:
         place = f", at {each.places}" if each.places else ""
-        what, _, _ = each.experiment.partition(":")  # what to do; what it tells stands in the table of all
+        what, _, _ = each.experiment.partition(":")  # what to do; the table on the page says what it shows
         experiment = f" To see it: {what[0].lower()}{what[1:].rstrip('.')}." if what else ""
         if what.startswith("No "):
             experiment = f" {what.rstrip('.')}."
@@ -296,18 +345,29 @@ def hidden_sentences(found: Diagnosis, names: Names) -> Iterator[str]:
 
 
 def next_sentence(found: Diagnosis) -> str:
-    """What to record next."""
+    """Say what to record next."""
     sentence = found.experiment.sentence.rstrip(".")
     if found.kind == "change" and not sentence:
-        return "No further recording is needed: nothing is left to be told apart."
-    return f"{sentence}." if sentence else "No further experiment is needed: nothing is left to be told apart."
+        return "No further recording is needed: nothing is left to distinguish."
+    return f"{sentence}." if sentence else "No further experiment is needed: nothing is left to distinguish."
 
 
 # --- printed ----------------------------------------------------------------------------------------------------------
 
 
 def tables(found: Diagnosis) -> Iterator[tuple[str, Row, list[Row]]]:
-    """(title, headings, rows) of the causes and of the errors by joint."""
+    """List the tables to print: the causes, and the errors by joint.
+
+    Parameters
+    ----------
+    found
+        Result of a diagnosis.
+
+    Yields
+    ------
+    tuple
+        Title, headings, rows.
+    """
     names, causes = names_of(found), reported_causes(found)
     if causes:
         first = "change" if found.kind == "change" else "cause"
@@ -331,7 +391,10 @@ def tables(found: Diagnosis) -> Iterator[tuple[str, Row, list[Row]]]:
 
 
 def error_rows(found: Diagnosis, names: Names, factor: float) -> list[Row]:
-    """By joint: bias alone, nominal and extended on training and test data, noise floor; all joints where several."""
+    """List the errors by joint, then for all joints if there are several.
+
+    Columns: bias alone; nominal and extended model on training and test data; noise floor.
+    """
     columns = [
         found.bias_only_rms,
         found.nominal.train_rms,
@@ -353,7 +416,7 @@ def error_rows(found: Diagnosis, names: Names, factor: float) -> list[Row]:
 
 
 def lines(found: Diagnosis) -> Iterator[str]:
-    """Verdict, error, causes, what is left, what could not be told, and what to do next."""
+    """List the lines to print: verdict, error, causes, what is left, what cannot be distinguished, what to do next."""
     names = names_of(found)
     yield headline(found)
     yield error_sentence(found)
@@ -375,7 +438,7 @@ def lines(found: Diagnosis) -> Iterator[str]:
 
 
 def place_rows(cause: Cause, names: Names, sizes: Sequence[str]) -> list[tuple[str, str, str]]:
-    """(joint, tendon, size) of each place of a cause; sizes: of each."""
+    """List (joint, tendon, size) of each place of a cause; `sizes` has the size at each."""
     return [
         (_at("joint", each, names), _at("tendon", each, names), size)
         for each, size in zip(cause.places, sizes, strict=True)
@@ -390,12 +453,12 @@ def _at(kind: str, place: FoundPlace, names: Names) -> str:
 
 
 def parameter_rows(parameters: Mapping[str, tuple[float, str]]) -> list[tuple[str, str]]:
-    """(path, value with unit)."""
+    """List (path, value with unit) of numbers."""
     return [(path, magnitude(value, unit)) for path, (value, unit) in parameters.items()]
 
 
 def change_rows(cause: Cause, recordings: Sequence[str]) -> list[tuple[str, str]]:
-    """(when, main number with its 95 % interval): in the reference, and now or in each of several new recordings."""
+    """List (when, main number with its 95 % interval): in the reference, then now or in each new recording."""
     changed = cause.changed
     if changed is None:
         return []

@@ -1,4 +1,4 @@
-"""From the error of the nominal model to what is left: what each cause takes away, in rows ready to be shown."""
+"""How much error each cause takes away: rows from the error of the nominal model to what is left."""
 
 from __future__ import annotations
 
@@ -14,7 +14,15 @@ from tendonfmu.report.fit_summary import rounded
 
 @dataclass(frozen=True)
 class Part:
-    """Of a bar. tone: "nominal", "cause", "more", "noise" or "nameless". start, width: per cent of the widest bar."""
+    """Part of a bar.
+
+    Attributes
+    ----------
+    tone
+        "nominal", "cause", "more", "noise" or "nameless".
+    start, width
+        Per cent of the widest bar.
+    """
 
     tone: str
     start: float
@@ -23,7 +31,17 @@ class Part:
 
 @dataclass(frozen=True)
 class Row:
-    """label: in plain words, with place. value: what the bar is long, with sign where it is taken away."""
+    """Row of a waterfall.
+
+    Attributes
+    ----------
+    label
+        What the row shows, in plain words, with its place.
+    value
+        Length of the bar as text, with a sign where it is taken away.
+    parts
+        Parts of the bar.
+    """
 
     label: str
     value: str
@@ -32,8 +50,21 @@ class Row:
 
 @dataclass(frozen=True)
 class Waterfall:
-    """unit: of the values. floor: per cent at which the noise floor is; None where it is not known. nameless: what the
-    part of that name is; taken: that of a cause."""
+    """What each cause takes away from the error.
+
+    Attributes
+    ----------
+    unit
+        Unit of the values.
+    rows
+        From the error of the nominal model to what is left.
+    floor
+        Position of the noise floor, per cent of the widest bar; None if unknown.
+    nameless
+        Legend of the parts with the tone "nameless".
+    taken
+        Legend of the parts with the tone "cause".
+    """
 
     unit: str
     rows: tuple[Row, ...]
@@ -43,7 +74,20 @@ class Waterfall:
 
 
 def waterfall_of(found: Diagnosis, names: Names) -> Waterfall:
-    """Rows in the order of the causes; the values add up as they are shown."""
+    """Return the waterfall of a diagnosis.
+
+    Parameters
+    ----------
+    found
+        Result of a diagnosis.
+    names
+        Names of its joints and tendons.
+
+    Returns
+    -------
+    Waterfall
+        Rows in the order of the causes. The values add up as they are shown, rounding included.
+    """
     factor, unit = unit_of(found)
     steps = [factor * each for each in found.steps]
     widest = max([each for each in steps if math.isfinite(each)], default=0.0) or 1.0
@@ -79,7 +123,7 @@ def _rows(found: Diagnosis, names: Names, steps: list[float], widest: float) -> 
 
 
 def _noise(found: Diagnosis, last: float) -> float | None:
-    """What of the last step nothing predicts; all of it where no difference would be shown."""
+    """Return the noise part of the last step; all of it where the remainder would round to 0."""
     left = left_of(found)
     if left is None:
         return None

@@ -1,4 +1,4 @@
-"""The words of a report by what was asked: what the model lacks, or what has changed since a reference."""
+"""Which words a report uses: one set for what the model lacks, one for what has changed since a reference."""
 
 from __future__ import annotations
 
@@ -9,9 +9,30 @@ Three = tuple[str, str, str]  # with no cause, one, several
 
 @dataclass(frozen=True)
 class Words:
-    """nominal, extended: the two models, and the heads of their columns. headlines: by verdict. error: whose it is.
-    no_name, left: what of the rest is not noise. source, cause, causes: headings. small, method, residual, floor,
-    views: sentences. hidden: where nothing is. taken: what a bar shows. refitted: the nominal model in a key.
+    """Words of a report.
+
+    Attributes
+    ----------
+    nominal, extended
+        Names of the two models.
+    nominal_column, extended_column
+        Their headings in tables.
+    headlines
+        Verdict -> headline with no cause, with one, with several.
+    error
+        Follows "error": of which model.
+    no_name, left
+        The part of the remaining error that is not noise: in a sentence, and in a legend.
+    source, cause, causes
+        Headings.
+    small, method, residual, floor, views
+        Sentences.
+    hidden
+        Sentence used when every effect would be visible.
+    taken
+        Legend of what a cause takes away.
+    refitted
+        The nominal model in a legend.
     """
 
     nominal: str
@@ -65,21 +86,20 @@ MODEL = Words(
     error="",
     no_name="can be predicted from what was recorded, but has no name",
     left="left: can be predicted, has no name",
-    small="Seen in these recordings, but on unseen data each of them takes away less than {least} of the error, or not "
-    "for certain. They are not in the extended model.",
+    small="These effects are visible in the recordings, but on unseen data each removes less than {least} of the "
+    "error, or its gain is not certain. They are not in the extended model.",
     source="Where the error comes from",
     cause="The cause",
     causes="The causes, in order of gain",
-    method="The given model was fitted first; a cause is what that cannot mend. Every effect, at every place where the "
-    "model lacks it, was then tried. A cause has to take away at least {least} of the error that is left without it, "
-    "on data that it was not fitted to, and its 95 % interval has to lie above 0.",
-    residual="Nominal: the given structure, its own numbers refitted.",
-    floor="Noise floor: what of the extended model's error on {unseen} a flexible learner, which knows no physics, "
-    "cannot predict from anything that was recorded.",
+    method="The given model was fitted first. A cause is an effect that this fit cannot absorb. Every effect was then "
+    "tested at every place where the model lacks it. A cause must remove at least {least} of the error that is left "
+    "without it, on data that it was not fitted to, and its 95 % interval must lie above 0.",
+    residual="Nominal: the given structure with its own numbers refitted.",
+    floor="Noise floor: the part of the extended model's error on {unseen} that a flexible learner without physics "
+    "cannot predict from the recorded signals.",
     views="The residual at each joint, of the refitted nominal model{and_extended}.",
-    hidden="Nothing: every effect that was tested would be visible in these data, and no cause can be mistaken for "
-    "another.",
-    taken="taken away by a cause",
+    hidden="Nothing: these data would show every effect that was tested, and no cause can be mistaken for another.",
+    taken="removed by a cause",
     refitted="nominal model, refitted",
 )
 
@@ -113,26 +133,26 @@ CHANGE = Words(
     error=" of the model of the reference",
     no_name="the model gets wrong in the reference as well",
     left="left: wrong in the reference as well",
-    small="Seen, but on unseen parts of the new recordings each of them takes away less than {least} of what is left, "
-    "or not for certain. They are not in the model of now.",
+    small="These changes are visible, but on unseen parts of the new recordings each removes less than {least} of what "
+    "is left, or its gain is not certain. They are not in the model of now.",
     source="What the change is worth",
     cause="What has changed",
     causes="What has changed, in order of gain",
-    method="The model was fitted to the reference. What it gets wrong there and in the new recordings alike is shared "
-    "by both and blamed on nothing. Every number of the model, and every effect that it lacks, was then tried as a "
-    "change of the new recordings alone. A change has to take away at least {least} of what is left without it, in "
-    "parts of the new recordings that it was not fitted to, and its 95 % interval has to lie above 0. What wanders as "
-    "much from stretch to stretch of the recordings is no change.",
-    residual="Reference's: the model fitted to the reference, run over the new recordings.",
-    floor="Noise floor: what is left where the motion tells nothing more and what is wrong in both recordings is taken "
-    "off, in means of 10 ms.",
+    method="The model was fitted to the reference. Errors that the reference and the new recordings share are not "
+    "attributed to a change. Every number of the model, and every effect that it lacks, was then tested as a change of "
+    "the new recordings alone. A change must remove at least {least} of what is left without it, in parts of the new "
+    "recordings that it was not fitted to, and its 95 % interval must lie above 0. A number that varies as much from "
+    "stretch to stretch of the recordings has not changed.",
+    residual="Model of the reference: fitted to the reference, run over the new recordings.",
+    floor="Noise floor: the part of the error that the motion cannot predict, without the errors that both recordings "
+    "share, in means of 10 ms.",
     views="The residual of the new recordings at each joint, of the model of the reference{and_extended}.",
-    hidden="Nothing: every change that was tried would be visible in these data, and none can be mistaken for another.",
-    taken="taken away by a change",
+    hidden="Nothing: these data would show every change that was tested, and none can be mistaken for another.",
+    taken="removed by a change",
     refitted="model of the reference",
 )
 
 
 def words_of(kind: str) -> Words:
-    """kind: of a `Diagnosis`."""
+    """Return the words for a kind of diagnosis (`Diagnosis.kind`)."""
     return CHANGE if kind == "change" else MODEL

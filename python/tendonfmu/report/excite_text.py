@@ -1,4 +1,4 @@
-"""What a motion excites, in words: rows and lines that `cli/program.py` prints."""
+"""What a motion excites, as tables and lines that `cli/program.py` prints."""
 
 from __future__ import annotations
 
@@ -10,11 +10,22 @@ from tendonfmu.excite import ExciteResult
 
 Row = tuple[str, ...]
 KEYS = ("static", "coulomb", "stribeck_velocity", "viscous")
-NEVER = ("side", "working_point", "slow")  # causes that another motion mends
+NEVER = ("side", "working_point", "slow")  # causes that another motion removes
 
 
 def tables(result: ExciteResult) -> Iterator[tuple[str, Row, list[Row]]]:
-    """(title, headings, rows) of joints, effects and kinds of numbers."""
+    """List the tables to print: joints, friction effects, kinds of numbers.
+
+    Parameters
+    ----------
+    result
+        Result of `excite`.
+
+    Yields
+    ------
+    tuple
+        Title, headings, rows.
+    """
     motion = result.motion
     yield (
         f"{result.subject.finger.name}: {motion.time[-1]:g} s of motion, {_load(result)}",
@@ -69,7 +80,7 @@ def _effect_row(cover: EffectCoverage, verdicts: list[Verdict]) -> Row:
 
 
 def _which(lost: list[Verdict]) -> str:
-    """Which laws, and which sides of an asymmetric one."""
+    """Name the laws, and the sides of an asymmetric law."""
     effect = lost[0].number.effect
     if effect is not None and effect.angles:
         return "of laws " + _runs(sorted({v.number.point + 1 for v in lost}))
@@ -77,7 +88,7 @@ def _which(lost: list[Verdict]) -> str:
 
 
 def _runs(numbers: list[int]) -> str:
-    """1, 2, 3, 5 as "1-3, 5"."""
+    """Shorten 1, 2, 3, 5 to "1-3, 5"."""
     parts = []
     for _, group in groupby(enumerate(numbers), lambda pair: pair[1] - pair[0]):
         run = [number for _, number in group]
@@ -86,19 +97,30 @@ def _runs(numbers: list[int]) -> str:
 
 
 def lines(result: ExciteResult) -> Iterator[str]:
-    """The sum of it, what it rests on, and what another motion would mend."""
+    """List the lines to print: a summary, the assumptions, and which numbers another motion would identify.
+
+    Parameters
+    ----------
+    result
+        Result of `excite`.
+
+    Yields
+    ------
+    str
+        One line.
+    """
     judgement, noise = result.judgement, result.noise
     verdicts = judgement.verdicts
     known = sum(verdict.identifiable for verdict in verdicts)
     yield (
         f"{known} of {len(verdicts)} numbers can be identified one by one, "
-        f"{judgement.directions} independent combinations of them; each joint's bias is tracked besides"
+        f"{judgement.directions} independent combinations of them; each joint's bias is tracked as well"
     )
     for cause, count in identifiability.causes(verdicts).items():
         yield f"  {count} not: {identifiability.CAUSES[cause]}"
     tendons, joints = len(result.subject.finger.tendon_names), len(result.ranges)
     if result.plan.vary is None and "combination" in identifiability.causes(verdicts) and tendons > joints + 1:
-        yield "  --vary-tension LOW:HIGH loads the tendons in turn and tells more of those combinations apart"
+        yield "  --vary-tension LOW:HIGH loads the tendons in turn and identifies more of those combinations"
     yield (
         f"assumed: white noise of {noise.std:g} N·m + {noise.per_force:g} N·m per N in each {1e3 * noise.time:g} ms, "
         f"bias a random walk of {noise.drift:g} (N·m)²/s"

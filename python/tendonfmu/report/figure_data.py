@@ -1,4 +1,4 @@
-"""What the figures of compensated recordings show, computed for `plots.py`: joint torques and contacts."""
+"""What the figures of compensated recordings show: joint torques and contacts, computed for `plots.py`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,16 @@ Interval = tuple[float, float]
 
 @dataclass(frozen=True)
 class JointCurves:
-    """Curves of one joint, [N] N·m each; external: reference sensor, None without one."""
+    """Torques of one joint over time.
+
+    Attributes
+    ----------
+    name
+        Name of the joint.
+    measured, predicted, compensated : [N] N·m
+    external : [N] N·m
+        Reference sensor; None without one.
+    """
 
     name: str
     measured: Array
@@ -29,8 +38,21 @@ class JointCurves:
 
 @dataclass(frozen=True)
 class CompensationFigure:
-    """One recording. time: [N] s. Intervals (begin, end) in s: contact found, but for false alarms; false alarms, as
-    `score_detection` counts them; and contact as labelled, which is None without labels.
+    """What a figure of one compensated recording shows.
+
+    Attributes
+    ----------
+    title
+        Heading.
+    time : [N] s
+    joints
+        Curves of each joint drawn.
+    found : (begin, end) s
+        Contacts found, without false alarms.
+    false : (begin, end) s
+        False alarms, as `score_detection` counts them.
+    labelled : (begin, end) s
+        Contacts as labelled; None without labels.
     """
 
     title: str
@@ -43,7 +65,17 @@ class CompensationFigure:
 
 @dataclass(frozen=True)
 class StoryFigure:
-    """free: recordings of free motion, one joint each, side by side. pushed: one with contact, below them."""
+    """What the figure of the demo shows.
+
+    Attributes
+    ----------
+    title
+        Heading.
+    free
+        Recordings of free motion, one joint each, side by side.
+    pushed
+        A recording with contact, below them.
+    """
 
     title: str
     free: list[CompensationFigure]
@@ -52,7 +84,15 @@ class StoryFigure:
 
 @dataclass(frozen=True)
 class ReferenceCurves:
-    """One recording against its reference sensor. time: [N] s; the rest: [N] N·m, of one joint."""
+    """One joint of a recording against its reference sensor.
+
+    Attributes
+    ----------
+    title
+        Name of the recording.
+    time : [N] s
+    measured, compensated, external : [N] N·m
+    """
 
     title: str
     time: Array
@@ -63,7 +103,21 @@ class ReferenceCurves:
 
 @dataclass(frozen=True)
 class ReferenceFigure:
-    """Recordings drawn, and the rms error (N·m) of all of them: names [r], with and without the friction model [r]."""
+    """Recordings against their reference sensor.
+
+    Attributes
+    ----------
+    title
+        Heading.
+    drawn
+        The recordings whose curves are drawn.
+    names : [r]
+        All recordings.
+    error, error_without : [r] N·m
+        rms error of each, with and without the friction model.
+    limit : N·m
+        Limit of the error, drawn as a line.
+    """
 
     title: str
     drawn: list[ReferenceCurves]
@@ -81,10 +135,24 @@ def compensation_figure(
     title: str,
     joints: Sequence[int],
 ) -> CompensationFigure:
-    """Curves of some joints (indices from 0) of one recording.
+    """Compute the curves and contacts of one recording.
 
-    recording: `time` [N], maybe `external_torque` [N, n] and `contact` [N].
-    outputs: those of `native.Finger.run`, [N, n] and [N].
+    Parameters
+    ----------
+    description
+        The finger.
+    recording
+        `time` [N]; `external_torque` [N, n] and `contact` [N] if there are labels.
+    outputs
+        Outputs of `native.Finger.run`, [N, n] and [N].
+    title
+        Heading.
+    joints
+        Joints drawn, indices from 0.
+
+    Returns
+    -------
+    CompensationFigure
     """
     time = recording["time"]
     labels, external = recording.get("contact"), recording.get("external_torque")
@@ -111,7 +179,7 @@ def compensation_figure(
 
 
 def intervals(time: Array, flags: Array) -> list[Interval]:
-    """Begin and end (s) of each stretch of samples whose flag is set; a stretch lasts until the next sample."""
+    """Return begin and end (s) of each stretch of samples whose flag is set; a stretch lasts until the next sample."""
     steps = np.diff(np.concatenate([[0], np.asarray(flags).astype(bool).astype(int), [0]]))
     begins, ends = np.flatnonzero(steps > 0), np.minimum(np.flatnonzero(steps < 0), len(time) - 1)
     return [(float(time[a]), float(time[b])) for a, b in zip(begins, ends, strict=True)]

@@ -1,4 +1,4 @@
-"""What the covariance of a fit says: standard error over value of every number, and how the unknowns are correlated."""
+"""How well a fit knows its numbers: standard error over value of each, and the correlations of the unknowns."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ Numbers = NDArray[np.float64]
 
 _SHOWN = (1e-3, 10.0)  # standard error over value
 _TICKS = ((1e-3, "0.1 %"), (1e-2, "1 %"), (1e-1, "10 %"), (1.0, "100 %"), (10.0, "1000 %"))
-_STRONG, _MANY = 0.5, 100  # correlation, and unknowns from which on such entries are drawn larger
-_NARROWEST = 0.035  # of all unknowns, a group that has its own name beside the correlation matrix
+_STRONG, _MANY = 0.5, 100  # correlation; with more unknowns than this, such entries are drawn larger
+_NARROWEST = 0.035  # share of all unknowns; smaller groups share a name beside the correlation matrix
 _KINDS = {
     "friction": "joint friction",
     "load_friction": "load friction",
@@ -42,7 +42,7 @@ class Pair:
 
 
 def kind_of(path: str) -> tuple[int, int, str]:
-    """Rank and name of the kind of a number: where it acts, and which number of a law it is."""
+    """Return rank and name of the kind of a number: where it acts, and which number of a law it is."""
     key = path.rsplit(".", 1)[-1]
     for rank, (place, name) in enumerate(_KINDS.items()):
         if re.search(rf"\.{place}(\[|\.)", path) and key in _ORDER:
@@ -54,7 +54,7 @@ def kind_of(path: str) -> tuple[int, int, str]:
 
 
 def relative_error(entry: Mapping[str, Any]) -> float:
-    """Standard error over value of a number of the report; infinite where there is none."""
+    """Return standard error over value of a number of the report; infinite where there is none."""
     error, value = entry.get("standard_error"), entry.get("value")
     if error is None or not value or not np.isfinite(error):
         return float("inf")
@@ -62,7 +62,7 @@ def relative_error(entry: Mapping[str, Any]) -> float:
 
 
 def error_sheet(picture: FitPicture) -> Sheet:
-    """Every estimated number as a dot, by kind."""
+    """Show every estimated number as a dot, by kind."""
     entries = picture.report["parameters"]
     kinds = sorted({kind_of(entry["path"]) for entry in entries})
     row_of = {kind: row for row, kind in enumerate(kinds)}
@@ -94,15 +94,15 @@ def error_sheet(picture: FitPicture) -> Sheet:
         section="errors",
         name="standard_errors",
         title="How well each number is known",
-        caption="Behind each kind: how many of its numbers are identified. The line is at "
-        f"{100 * identifiability.LIMIT:.0f} % of the value; what lies beyond the axis is drawn at its end.",
+        caption="Each kind shows how many of its numbers are identified. The line is at "
+        f"{100 * identifiability.LIMIT:.0f} % of the value. Dots beyond the axis are drawn at its end.",
         keys=(("identified", "identified"), ("unidentified", "not identified")),
         panels=(panel,),
     )
 
 
 def _dots(members: list[list[Mapping[str, Any]]]) -> Iterator[Dots]:
-    """Dots of a row side by side in order of their place in the description, so that none hides another."""
+    """Place the dots of a row side by side in the order of the description, so that none hides another."""
     for style, wanted in (("identified", True), ("unidentified", False)):
         x, y = [], []
         for row, found in enumerate(members):
@@ -117,19 +117,19 @@ def _dots(members: list[list[Mapping[str, Any]]]) -> Iterator[Dots]:
 
 
 def correlation(covariance: Numbers) -> Numbers:
-    """[p, p] from a covariance; 0 for what has no variance."""
+    """Return the correlations [p, p] of a covariance; 0 where the variance is 0."""
     size = np.sqrt(np.diag(covariance))
     scale = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0)
     return np.asarray(np.clip(covariance * scale[:, None] * scale[None, :], -1.0, 1.0))
 
 
 def unknown_name(path: str, role: str) -> str:
-    """Path of an unknown in the fit's own form: the last part says its role."""
+    """Return the path of an unknown in the fit's own form: the last part says its role."""
     return path if role == "value" else f"{path.rsplit('.', 1)[0]}.{role}"
 
 
 def strongest_pairs(picture: FitPicture, count: int) -> list[Pair]:
-    """The pairs of unknowns whose errors are most strongly correlated, strongest first."""
+    """Return the pairs of unknowns whose errors are most strongly correlated, strongest first."""
     matrix = np.abs(correlation(picture.covariance))
     rows, columns = np.triu_indices(len(matrix), 1)
     strength = matrix[rows, columns]
@@ -140,7 +140,7 @@ def strongest_pairs(picture: FitPicture, count: int) -> list[Pair]:
 
 
 def correlation_sheet(picture: FitPicture) -> Sheet:
-    """Correlation of all unknowns, ordered by where they act."""
+    """Show the correlations of all unknowns, ordered by where they act."""
     places = [_place(unknown.path) for unknown in picture.unknowns]
     order = sorted(range(len(places)), key=lambda k: places[k])
     matrix = correlation(picture.covariance)[np.ix_(order, order)]
@@ -158,25 +158,25 @@ def correlation_sheet(picture: FitPicture) -> Sheet:
     return Sheet(
         section="correlation",
         name="correlation",
-        title="What the data cannot tell apart",
+        title="What the data cannot distinguish",
         caption="Correlation of the errors of all unknowns, in the fit's own form (coulomb, drop = static − coulomb, "
         "rate = 1/stribeck_velocity, viscous), ordered by where they act. Red: their difference is known better than "
         "either of them; blue: their sum is. "
-        + ("Strong ones are drawn larger than they are." if len(panel.marked) else ""),
+        + ("Entries with a strong correlation are drawn enlarged." if len(panel.marked) else ""),
         keys=(("positive", "+1"), ("uncorrelated", "0"), ("opposed", "−1")),
         panels=(panel,),
     )
 
 
 def _marked(matrix: Numbers) -> NDArray[np.intp]:
-    """Entries beside the diagonal that must not be overlooked among many."""
+    """Find strong entries off the diagonal that would be too small to see among many."""
     if len(matrix) < _MANY:
         return np.empty((0, 2), dtype=np.intp)
     return np.argwhere((np.abs(matrix) >= _STRONG) & ~np.eye(len(matrix), dtype=bool))
 
 
 def _groups(picture: FitPicture, places: list[tuple[int, int]]) -> tuple[tuple[str, int, int], ...]:
-    """Name, begin and end of the unknowns of each joint and tendon; small neighbours of a kind share a name."""
+    """Return name, begin and end of the unknowns of each joint and tendon; small neighbours of a kind share a name."""
     begins = [k for k in range(len(places)) if k == 0 or places[k] != places[k - 1]]
     merged: list[tuple[int, int]] = []
     for begin, end in zip(begins, [*begins[1:], len(places)], strict=True):
@@ -194,7 +194,7 @@ def _groups(picture: FitPicture, places: list[tuple[int, int]]) -> tuple[tuple[s
 
 
 def _place(path: str) -> tuple[int, int]:
-    """Joints before tendons before the rest, and the number of the joint or tendon."""
+    """Return a sort key: joints before tendons before the rest, then the number of the joint or tendon."""
     found = _PLACE.match(path)
     return (2, 0) if found is None else ((0 if found[1] == "joints" else 1), int(found[2]))
 

@@ -1,7 +1,7 @@
-"""The figures of a fit, ready to be drawn: torque and modelled friction over time (figs. 6 and 7 of the
-paper), and the residual over time, angle and velocity.
+"""What the figures of a fit show: torque, modelled friction and residual, ready to be drawn.
 
-The friction laws are in `fit_law_figures.py`, what comes of the covariance in `fit_error_figures.py`.
+Torque and friction over time are figs. 6 and 7 of the paper. The residual is shown over time, angle and velocity.
+The friction laws are in `fit_law_figures.py`, the figures of the covariance in `fit_error_figures.py`.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from tendonfmu.report.fit_law_figures import law_sheets
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-SHOWN = 10.0  # s of motion, from BEGIN on as in the paper's figs. 6 and 7, where the recording is that long
+SHOWN = 10.0  # s of motion, starting at BEGIN as in the paper's figs. 6 and 7 if the recording is long enough
 BEGIN = 60.0
-COMPARED = 3  # recordings beyond the training that are drawn, so that the page stays small
+COMPARED = 3  # recordings not trained on that are drawn; more would make the page too large
 _BINS, _TIME_BINS = 36, 150
-_FEWEST = 8  # samples in a bin
+_FEWEST = 8  # samples in a bin; emptier bins are left out
 _TORQUE_KEYS = (
     ("measured", "measured joint torque"),
     ("predicted", "model with bias, before it sees the sample"),
@@ -32,13 +32,13 @@ _TORQUE_KEYS = (
 )
 _RESIDUAL_CAPTION = (
     "Residual before the bias has seen the sample: measured minus modelled torque. A median away from 0 over the angle "
-    "or the velocity is friction that the model does not have; a wide band is noise or stick-slip."
+    "or the velocity is friction that the model lacks; a wide band is noise or stick-slip."
 )
 _RESIDUAL_KEYS = (("median", "median"), ("spread", "10 to 90 % of the samples"), ("held_out", "held out of training"))
 
 
 def fit_sheets(picture: FitPicture) -> list[Sheet]:
-    """All figures of a fit, in the order of the page."""
+    """Make all figures of a fit, in the order of the page."""
     return [
         *torque_sheets(picture),
         *residual_sheets(picture),
@@ -49,13 +49,13 @@ def fit_sheets(picture: FitPicture) -> list[Sheet]:
 
 
 def rms(values: Numbers) -> float:
-    """Root of the mean square of what is a number; NaN of nothing."""
+    """Return the root of the mean square of the finite values; NaN if there are none."""
     known = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(np.square(known)))) if known.size else float("nan")
 
 
 def torque_unit(series: Sequence[FitSeries]) -> tuple[float, str]:
-    """Factor and unit in which torques read well."""
+    """Return factor and unit in which the torques of these recordings read well."""
     largest = max((float(np.nanmax(np.abs(each.torque))) for each in series), default=0.0)
     return (1.0, "N·m") if largest >= 2.0 else (1e3, "mN·m")
 
@@ -64,14 +64,25 @@ def torque_unit(series: Sequence[FitSeries]) -> tuple[float, str]:
 
 
 def torque_sheets(picture: FitPicture) -> Iterator[Sheet]:
-    """Ten seconds of the first training recording, of what was held out of it, and of each comparison, there the same
-    seconds as of the training if it has them: it may be the same motion."""
+    """Show the torque over time, ten seconds of each set of data.
+
+    Parameters
+    ----------
+    picture
+        A fit and its data.
+
+    Yields
+    ------
+    Sheet
+        The first training recording, what was held out of it, and each comparison. A comparison shows the same seconds
+        as the training if it has them, since it may be the same motion.
+    """
     first = BEGIN
     explanation = (
-        " The residual is taken before the bias has seen the sample; its share is of the rms in the time shown."
+        " The residual is taken before the bias has seen the sample. Its share is that of the rms in the time shown."
     )
     if any(each.get("external_torque") for each in picture.report["recordings"]):
-        explanation += " Where an external torque was measured, the torque shown is less that."
+        explanation += " A measured external torque is subtracted from the torque shown."
     for number, (part, series, where) in enumerate(_parts(picture), start=1):
         shown = _window(series.time, where, first)
         begin, end = float(series.time[shown][0]), float(series.time[shown][-1])
@@ -107,7 +118,7 @@ def _compared(picture: FitPicture) -> list[FitSeries]:
 
 
 def _window(time: Numbers, where: Flags, first: float) -> NDArray[np.bool_]:
-    """Samples of `SHOWN` seconds in the first stretch of `where` that is so long, from `first` s on if that can be."""
+    """Flag `SHOWN` seconds in the first stretch of `where` that is long enough, from `first` s on if possible."""
     stretches = intervals(time, where) or [(float(time[0]), float(time[-1]))]
     wanted = float(time[0]) + first
     later = [(max(begin, wanted), end) for begin, end in stretches if end - max(begin, wanted) >= SHOWN]
@@ -148,7 +159,7 @@ def _share(left: float, size: float) -> str:
 
 
 def _gaps(all_times: Numbers, time: Numbers) -> NDArray[np.intp]:
-    """Where a line must break: steps of more than ten usual ones."""
+    """Return where a line must break: time steps of more than ten usual ones."""
     usual = float(np.median(np.diff(all_times)))
     return np.flatnonzero(np.diff(time) > 10 * usual) + 1
 
@@ -157,7 +168,7 @@ def _gaps(all_times: Numbers, time: Numbers) -> NDArray[np.intp]:
 
 
 def residual_sheets(picture: FitPicture) -> Iterator[Sheet]:
-    """Residual over time, angle and velocity of each joint: all training together, then each comparison."""
+    """Show the residual of each joint over time, angle and velocity: all training data, then each comparison."""
     training = [series for series in picture.series if series.role == "training"]
     if training:
         label = training[0].label if len(training) == 1 else f"{len(training)} recordings, end to end"
@@ -218,14 +229,14 @@ def _residual_panels(
 
 
 def _judged(series: FitSeries) -> Flags:
-    """Samples whose residual says something of the model: trained on or held out; all of a comparison."""
+    """Flag the samples whose residual judges the model: trained on or held out; all samples of a comparison."""
     if series.role == "comparison":
         return np.ones(len(series.time), dtype=bool)
     return series.used if series.held_out is None else series.used | series.held_out
 
 
 def _end_to_end(series: Sequence[FitSeries]) -> tuple[Numbers, list[Interval]]:
-    """Times of recordings one after the other from 0 on, and where they were held out."""
+    """Return the times of recordings joined end to end, from 0, and the intervals that were held out."""
     times, stripes, begin = [], [], 0.0
     for each in series:
         time = each.time - each.time[0] + begin
@@ -237,7 +248,10 @@ def _end_to_end(series: Sequence[FitSeries]) -> tuple[Numbers, list[Interval]]:
 
 
 def _binned(x: Numbers, y: Numbers, even: bool) -> tuple[Numbers, Numbers, Numbers, Numbers]:
-    """Middle of each bin, and there 10, 50 and 90 % of y. even: bins as wide as each other; otherwise as full."""
+    """Return the middle of each bin, and there the 10, 50 and 90 % quantiles of y.
+
+    Bins have the same width if `even`, the same number of samples otherwise.
+    """
     if not x.size:
         return np.empty(0), np.empty(0), np.empty(0), np.empty(0)
     edges = (

@@ -1,4 +1,4 @@
-"""Panels of the friction laws of a fit: one sheet for the joints, one for each tendon."""
+"""What the friction laws of a fit look like: one sheet for the joints, one for each tendon."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from tendonfmu.model import Effect, effects, sliding_velocity, velocity_threshol
 Numbers = NDArray[np.float64]
 
 LAWS_DRAWN = 240  # friction effects at most; a snake of 16 joints and 64 tendons has thousands
-_LOOKED_AT = 20_000  # samples, for what a motion visits
+_LOOKED_AT = 20_000  # samples at most that say where the motion was
 _POINTS = 160  # of a curve
-_HEADROOM = 2.5  # a band that is wider than this times the highest curve leaves the panel
+_HEADROOM = 2.5  # the axis ends at this times the highest curve, even if a band is wider
 _LAW_KEYS = (
     ("confidence", "95 % confidence"),
     ("start", "start"),
@@ -25,7 +25,18 @@ _LAW_KEYS = (
 
 
 def law_sheets(picture: FitPicture) -> Iterator[Sheet]:
-    """One sheet for the friction in the joints, one for each tendon."""
+    """Show the friction laws of a fit.
+
+    Parameters
+    ----------
+    picture
+        A fit and its data.
+
+    Yields
+    ------
+    Sheet
+        One for the friction in the joints, then one for each tendon; at most `LAWS_DRAWN` laws in all.
+    """
     desk = _Desk(picture)
     pairs = list(zip(effects(picture.start), effects(picture.fitted), strict=True))
     drawn = pairs[:LAWS_DRAWN]
@@ -56,7 +67,7 @@ def _caption(drawn: Sequence[Effect]) -> str:
 
 
 def _is_plain(effect: Effect) -> bool:
-    """Whether it has working points and one side for both directions."""
+    """Say whether a law has working points and one side for both directions."""
     return bool(effect.angles) and not asymmetric(effect)
 
 
@@ -68,12 +79,12 @@ def _keys(picture: FitPicture, drawn: Sequence[Effect]) -> tuple[tuple[str, str]
     if any(asymmetric(effect) for effect in points):
         first += [("negative", "negative direction")]
     still = any(not effect.angles and velocity_threshold(picture.fitted, effect) for effect in drawn)
-    rest = [("standstill", "below v_min: none acts, that is the bias's part")] if still else []
+    rest = [("standstill", "below v_min: no friction acts, the bias takes its part")] if still else []
     return (*first, *_LAW_KEYS, *rest)
 
 
 class _Motion:
-    """What the training visits: samples of angle and velocity, thinned."""
+    """Angles and velocities that the training visits, thinned."""
 
     def __init__(self, picture: FitPicture) -> None:
         self._data = picture.fitted
@@ -86,7 +97,7 @@ class _Motion:
         self._angle, self._speed = angle[known], speed[known]
 
     def sliding(self, effect: Effect) -> tuple[Numbers, Numbers]:
-        """Velocities with which the effect slides, signed, and the angles of the joint before at these samples."""
+        """Return the signed velocities at which an effect slides, and the angles of the joint before then."""
         velocity = sliding_velocity(self._data, effect, self._speed)
         angle = self._angle[:, effect.joint - 2] if effect.joint > 1 else np.zeros(len(velocity))
         slides = np.abs(velocity) > velocity_threshold(self._data, effect)
@@ -94,7 +105,7 @@ class _Motion:
 
 
 class _Desk:
-    """Draws up the panels of one fit."""
+    """Makes the panels of one fit."""
 
     def __init__(self, picture: FitPicture) -> None:
         self._picture, self._bands, self._motion = picture, LawBands(picture), _Motion(picture)
@@ -115,7 +126,7 @@ class _Desk:
         )
 
     def _over_speed(self, start: Effect, fitted: Effect) -> Panel:
-        """Both directions as in fig. 2b: 0 below v_min."""
+        """Show both directions as in fig. 2b: 0 below v_min."""
         threshold = velocity_threshold(self._picture.fitted, fitted)
         sliding, _ = self._motion.sliding(fitted)
         slowest = max(threshold, 1e-6)
@@ -151,7 +162,7 @@ class _Desk:
         )
 
     def _over_angle(self, start: Effect, fitted: Effect) -> Panel:
-        """At two speeds, or both directions at one where they differ."""
+        """Show a law at two speeds, or both directions at one speed where they differ."""
         threshold = velocity_threshold(self._picture.fitted, fitted)
         sliding, visited = self._motion.sliding(fitted)
         median = float(np.median(np.abs(sliding))) if sliding.size else 4.0 * threshold
@@ -188,14 +199,14 @@ class _Desk:
 
 
 def _top(curves: Sequence[LawCurve]) -> float:
-    """Upper end of the axis: all curves, and the bands where they are not too wide."""
+    """Return the upper end of the axis: all curves, and the bands where they are not too wide."""
     lines = max(float(np.max([curve.fitted, curve.start])) for curve in curves)
     bands = max(float(np.max(curve.high)) for curve in curves)
     return 1.08 * max(lines, min(bands, _HEADROOM * lines)) or 1.0
 
 
 def _unit(effect: Effect, curves: Sequence[LawCurve]) -> tuple[float, str]:
-    """Factor and label of the friction."""
+    """Return factor and label of the friction axis."""
     if effect.tendon:
         return 1e2, "share of force (%)"
     largest = _top(curves)
@@ -204,7 +215,7 @@ def _unit(effect: Effect, curves: Sequence[LawCurve]) -> tuple[float, str]:
 
 
 def _histogram(values: Numbers, low: float, high: float) -> tuple[Numbers, Numbers] | None:
-    """Bin edges, and heights of which the highest is 1."""
+    """Return bin edges and heights, the highest 1."""
     if not values.size:
         return None
     counts, edges = np.histogram(values, 60, (low, high))

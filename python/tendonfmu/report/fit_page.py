@@ -1,4 +1,4 @@
-"""The page of a fit, and its figures as PNG files beside it."""
+"""What the page of a fit, `report.html`, shows, and its figures as PNG files beside it."""
 
 from __future__ import annotations
 
@@ -24,16 +24,31 @@ from tendonfmu.report.fit_summary import (
 from tendonfmu.report.page import render
 
 PAGE = "report.html"
-PAIRS = 20  # most strongly correlated, in a table
+PAIRS = 20  # most strongly correlated pairs in the table
 
 Cells = tuple[str, ...]
 Entry = Mapping[str, Any]
 
 
 def write_fit_page(picture: FitPicture, folder: Path) -> dict[Path, str]:
-    """Writes one PNG per sheet and `report.html` into a folder, which is made if missing.
+    """Write `report.html` and one PNG file per sheet to a folder. Files appear whole or not at all.
 
-    Returns file -> what is in it. Files appear whole or not at all. Raises InputError where they cannot be written.
+    Parameters
+    ----------
+    picture
+        A fit and its data.
+    folder
+        Output folder; it is made if missing.
+
+    Returns
+    -------
+    dict of Path to str
+        What each file contains.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be made, or a file cannot be written.
     """
     from tendonfmu.drawing import draw_panel, write_sheet
 
@@ -50,11 +65,11 @@ def write_fit_page(picture: FitPicture, folder: Path) -> dict[Path, str]:
     text = fit_page(picture, summarise(picture), sheets)
     with whole_file(page) as partial:
         partial.write_text(text, encoding="utf-8")
-    return {page: "all of it, to be read in a browser"} | written
+    return {page: "all results, to be read in a browser"} | written
 
 
 def fit_page(picture: FitPicture, summary: Summary, sheets: Sequence[Sheet]) -> str:
-    """HTML text of the page."""
+    """Return the HTML text of the page of a fit."""
     pairs = [
         (f"{each.correlation:+.3f}".replace("-", "−"), each.first, each.second)
         for each in strongest_pairs(picture, PAIRS)
@@ -79,7 +94,7 @@ def fit_page(picture: FitPicture, summary: Summary, sheets: Sequence[Sheet]) -> 
 
 
 def _residuals(table: ResidualTable) -> dict[str, Any]:
-    """(name, torque, fitted, left, before the fit, bias alone, friction alone)."""
+    """Return title and rows (name, torque, fitted, left, before the fit, bias alone, friction alone) of a table."""
 
     def cells(values: Sequence[float | None]) -> Iterator[str]:
         return (rounded(value) for value in values)
@@ -109,7 +124,7 @@ def _doubtful(entry: Entry) -> Cells:
 
 
 def _group(group: NumberGroup) -> dict[str, Any]:
-    """(number, start, fitted, standard error, unit, identified)."""
+    """Return a group with rows (number, start, fitted, standard error, unit, identified)."""
     return {
         "name": group.name,
         "identified": group.identified,
@@ -136,7 +151,7 @@ def _recording(each: Entry) -> Cells:
 
 
 def _options(report: Mapping[str, Any]) -> dict[str, str]:
-    """Those given, as text."""
+    """Return the options that were given, as text."""
 
     def text(value: Any) -> str:
         if isinstance(value, list | tuple):
@@ -147,10 +162,10 @@ def _options(report: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _unit(name: str) -> str:
-    """As people write it; nothing for a plain number."""
+    """Format a unit; empty for a plain number."""
     return "" if name == "1" else name.replace(".", "·")
 
 
 def _number(value: float | None, digits: int = 3) -> str:
-    """A number with some significant digits; a dash where there is none."""
+    """Format a number with some significant digits; a dash where there is none."""
     return "–" if value is None or value != value else f"{value:.{digits}g}"

@@ -1,5 +1,6 @@
-"""What a fit says on the first screen of its page: plain sentences, the figures that matter, tables of residuals and of
-numbers. All values come from the report.
+"""What a fit says on the first screen of its page.
+
+Plain sentences, the main figures, tables of residuals and of numbers. All values come from the report.
 """
 
 from __future__ import annotations
@@ -24,7 +25,17 @@ _GROUP = re.compile(r"(joints|tendons)\[(\d+)\]\.?(.*)")
 
 @dataclass(frozen=True)
 class ResidualRow:
-    """Of one joint, or of all together: rms in `ResidualTable.unit`, None where unknown. left: residual over torque."""
+    """Residuals of one joint, or of all together.
+
+    Attributes
+    ----------
+    name
+        Name of the joint, or of the set of data.
+    torque, start, bias_only, model_only, fitted
+        rms in `ResidualTable.unit`; None where unknown.
+    left
+        Residual over torque.
+    """
 
     name: str
     torque: float | None
@@ -37,7 +48,19 @@ class ResidualRow:
 
 @dataclass(frozen=True)
 class ResidualTable:
-    """One set of data, a row per joint; or all sets of a finger with one joint. all: all joints together."""
+    """Residuals of one set of data, a row per joint; or of all sets if the finger has one joint.
+
+    Attributes
+    ----------
+    title
+        Heading.
+    unit
+        Unit of the torques.
+    rows
+        Residuals by joint (or by set of data).
+    all
+        All joints together.
+    """
 
     title: str
     unit: str
@@ -47,7 +70,15 @@ class ResidualTable:
 
 @dataclass(frozen=True)
 class Doubt:
-    """Numbers that the data do not identify for one reason; numbers: entries of the report."""
+    """Numbers that the data do not identify for one reason.
+
+    Attributes
+    ----------
+    reason
+        Why not.
+    numbers
+        Entries of the report.
+    """
 
     reason: str
     numbers: list[Mapping[str, Any]]
@@ -55,7 +86,14 @@ class Doubt:
 
 @dataclass(frozen=True)
 class Told:
-    """A standard deviation in mN·m; rms and 99 % quantile of the error in telling it, as shares: None where it is 0."""
+    """Standard deviation of a friction torque, and how well `contact.uncertainty` reproduces it.
+
+    Attributes
+    ----------
+    std : mN·m
+    error, worst
+        rms and 99 % quantile of the error as shares; None where the standard deviation is 0.
+    """
 
     std: float
     error: float | None
@@ -64,8 +102,20 @@ class Told:
 
 @dataclass(frozen=True)
 class UncertaintyRow:
-    """What is not known of a joint's modelled friction torque. captured: share of the variance in the directions before
-    what they leave out is put back. sets: training, held-out data, more load; None without data.
+    """What is unknown of a joint's modelled friction torque.
+
+    Attributes
+    ----------
+    joint
+        Name of the joint.
+    inflation
+        The residuals count as this many times the noise that the description states.
+    directions
+        How many directions are kept.
+    captured
+        Their share of the variance, before the variance that they leave out is added back.
+    sets
+        Training data, held-out data, more load; None without data.
     """
 
     joint: str
@@ -77,7 +127,17 @@ class UncertaintyRow:
 
 @dataclass(frozen=True)
 class NumberGroup:
-    """All estimated numbers of one joint or tendon: (path without it, entry of the report)."""
+    """All estimated numbers of one joint or tendon.
+
+    Attributes
+    ----------
+    name
+        Name of the joint or tendon.
+    identified
+        How many of its numbers are identified.
+    numbers
+        (path without the joint or tendon, entry of the report).
+    """
 
     name: str
     identified: int
@@ -86,7 +146,7 @@ class NumberGroup:
 
 @dataclass(frozen=True)
 class Summary:
-    """Everything of the page that is not a figure."""
+    """Everything on the page of a fit that is not a figure."""
 
     state: str
     sentences: list[str]
@@ -99,7 +159,7 @@ class Summary:
 
 
 def summarise(picture: FitPicture) -> Summary:
-    """From a fit's report and descriptions."""
+    """Summarise a fit from its report and descriptions."""
     report = picture.report
     tables = list(residual_tables(picture))
     return Summary(
@@ -115,7 +175,7 @@ def summarise(picture: FitPicture) -> Summary:
 
 
 def _state(report: Mapping[str, Any]) -> str:
-    """Empty where nothing is wrong."""
+    """Say what is wrong with the fit; empty if nothing is."""
     if not report["finished"]:
         return "Unfinished: the fit was interrupted. These are the best values so far."
     return "" if report["converged"] else "Not converged: the values may still change with more iterations."
@@ -125,7 +185,18 @@ def _state(report: Mapping[str, Any]) -> str:
 
 
 def residual_tables(picture: FitPicture) -> Iterator[ResidualTable]:
-    """Training, held-out data, and each comparison."""
+    """List the residuals of a fit by set of data.
+
+    Parameters
+    ----------
+    picture
+        A fit and its data.
+
+    Yields
+    ------
+    ResidualTable
+        Training data, held-out data, then each comparison.
+    """
     residual = picture.report["residual"]
     sets = [("Training", residual["train"]), ("Held out of training", residual.get("held_out"))]
     sets += [(f"{_COMPARED}{each['label']}", each) for each in residual.get("comparisons") or []]
@@ -151,7 +222,7 @@ def _table(title: str, found: Mapping[str, Any], joints: Sequence[str]) -> Resid
 
 
 def _joined(joint: str, tables: Sequence[ResidualTable]) -> list[ResidualTable]:
-    """The tables of one joint as one, a row per set of data; those in other units stay apart."""
+    """Join the tables of a finger with one joint, a row per set of data; tables in other units stay separate."""
     by_unit: dict[str, list[ResidualRow]] = {}
     for table in tables:
         by_unit.setdefault(table.unit, []).append(replace(table.all, name=table.title))
@@ -159,7 +230,7 @@ def _joined(joint: str, tables: Sequence[ResidualTable]) -> list[ResidualTable]:
 
 
 def _together(values: Sequence[float]) -> float:
-    """rms over all joints of the rms of each."""
+    """Return the rms over all joints from the rms of each."""
     return math.sqrt(sum(value * value for value in values) / len(values)) if values else math.nan
 
 
@@ -181,7 +252,7 @@ def _what(picture: FitPicture) -> Iterator[str]:
         f"{report['identified']['of']} numbers of the friction of {report['finger']} ({finger}) were estimated at once "
         f"from {source}: {_thousands(used)} samples"
     )
-    yield sentence + (f", and {_thousands(held)} held out to judge by." if held else ".")
+    yield sentence + (f"; {_thousands(held)} more were held out to judge the result." if held else ".")
     out = sum(each.get("contact_left_out") or 0 for each in recordings)
     if out:
         yield f"{_thousands(out)} samples with contact were left out."
@@ -210,7 +281,7 @@ def _how_well(tables: Sequence[ResidualTable]) -> Iterator[str]:
         amounts = f"{rounded(row.fitted)} of {rounded(row.torque)} {table.unit}"
         text = f"{table.title}: {amounts} of torque are left, {_percent(row.left)}"
         if row.start is not None:
-            text += f"; with the numbers it started from {_percent(row.start / row.torque)}"
+            text += f"; with the starting values {_percent(row.start / row.torque)}"
         if table is tables[0] and row.bias_only is not None and row.model_only is not None:
             text += (
                 f". The bias alone, without friction, leaves {_percent(row.bias_only / row.torque)}; the friction "
@@ -222,7 +293,7 @@ def _how_well(tables: Sequence[ResidualTable]) -> Iterator[str]:
 
 
 def _apart(tables: Sequence[ResidualTable]) -> tuple[list[ResidualTable], list[ResidualTable]]:
-    """Those to be told one by one, and comparisons that are too many for that."""
+    """Split tables into those described one by one and comparisons that are too many for that."""
     compared = [table for table in tables if table.title.startswith(_COMPARED)]
     if len(compared) <= 2:
         return list(tables), []
@@ -235,7 +306,20 @@ def _range(tables: Sequence[ResidualTable]) -> str:
 
 
 def rounded(value: float | None, digits: int = 3) -> str:
-    """With trailing zeros and without an exponent, to be compared; a dash where there is none."""
+    """Format a number for a column of numbers to compare.
+
+    Parameters
+    ----------
+    value
+        Number; None where unknown.
+    digits
+        Significant digits.
+
+    Returns
+    -------
+    str
+        With trailing zeros and without an exponent; a dash for None.
+    """
     if value is None or not math.isfinite(value):
         return "–"
     whole = len(str(int(abs(value)))) if abs(value) >= 1 else 0
@@ -251,8 +335,8 @@ def _known(report: Mapping[str, Any]) -> str:
     if count == of:
         return f"All {of} numbers are identified: their standard errors are at most {_LIMIT} of their values."
     return (
-        f"{count} of {of} numbers are identified, with standard errors of at most {_LIMIT} of their values; what would "
-        f"identify the {'last one' if of - count == 1 else f'other {of - count}'} is said below."
+        f"{count} of {of} numbers are identified: their standard errors are at most {_LIMIT} of their values. What "
+        f"would identify the {'last one' if of - count == 1 else f'other {of - count}'} is listed below."
     )
 
 
@@ -273,7 +357,7 @@ def _tiles(report: Mapping[str, Any], tables: Sequence[ResidualTable]) -> list[T
 
 
 def _consistency(picture: FitPicture) -> list[str]:
-    """NIS and whiteness in words."""
+    """Describe the size (NIS) and whiteness of the innovations in words."""
     found = picture.report["innovations"]
     nis, lag_one = found["nis"], found["whiteness"]["lag_one"]
     sentences = []
@@ -284,8 +368,8 @@ def _consistency(picture: FitPicture) -> list[str]:
         else:
             size, far = ("larger", "small") if nis["mean"] > 1 else ("smaller", "large")
             meaning = (
-                f"{size} than the noise that the description states, by a factor of {math.sqrt(nis['mean']):.2g}; by "
-                f"that alone the standard errors are too {far} by about as much"
+                f"{size} than the noise that the description states, by a factor of {math.sqrt(nis['mean']):.2g}; this "
+                f"alone makes the standard errors too {far} by about the same factor"
             )
         sentences.append(
             f"Mean squared standardised innovation (NIS) {nis['mean']:.3g}; expected 1, in 95 % of cases between "
@@ -298,8 +382,8 @@ def _consistency(picture: FitPicture) -> list[str]:
     ]
     if strong:
         sentences.append(
-            f"Autocorrelation from sample to sample: {', '.join(strong)}. White innovations have none: what is left "
-            f"has a shape in time that the model lacks, and {_counted(found)}."
+            f"Autocorrelation from sample to sample: {', '.join(strong)}. White innovations have none. The residual "
+            f"has a shape in time that the model lacks; {_counted(found)}."
         )
     return sentences
 
@@ -313,7 +397,7 @@ def _counted(innovations: Mapping[str, Any]) -> str:
 
 
 def _uncertainty(picture: FitPicture) -> list[UncertaintyRow]:
-    """A row per joint; none where it was not asked for."""
+    """List what is unknown of the friction torque, a row per joint; empty where it was not computed."""
     found = picture.report.get("uncertainty")
     if not found:
         return []
@@ -340,7 +424,7 @@ def _told(std: float, error: float, worst: float) -> Told:
 
 
 def _doubts(report: Mapping[str, Any]) -> list[Doubt]:
-    """Numbers not identified, by reason, most frequent first."""
+    """List the numbers that are not identified by reason, most frequent first."""
     by_reason: dict[str, list[Mapping[str, Any]]] = {}
     for entry in report["parameters"]:
         if not entry["identified"]:
@@ -350,7 +434,7 @@ def _doubts(report: Mapping[str, Any]) -> list[Doubt]:
 
 
 def _groups(picture: FitPicture) -> list[NumberGroup]:
-    """All numbers by joint and tendon, in the order of the report."""
+    """List all numbers by joint and tendon, in the order of the report."""
     found: dict[str, list[tuple[str, Mapping[str, Any]]]] = {}
     for entry in picture.report["parameters"]:
         match = _GROUP.fullmatch(entry["path"])

@@ -1,4 +1,4 @@
-"""A finished fit in words: rows and lines that `cli/program.py` prints."""
+"""How a finished fit reads in the terminal: tables and lines that `cli/program.py` prints."""
 
 from __future__ import annotations
 
@@ -9,11 +9,22 @@ from typing import Any
 from tendonfmu.estimate import Fitted, FrictionFit, verdicts
 
 Row = tuple[str, ...]
-EXAMPLES = 3  # paths named for each reason
+EXAMPLES = 3  # paths listed for each reason
 
 
 def tables(fit: FrictionFit) -> Iterator[tuple[str, Row, list[Row]]]:
-    """(title, headings, rows) of what is left of the torque, and of the numbers by kind."""
+    """List the tables to print: what is left of the torque, and the numbers by kind.
+
+    Parameters
+    ----------
+    fit
+        A finished fit.
+
+    Yields
+    ------
+    tuple
+        Title, headings, rows.
+    """
     report, numbers, joints = fit.report_, fit.numbers_, fit.description_.joint_names
     known = report["identified"]
     yield _residuals(report, joints)
@@ -66,7 +77,18 @@ def _kind(number: Fitted) -> str:
 
 
 def lines(fit: FrictionFit) -> Iterator[str]:
-    """How it went, what the residuals are like, and what would tell the rest."""
+    """List the lines to print: how the fit went, the residuals, and what would identify the remaining numbers.
+
+    Parameters
+    ----------
+    fit
+        A finished fit.
+
+    Yields
+    ------
+    str
+        One line.
+    """
     report, numbers = fit.report_, fit.numbers_
     used = sum(each["used"] for each in report["recordings"])
     held = sum(each["held_out"] for each in report["recordings"])
@@ -97,7 +119,7 @@ def lines(fit: FrictionFit) -> Iterator[str]:
         for number in several[:EXAMPLES]:
             yield f"    {number.number.path}: {number.advice}"
         if count > EXAMPLES:
-            yield f"    ... and {count - EXAMPLES} more; all of them in --report"
+            yield f"    ... and {count - EXAMPLES} more; --report lists all"
 
 
 def _uncertainty(found: Mapping[str, Any]) -> str:
@@ -107,5 +129,5 @@ def _uncertainty(found: Mapping[str, Any]) -> str:
     left = ", ".join(f"{100 * e / s:.0f}" if s else "-" for e, s in zip(error, std, strict=True))
     return (
         f"uncertainty of the modelled friction torque: {size} mN·m rms, the residuals counting as {times} times the "
-        f"noise settings; contact.uncertainty tells it within {left} % rms"
+        f"noise settings; contact.uncertainty reproduces it within {left} % rms"
     )

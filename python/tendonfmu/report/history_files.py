@@ -1,4 +1,4 @@
-"""The files of a history: a table, a picture, a page."""
+"""Which files a history writes: a table, a picture and a page."""
 
 from __future__ import annotations
 
@@ -18,12 +18,32 @@ TABLE, PICTURE, PAGE = "history.csv", "history.png", "history.html"
 
 
 def write_history(found: History, names: Names, folder: Path) -> dict[Path, str]:
-    """file -> what is in it. Raises InputError where one cannot be written."""
+    """Write the table, the picture and the page of a history.
+
+    Parameters
+    ----------
+    found
+        Sizes of causes over several recordings.
+    names
+        Names of joints and tendons.
+    folder
+        Output folder, which exists.
+
+    Returns
+    -------
+    dict of Path to str
+        What each file contains, the page first.
+
+    Raises
+    ------
+    InputError
+        A file cannot be written.
+    """
     sheet = history_sheet(found, names)
     written: dict[Path, str] = {}
     with whole_file(folder / PAGE) as file:
         file.write_text(_page(found, names, sheet), encoding="utf-8")
-    written[folder / PAGE] = "all of it, to be read in a browser"
+    written[folder / PAGE] = "all results, to be read in a browser"
     with whole_file(folder / TABLE) as file, file.open("w", encoding="utf-8", newline="") as stream:
         columns = columns_of(found)
         writer = csv.writer(stream)

@@ -1,4 +1,4 @@
-"""A history in plain words, and its table."""
+"""How a history reads in plain words, and as a table."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tendonfmu.report.diagnosis_text import Names, at_place, percent
 
 
 def headline(found: History) -> str:
-    """What has changed over all recordings, in a sentence."""
+    """Say in one sentence what has changed over all recordings."""
     count = count_of(len(found.recordings), "recording")
     if not found.lines:
         return f"Nothing has changed in {count}."
@@ -19,7 +19,22 @@ def headline(found: History) -> str:
 
 
 def trend_sentence(line: Line, found: History, names: Names) -> str:
-    """Such as "friction at edges, at joint 2: grows 4 % a week (3 to 5 %), off the reference since march_8.parquet"."""
+    """Describe the trend of one cause.
+
+    Parameters
+    ----------
+    line
+        Size of one cause over the recordings.
+    found
+        The history with its unit of time.
+    names
+        Names of joints and tendons.
+
+    Returns
+    -------
+    str
+        Such as "friction at edges, at joint 2: grows 4 % a week (3 to 5 %), off the reference since march_8.parquet".
+    """
     what = at_place(line.title, line.where, names)
     since = f", off the reference since {Path(line.since).name}" if line.since else ""
     if line.trend is None:
@@ -40,7 +55,7 @@ def trend_sentence(line: Line, found: History, names: Names) -> str:
 
 
 def rows_of_lines(found: History, names: Names) -> Iterator[tuple[str, ...]]:
-    """cause, place, reference, last, named in, trend."""
+    """List (cause, place, reference, last, named in, trend) for each cause."""
     for line in found.lines:
         last = line.sizes[-1].size
         yield (
@@ -54,7 +69,7 @@ def rows_of_lines(found: History, names: Names) -> Iterator[tuple[str, ...]]:
 
 
 def columns_of(found: History) -> dict[str, list[Any]]:
-    """One row per recording and cause, in SI units; 0 stands for no joint or tendon."""
+    """Return the columns of the table: one row per recording and cause, in SI units; 0 means no joint or tendon."""
     rows = [
         (time, each, line)
         for line in found.lines

@@ -1,4 +1,7 @@
-"""Makes a page from a template: one HTML file with its figures in it that needs nothing else; every text is escaped."""
+"""How a template becomes a page: one HTML file that contains its figures and needs nothing else.
+
+All texts are escaped.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,17 @@ from tendonfmu.drawing import (
 
 
 class Tile(NamedTuple):
-    """A number that matters, and what it is."""
+    """An important number and what it is.
+
+    Attributes
+    ----------
+    value
+        The number as text.
+    unit
+        Its unit; may be empty.
+    meaning
+        What it is.
+    """
 
     value: str
     unit: str
@@ -29,7 +42,16 @@ class Tile(NamedTuple):
 
 @dataclass(frozen=True)
 class PagePanel:
-    """A panel as a page shows it. number: of its figure in the page. width, height: CSS pixels."""
+    """A panel as a page shows it.
+
+    Attributes
+    ----------
+    number
+        Index of its figure in the page.
+    title, note, alt
+        Texts of the panel.
+    width, height : CSS pixels
+    """
 
     number: int
     title: str
@@ -41,7 +63,19 @@ class PagePanel:
 
 @dataclass(frozen=True)
 class PageSheet:
-    """A sheet as a page shows it. size: of its panels. keys: (CSS class, CSS colour, opacity, meaning)."""
+    """A sheet as a page shows it.
+
+    Attributes
+    ----------
+    sheet
+        The sheet.
+    size
+        Size of its panels.
+    keys
+        (CSS class, CSS colour, opacity, meaning).
+    panels
+        Its panels.
+    """
 
     sheet: Sheet
     size: str
@@ -50,7 +84,22 @@ class PageSheet:
 
 
 def render(template: str, sheets: Iterable[Sheet] = (), **content: Any) -> str:
-    """HTML text of a page. sheets: its figures, which the template finds by section in `figures`."""
+    """Return the HTML text of a page.
+
+    Parameters
+    ----------
+    template
+        Name of a file in python/tendonfmu/templates.
+    sheets
+        Figures of the page. The template finds them by section in `figures`.
+    **content
+        Variables of the template.
+
+    Returns
+    -------
+    str
+        A whole HTML file.
+    """
     import jinja2
 
     environment = jinja2.Environment(
@@ -88,6 +137,9 @@ def _placed(sheet: Sheet, first: int) -> PageSheet:
 
 
 def _keys(sheet: Sheet) -> list[tuple[str, str, float, str]]:
-    """The correlation's have the name of their style as a class too, since a dark page turns its colours round."""
+    """List the keys of a sheet.
+
+    Keys of the correlation also have their style's name as a class, since a dark page inverts its colours.
+    """
     styles = [(name, STYLES[name], meaning) for name, meaning in sheet.keys]
     return [(f"{style.shape} {name}", style.colour, style.alpha, meaning) for name, style, meaning in styles]

@@ -1,5 +1,6 @@
-"""What the figures of the simulated finger show, computed for `plots.py`: one joint led to and fro, its friction, and
-what the friction model makes of the same motion.
+"""What the figures of the simulated finger show, computed for `plots.py`.
+
+One joint moves to and fro: its friction, and what the friction model makes of the same motion.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ DRAWN_APART = 1e-4  # rad, between points of a model's line
 KINEMATICS_MEASURED = 3  # joint positions and velocities
 PRETENSIONS = (10.0, 40.0)  # N
 TO_AND_FRO: WAYS = ((0.0, 0.35), (1.0, 0.35), (3.0, 0.1), (9.0, 1.0), (15.0, 0.1), (21.0, 1.0))  # s, rad
-# after a stroke small moves to and fro, each commanded larger than the one before, then one that breaks away
+# after a stroke: small moves to and fro, each larger than the one before, then one that breaks away
 SMALL: WAYS = (
     (0.0, 0.35), (0.5, 0.35), (2.5, 0.7), (4.0, 0.69), (5.5, 0.704), (7.0, 0.684), (8.5, 0.708), (10.0, 0.672),
     (11.5, 0.712), (13.5, 1.2),
@@ -33,8 +34,17 @@ SMALL: WAYS = (
 
 @dataclass(frozen=True)
 class Loop:
-    """One joint: angle [N] rad, friction torque of the rig and of the friction model [N] N·m. model_line: [K, 2] angle
-    and model torque where the joint moves on, without standstill: each jump once.
+    """Friction of one joint over its angle.
+
+    Attributes
+    ----------
+    label
+        Name in the legend.
+    angle : [N] rad
+    rig, model : [N] N·m
+        Friction torque of the rig and of the friction model.
+    model_line : [K, 2] rad, N·m
+        Angle and model torque where the joint moves, without standstill, so that each jump is drawn once.
     """
 
     label: str
@@ -46,7 +56,16 @@ class Loop:
 
 @dataclass(frozen=True)
 class Contact:
-    """A bristle: angle [N] rad, w [N] (1: break-away)."""
+    """A bristle over the joint angle.
+
+    Attributes
+    ----------
+    label
+        Name in the legend.
+    angle : [N] rad
+    bristle : [N]
+        w; 1 is break-away.
+    """
 
     label: str
     angle: Array
@@ -55,7 +74,15 @@ class Contact:
 
 @dataclass(frozen=True)
 class LoopFigure:
-    """joint: its name. loops: one per pretension."""
+    """Friction loops of one joint.
+
+    Attributes
+    ----------
+    joint
+        Its name.
+    loops
+        One per pretension.
+    """
 
     joint: str
     loops: list[Loop]
@@ -63,9 +90,20 @@ class LoopFigure:
 
 @dataclass(frozen=True)
 class PreslidingFigure:
-    """joint, tendon: their names. reversals: torque after a reversal, angle back from there, one per pretension.
-    contacts: bristles in the same motion at the first pretension. small: small moves to and fro, angle from where they
-    begin. turns: index in `small` at the end of each small move; from the last one on the joint is led away.
+    """Friction before sliding.
+
+    Attributes
+    ----------
+    joint, tendon
+        Their names.
+    reversals
+        Torque after a reversal over the angle back from there, one per pretension.
+    contacts
+        Bristles in the same motion at the first pretension.
+    small
+        Small moves to and fro; the angle counts from where they begin.
+    turns
+        Indices in `small` at the end of each small move. After the last one the joint is led away.
     """
 
     joint: str
@@ -78,8 +116,21 @@ class PreslidingFigure:
 
 @dataclass(frozen=True)
 class TruthFigure:
-    """A part of a recording with its truth. time: [N] s. forces: [N, m] N measured. angle: [N] rad. torques: label ->
-    [N] N·m, of one joint. contacts: begin and end in s.
+    """Part of a recording with its truth.
+
+    Attributes
+    ----------
+    joint
+        Its name.
+    time : [N] s
+    forces : [N, m] N
+        Measured tendon forces.
+    flexors : [m]
+        Which tendons are flexors.
+    angle : [N] rad
+    torques : [N] N·m
+        Torques of the joint by label.
+    contacts : (begin, end) s
     """
 
     joint: str
@@ -92,9 +143,22 @@ class TruthFigure:
 
 
 def led(rig: Rig, joint: int, ways: WAYS, pretension: float) -> dict[str, Array]:
-    """Signals of a rig whose motors lead one joint (0-based) from rest to rest, the others staying; without sensors.
+    """Return the true signals of a rig whose motors lead one joint from rest to rest while the others stay.
 
-    ways: (time s, angle rad). Also `bristle` [N, k], and `time` [N].
+    Parameters
+    ----------
+    rig
+        Simulated finger.
+    joint
+        Index of the joint, from 0.
+    ways
+        (time s, angle rad) of each rest.
+    pretension : N
+
+    Returns
+    -------
+    dict of str to ndarray
+        Signals without sensors; also `bristle` [N, k] and `time` [N].
     """
     expanded = copy.deepcopy(dict(rig.expanded))
     first = [knots["position"][0] for knots in expanded["motion"]["joints"]]
@@ -122,8 +186,10 @@ def _knots(ways: Sequence[tuple[float, float]]) -> dict[str, list[float]]:
 
 
 def model_friction(rig: Rig, joint: int, signals: Signals) -> NDArray[np.float64]:
-    """[N] N·m: eq. (10) of one joint with the rig's own static numbers, v_min = 0, at the true velocity of that joint
-    alone, without the bias."""
+    """Return the friction torque [N] N·m of one joint as the friction model has it, eq. (10).
+
+    It uses the rig's own static numbers, v_min = 0, and the true velocity of that joint alone, without the bias.
+    """
     description = dict(rig.finger.data) | {"velocity_threshold": {"tendon": 0.0, "joint": 0.0}}
     alone = np.zeros_like(signals["joint_velocity"])
     alone[:, joint] = signals["joint_velocity"][:, joint]
@@ -132,7 +198,7 @@ def model_friction(rig: Rig, joint: int, signals: Signals) -> NDArray[np.float64
 
 
 def loop_figure(rig: Rig, joint: int) -> LoopFigure:
-    """One joint slowly to and fro at each of `PRETENSIONS`; the way to the start of the loop is left out."""
+    """Move one joint slowly to and fro at each of `PRETENSIONS`; the way to the start of the loop is left out."""
     loops = []
     for pretension in PRETENSIONS:
         signals = led(rig, joint, TO_AND_FRO, pretension)
@@ -144,7 +210,7 @@ def loop_figure(rig: Rig, joint: int) -> LoopFigure:
 
 
 def presliding_figure(rig: Rig, joint: int, tendon: int) -> PreslidingFigure:
-    """After a reversal, and small moves to and fro. tendon: 0-based, whose bristles are shown."""
+    """Show one joint after a reversal and in small moves, with the bristles of one tendon; both indices from 0."""
     reversals: list[Loop] = []
     contacts: list[Contact] = []
     for pretension in PRETENSIONS:
@@ -183,8 +249,11 @@ def _loop(rig: Rig, joint: int, signals: Signals, shown: Array | slice, label: s
 
 
 def moving_on(angle: Array, apart: float) -> NDArray[np.intp]:
-    """Indices of points at least `apart` (rad) from the one before. Where a joint stands its velocity trembles about
-    0 and the model's torque jumps from row to row, which a dashed line must not trace."""
+    """Return indices of points at least `apart` (rad) from the one before.
+
+    At standstill the velocity trembles about 0 and the model's torque jumps from row to row. A dashed line must not
+    follow these jumps.
+    """
     kept, last = [], angle[0]
     for k, value in enumerate(angle):
         if abs(value - last) >= apart:
@@ -194,7 +263,7 @@ def moving_on(angle: Array, apart: float) -> NDArray[np.intp]:
 
 
 def _contacts(rig: Rig, joint: int, tendon: int) -> dict[str, int]:
-    """Label with the presliding distance, also as an angle of the joint -> number of the bristle."""
+    """Map a label to the number of a bristle. The label has the presliding distance, also as an angle of the joint."""
     distances = rig.expanded["physics"]["friction"]["presliding"]
     arm = abs(rig.finger.data["tendons"][tendon]["moment_arms"][joint])
     labels = {}
@@ -206,7 +275,7 @@ def _contacts(rig: Rig, joint: int, tendon: int) -> dict[str, int]:
 
 
 def truth_figure(rig: Rig, joint: int, begin: float, end: float) -> TruthFigure:
-    """From begin to end (s) of a rig's own recording, one joint (0-based)."""
+    """Show one joint (from 0) of a rig's own recording from begin to end (s)."""
     simulation = simulate(rig, truth=True)
     recording, truth = simulation.recording, simulation.truth or {}
     shown = (recording["time"] >= begin) & (recording["time"] <= end)
@@ -225,9 +294,10 @@ def truth_figure(rig: Rig, joint: int, begin: float, end: float) -> TruthFigure:
 
 
 def bristle_numbers(rig: Rig, joint: int, tendon: int) -> dict[str, int]:
-    """Number among the bristles of the edge before a joint, of the pulley before that, and of the joint's own friction.
+    """Return the indices of three bristles: the edge before a joint, the pulley there, and the joint's own friction.
 
-    Order as in tendonfmu_plant_derivative: along each tendon edge and pulley of joint 1, of joint 2, ..., then joints.
+    Bristles are ordered as in tendonfmu_plant_derivative: along each tendon edge and pulley of joint 1, of joint 2, and
+    so on, then the joints.
     """
     found: dict[str, int] = {}
     wrist = 1 if rig.expanded["physics"].get("wrist") else 0  # comes first along each tendon

@@ -1,4 +1,4 @@
-"""The figures of fingers, recordings and rigs. It computes nothing: what it draws comes ready-made."""
+"""Draws the figures of fingers, recordings and rigs. It computes nothing: the data come ready-made."""
 
 from __future__ import annotations
 
@@ -32,7 +32,15 @@ from tendonfmu.report.rig_drawing import DrawnBody, DrawnRoute, RigDrawing, View
 
 
 def draw_story(data: StoryFigure, target: Target) -> None:
-    """Free motions side by side, below them a recording with pushes, as PNG (the paper's figs. 6 to 8)."""
+    """Draw free motions side by side and a recording with pushes below them, as PNG (the paper's figs. 6 to 8).
+
+    Parameters
+    ----------
+    data
+        What to draw.
+    target
+        File name or binary stream.
+    """
     pushed = data.pushed
     figure = Figure(figsize=(15.0, 6.4 + 4.4 * len(pushed.joints)), layout="constrained")
     heights = [1.0, 0.8] + [1.0, 0.9] * len(pushed.joints) + [0.42]
@@ -117,7 +125,7 @@ def _draw_contacts(axes: Axes, data: CompensationFigure) -> None:
 
 
 def draw_reference(data: ReferenceFigure, target: Target) -> None:
-    """Compensated torque over the reference sensor's for some recordings, and the rms errors of all, as PNG."""
+    """Draw the compensated torque and the reference sensor's for some recordings, and all rms errors, as PNG."""
     rows = len(data.drawn)
     figure = Figure(figsize=(15.0, 2.9 * rows + 0.8), layout="constrained")
     grid = figure.add_gridspec(rows, 2, width_ratios=[2.3, 1.0])
@@ -163,12 +171,12 @@ def _draw_errors(axes: Axes, data: ReferenceFigure) -> None:
 
 FLEXOR_COLOURS = (BLUE, SKY, "#332288", GREEN)
 EXTENSOR_COLOURS = (ORANGE, VERMILION, PURPLE, "#8A5A00")
-VIEW_HEIGHT = 21.0  # mm, from a view's middle to where the next one begins
+VIEW_HEIGHT = 21.0  # mm, from the middle of a view to the next view
 SMALL_SHOWN = (-14.0, 62.0)  # mrad
 
 
 def draw_rig(drawing: RigDrawing, target: Target) -> None:
-    """The finger of a rig to scale, from the side and from above: links, tendons, where friction acts, as PNG."""
+    """Draw the finger of a rig to scale from the side and from above, as PNG: links, tendons, where friction acts."""
     labels = 28.0  # mm, for names on the left
     left, right = drawing.left - labels, drawing.right + 4.0
     low, high = -VIEW_HEIGHT - 26.0, 17.0
@@ -268,7 +276,7 @@ def _draw_rig_legend(axes: Axes) -> None:
 
 
 def draw_loops(data: LoopFigure, target: Target) -> None:
-    """Friction torque of one joint over its angle, the rig's and the friction model's, as PNG."""
+    """Draw the friction torque of one joint over its angle as PNG: the rig's and the friction model's."""
     figure = Figure(figsize=(12.8, 6.4), layout="constrained")
     axes = figure.subplots()
     clean(axes)
@@ -284,7 +292,7 @@ def draw_loops(data: LoopFigure, target: Target) -> None:
 
 
 def draw_presliding(data: PreslidingFigure, target: Target) -> None:
-    """Torque and bristles after a reversal; small moves to and fro before a joint breaks away, as PNG."""
+    """Draw torque and bristles after a reversal, and small moves to and fro before a joint breaks away, as PNG."""
     figure = Figure(figsize=(16.0, 6.4), layout="constrained")
     turn, bent, small = figure.subplots(1, 3)
     for loop, colour in zip(data.reversals, (BLUE, VERMILION), strict=False):
@@ -343,7 +351,7 @@ def _draw_small_moves(axes: Axes, data: PreslidingFigure) -> None:
 
 
 def draw_truth(data: TruthFigure, target: Target) -> None:
-    """Tendon forces as measured, and the truth of one joint: its angle, and its torque with what takes it, as PNG."""
+    """Draw the measured tendon forces, and the true angle of one joint and its torque with its parts, as PNG."""
     figure = Figure(figsize=(12.8, 7.6), layout="constrained")
     panels = forces, angle, torque = figure.subplots(3, 1, sharex=True, height_ratios=[1.0, 0.7, 1.2])
     for axes, name in zip(panels, ("tendon force (N)", "angle (rad)", "torque (mN·m)"), strict=True):

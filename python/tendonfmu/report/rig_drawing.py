@@ -1,8 +1,10 @@
-"""Geometry of the drawing of a rig's finger, to scale: links of its lengths, tendons at the distance of their moment
-arms. Stretched out (all angles 0), seen from the side and from above, in mm. `plots.py` draws it.
+"""Where the parts of a rig's finger lie in a drawing to scale, in mm; `plots.py` draws it.
 
-Seen from the side x points right and z up, so that a positive angle about y bends down: a tendon with a positive moment
-arm runs below. Seen from above y points up, and a positive arm about z lies above.
+Links have their lengths, tendons the distance of their moment arms. The finger is stretched out (all angles 0) and
+seen from the side and from above.
+
+Seen from the side x points right and z up. A positive angle about y therefore bends down, and a tendon with a positive
+moment arm runs below. Seen from above y points up, and a positive arm about z lies above.
 """
 
 from __future__ import annotations
@@ -17,11 +19,11 @@ from numpy.typing import NDArray
 Points = NDArray[np.float64]
 
 MM = 1e3
-PARALLEL = 0.7  # cosine from which a joint's axis counts as that of a view
+PARALLEL = 0.7  # cosine; from here on a joint's axis counts as parallel to that of a view
 GAP = 0.45  # mm, least distance of two lines at a joint
-STATION = 9.0  # mm, between the marks of one friction effect and the next before a joint
+STATION = 9.0  # mm, between the marks of neighbouring friction effects before a joint
 STAGGER = 1.7  # mm, between neighbouring tendons' marks
-ENTRY, FAN = -37.0, -47.0  # mm, where the tendons run as their arms say, and where they lie apart for their names
+ENTRY, FAN = -37.0, -47.0  # mm, where the tendons reach their arms, and where they spread for their names
 NAME_SPACING = 2.7  # mm
 SPRING = 9.0  # mm
 BEYOND = 7.0  # mm, from a tendon's last joint to its end
@@ -29,7 +31,14 @@ BEYOND = 7.0  # mm, from a tendon's last joint to its end
 
 @dataclass(frozen=True)
 class DrawnBody:
-    """A link as the solid cylinder that has its mass and moment of inertia along the finger: x from, x to, radius."""
+    """A link as a solid cylinder with its mass and its moment of inertia along the finger.
+
+    Attributes
+    ----------
+    begin, end : mm
+        Along x.
+    radius : mm
+    """
 
     begin: float
     end: float
@@ -40,8 +49,17 @@ class DrawnBody:
 class DrawnRoute:
     """A tendon in one view.
 
-    colour: index among the tendons of its kind. line, spring: [k, 2]. pulleys, edges, varying_edges: [k, 2], the last
-    where the friction varies with an angle; none in the view from above.
+    Attributes
+    ----------
+    name
+        Its name.
+    flexor
+        Whether it bends the finger.
+    colour
+        Index among the tendons of its kind.
+    line, spring : [k, 2] mm
+    pulleys, edges, varying_edges : [k, 2] mm
+        Marks of friction; `varying_edges` where it varies with an angle. Empty in the view from above.
     """
 
     name: str
@@ -56,7 +74,19 @@ class DrawnRoute:
 
 @dataclass(frozen=True)
 class View:
-    """joints: (name, x) of those whose axis one looks along. stations: (label, x) of friction effects."""
+    """The finger seen along one axis.
+
+    Attributes
+    ----------
+    title
+        "from the side" or "from above".
+    joints : (name, x mm)
+        Joints whose axis one looks along.
+    routes
+        Its tendons.
+    stations : (label, x mm)
+        Where friction acts.
+    """
 
     title: str
     joints: list[tuple[str, float]]
@@ -66,7 +96,19 @@ class View:
 
 @dataclass(frozen=True)
 class RigDrawing:
-    """bodies: of the links, base first; those without length are left out. lengths: (x from, x to) of each, mm."""
+    """A finger in two views.
+
+    Attributes
+    ----------
+    name
+        Name of the rig.
+    bodies
+        Links, the base first; links without length are left out.
+    side, top
+        The views.
+    left, right : mm
+        Ends of the drawing along x.
+    """
 
     name: str
     bodies: list[DrawnBody]
@@ -77,7 +119,7 @@ class RigDrawing:
 
 
 def rig_drawing(expanded: Mapping[str, Any]) -> RigDrawing:
-    """Geometry of an expanded rig (`Rig.expanded`) whose finger lies along x, with joint axes along y and z."""
+    """Return the drawing of an expanded rig (`Rig.expanded`). The finger lies along x, joint axes along y and z."""
     physics, finger = expanded["physics"], expanded["finger"]
     links = physics["links"]
     offsets = np.array([link.get("offset", [0.0, 0.0, 0.0]) for link in links])
@@ -106,7 +148,7 @@ def rig_drawing(expanded: Mapping[str, Any]) -> RigDrawing:
 
 
 def _stations(x: Points) -> dict[tuple[str, int], float]:
-    """(kind, joint) -> x of its marks: the edge before the pulley, joints in one place one after the other."""
+    """Map (kind, joint) to the x of its marks: the edge before the pulley; joints in one place follow one another."""
     found: dict[tuple[str, int], float] = {}
     place = np.inf
     for j in reversed(range(len(x))):
@@ -126,7 +168,7 @@ def _present(tendons: Sequence[Mapping[str, Any]], kind: str, j: int) -> bool:
 
 
 def _apart(heights: Points) -> Points:
-    """[m] heights at one joint, at least GAP apart on each side; 0 stays."""
+    """Spread heights [m] at one joint to at least GAP apart on each side; 0 stays."""
     result: Points = heights.copy()
     for side in (1.0, -1.0):
         before = 0.0
@@ -157,7 +199,7 @@ def _routes(
     start[order] = NAME_SPACING * (0.5 * (m - 1) - np.arange(m))
     routes = []
     for i, tendon in enumerate(tendons):
-        # a joint without an arm is passed through its axis only by tendons that have arms farther on
+        # at a joint without an arm only tendons with arms farther on pass, through its axis
         passed = [j for j in seen if j <= last[i]]
         if not passed:
             continue

@@ -1,5 +1,6 @@
-"""The figures of a score, computed for `score_plots.py`: torques and detection over time (fig. 8 of the paper), every
-event from its onset on, the ROC, and the delays.
+"""What the figures of a score show, computed for `score_plots.py`.
+
+Torques and detection over time (fig. 8 of the paper), every event from its onset on, the ROC, and the delays.
 """
 
 from __future__ import annotations
@@ -18,16 +19,25 @@ from tendonfmu.statistics import intervals as statistics_intervals
 Numbers = NDArray[np.float64]
 
 SHOWN = 20.0  # s of the recording, where most events are
-JOINTS = 4  # that are drawn
-BEFORE, AFTER, LONGEST = 0.3, 0.3, 2.5  # s; of an event's row before the onset, after the end, and at most after onset
-TAIL = 2.0  # times the delay of 90 %; what is found later is not drawn, but told
-NAMED = (0.25, 0.5, 1.0, 2.0, 4.0)  # factors
+JOINTS = 4  # drawn at most
+BEFORE, AFTER, LONGEST = 0.3, 0.3, 2.5  # s; an event's row before the onset, after the end, and at most after onset
+TAIL = 2.0  # times the delay of 90 %; later events are counted, not drawn
+NAMED = (0.25, 0.5, 1.0, 2.0, 4.0)  # factors written beside their points
 _COLUMNS, _POINTS = 560, 5000
 
 
 @dataclass(frozen=True)
 class JointTorques:
-    """[N] N·m. external: of the reference sensor, or None."""
+    """Torques of one joint.
+
+    Attributes
+    ----------
+    name
+        Its name.
+    measured, compensated : [N] N·m
+    external : [N] N·m
+        Of the reference sensor; None without one.
+    """
 
     name: str
     measured: Numbers
@@ -37,8 +47,23 @@ class JointTorques:
 
 @dataclass(frozen=True)
 class ContactFigure:
-    """time: [N] s. force: [N] N, sensed, or None. labelled: contact as labelled. found, masked, outside: alarm while an
-    event is there that is found, or missed; outside of events, and what outlasts these.
+    """Torques and detection over time.
+
+    Attributes
+    ----------
+    title
+        Heading.
+    time : [N] s
+    joints
+        Torques of the joints drawn.
+    force : [N] N
+        Sensed force; None without a sensor.
+    labelled : (begin, end) s
+        Contact as labelled.
+    found, masked : (begin, end) s
+        Alarm during an event that is found, or missed.
+    outside : (begin, end) s
+        Alarm outside events, including what outlasts them.
     """
 
     title: str
@@ -53,11 +78,22 @@ class ContactFigure:
 
 @dataclass(frozen=True)
 class EventFigure:
-    """A row for each event, in order of delay, then the missed ones, those that began in an alarm last.
+    """Every event as a row, found ones in order of delay, then missed ones, last those that began in an alarm.
 
-    begin, end: s from the onset that are drawn. torque: [e, t] N·m, compensated torque, magnitude over all joints, NaN
-    beyond the recording. most: N·m, that few rows pass. groups: (what, how many rows). delay, length: [e] s; the delay
-    is NaN if missed.
+    Attributes
+    ----------
+    title
+        Heading.
+    begin, end : s
+        Time drawn, from the onset.
+    torque : [e, t] N·m
+        Magnitude of the compensated torque over all joints; NaN beyond the recording.
+    most : N·m
+        Upper end of the colours; few rows exceed it.
+    groups
+        (what, how many rows).
+    delay, length : [e] s
+        The delay is NaN for missed events.
     """
 
     title: str
@@ -72,11 +108,27 @@ class EventFigure:
 
 @dataclass(frozen=True)
 class RocFigure:
-    """factors [f]. found, found_low, found_high: shares of the events; masked: of those that began in an alarm;
-    in_alarm: of the free time. rate, rate_low, rate_high: false alarms per hour.
+    """Found events against false alarms, over factors on the thresholds.
 
-    own: index of the description's own thresholds. named: of points whose factor is written beside them. least: 1/h, of
-    one false alarm in all the free time.
+    Attributes
+    ----------
+    title
+        Heading.
+    factors : [f]
+    found, found_low, found_high : [f]
+        Share of the events, with its 95 % interval.
+    rate, rate_low, rate_high : [f] 1/h
+        False alarms.
+    in_alarm : [f]
+        Share of the free time in alarm.
+    masked : [f]
+        Share of the events that began in an alarm.
+    own
+        Index of the description's own thresholds.
+    named
+        Indices of points whose factor is written beside them.
+    least : 1/h
+        Rate of one false alarm in all the free time.
     """
 
     title: str
@@ -96,9 +148,24 @@ class RocFigure:
 
 @dataclass(frozen=True)
 class DelayFigure:
-    """delays: [k] s, increasing. share, low, high: [k] of all events found within that. median, ninety: s.
+    """How soon events are found.
 
-    end: s that are drawn. later: how many delays are beyond. bins: of the histogram.
+    Attributes
+    ----------
+    title
+        Heading.
+    delays : [k] s
+        Increasing.
+    share, low, high : [k]
+        Share of all events found within that time, with its 95 % interval.
+    median, ninety : s
+        Delays within which 50 % and 90 % are found.
+    end : s
+        Time drawn.
+    later
+        How many delays are beyond `end`.
+    bins
+        Bins of the histogram.
     """
 
     title: str
@@ -114,7 +181,7 @@ class DelayFigure:
 
 
 def contact_figure(scored: Scored) -> ContactFigure:
-    """The `SHOWN` seconds with most events, or of false alarms where there is none."""
+    """Show the `SHOWN` seconds with most events, or with most false alarms if there is no event."""
     counts = [_busiest(track, score) for track, score in zip(scored.tracks, scored.scores, strict=True)]
     most = max(range(len(counts)), key=lambda k: counts[k][:2])
     begin = counts[most][2]
@@ -145,9 +212,9 @@ def contact_figure(scored: Scored) -> ContactFigure:
 
 
 def _busiest(track: Track, score: DetectionScore) -> tuple[int, int, float]:
-    """(events, those found, begin in s) of the window of `SHOWN` seconds with most of them, the earliest.
+    """Find the earliest window of `SHOWN` seconds with most events: (events, those found, begin in s).
 
-    Of a recording without events: (0, false alarms, begin).
+    For a recording without events: (0, false alarms, begin).
     """
     time = track.recording.time
     onsets = np.array([event.onset for event in score.events])
@@ -166,7 +233,7 @@ def _busiest(track: Track, score: DetectionScore) -> tuple[int, int, float]:
 
 
 def _by_event(track: Track, score: DetectionScore) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """[N] samples of events that are found, from the alarm on to the end and its grace; and of all other events."""
+    """Flag the samples [N] of found events, from the alarm to the end and its grace, and those of all other events."""
     time = track.recording.time
     found, others = np.zeros(len(time), dtype=bool), np.zeros(len(time), dtype=bool)
     for event in score.events:
@@ -176,7 +243,7 @@ def _by_event(track: Track, score: DetectionScore) -> tuple[NDArray[np.bool_], N
 
 
 def _strongest(track: Track) -> list[int]:
-    """The joints with most torque in contact (or ever), in their order."""
+    """Choose the joints with most torque in contact (or ever), in their order."""
     torque = track.outputs["compensated_torque"] if track.external is None else track.external
     rows = track.label if track.label.any() else np.ones(len(torque), dtype=bool)
     power = np.sum(torque[rows] ** 2, axis=0)
@@ -187,7 +254,7 @@ def _strongest(track: Track) -> list[int]:
 
 
 def event_figure(scored: Scored) -> EventFigure:
-    """Every event of every recording."""
+    """Show every event of every recording."""
     rows: list[tuple[Event, Track]] = [
         (event, track) for track, score in zip(scored.tracks, scored.scores, strict=True) for event in score.events
     ]
@@ -215,12 +282,12 @@ def event_figure(scored: Scored) -> EventFigure:
 
 
 def _order(event: Event) -> tuple[int, float]:
-    """Group, and place in it."""
+    """Return a sort key: the group, and the place in it."""
     return (0, event.delay) if event.found else (1 if event.silent else 2, event.end - event.onset)
 
 
 def _row(track: Track, at: Numbers) -> Numbers:
-    """[t] N·m at the last sample before each time."""
+    """Return the torque [t] N·m at the last sample before each time."""
     time = track.recording.time
     size = np.sqrt(np.sum(track.outputs["compensated_torque"] ** 2, axis=1))
     index = np.searchsorted(time, at + 1e-9, side="right") - 1
@@ -252,7 +319,7 @@ def roc_figure(scored: Scored, points: Sequence[RocPoint]) -> RocFigure:
 
 
 def _named(points: Sequence[RocPoint]) -> list[int]:
-    """Points of `NAMED` factors, one of those at the same place."""
+    """Choose the points of `NAMED` factors, one of those in the same place."""
     places: dict[tuple[int, int], int] = {}
     for k, point in enumerate(points):
         if any(math.isclose(point.factor, each) for each in NAMED):

@@ -1,4 +1,4 @@
-"""The figures of a score as files."""
+"""Which figures of a score are written as files."""
 
 from __future__ import annotations
 
@@ -11,7 +11,25 @@ from tendonfmu.report.score_plots import draw_contacts, draw_delays, draw_events
 
 
 def write_figures(scored: Scored, folder: Path) -> dict[Path, str]:
-    """Draws what there is to draw into a folder that is made if missing; file -> what is in it."""
+    """Draw the figures of a score as PNG files.
+
+    Parameters
+    ----------
+    scored
+        A scored detection. Figures without data are left out.
+    folder
+        Output folder; it is made if missing.
+
+    Returns
+    -------
+    dict of Path to str
+        What each file shows.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be made, or a file cannot be written.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Draws the figures of a score (`score_figures.py`). It computes nothing: what it draws comes ready-made."""
+"""Draws the figures of a score (`score_figures.py`). It computes nothing: the data come ready-made."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _TITLE, _LABEL, _LEGEND = 14.0, 12.5, 11.5  # pt
 
 
 def draw_contacts(data: ContactFigure, target: Target) -> None:
-    """Joint torques, compensated torques with the reference, sensed force, and detection, as PNG (fig. 8)."""
+    """Draw joint torques, compensated torques with the reference, sensed force and detection, as PNG (fig. 8)."""
     heights = [1.0, 1.25, *([0.6] if data.force is not None else []), 0.55]
     figure = Figure(figsize=(12.8, 2.9 * sum(heights)), layout="constrained")
     panels = list(figure.subplots(len(heights), 1, sharex=True, height_ratios=heights))
@@ -91,7 +91,7 @@ def _draw_detection(axes: Axes, data: ContactFigure) -> None:
 
 
 def _legend(axes: Axes, handles: Sequence[Artist]) -> None:
-    """Above the panel on the right, out of the way of the curves."""
+    """Place the legend above the panel on the right, clear of the curves."""
     axes.legend(
         handles=handles,
         loc="lower right",
@@ -107,7 +107,7 @@ def _legend(axes: Axes, handles: Sequence[Artist]) -> None:
 
 
 def draw_events(data: EventFigure, target: Target) -> None:
-    """A row of colour for each event, from before its onset on, its alarm and its end marked, as PNG."""
+    """Draw each event as a row of colour from before its onset, with its alarm and its end marked, as PNG."""
     count = len(data.torque)
     figure = Figure(figsize=(12.8, min(max(3.6, 1.8 + 0.3 * count), 12.0)), layout="constrained")
     axes = figure.subplots()
@@ -164,7 +164,7 @@ def _legend_of_events(axes: Axes) -> None:
 
 
 def draw_roc(data: RocFigure, target: Target) -> None:
-    """Found events against false alarms per hour, and both over the factor on the thresholds, as PNG."""
+    """Draw found events against false alarms per hour, and both over the factor on the thresholds, as PNG."""
     figure = Figure(figsize=(12.8, 5.4), layout="constrained")
     curve, over = figure.subplots(1, 2, width_ratios=[1.25, 1.0])
     for axes in (curve, over):
@@ -223,7 +223,7 @@ def _draw_points(axes: Axes, data: RocFigure) -> None:
 
 
 def draw_delays(data: DelayFigure, target: Target) -> None:
-    """Share of all events found within a time, with its interval, and how many delays there are, as PNG."""
+    """Draw the share of all events found within a time, with its interval, and the number of delays, as PNG."""
     figure = Figure(figsize=(12.8, 6.2), layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1.0])
     for axes in (above, below):

@@ -1,4 +1,4 @@
-"""What a score says, in words: a table by joint and a few lines that `cli/detect.py` prints."""
+"""How a score reads in the terminal: a table by joint and a few lines that `cli/detect.py` prints."""
 
 from __future__ import annotations
 
@@ -9,11 +9,22 @@ from tendonfmu.detect import Scored, Summary
 from tendonfmu.statistics import Estimate
 
 Row = tuple[str, ...]
-SHOWN = (0.5, 1.0, 2.0)  # factors of the ROC that are told
+SHOWN = (0.5, 1.0, 2.0)  # factors of the ROC that are printed
 
 
 def tables(scored: Scored) -> Iterator[tuple[str, Row, list[Row]]]:
-    """(title, headings, rows): torque by joint. [95 % interval]."""
+    """List the tables to print: torque by joint, with 95 % intervals in brackets.
+
+    Parameters
+    ----------
+    scored
+        A scored detection.
+
+    Yields
+    ------
+    tuple
+        Title, headings, rows.
+    """
     found = scored.summary
     headings = ["joint", "free residual\nrms, mN·m"]
     columns = [[_estimate(each, 1e3) for each in found.free_rms]]
@@ -39,6 +50,7 @@ def tables(scored: Scored) -> Iterator[tuple[str, Row, list[Row]]]:
 
 
 def lines(scored: Scored) -> Iterator[str]:
+    """List the lines to print: false alarms, events, delays, other thresholds."""
     found = scored.summary
     if found.events:
         yield from _event_lines(found)
@@ -81,7 +93,7 @@ def _percent(found: Estimate) -> str:
 
 
 def _estimate(found: Estimate, factor: float = 1.0) -> str:
-    """`12 (8.1 to 19)`."""
+    """Format an estimate with its interval, such as `12 (8.1 to 19)`."""
     value = _number(found.value, factor)
     if math.isnan(found.low) or math.isnan(found.high):
         return value
@@ -89,7 +101,7 @@ def _estimate(found: Estimate, factor: float = 1.0) -> str:
 
 
 def _number(value: float, factor: float) -> str:
-    """Three digits; two decimals at most where that is enough."""
+    """Format with three digits, and at most two decimals where that is enough."""
     scaled = factor * value
     if math.isnan(scaled):
         return "-"

@@ -1,4 +1,4 @@
-"""The figures of a tuning, computed for `tune_plots.py`: alarms over level, bounds over force, the worst moments."""
+"""What the figures of a tuning show: alarms over level, bounds over force, and the worst moments."""
 
 from __future__ import annotations
 
@@ -14,16 +14,35 @@ from tendonfmu.statistics import intervals
 
 Numbers = NDArray[np.float64]
 
-JOINTS = 4  # that are drawn
+JOINTS = 4  # drawn at most
 WORST = 4  # moments
-AROUND = 0.6  # s before and after
-APART = 2.0  # s; nearer moments have one cause
+AROUND = 0.6  # s before and after a moment
+APART = 2.0  # s; moments nearer than this have one cause
 _FACTORS = np.geomspace(0.4, 2.5, 60)
 
 
 @dataclass(frozen=True)
 class TailFigure:
-    """Alarms per hour over the factor [f] on the chosen bases, with 95 % intervals; limit: at the confidence, at 1."""
+    """Alarms per hour over the factor on the chosen thresholds.
+
+    Attributes
+    ----------
+    title
+        Heading.
+    factors : [f]
+    in_sample, held_out : [f] 1/h
+        Rates with bounds chosen on the same blocks, and on other blocks.
+    low, high : [f] 1/h
+        95 % interval of `held_out`.
+    wished : 1/h
+        Rate that was asked for.
+    limit : 1/h
+        Upper limit of the rate at factor 1.
+    confidence
+        Probability of that limit.
+    least : 1/h
+        Rate of one alarm in all the time.
+    """
 
     title: str
     factors: Numbers
@@ -39,10 +58,25 @@ class TailFigure:
 
 @dataclass(frozen=True)
 class BoundPanel:
-    """Of one joint, N·m over force [k]. own: base + per_force·f; friction: what stiction and jumps add on average.
+    """Bounds of one joint over the force.
 
-    points [g]: what its innovation alone exceeds at the rate, with the friction taken off. rms: of the residual.
-    others: of the bounds of the residual and of slow loads, by name, without friction.
+    Attributes
+    ----------
+    joint
+        Its name.
+    force : [k] N
+    own : [k] N·m
+        base + per_force·f.
+    others : [k] N·m
+        Bounds of the residual and of slow loads by name, without friction.
+    at : [g] N
+        Mean forces of the groups.
+    friction : [g] N·m
+        Bound with what stiction and jumps add on average.
+    points : [g] N·m
+        What the joint's innovation alone exceeds at the rate, with the friction subtracted.
+    rms : [g] N·m
+        Of the residual.
     """
 
     joint: str
@@ -64,7 +98,16 @@ class BoundFigure:
 
 @dataclass(frozen=True)
 class Moment:
-    """Around one of the highest peaks. time [t] s from it; signal and bounds N·m; at: s of the recording."""
+    """Signal and bound around one of the highest peaks.
+
+    Attributes
+    ----------
+    title
+        Where and when.
+    time : [t] s
+        From the peak.
+    signal, bound, own : [t] N·m
+    """
 
     title: str
     time: Numbers
@@ -134,12 +177,12 @@ def bound_figure(tuning: ContactTuning) -> BoundFigure:
 
 
 def own_at(base: float, per_force: float, force: Numbers) -> Numbers:
-    """[k] N·m."""
+    """Return the bound base + per_force·force [k] N·m."""
     return np.asarray(base + per_force * force)
 
 
 def worst_figure(tuning: ContactTuning) -> WorstFigure:
-    """The highest ratios of a cell to its bound, one of those that are near each other."""
+    """Find the highest ratios of a cell to its bound, one of those near each other."""
     name = _main(tuning)
     line, cells = tuning.lines_[name], tuning.cells_
     moments: list[Moment] = []

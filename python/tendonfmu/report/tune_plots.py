@@ -1,4 +1,4 @@
-"""Draws the figures of a tuning (`tune_figures.py`). It computes nothing: what it draws comes ready-made."""
+"""Draws the figures of a tuning (`tune_figures.py`). It computes nothing: the data come ready-made."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _OTHERS = {"residual": ("threshold of the residual", (4, 2)), "drift": ("thresho
 
 
 def draw_tail(data: TailFigure, target: Target) -> None:
-    """False alarms per hour over the factor on the bounds, in sample and held out, as PNG."""
+    """Draw false alarms per hour over the factor on the bounds, in sample and held out, as PNG."""
     figure = Figure(figsize=(10.4, 5.8), layout="constrained")
     axes = figure.subplots()
     clean(axes)
@@ -63,7 +63,7 @@ def draw_tail(data: TailFigure, target: Target) -> None:
 
 
 def draw_bounds(data: BoundFigure, target: Target) -> None:
-    """Bounds over the mean force by joint, as PNG."""
+    """Draw the bounds over the mean force by joint, as PNG."""
     figure = Figure(figsize=(12.8, 7.4), layout="constrained")
     grid = figure.subplots(2, 2, squeeze=False)
     panels = [axes for row in grid for axes in row]
@@ -97,7 +97,7 @@ def draw_bounds(data: BoundFigure, target: Target) -> None:
 
 
 def draw_worst(data: WorstFigure, target: Target) -> None:
-    """Signal and bound around the moments nearest to an alarm, as PNG."""
+    """Draw signal and bound around the moments nearest to an alarm, as PNG."""
     figure = Figure(figsize=(12.8, 7.4), layout="constrained")
     grid = figure.subplots(2, 2, squeeze=False)
     panels = [axes for row in grid for axes in row]

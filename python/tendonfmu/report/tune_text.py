@@ -1,4 +1,4 @@
-"""What a tuning says, in words: a table by joint, one by pretension, and a few lines that `cli/detect.py` prints."""
+"""How a tuning reads in the terminal: tables by joint and by pretension, and lines that `cli/detect.py` prints."""
 
 from __future__ import annotations
 
@@ -12,7 +12,18 @@ Row = tuple[str, ...]
 
 
 def tables(tuning: ContactTuning) -> Iterator[tuple[str, Row, list[Row]]]:
-    """(title, headings, rows)."""
+    """List the tables to print: bounds by joint, then results by pretension.
+
+    Parameters
+    ----------
+    tuning
+        Thresholds tuned on free motion.
+
+    Yields
+    ------
+    tuple
+        Title, headings, rows.
+    """
     yield _bounds(tuning)
     yield _pretensions(tuning)
 
@@ -52,7 +63,7 @@ def _pretensions(tuning: ContactTuning) -> tuple[str, Row, list[Row]]:
 
 
 def lines(tuning: ContactTuning) -> Iterator[str]:
-    """What the rate is, and what it was measured on."""
+    """List the lines to print: the rate of false alarms, and the data it was measured on."""
     alarms = sum(each.alarms for each in tuning.loop_)
     percent = 100 * tuning.confidence
     held, limit = tuning.held_out_
@@ -77,7 +88,7 @@ def lines(tuning: ContactTuning) -> Iterator[str]:
     )
     sensors = tuning.sensors_
     if sensors.keys is None:
-        yield f"sensor faults are not watched: {sensors.why}"
+        yield f"sensor faults are not monitored: {sensors.why}"
     else:
         yield (
             f"sensor faults: forces differ from their springs by up to {sensors.largest:.2g} N in free motion, "
@@ -85,4 +96,4 @@ def lines(tuning: ContactTuning) -> Iterator[str]:
         )
     levels = np.array([level.held_out / level.in_sample for level in tuning.levels_.values()])
     if levels.max() > 1:
-        yield f"held-out halves ask for bounds {levels.max():.2f} times those that the data themselves ask for"
+        yield f"held-out halves need bounds {levels.max():.2f} times those that the data themselves need"

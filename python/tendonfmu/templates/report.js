@@ -4,7 +4,7 @@
   const page = JSON.parse(document.getElementById("panels").textContent);
   const plots = [...document.querySelectorAll(".plot")];
   const zoomed = new Map(); // name of a group -> its range along x; absent: as drawn at first
-  const touched = matchMedia("(hover: none)").matches; // there a drag scrolls the page, and the buttons always show
+  const touched = matchMedia("(hover: none)").matches; // on a touch screen a drag scrolls the page, and the buttons always show
   const config = {
     displaylogo: false,
     modeBarButtons: [["zoom2d", "pan2d", "zoomIn2d", "zoomOut2d", "resetScale2d", "toImage"]],
@@ -29,7 +29,7 @@
     following = false;
   };
 
-  // with a view box the style sheet can shrink a drawing, as for paper
+  // A view box lets the style sheet shrink a drawing, for example on paper.
   const frame = plot => {
     const { width, height } = plot._fullLayout;
     plot.style.setProperty("--shape", `${width} / ${height}`);
