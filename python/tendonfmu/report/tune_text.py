@@ -88,7 +88,7 @@ def lines(tuning: ContactTuning) -> Iterator[str]:
     )
     sensors = tuning.sensors_
     if sensors.keys is None:
-        yield f"sensor faults are not monitored: {sensors.why}"
+        yield f"sensor faults are not watched: {sensors.why}"
     else:
         yield (
             f"sensor faults: forces differ from their springs by up to {sensors.largest:.2g} N in free motion, "
