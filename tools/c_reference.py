@@ -23,7 +23,10 @@ def header_markdown(header: Path) -> str:
     """A section for a header: its introduction, then its declarations under the headings that it has."""
     text = header.read_text(encoding="utf-8")
     introduction, _, rest = text.partition("*/")
-    body = rest[rest.index('extern "C" {') :].split("#endif", 1)[1].rsplit("#ifdef __cplusplus", 1)[0]
+    if 'extern "C" {' in rest:
+        body = rest[rest.index('extern "C" {') :].split("#endif", 1)[1].rsplit("#ifdef __cplusplus", 1)[0]
+    else:  # generated: types alone, and a first comment for those who would edit it
+        introduction, body = "", rest.partition("#define")[2].partition("\n")[2].rpartition("#endif")[0]
     parts = [f"## `{header.name}`", _paragraphs(_plain(introduction))]
     for title, block in _sections(body):
         if title:

@@ -14,7 +14,14 @@ from c_reference import header_markdown
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
-HEADERS = ("tendonfmu", "tendonfmu_description", "tendonfmu_estimation", "tendonfmu_learner", "tendonfmu_plant")
+HEADERS = (
+    "tendonfmu",
+    "tendonfmu_outputs",
+    "tendonfmu_description",
+    "tendonfmu_estimation",
+    "tendonfmu_learner",
+    "tendonfmu_plant",
+)
 _MARK = re.compile(r"<!-- headers: .*? -->")
 _LINK = re.compile(r"(?<!!)\[((?:[^\[\]]|\[[^\]]*\])+)\]\(([^)\s#:]+)(#[^)\s]*)?\)")
 log = logging.getLogger("mkdocs.hooks.site")  # a warning ends a strict build

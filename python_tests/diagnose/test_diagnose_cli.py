@@ -208,7 +208,7 @@ def test_options_and_effects_are_on_the_page(call: Call) -> None:
 def test_a_motion_that_discriminates_takes_no_plan_of_its_own(call: Call, tmp_path: Path) -> None:
     (tmp_path / "finger.json").write_text(json.dumps(examples.adequate().nominal_data))
     answer = call("excite", "finger.json", "--discriminate", "out", "-o", "m.csv", "--duration", "60")
-    assert answer.status == 2 and "--duration: with --discriminate out" in answer.err
+    assert answer.status == 2 and "--duration: given with --discriminate out" in answer.err
     answer = call("excite", "finger.json", "--discriminate", "out", "-o", "m.csv")
     assert answer.status == 2 and "diagnosis.json" in answer.err and answer.err.count("\n") == 1
     write_diagnosis(replace(brief(examples.adequate()), experiment=examples.NO_EXPERIMENT), tmp_path / "out")

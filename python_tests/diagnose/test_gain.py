@@ -261,7 +261,7 @@ def test_what_cannot_be_compared_is_refused() -> None:
         measure_gain(nominal(), nominal(), [training])
     other = copy.deepcopy(nominal())
     other["bias"]["noise_std"] = 0.1
-    with pytest.raises(InternalError, match="bias: not the same"):
+    with pytest.raises(InternalError, match="bias: different settings in the two"):
         measure_gain(nominal(), other, [training], [prepared(nominal(), 2)])
 
 

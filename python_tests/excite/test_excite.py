@@ -286,7 +286,7 @@ def test_cable_loops_pull_and_push() -> None:
 
 def test_varied_tensions_that_cannot_be_are_refused() -> None:
     tight = Plan(SMALL_RANGES, duration=20, vary=Variation(10.0, 11.0))
-    with pytest.raises(InputError, match=r"--vary-tension 10:11: no pretension .*HIGH at least 2 times LOW"):
+    with pytest.raises(InputError, match=r"--vary-tension 10:11: no balanced pretension .*HIGH at least 2 times LOW"):
         plan_excitation(SMALL, tight)
     data = {**SMALL, "tendons": [{**tendon, "bidirectional": True} for tendon in SMALL["tendons"][:2]]}
     with pytest.raises(InputError, match="2 tendons at 2 joints hold no tension; expected more tendons than joints"):

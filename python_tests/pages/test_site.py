@@ -29,7 +29,7 @@ def test_the_c_reference_has_every_declaration(header: Path) -> None:
     names = set(re.findall(r"\b(tendonfmu_\w+)\(", code)) | set(re.findall(r"^} (\w+);", code, re.MULTILINE))
     text = header_markdown(header)
     shown = "".join(re.findall(r"```c\n(.*?)```", text, re.DOTALL))
-    assert len(names) > 1
+    assert names
     assert {name for name in names if name not in shown} == set()
     headings = re.findall(r"^#### `(\w+)`", text, re.MULTILINE)
     assert len(set(headings)) == len(headings)

@@ -338,7 +338,7 @@ def test_without_a_plant_check_says_so(
 
 def test_an_installation_without_the_module_does_everything_else(tmp_path: Path) -> None:
     """The package as it is where SUNDIALS was not found, in an interpreter of its own."""
-    installed = Path(plant.__file__).parent
+    installed = Path(plant.__file__).parent.parent
     without = shutil.ignore_patterns("_plant*.so", "_plant*.pyd", "binaries", "sources", "__pycache__")
     shutil.copytree(installed, tmp_path / "tendonfmu", ignore=without)
 
