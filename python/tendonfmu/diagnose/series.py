@@ -102,54 +102,6 @@ class Series(BlockSeries):
     travel: Numbers
 
 
-@dataclass(frozen=True)
-class Columns:
-    """Derivatives of G, averaged like the series [B, n, c], and their names [c]."""
-
-    values: Array
-    names: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Trial:
-    """A candidate at a place with one choice of its non-linear numbers.
-
-    Its columns in a bank are first .. first + count − 1.
-
-    Attributes
-    ----------
-    effect, joint, tendon
-        As in the report.
-    signs
-        Expected sign of each magnitude, 0 for either.
-    shape
-        The choice.
-    origin
-        What made it (the candidate), for the caller.
-    """
-
-    effect: str
-    joint: int | None
-    tendon: int | None
-    signs: tuple[int, ...]
-    shape: Mapping[str, float]
-    first: int
-    count: int
-    origin: Any = None
-
-    @property
-    def place(self) -> tuple[str, int | None, int | None]:
-        return self.effect, self.joint, self.tendon
-
-
-@dataclass(frozen=True)
-class Bank:
-    """Columns of all candidates."""
-
-    columns: Columns
-    trials: tuple[Trial, ...]
-
-
 def make_grid(recordings: Sequence[FitRecording]) -> Grid:
     """Cut recordings into blocks of about 10 ms.
 

@@ -20,10 +20,6 @@ from tendonfmu.estimate.fisher_information import Unknown, unknowns
 from tendonfmu.model import LEFT_OUT, FingerDescription, effects, native, sides
 
 MAGNITUDES = ("static", "coulomb", "stribeck_velocity", "viscous")
-SHARED_BY_WORD = {
-    "tendons": ("tendons[*].edge_friction[*]", "tendons[*].pulley_friction[*]"),
-    "pulleys": ("tendons[*].pulley_friction[*]",),
-}
 FIXED = -1
 
 _INDEX = re.compile(r"\[(\d+)\]")

@@ -44,7 +44,6 @@ _RATE = 50.0  # 1/s, of a predicted recording
 _LEAST_RATE, _MOST_SAMPLES = 10.0, 3200
 _BLOCK = 0.02  # s
 _OLD_SECONDS = 60.0  # of each old recording that is used, s
-CLEAR = 1.0  # rms of what is left over that of the noise: no more entries are tried beyond
 _BETTER = 1.5  # times the present distance
 _FAINTEST = 0.01  # times the noise: smaller values are rounding errors
 _SIMPLER = 0.7  # of the largest distance is sufficient for a simpler entry
