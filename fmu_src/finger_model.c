@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "model.h"
+#include "finger_signals.h"
 
 struct model {
   tendonfmu_finger* finger;
@@ -236,6 +236,10 @@ int model_step(model* m, variables* values, double time, double step) {
 
 size_t model_state_size(const model* m) {
   return m->state_size;
+}
+
+void model_fetch_outputs(const model* m, variables* values) {
+  variables_fetch_outputs(values, m->finger);
 }
 
 void model_save(const model* m, void* bytes) {

@@ -2,15 +2,11 @@
 #ifndef TENDONFMU_FINGER_MODEL_H
 #define TENDONFMU_FINGER_MODEL_H
 
+#include "model.h"
 #include "tendonfmu.h"
-#include "variables.h"
 
 /* For what is not the same in every FMU: derivatives. */
 tendonfmu_finger* model_finger(const model* m);
 double* model_derivatives(const model* m); /* room for one number of each Real input and output */
-
-/* Views of the block of variables for tendonfmu.h. */
-tendonfmu_inputs variables_inputs(const variables* v);
-tendonfmu_outputs variables_outputs(const variables* v);
 
 #endif

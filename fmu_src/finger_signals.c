@@ -1,8 +1,6 @@
 /* Generated from the tables in runtime/description by `python tools/tables/generate.py`: do not edit. */
 /* clang-format off */
-#include "finger_model.h"
-
-#include "model.h"
+#include "finger_signals.h"
 
 tendonfmu_inputs variables_inputs(const variables* v) {
   return (tendonfmu_inputs){
@@ -37,12 +35,12 @@ tendonfmu_outputs variables_outputs(const variables* v) {
 }
 
 /* The block of variables holds numbers of one type, so Integer ones go through a variable of their own. */
-void model_fetch_outputs(const model* m, variables* values) {
-  tendonfmu_outputs outputs = variables_outputs(values);
+void variables_fetch_outputs(variables* v, const tendonfmu_finger* finger) {
+  tendonfmu_outputs outputs = variables_outputs(v);
   int contact_link = 0;
-  outputs.contact_link = values->number[GROUP_CONTACT_LINK] ? &contact_link : NULL;
-  tendonfmu_get_outputs(model_finger(m), &outputs);
+  outputs.contact_link = v->number[GROUP_CONTACT_LINK] ? &contact_link : NULL;
+  tendonfmu_get_outputs(finger, &outputs);
   if (outputs.contact_link) {
-    *values->number[GROUP_CONTACT_LINK] = contact_link;
+    *v->number[GROUP_CONTACT_LINK] = contact_link;
   }
 }

@@ -4,6 +4,7 @@
 
 #include "component.h"
 #include "finger_model.h"
+#include "finger_signals.h"
 #include "fmi2Functions.h"
 #include "variable_access.h"
 
