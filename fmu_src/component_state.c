@@ -117,7 +117,8 @@ static int values_are_sound(const component* c, const unsigned char* from) {
   return 1;
 }
 
-static const char* check_header(const component* c, const unsigned char* from) {
+const char* component_refuse_block(const component* c, const void* bytes) {
+  const unsigned char* from = bytes;
   if (memcmp(from + MAGIC, magic, sizeof magic) != 0 || get_u64(from + VERSION) != STATE_VERSION) {
     return "not a state of an FMU of this kind and version";
   }
@@ -131,7 +132,7 @@ const char* component_check_state(component* c, const void* bytes, size_t size) 
   if (size != component_state_size(c)) {
     return "size is not that of fmi2SerializedFMUstateSize";
   }
-  const char* reason = check_header(c, bytes);
+  const char* reason = component_refuse_block(c, bytes);
   if (reason) {
     return reason;
   }
@@ -148,7 +149,7 @@ const char* component_check_state(component* c, const void* bytes, size_t size) 
 const char* component_restore(component* c, const void* bytes) {
   const unsigned char* from = bytes;
   variables* v = &c->values;
-  const char* reason = check_header(c, from);
+  const char* reason = component_refuse_block(c, from);
   if (reason) {
     return reason;
   }

@@ -13,6 +13,10 @@ size_t component_state_size(const component* c);
 /* Writes the state into bytes [component_state_size()]. Logging and the state "error" are no part of it. */
 void component_save(const component* c, void* bytes);
 
+/* Why a block that component_save() of some instance wrote is no state of this FMU, NULL when it is. Reads its first
+ * bytes only, which every FMU of this kind writes. */
+const char* component_refuse_block(const component* c, const void* bytes);
+
 /* Why these bytes [size] cannot be a state of this FMU, NULL when they can. Changes nothing. */
 const char* component_check_state(component* c, const void* bytes, size_t size);
 

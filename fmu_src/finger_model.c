@@ -139,7 +139,7 @@ int model_parameter_path(const model* m, size_t index, char* path, size_t size) 
   return tendonfmu_get_parameter_path(m->finger, index, path, size) == TENDONFMU_OK ? 0 : -1;
 }
 
-const char* model_set_tolerance(model* m, double tolerance) {
+const char* model_set_tolerance(model* m, double* tolerance) {
   (void)m, (void)tolerance; /* nothing is iterated */
   return NULL;
 }

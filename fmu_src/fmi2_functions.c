@@ -139,6 +139,27 @@ static int time_is_sound(component* c, const char* function, const char* name, d
   return 0;
 }
 
+/* Importers give tolerances of their own (Maestro 0.1), meant for all FMUs of a system: a model that cannot take it
+ * uses the nearest that it can, and says so. */
+static int set_tolerance(component* c, double tolerance) {
+  double used = tolerance;
+  const char* expected = model_set_tolerance(c->model, &used);
+  if (!expected && !(used < tolerance || used > tolerance)) {
+    return 1;
+  }
+  log_text text = log_start("fmi2SetupExperiment", "tolerance = ");
+  log_append_number(&text, tolerance);
+  log_append(&text, expected ? ": expected " : ": this FMU goes on with ");
+  if (expected) {
+    log_append(&text, expected);
+    component_fail(c, &text);
+    return 0;
+  }
+  log_append_number(&text, used);
+  log_send(&c->log, fmi2Warning, LOG_STATUS_WARNING, &text);
+  return 1;
+}
+
 fmi2Status fmi2SetupExperiment(fmi2Component instance, fmi2Boolean toleranceDefined, fmi2Real tolerance,
                                fmi2Real startTime, fmi2Boolean stopTimeDefined, fmi2Real stopTime) {
   component* c = instance;
@@ -154,13 +175,8 @@ fmi2Status fmi2SetupExperiment(fmi2Component instance, fmi2Boolean toleranceDefi
     log_append(&text, " s");
     return component_fail(c, &text);
   }
-  const char* expected = toleranceDefined ? model_set_tolerance(c->model, tolerance) : NULL;
-  if (expected) {
-    log_text text = log_start("fmi2SetupExperiment", "tolerance = ");
-    log_append_number(&text, tolerance);
-    log_append(&text, ": expected ");
-    log_append(&text, expected);
-    return component_fail(c, &text);
+  if (toleranceDefined && !set_tolerance(c, tolerance)) {
+    return fmi2Error;
   }
   variables_fetch_settings(&c->values, c->model);
   c->start_time = c->end_of_step = startTime;

@@ -6,6 +6,15 @@
 #include "component_state.h"
 #include "fmi2Functions.h"
 
+/* A block of another FMU may be shorter than those of this one. */
+static int is_own_block(component* c, const char* function, fmi2FMUstate block) {
+  const char* reason = block ? component_refuse_block(c, block) : "FMUstate is NULL";
+  if (reason) {
+    component_fail_because(c, function, reason);
+  }
+  return !reason;
+}
+
 fmi2Status fmi2GetFMUstate(fmi2Component instance, fmi2FMUstate* FMUstate) {
   component* c = instance;
   if (!component_may_call(c, CALL_GET_FMU_STATE)) {
@@ -13,6 +22,9 @@ fmi2Status fmi2GetFMUstate(fmi2Component instance, fmi2FMUstate* FMUstate) {
   }
   if (!FMUstate) {
     return component_fail_because(c, "fmi2GetFMUstate", "FMUstate is NULL");
+  }
+  if (*FMUstate && !is_own_block(c, "fmi2GetFMUstate", *FMUstate)) {
+    return fmi2Error;
   }
   if (!*FMUstate) {
     *FMUstate = malloc(component_state_size(c));
@@ -49,8 +61,11 @@ fmi2Status fmi2SerializedFMUstateSize(fmi2Component instance, fmi2FMUstate FMUst
   if (!component_may_call(c, CALL_SERIALIZED_FMU_STATE_SIZE)) {
     return fmi2Error;
   }
-  if (!FMUstate || !size) {
-    return component_fail_because(c, "fmi2SerializedFMUstateSize", FMUstate ? "size is NULL" : "FMUstate is NULL");
+  if (!is_own_block(c, "fmi2SerializedFMUstateSize", FMUstate)) {
+    return fmi2Error;
+  }
+  if (!size) {
+    return component_fail_because(c, "fmi2SerializedFMUstateSize", "size is NULL");
   }
   *size = component_state_size(c);
   return fmi2OK;
@@ -76,10 +91,8 @@ fmi2Status fmi2SerializeFMUstate(fmi2Component instance, fmi2FMUstate FMUstate, 
   if (!component_may_call(c, CALL_SERIALIZE_FMU_STATE)) {
     return fmi2Error;
   }
-  if (!FMUstate) {
-    return component_fail_because(c, "fmi2SerializeFMUstate", "FMUstate is NULL");
-  }
-  if (!has_bytes(c, "fmi2SerializeFMUstate", serializedState, size)) {
+  if (!is_own_block(c, "fmi2SerializeFMUstate", FMUstate) ||
+      !has_bytes(c, "fmi2SerializeFMUstate", serializedState, size)) {
     return fmi2Error;
   }
   memcpy(serializedState, FMUstate, size);
@@ -101,6 +114,9 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component instance, const fmi2Byte serial
   const char* reason = component_check_state(c, serializedState, size);
   if (reason) {
     return component_fail_because(c, "fmi2DeSerializeFMUstate", reason);
+  }
+  if (*FMUstate && !is_own_block(c, "fmi2DeSerializeFMUstate", *FMUstate)) {
+    return fmi2Error;
   }
   if (!*FMUstate) {
     *FMUstate = malloc(size);

@@ -61,8 +61,8 @@ model_range model_parameter_range(const model* m, size_t index);
 /* 0, or -1 when the path is longer than size - 1. */
 int model_parameter_path(const model* m, size_t index, char* path, size_t size);
 
-/* The tolerance of fmi2SetupExperiment. NULL, or what was expected. */
-const char* model_set_tolerance(model* m, double tolerance);
+/* The tolerance of fmi2SetupExperiment, replaced by the nearest that the model can use. NULL, or what was expected. */
+const char* model_set_tolerance(model* m, double* tolerance);
 
 /* --- life ----------------------------------------------------------------------------------------------------------
  */

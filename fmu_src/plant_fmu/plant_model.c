@@ -125,13 +125,14 @@ model_range model_setting_range(const model* m, variable_group_id group) {
   return setting_range(group, m->joints);
 }
 
-const char* model_set_tolerance(model* m, double tolerance) {
+const char* model_set_tolerance(model* m, double* tolerance) {
   const variable_group* group = &variable_groups[GROUP_RELATIVE_TOLERANCE];
-  if (!(tolerance >= group->minimum && tolerance <= group->maximum)) {
-    return "1e-10 to 0.01, as of relative_tolerance";
+  if (!(*tolerance > 0.0) || isinf(*tolerance)) {
+    return "a finite number above 0";
   }
+  *tolerance = fmin(fmax(*tolerance, group->minimum), group->maximum);
   if (!m->tolerance_written) {
-    m->wanted[SETTING_RELATIVE_TOLERANCE] = tolerance;
+    m->wanted[SETTING_RELATIVE_TOLERANCE] = *tolerance;
   }
   return NULL;
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
 import os
 import re
@@ -161,6 +162,27 @@ def test_state_of_another_fmu_is_refused(small_fmu: UnpackedFmu, other_fmu: Unpa
     with Instance(small_fmu) as mine, Instance(other_fmu) as other:
         assert other.restore(mine.save()) == ERROR
         assert "fmi2DeSerializeFMUstate: size" in other.last_message
+
+
+def test_blocks_of_another_fmu_are_neither_read_nor_written(small_fmu: UnpackedFmu, other_fmu: UnpackedFmu) -> None:
+    """Its states are of another length."""
+    with Instance(small_fmu) as mine, Instance(other_fmu) as other:
+        block, size = ctypes.c_void_p(), ctypes.c_size_t()
+        assert other.call("GetFMUstate", ctypes.byref(block)) == OK
+        assert other.call("SerializedFMUstateSize", block, ctypes.byref(size)) == OK
+        before = ctypes.string_at(block, size.value)
+        assert before == other.save()
+        assert mine.call("SerializedFMUstateSize", block, ctypes.byref(size)) == ERROR
+        own = mine.save()
+        for name, arguments in {
+            "SerializeFMUstate": (block, (ctypes.c_char * len(own))(), len(own)),
+            "GetFMUstate": (ctypes.byref(block),),
+            "SetFMUstate": (block,),
+            "DeSerializeFMUstate": (own, len(own), ctypes.byref(block)),
+        }.items():
+            assert mine.call(name, *arguments) == ERROR
+            assert f"fmi2{name}: state of another FMU" in mine.last_message
+            assert ctypes.string_at(block, len(before)) == before
 
 
 def test_the_hosts_floating_point_stays(small_fmu: UnpackedFmu) -> None:

@@ -71,7 +71,9 @@ def test_everything_is_in(packed: Pack) -> None:
     suffix = {"linux": "so", "win32": "dll", "darwin": "dylib"}[sys.platform]
     assert f"binaries/{fmi_platform()}/small_finger.{suffix}" in files
     assert files["model.png"][:8] == b"\x89PNG\r\n\x1a\n"
+    assert files["documentation/licenses/license.txt"] == (ROOT / "LICENSE").read_bytes()
     page = files["documentation/index.html"].decode()
+    assert 'src="../model.png"' in page
     finger = native.Finger(files["resources/model.image"])
     for parameter in finger.parameters():
         assert f'<code>{parameter.path}</code></td><td class="number">{parameter.start}</td>' in page

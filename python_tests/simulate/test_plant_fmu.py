@@ -58,7 +58,8 @@ def test_everything_is_in(plant_fmu_path: Path) -> None:
         "modelDescription.xml",
         "model.png",
         "documentation/index.html",
-        "documentation/finger.png",
+        "documentation/licenses/license.txt",
+        "documentation/licenses/third_party.txt",
         "resources/rig.json",
         f"binaries/{fmi_platform()}/TendonFinger_small.{suffix}",
     }
@@ -318,10 +319,15 @@ def test_experiments_tolerance(plant_fmu: UnpackedFmu) -> None:
                 )
                 assert status == OK
             assert tolerance(instance) == 1e-8
-    for bad in (0.0, -1.0, 0.1, float("nan")):
+    for bad in (0.0, -1.0, float("nan"), float("inf")):
         with Instance(plant_fmu) as instance:
             assert instance.call("SetupExperiment", 1, bad, 0.0, 0, 0.0) == ERROR
-            assert "tolerance = " in instance.last_message and "expected 1e-10 to 0.01" in instance.last_message
+            assert "tolerance = " in instance.last_message and "a finite number above 0" in instance.last_message
+    for given, used in ((0.1, 0.01), (1e-12, 1e-10)):  # 0.1 is Maestro's, for all FMUs of a system
+        with Instance(plant_fmu) as instance:
+            assert instance.call("SetupExperiment", 1, given, 0.0, 0, 0.0) == OK
+            assert f"this FMU goes on with {used:g}" in instance.last_message
+            assert tolerance(instance) == used
 
 
 # --- several instances ------------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Bytes and handles that instances of an FMU leave behind, counted in a process that does nothing else.
+"""Bytes and handles that an FMU and its instances leave behind, counted in a process that does nothing else.
 
 In pytest's own process other threads (execnet's, of pytest-xdist) and Python's allocations count too. Here one thread
 runs, garbage is collected only between rounds, and the least growth of several rounds decides: a block lost by every
@@ -11,6 +11,7 @@ import ctypes
 import gc
 import json
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -97,7 +98,25 @@ def losing(fmu: UnpackedFmu) -> Callable[[int], None]:
     return cycle
 
 
-CYCLES = {function.__name__: function for function in (bare, whole, losing)}
+def unloaded(fmu: UnpackedFmu) -> Callable[[int], None]:
+    """The library loaded from a copy, one instance made and freed, the library unloaded."""
+    import _ctypes
+
+    copy = fmu.binary.with_name("unloaded.so")
+    shutil.copy(fmu.binary, copy)
+    arguments = (b"finger", 1, fmu.guid.encode(), fmu.location, None, 0, 0)
+
+    def cycle(_: int) -> None:
+        library = ctypes.CDLL(str(copy))
+        library.fmi2Instantiate.restype = ctypes.c_void_p
+        library.fmi2FreeInstance.argtypes = [ctypes.c_void_p]
+        library.fmi2FreeInstance(library.fmi2Instantiate(*arguments))
+        _ctypes.dlclose(library._handle)
+
+    return cycle
+
+
+CYCLES = {function.__name__: function for function in (bare, whole, losing, unloaded)}
 
 
 def growths(cycle: Callable[[int], None], count: int) -> Iterator[tuple[int, int]]:

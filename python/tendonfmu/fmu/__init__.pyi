@@ -10,6 +10,7 @@ from .model_variables import units_of as units_of
 from .packaging import build_fmu as build_fmu
 from .packaging import find_binaries as find_binaries
 from .packaging import guid as guid
+from .packaging import licenses as licenses
 from .packaging import members as members
 from .packaging import model_description as model_description
 from .packaging import model_identifier as model_identifier

@@ -185,6 +185,7 @@ def members(
     }
     if illustrated:
         content |= _for_readers(description, context)
+    content |= licenses("license.txt")
     content |= {f"sources/{name}": data for name, data in sources.items()}
     libraries = find_binaries(binaries, BINARIES, BINARY_STEM, identifier)
     content |= {f"binaries/{path}": data for path, data in libraries.items()}
@@ -200,7 +201,6 @@ def _for_readers(description: FingerDescription, context: Mapping[str, Any]) -> 
     draw_finger(finger_drawing(description), picture)
     return {
         "model.png": picture.getvalue(),
-        "documentation/finger.png": picture.getvalue(),
         "documentation/index.html": documentation_page(description, context).encode(),
     }
 
@@ -233,6 +233,22 @@ def variable_generator() -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+def licenses(*names: str) -> dict[str, bytes]:
+    """Return the licence texts of an FMU, where FMI 2.0.4 wants them.
+
+    Parameters
+    ----------
+    names
+        `license.txt`, that of this project; `third_party.txt`, those of what its binary holds.
+
+    Returns
+    -------
+    dict of bytes
+        Path in the archive -> content.
+    """
+    return {f"documentation/licenses/{name}": package_file(f"licenses/{name}").read_bytes() for name in names}
 
 
 def _sources() -> dict[str, bytes]:

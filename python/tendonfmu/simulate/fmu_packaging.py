@@ -12,7 +12,16 @@ from typing import Any
 
 from tendonfmu.errors import InputError
 from tendonfmu.files import whole_file
-from tendonfmu.fmu import find_binaries, guid, model_description, model_identifier, pack, package_file, read_table
+from tendonfmu.fmu import (
+    find_binaries,
+    guid,
+    licenses,
+    model_description,
+    model_identifier,
+    pack,
+    package_file,
+    read_table,
+)
 from tendonfmu.model import count, native
 from tendonfmu.simulate.fmu_variables import describe_plant
 from tendonfmu.simulate.plant import Plant, Settings, refused_by
@@ -77,9 +86,9 @@ def plant_members(rig: Rig, *, binaries: Path | None = None) -> dict[str, bytes]
     return {
         "modelDescription.xml": model_description(context),
         "model.png": picture.getvalue(),
-        "documentation/finger.png": picture.getvalue(),
         "documentation/index.html": page.encode(),
         "resources/rig.json": text,
+        **licenses("license.txt", "third_party.txt"),
         **{f"binaries/{path}": data for path, data in found.items()},
     }
 
