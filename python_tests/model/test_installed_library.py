@@ -26,6 +26,9 @@ add_executable(version version.c)
 target_link_libraries(version PRIVATE tendonfmu::tendonfmu)
 add_executable(sizes sizes.cpp)
 target_link_libraries(sizes PRIVATE tendonfmu::description)
+add_executable(cpp_sizes cpp_sizes.cpp)
+target_link_libraries(cpp_sizes PRIVATE tendonfmu::description)
+target_compile_features(cpp_sizes PRIVATE cxx_std_17)
 if(TARGET tendonfmu::estimation)
   add_executable(estimation estimation.c)
   target_link_libraries(estimation PRIVATE tendonfmu::estimation)
@@ -108,6 +111,22 @@ int main(int, char** arguments) {
 }
 """
 
+# The C++ interface: no library of its own.
+CPP_SIZES = """\
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <string>
+#include <tendonfmu.hpp>
+
+int main(int, char** arguments) {
+  std::ifstream file(arguments[1]);
+  const std::string json{std::istreambuf_iterator<char>(file), {}};
+  const tendonfmu::finger finger = tendonfmu::finger::from_json(json).value();
+  std::cout << finger.joint_count() << ' ' << finger.tendon_count() << '\\n';
+}
+"""
+
 
 def call(*command: str | Path, env: Mapping[str, str] | None = None) -> str:
     result = subprocess.run(
@@ -160,6 +179,7 @@ def consumer(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "CMakeLists.txt").write_text(CONSUMER_CMAKE.format(version=project_version()), encoding="utf-8")
     (folder / "version.c").write_text(VERSION_C, encoding="utf-8")
     (folder / "sizes.cpp").write_text(SIZES_CPP, encoding="utf-8")
+    (folder / "cpp_sizes.cpp").write_text(CPP_SIZES, encoding="utf-8")
     (folder / "plant.c").write_text(PLANT_C, encoding="utf-8")
     (folder / "estimation.c").write_text(ESTIMATION_C, encoding="utf-8")
     return folder
@@ -170,7 +190,7 @@ def test_find_package_gives_the_libraries(prefix: Path, consumer: Path) -> None:
     call("cmake", "-G", "Ninja", "-S", consumer, "-B", build, f"-DCMAKE_PREFIX_PATH={prefix}")
     call("cmake", "--build", build)
     assert call(build / "version") == project_version()
-    assert call(build / "sizes", FINGER) == "4 8"
+    assert call(build / "sizes", FINGER) == call(build / "cpp_sizes", FINGER) == "4 8"
     assert (build / "plant").exists() == has_plant(prefix)
     if has_plant(prefix):
         assert call(build / "plant") == REFUSED
@@ -192,6 +212,7 @@ def test_find_package_refuses_a_newer_version(prefix: Path, consumer: Path, tmp_
     [
         ("tendonfmu", "version.c", "cc", [], project_version()),
         ("tendonfmu-description", "sizes.cpp", "c++", [FINGER], "4 8"),
+        ("tendonfmu-description", "cpp_sizes.cpp", "c++", [FINGER], "4 8"),
     ],
 )
 def test_pkg_config(

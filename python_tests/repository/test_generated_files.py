@@ -73,6 +73,7 @@ def test_an_output_is_a_fact_of_one_table(generator: ModuleType) -> None:
         "python/binding/output_table.h",
         "python/tendonfmu/model/output_names.py",
         "runtime/include/tendonfmu_outputs.h",
+        "runtime/include/tendonfmu_outputs.hpp",
     }
 
 

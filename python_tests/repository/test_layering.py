@@ -381,7 +381,7 @@ def test_no_source_is_too_long() -> None:
     code = [
         name
         for name in tracked()
-        if Path(name).suffix in (".c", ".h", ".cpp", ".py", ".pyi", ".sh", ".cmake", ".jinja")
+        if Path(name).suffix in (".c", ".h", ".cpp", ".hpp", ".py", ".pyi", ".sh", ".cmake", ".jinja")
     ]
     lengths = {name: lines_of(ROOT / name) for name in code}
     assert {name: length for name, length in lengths.items() if length > LONGEST} == {}

@@ -28,6 +28,7 @@ TEMPLATES = {
     "effect_facts.c.jinja": "runtime/core/effects/effect_facts.c",
     "description_keys.cpp.jinja": "runtime/description/description_keys.cpp",
     "tendonfmu_outputs.h.jinja": "runtime/include/tendonfmu_outputs.h",
+    "tendonfmu_outputs.hpp.jinja": "runtime/include/tendonfmu_outputs.hpp",
     "output_table.h.jinja": "python/binding/output_table.h",
     "finger_signals.c.jinja": "fmu_src/finger_signals.c",
     "description_defaults.py.jinja": "python/tendonfmu/model/description_defaults.py",
