@@ -7,10 +7,12 @@ import os
 import re
 import shutil
 import subprocess
+import time
 import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from fit_finger import made_recording, moved_start, write_recording
@@ -305,12 +307,74 @@ def test_installed_text_names_no_folder_of_the_build(prefix: Path) -> None:
     ] == []
 
 
-def test_control_loop_of_the_examples_feels_the_push(prefix: Path, tmp_path: Path) -> None:
-    call("cmake", "-S", ROOT / "examples" / "c_control_loop", "-B", tmp_path, f"-DCMAKE_PREFIX_PATH={prefix}")
-    call("cmake", "--build", tmp_path)
-    lines = call(tmp_path / "control_loop", FINGER, "2.2").splitlines()
-    begins = [float(line.split()[0]) for line in lines if "contact, compensated" in line]
-    ends = [float(line.split()[0]) for line in lines if "free again" in line]
-    # one push, from 1.5 s to 1.8 s; generous, since a busy machine reads the sensors late
-    assert any(1.5 <= time < 1.7 for time in begins), lines
-    assert any(1.8 <= time < 2.1 for time in ends), lines
+@pytest.fixture(scope="module")
+def control_loop(prefix: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    build = tmp_path_factory.mktemp("loop")
+    source = ROOT / "examples" / "cpp_control_loop"
+    flags = "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Werror"
+    call("cmake", "-G", "Ninja", "-S", source, "-B", build, f"-DCMAKE_PREFIX_PATH={prefix}", flags)
+    call("cmake", "--build", build)
+    assert not (build / "tendonfmu").exists(), "the repository was taken in place of the installed library"
+    return build / "control_loop"
+
+
+def contacts(lines: str) -> tuple[list[float], list[float]]:
+    """Times at which contact begins, and at which it ends."""
+    found = [line.split() for line in lines.splitlines()]
+    begins = [float(words[0]) for words in found if words[1:3] == ["s", "contact,"]]
+    ends = [float(words[0]) for words in found if words[1:3] == ["s", "free"]]
+    return begins, ends
+
+
+def test_control_loop_of_the_examples_feels_the_pull(control_loop: Path) -> None:
+    begins, ends = contacts(call(control_loop, FINGER, "--rate", "3000", "--seconds", "2.2", "--no-wait"))
+    # one pull, from 1.5 s to 1.8 s
+    assert begins == [pytest.approx(1.5, abs=0.005)]
+    assert ends == [pytest.approx(1.8, abs=0.005)]
+
+
+def test_control_loop_of_the_examples_waits_for_its_samples(control_loop: Path) -> None:
+    started = time.monotonic()
+    printed = call(control_loop, FINGER, "--seconds", "0.5")
+    assert time.monotonic() - started >= 0.499
+    assert " 500 samples, 0 refused" in printed and "latest sample" in printed
+
+
+def test_control_loop_of_the_examples_feels_the_pushes_of_the_demo_recording(
+    control_loop: Path, tmp_path: Path
+) -> None:
+    folder = ROOT / "examples" / "demo_recording"
+    recorded = pd.read_parquet(folder / "index_finger_pushes.parquet")
+    pushed = recorded["contact"].to_numpy() > 0
+    onsets = recorded["time"].to_numpy()[1:][pushed[1:] & ~pushed[:-1]] - recorded["time"][0]
+    recorded.to_csv(tmp_path / "pushes.csv", index=False)
+    calibrated = folder / "index_finger_calibrated.json"
+    begins, _ = contacts(call(control_loop, calibrated, "--recording", tmp_path / "pushes.csv", "--no-wait"))
+    assert len(begins) == len(onsets) == 11
+    assert all(0.0 <= begin - onset < 0.5 for begin, onset in zip(begins, onsets, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("changed", "status", "said"),
+    [
+        (("tendon_force[2]", 3, float("nan")), 1, "0.006 s  refused: tendon_force[2]"),
+        (("time", 3, 0.001), 1, "0.001 s  refused: time = 0.001 s: expected a finite number"),
+        (("tendon_position[8]", 3, "fast"), 2, 'row 4, column 17: "fast": expected a number'),
+        (("tendon_force[8]", None, None), 2, "no column tendon_force[8]"),
+    ],
+)
+def test_control_loop_of_the_examples_says_what_it_refuses(
+    control_loop: Path, tmp_path: Path, changed: tuple[str, int | None, object], status: int, said: str
+) -> None:
+    recorded = pd.read_parquet(ROOT / "examples" / "demo_recording" / "index_finger_pushes.parquet").head(10)
+    column, row, value = changed
+    if row is None:
+        recorded = recorded.drop(columns=column)
+    else:
+        recorded[column] = recorded[column].astype(object)
+        recorded.loc[row, column] = value
+    recorded.to_csv(tmp_path / "damaged.csv", index=False, na_rep="nan")
+    command = [control_loop, FINGER, "--recording", tmp_path / "damaged.csv", "--no-wait"]
+    result = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
+    assert result.returncode == status
+    assert said in result.stdout + result.stderr
