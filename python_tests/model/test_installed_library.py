@@ -318,6 +318,15 @@ def control_loop(prefix: Path, tmp_path_factory: pytest.TempPathFactory) -> Path
     return build / "control_loop"
 
 
+def test_the_ros2_example_is_built_and_tested_without_ros(prefix: Path, tmp_path: Path) -> None:
+    """Where ROS 2 is sourced, the node is built as well."""
+    source = ROOT / "examples" / "ros2_contact_node"
+    flags = "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Werror"
+    call("cmake", "-G", "Ninja", "-S", source, "-B", tmp_path, f"-DCMAKE_PREFIX_PATH={prefix}", flags)
+    call("cmake", "--build", tmp_path)
+    assert "100% tests passed" in call("ctest", "--test-dir", tmp_path, "--no-tests=error")
+
+
 def contacts(lines: str) -> tuple[list[float], list[float]]:
     """Times at which contact begins, and at which it ends."""
     found = [line.split() for line in lines.splitlines()]
