@@ -1,10 +1,11 @@
-// Time of a step of the C interface, by kernel and size. Counter per_step is the figure of
-// docs/evidence/performance.md.
+// Time of a step of the C interface, by kernel and size, and of the same step through tendonfmu.hpp. Counter per_step
+// is the figure of docs/evidence/performance.md.
 #include <benchmark/benchmark.h>
 
 #include <vector>
 
 #include "bench_finger.h"
+#include "tendonfmu.hpp"
 
 namespace {
 
@@ -95,6 +96,37 @@ const auto* const registered = [] {
   add("step/avx2/1x2x1", "avx2", 1, 2, 1, false);
   return add("step/avx2/16x64x5", "avx2", 16, 64, 5, false);
 }();
+
+// The finger of step/avx2/4x8x5, through tendonfmu.hpp.
+void cpp_steps(benchmark::State& state) {
+  constexpr std::size_t m = 8;
+  tendonfmu::finger finger(bench_finger::image(bench_finger::description(4, 8, 5)));
+  if (finger.set_kernel("avx2") != tendonfmu::status::ok) {
+    state.SkipWithError("this kernel cannot run here");
+    return;
+  }
+  const bench_finger::made_recording r = bench_finger::motion(4, 8, samples);
+  std::vector<double> torque(4);
+  tendonfmu::outputs outputs;
+  outputs.compensated_torque = torque;
+  bool well = true;
+  for (auto _ : state) {
+    well = finger.reset() == tendonfmu::status::ok && well;
+    for (std::size_t k = 0; k < samples; ++k) {
+      const tendonfmu::inputs inputs = {{&r.force[k * m], m}, {&r.position[k * m], m}};
+      well =
+          (k == 0 ? finger.initialise(r.time[k], inputs) : finger.step(r.time[k], inputs)) == tendonfmu::status::ok &&
+          finger.get_outputs(outputs) == tendonfmu::status::ok && well;
+      benchmark::DoNotOptimize(torque.data());
+    }
+  }
+  if (!well) {
+    state.SkipWithError("a sample was refused");
+  }
+  state.counters["per_step"] = benchmark::Counter(static_cast<double>(state.iterations()) * samples,
+                                                  benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+}
+BENCHMARK(cpp_steps)->Name("step/cpp/4x8x5")->Unit(benchmark::kMillisecond);
 
 void save_and_restore(benchmark::State& state) {
   finger_runner runner(4, 8, 5, "auto");

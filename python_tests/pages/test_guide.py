@@ -28,6 +28,7 @@ START = re.compile(
     r"# .+\n\n```sh\n(?:tendonfmu|python) (?:.*\n)+?```\n\n" r"!\[[^\]]{20,}\]\(\.\./(figures/\w+\.png)\)\n"
 )
 SAVED = {"your_finger": "two_joints.json", "simulated_finger": "softer.json"}  # what the page has the reader save
+CHECK_ONLY = ["-Wall", "-Wextra", "-Werror", "-fsyntax-only", f"-I{ROOT / 'runtime' / 'include'}"]
 FITS = [pytest.param(name, marks=pytest.mark.long) for name in ("calibrate", "fit", "diagnose", "change")]
 
 
@@ -92,13 +93,14 @@ def test_the_loop_is_c(tmp_path: Path) -> None:
         pytest.skip("SKIPPED: no C compiler")
     (code,) = (code for language, code in BLOCK.findall(text("in_your_loop")) if language == "c")
     (tmp_path / "loop.c").write_text(code, encoding="utf-8")
-    command = [
-        compiler,
-        "-std=c11",
-        "-Wall",
-        "-Wextra",
-        "-Werror",
-        "-fsyntax-only",
-        f"-I{ROOT / 'runtime' / 'include'}",
-    ]
-    subprocess.run([*command, "loop.c"], cwd=tmp_path, check=True)
+    subprocess.run([compiler, "-std=c11", *CHECK_ONLY, "loop.c"], cwd=tmp_path, check=True)
+
+
+@pytest.mark.parametrize("standard", ["c++17", "c++20"])
+def test_the_other_loop_is_cpp(tmp_path: Path, standard: str) -> None:
+    compiler = shutil.which("c++")
+    if compiler is None:
+        pytest.skip("SKIPPED: no C++ compiler")
+    (code,) = (code for language, code in BLOCK.findall(text("in_your_loop")) if language == "cpp")
+    (tmp_path / "loop.cpp").write_text(code, encoding="utf-8")
+    subprocess.run([compiler, f"-std={standard}", *CHECK_ONLY, "loop.cpp"], cwd=tmp_path, check=True)

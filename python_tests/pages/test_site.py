@@ -35,6 +35,16 @@ def test_the_c_reference_has_every_declaration(header: Path) -> None:
     assert len(set(headings)) == len(headings)
 
 
+def test_the_page_has_every_call_of_the_cpp_interface() -> None:
+    header = (ROOT / "runtime" / "include" / "tendonfmu.hpp").read_text(encoding="utf-8")
+    page = (DOCS / "reference" / "c.md").read_text(encoding="utf-8")
+    public = header[header.index("class finger {") :].split(" private:")[0]
+    calls = set(re.findall(r"^  (?! )(?:static |const )*[\w:<>]+[ *]+(\w+)\(", public, re.MULTILINE)) - {"finger"}
+    assert {"step", "get_outputs", "last_error", "handle", "place"} <= calls
+    assert {name for name in calls if not re.search(rf"`(finger::)?{name}\(", page)} == set()
+    assert all(f"`{path.name}`" in page for path in (ROOT / "runtime" / "include").glob("*.hpp"))
+
+
 def test_every_header_is_on_the_page() -> None:
     page = (DOCS / "reference" / "c.md").read_text(encoding="utf-8")
     hooks = (ROOT / "tools" / "site_hooks.py").read_text(encoding="utf-8")

@@ -179,14 +179,14 @@ class finger {
     return unpack(sample, 1, arrays) ? to_status(tendonfmu_step(handle_, time, &arrays)) : status::bad_argument;
   }
   status get_outputs(const outputs& wanted) const noexcept {
-    tendonfmu_outputs arrays = {};
+    tendonfmu_outputs arrays;
     return unpack(wanted, 1, arrays) ? to_status(tendonfmu_get_outputs(handle_, &arrays)) : status::bad_argument;
   }
 
   /* time.size() samples in one call; `done` receives how many were taken. */
   status run(span<const double> time, const inputs& samples, const outputs& wanted, std::size_t& done) noexcept {
     tendonfmu_inputs from;
-    tendonfmu_outputs to = {};
+    tendonfmu_outputs to;
     done = 0;
     if (!unpack(samples, time.size(), from) || !unpack(wanted, time.size(), to)) {
       return status::bad_argument;
@@ -196,7 +196,7 @@ class finger {
 
   status get_directional_derivative(const inputs& direction, const outputs& derivative) noexcept {
     tendonfmu_inputs from;
-    tendonfmu_outputs to = {};
+    tendonfmu_outputs to;
     return unpack(direction, 1, from) && unpack(derivative, 1, to)
                ? to_status(tendonfmu_get_directional_derivative(handle_, &from, &to))
                : status::bad_argument;
@@ -325,11 +325,23 @@ class finger {
            has_size("joint_velocity", given.joint_velocity.size(), samples * joints_);
   }
 
+  // Without a branch for each output: 25 of them took 9 % of a step.
   bool unpack(const outputs& wanted, std::size_t samples, tendonfmu_outputs& c) const noexcept {
-    bool all = true;
+    bool wrong = false;
     detail::for_each_output(wanted, c, joints_, tendons_,
-                            [&](const char* name, auto array, auto*& to, std::size_t count) noexcept {
+                            [&](const char*, auto array, auto*& to, std::size_t count) noexcept {
                               to = pointer(array);
+                              wrong |= (array.size() != 0) & (array.size() != samples * count);
+                            });
+    return !wrong || have_sizes(wanted, samples);
+  }
+
+  // The same, to name the first one that is wrong.
+  bool have_sizes(const outputs& wanted, std::size_t samples) const noexcept {
+    bool all = true;
+    tendonfmu_outputs unused;
+    detail::for_each_output(wanted, unused, joints_, tendons_,
+                            [&](const char* name, auto array, auto*&, std::size_t count) noexcept {
                               all = all && has_size(name, array.size(), samples * count);
                             });
     return all;
