@@ -123,5 +123,5 @@ def run_model(
 
     with tempfile.TemporaryDirectory(prefix="tendonfmu-") as folder:
         fmu = Path(folder) / "finger.fmu"
-        build_fmu(model, fmu)
+        build_fmu(model, fmu, illustrated=False)  # nobody sees its pictures
         return run_fmu(fmu, recording, kinematics_source=kinematics_source, progress=progress)
