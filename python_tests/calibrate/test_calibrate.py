@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
 
+from command import Call
 from tendonfmu.calibrate import calibration
 from tendonfmu.calibrate.calibration import Calibration, Options, calibrate
 from tendonfmu.calibrate.files import write_calibration
@@ -152,7 +153,7 @@ def test_the_folder_holds_finger_fmu_page_and_report(calibrated: tuple[Calibrati
 
 
 def test_what_is_unchanged_is_not_done_again(
-    calibrated: tuple[Calibration, Path], folder: Path, monkeypatch: pytest.MonkeyPatch
+    call: Call, calibrated: tuple[Calibration, Path], folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found, out = calibrated
 
@@ -166,6 +167,10 @@ def test_what_is_unchanged_is_not_done_again(
     )
     assert again.report["steps"]["repeated"] == ["diagnosis", "fit", "tune", "score"]
     assert again.data == found.data
+    tests = ("--test", folder / UNSEEN, "--pushes", folder / "pushes.parquet")
+    answer = call("calibrate", folder / FINGER, folder / FREE, *tests, "-o", out, "--json", "--quiet")
+    assert answer.status == 0 and answer.err == ""
+    assert json.loads(answer.out) == json.loads((out / "calibration.json").read_text(encoding="utf-8"))
     other = calibrate(
         folder / FINGER,
         [folder / FREE],

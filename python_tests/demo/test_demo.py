@@ -17,6 +17,7 @@ from command import Call
 from real_browser import Elements, find_browser, measure, needs_nothing_else
 from repository_paths import ROOT
 from tendonfmu.demo import demo
+from tendonfmu.demo.report import story_report
 from tendonfmu.files.tables import read_table
 
 HIDDEN = ROOT / "examples" / "demo_recording" / "two_joints_hidden.json"
@@ -44,6 +45,9 @@ def test_chapters_that_cannot_be_are_left_out_loudly(tmp_path: Path, monkeypatch
     story = demo.Story(tmp_path / "out")
     assert [each.name for each in story.chapters] == ["detect", "run"]
     assert "calibrate, diagnose, fit are left out: " in story.missing and "Eigen" in story.missing
+    report = story_report(story)
+    assert (report["format"], report["left_out"]) == ("tendonfmu-demo-1", story.missing)
+    assert [each["name"] for each in report["chapters"]] == ["detect", "run"]
 
 
 def says_every_chapter(out: str, err: str) -> None:

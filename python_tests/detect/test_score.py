@@ -145,9 +145,9 @@ def test_labels_force_and_recordings_without_a_reference(call: Call, pushes: Tab
     force = np.linspace(0.0, 2.0, len(pushes["time"]))
     labelled = written(pushes, "a.parquet", contact=None, touched=pushes["contact"], newton=force)
     plain = written(pushes, "b.parquet", touched=pushes["contact"], contact=None, **load)
-    report = report_of(
-        call("score", INDEX, labelled, plain, "-o", "s.json", "--labels", "touched", "--force", "newton")
-    )
+    answer = call("score", INDEX, labelled, plain, "-o", "s.json", "--labels", "touched", "--force", "newton", "--json")
+    report = report_of(answer)
+    assert json.loads(answer.out) == report
     first, second = report["recordings"]
     assert (report["labels"], report["events"], first["events"], second["events"]) == ("touched", 8, 4, 4)
     assert (first["external_torque"], second["external_torque"]) == (True, False)

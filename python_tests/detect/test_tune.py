@@ -312,9 +312,10 @@ def test_the_alarms_are_those_of_the_finger(tuned: tuple[Path, str, str]) -> Non
 
 
 def test_little_motion_is_tuned_for_the_rate_that_it_supports(call: Call) -> None:
-    answer = call("tune", INDEX, FREE, "-o", "t.json", "--report", "r.json")
+    answer = call("tune", INDEX, FREE, "-o", "t.json", "--report", "r.json", "--json")
     assert answer.status == 0 and Path("t.json").exists(), answer
     report = json.loads(Path("r.json").read_text())
+    assert answer.out == Path("r.json").read_text()
     schema = json.loads(files_of("tendonfmu").joinpath("schema", "tune_report.schema.json").read_text())
     jsonschema.validate(report, schema, cls=jsonschema.Draft202012Validator)
     hours = report["minutes"] / 60

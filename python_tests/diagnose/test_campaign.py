@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from command import Call
 from dask_on_loopback import dask_processes
 from repository_paths import TESTS
 from tendonfmu.diagnose.campaign import campaign as campaigns
@@ -145,7 +146,9 @@ def test_a_maker_writes_the_files_of_its_case(tmp_path: Path) -> None:
         made(Case("a", "null", tmp_path, maker="maker.py:other"), folder)
 
 
-def test_a_campaign_is_resumed_and_survives_a_case_that_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_campaign_is_resumed_and_survives_a_case_that_fails(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     ran: list[str] = []
 
     def run(case: Case, how: campaigns.How) -> dict[str, Any]:
@@ -168,6 +171,12 @@ def test_a_campaign_is_resumed_and_survives_a_case_that_fails(tmp_path: Path, mo
     assert (output / "campaign.parquet").is_file()
     assert [(each.hits, each.cases) for each in rates(rows)[:1]] == [(0, 2)]
     assert "1 of 3 cases ended in an error" in markdown(rows)
+    answer = call("campaign", "cases.json", "-o", "out", "--stop-after", "0", "--json")
+    report = json.loads(answer.out)
+    assert answer.status == 1 and answer.err.splitlines()[0].startswith("tendonfmu: warning: b: ")
+    assert (report["format"], report["cases"], report["rows"]) == ("tendonfmu-campaign-rates-1", 3, 3)
+    assert list(report["errors"]) == ["b"] and "bad" in report["errors"]["b"]
+    assert (report["rates"][0]["hits"], report["rates"][0]["cases"]) == (0, 2)
 
 
 def test_workers_of_dask_write_the_rows(tmp_path: Path) -> None:

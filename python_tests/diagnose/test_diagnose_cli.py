@@ -99,8 +99,9 @@ def test_an_earlier_diagnosis_is_replaced_and_nothing_else(
     Path("out/diagnosis.json").write_text(json.dumps(earlier))
     Path("out/cause_1.png").write_text("a figure")
     answering(brief(examples.adequate()))
-    assert call("diagnose", "f.json", "a.csv", "-o", "out").status == 0
+    answer = call("diagnose", "f.json", "a.csv", "-o", "out", "--json")
     report = json.loads(Path("out/diagnosis.json").read_text(encoding="utf-8"))
+    assert answer.status == 0 and json.loads(answer.out) == report
     assert report["verdict"] == "adequate" and report["causes"] == []
     assert files_in(Path("out")) == {*report["files"], "notes.png"} == {*NAMED, "notes.png"}
 
@@ -220,8 +221,12 @@ def test_the_next_experiment_is_written(call: Call, tmp_path: Path) -> None:
     found = brief(examples.three_causes())
     (tmp_path / "finger.json").write_text(json.dumps(found.nominal_data))
     write_diagnosis(found, tmp_path / "out")
+    told = json.loads(
+        call("excite", "finger.json", "--discriminate", "out", "-o", "m.csv", "--rate", "50", "--json").out
+    )
     answer = call("excite", "finger.json", "--discriminate", "out", "-o", "m.csv", "--rate", "50")
     assert answer.status == 0, answer.err
+    assert told["format"] == "tendonfmu-discriminating-motion-1" and told["sentence"] in answer.out
     motion = read_table(tmp_path / "m.csv", lambda *_: None)
     assert motion["time"][1] == 0.02 and motion["time"][-1] >= 59.9
     assert motion["pretension"].max() == pytest.approx(25.0)

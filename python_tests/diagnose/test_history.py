@@ -23,8 +23,9 @@ from tendonfmu.diagnose.changes.history import History, Line, Size, diagnose_his
 from tendonfmu.diagnose.changes.trend import slope
 from tendonfmu.diagnose.result import ChangedSize, Where
 from tendonfmu.errors import InputError
+from tendonfmu.files.finite_numbers import finite
 from tendonfmu.report.diagnosis_text import Names
-from tendonfmu.report.history_files import write_history
+from tendonfmu.report.history_files import history_report, write_history
 from tendonfmu.report.history_text import headline, trend_sentence
 from tendonfmu.statistics.interval import Interval
 from tendonfmu.tasks.jobs import workers_of
@@ -216,6 +217,10 @@ def test_what_fails_is_left_out_and_named(tmp_path: Path, history: Callable[[], 
     assert found.times == (1.0, 3.0, 4.0) and len(found.lines[0].sizes) == len(found.verdicts) == 3
     page = next(iter(write_history(found, NAMES, tmp_path / "out"))).read_text("utf-8")
     assert "no column; expected some" in page
+    report = json.loads(json.dumps(finite(history_report(found))))
+    assert report["format"] == "tendonfmu-history-1" and report["unit_of_time"] == "week"
+    assert [each["time"] for each in report["recordings"]] == [1.0, 3.0, 4.0]
+    assert [Path(each["file"]).stem for each in report["failed"]] == [WEEKS[1]] and len(report["causes"]) == 1
 
 
 # --- files ------------------------------------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from command import Call
+from command import Answer, Call
 from fit_cases import small_finger
 from fit_finger import made_recording, moved_start, write_recording
 from repository_paths import ROOT
@@ -61,7 +61,10 @@ def test_the_report_is_as_its_schema_says(call: Call, files: tuple[Path, Path]) 
     schema = json.loads(files_of("tendonfmu").joinpath("schema", "fit_report.schema.json").read_text())
     jsonschema.Draft202012Validator.check_schema(schema)
     finger, recording = files
-    assert call("fit", finger, recording, "-o", "f.json", "--report", "r.json", "--holdout", "0.1", *FIT).status == 0
+    printed = call(
+        "fit", finger, recording, "-o", "f.json", "--report", "r.json", "--holdout", "0.1", "--json", "-q", *FIT
+    )
+    assert printed == Answer(0, Path("r.json").read_text(), "")
     jsonschema.validate(json.loads(Path("r.json").read_text()), schema)
 
 

@@ -57,6 +57,7 @@ COMMANDS = {
     "cli/detect.py",
     "cli/diagnose.py",
     "cli/options.py",
+    "cli/run.py",
     "cli/several_values.py",
 }  # what a user may call
 # those that draw, and what they share

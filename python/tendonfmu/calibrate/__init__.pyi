@@ -4,6 +4,7 @@ from .calibration import Calibration as Calibration
 from .calibration import Options as Options
 from .calibration import calibrate as calibrate
 from .files import PAGE as PAGE
+from .files import REPORT as REPORT
 from .files import check_folder as check_folder
 from .files import write_calibration as write_calibration
 from .report import rms_of as rms_of

@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
-from tendonfmu.cli.console import PhaseDisplay, print_tables, say
+from tendonfmu.cli.console import PhaseDisplay, print_json, print_tables, say, say_files, warn
 from tendonfmu.cli.options import (
+    AsJson,
     Confidence,
     FalseAlarms,
     FingerFile,
@@ -16,6 +17,7 @@ from tendonfmu.cli.options import (
     Jobs,
     Kinematics,
     Progress,
+    Quiet,
     Seed,
 )
 from tendonfmu.cli.several_values import SeveralValues
@@ -34,7 +36,7 @@ def calibrate(
         list[Path] | None,
         typer.Option(
             metavar="FREE",
-            help="free motion to measure the errors on; may be repeated \\[default: parts of FREE]",
+            help="free motion to measure the errors on; may be repeated [default: parts of FREE]",
         ),
     ] = None,
     pushes: Annotated[
@@ -55,6 +57,8 @@ def calibrate(
     seed: Seed = 0,
     jobs: Jobs = 1,
     progress: Progress = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
     """Make a tuned FMU from free motion: find missing effects, fit all numbers, tune contact detection.
 
@@ -66,7 +70,7 @@ def calibrate(
     --from the structure of the earlier model stays and its numbers are the
     prior.
     """
-    from tendonfmu.calibrate import Options, check_folder, text, write_calibration
+    from tendonfmu.calibrate import REPORT, Options, check_folder, text, write_calibration
     from tendonfmu.calibrate import calibrate as run
 
     tests, labelled = test or [], pushes or []
@@ -86,9 +90,9 @@ def calibrate(
         display.note("writing the files")
         written = write_calibration(found, output)
     for sentence in found.report["warnings"]:
-        say(f"tendonfmu: warning: {sentence}")
+        warn(sentence)
     if found.report["steps"]["repeated"]:
         say(f"unchanged since the last call, not repeated: {', '.join(found.report['steps']['repeated'])}")
     print_tables(text.tables(found.report), text.lines(found.report), left="model")
-    for path, what in written.items():
-        say(f"{path}: {what}")
+    say_files(written)
+    print_json((output / REPORT).read_text)

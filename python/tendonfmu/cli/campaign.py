@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from tendonfmu.cli.console import print_tables, progress_bar, say
-from tendonfmu.cli.options import LeastGain, Progress
+from tendonfmu.cli.console import NO, fail, print_json, print_tables, progress_bar, say, warn
+from tendonfmu.cli.options import AsJson, LeastGain, Progress, Quiet
 
 
 def register(app: typer.Typer) -> None:
@@ -23,10 +23,7 @@ def campaign(
     ],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder for rows and table")],
     scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="dask cluster \\[default: worker processes here]")
-    ] = None,
-    workers: Annotated[
-        int | None, typer.Option(min=1, max=1024, help="worker processes here \\[default: one per processor]")
+        str | None, typer.Option(metavar="ADDRESS", help="dask cluster [default: --jobs processes]")
     ] = None,
     stop_after: Annotated[
         float, typer.Option(min=0.0, metavar="SECONDS", help="start no case after this time; call again to continue")
@@ -37,7 +34,15 @@ def campaign(
     ] = None,
     again: Annotated[bool, typer.Option("--again", help="repeat cases that ended in an error")] = False,
     report: Annotated[Path | None, typer.Option(metavar="R.md", help="the tables as Markdown")] = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option(
+            min=1, max=1024, metavar="N", help="processor cores to use; no effect on the result [default: all]"
+        ),
+    ] = None,
     progress: Progress = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
     """Diagnose many recordings whose cause is known, and count how often the answer is right.
 
@@ -51,6 +56,7 @@ def campaign(
         HEADINGS,
         How,
         by_effect,
+        campaign_report,
         collect,
         markdown,
         python_function,
@@ -72,7 +78,7 @@ def campaign(
     waiting = len(still_to_do(listed, output, again))
     if waiting and stop_after > 0:
         with (
-            workers_of(scheduler, min(workers or worker_count(), waiting)) as client,
+            workers_of(scheduler, min(jobs or worker_count(), waiting)) as client,
             progress_bar(progress) as bar,
         ):
             task = bar.add_task("cases", total=len(listed))
@@ -96,7 +102,9 @@ def campaign(
     failed = sum(1 for row in rows if row["error"])
     for row in rows:
         if row["error"]:
-            say(f"tendonfmu: {row['name']}: {row['error']}")
+            warn(f"{row['name']}: {row['error']}")
+    print_json(lambda: campaign_report(rows, len(listed)))
     say(f"{output}: {len(rows)} of {len(listed)} cases, {failed} with an error")
     if failed:
-        raise typer.Exit(1)
+        fail(f"{output}: {failed} of {len(rows)} cases ended in an error; repeat them with --again")
+        raise typer.Exit(NO)

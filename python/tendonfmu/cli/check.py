@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tendonfmu.cli.console import say, show
-from tendonfmu.cli.options import Subject
+from tendonfmu.cli.console import NO, fail, print_json, progress_bar, show, warn
+from tendonfmu.cli.options import AsJson, Progress, Quiet, Subject
+from tendonfmu.cli.standard_streams import reads
 from tendonfmu.errors import InputError
 
 if TYPE_CHECKING:
@@ -20,11 +21,15 @@ def register(app: typer.Typer) -> None:
     app.command()(check)
 
 
+@reads("file", "recordings")
 def check(
     file: Subject,
     recordings: Annotated[
         list[Path] | None, typer.Argument(metavar="[RECORDING]...", help="recordings of this finger, .csv or .parquet")
     ] = None,
+    progress: Progress = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
     """Validate a finger description or a rig and describe it. Exit status 1 if it is refused.
 
@@ -33,6 +38,7 @@ def check(
     """
     from tendonfmu.files import check_format
     from tendonfmu.model import description_findings, read_finger
+    from tendonfmu.recordings import check_report, refusal_report
     from tendonfmu.simulate import describe_rig, is_rig, require_plant
 
     for recording in recordings or []:
@@ -46,30 +52,40 @@ def check(
         finger = None if rig else read_finger(file)
         lines = describe_rig(file) if finger is None else finger.summary()
     except InputError as refused:
-        # An unsound description is the answer "no" (1); a file that cannot be read is bad input (2).
-        say(f"tendonfmu: {refused}")
-        raise typer.Exit(1 if file.is_file() else 2) from None
+        if not file.is_file():  # bad input (2); an unsound description is the answer "no" (1)
+            raise
+        reason = str(refused)
+        print_json(lambda: refusal_report(file, reason))
+        fail(reason)
+        raise typer.Exit(NO) from None
     for line in lines:
         show(line)
-    if finger is not None:
-        for finding in description_findings(finger):
-            say(f"tendonfmu: warning: {finding.line()}")
-        _check_recordings(finger, recordings or [])
+    findings = [] if finger is None else description_findings(finger)
+    for finding in findings:
+        warn(finding.line())
+    checked = [] if finger is None else _check_recordings(finger, recordings or [], progress)
+    print_json(lambda: check_report(file, "rig" if rig else "finger", lines, findings, checked))
+    strangers = sum(not each["belongs"] for each in checked)
+    if strangers:
+        count = f"{strangers} of {len(checked)} recordings" if len(checked) > 1 else checked[0]["file"]
+        fail(f"{count}: does not belong to {file} as it is; see above for what to change")
+        raise typer.Exit(NO)
 
 
-def _check_recordings(finger: FingerDescription, files: list[Path]) -> None:
-    """Print for each recording whether it belongs to the finger. Exit status 1 if one does not."""
-    from tendonfmu.recordings import belongs, read_recording, verdict
+def _check_recordings(finger: FingerDescription, files: list[Path], progress: bool | None) -> list[dict[str, Any]]:
+    """Print for each recording whether it belongs to the finger, and return the reports on them."""
+    from tendonfmu.recordings import belongs, read_recording, recording_report
 
-    strangers = 0
-    for file in files:
-        recording = read_recording(file)
-        findings = belongs(finger, [recording])
-        show(verdict(recording, findings))
+    found = []
+    with progress_bar(progress if files else False) as bar:
+        task = bar.add_task("recordings", total=len(files))
+        for file in files:
+            recording = read_recording(file)
+            findings = belongs(finger, [recording])
+            found.append((recording_report(recording, findings), findings))
+            bar.update(task, advance=1)
+    for report, findings in found:
+        show(report["verdict"])
         for finding in findings:
             show(f"{finding.severity}: {finding.line()}")
-        strangers += any(finding.severity == "error" for finding in findings)
-    if strangers:
-        count = f"{strangers} of {len(files)} recordings" if len(files) > 1 else str(files[0])
-        say(f"tendonfmu: {count}: does not belong to {finger.path} as it is; see above for what to change")
-        raise typer.Exit(1)
+    return [report for report, _ in found]

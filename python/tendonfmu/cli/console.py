@@ -1,6 +1,13 @@
-"""How commands write to the terminal: messages, tables and progress bars.
+"""How commands write to the terminal: messages, results and progress bars.
 
-Only this module and `program.py` print.
+Only this module and `program.py` print. What is printed depends on the options of the call (`PRINTED`):
+
+| option | standard output | standard error |
+| --- | --- | --- |
+| none | lines and tables | messages, warnings, errors |
+| `--quiet` | nothing | errors |
+| `--json` | one JSON object | messages, warnings, errors |
+| `--output -` | a table as CSV | lines and tables, messages, warnings, errors |
 """
 
 from __future__ import annotations
@@ -8,8 +15,10 @@ from __future__ import annotations
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any, NoReturn
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import IO, TYPE_CHECKING, Any, NoReturn
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -17,14 +26,99 @@ if TYPE_CHECKING:
     from tendonfmu.tasks import PhaseState
 
 
+# exit status of every command; 0 is done, 143 is ended by SIGTERM
+NO, BAD_INPUT, FAULT, INTERRUPTED = 1, 2, 3, 130
+
+
+@dataclass
+class Printed:
+    """What this call of the command prints.
+
+    Attributes
+    ----------
+    quiet, json
+        Whether `--quiet` and `--json` are given.
+    table
+        Whether standard output carries a table (`--output -`).
+    """
+
+    quiet: bool = False
+    json: bool = False
+    table: bool = False
+
+
+PRINTED = Printed()  # a process has one standard output; `options.py` sets this anew when it parses a command
+
+
+def fail(message: str) -> None:
+    """Print the line of an error on standard error, also with `--quiet`."""
+    print(f"tendonfmu: {message}", file=sys.stderr)
+
+
+def warn(sentence: str) -> None:
+    """Print a warning on standard error."""
+    say(f"tendonfmu: warning: {sentence}")
+
+
 def say(message: str) -> None:
     """Print a line on standard error."""
-    print(message, file=sys.stderr)
+    if not PRINTED.quiet:
+        with reader_may_leave(sys.stderr):
+            print(message, file=sys.stderr)
+
+
+def say_files(written: Mapping[Any, str]) -> None:
+    """Print each file that was written, with its content in words, on standard error."""
+    for path, what in written.items():
+        say(f"{path}: {what}")
 
 
 def show(line: str) -> None:
     """Print a line of a result on standard output."""
-    print(line)
+    stream = _of_results()
+    if stream is not None:
+        with reader_may_leave(stream):
+            print(line, file=stream)
+
+
+def print_json(report: Callable[[], Mapping[str, Any] | str]) -> None:
+    """Print a report on standard output if `--json` is given. report: makes it, as a mapping or as its JSON text."""
+    if not PRINTED.json:
+        return
+    import json
+
+    from tendonfmu.files import finite
+
+    found = report()
+    text = found if isinstance(found, str) else json.dumps(finite(found), indent=1, ensure_ascii=False)
+    with reader_may_leave(sys.stdout):
+        sys.stdout.write(f"{text.rstrip()}\n")
+        sys.stdout.flush()
+
+
+def print_csv(lines: Iterable[str]) -> None:
+    """Print a table on standard output."""
+    with reader_may_leave(sys.stdout):
+        sys.stdout.writelines(lines)
+        sys.stdout.flush()
+
+
+@contextmanager
+def reader_may_leave(stream: IO[str]) -> Iterator[None]:
+    """Go on silently when the reader of a stream closes it, as `head` does: it has what it wants."""
+    try:
+        yield
+    except BrokenPipeError:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())  # what is still buffered goes there
+        os.close(nowhere)
+
+
+def _of_results() -> IO[str] | None:
+    """Return the stream of lines and tables, or None if they are not printed."""
+    if PRINTED.quiet or PRINTED.json:
+        return None
+    return sys.stderr if PRINTED.table else sys.stdout
 
 
 def leave(status: int) -> NoReturn:
@@ -44,18 +138,22 @@ def print_tables(tables: Iterable[Any], lines: Iterable[str], left: str) -> None
     from rich.console import Console
     from rich.table import Table
 
-    console = Console()
+    stream = _of_results()
+    if stream is None:
+        return
+    console = Console(file=stream)
     if not console.is_terminal:  # a file has no width: keep each row on one line
         console.width = 160
-    for title, headings, rows in tables:
-        table = Table(title=title, title_justify="left")
-        for k, heading in enumerate(headings):
-            table.add_column(heading, justify="right" if k > 0 and heading != left else "left")
-        for row in rows:
-            table.add_row(*row)
-        console.print(table)
-    for line in lines:
-        console.print(line, highlight=False, soft_wrap=True)
+    with reader_may_leave(stream):
+        for title, headings, rows in tables:
+            table = Table(title=title, title_justify="left")
+            for k, heading in enumerate(headings):
+                table.add_column(heading, justify="right" if k > 0 and heading != left else "left")
+            for row in rows:
+                table.add_row(*row)
+            console.print(table)
+        for line in lines:
+            console.print(line, highlight=False, soft_wrap=True)
 
 
 def progress_bar(wanted: bool | None = None) -> Progress:
@@ -63,6 +161,7 @@ def progress_bar(wanted: bool | None = None) -> Progress:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+    wanted = False if PRINTED.quiet else wanted
     console = Console(stderr=True, force_terminal=wanted or None)
     return Progress(
         TextColumn("{task.description}"),
@@ -104,6 +203,7 @@ class PhaseDisplay:
         from rich.console import Console
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
+        wanted = False if PRINTED.quiet else wanted
         console = Console(stderr=True)
         self._on_terminal = console.is_terminal
         self._shown = console.is_terminal if wanted is None else wanted

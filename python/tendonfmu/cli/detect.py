@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
-from tendonfmu.cli.console import print_tables, progress_bar, say
+from tendonfmu.cli.console import NO, fail, print_json, print_tables, progress_bar, say, say_files, warn
 from tendonfmu.cli.options import (
+    AsJson,
     Confidence,
     FalseAlarms,
     Figures,
@@ -16,8 +17,11 @@ from tendonfmu.cli.options import (
     Kinematics,
     Model,
     Progress,
+    Quiet,
     Report,
+    Seed,
 )
+from tendonfmu.cli.standard_streams import reads
 
 
 def register(app: typer.Typer) -> None:
@@ -26,6 +30,7 @@ def register(app: typer.Typer) -> None:
     app.command()(score)
 
 
+@reads("finger", "recordings")
 def tune(
     finger: Annotated[Path, typer.Argument(metavar="FINGER.json", help="fitted finger description")],
     recordings: FreeAtPretensions,
@@ -37,7 +42,7 @@ def tune(
     ] = "innovation",
     bias_time: Annotated[
         float | None,
-        typer.Option(min=1e-3, max=1e4, metavar="SECONDS", help="time constant of the bias \\[default: unchanged]"),
+        typer.Option(min=1e-3, max=1e4, metavar="SECONDS", help="time constant of the bias [default: unchanged]"),
     ] = None,
     release_time: Annotated[
         float,
@@ -50,6 +55,8 @@ def tune(
         bool, typer.Option("--strict", help="write no file and exit with 1 if FREE is too short for RATE")
     ] = False,
     progress: Progress = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
     """Tune contact detection on free motion for a stated rate of false alarms.
 
@@ -86,34 +93,38 @@ def tune(
                 warnings.simplefilter("ignore", TuneWarning)  # printed below, one line each
                 tuning.tune(list(recordings))
         except NotEnough as refused:
-            say(f"tendonfmu: {refused}")
-            raise typer.Exit(1) from None
+            fail(str(refused))
+            raise typer.Exit(NO) from None
     for sentence in tuning.warnings_:
-        say(f"tendonfmu: warning: {sentence}")
+        warn(sentence)
     write_text(output, tuning.description_text())
+    text = tune_report.report_text(tune_report.build_report(tuning))
     if report is not None:
-        write_text(report, tune_report.report_text(tune_report.build_report(tuning)))
+        write_text(report, text)
+    print_json(lambda: text)
     print_tables(tune_text.tables(tuning), tune_text.lines(tuning), left="joint")
     say(f"{output}: {tuning.method}, tuned on {60 * tuning.hours_:.1f} min of free motion")
     if figures is not None:
-        for path, what in tune_files.write_figures(tuning, figures).items():
-            say(f"{path}: {what}")
+        say_files(tune_files.write_figures(tuning, figures))
 
 
+@reads("model", "recordings")
 def score(
     model: Model,
     recordings: Annotated[list[Path], typer.Argument(metavar="RECORDING", help="labelled or free, .csv or .parquet")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="SCORE.json", help="report to write")],
     labels: Annotated[
-        str | None, typer.Option(metavar="COLUMN", help="1 in contact, else 0 \\[default: contact, if present]")
+        str | None, typer.Option(metavar="COLUMN", help="1 in contact, else 0 [default: contact, if present]")
     ] = None,
     force: Annotated[
         str | None, typer.Option(metavar="COLUMN", help="sensed force in N, reported at each alarm and drawn")
     ] = None,
     figures: Figures = None,
     kinematics: Kinematics = 1,
-    seed: Annotated[int, typer.Option(min=0, max=2**53, help="seed of the resampling for the intervals")] = 0,
+    seed: Seed = 0,
     progress: Progress = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
     """Measure contact detection against labels: events found and missed, false alarms, delay, torque, ROC.
 
@@ -139,12 +150,13 @@ def score(
             progress=lambda done, total: bar.update(task, completed=done, total=total),
         )
     for sentence in scored.warnings:
-        say(f"tendonfmu: warning: {sentence}")
-    write_text(output, score_report.report_text(score_report.build_report(scored)))
+        warn(sentence)
+    text = score_report.report_text(score_report.build_report(scored))
+    write_text(output, text)
+    print_json(lambda: text)
     print_tables(score_text.tables(scored), score_text.lines(scored), left="")
     say(f"{output}: {scored.summary.events} events, {scored.summary.false_alarms} false alarms")
     if figures is not None:
         from tendonfmu.report import score_files
 
-        for path, what in score_files.write_figures(scored, figures).items():
-            say(f"{path}: {what}")
+        say_files(score_files.write_figures(scored, figures))

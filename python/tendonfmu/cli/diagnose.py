@@ -10,9 +10,10 @@ from typing import Annotated
 
 import typer
 
-from tendonfmu.cli.console import PhaseDisplay, print_tables, progress_bar, say
-from tendonfmu.cli.options import FingerFile, FreeRecordings, Jobs, Kinematics, LeastGain, Progress, Seed
+from tendonfmu.cli.console import PhaseDisplay, print_json, print_tables, progress_bar, say, say_files, warn
+from tendonfmu.cli.options import AsJson, FingerFile, FreeRecordings, Jobs, Kinematics, LeastGain, Progress, Quiet, Seed
 from tendonfmu.cli.several_values import SeveralValues
+from tendonfmu.cli.standard_streams import check_table, name_of, write_table
 from tendonfmu.errors import InputError
 
 
@@ -29,7 +30,7 @@ def diagnose(
         list[Path] | None,
         typer.Option(
             metavar="RECORDING",
-            help="recordings to measure the gain on, not to fit; may be repeated \\[default: parts of RECORDING]",
+            help="recordings to measure the gain on, not to fit; may be repeated [default: parts of RECORDING]",
         ),
     ] = None,
     reference: Annotated[
@@ -43,18 +44,20 @@ def diagnose(
         bool,
         typer.Option(
             "--history",
-            help="compare each recording, in order of time, with the reference \\[default: the first recording]",
+            help="compare each recording, in order of time, with the reference [default: the first recording]",
         ),
     ] = False,
     scheduler: Annotated[
         str | None,
-        typer.Option(metavar="ADDRESS", help="dask cluster for --history \\[default: --jobs processes]"),
+        typer.Option(metavar="ADDRESS", help="dask cluster for --history [default: --jobs processes]"),
     ] = None,
     kinematics: Kinematics = 1,
     least_gain: LeastGain = 0.03,
     seed: Seed = 0,
     jobs: Jobs = 1,
     progress: Progress = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
     """Show what the model gets wrong, name the cause, add it to the model and measure the gain.
 
@@ -73,7 +76,7 @@ def diagnose(
     """
     from tendonfmu.diagnose import diagnose as find
     from tendonfmu.estimate import check_given_once
-    from tendonfmu.report import check_folder, diagnosis_text, write_diagnosis
+    from tendonfmu.report import REPORT, check_folder, diagnosis_text, write_diagnosis
 
     if not 0.0 <= least_gain <= 0.5:  # typer's range lets NaN pass
         raise InputError(f"--least-gain {least_gain:g}: expected 0 to 0.5")
@@ -103,10 +106,10 @@ def diagnose(
         display.note("writing the files")
         written = write_diagnosis(found, output)
     for sentence in found.warnings:
-        say(f"tendonfmu: warning: {sentence}")
+        warn(sentence)
     print_tables(diagnosis_text.tables(found), diagnosis_text.lines(found), left="may also be")
-    for path, what in written.items():
-        say(f"{path}: {what}")
+    say_files(written)
+    print_json((output / REPORT).read_text)
 
 
 def _history(
@@ -128,7 +131,7 @@ def _history(
     from tendonfmu.estimate import check_given_once
     from tendonfmu.files import check_output_folder
     from tendonfmu.model import read_finger
-    from tendonfmu.report import Names, history_text, write_history
+    from tendonfmu.report import Names, history_report, history_text, write_history
     from tendonfmu.tasks import workers_of
 
     check_given_once(recordings, reference, "the reference")
@@ -154,28 +157,27 @@ def _history(
     rows = list(history_text.rows_of_lines(found, names))
     print_tables([(found.finger, headings, rows)] if rows else (), [history_text.headline(found)], left="trend")
     for name, why in found.failed:
-        say(f"tendonfmu: warning: {name}: left out: {why}")
-    for path, what in written.items():
-        say(f"{path}: {what}")
+        warn(f"{name}: left out: {why}")
+    say_files(written)
+    print_json(lambda: history_report(found, written))
 
 
 def discriminate(context: typer.Context, finger: Path, folder: Path, output: Path, rate: float) -> None:
     """Write the motion that a diagnosis asked for: `tendonfmu excite FINGER --discriminate DIR -o MOTION`."""
     from tendonfmu.diagnose import discriminating_motion
     from tendonfmu.excite import read_subject
-    from tendonfmu.files import check_format, check_output, write_table
     from tendonfmu.simulate import description_files, is_rig
 
-    own = {"finger", "output", "rate", "discriminate"}
+    own = {"finger", "output", "rate", "discriminate", "progress", "as_json", "quiet"}
     for each in context.command.params:
         source = context.get_parameter_source(str(each.name))
         if each.name not in own and source is not None and source.name == "COMMANDLINE":
             raise InputError(f"{each.opts[0]}: given with --discriminate {folder}; expected no other option but --rate")
-    check_format(output)
-    check_output(output, *(description_files(finger) if is_rig(finger) else [finger]))
+    check_table(output, *(description_files(finger) if is_rig(finger) else [finger]))
     subject = read_subject(finger)
     found = discriminating_motion(folder, subject.finger.data, limits=subject.limits, rate=rate)
     columns = found.columns()
     write_table(output, columns)
     print_tables((), found.lines(), left="")
-    say(f"{output}: {len(columns['time'])} rows, {columns['time'][-1]:g} s")
+    print_json(lambda: found.report(output))
+    say(f"{name_of(output)}: {len(columns['time'])} rows, {columns['time'][-1]:g} s")

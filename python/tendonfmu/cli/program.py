@@ -20,21 +20,47 @@ from tendonfmu.cli import check as cli_check
 from tendonfmu.cli import convert as cli_convert
 from tendonfmu.cli import detect as cli_detect
 from tendonfmu.cli import diagnose as cli_diagnose
-from tendonfmu.cli.console import fit_bar, leave, phase_bar, print_tables, progress_bar, say
+from tendonfmu.cli import run as cli_run
+from tendonfmu.cli.console import (
+    BAD_INPUT,
+    FAULT,
+    INTERRUPTED,
+    PRINTED,
+    fail,
+    fit_bar,
+    leave,
+    phase_bar,
+    print_json,
+    print_tables,
+    progress_bar,
+    reader_may_leave,
+    say,
+    say_files,
+    warn,
+)
 from tendonfmu.cli.fault_report import is_own_file, write_fault_report
-from tendonfmu.cli.options import FingerFile, FreeRecordings, Kinematics, Model, Progress, Report, Subject
+from tendonfmu.cli.options import (
+    AsJson,
+    FingerFile,
+    FreeRecordings,
+    Kinematics,
+    Progress,
+    Quiet,
+    Report,
+    Seed,
+    Subject,
+)
+from tendonfmu.cli.standard_streams import check_table, name_of, reads, write_table
 from tendonfmu.errors import InputError, line_of
 from tendonfmu.tasks import ended_by_signals
 
 app = typer.Typer(
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # its boxes cut off the names of options at 80 columns
+    context_settings={"help_option_names": ["-h", "--help"]},
     help="Model the friction of tendon-driven robot fingers, and detect contact without a tactile sensor.",
 )
-
-FAULT = 3
-INTERRUPTED = 130
 
 cli_check.register(app)
 
@@ -44,9 +70,10 @@ def main() -> None:
 
     A refusal is one line on standard error and exit status 2. An internal fault is one line and exit status 3.
     """
+    PRINTED.quiet = PRINTED.json = PRINTED.table = False
     with ended_by_signals() as ending:
         try:
-            status = app(standalone_mode=False)
+            status = app(prog_name="tendonfmu", standalone_mode=False)
         except (InputError, OSError) as refused:
             if isinstance(refused, BrokenPipeError):  # the reader of standard output has closed it, as `head` does
                 sys.stderr.close()
@@ -65,31 +92,33 @@ def main() -> None:
             if not hasattr(refused, "format_message"):
                 _fault(refused)
             elif type(refused).__name__ == "NoArgsIsHelpError":
-                say(refused.format_message())
-                sys.exit(2)
+                print(refused.format_message(), file=sys.stderr)
+                sys.exit(BAD_INPUT)
             else:
                 page = getattr(getattr(refused, "ctx", None), "command_path", "tendonfmu")
                 _refuse(f"{refused.format_message().rstrip('.')}; see {page} --help")
         else:
             if status == INTERRUPTED:  # newer versions of typer turn Ctrl-C into a status
                 _interrupted(ending.status)
+            with reader_may_leave(sys.stdout):
+                sys.stdout.flush()
             sys.exit(status if isinstance(status, int) else 0)
 
 
 def _refuse(reason: str) -> NoReturn:
-    say(f"tendonfmu: {' '.join(reason.split())}")
-    sys.exit(2)
+    fail(" ".join(reason.split()))
+    sys.exit(BAD_INPUT)
 
 
 def _fault(error: BaseException) -> NoReturn:
     report = write_fault_report(error, sys.argv[1:])
     where = "no report could be written" if report is None else f"please send the report {report}"
-    say(f"tendonfmu: internal error ({type(error).__name__}), a fault of tendonfmu, not of its input; {where}")
+    fail(f"internal error ({type(error).__name__}), a fault of tendonfmu, not of its input; {where}")
     leave(FAULT)
 
 
 def _interrupted(status: int) -> NoReturn:
-    say("tendonfmu: interrupted; no file was left half written")
+    fail("interrupted; no file was left half written")
     leave(status)
 
 
@@ -111,6 +140,7 @@ def options(
 
 
 @app.command()
+@reads("file")
 def build(
     file: Subject,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FINGER.fmu", help="FMU to write")],
@@ -118,67 +148,51 @@ def build(
         Path | None,
         typer.Option(metavar="DIR", help="folder of binaries by FMI platform [default: those installed]"),
     ] = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
     """Pack an FMI 2.0 co-simulation FMU: the friction of a finger, or the simulated finger of a rig.
 
     Needs no compiler. The same input gives the same bytes.
     """
     from tendonfmu.files import check_output
-    from tendonfmu.fmu import build_fmu
+    from tendonfmu.fmu import build_fmu, fmu_report
     from tendonfmu.simulate import build_plant_fmu, is_rig, read_rig
 
     check_output(output, *(read_rig(file).files if is_rig(file) else [file]))
     (build_plant_fmu if is_rig(file) else build_fmu)(file, output, binaries=binaries)
     say(f"{output}: {output.stat().st_size / 1024:.0f} KiB")
+    print_json(lambda: fmu_report(file, output))
+
+
+cli_run.register(app)
 
 
 @app.command()
-def run(
-    model: Model,
-    recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="recording, .csv or .parquet")],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT.csv", help="table to write, .csv or .parquet")],
-    kinematics: Kinematics = 1,
-) -> None:
-    """Run the model over a recording and write all outputs, one row per sample at the time of that sample."""
-    from tendonfmu.files import check_format, check_output, write_table
-    from tendonfmu.fmu import check_model, run_model, summary
-    from tendonfmu.recordings import read_recording
-
-    check_model(model)
-    check_format(output)
-    check_output(output, model, recording)
-    samples = read_recording(recording)
-    with progress_bar() as bar:
-        task = bar.add_task("samples", total=len(samples))
-        table = run_model(
-            model, samples, kinematics_source=kinematics, progress=lambda done: bar.update(task, completed=done)
-        )
-    write_table(output, table)
-    say(f"{output}: {summary(table)}")
-
-
-@app.command()
+@reads("rig")
 def simulate(
     rig: Annotated[Path, typer.Argument(metavar="RIG.json", help="rig of a simulated finger")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="REC.parquet", help="recording, .csv or .parquet")],
     truth: Annotated[
         Path | None, typer.Option(metavar="TRUTH.parquet", help="true signals to write, .csv or .parquet")
     ] = None,
-    integrator: Annotated[str | None, typer.Option(metavar="cvode|fixed_step", help="\\[default: the rig's]")] = None,
+    integrator: Annotated[str | None, typer.Option(metavar="cvode|fixed_step", help="[default: the rig's]")] = None,
     progress: Progress = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
     """Simulate a finger and write the recording. The same rig gives the same numbers."""
-    from tendonfmu.files import check_format, check_output, write_table
+    from tendonfmu.files import check_format, check_output
     from tendonfmu.simulate import INTEGRATORS, read_rig
     from tendonfmu.simulate import simulate as simulate_rig
 
     if integrator is not None and integrator not in INTEGRATORS:
         raise InputError(f"--integrator {integrator}: expected {' or '.join(INTEGRATORS)}")
     found = read_rig(rig)
-    outputs = [output] if truth is None else [output, truth]
-    for file in outputs:
-        check_format(file)
-        check_output(file, *found.files)
+    check_table(output, *found.files)
+    if truth is not None:
+        check_format(truth)
+        check_output(truth, *found.files)
     if truth is not None and truth.resolve() == output.resolve():
         raise InputError(f"{truth}: the same file for recording and truth; expected two names")
     with progress_bar(progress) as bar:
@@ -192,46 +206,58 @@ def simulate(
     if truth is not None and result.truth is not None:
         write_table(truth, result.truth)
     write_table(output, result.recording)
+    written = {"output": output} if truth is None else {"output": output, "truth": truth}
+    print_json(lambda: result.report(found, written))
     for line in result.summary(found):
-        say(f"{output}: {line}")
+        say(f"{name_of(output)}: {line}")
 
 
 cli_convert.register(app)
 
 
 @app.command()
+@reads("finger")
 def excite(
     context: typer.Context,
     finger: Annotated[Path, typer.Argument(metavar="FINGER.json|RIG.json", help="finger description, or rig")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="MOTION.csv", help="motion, .csv or .parquet")],
     duration: Annotated[
-        float, typer.Option(min=1.0, max=1e5, help="s; per pretension, in all with --alternate")
+        float, typer.Option(min=1.0, max=1e5, metavar="SECONDS", help="per pretension, in all with --alternate")
     ] = 400.0,
-    max_speed: Annotated[float, typer.Option(min=1e-3, max=100.0, help="rad/s; limit for every joint")] = 1.0,
+    max_speed: Annotated[float, typer.Option(min=1e-3, max=100.0, metavar="RAD/S", help="limit for every joint")] = 1.0,
     range_: Annotated[
         list[str] | None,
-        typer.Option("--range", metavar="JOINT=LOW:HIGH", help="rad; joint range by number or name; may be repeated"),
+        typer.Option(
+            "--range", metavar="JOINT=LOW:HIGH", help="joint range in rad, by number or name; may be repeated"
+        ),
     ] = None,
     pretension: Annotated[
         list[float] | None,
-        typer.Option(min=1e-3, max=1e6, help="N; mean tendon force, default 10; may be repeated"),
+        typer.Option(min=1e-3, max=1e6, metavar="NEWTON", help="mean tendon force; may be repeated [default: 10]"),
     ] = None,
     alternate: Annotated[
         float | None, typer.Option(min=1.0, metavar="SECONDS", help="time between changes of the pretension")
     ] = None,
     vary_tension: Annotated[
         str | None,
-        typer.Option(metavar="LOW:HIGH", help="N; vary the tension of each tendon in turn, without a pretension"),
+        typer.Option(metavar="LOW:HIGH", help="in N; vary the tension of each tendon in turn, without a pretension"),
     ] = None,
-    vary_every: Annotated[float, typer.Option(min=2.0, max=1e5, help="s; time between changes of the tensions")] = 10.0,
-    max_acceleration: Annotated[float, typer.Option(min=0.1, max=1e4, help="rad/s²; limit for every joint")] = 10.0,
-    rate: Annotated[float, typer.Option(min=20.0, max=10000.0, help="rows per second")] = 100.0,
-    seed: Annotated[int, typer.Option(min=0, max=2**53, help="seed of the random strokes")] = 0,
+    vary_every: Annotated[
+        float, typer.Option(min=2.0, max=1e5, metavar="SECONDS", help="time between changes of the tensions")
+    ] = 10.0,
+    max_acceleration: Annotated[
+        float, typer.Option(min=0.1, max=1e4, metavar="RAD/S²", help="limit for every joint")
+    ] = 10.0,
+    rate: Annotated[float, typer.Option(min=20.0, max=10000.0, metavar="HZ", help="rows per second")] = 100.0,
+    seed: Seed = 0,
     report: Report = None,
     discriminate: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="write the next experiment of this diagnosis; only --rate applies"),
     ] = None,
+    progress: Progress = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
     """Plan a training motion; report what it excites and which parameters it cannot identify."""
     if discriminate is not None:
@@ -242,36 +268,38 @@ def excite(
 
     from tendonfmu.excite import Plan
     from tendonfmu.excite import training_motion as exciting
-    from tendonfmu.files import check_format, check_output, whole_file, write_table
+    from tendonfmu.files import check_output, write_text
     from tendonfmu.report import excite_text
     from tendonfmu.simulate import description_files, is_rig
 
-    check_format(output)
-    for file in (output, *([report] if report is not None else [])):
-        check_output(file, *(description_files(finger) if is_rig(finger) else [finger]))
+    inputs = description_files(finger) if is_rig(finger) else [finger]
+    check_table(output, *inputs)
+    if report is not None:
+        check_output(report, *inputs)
     if report is not None and report.resolve() == output.resolve():
         raise InputError(f"{report}: the same file for motion and report; expected two names")
     subject = exciting.read_subject(finger)
     ranges = exciting.find_ranges(subject, range_ or [])
     for span in ranges:
         if span.guessed:
-            say(f"tendonfmu: warning: joint {span.name}: {span.source}; set it with --range {span.name}=LOW:HIGH")
+            warn(f"joint {span.name}: {span.source}; set it with --range {span.name}=LOW:HIGH")
     vary = exciting.find_variation(vary_tension, vary_every, pretension, alternate)
     levels = exciting.find_pretensions(subject, pretension or [])
     plan = Plan(exciting.as_array(ranges), max_speed, duration, levels, alternate, rate, seed, vary, max_acceleration)
-    with progress_bar() as bar:
+    with progress_bar(progress) as bar:
         task = bar.add_task("judging the motion", total=None)
         result = exciting.excite(subject, ranges, plan, lambda done, all_: bar.update(task, completed=done, total=all_))
     write_table(output, result.motion.columns())
+    text = json.dumps(exciting.report(result, shlex.join(["tendonfmu", *sys.argv[1:]])), indent=1) + "\n"
     if report is not None:
-        everything = exciting.report(result, shlex.join(["tendonfmu", *sys.argv[1:]]))
-        with whole_file(report) as temporary:
-            temporary.write_text(json.dumps(everything, indent=1) + "\n", encoding="utf-8")
+        write_text(report, text)
+    print_json(lambda: text)
     print_tables(excite_text.tables(result), excite_text.lines(result), left="cannot be identified")
-    say(f"{output}: {len(result.motion.time)} rows, {result.motion.time[-1]:g} s")
+    say(f"{name_of(output)}: {len(result.motion.time)} rows, {result.motion.time[-1]:g} s")
 
 
 @app.command()
+@reads("finger", "recordings")
 def fit(
     finger: FingerFile,
     recordings: FreeRecordings,
@@ -301,7 +329,7 @@ def fit(
         bool | None, typer.Option("--asymmetric/--symmetric", help="fit the two sides of a law apart, or as one")
     ] = None,
     prior: Annotated[
-        float, typer.Option(min=1e-6, max=1e6, help="prior: standard deviation / expected magnitude")
+        float, typer.Option(min=1e-6, max=1e6, metavar="RATIO", help="prior: standard deviation / expected magnitude")
     ] = 1.0,
     scale: Annotated[
         list[str] | None, typer.Option(metavar="PATTERN=VALUE", help="expected magnitude, instead of the description's")
@@ -311,15 +339,24 @@ def fit(
         typer.Option("--from", metavar="PREVIOUS.json", help="report or description of an earlier fit, as the prior"),
     ] = None,
     change: Annotated[
-        float, typer.Option(min=1e-6, max=10.0, help="with --from: expected relative change of the numbers since")
+        float,
+        typer.Option(
+            min=1e-6, max=10.0, metavar="SHARE", help="with --from: expected relative change of the numbers since"
+        ),
     ] = 0.02,
     effective_samples: Annotated[
         bool | None,
-        typer.Option(help="count correlated residuals as fewer samples \\[default: with --from]"),
+        typer.Option(help="count correlated residuals as fewer samples [default: with --from]"),
     ] = None,
-    passes: Annotated[int | None, typer.Option(min=1, help="most passes over the data \\[default: 60; ekf: 2]")] = None,
-    tolerance: Annotated[float, typer.Option(min=1e-9, max=0.5, help="batch: last step, in standard errors")] = 0.3,
-    drift: Annotated[float, typer.Option(min=0.0, max=1.0, help="ekf: relative variance of the numbers per s")] = 0.0,
+    passes: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="most passes over the data [default: 60; ekf: 2]")
+    ] = None,
+    tolerance: Annotated[
+        float, typer.Option(min=1e-9, max=0.5, metavar="SIZE", help="batch: last step, in standard errors")
+    ] = 0.3,
+    drift: Annotated[
+        float, typer.Option(min=0.0, max=1.0, metavar="RATE", help="ekf: relative variance of the numbers per s")
+    ] = 0.0,
     uncertainty: Annotated[
         bool,
         typer.Option("--uncertainty/--no-uncertainty", help="write the uncertainty of the friction, for detection"),
@@ -328,6 +365,8 @@ def fit(
         Path | None, typer.Option(metavar="FITTED.unfinished.json", help="continue an interrupted fit")
     ] = None,
     progress: Progress = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
     """Estimate the numbers of a finger from recordings of free motion, with their uncertainty.
 
@@ -373,20 +412,21 @@ def fit(
                 raise
             bar.stop()
             left = write_unfinished(output, fitting.unfinished_)
-            say(f"tendonfmu: interrupted; the best estimate so far is in {left}; continue with --resume {left}")
+            fail(f"interrupted; the best estimate so far is in {left}; continue with --resume {left}")
             sys.exit(INTERRUPTED)
     for sentence in fitting.warnings_:
-        say(f"tendonfmu: warning: {sentence}")
+        warn(sentence)
     write_text(output, fitting.description_text())
+    text = fit_report.report_text(fitting.report_)
     if report is not None:
-        write_text(report, fit_report.report_text(fitting.report_))
+        write_text(report, text)
+    print_json(lambda: text)
     print_tables(fit_text.tables(fitting), fit_text.lines(fitting), left="joint")
     say(f"{output}: {len(fitting.parameters_)} numbers estimated")
     if figures is not None:
         from tendonfmu.report import write_fit_page
 
-        for path, what in write_fit_page(fitting.picture(), figures).items():
-            say(f"{path}: {what}")
+        say_files(write_fit_page(fitting.picture(), figures))
 
 
 cli_calibrate.register(app)
@@ -400,20 +440,24 @@ def demo(
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder for the results")] = Path(
         "tendonfmu-demo"
     ),
+    progress: Progress = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
     """Show every step on built-in data in a minute: calibrate, detect, diagnose, fit, run.
 
     DIR gets the page story.html and all the files that it is made from.
     """
-    from tendonfmu.demo import Story, chapter_lines, chapter_tables, file_lines, write_story
+    from tendonfmu.demo import Story, chapter_lines, chapter_tables, file_lines, story_report, write_story
 
     story = Story(output)
     if story.missing:
-        say(f"tendonfmu: warning: {story.missing}")
+        warn(f"{story.missing}")
     for number, chapter in enumerate(story.chapters, start=1):
         say(f"{number} {chapter.name}: {chapter.title[:1].lower()}{chapter.title[1:]}")
-        with progress_bar() as bar:
+        with progress_bar(progress) as bar:
             chapter.run(phase_bar(bar))
         print_tables(chapter_tables(story, chapter.name), chapter_lines(story, chapter.name), left="")
     write_story(story)
     print_tables((), file_lines(story), left="")
+    print_json(lambda: story_report(story))

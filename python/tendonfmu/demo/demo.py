@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING
 from tendonfmu.demo.run import DATA, IndexFinger
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import ESTIMATION_MISSING, HAS_ESTIMATION
+from tendonfmu.files import check_output_folder
 from tendonfmu.tasks import PhaseState
 
 if TYPE_CHECKING:
@@ -86,6 +87,7 @@ class Story:
     fit: FrictionFit
 
     def __init__(self, folder: Path) -> None:
+        check_output_folder(folder)
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:

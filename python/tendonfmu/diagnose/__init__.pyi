@@ -7,6 +7,7 @@ from .campaign.cases import read_cases as read_cases
 from .campaign.rates import EFFECT_HEADINGS as EFFECT_HEADINGS
 from .campaign.rates import HEADINGS as HEADINGS
 from .campaign.rates import by_effect as by_effect
+from .campaign.rates import campaign_report as campaign_report
 from .campaign.rates import markdown as markdown
 from .campaign.rates import rates as rates
 from .campaign.rates import rates_by_part as rates_by_part

@@ -5,6 +5,7 @@ from .json_node import read_json as read_json
 from .tables import FORMATS as FORMATS
 from .tables import Table as Table
 from .tables import check_format as check_format
+from .tables import csv_lines as csv_lines
 from .tables import read_table as read_table
 from .tables import write_table as write_table
 from .writing import check_output as check_output

@@ -9,7 +9,7 @@ import csv
 import math
 import os
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +52,7 @@ def read_table(path: str | os.PathLike[str], check_names: CheckNames, flags: Col
     InputError
         File, column, row and what was expected.
     """
-    file = Path(path)
+    file = path if isinstance(path, Path) else Path(path)  # a path of its own kind keeps its name in messages
     check_format(file)
     if not file.is_file():
         raise InputError(f"{file}: no such file; expected a recording, .csv or .parquet")
@@ -215,17 +215,37 @@ def write_table(path: str | os.PathLike[str], table: Mapping[str, NDArray[Any]])
     """
     file = Path(path)
     check_format(file)
-    columns = {name: np.asarray(values) for name, values in table.items()}
-    columns = {name: column.astype(np.uint8) if column.dtype == bool else column for name, column in columns.items()}
     with whole_file(file) as temporary:
         if file.suffix.lower() == ".csv":
-            # repr gives the shortest digits that read back as the same number
-            rows = zip(*(map(repr, column.tolist()) for column in columns.values()), strict=True)
             with open(temporary, "w", encoding="utf-8", newline="\n") as out:
-                out.write(",".join(columns) + "\n")
-                out.writelines(",".join(row) + "\n" for row in rows)
+                out.writelines(csv_lines(table))
         else:
             import pyarrow as pa
             import pyarrow.parquet as pq
 
-            pq.write_table(pa.table(columns), temporary, compression="zstd", compression_level=COMPRESSION)
+            pq.write_table(pa.table(_columns(table)), temporary, compression="zstd", compression_level=COMPRESSION)
+
+
+def csv_lines(table: Mapping[str, NDArray[Any]]) -> Iterator[str]:
+    """Yield the lines of a CSV file.
+
+    Parameters
+    ----------
+    table
+        Columns [N]. Numbers read back the same; flags become 0 and 1.
+
+    Yields
+    ------
+    str
+        The names, then each row, with its line end.
+    """
+    columns = _columns(table)
+    yield ",".join(columns) + "\n"
+    # repr gives the shortest digits that read back as the same number
+    for row in zip(*(map(repr, column.tolist()) for column in columns.values()), strict=True):
+        yield ",".join(row) + "\n"
+
+
+def _columns(table: Mapping[str, NDArray[Any]]) -> Table:
+    columns = {name: np.asarray(values) for name, values in table.items()}
+    return {name: column.astype(np.uint8) if column.dtype == bool else column for name, column in columns.items()}

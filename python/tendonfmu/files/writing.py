@@ -34,6 +34,8 @@ def check_output(output: Path, *inputs: Path) -> None:
 
 
 def _check_place(file: Path) -> None:
+    if file.name == "-":
+        raise InputError("-: standard output takes tables only; expected the name of a file to write")
     if not file.parent.is_dir():
         raise InputError(f"{file}: no folder {file.parent}; expected one that exists")
     if file.is_dir():
@@ -58,6 +60,8 @@ def check_output_folder(folder: Path) -> None:
     InputError
         It is a file, lies in a file, or cannot be written to.
     """
+    if folder.name == "-":
+        raise InputError("-: standard output takes tables only; expected the name of a folder")
     there = next(each for each in (folder, *folder.absolute().parents) if each.exists())
     if not there.is_dir():
         what = "a file" if there == folder else f"{there} is a file"

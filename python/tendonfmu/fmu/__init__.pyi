@@ -1,5 +1,6 @@
 from .documentation import render_documentation as render_documentation
 from .fmpy_client import run_fmu as run_fmu
+from .fmu_report import fmu_report as fmu_report
 from .model_variables import NOT_IN_XML as NOT_IN_XML
 from .model_variables import VariableTable as VariableTable
 from .model_variables import counted as counted
@@ -17,5 +18,6 @@ from .packaging import model_identifier as model_identifier
 from .packaging import pack as pack
 from .packaging import package_file as package_file
 from .running import check_model as check_model
+from .running import finger_of as finger_of
 from .running import run_model as run_model
 from .running import summary as summary

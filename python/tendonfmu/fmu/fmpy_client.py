@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import re
 import shutil
 import tempfile
@@ -105,7 +106,7 @@ def _unpacked(path: Path) -> Iterator[Path]:
         raise InputError(f"{path}: no such file")
     folder = Path(tempfile.mkdtemp(prefix="tendonfmu-"))
     try:
-        extract(str(path), unzipdir=str(folder))
+        extract(os.fspath(path), unzipdir=str(folder))
         if not (folder / "modelDescription.xml").is_file():
             raise InputError(f"{path}: no modelDescription.xml in it; expected an FMU of `tendonfmu build`")
         yield folder

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from tendonfmu.errors import InputError
 from tendonfmu.files import FORMATS
 from tendonfmu.fmu.fmpy_client import Progress, run_fmu
+from tendonfmu.model import FingerDescription, finger_from_text, read_finger
 from tendonfmu.recordings import Recording
 
 
@@ -33,6 +35,36 @@ def check_model(model: Path) -> None:
         raise InputError(f"{model}: a recording; expected FINGER.json or FINGER.fmu here, and the recording after it")
     if not model.is_file():
         raise InputError(f"{model}: no such file; expected FINGER.json or FINGER.fmu")
+
+
+def finger_of(model: Path) -> FingerDescription | None:
+    """Return the description of a model.
+
+    Parameters
+    ----------
+    model
+        FINGER.json, or FINGER.fmu, which contains the description.
+
+    Returns
+    -------
+    FingerDescription or None
+        None for an FMU without a description.
+
+    Raises
+    ------
+    InputError
+        The description is refused.
+    """
+    if model.suffix.lower() == ".json":
+        return read_finger(model)
+    try:
+        with zipfile.ZipFile(model) as archive:
+            text = archive.read("resources/finger.json")
+    except KeyError:
+        return None
+    except (OSError, zipfile.BadZipFile) as wrong:
+        raise InputError(f"{model}: cannot be read ({wrong}); expected an FMU") from None
+    return finger_from_text(model, text)
 
 
 def summary(table: Mapping[str, NDArray[Any]]) -> str:
@@ -91,5 +123,5 @@ def run_model(
 
     with tempfile.TemporaryDirectory(prefix="tendonfmu-") as folder:
         fmu = Path(folder) / "finger.fmu"
-        build_fmu(model, fmu)
+        build_fmu(model, fmu, illustrated=False)  # nobody sees its pictures
         return run_fmu(fmu, recording, kinematics_source=kinematics_source, progress=progress)

@@ -6,6 +6,7 @@ from .balance import pretension_vector as pretension_vector
 from .description import FingerDescription as FingerDescription
 from .description import Law as Law
 from .description import count as count
+from .description import finger_from_text as finger_from_text
 from .description import read_finger as read_finger
 from .description import sides as sides
 from .description_defaults import DEFAULTS as DEFAULTS

@@ -147,6 +147,29 @@ def read_finger(path: Path) -> FingerDescription:
         raise InputError(f"{path}: {failed.strerror}; expected a finger description (JSON)") from None
     if text.startswith(b"PK\x03\x04"):
         raise InputError(f"{path}: an archive, such as an FMU; expected a finger description (JSON)")
+    return finger_from_text(path, text)
+
+
+def finger_from_text(path: Path, text: bytes) -> FingerDescription:
+    """Read the text of a finger description.
+
+    Parameters
+    ----------
+    path
+        The file that the text is from, for messages.
+    text
+        JSON in UTF-8.
+
+    Returns
+    -------
+    FingerDescription
+        A description that the native reader has accepted.
+
+    Raises
+    ------
+    InputError
+        One line that starts with the path.
+    """
     _check_format(path, text)
     try:
         image = native.image_from_json(text)

@@ -1,3 +1,6 @@
+from .check_report import check_report as check_report
+from .check_report import recording_report as recording_report
+from .check_report import refusal_report as refusal_report
 from .converters import convert_file as convert_file
 from .converters.one_joint_description import describe_joint as describe_joint
 from .converters.one_joint_description import description_text as description_text
@@ -6,7 +9,6 @@ from .faults import gaps as gaps
 from .match import UNFIT_FOR_SEARCH as UNFIT_FOR_SEARCH
 from .match import admit as admit
 from .match import belongs as belongs
-from .match_text import verdict as verdict
 from .prepared import FitRecording as FitRecording
 from .prepared import Held as Held
 from .prepared import motion_of as motion_of

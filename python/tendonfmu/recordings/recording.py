@@ -119,7 +119,7 @@ def read_recording(path: str | os.PathLike[str], *, label: str = LABEL, others: 
     InputError
         The file, column or row that is wrong, and what was expected.
     """
-    file = Path(path)
+    file = path if isinstance(path, Path) else Path(path)
     known = {LABEL, label, *others}
     table = read_table(file, partial(_check_columns, known=known), flags=(LABEL, label))
     time = table["time"]

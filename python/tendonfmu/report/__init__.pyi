@@ -12,6 +12,7 @@ from .diagnosis_figures import diagnosis_sheets as diagnosis_sheets
 from .diagnosis_files import check_folder as check_folder
 from .diagnosis_files import write_diagnosis as write_diagnosis
 from .diagnosis_page import cards_of as cards_of
+from .diagnosis_report import REPORT as REPORT
 from .diagnosis_text import Names as Names
 from .diagnosis_text import at_place as at_place
 from .diagnosis_text import confusion_sentence as confusion_sentence
@@ -30,7 +31,11 @@ from .fit_page import write_fit_page as write_fit_page
 from .fit_summary import ResidualTable as ResidualTable
 from .fit_summary import residual_tables as residual_tables
 from .fit_summary import rounded as rounded
+from .history_files import history_report as history_report
 from .history_files import write_history as write_history
 from .page import Tile as Tile
 from .page import render as render
 from .plots import draw_story as draw_story
+from .run_page import check_page as check_page
+from .run_page import write_run_page as write_run_page
+from .run_report import run_report as run_report

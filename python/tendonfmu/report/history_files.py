@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from tendonfmu.diagnose import History
 from tendonfmu.drawing import Sheet, draw_panel, write_sheet
@@ -14,6 +16,7 @@ from tendonfmu.report.history_figures import history_sheet
 from tendonfmu.report.history_text import columns_of, headline, rows_of_lines, trend_sentence
 from tendonfmu.report.page import render
 
+FORMAT = "tendonfmu-history-1"
 TABLE, PICTURE, PAGE = "history.csv", "history.png", "history.html"
 
 
@@ -54,6 +57,36 @@ def write_history(found: History, names: Names, folder: Path) -> dict[Path, str]
         write_sheet(sheet, [draw_panel(each) for each in sheet.panels], folder / PICTURE)
         written[folder / PICTURE] = "sizes over time"
     return written
+
+
+def history_report(found: History, written: Iterable[Path] = ()) -> dict[str, Any]:
+    """Return what `tendonfmu diagnose --history --json` prints.
+
+    Parameters
+    ----------
+    found
+        Sizes of causes over several recordings.
+    written
+        Files of the history.
+
+    Returns
+    -------
+    dict
+        Ready for JSON.
+    """
+    return {
+        "format": FORMAT,
+        "finger": found.finger,
+        "references": list(found.references),
+        "recordings": [
+            {"file": name, "time": time, "verdict": verdict}
+            for name, time, verdict in zip(found.recordings, found.times, found.verdicts, strict=True)
+        ],
+        "unit_of_time": found.unit,
+        "causes": [asdict(line) for line in found.lines],
+        "failed": [{"file": name, "reason": why} for name, why in found.failed],
+        "files": [str(file) for file in written],
+    }
 
 
 def _page(found: History, names: Names, sheet: Sheet) -> str:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +14,8 @@ from tendonfmu.simulate.plant import MEASURED, TRUE, Array, Plant, Statistics, r
 from tendonfmu.simulate.rig import Rig
 
 Table = dict[str, NDArray[np.float64]]
+
+REPORT_FORMAT = "tendonfmu-simulation-1"
 
 # Samples in one call of the plant. Progress and Ctrl-C are handled between calls.
 CHUNK = 100
@@ -52,6 +56,24 @@ class Simulation:
         return [
             f"{len(time)} samples, {time[-1]:.3f} s of {rig.name}{contact}; {self.integrator}: {self.work.steps} steps"
         ]
+
+    def report(self, rig: Rig, written: Mapping[str, Path]) -> dict[str, Any]:
+        """Return what `tendonfmu simulate --json` prints. written: name of a table -> its file."""
+        time = self.recording["time"]
+        return {
+            "format": REPORT_FORMAT,
+            "rig": str(rig.path),
+            "name": rig.name,
+            "seed": rig.expanded["seed"],
+            "samples": len(time),
+            "duration": float(time[-1] - time[0]),
+            "columns": list(self.recording),
+            "pushes": len(rig.expanded["pushes"]),
+            "contact_seconds": float(self.contact_seconds),
+            "integrator": self.integrator,
+            "steps": int(self.work.steps),
+            **{name: str(file) for name, file in written.items()},
+        }
 
 
 def plant_of(rig: Rig) -> Plant:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from tendonfmu.statistics import intervals
 
 Row = Mapping[str, Any]
+REPORT_FORMAT = "tendonfmu-campaign-rates-1"
 STRENGTHS = (0.03, 0.1, 0.3, 1.0)
 NEAR = 1.4  # a case counts as one of these strengths within this factor
 COVERAGE = "the gain's interval covers the true gain"
@@ -245,6 +246,41 @@ def by_effect(rows: Sequence[Row]) -> list[list[str]]:
 
 
 EFFECT_HEADINGS = ("hidden effect", "cases", "detected", "in the set", "first", "place")
+
+
+def campaign_report(rows: Sequence[Row], cases: int) -> dict[str, Any]:
+    """Return what `tendonfmu campaign --json` prints.
+
+    Parameters
+    ----------
+    rows
+        Rows of a campaign.
+    cases
+        Number of cases listed, also those without a row yet.
+
+    Returns
+    -------
+    dict
+        Ready for JSON. Shares from 0 to 1, with their 95 % interval.
+    """
+    return {
+        "format": REPORT_FORMAT,
+        "cases": cases,
+        "rows": len(rows),
+        "rates": [asdict(each) for each in rates(rows)],
+        "by_part": [asdict(each) for each in rates_by_part(rows)],
+        "rivals": {name: [asdict(each) for each in rates(seen_by(rows, name))] for name in rivals_of(rows)},
+        "by_effect": [_effect_entry(*cells) for cells in by_effect(rows)],
+        "errors": {str(row["name"]): str(row["error"]) for row in rows if row.get("error")},
+    }
+
+
+def _effect_entry(effect: str, *counts: str) -> dict[str, Any]:
+    """Return a row of `by_effect` with its counts as numbers."""
+    *plain, place = counts
+    right, known = place.split("/")
+    named = dict(zip(("cases", "detected", "in_set", "first"), map(int, plain), strict=True))
+    return {"effect": effect, **named, "place": int(right), "place_known": int(known)}
 
 
 def markdown(rows: Sequence[Row]) -> str:

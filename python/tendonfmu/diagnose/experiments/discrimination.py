@@ -19,6 +19,7 @@ Numbers = NDArray[np.float64]
 
 REPORT = "diagnosis.json"
 FORMAT = "tendonfmu-diagnosis-1"
+MOTION_FORMAT = "tendonfmu-discriminating-motion-1"
 RATE = 100.0  # rows per second
 
 
@@ -55,6 +56,19 @@ class Discrimination:
                 if end - begin > 1:  # constant load, not a transition
                     torques = ", ".join(f"{value:.3g}" for value in load[begin])
                     yield f"known load {torques} N·m from {time[begin]:.1f} to {time[end - 1]:.1f} s"
+
+    def report(self, output: Path) -> dict[str, Any]:
+        """Return what `tendonfmu excite --discriminate --json` prints. output: file of the motion."""
+        time = self.performed.time
+        return {
+            "format": MOTION_FORMAT,
+            "output": str(output),
+            "rows": len(time),
+            "duration": float(time[-1]),
+            "sentence": self.sentence,
+            "experiment": self.entry.words,
+            "lines": list(self.lines()),
+        }
 
 
 def discriminating_motion(
