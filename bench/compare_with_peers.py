@@ -128,7 +128,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         fmu = build_fmu(FINGER, Path(name) / "index_finger.fmu")
         slave = slave_fmu(Path(name))
-        finger = native.Finger.from_description(description)
+        finger = native.Instance.from_description(description)
 
         def c_interface() -> Any:
             finger.reset()

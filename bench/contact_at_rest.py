@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from detection_limit_cases import ROOT, Case, cut, made, slots
 from tendonfmu.detect.contact_at_rest import count_alarms, find_rests, learn_rest
 from tendonfmu.detect.free_motion import free_parts
-from tendonfmu.model.description import FingerDescription
-from tendonfmu.model.native import Finger, image_from_json
+from tendonfmu.model.description import Finger
+from tendonfmu.model.native import Instance, image_from_json
 from tendonfmu.recordings.recording import Recording
 
 sys.path.insert(0, str(ROOT / "python_tests" / "foreign"))
@@ -62,9 +62,9 @@ class Counts:
     tails: list[float] = field(default_factory=list)  # share of the time from 0.2 s after the push on in contact
 
 
-def described(data: Mapping[str, Any]) -> FingerDescription:
+def described(data: Mapping[str, Any]) -> Finger:
     text = json.dumps(data).encode()
-    return FingerDescription(Path("finger"), text, data, image_from_json(text))
+    return Finger(Path("finger"), text, data, image_from_json(text))
 
 
 def inputs(arrays: Arrays) -> Arrays:
@@ -101,7 +101,7 @@ def measure(data: Mapping[str, Any], free: Sequence[Arrays], other: Sequence[Arr
 
 def count_push(image: bytes, push: Pushed, counts: Counts) -> None:
     time = push.arrays["time"]
-    alarm = Finger(image).run(inputs(push.arrays))["contact_at_rest"].ravel()
+    alarm = Instance(image).run(inputs(push.arrays))["contact_at_rest"].ravel()
     during = (time >= push.begin) & (time <= push.end)
     before = (time < push.begin) & (time > push.begin - 1.0)
     counts.alarms += int(np.any(alarm[before]))

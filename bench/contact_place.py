@@ -107,7 +107,7 @@ def touches(folder: Path, take: Take, finger: bytes, chain: Chain) -> Iterator[T
     """All pushes of a recording."""
     rig = read_rig(write_rig(folder, take))
     recording, truth = read_recording(recording_file(folder, take)), read_truth(folder, take)
-    outputs = native.Finger(finger).run({"time": recording.time, **recording.groups})
+    outputs = native.Instance(finger).run({"time": recording.time, **recording.groups})
     for push in rig.expanded["pushes"]:
         k = int(np.searchsorted(recording.time, push["start"] + push["rise"] + push["hold"] / 2))
         end, point = chain.ends[push["link"] - 1], np.array(push["point"])

@@ -44,7 +44,7 @@ from detection_limit_table import ramp_tables, recovery_table, stuck_tables
 from tendonfmu.detect.counting import Event, score_detection, stretches
 from tendonfmu.files.writing import whole_file
 from tendonfmu.model.balance import moment_arms
-from tendonfmu.model.native import Finger, image_from_json
+from tendonfmu.model.native import Instance, image_from_json
 
 Row = dict[str, Any]
 
@@ -68,7 +68,7 @@ class Subject:
         return cls(name, data, image_from_json(json.dumps(data)), image_from_json(json.dumps(never)))
 
     def run(self, arrays: Arrays, detecting: bool = True) -> Arrays:
-        return Finger(self.image if detecting else self.free).run(arrays)
+        return Instance(self.image if detecting else self.free).run(arrays)
 
 
 # --- pushes: computing ------------------------------------------------------------------------------------------------

@@ -72,7 +72,7 @@ class Detector:
     predictor: Predictor | None = None
 
     def inputs(self, recording: Recording) -> dict[str, Numbers]:
-        """As `native.Finger.run` takes them."""
+        """As `native.Instance.run` takes them."""
         given = recording.arrays()
         if self.predictor is None:
             return given

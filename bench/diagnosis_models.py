@@ -27,11 +27,11 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from sklearn.ensemble import HistGradientBoostingRegressor
 
-from tendonfmu.diagnose.diagnosis import diagnose
-from tendonfmu.diagnose.gain import residual_of
+from tendonfmu.diagnosis.diagnosis import diagnose
+from tendonfmu.diagnosis.gain import residual_of
 from tendonfmu.model.balance import moment_arms
 from tendonfmu.model.description import read_finger
-from tendonfmu.model.native import Finger
+from tendonfmu.model.native import Instance
 from tendonfmu.recordings.prepared import FitRecording, Held, prepare
 from tendonfmu.recordings.recording import read_recording
 
@@ -49,7 +49,7 @@ MOVES = 5.0  # times the joint's threshold: samples for the static curve
 
 def kinematics(data: Data, recording: FitRecording) -> tuple[Numbers, Numbers, Numbers]:
     """[N, n] angle, velocity, joint torque as the finger sees them."""
-    out = Finger.from_description(data, recording.kinematics).run(recording.recording.arrays())
+    out = Instance.from_description(data, recording.kinematics).run(recording.recording.arrays())
     return out["joint_angle"], out["joint_speed"], out["joint_torque"]
 
 

@@ -19,11 +19,11 @@ from rival_discrepancy import gain_of_discrepancy
 from rival_knockoffs import by_knockoffs
 from rival_parity import by_parity
 from rival_selection import by_bic, by_correlation, by_random_cv, by_sindy, stepwise
-from tendonfmu.diagnose.campaign.cases import Case
-from tendonfmu.diagnose.campaign.judging import Answer
-from tendonfmu.diagnose.cause_search import View, look
-from tendonfmu.diagnose.extension_fit import FitSettings
-from tendonfmu.diagnose.signal_choice import choose
+from tendonfmu.diagnosis.campaign.cases import Case
+from tendonfmu.diagnosis.campaign.judging import Answer
+from tendonfmu.diagnosis.cause_search import View, look
+from tendonfmu.diagnosis.extension_fit import FitSettings
+from tendonfmu.diagnosis.signal_choice import choose
 from tendonfmu.model.balance import moment_arms
 from tendonfmu.model.description import read_finger
 from tendonfmu.recordings.prepared import FitRecording, Held, prepare

@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from tendonfmu.model.description import FingerDescription, read_finger
+from tendonfmu.model.description import Finger, read_finger
 from tendonfmu.model.findings import Finding
 from tendonfmu.recordings.match import belongs
 from tendonfmu.recordings.recording import GROUPS, Recording
@@ -43,7 +43,7 @@ def recording_of(name: str, frame: pd.DataFrame) -> Recording:
     return Recording(Path(name), frame["time"].to_numpy(), groups)
 
 
-def described(nominal: Nominal) -> FingerDescription:
+def described(nominal: Nominal) -> Finger:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "finger.json"
         file.write_text(json.dumps(nominal), encoding="utf-8")
@@ -164,7 +164,7 @@ def check_clean(name: str, nominal: Nominal, frame: pd.DataFrame, counts: Counts
 
 
 def check_corrupted(
-    name: str, finger: FingerDescription, frame: pd.DataFrame, corruption: Corruption, counts: Counts, verbose: bool
+    name: str, finger: Finger, frame: pd.DataFrame, corruption: Corruption, counts: Counts, verbose: bool
 ) -> None:
     rng = np.random.default_rng(zlib.crc32(f"{name} {corruption.name}".encode()))
     changed, chosen = corrupt(frame, corruption, rng)

@@ -124,7 +124,7 @@ def _start(truth: Description, seed: int) -> Description:
     known = Estimator(image(truth))
     factors = np.exp(np.random.default_rng([seed, 2]).normal(0.0, START_SPREAD, len(known.unknowns)))
     values = known.values(known.start * factors)
-    parameters = native.Finger(image(truth)).parameters()
+    parameters = native.Instance(image(truth)).parameters()
     start = copy.deepcopy(truth)
     for index in {index for unknown in known.unknowns for index in unknown.parameters}:
         _put(start, parameters[index].path, float(values[index]))
@@ -157,7 +157,7 @@ class Scale:
     def __init__(self, truth: Description) -> None:
         known = Estimator(image(truth))
         moved = sorted({index for unknown in known.unknowns for index in unknown.parameters})
-        paths = [parameter.path for parameter in native.Finger(image(truth)).parameters()]
+        paths = [parameter.path for parameter in native.Instance(image(truth)).parameters()]
         self._moved, self.paths = np.array(moved), [paths[index] for index in moved]
         self.kinds = np.array([path.rsplit(".", 1)[-1].split("[")[0] for path in self.paths])
         self.unknowns = known.start

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.diagnose.cause_search import View
-from tendonfmu.diagnose.result import Where
+from tendonfmu.diagnosis.cause_search import View
+from tendonfmu.diagnosis.result import Where
 from tendonfmu.statistics.splines import Span, basis, without
 
 Numbers = NDArray[np.float64]

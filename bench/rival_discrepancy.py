@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
-from tendonfmu.diagnose.cause_search import residual_alone, series_of
-from tendonfmu.diagnose.series import make_grid
+from tendonfmu.diagnosis.cause_search import residual_alone, series_of
+from tendonfmu.diagnosis.series import make_grid
 from tendonfmu.estimate.evaluation import model_over, residuals
 from tendonfmu.recordings.prepared import FitRecording
 from tendonfmu.recordings.residuals import Model

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from rival_columns import Numbers, Plain, least_power
-from tendonfmu.diagnose.result import Where
+from tendonfmu.diagnosis.result import Where
 
 Flags = NDArray[np.bool_]
 

@@ -44,7 +44,7 @@ from tendonfmu.detect.free_motion import FreePart
 from tendonfmu.detect.sensor_faults import learn_sensors
 from tendonfmu.detect.tuning import ContactTuning, TuneWarning
 from tendonfmu.model.description import read_finger
-from tendonfmu.model.native import Finger
+from tendonfmu.model.native import Instance
 from tendonfmu.recordings.recording import read_recording
 
 Numbers = NDArray[np.float64]
@@ -151,7 +151,7 @@ def _subject(name: str, data: Mapping[str, Any], files: Mapping[str, Sequence[Pa
 
 
 def run(data: Mapping[str, Any], arrays: Mapping[str, Numbers]) -> dict[str, NDArray[Any]]:
-    return Finger.from_description(json.dumps(data), 1).run(arrays)
+    return Instance.from_description(json.dumps(data), 1).run(arrays)
 
 
 def widened(flags: Flags, time: Numbers) -> Flags:

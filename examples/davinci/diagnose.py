@@ -16,8 +16,8 @@ import numpy as np
 from jaw_recordings import FAST, FAULT, data_folder, rms, torque_error
 
 from tendonfmu.cli.console import PhaseDisplay, print_tables
-from tendonfmu.diagnose.diagnosis import diagnose
-from tendonfmu.diagnose.result import Diagnosis
+from tendonfmu.diagnosis.diagnosis import diagnose
+from tendonfmu.diagnosis.result import Diagnosis
 from tendonfmu.files.tables import write_table
 from tendonfmu.model.native import run_recording
 from tendonfmu.recordings.converters import convert_file

@@ -62,13 +62,13 @@ def calibrate(folder: Path, jobs: int) -> Path:
 
 def rows(finger: Path) -> Iterator[tuple[str, list[str]]]:
     """(what, before → after of each joint in mN·m) of free motion, and of the time in contact."""
-    from tendonfmu.model.native import Finger
+    from tendonfmu.model.native import Instance
     from tendonfmu.recordings.recording import read_recording
 
     description = json.loads(finger.read_text(encoding="utf-8"))
     for name, what in RECORDINGS.items():
         recording = read_recording(HERE / f"{name}.parquet")
-        given = Finger.from_description(description).run(recording.arrays())
+        given = Instance.from_description(description).run(recording.arrays())
         label = np.zeros(len(recording), bool) if recording.contact is None else recording.contact
         torque, left = given["joint_torque"], given["compensated_torque"]
         yield f"{what}: τ → compensated", cells(torque[~label], left[~label])

@@ -16,8 +16,8 @@ from pathlib import Path
 from emps_recordings import KINEMATICS, MASS, PULSES, TRAINING, data_folder, read_emps, relative_as_published
 
 from tendonfmu.cli.console import PhaseDisplay, print_tables
-from tendonfmu.diagnose.diagnosis import diagnose
-from tendonfmu.diagnose.result import Diagnosis
+from tendonfmu.diagnosis.diagnosis import diagnose
+from tendonfmu.diagnosis.result import Diagnosis
 from tendonfmu.files.tables import write_table
 from tendonfmu.recordings.converters import convert_file
 from tendonfmu.report.diagnosis_files import write_diagnosis

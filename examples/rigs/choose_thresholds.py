@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.detect.counting import DetectionScore, score_detection
-from tendonfmu.model.native import Finger
+from tendonfmu.model.native import Instance
 from tendonfmu.simulate.rig import read_rig
 from tendonfmu.simulate.simulation import Table, simulate
 
@@ -50,7 +50,7 @@ def score(description: dict[str, Any], recording: Table) -> DetectionScore:
         name: np.column_stack([recording[f"{name}[{i + 1}]"] for i in range(tendons)])
         for name in ("tendon_force", "tendon_position")
     }
-    outputs = Finger.from_description(description).run({"time": recording["time"], **inputs})
+    outputs = Instance.from_description(description).run({"time": recording["time"], **inputs})
     return score_detection(recording["time"], recording["contact"].astype(bool), outputs["contact"])
 
 

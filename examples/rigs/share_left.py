@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.model.native import Finger
+from tendonfmu.model.native import Instance
 from tendonfmu.recordings.recording import read_recording
 
 HERE = Path(__file__).parent
@@ -35,7 +35,7 @@ def main() -> None:
             part.pop(key, None)
     for name in RECORDINGS:
         samples = read_recording(HERE.parent / "demo_recording" / name).arrays()
-        model, bias_only = (Finger.from_description(each).run(samples) for each in (finger, bare))
+        model, bias_only = (Instance.from_description(each).run(samples) for each in (finger, bare))
         torque = model["joint_torque"]
         print(name)
         print("  model                 ", shares(model["compensated_torque"], torque))

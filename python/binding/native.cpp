@@ -22,6 +22,7 @@ namespace {
 
 using number_rows = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using time_row = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using number_row = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
 nb::bytes image_from_json(const nb::bytes& json) {
   void* image = nullptr;
@@ -153,6 +154,37 @@ class bound_finger {
     return arrays;
   }
 
+  // Name of each output to the array that every step() writes: [n], [m], [3] or [1].
+  nb::dict step_outputs() {
+    if (!step_arrays_.is_valid()) {
+      nb::dict arrays;
+      for (const output_row& row : output_table) {
+        if (row.need != output_need::parts && has(row.need)) {
+          void* data = nullptr;
+          const std::vector<std::size_t> shape = shape_of(row.size, 1);
+          arrays[row.name] = new_array(row.type, {shape.back()}, &data);
+          set_array(step_pointers_, row, data);
+        }
+      }
+      step_arrays_ = arrays;
+    }
+    nb::dict shared;  // the arrays must live as long as the finger: the caller gets a dictionary of its own
+    shared.update(step_arrays_);
+    return shared;
+  }
+
+  // Takes one sample and writes the arrays of step_outputs(). A refused sample changes neither them nor the state.
+  void step(double time, const std::optional<number_row>& force, const std::optional<number_row>& position,
+            const std::optional<number_row>& angle, const std::optional<number_row>& velocity) {
+    if (!step_arrays_.is_valid()) {
+      step_outputs();
+    }
+    const std::size_t n = joints(), m = tendons();
+    const tendonfmu_inputs inputs = {numbers(force, m, "tendon_force"), numbers(position, m, "tendon_position"),
+                                     numbers(angle, n, "joint_position"), numbers(velocity, n, "joint_velocity")};
+    check(tendonfmu_run(handle_, 1, &time, &inputs, &step_pointers_, nullptr));
+  }
+
   // Name of each output that has a derivative to its n slopes.
   nb::dict directional_derivative(const std::vector<double>& force, const std::vector<double>& position,
                                   const std::vector<double>& angle, const std::vector<double>& velocity) {
@@ -176,6 +208,8 @@ class bound_finger {
 
  private:
   tendonfmu_finger* handle_ = nullptr;
+  nb::dict step_arrays_ = nb::steal<nb::dict>(nb::handle());  // made by the first step_outputs()
+  tendonfmu_outputs step_pointers_ = {};
 
   bool has(output_need need) const {
     switch (need) {
@@ -215,6 +249,18 @@ class bound_finger {
     }
     return array->data();
   }
+
+  static const double* numbers(const std::optional<number_row>& array, std::size_t count, const char* name) {
+    if (!array) {
+      return nullptr;
+    }
+    if (array->shape(0) != count) {
+      throw nb::value_error((std::string(name) + ": " + std::to_string(array->shape(0)) + " numbers; expected " +
+                             std::to_string(count))
+                                .c_str());
+    }
+    return array->data();
+  }
 };
 
 }  // namespace
@@ -244,5 +290,8 @@ NB_MODULE(_native, m) {
       .def("run", &bound_finger::run, nb::arg("time"), nb::arg("tendon_force").none(),
            nb::arg("tendon_position").none(), nb::arg("joint_position").none(), nb::arg("joint_velocity").none(),
            nb::arg("with_parts"))
+      .def("step_outputs", &bound_finger::step_outputs)
+      .def("step", &bound_finger::step, nb::arg("time"), nb::arg("tendon_force").none(),
+           nb::arg("tendon_position").none(), nb::arg("joint_position").none(), nb::arg("joint_velocity").none())
       .def("directional_derivative", &bound_finger::directional_derivative);
 }

@@ -43,6 +43,15 @@ class Finger:
         joint_velocity: NDArray[np.float64] | None,
         with_parts: bool,
     ) -> dict[str, NDArray[Any]]: ...
+    def step_outputs(self) -> dict[str, NDArray[Any]]: ...
+    def step(
+        self,
+        time: float,
+        tendon_force: NDArray[np.float64] | None,
+        tendon_position: NDArray[np.float64] | None,
+        joint_position: NDArray[np.float64] | None,
+        joint_velocity: NDArray[np.float64] | None,
+    ) -> None: ...
     def directional_derivative(
         self, force: Sequence[float], position: Sequence[float], angle: Sequence[float], velocity: Sequence[float]
     ) -> dict[str, NDArray[np.float64]]: ...

@@ -11,6 +11,10 @@ class InputError(ValueError):
     """Input from the user is refused. The message is one line that starts with the file."""
 
 
+class InputWarning(UserWarning):
+    """Input from the user is accepted, but not all of it is used. The message is one line that starts with the file."""
+
+
 class InternalError(Exception):
     """A fault of tendonfmu: one part of it gave another an invalid value. Never caused by a file or an option."""
 

@@ -25,7 +25,7 @@ from tendonfmu.calibrate.parts import DIAGNOSED, JUDGED, stretches_for_diagnosis
 from tendonfmu.calibrate.report import errors_of, rms_of
 from tendonfmu.calibrate.text import size_rows, verdict
 from tendonfmu.cli.several_values import several_values
-from tendonfmu.diagnose.extension_fit import FitSettings
+from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.structure import described
 from tendonfmu.files.tables import write_table

@@ -54,10 +54,10 @@ FIRST = {
     "excite": "tendonfmu.excite.training_motion.excite",
     "fit": "tendonfmu.estimate.FrictionFit",
     "calibrate": "tendonfmu.calibrate.calibrate",
-    "diagnose": "tendonfmu.diagnose.diagnose",
+    "diagnose": "tendonfmu.diagnosis.diagnose",
     "tune": "tendonfmu.detect.ContactTuning",
     "score": "tendonfmu.detect.score_recordings",
-    "campaign": "tendonfmu.diagnose.read_cases",
+    "campaign": "tendonfmu.diagnosis.read_cases",
     "demo": "tendonfmu.demo.Story",
 }
 QUICK = ("check", "build", "run", "simulate", "excite")  # the others are seen with --json where they are tested

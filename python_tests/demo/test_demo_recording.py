@@ -23,7 +23,7 @@ from repository_paths import ROOT
 from tendonfmu.detect.counting import score_detection
 from tendonfmu.files.tables import read_table
 from tendonfmu.model.description import read_finger
-from tendonfmu.model.native import Finger
+from tendonfmu.model.native import Instance
 from tendonfmu.recordings.recording import Recording, read_recording
 from tendonfmu.simulate.rig import read_rig
 from tendonfmu.simulate.simulation import Table, simulate
@@ -75,7 +75,7 @@ def calibrated_outputs(calibrated: dict[str, Any], recordings: dict[str, Recordi
 
 
 def outputs_of(description: dict[str, Any], recordings: dict[str, Recording]) -> Outputs:
-    return {name: Finger.from_description(description).run(each.arrays()) for name, each in recordings.items()}
+    return {name: Instance.from_description(description).run(each.arrays()) for name, each in recordings.items()}
 
 
 def label_of(recording: Recording) -> Array:
@@ -356,7 +356,7 @@ def test_a_load_that_rises_over_seconds_is_found(recordings: dict[str, Recording
     }
 
     def found(contact: dict[str, Any]) -> tuple[int, int]:
-        outputs = Finger.from_description(json.dumps({**finger, "contact": contact})).run(groups)
+        outputs = Instance.from_description(json.dumps({**finger, "contact": contact})).run(groups)
         score = score_detection(free.time, loaded, outputs["contact"].ravel())
         return score.found, len(score.events)
 

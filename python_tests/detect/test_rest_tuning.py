@@ -77,7 +77,7 @@ def learned(*recordings: dict[str, Array]) -> tuple[Any, list[str]]:
 
 def at_rest(rule: Any, arrays: dict[str, Array]) -> NDArray[np.bool_]:
     data = FINGER | {"contact": {"threshold": [1e6], "rest": dict(rule.keys)}}
-    return np.ravel(product("model.native").Finger.from_description(data).run(arrays)["contact_at_rest"])
+    return np.ravel(product("model.native").Instance.from_description(data).run(arrays)["contact_at_rest"])
 
 
 @pytest.fixture(scope="module")

@@ -24,7 +24,7 @@ from tendonfmu.cli import main
 from tendonfmu.detect.run import read_subject, residual_of, run_track, scaled_detection
 from tendonfmu.detect.scoring import score_recordings
 from tendonfmu.files.tables import read_table, write_table
-from tendonfmu.model.native import Finger
+from tendonfmu.model.native import Instance
 from tendonfmu.recordings.recording import read_recording
 from tendonfmu.report.score_figures import contact_figure, delay_figure, event_figure, roc_figure
 
@@ -89,7 +89,7 @@ def test_the_demo_scored_and_drawn(demo: tuple[Path, str, str]) -> None:
     assert set(report) > LITERAL
     assert (report["format"], report["events"], report["found"]) == ("tendonfmu-score-1", 11, 8)
     recording = read_recording(PUSHES)
-    contact = Finger.from_description(json.loads(INDEX.read_text())).run(recording.arrays())["contact"].ravel()
+    contact = Instance.from_description(json.loads(INDEX.read_text())).run(recording.arrays())["contact"].ravel()
     assert recording.contact is not None
     delays = delays_by_hand(recording.time, recording.contact, contact)
     assert [each["delay_s"] for each in report["recordings"][0]["event_list"]] == [
@@ -270,7 +270,7 @@ def two_tendons(table: Table) -> Path:
         (lambda table: written(table, "r.csv"), ("--labels", "tendon_force[1]"), ("tendon_force[1]", "signal")),
         (lambda table: written(table, "r.csv"), ("--force", "newton"), ("r.csv", "no column newton", "(N)")),
         (lambda table: written(table, "r.csv"), ("--kinematics", "3"), ("r.csv", "no column joint_velocity[1]")),
-        (lambda table: written(table, "r.csv", touch=table["contact"]), (), ("r.csv", "unknown column 'touch'")),
+        (lambda table: written(table, "r.csv", Contact=table["contact"]), (), ("r.csv", "column 'Contact'", "contact")),
         (two_tendons, (), ("small.csv", "2 columns tendon_force[...], expected 8")),
         (
             lambda table: written({name: column[:1] for name, column in table.items()}, "r.csv"),

@@ -14,7 +14,7 @@ from tendonfmu.detect.sensor_faults import AMPLE, HOLD_SAMPLES, finds_a_fault, l
 from tendonfmu.estimate.files import with_values
 from tendonfmu.estimate.structure import Choice, build_structure
 from tendonfmu.model import native
-from tendonfmu.model.description import FingerDescription
+from tendonfmu.model.description import Finger
 
 Array = NDArray[np.float64]
 
@@ -121,8 +121,8 @@ def test_a_fit_leaves_the_watch_out_and_keeps_its_keys() -> None:
     joints = [{"friction": {"static": 0.01, "coulomb": 0.01, "stribeck_velocity": 0.1}}, {}]
     data = json.loads(json.dumps(FINGER | {"joints": joints, "sensor_fault": {"jump_margin": 0.7}}))
     text = json.dumps(data).encode()
-    finger = FingerDescription(Path("finger"), text, data, native.image_from_json(text))
+    finger = Finger(Path("finger"), text, data, native.image_from_json(text))
     structure = build_structure(finger, Choice())
     assert "sensor_fault" not in structure.start.data
-    values = np.array([parameter.start for parameter in native.Finger(structure.start.image).parameters()])
+    values = np.array([parameter.start for parameter in native.Instance(structure.start.image).parameters()])
     assert with_values(structure, values).data["sensor_fault"] == {"jump_margin": 0.7}

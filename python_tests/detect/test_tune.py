@@ -39,7 +39,7 @@ from tendonfmu.detect.noise import bias_noise, deviation, drift_variance, time_c
 from tendonfmu.detect.tuning import RELEASE, RELEASE_TIME, ContactTuning, TuneWarning
 from tendonfmu.errors import InputError
 from tendonfmu.files.tables import read_table, write_table
-from tendonfmu.model.native import Finger
+from tendonfmu.model.native import Instance
 from tendonfmu.recordings.residuals import BiasSettings, track
 
 INDEX = ROOT / "examples" / "fingers" / "index_finger.json"
@@ -300,7 +300,7 @@ def test_the_alarms_are_those_of_the_finger(tuned: tuple[Path, str, str]) -> Non
             for name in ("tendon_force", "tendon_position")
         }
         time = table["time"]
-        contact = Finger.from_description(data).run({"time": time, **arrays})["contact"].ravel()
+        contact = Instance.from_description(data).run({"time": time, **arrays})["contact"].ravel()
         begins, last = [], -math.inf
         for t, on in zip(time.tolist(), contact.tolist(), strict=True):
             if on and t - last >= 0.1 - 1e-9:

@@ -21,7 +21,7 @@ from tendonfmu.detect.free_motion import closed_loop, free_parts
 from tendonfmu.detect.tune_report import build_report
 from tendonfmu.detect.tuning import METHODS, ContactTuning, TuneWarning
 from tendonfmu.errors import InputError
-from tendonfmu.model.native import Finger
+from tendonfmu.model.native import Instance
 
 # 13, 23, 36 and 59: negative thresholds, or of 4e10, before bounds had a least; 1 is refused
 FEW, MANY = (0, 1, 3, 5, 13, 23, 36, 59), range(200)
@@ -56,7 +56,7 @@ def check(seed: int, method: str, longest: float) -> bool:
     if tuning is None:
         return False
     data = json.loads(tuning.description_text())
-    Finger.from_description(data)  # the core takes it
+    Instance.from_description(data)  # the core takes it
     contact = data["contact"]
     assert contact["method"] == method
     for numbers in numbers_of(contact):

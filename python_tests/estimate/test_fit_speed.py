@@ -15,7 +15,7 @@ from fit_data import wavy_motion
 from repository_paths import ROOT
 from tendonfmu.estimate import estimation
 from tendonfmu.model.balance import balanced_forces
-from tendonfmu.model.description import FingerDescription, read_finger
+from tendonfmu.model.description import Finger, read_finger
 
 if not estimation.HAS_ESTIMATION:
     pytest.skip(f"FIT NOT TESTED: {estimation.ESTIMATION_MISSING}", allow_module_level=True)
@@ -25,19 +25,19 @@ PASS, FILTER = 15_000, 2_000  # samples per second of CPU time, 468 unknowns
 
 
 @pytest.fixture(scope="module")
-def finger() -> FingerDescription:
+def finger() -> Finger:
     return read_finger(FINGER)
 
 
 @pytest.fixture(scope="module")
-def recording(finger: FingerDescription) -> dict[str, Any]:
+def recording(finger: Finger) -> dict[str, Any]:
     """10 s at 1 kHz, all joints moving."""
     motion = wavy_motion(1, 10.0, 1000.0, len(finger.joint_names))
     force = balanced_forces(finger.data, motion, np.full(len(motion["time"]), 20.0))
     return {**motion, "tendon_force": force}
 
 
-def test_a_pass_over_the_data(finger: FingerDescription, recording: dict[str, Any]) -> None:
+def test_a_pass_over_the_data(finger: Finger, recording: dict[str, Any]) -> None:
     estimator = estimation.Estimator(finger.image)
     assert len(estimator.unknowns) == 468
     estimator.add_recording(recording, kinematics_source=3)
@@ -48,7 +48,7 @@ def test_a_pass_over_the_data(finger: FingerDescription, recording: dict[str, An
     assert len(recording["time"]) / seconds > PASS
 
 
-def test_the_filter(finger: FingerDescription, recording: dict[str, Any]) -> None:
+def test_the_filter(finger: Finger, recording: dict[str, Any]) -> None:
     learner = estimation.Learner(finger.image)
     first = {name: values[:5000] for name, values in recording.items()}
     begin = time.process_time()

@@ -36,7 +36,7 @@ def fit() -> FrictionFit:
 
 def parts_of(data: dict[str, Any], recording: Any) -> Numbers:
     arrays = {name: values[::10] for name, values in recording.arrays().items()}
-    return native.Finger.from_description(data, 3).run(arrays, parts=True)["friction_parts"]
+    return native.Instance.from_description(data, 3).run(arrays, parts=True)["friction_parts"]
 
 
 # --- directions -------------------------------------------------------------------------------------------------------

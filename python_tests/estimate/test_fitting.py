@@ -17,10 +17,10 @@ from fit_cases import small_finger
 from fit_finger import asymmetric_finger, made_recording, moved_start, write_recording
 from repository_paths import ROOT
 from tendonfmu.errors import InputError
-from tendonfmu.estimate.files import Unfinished, description_text, read_unfinished, write_unfinished
+from tendonfmu.estimate.files import Unfinished, read_unfinished, write_unfinished
 from tendonfmu.estimate.fitting import FitWarning, FrictionFit
 from tendonfmu.estimate.structure import get_number, set_number, with_sides
-from tendonfmu.model import native
+from tendonfmu.model import description_text, native
 from tendonfmu.recordings.recording import Recording
 from tendonfmu.recordings.residuals import chi_square_tail, consistency, whiteness
 

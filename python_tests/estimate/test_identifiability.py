@@ -35,7 +35,7 @@ def small_samples(data: dict[str, Any], duration: float = 60.0) -> dict[str, np.
 def innovations(data: dict[str, Any], samples: dict[str, np.ndarray], change: dict[str, float]) -> np.ndarray:
     """[N, n] τ − T_eff before the bias step, by the core's own filter, in units of their standard deviation."""
     free = {**data, "contact": {"threshold": [1e9] * 2}}
-    finger = native.Finger.from_description(free, kinematics_source=3)
+    finger = native.Instance.from_description(free, kinematics_source=3)
     finger.set({path: finger.get(path) + step for path, step in change.items()})
     left = finger.run(samples)["compensated_torque"]
     bias = data["bias"]

@@ -226,7 +226,7 @@ def test_balanced_forces_carry_the_friction() -> None:
     motion = plan_excitation(SMALL, Plan(SMALL_RANGES, duration=30))
     samples = {name: getattr(motion, name) for name in ("time", "joint_position", "joint_velocity")}
     force = balanced_forces(SMALL, samples, motion.pretension)
-    finger = native.Finger.from_description(SMALL, kinematics_source=3)
+    finger = native.Instance.from_description(SMALL, kinematics_source=3)
     found = finger.run({**samples, "tendon_force": force})
     torque = found["friction_torque"] - found["bias_torque"]
     assert np.abs(force @ moment_arms(SMALL) - torque).max() < 1e-5
@@ -318,7 +318,7 @@ def test_numbers_are_those_of_the_description() -> None:
         expected = sum(estimated_numbers(data).values()) - len(data["joints"])
         assert len(unknowns(data)) == expected
     assert len(unknowns(INDEX_DATA)) == 468
-    paths = {parameter.path for parameter in native.Finger.from_description(INDEX_DATA).parameters()}
+    paths = {parameter.path for parameter in native.Instance.from_description(INDEX_DATA).parameters()}
     assert {number.path for number in unknowns(INDEX_DATA)} <= paths
 
 

@@ -12,7 +12,7 @@ from test_fmu_calls import SOURCE, derivative
 from fmu_binary import OK, Instance, UnpackedFmu, unpack
 from random_fingers import Recording, random_case
 from tendonfmu.fmu.packaging import build_fmu
-from tendonfmu.model.native import Finger
+from tendonfmu.model import native as native_model
 
 SAMPLES = 60
 
@@ -52,7 +52,7 @@ def test_fmu_is_the_native_finger(seed: int, source: int, tmp_path: Path) -> Non
     (tmp_path / "finger.json").write_text(json.dumps(description))
     fmu = unpack(build_fmu(tmp_path / "finger.json", tmp_path / "finger.fmu"), tmp_path / "unpacked")
     declared, outputs, inputs = dependencies(fmu), fmu.with_derivatives(), fmu.names("input")
-    native = Finger.from_description(description, source)
+    native = native_model.Instance.from_description(description, source)
     native.run({name: series[:1] for name, series in recording.items()})
     with Instance(fmu) as instance, Instance(fmu) as other:
         begin(instance, recording, source)
@@ -71,7 +71,11 @@ def test_fmu_is_the_native_finger(seed: int, source: int, tmp_path: Path) -> Non
 
 
 def compare_slopes(
-    instance: Instance, native: Finger, outputs: list[str], inputs: list[str], declared: dict[str, set[str]]
+    instance: Instance,
+    native: native_model.Instance,
+    outputs: list[str],
+    inputs: list[str],
+    declared: dict[str, set[str]],
 ) -> None:
     """fmi2GetDirectionalDerivative gives the bits of the C interface, 0 where no dependency is declared."""
     for name in inputs:

@@ -74,7 +74,7 @@ def test_everything_is_in(packed: Pack) -> None:
     assert files["documentation/licenses/license.txt"] == (ROOT / "LICENSE").read_bytes()
     page = files["documentation/index.html"].decode()
     assert 'src="../model.png"' in page
-    finger = native.Finger(files["resources/model.image"])
+    finger = native.Instance(files["resources/model.image"])
     for parameter in finger.parameters():
         assert f'<code>{parameter.path}</code></td><td class="number">{parameter.start}</td>' in page
     root = ElementTree.fromstring(files["modelDescription.xml"])
@@ -89,7 +89,7 @@ def test_everything_is_in(packed: Pack) -> None:
 
 def test_start_values_and_names_are_those_of_the_image(packed: Pack) -> None:
     fmu = packed(FINGER)
-    finger = native.Finger(native.image_from_json(json.dumps(FINGER)))
+    finger = native.Instance(native.image_from_json(json.dumps(FINGER)))
     root = ElementTree.fromstring(members(fmu)["modelDescription.xml"])
     found = {
         scalar.attrib["name"]: scalar

@@ -17,9 +17,9 @@ import numpy as np
 
 import fingers_in_numpy
 from foreign_case import Array, Case
-from tendonfmu.diagnose.cause_search import look
-from tendonfmu.diagnose.extension_fit import FitSettings
-from tendonfmu.diagnose.signal_choice import Estimation, choose
+from tendonfmu.diagnosis.cause_search import look
+from tendonfmu.diagnosis.extension_fit import FitSettings
+from tendonfmu.diagnosis.signal_choice import Estimation, choose
 from tendonfmu.model.description import read_finger
 from tendonfmu.recordings.prepared import Held, prepare
 from tendonfmu.recordings.recording import read_recording

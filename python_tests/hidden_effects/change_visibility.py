@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from change_case import Array, Columns
-from tendonfmu.diagnose.cause_search import look
-from tendonfmu.diagnose.extension_fit import FitSettings
-from tendonfmu.diagnose.signal_choice import choose
+from tendonfmu.diagnosis.cause_search import look
+from tendonfmu.diagnosis.extension_fit import FitSettings
+from tendonfmu.diagnosis.signal_choice import choose
 from tendonfmu.files.tables import write_table
 from tendonfmu.model.description import read_finger
 from tendonfmu.recordings.prepared import Held, prepare

@@ -12,7 +12,7 @@ import numpy as np
 
 from friction_physics import filtered_velocity, motion_of, read_finger
 from matched_rig import Hand, Made, balanced_forces, coloured, columns_of, measure
-from tendonfmu.diagnose.experiments.discrimination import performed_of
+from tendonfmu.diagnosis.experiments.discrimination import performed_of
 
 
 def perform_experiment(hand: Hand, motion: Mapping[str, Any], seed: int) -> Made:

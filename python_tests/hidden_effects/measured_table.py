@@ -29,8 +29,8 @@ ROOT = HERE.parents[1]
 sys.path.insert(0, str(HERE))
 
 from measured import EFFECTS, Columns, Hidden, Machine, hide  # noqa: E402
-from tendonfmu.diagnose.diagnosis import diagnose  # noqa: E402
-from tendonfmu.diagnose.result import Cause, Diagnosis  # noqa: E402
+from tendonfmu.diagnosis.diagnosis import diagnose  # noqa: E402
+from tendonfmu.diagnosis.result import Cause, Diagnosis  # noqa: E402
 from tendonfmu.files.tables import write_table  # noqa: E402
 from tendonfmu.recordings.converters import convert_file  # noqa: E402
 

@@ -15,7 +15,7 @@ from campaign_plan import FOREIGN, STRENGTHS, planned
 from effects_hidden import placed, scaled
 from joint_strength import shown_strength
 from matched_rig import random_hand
-from tendonfmu.diagnose.campaign.cases import Case, made, read_cases
+from tendonfmu.diagnosis.campaign.cases import Case, made, read_cases
 
 ALL = argparse.Namespace(
     null=460, per_effect=4, strengths=list(STRENGTHS), double=60, absorbed=80, unknown=48, contact=16, foreign=1,

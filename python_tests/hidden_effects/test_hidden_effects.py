@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 import cases
-from tendonfmu.diagnose.diagnosis import diagnose
-from tendonfmu.diagnose.result import Cause, Diagnosis
+from tendonfmu.diagnosis.diagnosis import diagnose
+from tendonfmu.diagnosis.result import Cause, Diagnosis
 
 SHORT = {"joints": 1, "seconds": 40.0, "rate": 250.0}
 

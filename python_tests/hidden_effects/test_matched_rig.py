@@ -27,7 +27,7 @@ def left_by_the_core(data: dict[str, Any], hand: Hand, made: Made) -> Array:
         "initial_variance": 0.0,
         "initial_torque": [0.0] * len(data["joints"]),
     }
-    finger = native.Finger.from_description({**data, "bias": bias}, hand.source)
+    finger = native.Instance.from_description({**data, "bias": bias}, hand.source)
     names = ["tendon_force", "tendon_position"]
     names += ["joint_position"] * (hand.source >= 2) + ["joint_velocity"] * (hand.source == 3)
     inputs = {"time": made.columns["time"]} | {name: group(made.columns, name) for name in names}

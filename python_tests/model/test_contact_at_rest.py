@@ -173,8 +173,8 @@ def test_positions_are_needed_with_every_source() -> None:
     description, recording = random_case(301, 60)
     n = len(description["joints"])
     without = {name: values for name, values in recording.items() if name != "tendon_position"}
-    native.Finger.from_description(description, 2).run(without)
-    watched = native.Finger.from_description(with_rest(description, QUICK | {"threshold": [1.0] * n}), 2)
+    native.Instance.from_description(description, 2).run(without)
+    watched = native.Instance.from_description(with_rest(description, QUICK | {"threshold": [1.0] * n}), 2)
     with pytest.raises(
         native.NativeError, match=r"tendon_position is missing: this kinematics source, or contact\.rest"
     ):
@@ -301,7 +301,7 @@ def test_a_saved_rest_goes_on(tmp_path: Path) -> None:
     whole = NATIVE(description, recording, 1)
     for k in (30, 60, 61, 75, 100, 140, 200, 300):
         head, tail = ({name: values[part] for name, values in recording.items()} for part in (slice(k), slice(k, None)))
-        one, other = (native.Finger.from_description(description, 1) for _ in range(2))
+        one, other = (native.Instance.from_description(description, 1) for _ in range(2))
         one.run(head)
         other.restore_state(one.save_state())
         found = other.run(tail)

@@ -18,7 +18,7 @@ from fmu_binary import FINGER
 from random_fingers import random_case
 from repository_paths import ROOT
 from tendonfmu.model.description import read_finger
-from tendonfmu.model.native import Finger
+from tendonfmu.model.native import Instance
 from tendonfmu.model.output_dependencies import Dependencies, dependencies, structure_of
 from tendonfmu.model.signals import FLAGS, INPUTS, NUMBERS
 
@@ -55,12 +55,12 @@ def with_extension(description: dict[str, Any], seed: int) -> dict[str, Any]:
 # --- nothing that is not declared -------------------------------------------------------------------------------------
 
 
-def outputs_of(finger: Finger, state: bytes, sample: Sample) -> dict[str, Any]:
+def outputs_of(finger: Instance, state: bytes, sample: Sample) -> dict[str, Any]:
     finger.restore_state(state)
     return finger.run(sample)
 
 
-def steps_apart(finger: Finger, state: bytes, sample: Sample) -> Influence:
+def steps_apart(finger: Instance, state: bytes, sample: Sample) -> Influence:
     """Outputs whose bits change when one input of the next sample does, by little and by much.
 
     Branch decisions are frozen (docs/reference/semantics.md#directional-derivatives): where contact itself turns, and
@@ -87,7 +87,7 @@ def test_nothing_undeclared_influences(seed: int, tmp_path: Path) -> None:
     allowed = pairs(declared(with_extension(description, seed), tmp_path))
     seen: Influence = set()
     for source in (1, 2, 3):
-        finger = Finger.from_description(description, source)
+        finger = Instance.from_description(description, source)
         begin = 0
         for k in (1, 40, 80, 120, 159):
             finger.run({name: values[begin:k] for name, values in recording.items()})
@@ -101,7 +101,7 @@ def test_nothing_undeclared_influences(seed: int, tmp_path: Path) -> None:
 # --- everything that is declared --------------------------------------------------------------------------------------
 
 
-def enliven(finger: Finger) -> None:
+def enliven(finger: Instance) -> None:
     """Tunable values with which all that exists acts: nothing sticks, no value is 0, no two laws are alike."""
     values = {}
     for k, parameter in enumerate(p for p in finger.parameters() if p.tunable):
@@ -147,7 +147,7 @@ def lively_recording(description: dict[str, Any], seed: int) -> Sample:
     }
 
 
-def slopes(finger: Finger, recording: Sample) -> Influence:
+def slopes(finger: Instance, recording: Sample) -> Influence:
     """Outputs with a slope other than 0 at some sample of a recording."""
     found: Influence = set()
     for k in range(len(recording["time"])):
@@ -166,7 +166,7 @@ def test_each_declared_number_influences(seed: int, tmp_path: Path) -> None:
     wanted = {pair for pair in pairs(declared(description, tmp_path)) if pair[0] in NUMBERS}
     seen: Influence = set()
     for source in (1, 2, 3):
-        finger = Finger.from_description(description, source)
+        finger = Instance.from_description(description, source)
         enliven(finger)
         seen |= slopes(finger, recording)
     assert seen == wanted
@@ -182,7 +182,7 @@ def test_contact_depends_as_the_torques_do(tmp_path: Path) -> None:
             assert set(found["contact"][0][name]) == together
 
 
-def slack_by_hand(finger: Finger, sample: Sample, name: str, i: int, tendon: int) -> bool:
+def slack_by_hand(finger: Instance, sample: Sample, name: str, i: int, tendon: int) -> bool:
     """Whether some small change of one input of a first sample flips a tendon's slack."""
     flags = set()
     for change in (-1e-6, 0.0, 1e-6):
@@ -210,7 +210,7 @@ def test_slack_follows_every_effect(
     found = declared(FINGER, tmp_path)["slack"]
     assert found[0]["joint_velocity"] == [0, 1] and found[0]["joint_position"] == [0, 1]
     assert found[2] == {}  # a cable loop
-    finger = Finger.from_description(FINGER, 3)
+    finger = Instance.from_description(FINGER, 3)
     velocity = np.array([[0.3, 0.4]])
     arms = np.array(FINGER["tendons"][0]["moment_arms"])
     speed = float(arms[min(velocities) :] @ velocity[0, min(velocities) :])

@@ -22,7 +22,7 @@ from tendonfmu.errors import InputError
 from tendonfmu.estimate.fisher_information import unknowns
 from tendonfmu.model.description import count, read_finger
 from tendonfmu.model.extensions import MAGNITUDES, extension_numbers
-from tendonfmu.model.native import Finger, NativeError, image_from_json
+from tendonfmu.model.native import Instance, NativeError, image_from_json
 
 INDEX_FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
 SCHEMA = json.loads((files("tendonfmu") / "schema" / "finger.schema.json").read_text(encoding="utf-8"))
@@ -239,7 +239,7 @@ def test_absent_friction_is_not_estimated(tmp_path: Path) -> None:
 def test_numbers_of_extensions_are_those_of_the_runtime() -> None:
     """In order, with those that are left out."""
     description = with_everything() | {"extensions": extension_cases.ROWS}
-    known = {parameter.path: parameter.start for parameter in Finger.from_description(description).parameters()}
+    known = {parameter.path: parameter.start for parameter in Instance.from_description(description).parameters()}
     listed = {number.path: number.value for number in extension_numbers(description)}
     assert list(listed.items()) == [(path, value) for path, value in known.items() if path.startswith("extensions[")]
     assert {row["effect"] for row in extension_cases.ROWS} == set(MAGNITUDES)

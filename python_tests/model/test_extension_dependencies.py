@@ -17,7 +17,7 @@ from fmu_binary import FINGER
 from random_fingers import random_case
 from tendonfmu.fmu.model_variables import describe_model, read_table
 from tendonfmu.model.description import read_finger
-from tendonfmu.model.native import Finger
+from tendonfmu.model.native import Instance
 from tendonfmu.model.signals import NUMBERS
 
 SEEDS = range(12)
@@ -38,7 +38,7 @@ def test_nothing_undeclared_influences(seed: int, tmp_path: Path) -> None:
     allowed = pairs(declared(description, tmp_path))
     seen: Influence = set()
     for source in (1, 2, 3):
-        finger = Finger.from_description(description, source)
+        finger = Instance.from_description(description, source)
         begin = 0
         for k in (1, 50, 99):
             finger.run(rows_of(recording, begin, k))
@@ -70,7 +70,7 @@ def test_each_declared_number_influences(row: dict[str, Any], tmp_path: Path) ->
     wanted = {pair for pair in pairs(declared(description, tmp_path)) if pair[0] in NUMBERS}
     seen: Influence = set()
     for source in (1, 2, 3):
-        finger = Finger.from_description(description, source)
+        finger = Instance.from_description(description, source)
         seen |= slopes(finger, recording)
         finger.reset()
         finger.set_kinematics_source(source)

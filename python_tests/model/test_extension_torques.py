@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from extension_cases import ROWS, name_of
 from fmu_binary import FINGER
-from tendonfmu.model.native import Finger
+from tendonfmu.model.native import Instance
 
 Numbers = NDArray[np.float64]
 V_MIN = {"tendon": 0.002, "joint": 0.2}
@@ -96,12 +96,12 @@ def by_the_text(row: dict[str, Any], m: dict[str, Numbers]) -> Numbers:
 
 def modelled(rows: list[dict[str, Any]], m: dict[str, Numbers], parts: int = 1) -> Numbers:
     """[N, n] T of step 4, the recording in `parts` with a saved and restored state between them."""
-    finger, found = Finger.from_description(bare(rows), 3), []
+    finger, found = Instance.from_description(bare(rows), 3), []
     for part in np.array_split(np.arange(len(m["time"])), parts):
         outputs = finger.run({name: values[part] for name, values in m.items()})
         found.append(outputs["friction_torque"] - outputs["bias_torque"])
         state = finger.save_state()
-        finger = Finger.from_description(bare(rows), 3)
+        finger = Instance.from_description(bare(rows), 3)
         finger.restore_state(state)
     return np.concatenate(found)
 
@@ -126,7 +126,7 @@ def test_the_axes_of_links_weigh_gravity() -> None:
     row = {"effect": "gravity", "joint": 2, "sine": 0.02, "cosine": -0.03}
     for axis, w in (([0.0, 0.0, -2.0], -1.0), ([1.0, 0.0, 0.0], 0.0), ([0.0, 3.0, 3.0], np.sqrt(0.5))):
         links = {"links": [{"axis": [0.0, 0.0, 1.0]}, {"axis": axis}], "tip": [0.1, 0.0, 0.0]}
-        finger = Finger.from_description(bare([row]) | links, 3)
+        finger = Instance.from_description(bare([row]) | links, 3)
         outputs = finger.run(m)
         theta = w * m["joint_position"][:, 0] + m["joint_position"][:, 1]
         weight = 0.02 * np.sin(theta) - 0.03 * np.cos(theta)

@@ -20,7 +20,7 @@ from tendonfmu.fmu.fmpy_client import run_fmu
 from tendonfmu.fmu.model_variables import read_table
 from tendonfmu.fmu.packaging import build_fmu, package_file
 from tendonfmu.model.description import read_finger
-from tendonfmu.model.native import Finger, NativeError, image_from_json
+from tendonfmu.model.native import Instance, NativeError, image_from_json
 from tendonfmu.model.signals import PLACE
 from tendonfmu.recordings.recording import read_recording
 
@@ -88,8 +88,8 @@ def test_agrees_with_the_twin_and_changes_nothing_else(seed: int) -> None:
     description = with_links(plain, seed)
     if seed % 4 == 3:
         del description["contact"]["deviation"], description["contact"]["deviation_per_force"]
-    outputs = Finger.from_description(description, 2).run(recording)
-    without = Finger.from_description({k: v for k, v in description.items() if k not in ("links", "tip")}, 2)
+    outputs = Instance.from_description(description, 2).run(recording)
+    without = Instance.from_description({k: v for k, v in description.items() if k not in ("links", "tip")}, 2)
     bare = without.run(recording)
     assert set(outputs) - set(bare) == set(PLACE)
     assert all(np.array_equal(outputs[name], bare[name]) for name in bare)
@@ -134,7 +134,7 @@ def held(description: dict[str, Any], angle: Array, torque: Array) -> dict[str, 
         "tendon_force": np.array([np.full(4, 5.0), 5.0 + np.array(torque) / 0.01]),
         "joint_position": np.tile(angle, (2, 1)),
     }
-    return {name: values[1] for name, values in Finger.from_description(description, 2).run(recording).items()}
+    return {name: values[1] for name, values in Instance.from_description(description, 2).run(recording).items()}
 
 
 def test_a_force_at_the_tip_is_found_from_the_tendons() -> None:
@@ -185,7 +185,7 @@ def test_what_cannot_be_is_refused(change: dict[str, Any], said: str) -> None:
 
 def test_saved_states_hold_nothing_of_it() -> None:
     plain, recording = random_case(3, samples=120)
-    finger = Finger.from_description(with_links(plain, 3), 2)
+    finger = Instance.from_description(with_links(plain, 3), 2)
     halves = [{name: values[part] for name, values in recording.items()} for part in (slice(0, 60), slice(60, 120))]
     finger.run(halves[0])
     state = finger.save_state()
@@ -194,7 +194,7 @@ def test_saved_states_hold_nothing_of_it() -> None:
     again = finger.run(halves[1])
     assert all(np.array_equal(first[name], again[name]) for name in first)
     numbers = 6 * len(plain["joints"]) + 3  # the parameters in it, and no more
-    bare = Finger.from_description({k: v for k, v in with_links(plain, 3).items() if k not in ("links", "tip")})
+    bare = Instance.from_description({k: v for k, v in with_links(plain, 3).items() if k not in ("links", "tip")})
     assert len(state) == len(bare.save_state()) + 8 * numbers
 
 
@@ -221,7 +221,7 @@ def test_the_fmu_has_the_outputs_where_there_are_links(tmp_path: Path) -> None:
         assert validate_fmu(str(fmu)) == []
         out = run_fmu(fmu, recording)
         assert any(name.startswith("fingertip") or name == "contact_link" for name in out) == with_geometry
-        expected = Finger(read_finger(source).image).run({"time": recording.time, **recording.groups})
+        expected = Instance(read_finger(source).image).run({"time": recording.time, **recording.groups})
         assert expected["contact"].any()
         for name in PLACE if with_geometry else ():
             values = np.column_stack([out[each] for each in out if each.split("[")[0] == name])

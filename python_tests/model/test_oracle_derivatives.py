@@ -78,7 +78,7 @@ def test_the_core_has_the_oracles_derivatives() -> None:
         k = 20 + 5 * (seed - 500)
         source = 1 + seed % 3
         found, errors = oracle_derivatives.derivatives(description, inputs, source, k)
-        finger = native.Finger.from_description(description, source)
+        finger = native.Instance.from_description(description, source)
         finger.run({name: series[: k + 1] for name, series in inputs.items()})
         for name in oracle_derivatives.STEPS:
             for column, unit in enumerate(np.eye(inputs[name].shape[1])):

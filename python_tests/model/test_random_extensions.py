@@ -60,7 +60,7 @@ def oracle_run(seed: int) -> oracle.Result:
 
 
 def run_sse2(description: Description, recording: Recording, source: int) -> dict[str, Any]:
-    finger = product("model.native").Finger.from_description(description, source)
+    finger = product("model.native").Instance.from_description(description, source)
     try:
         finger.kernel = "sse2"
     except product("model.native").NativeError as refused:
@@ -105,7 +105,7 @@ def test_each_row_matters() -> None:
     for seed in FINGERS:
         description, recording = case(seed)
         rows = description["extensions"]
-        finger = product("model.native").Finger
+        finger = product("model.native").Instance
         whole = finger.from_description(description, source_of(seed)).run(recording)["compensated_torque"]
         for effect in {row["effect"] for row in rows}:
             others = description | {"extensions": [row for row in rows if row["effect"] != effect]}
@@ -135,13 +135,13 @@ def test_a_restored_state_gives_the_same_bits() -> None:
     native = product("model.native")
     for seed in FINGERS:
         description, recording = case(seed)
-        whole = native.Finger.from_description(description, source_of(seed)).run(recording, parts=True)
+        whole = native.Instance.from_description(description, source_of(seed)).run(recording, parts=True)
         at = 1 + (37 * seed) % (SAMPLES - 1)
         parts = [{name: series[part] for name, series in recording.items()} for part in (slice(at), slice(at, None))]
-        finger = native.Finger.from_description(description, source_of(seed))
+        finger = native.Instance.from_description(description, source_of(seed))
         finger.run(parts[0])
         state = finger.save_state()
-        other = native.Finger.from_description(description)
+        other = native.Instance.from_description(description)
         for fresh in (finger, other, other):
             fresh.restore_state(state)
             rest = fresh.run(parts[1], parts=True)
@@ -155,7 +155,7 @@ def test_kernels_give_the_same_bits() -> None:
         description, recording = case(seed)
         found = []
         for kernel in ("plain", "sse2", "avx2"):
-            finger = native.Finger.from_description(description, source_of(seed))
+            finger = native.Instance.from_description(description, source_of(seed))
             try:
                 finger.kernel = kernel
             except native.NativeError:  # not on this machine
@@ -173,10 +173,10 @@ def test_a_refused_sample_changes_nothing_that_effects_remember() -> None:
     for seed in FINGERS:
         description, recording = case(seed)
         source = source_of(seed)
-        whole = native.Finger.from_description(description, source).run(recording)
+        whole = native.Instance.from_description(description, source).run(recording)
         at = 1 + (53 * seed) % (SAMPLES - 1)
         parts = [{name: series[part] for name, series in recording.items()} for part in (slice(at), slice(at, None))]
-        finger = native.Finger.from_description(description, source)
+        finger = native.Instance.from_description(description, source)
         finger.run(parts[0])
         name = {1: "tendon_position", 2: "joint_position", 3: "joint_velocity"}[source]
         for broken in ("tendon_force", name):
@@ -198,7 +198,7 @@ def test_derivatives_are_those_of_the_oracle() -> None:
         k = 20 + seed % 7 * 10
         recording = {name: series[: k + 1] for name, series in inputs.items()}
         found, errors = oracle_derivatives.derivatives(description, recording, source, k)
-        finger = product("model.native").Finger.from_description(description, source)
+        finger = product("model.native").Instance.from_description(description, source)
         finger.run(recording)
         for name in oracle_derivatives.STEPS:
             for column, unit in enumerate(np.eye(inputs[name].shape[1])):

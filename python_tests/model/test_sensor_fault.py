@@ -286,7 +286,7 @@ def test_positions_are_needed_with_every_source() -> None:
     native = product("model.native")
     recording = {name: values for name, values in moving(5).items() if name != "tendon_position"}
     with pytest.raises(native.NativeError, match=r"tendon_position is missing: .* sensor_fault"):
-        native.Finger.from_description(pair(), 2).run(recording)
+        native.Instance.from_description(pair(), 2).run(recording)
 
 
 # --- random fingers whose sensors fail now and then
@@ -406,7 +406,7 @@ def test_a_saved_fault_goes_on() -> None:
     assert whole["sensor_fault"].any()
     for k in (30, 41, 60, 100, 125, 140, 200, 300):
         head, tail = ({name: values[part] for name, values in recording.items()} for part in (slice(k), slice(k, None)))
-        one, other = (native.Finger.from_description(description, 1) for _ in range(2))
+        one, other = (native.Instance.from_description(description, 1) for _ in range(2))
         one.run(head)
         other.restore_state(one.save_state())
         found = other.run(tail)
@@ -420,9 +420,9 @@ def test_the_derivative_is_that_of_the_rows_in_use() -> None:
     recording = changed(moving(12), "tendon_force", 0, slice(8, None), 0.0)
     expected = {6: [0.5 / ARM, -0.5 / ARM], 10: [0.0, -1.0 / ARM]}
     for samples, slopes in expected.items():
-        one = native.Finger.from_description(pair(), 1)
+        one = native.Instance.from_description(pair(), 1)
         one.run({name: values[:samples] for name, values in recording.items()})
-        again = native.Finger.from_description(pair(), 1)
+        again = native.Instance.from_description(pair(), 1)
         again.restore_state(one.save_state())
         for each in (one, again):
             found = [each.directional_derivative({"tendon_position": unit})["joint_angle"][0] for unit in np.eye(2)]

@@ -1,4 +1,4 @@
-"""docs/guide: ten short pages, each with a command that works and a picture; a reader can follow them word by word."""
+"""docs/guide: eleven short pages, each with a command that works and a picture; a reader can follow them."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
+from itertools import groupby
 from pathlib import Path
 
 import pytest
@@ -20,12 +22,13 @@ GUIDE = ROOT / "docs" / "guide"
 PAGES = sorted(path.stem for path in GUIDE.glob("*.md"))
 IN_ORDER = [
     *("your_finger", "your_recording", "calibrate", "fit", "diagnose", "change", "detect"),
-    *("in_your_loop", "in_your_simulator", "simulated_finger"),
+    *("in_your_loop", "in_your_simulator", "from_python", "simulated_finger"),
 ]
 MOST_WORDS = 900
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 START = re.compile(
-    r"# .+\n\n```sh\n(?:tendonfmu|python) (?:.*\n)+?```\n\n" r"!\[[^\]]{20,}\]\(\.\./(figures/\w+\.png)\)\n"
+    r"# .+\n\n```(?:sh\n(?:tendonfmu|python) |python\n)(?:.*\n)+?```\n\n"
+    r"!\[[^\]]{20,}\]\(\.\./(figures/\w+\.png)\)\n"
 )
 SAVED = {"your_finger": "two_joints.json", "simulated_finger": "softer.json"}  # what the page has the reader save
 CHECK_ONLY = ["-Wall", "-Wextra", "-Werror", "-fsyntax-only", f"-I{ROOT / 'runtime' / 'include'}"]
@@ -37,7 +40,7 @@ def text(name: str) -> str:
 
 
 def test_the_pages_are_those_of_a_day() -> None:
-    assert sorted(IN_ORDER) == PAGES and len(PAGES) <= 10
+    assert sorted(IN_ORDER) == PAGES and len(PAGES) <= 11
     index = (ROOT / "docs" / "README.md").read_text(encoding="utf-8")
     places = [index.index(f"(guide/{name}.md)") for name in IN_ORDER]
     assert places == sorted(places)
@@ -52,11 +55,18 @@ def test_a_page_is_short_and_begins_with_a_command_and_a_picture(name: str) -> N
     assert (ROOT / "docs" / start[1]).stat().st_size < 400_000
 
 
+def blocks(name: str) -> Iterator[tuple[str, str]]:
+    """Language and code of each block; blocks of Python one after another are one program."""
+    for language, several in groupby(BLOCK.findall(text(name)), key=lambda block: block[0]):
+        codes = [code for _, code in several]
+        yield from ((language, code) for code in (["".join(codes)] if language == "python" else codes))
+
+
 def follow(name: str, folder: Path) -> None:
     """Does what the page says, from its first line to its last."""
     (folder / "examples").symlink_to(ROOT / "examples")
     environment = os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
-    for language, code in BLOCK.findall(text(name)):
+    for language, code in blocks(name):
         if language == "json" and name in SAVED:
             (folder / SAVED[name]).write_text(code, encoding="utf-8")
         command = {"sh": ["sh", "-e", "-c", code], "python": [sys.executable, "-c", code]}.get(language)
@@ -66,9 +76,9 @@ def follow(name: str, folder: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["your_finger", "detect", "in_your_loop", "in_your_simulator", *FITS])
+@pytest.mark.parametrize("name", ["your_finger", "detect", "in_your_loop", "in_your_simulator", "from_python", *FITS])
 def test_a_reader_can_follow(name: str, tmp_path: Path) -> None:
-    if name in ("calibrate", "fit", "diagnose", "change"):
+    if name in ("calibrate", "fit", "diagnose", "change", "from_python"):
         pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not installed with its estimation")
     follow(name, tmp_path)
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
-from tendonfmu.errors import InputError
+from tendonfmu.errors import InputError, InputWarning
 from tendonfmu.files.tables import write_table
 from tendonfmu.recordings.recording import read_recording
 
@@ -141,14 +141,49 @@ def test_every_missing_column_is_named(tmp_path: Path) -> None:
             assert name in refusal(tmp_path / "less.csv")
 
 
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_other_columns_are_ignored_with_one_warning(tmp_path: Path, suffix: str) -> None:
+    """Also text, which is never read as a number."""
+    file = written(
+        tmp_path, "\n".join([f"{HEADER},motor_current[1],phase", *(f"{row},1.0,start" for row in ROWS)]) + "\n"
+    )
+    if suffix == ".parquet":
+        pd.read_csv(file).to_parquet(tmp_path / "rec.parquet")
+        file = tmp_path / "rec.parquet"
+    with pytest.warns(InputWarning) as found:
+        recording = read_recording(file)
+    assert len(found) == 1
+    assert str(found[0].message).startswith(f"{file}: ignored columns: 'motor_current[1]', 'phase'; a recording has ")
+    plain = read_recording(written(tmp_path, GOOD, "plain.csv"))
+    assert set(recording.arrays()) == set(plain.arrays())
+    assert all((values == plain.arrays()[name]).all() for name, values in recording.arrays().items())
+
+
 @pytest.mark.parametrize(
-    ("name", "cell"),
-    [("motor_current[1]", "1.0"), ("tendon_force[0]", "1.0"), ("phase", "start"), ("tendon_force", "2")],
+    ("name", "right"),
+    [
+        ("tendon_force_1", "tendon_force[1]"),
+        ("Tendon_Force[1]", "tendon_force[1]"),
+        ("tendon_force[01]", "tendon_force[1]"),
+        ("tendon_force[0]", "tendon_force[1], tendon_force[2], ..., with indices from 1"),
+        ("tendon_force", "tendon_force[1], tendon_force[2], ..., with indices from 1"),
+        ("tendonPosition(12)", "tendon_position[12]"),
+        ("joint velocity 3", "joint_velocity[3]"),
+        ("Time", "time"),
+        ("CONTACT", "contact"),
+    ],
 )
-def test_unknown_columns_are_named(tmp_path: Path, name: str, cell: str) -> None:
-    lines = [f"{HEADER},{name}", *(f"{row},{cell}" for row in ROWS)]
+def test_other_spellings_are_errors_with_the_right_name(tmp_path: Path, name: str, right: str) -> None:
+    lines = [f"{HEADER},{name}", *(f"{row},0" for row in ROWS)]
     line = refusal(written(tmp_path, "\n".join(lines) + "\n"))
-    assert name in line and "unknown column" in line and "expected" in line
+    assert f"column {name!r}; expected the name {right}; `tendonfmu convert table`" in line
+
+
+@pytest.mark.parametrize("name", ["time_of_day", "timestamp", "force[1]", "tendon_force[1].raw", "contacts", "t"])
+def test_what_is_not_ours_in_another_spelling_is_ignored(tmp_path: Path, name: str) -> None:
+    lines = [f"{HEADER},{name}", *(f"{row},0" for row in ROWS)]
+    with pytest.warns(InputWarning, match="ignored columns"):
+        read_recording(written(tmp_path, "\n".join(lines) + "\n"))
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])

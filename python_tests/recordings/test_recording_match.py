@@ -17,7 +17,7 @@ from command import Call
 from repository_paths import ROOT
 from tendonfmu.errors import InputError
 from tendonfmu.files.tables import write_table
-from tendonfmu.model.description import FingerDescription, read_finger
+from tendonfmu.model.description import Finger, read_finger
 from tendonfmu.recordings.match import UNFIT_FOR_SEARCH, admit, belongs, refuse_errors
 from tendonfmu.recordings.prepared import Held, prepare
 from tendonfmu.recordings.recording import Recording, read_recording
@@ -31,7 +31,7 @@ Numbers = NDArray[np.float64]
 
 
 @pytest.fixture(scope="module")
-def finger() -> FingerDescription:
+def finger() -> Finger:
     return read_finger(INDEX)
 
 
@@ -84,7 +84,7 @@ def test_sound_recordings_have_no_findings(description: Path, name: str) -> None
     assert belongs(read_finger(description), [recording, without_angles(recording)]) == []
 
 
-def test_rest_and_few_samples_have_no_findings(finger: FingerDescription, sound: Recording) -> None:
+def test_rest_and_few_samples_have_no_findings(finger: Finger, sound: Recording) -> None:
     """Noise alone, and too little of anything, says nothing of signs and units."""
     rng = np.random.default_rng(3)
     groups = {name: np.tile(values[:1], (len(sound), 1)) for name, values in sound.groups.items()}
@@ -93,7 +93,7 @@ def test_rest_and_few_samples_have_no_findings(finger: FingerDescription, sound:
     assert belongs(finger, [rest, part_of(sound, slice(0, 30)), part_of(sound, slice(0, 1))]) == []
 
 
-def test_slack_tendons_are_no_misfit(finger: FingerDescription, sound: Recording) -> None:
+def test_slack_tendons_are_no_misfit(finger: Finger, sound: Recording) -> None:
     """A slack tendon does not follow its joints."""
     force, position = (sound.groups[name].copy() for name in ("tendon_force", "tendon_position"))
     slack = (sound.time > 4.0) & (sound.time < 7.0)
@@ -153,7 +153,7 @@ SPOILT: dict[str, tuple[Spoil, dict[str, dict[str, float | str]]]] = {
 
 
 @pytest.mark.parametrize("name", SPOILT)
-def test_what_to_write_into_the_map(finger: FingerDescription, sound: Recording, name: str) -> None:
+def test_what_to_write_into_the_map(finger: Finger, sound: Recording, name: str) -> None:
     spoil, expected = SPOILT[name]
     findings = belongs(finger, [spoil(sound)])
     entries = {column: dict(entry) for finding in findings for column, entry in finding.entries.items()}
@@ -179,7 +179,7 @@ def test_units_without_any_redundancy() -> None:
     assert finding.kind == "sign" and "against the pull" in finding.line()
 
 
-def test_velocities(finger: FingerDescription, sound: Recording) -> None:
+def test_velocities(finger: Finger, sound: Recording) -> None:
     velocity = np.gradient(sound.groups["joint_position"], sound.time, axis=0)
     assert belongs(finger, [with_group(sound, "joint_velocity", velocity)]) == []
     spoilt = with_group(sound, "joint_velocity", velocity * at(4, 2, value=-180 / np.pi))
@@ -197,7 +197,7 @@ def test_a_recording_of_another_finger(sound: Recording) -> None:
     assert {other.kind for other in others} == {"columns"}
 
 
-def test_arms_of_another_finger(finger: FingerDescription, sound: Recording) -> None:
+def test_arms_of_another_finger(finger: Finger, sound: Recording) -> None:
     """What no map of columns mends is said without a guess."""
     mixed = sound.groups["tendon_position"] @ np.random.default_rng(1).standard_normal((8, 8))
     findings = belongs(finger, [with_group(sound, "tendon_position", mixed)])
@@ -207,7 +207,7 @@ def test_arms_of_another_finger(finger: FingerDescription, sound: Recording) -> 
         admit(finger, [with_group(sound, "tendon_position", mixed)], unfit=UNFIT_FOR_SEARCH)
 
 
-def test_a_search_of_causes_may_find_a_spring_that_stiffens(finger: FingerDescription, sound: Recording) -> None:
+def test_a_search_of_causes_may_find_a_spring_that_stiffens(finger: Finger, sound: Recording) -> None:
     """It is refused by a fit of the numbers that there are, and only warned of where the cause can be named."""
     force, stiffness = sound.groups["tendon_force"], finger.data["tendons"][0]["stiffness"]
     stretched = sound.groups["tendon_position"] + 20.0 * force**2 / force.max() / stiffness
@@ -220,7 +220,7 @@ def test_a_search_of_causes_may_find_a_spring_that_stiffens(finger: FingerDescri
 # --- clock and sensors ------------------------------------------------------------------------------------------------
 
 
-def test_clock(finger: FingerDescription, sound: Recording) -> None:
+def test_clock(finger: Finger, sound: Recording) -> None:
     rng = np.random.default_rng(1)
     lost = part_of(sound, rng.random(len(sound)) > 0.02)
     assert [finding.kind for finding in belongs(finger, [lost])] == ["lost"]
@@ -230,7 +230,7 @@ def test_clock(finger: FingerDescription, sound: Recording) -> None:
     assert [finding.kind for finding in belongs(finger, [uneven])] == ["jitter"]
 
 
-def test_saturated_force(finger: FingerDescription, sound: Recording) -> None:
+def test_saturated_force(finger: Finger, sound: Recording) -> None:
     force = sound.groups["tendon_force"].copy()
     limit = np.quantile(force[:, 4], 0.97)
     force[:, 4] = np.minimum(force[:, 4], limit)
@@ -240,7 +240,7 @@ def test_saturated_force(finger: FingerDescription, sound: Recording) -> None:
 
 
 @pytest.mark.parametrize("group", ["tendon_force", "tendon_position", "joint_position"])
-def test_held_sensor(finger: FingerDescription, sound: Recording, group: str) -> None:
+def test_held_sensor(finger: Finger, sound: Recording, group: str) -> None:
     for until, severity in ((9.0, "warning"), (1e9, "error")):
         values = sound.groups[group].copy()
         held = (sound.time > 3.0) & (sound.time < until)
@@ -249,7 +249,7 @@ def test_held_sensor(finger: FingerDescription, sound: Recording, group: str) ->
         assert [(each.severity, each.kind, each.columns) for each in findings] == [(severity, "held", (f"{group}[2]",))]
 
 
-def test_coarse_sensor(finger: FingerDescription, sound: Recording) -> None:
+def test_coarse_sensor(finger: Finger, sound: Recording) -> None:
     position = sound.groups["tendon_position"].copy()
     step = np.ptp(position[:, 7]) / 20
     position[:, 7] = np.round(position[:, 7] / step) * step
@@ -260,7 +260,7 @@ def test_coarse_sensor(finger: FingerDescription, sound: Recording) -> None:
     assert all(each.severity == "warning" for each in findings)
 
 
-def test_pushing_tendon_and_zero_of_a_sensor(finger: FingerDescription, sound: Recording) -> None:
+def test_pushing_tendon_and_zero_of_a_sensor(finger: Finger, sound: Recording) -> None:
     force = sound.groups["tendon_force"].copy()
     force[:, 2] -= force[:, 2].mean()
     [finding] = belongs(finger, [with_group(sound, "tendon_force", force)])
@@ -340,7 +340,7 @@ def test_a_stranger_is_refused_where_it_only_judges(call: Call, tmp_path: Path, 
     assert not (tmp_path / output).exists()
 
 
-def test_a_fit_says_itself_what_becomes_of_gaps_and_stuck_sensors(finger: FingerDescription, sound: Recording) -> None:
+def test_a_fit_says_itself_what_becomes_of_gaps_and_stuck_sensors(finger: Finger, sound: Recording) -> None:
     """Each of them once: `belongs` sees them, `admit` leaves them to `prepare`."""
     gap = part_of(sound, (sound.time < 8.0) | (sound.time > 9.5))
     position = sound.groups["joint_position"].copy()

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.model.native import Finger
+from tendonfmu.model.native import Instance
 from tendonfmu.recordings.recording import Recording
 from tendonfmu.recordings.signal_noise import joint_position_noise, joint_torque_noise, white_noise
 
@@ -107,7 +107,7 @@ def test_what_it_finds_is_a_description() -> None:
     made = recording(rng, 0.0, 1e-9, angle_noise=0.0, angle_step=1e-12)
     noise = joint_position_noise(DATA, made)
     assert (noise >= 1e-6).all()
-    finger = Finger.from_description(DATA | {"position_filter": {"noise": noise.tolist()}})
+    finger = Instance.from_description(DATA | {"position_filter": {"noise": noise.tolist()}})
     assert finger.get("position_filter.noise[2]") == noise[1]
     assert finger.get("position_filter.jerk_density") == 1.0
 
@@ -122,7 +122,7 @@ def test_with_it_the_velocity_is_quieter_than_that_of_the_low_pass() -> None:
         "low-pass": {},
         "filter": {"position_filter": {"noise": joint_position_noise(DATA, made).tolist(), "jerk_density": 1e3}},
     }.items():
-        speed = Finger.from_description(DATA | extra).run(made.arrays())["joint_speed"]
+        speed = Instance.from_description(DATA | extra).run(made.arrays())["joint_speed"]
         error[name] = np.sqrt(np.mean((speed - true)[250:] ** 2, axis=0))
     assert (error["filter"] < 0.65 * error["low-pass"]).all(), error
 

@@ -22,9 +22,9 @@ pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not insta
 
 import diagnosis_examples as examples
 from real_browser import Elements, figures_of, framed, measure, needs_nothing_else, visit
-from tendonfmu.diagnose.reported import reported_causes
-from tendonfmu.diagnose.result import Diagnosis, FoundPlace, ModelErrors, Where
-from tendonfmu.diagnose.size import size_of
+from tendonfmu.diagnosis.reported import reported_causes
+from tendonfmu.diagnosis.result import Diagnosis, FoundPlace, ModelErrors, Where
+from tendonfmu.diagnosis.size import size_of
 from tendonfmu.report.diagnosis_page import PAGE, diagnosis_page, write_diagnosis_page
 from tendonfmu.report.diagnosis_report import build_report, report_text
 from tendonfmu.report.diagnosis_text import (

@@ -173,7 +173,7 @@ def test_a_law_is_drawn_as_the_model_has_it() -> None:
     drawn = curve(sheet.panels[0], "fitted")
     velocity = drawn.x[np.abs(drawn.x) > 0.0201]
     n = len(velocity)
-    outputs = native.Finger.from_description(data, 3).run(
+    outputs = native.Instance.from_description(data, 3).run(
         {
             "time": np.arange(n) * 0.01,
             "tendon_force": np.full((n, 2), 5.0),

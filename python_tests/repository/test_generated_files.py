@@ -143,7 +143,7 @@ def test_the_compiled_runtime_has_the_numbers_of_the_table() -> None:
     }
     left_out = set()
     for description in (plain, full):
-        for parameter in native.Finger.from_description(description).parameters():
+        for parameter in native.Instance.from_description(description).parameters():
             path = "".join(part.partition("]")[2] if k else part for k, part in enumerate(parameter.path.split("[")))
             assert (parameter.minimum, parameter.maximum) == RANGES[path], path
             if path in DEFAULTS:

@@ -27,9 +27,10 @@ PACKAGES = (
     "fmu",
     "simulate",
     "detect",
-    "diagnose",
+    "diagnosis",
     "report",
     "calibrate",
+    "interface",
     "demo",
     "cli",
 )
@@ -92,9 +93,26 @@ def test_nobody_imports_a_package_s_inside() -> None:
     assert wrong == set()
 
 
+def public_names() -> set[tuple[str, str]]:
+    """(package, name) of what `tendonfmu` itself exports."""
+    stub = ast.parse((PACKAGE / "__init__.pyi").read_text(encoding="utf-8"))
+    return {
+        (str(node.module), alias.name)
+        for node in ast.walk(stub)
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+
+
+def test_no_public_name_is_that_of_a_package() -> None:
+    """The first import of a package would put it in the place of the name."""
+    assert {name for _, name in public_names()} & set(PACKAGES) == set()
+
+
 def test_packages_export_what_others_use_and_nothing_else() -> None:
+    public = public_names()
     for package in PACKAGES[:-1]:
-        others = {
+        others = {name for source, name in public if source == package} | {
             name
             for module in MODULES
             if package_of(module) != package

@@ -19,7 +19,7 @@ pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not insta
 from plant_rigs import needs_plant
 from random_rigs import random_rig
 from repository_paths import ROOT
-from tendonfmu.model.native import Finger
+from tendonfmu.model.native import Instance
 from tendonfmu.recordings.recording import read_recording
 from tendonfmu.simulate.rig import read_rig
 from tendonfmu.simulate.simulation import simulate
@@ -39,7 +39,7 @@ def left_over(description: dict[str, Any], recording: dict[str, Array]) -> Array
     """[n] rms of the compensated torque over rms of the joint torque."""
     finger = copy.deepcopy(description)
     finger["contact"] = {"threshold": [NEVER] * len(finger["joints"])}
-    outputs = Finger.from_description(finger).run(recording)
+    outputs = Instance.from_description(finger).run(recording)
     left, before = (np.mean(outputs[name] ** 2, axis=0) for name in ("compensated_torque", "joint_torque"))
     return np.asarray(np.sqrt(left / before))
 

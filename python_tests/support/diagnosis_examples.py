@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.diagnose.result import (
+from tendonfmu.diagnosis.result import (
     Cause,
     ChangedSize,
     DetectionGain,

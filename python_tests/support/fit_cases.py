@@ -69,7 +69,7 @@ def few_unknowns(path: str) -> str | None:
 
 def parameters_of(description: Description) -> tuple[list[str], Array]:
     """Paths and values of all parameters, in canonical order."""
-    found = native.Finger.from_description(description).parameters()
+    found = native.Instance.from_description(description).parameters()
     return [each.path for each in found], np.array([each.start for each in found])
 
 

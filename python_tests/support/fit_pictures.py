@@ -66,7 +66,7 @@ def wrong_start(data: dict[str, Any], seed: int = 1) -> dict[str, Any]:
 
 def made_up_unknowns(data: dict[str, Any]) -> list[MadeUp]:
     """One for every number that a fit of the finger estimates; coulomb moves static along."""
-    index = {parameter.path: k for k, parameter in enumerate(native.Finger.from_description(data).parameters())}
+    index = {parameter.path: k for k, parameter in enumerate(native.Instance.from_description(data).parameters())}
     found = []
     for number in unknowns(data):
         role = ROLES[number.key]
@@ -78,7 +78,7 @@ def made_up_unknowns(data: dict[str, Any]) -> list[MadeUp]:
 
 
 def internal_values(data: dict[str, Any], found: list[MadeUp]) -> Numbers:
-    values = {p.path: p.start for p in native.Finger.from_description(data).parameters()}
+    values = {p.path: p.start for p in native.Instance.from_description(data).parameters()}
     z = []
     for one in found:
         value = values[one.path]
@@ -151,7 +151,8 @@ def made_up_report(
 ) -> dict[str, Any]:
     """As "tendonfmu-fit-1" says, from the made-up numbers."""
     values, begun = (
-        {p.path: (p.start, p.unit) for p in native.Finger.from_description(each).parameters()} for each in (data, start)
+        {p.path: (p.start, p.unit) for p in native.Instance.from_description(each).parameters()}
+        for each in (data, start)
     )
     z = internal_values(data, found)
     relative = np.sqrt(np.diag(covariance)) / np.abs(z)

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from tendonfmu.diagnose.candidate_columns import CandidateColumns, Proposal, Shape
-from tendonfmu.diagnose.effects import Place, by_name
-from tendonfmu.diagnose.least_sizes import LeastSizes
-from tendonfmu.diagnose.series import Series
+from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal, Shape
+from tendonfmu.diagnosis.effects import Place, by_name
+from tendonfmu.diagnosis.least_sizes import LeastSizes
+from tendonfmu.diagnosis.series import Series
 from tendonfmu.statistics.block_grams import Grams
 from tendonfmu.statistics.folds import make_folds
 from tendonfmu.statistics.splines import bias_splines

@@ -61,7 +61,7 @@ def run_native(
     description: Mapping[str, Any], recording: Mapping[str, NDArray[Any]], kinematics_source: int
 ) -> Outputs:
     """The batch run of the C interface, through the one module that binds it."""
-    finger = product("model.native").Finger.from_description(description, kinematics_source)
+    finger = product("model.native").Instance.from_description(description, kinematics_source)
     outputs: Outputs = finger.run(recording, parts=True)
     return outputs
 
@@ -70,7 +70,7 @@ def run_plain_kernel(
     description: Mapping[str, Any], recording: Mapping[str, NDArray[Any]], kinematics_source: int
 ) -> Outputs:
     """The same on the kernel in plain C, which any machine can run."""
-    finger = product("model.native").Finger.from_description(description, kinematics_source)
+    finger = product("model.native").Instance.from_description(description, kinematics_source)
     finger.kernel = "plain"
     outputs: Outputs = finger.run(recording, parts=True)
     return outputs
@@ -81,13 +81,13 @@ def run_single_steps(
 ) -> Outputs:
     """One call of the C interface a sample, the state saved and restored into a fresh finger half way."""
     native = product("model.native")
-    finger = native.Finger.from_description(description, kinematics_source)
+    finger = native.Instance.from_description(description, kinematics_source)
     samples = len(recording["time"])
     rows = []
     for k in range(samples):
         if k == samples // 2 and k > 0:
             state = finger.save_state()
-            finger = native.Finger.from_description(description)
+            finger = native.Instance.from_description(description)
             finger.restore_state(state)
         rows.append(finger.run({name: np.asarray(array)[k : k + 1] for name, array in recording.items()}, parts=True))
     return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from tendonfmu.diagnose.series import Series
+from tendonfmu.diagnosis.series import Series
 from tendonfmu.statistics.splines import basis, bias_splines, without
 
 Numbers = NDArray[np.float64]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.files.tables import write_table
 from tendonfmu.model import native
-from tendonfmu.model.description import FingerDescription
+from tendonfmu.model.description import Finger
 from tendonfmu.recordings.recording import Recording
 
 Array = NDArray[np.float64]
@@ -109,9 +109,9 @@ def described(**joint: Any) -> dict[str, Any]:
     }
 
 
-def finger(data: Mapping[str, Any] | None = None) -> FingerDescription:
+def finger(data: Mapping[str, Any] | None = None) -> Finger:
     text = json.dumps(data or described()).encode()
-    return FingerDescription(Path("finger.json"), text, json.loads(text), native.image_from_json(text))
+    return Finger(Path("finger.json"), text, json.loads(text), native.image_from_json(text))
 
 
 def recording(columns: Columns, name: str = "now.parquet") -> Recording:

@@ -39,7 +39,7 @@ sys.path.insert(0, {here!r})
 import numpy as np
 from dataclasses import replace
 import diagnosis_examples as examples
-from tendonfmu.diagnose import diagnosis
+from tendonfmu.diagnosis import diagnosis
 from tendonfmu.report import diagnosis_files
 from tendonfmu.report import diagnosis_page
 from tendonfmu.tasks.interruption import worker_threads

@@ -28,11 +28,11 @@ from tendonfmu.calibrate.parts import stretches_for_diagnosis
 from tendonfmu.calibrate.report import errors_of, record_next, recording_of, rms_of, structure_of, tuning_of
 from tendonfmu.detect import ContactTuning, TuneWarning, by_size, require_no_contact, score_recordings
 from tendonfmu.detect import score_report as detect_score_report
-from tendonfmu.diagnose import Diagnosis, FitSettings, diagnose
+from tendonfmu.diagnosis import Diagnosis, FitSettings, diagnose
 from tendonfmu.errors import InputError
-from tendonfmu.estimate import check_given_once, check_unseen, described, description_text
+from tendonfmu.estimate import check_given_once, check_unseen, described
 from tendonfmu.files import finite, write_text
-from tendonfmu.model import FingerDescription, read_finger
+from tendonfmu.model import Finger, description_text, read_finger
 from tendonfmu.recordings import (
     UNFIT_FOR_SEARCH,
     FitRecording,
@@ -188,7 +188,7 @@ def calibrate(
 class _Start:
     """The finger to begin with, and the file of an earlier calibration or None."""
 
-    finger: FingerDescription
+    finger: Finger
     previous: Path | None
 
 
@@ -220,7 +220,7 @@ class _Case:
     sentences: list[str]
 
     @property
-    def finger(self) -> FingerDescription:
+    def finger(self) -> Finger:
         return self.start.finger
 
     @property

@@ -20,9 +20,9 @@ from tendonfmu.calibrate.text import (
     torque_rows,
     verdict,
 )
-from tendonfmu.estimate import description_text
 from tendonfmu.files import check_output, check_output_folder, write_text
 from tendonfmu.fmu import build_fmu
+from tendonfmu.model import description_text
 from tendonfmu.report import render
 
 FINGER, FMU, PAGE, REPORT = "finger.json", "finger.fmu", "calibration.html", "calibration.json"

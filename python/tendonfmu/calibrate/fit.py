@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from tendonfmu.diagnose import (
+from tendonfmu.diagnosis import (
     Event,
     FitSettings,
     estimation_recordings,
@@ -38,7 +38,7 @@ from tendonfmu.estimate import (
     with_values,
 )
 from tendonfmu.files import read_json
-from tendonfmu.model import FingerDescription, read_finger
+from tendonfmu.model import Finger, read_finger
 from tendonfmu.recordings import FitRecording, Signals
 
 Data = Mapping[str, Any]
@@ -58,7 +58,7 @@ class CalibratedFit:
 
 
 def fit_all(
-    finger: FingerDescription,
+    finger: Finger,
     recordings: Sequence[FitRecording],
     signals: Signals,
     settings: FitSettings,
@@ -92,7 +92,7 @@ def fit_all(
     return CalibratedFit(online.data, events, tuple(learned.warnings))
 
 
-def earlier_finger(given: FingerDescription, previous: Path) -> FingerDescription:
+def earlier_finger(given: Finger, previous: Path) -> Finger:
     """Return the description of an earlier calibration; for a fit's report, the given one with its values.
 
     Raises InputError.
@@ -103,7 +103,7 @@ def earlier_finger(given: FingerDescription, previous: Path) -> FingerDescriptio
 
 
 def fit_again(
-    finger: FingerDescription,
+    finger: Finger,
     previous: Path,
     recordings: Sequence[FitRecording],
     *,

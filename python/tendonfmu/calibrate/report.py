@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.detect import ContactTuning, contact_at_rest, tune_report
-from tendonfmu.diagnose import Diagnosis, residual_of
+from tendonfmu.diagnosis import Diagnosis, residual_of
 from tendonfmu.estimate import residuals
 from tendonfmu.recordings import FitRecording, rms
 from tendonfmu.report import cards_of, names_of

@@ -51,7 +51,7 @@ def campaign(
     DIR/campaign.parquet. Each rate comes with its number of cases and its 95 %
     interval.
     """
-    from tendonfmu.diagnose import (
+    from tendonfmu.diagnosis import (
         EFFECT_HEADINGS,
         HEADINGS,
         How,

@@ -13,7 +13,7 @@ from tendonfmu.cli.standard_streams import reads
 from tendonfmu.errors import InputError
 
 if TYPE_CHECKING:
-    from tendonfmu.model import FingerDescription
+    from tendonfmu.model import Finger
 
 
 def register(app: typer.Typer) -> None:
@@ -72,7 +72,7 @@ def check(
         raise typer.Exit(NO)
 
 
-def _check_recordings(finger: FingerDescription, files: list[Path], progress: bool | None) -> list[dict[str, Any]]:
+def _check_recordings(finger: Finger, files: list[Path], progress: bool | None) -> list[dict[str, Any]]:
     """Print for each recording whether it belongs to the finger, and return the reports on them."""
     from tendonfmu.recordings import belongs, read_recording, recording_report
 

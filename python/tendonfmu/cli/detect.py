@@ -69,36 +69,38 @@ def tune(
     """
     import warnings
 
-    from tendonfmu.detect import ContactTuning, NotEnough, TuneWarning, tune_report
+    from tendonfmu.detect import NotEnough, TuneWarning, tune_report
     from tendonfmu.estimate import check_outputs
     from tendonfmu.files import write_text
+    from tendonfmu.interface import tune as tune_finger
     from tendonfmu.report import tune_files, tune_text
 
     check_outputs(output, report, figures, [finger, *recordings])
     with progress_bar(progress) as bar:
         task = bar.add_task("bounds", total=None)
-        tuning = ContactTuning(
-            finger,
-            false_alarms_per_hour=false_alarms_per_hour,
-            confidence=confidence,
-            method=method,
-            bias_time=bias_time,
-            release_time=release_time,
-            kinematics=kinematics,
-            strict=strict,
-            progress=lambda done, total: bar.update(task, completed=done, total=total),
-        )
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", TuneWarning)  # printed below, one line each
-                tuning.tune(list(recordings))
+                found = tune_finger(
+                    finger,
+                    recordings,
+                    false_alarms_per_hour=false_alarms_per_hour,
+                    confidence=confidence,
+                    method=method,
+                    bias_time=bias_time,
+                    release_time=release_time,
+                    kinematics=kinematics,
+                    strict=strict,
+                    progress=lambda done, total: bar.update(task, completed=done, total=total),
+                )
         except NotEnough as refused:
             fail(str(refused))
             raise typer.Exit(NO) from None
-    for sentence in tuning.warnings_:
+    tuning = found.tuning
+    for sentence in found.warnings:
         warn(sentence)
-    write_text(output, tuning.description_text())
-    text = tune_report.report_text(tune_report.build_report(tuning))
+    found.write(output)
+    text = tune_report.report_text(found.report)
     if report is not None:
         write_text(report, text)
     print_json(lambda: text)
@@ -133,14 +135,14 @@ def score(
     An alarm that begins neither in an event nor in the 100 ms after one is
     false. Every figure has its 95 % interval. Several recordings are pooled.
     """
-    from tendonfmu.detect import check_outputs, score_recordings, score_report
-    from tendonfmu.files import write_text
+    from tendonfmu.detect import check_outputs, score_report
+    from tendonfmu.interface import score as score_finger
     from tendonfmu.report import score_text
 
     check_outputs(output, figures, [model, *recordings])
     with progress_bar(progress) as bar:
         task = bar.add_task("runs", total=None)
-        scored = score_recordings(
+        result = score_finger(
             model,
             recordings,
             labels=labels,
@@ -149,13 +151,14 @@ def score(
             seed=seed,
             progress=lambda done, total: bar.update(task, completed=done, total=total),
         )
-    for sentence in scored.warnings:
+    scored = result.scored
+    for sentence in result.warnings:
         warn(sentence)
-    text = score_report.report_text(score_report.build_report(scored))
-    write_text(output, text)
+    result.write(output)
+    text = score_report.report_text(result.report)
     print_json(lambda: text)
     print_tables(score_text.tables(scored), score_text.lines(scored), left="")
-    say(f"{output}: {scored.summary.events} events, {scored.summary.false_alarms} false alarms")
+    say(f"{output}: {result.events} events, {result.false_alarms} false alarms")
     if figures is not None:
         from tendonfmu.report import score_files
 

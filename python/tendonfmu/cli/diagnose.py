@@ -74,9 +74,8 @@ def diagnose(
     page history.html, history.csv and history.png: a line per recording and
     cause, and how fast each cause grows.
     """
-    from tendonfmu.diagnose import diagnose as find
-    from tendonfmu.estimate import check_given_once
-    from tendonfmu.report import REPORT, check_folder, diagnosis_text, write_diagnosis
+    from tendonfmu.interface import diagnose as find
+    from tendonfmu.report import REPORT, check_folder, diagnosis_text
 
     if not 0.0 <= least_gain <= 0.5:  # typer's range lets NaN pass
         raise InputError(f"--least-gain {least_gain:g}: expected 0 to 0.5")
@@ -89,23 +88,22 @@ def diagnose(
     if scheduler is not None:
         raise InputError("--scheduler: given without --history; expected both or neither")
     check_folder(output, [finger, *recordings, *tests, *before])
-    check_given_once(recordings, tests, "a test")
-    check_given_once([*recordings, *tests], before, "the reference")
     with PhaseDisplay(progress) as display:
-        found = find(
+        diagnosed = find(
             finger,
             recordings,
-            tests,
+            test=tests,
+            reference=before or None,
             kinematics=kinematics,
             least_gain=least_gain,
             seed=seed,
             jobs=jobs,
-            reference=before or None,
             progress=display,
         )
         display.note("writing the files")
-        written = write_diagnosis(found, output)
-    for sentence in found.warnings:
+        written = diagnosed.write(output)
+    found = diagnosed.found
+    for sentence in diagnosed.warnings:
         warn(sentence)
     print_tables(diagnosis_text.tables(found), diagnosis_text.lines(found), left="may also be")
     say_files(written)
@@ -127,7 +125,7 @@ def _history(
     """Run `diagnose --history`."""
     from contextlib import nullcontext
 
-    from tendonfmu.diagnose import diagnose_history
+    from tendonfmu.diagnosis import diagnose_history
     from tendonfmu.estimate import check_given_once
     from tendonfmu.files import check_output_folder
     from tendonfmu.model import read_finger
@@ -164,7 +162,7 @@ def _history(
 
 def discriminate(context: typer.Context, finger: Path, folder: Path, output: Path, rate: float) -> None:
     """Write the motion that a diagnosis asked for: `tendonfmu excite FINGER --discriminate DIR -o MOTION`."""
-    from tendonfmu.diagnose import discriminating_motion
+    from tendonfmu.diagnosis import discriminating_motion
     from tendonfmu.excite import read_subject
     from tendonfmu.simulate import description_files, is_rig
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import sys
 import warnings
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import Annotated, NoReturn, TextIO
 
 import typer
 
@@ -51,8 +51,10 @@ from tendonfmu.cli.options import (
     Subject,
 )
 from tendonfmu.cli.standard_streams import check_table, name_of, reads, write_table
-from tendonfmu.errors import InputError, line_of
+from tendonfmu.errors import InputError, InputWarning, line_of
 from tendonfmu.tasks import ended_by_signals
+
+_show_as_python = warnings.showwarning
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -71,6 +73,8 @@ def main() -> None:
     A refusal is one line on standard error and exit status 2. An internal fault is one line and exit status 3.
     """
     PRINTED.quiet = PRINTED.json = PRINTED.table = False
+    warnings.showwarning = _show_warning
+    warnings.simplefilter("default", InputWarning)  # each text once
     with ended_by_signals() as ending:
         try:
             status = app(prog_name="tendonfmu", standalone_mode=False)
@@ -103,6 +107,21 @@ def main() -> None:
             with reader_may_leave(sys.stdout):
                 sys.stdout.flush()
             sys.exit(status if isinstance(status, int) else 0)
+
+
+def _show_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """Show a warning about the input as a line, and any other as Python does."""
+    if issubclass(category, InputWarning):
+        warn(" ".join(str(message).split()))
+    else:
+        _show_as_python(message, category, filename, lineno, file, line)
 
 
 def _refuse(reason: str) -> NoReturn:
@@ -155,12 +174,10 @@ def build(
 
     Needs no compiler. The same input gives the same bytes.
     """
-    from tendonfmu.files import check_output
-    from tendonfmu.fmu import build_fmu, fmu_report
-    from tendonfmu.simulate import build_plant_fmu, is_rig, read_rig
+    from tendonfmu.fmu import fmu_report
+    from tendonfmu.interface import build as build_fmu
 
-    check_output(output, *(read_rig(file).files if is_rig(file) else [file]))
-    (build_plant_fmu if is_rig(file) else build_fmu)(file, output, binaries=binaries)
+    build_fmu(file, output, binaries=binaries)
     say(f"{output}: {output.stat().st_size / 1024:.0f} KiB")
     print_json(lambda: fmu_report(file, output))
 
@@ -374,50 +391,52 @@ def fit(
     tendons[*].edge_friction[2]*.viscous; * stands for anything. Ctrl-C saves
     the best estimate so far in FITTED.unfinished.json.
     """
-    from tendonfmu.estimate import FitWarning, FrictionFit, check_outputs, fit_report, write_unfinished
+    from tendonfmu.estimate import FitWarning, check_outputs, fit_report, write_unfinished
     from tendonfmu.files import write_text
+    from tendonfmu.interface import FitInterrupted
+    from tendonfmu.interface import fit as fit_finger
     from tendonfmu.report import fit_text
 
     inputs = [finger, *recordings, *(compare or []), *(each for each in (previous, resume) if each is not None)]
     check_outputs(output, report, figures, inputs)
     with progress_bar(progress) as bar:
-        fitting = FrictionFit(
-            finger,
-            method,
-            kinematics=kinematics,
-            holdout=holdout,
-            holdout_block=holdout_block,
-            sides="given" if asymmetric is None else "asymmetric" if asymmetric else "symmetric",
-            only=only or [],
-            fix=fix or [],
-            share=share or [],
-            prior=prior,
-            scale=scale or [],
-            previous=previous,
-            change=change,
-            effective_samples=effective_samples,
-            max_passes=passes,
-            tolerance=tolerance,
-            parameter_drift=drift,
-            uncertainty=uncertainty,
-            start=resume,
-            progress=fit_bar(bar),
-        )
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", FitWarning)  # printed below, one line each
-                fitting.fit(recordings, compare=compare or [])
-        except KeyboardInterrupt:
-            if fitting.unfinished_ is None:
-                raise
+                found = fit_finger(
+                    finger,
+                    recordings,
+                    method=method,
+                    compare=compare or [],
+                    holdout=holdout,
+                    holdout_block=holdout_block,
+                    kinematics=kinematics,
+                    only=only or [],
+                    fix=fix or [],
+                    share=share or [],
+                    asymmetric=asymmetric,
+                    prior=prior,
+                    scale=scale or [],
+                    previous=previous,
+                    change=change,
+                    effective_samples=effective_samples,
+                    passes=passes,
+                    tolerance=tolerance,
+                    drift=drift,
+                    uncertainty=uncertainty,
+                    resume=resume,
+                    progress=fit_bar(bar),
+                )
+        except FitInterrupted as stopped:
             bar.stop()
-            left = write_unfinished(output, fitting.unfinished_)
+            left = write_unfinished(output, stopped.unfinished)
             fail(f"interrupted; the best estimate so far is in {left}; continue with --resume {left}")
             sys.exit(INTERRUPTED)
-    for sentence in fitting.warnings_:
+    fitting = found.estimator
+    for sentence in found.warnings:
         warn(sentence)
-    write_text(output, fitting.description_text())
-    text = fit_report.report_text(fitting.report_)
+    found.write(output)
+    text = fit_report.report_text(found.report)
     if report is not None:
         write_text(report, text)
     print_json(lambda: text)

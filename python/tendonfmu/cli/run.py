@@ -34,7 +34,8 @@ def run(
     quiet: Quiet = False,
 ) -> None:
     """Run the model over a recording and write all outputs, one row per sample at the time of that sample."""
-    from tendonfmu.fmu import check_model, finger_of, run_model, summary
+    from tendonfmu.fmu import check_model, finger_of
+    from tendonfmu.interface import run as run_finger
     from tendonfmu.recordings import read_recording
     from tendonfmu.report import check_page, run_report, write_run_page
 
@@ -47,12 +48,13 @@ def run(
     samples = read_recording(recording)
     with progress_bar(progress) as bar:
         task = bar.add_task("samples", total=len(samples))
-        table = run_model(
-            model, samples, kinematics_source=kinematics, progress=lambda done: bar.update(task, completed=done)
+        found = run_finger(
+            model, samples, kinematics=kinematics, progress=lambda done: bar.update(task, completed=done)
         )
+    table = found.columns()
     write_table(output, table)
     numbers = run_report(model, recording, table, finger_of(model), kinematics=kinematics, output=name_of(output))
-    say(f"{name_of(output)}: {summary(table)}")
+    say(f"{name_of(output)}: {found.summary}")
     if report is not None:
         say(f"{write_run_page(report, numbers, table, samples.contact)}: the run, to be read in a browser")
     print_json(lambda: numbers)

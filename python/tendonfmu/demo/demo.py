@@ -29,7 +29,7 @@ from tendonfmu.tasks import PhaseState
 
 if TYPE_CHECKING:
     from tendonfmu.calibrate import Calibration
-    from tendonfmu.diagnose import Diagnosis
+    from tendonfmu.diagnosis import Diagnosis
     from tendonfmu.estimate import FitProgress, FrictionFit
 
 TWO_JOINTS, TRAINING, UNSEEN = "two_joints.json", "two_joints_training.parquet", "two_joints_unseen.parquet"

@@ -14,7 +14,7 @@ from tendonfmu.demo.demo import CALIBRATION, FIT, TRAINING, TWO_JOINTS, UNSEEN, 
 from tendonfmu.demo.figures import story_sheets
 from tendonfmu.demo.run import FLEXION, FREE, FREE_X4, MINUTES, PUSHES
 from tendonfmu.demo.text import Table, alarms, chapter_tables, detection_sentence, fit_sentence
-from tendonfmu.diagnose import Diagnosis
+from tendonfmu.diagnosis import Diagnosis
 from tendonfmu.files import whole_file
 from tendonfmu.report import (
     Tile,

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from tendonfmu.detect import DetectionScore, score_detection
 from tendonfmu.files import write_table
 from tendonfmu.fmu import build_fmu, run_fmu
-from tendonfmu.model import NUMBERS, Finger, FingerDescription, read_finger
+from tendonfmu.model import NUMBERS, Finger, Instance, read_finger
 from tendonfmu.recordings import Recording, read_recording
 from tendonfmu.report import CompensationFigure, StoryFigure, compensation_figure
 
@@ -89,7 +89,7 @@ class IndexFinger:
         self.files[self.folder / FMU] = "the calibrated index finger's FMU"
         self._run((PUSHES,), progress)
         recording = self._recordings[PUSHES]
-        contact = Finger(before.image).run(recording.arrays())["contact"]
+        contact = Instance(before.image).run(recording.arrays())["contact"]
         self.as_given = score_detection(recording.time, _label(recording), contact)
 
     def free_motion(self, progress: Callable[[int, int], None]) -> None:
@@ -124,7 +124,7 @@ def _advance(progress: Callable[[int, int], None], before: int, total: int, done
 
 
 def _draw(
-    description: FingerDescription,
+    description: Finger,
     results: Mapping[str, RecordingResult],
     recordings: Mapping[str, Recording],
     outputs: Mapping[str, Outputs],
@@ -144,7 +144,7 @@ def _draw(
 
 
 def _curves(
-    description: FingerDescription, recording: Recording, outputs: Outputs, title: str, joints: Sequence[int]
+    description: Finger, recording: Recording, outputs: Outputs, title: str, joints: Sequence[int]
 ) -> CompensationFigure:
     measured: dict[str, NDArray[Any]] = recording.arrays()
     if recording.contact is not None:
@@ -168,7 +168,7 @@ def _label(recording: Recording) -> NDArray[np.bool_]:
     return np.zeros(len(recording), bool) if recording.contact is None else recording.contact
 
 
-def _result(description: FingerDescription, name: str, recording: Recording, outputs: Outputs) -> RecordingResult:
+def _result(description: Finger, name: str, recording: Recording, outputs: Outputs) -> RecordingResult:
     torque, left = _rows(outputs, "joint_torque"), _rows(outputs, "compensated_torque")
     label = _label(recording)
     external = recording.groups.get("external_torque", np.zeros_like(torque))

@@ -272,7 +272,7 @@ def _runs(
     data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int, rule: Mapping[str, Any]
 ) -> list[tuple[FreePart, dict[str, NDArray[Any]]]]:
     contact = {**data["contact"], "rest": dict(rule)}
-    finger = native.Finger.from_description(json.dumps({**data, "contact": contact}), kinematics)
+    finger = native.Instance.from_description(json.dumps({**data, "contact": contact}), kinematics)
     begin, found = finger.save_state(), []
     for part in parts:
         finger.restore_state(begin)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.detect.counting import sample_seconds
 from tendonfmu.errors import InputError
-from tendonfmu.model import FingerDescription, native, number_of
+from tendonfmu.model import Finger, native, number_of
 from tendonfmu.recordings import Held, Recording, prepare
 
 Numbers = NDArray[np.float64]
@@ -35,7 +35,7 @@ class FreePart:
     source
         File of the recording.
     arrays
-        Inputs of `native.Finger.run`.
+        Inputs of `native.Instance.run`.
     mean_force
         [N] mean tendon force (N).
     counted
@@ -101,7 +101,7 @@ class Clock:
 # --- recordings -------------------------------------------------------------------------------------------------------
 
 
-def free_parts(finger: FingerDescription, recording: Recording, kinematics: int) -> tuple[list[FreePart], list[str]]:
+def free_parts(finger: Finger, recording: Recording, kinematics: int) -> tuple[list[FreePart], list[str]]:
     """Divide a recording of free motion into parts without gaps.
 
     Parameters
@@ -186,7 +186,7 @@ def _smoothed(values: Numbers, time: Numbers) -> Numbers:
     return np.asarray((total[begin + width] - total[begin]) / width)
 
 
-def _refuse_stillness(finger: FingerDescription, recording: Recording, speed: Numbers) -> None:
+def _refuse_stillness(finger: Finger, recording: Recording, speed: Numbers) -> None:
     least = number_of(finger.data, "velocity_threshold.joint")
     share = float(np.nanmean((np.abs(speed) > least).any(axis=1)))
     if share < STILL:
@@ -250,11 +250,11 @@ def _without_uncertainty(data: Mapping[str, Any]) -> dict[str, Any]:
     return {**data, "contact": {key: value for key, value in data["contact"].items() if key != "uncertainty"}}
 
 
-def _finger(data: Mapping[str, Any], kinematics: int) -> native.Finger:
-    return native.Finger(native.image_from_json(json.dumps(data)), kinematics)
+def _finger(data: Mapping[str, Any], kinematics: int) -> native.Instance:
+    return native.Instance(native.image_from_json(json.dumps(data)), kinematics)
 
 
-def _run(finger: native.Finger, part: FreePart) -> dict[str, NDArray[Any]]:
+def _run(finger: native.Instance, part: FreePart) -> dict[str, NDArray[Any]]:
     try:
         return finger.run(part.arrays)
     except native.NativeError as refused:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,8 +15,8 @@ from numpy.typing import NDArray
 
 from tendonfmu.detect.counting import DetectionScore, Signals, pooled, score_detection
 from tendonfmu.errors import InputError
-from tendonfmu.fmu import check_model, run_model
-from tendonfmu.model import DEFAULTS, RANGES, FingerDescription, inputs_used, native, read_finger, watches_motors
+from tendonfmu.fmu import check_model, outputs_of, run_fmu
+from tendonfmu.model import DEFAULTS, RANGES, Finger, FingerSource, inputs_used, native, read_finger, watches_motors
 from tendonfmu.recordings import Recording, model_alone
 
 Numbers = NDArray[np.float64]
@@ -39,7 +40,7 @@ class Subject:
     Attributes
     ----------
     path
-        File as given.
+        File as given, or the name of a finger in memory.
     finger
         Its description.
     packed
@@ -47,7 +48,7 @@ class Subject:
     """
 
     path: Path
-    finger: FingerDescription
+    finger: Finger
     packed: bool
 
 
@@ -62,7 +63,7 @@ class Track:
     label
         [N] label; False throughout if there is none.
     outputs
-        Outputs of `native.Finger.run`.
+        Outputs of `native.Instance.run`.
     residual
         [N, n] residual before the bias update, NaN where it is unknown (N·m).
     force
@@ -102,8 +103,12 @@ class Track:
         return score_detection(self.recording.time, self.label, self.alarm)
 
 
-def read_subject(model: Path) -> Subject:
-    """Read a description, or an FMU with the description it was made of. Raises InputError."""
+def read_subject(source: FingerSource) -> Subject:
+    """Read a finger, or an FMU with the description it was made of. Raises InputError."""
+    if not isinstance(source, str | os.PathLike):
+        finger = read_finger(source)
+        return Subject(finger.path, finger, packed=False)
+    model = source if isinstance(source, Path) else Path(source)
     check_model(model)
     if model.suffix.lower() == ".json":
         return Subject(model, read_finger(model), packed=False)
@@ -115,9 +120,7 @@ def read_subject(model: Path) -> Subject:
     except KeyError:
         raise InputError(f"{model}: lacks resources/finger.json; expected an FMU of `tendonfmu build`") from None
     try:
-        return Subject(
-            model, FingerDescription(model, text, json.loads(text), native.image_from_json(text)), packed=True
-        )
+        return Subject(model, Finger(model, text, json.loads(text), native.image_from_json(text)), packed=True)
     except ValueError as refused:
         raise InputError(f"{model}: resources/finger.json: {refused}") from None
 
@@ -145,12 +148,12 @@ def run_track(subject: Subject, recording: Recording, kinematics: int, force: st
     joints, tendons = len(data["joints"]), len(data["tendons"])
     recording.require(joints, tendons, inputs_used(kinematics, watches_motors(data)))
     if subject.packed:
-        outputs = _grouped(run_model(subject.path, recording, kinematics_source=kinematics))
+        outputs = outputs_of(run_fmu(subject.path, recording, kinematics_source=kinematics))
     else:
         outputs = _run(subject.finger.image, recording, kinematics)
     label = np.zeros(len(recording), dtype=bool) if recording.contact is None else recording.contact
     sensed = None if force is None else recording.others.get(force)
-    if "residual" in outputs:  # `native.Finger.run` gives it, with 0 at the first sample
+    if "residual" in outputs:  # `native.Instance.run` gives it, with 0 at the first sample
         residual = outputs["residual"].copy()
         residual[0] = np.nan
     else:
@@ -160,17 +163,9 @@ def run_track(subject: Subject, recording: Recording, kinematics: int, force: st
 
 def _run(image: bytes, recording: Recording, kinematics: int) -> dict[str, NDArray[Any]]:
     try:
-        return native.Finger(image, kinematics).run(recording.arrays())
+        return native.Instance(image, kinematics).run(recording.arrays())
     except native.NativeError as refused:
         raise InputError(f"{recording.path}: {refused}") from None
-
-
-def _grouped(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Join the columns name[1], name[2], ... to [N, n]; columns without an index stay as they are."""
-    groups: dict[str, list[NDArray[Any]]] = {}
-    for name, column in columns.items():
-        groups.setdefault(name.partition("[")[0], []).append(column)
-    return {name: each[0] if name in columns else np.column_stack(each) for name, each in groups.items()}
 
 
 def residual_of(

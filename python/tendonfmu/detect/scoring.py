@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -12,7 +13,8 @@ from tendonfmu.detect.summary import FACTORS, RocPoint, roc, summarise
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import check_given_once
 from tendonfmu.files import check_output, check_output_folder
-from tendonfmu.recordings import GROUP_PER, LABEL, Recording, gaps, read_recording
+from tendonfmu.model import FingerSource
+from tendonfmu.recordings import GROUP_PER, LABEL, Recording, RecordingSource, gaps, listed_sources, read_recording
 
 Progress = Callable[[int, int], None]
 
@@ -44,8 +46,8 @@ def check_outputs(output: Path, figures: Path | None, inputs: Sequence[Path]) ->
 
 
 def score_recordings(
-    model: Path,
-    recordings: Sequence[Path],
+    model: FingerSource,
+    recordings: RecordingSource | Sequence[RecordingSource],
     *,
     labels: str | None = None,
     force: str | None = None,
@@ -58,9 +60,9 @@ def score_recordings(
     Parameters
     ----------
     model
-        Finger description or FMU.
+        Finger, its description, the file of it, or an FMU.
     recordings
-        Labelled recordings, or recordings of free motion.
+        Labelled recordings, or recordings of free motion; DataFrames or files.
     labels
         Column of the label; None: `contact`, where there is one.
     force
@@ -82,10 +84,13 @@ def score_recordings(
     InputError
         A file, a column or an option does not allow a score.
     """
-    check_given_once(recordings, [])
+    sources = listed_sources(recordings)
+    check_given_once(sources, [])
     subject = read_subject(model)
     column = LABEL if labels is None else labels
-    read = [_read(path, column, force) for path in recordings]
+    read = [_read(source, column, force) for source in sources]
+    if not read:
+        raise InputError("no recording; expected at least one")
     warnings = [*_unlabelled(read, labels), *_without_force(read, force)]
     total = len(read) + (0 if subject.packed else len(FACTORS) * len(read))
     tracks: list[Track] = []
@@ -127,14 +132,15 @@ def _roc(subject: Subject, tracks: Sequence[Track], kinematics: int, progress: P
     return roc(score_at)
 
 
-def _read(path: Path, labels: str, force: str | None) -> Recording:
+def _read(source: RecordingSource, labels: str, force: str | None) -> Recording:
+    path = source if isinstance(source, str | os.PathLike) else getattr(source, "path", "DataFrame")
     for name in (labels, force):
         if name is not None and (name == "time" or name.partition("[")[0] in GROUP_PER):
             what = "a label, 0 or 1" if name == labels else "the sensed force in N"
             raise InputError(f"{path}: column {name}: is a signal of the finger; expected a column that holds {what}")
     if force is not None and force == labels:
         raise InputError(f"{path}: column {force}: both label and sensed force; expected two columns")
-    recording = read_recording(path, label=labels, others=() if force is None else (force,))
+    recording = read_recording(source, label=labels, others=() if force is None else (force,))
     if len(recording) < 2:
         raise InputError(f"{path}: one sample; expected at least two")
     return recording

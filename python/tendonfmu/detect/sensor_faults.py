@@ -82,7 +82,7 @@ def finds_a_fault(
     data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int, keys: Mapping[str, float]
 ) -> bool:
     """Tell whether the finger with these keys finds a fault in counted time."""
-    finger = native.Finger.from_description(json.dumps({**data, "sensor_fault": dict(keys)}), kinematics)
+    finger = native.Instance.from_description(json.dumps({**data, "sensor_fault": dict(keys)}), kinematics)
     begin = finger.save_state()
     for part in parts:
         finger.restore_state(begin)

@@ -11,13 +11,10 @@ Examples
 
 from __future__ import annotations
 
-import json
 import math
-import os
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -34,13 +31,11 @@ from tendonfmu.detect.noise import BiasNoise, Deviation, bias_noise, deviation, 
 from tendonfmu.detect.sensor_faults import SensorRule, learn_sensors
 from tendonfmu.detect.support import NotEnough, hours_by_pretension, supported
 from tendonfmu.errors import InputError
-from tendonfmu.estimate import ConstructorArguments, check_given_once, description_text, own_copy
-from tendonfmu.model import FingerDescription, native, read_finger
-from tendonfmu.recordings import Recording, admit, read_recording
+from tendonfmu.estimate import ConstructorArguments, check_given_once, own_copy
+from tendonfmu.model import FingerSource, description_text, finger_from_data, read_finger
+from tendonfmu.recordings import RecordingSource, admit, listed_sources, read_recording
 
 Numbers = NDArray[np.float64]
-Source = str | os.PathLike[str] | Recording
-Finger = str | os.PathLike[str] | Mapping[str, Any] | FingerDescription
 
 METHODS = ("innovation", "cusum", "threshold")
 INNOVATION_TIME = 0.05  # s, T
@@ -130,7 +125,7 @@ class ContactTuning(ConstructorArguments):
 
     def __init__(
         self,
-        finger: Finger,
+        finger: FingerSource,
         *,
         false_alarms_per_hour: float = 6.0,
         confidence: float = 0.9,
@@ -159,13 +154,13 @@ class ContactTuning(ConstructorArguments):
         self.evidence_time = evidence_time
         self.progress = progress
 
-    def tune(self, recordings: Source | Sequence[Source], *, checked: bool = False) -> ContactTuning:
+    def tune(self, recordings: RecordingSource | Sequence[RecordingSource], *, checked: bool = False) -> ContactTuning:
         """Tune on recordings of free motion.
 
         Parameters
         ----------
         recordings
-            Recordings, or their files.
+            Recordings, DataFrames or files.
         checked
             Whether the caller has compared the recordings with the finger and reported the findings.
 
@@ -183,8 +178,8 @@ class ContactTuning(ConstructorArguments):
         """
         begin = perf_counter()
         self._check_options()
-        self.start_ = _read(self.finger)
-        parts = self._parts(_listed(recordings), checked)
+        self.start_ = read_finger(self.finger)
+        parts = self._parts(listed_sources(recordings), checked)
         self.hours_ = sum(part.hours for part in parts)
         self.cells_ = cells_of(parts)
         self.forces_ = (float(self.cells_.force.min()), float(self.cells_.force.max()))
@@ -220,11 +215,11 @@ class ContactTuning(ConstructorArguments):
 
     # --- recordings ---------------------------------------------------------------------------------------------------
 
-    def _parts(self, sources: Sequence[Source], checked: bool) -> list[FreePart]:
+    def _parts(self, sources: Sequence[RecordingSource], checked: bool) -> list[FreePart]:
         check_given_once(sources, [])
         if not sources:
             raise InputError("no recording; expected at least one of free motion")
-        recordings = [each if isinstance(each, Recording) else read_recording(each) for each in sources]
+        recordings = [read_recording(each) for each in sources]
         parts: list[FreePart] = []
         self.warnings_: list[str] = [] if checked else admit(self.start_, recordings)
         for recording in recordings:
@@ -346,8 +341,7 @@ class ContactTuning(ConstructorArguments):
                 break
             raised *= _STEP
         self.level_raised_ = raised
-        text = description_text(data).encode()
-        self.description_ = FingerDescription(self.start_.path, text, data, native.image_from_json(text))
+        self.description_ = finger_from_data(data, self.start_.path)
 
     def _tuned(self) -> dict[str, Any]:
         """Return the description with everything that was learned."""
@@ -476,19 +470,3 @@ class ContactTuning(ConstructorArguments):
 
 def _rounded(values: Numbers) -> list[float]:
     return [float(f"{value:.{_DIGITS}g}") for value in values]
-
-
-def _read(finger: Finger) -> FingerDescription:
-    if isinstance(finger, FingerDescription):
-        return finger
-    if isinstance(finger, Mapping):
-        text = json.dumps(finger).encode()
-        try:
-            return FingerDescription(Path("finger"), text, finger, native.image_from_json(text))
-        except native.NativeError as refused:
-            raise InputError(f"finger: {refused}") from None
-    return read_finger(Path(finger))
-
-
-def _listed(sources: Source | Sequence[Source]) -> list[Source]:
-    return [sources] if isinstance(sources, Recording | str | os.PathLike) else list(sources)

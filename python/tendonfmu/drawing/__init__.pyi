@@ -1,3 +1,6 @@
+from .figure_grid import SeriesRow as SeriesRow
+from .figure_grid import series_figure as series_figure
+from .figure_grid import sheets_figure as sheets_figure
 from .finger_picture import EDGE_RED as EDGE_RED
 from .finger_picture import draw_finger as draw_finger
 from .interactive import dark_colours as dark_colours

@@ -88,6 +88,20 @@ def packed_plotly() -> Markup:
     return Markup(base64.b64encode(gzip.compress(get_plotlyjs().encode(), 6, mtime=0)).decode("ascii"))
 
 
+def plotly_figure(figure: Figure) -> Any:
+    """Return data and layout as a `plotly.graph_objects.Figure` with the look of the pages.
+
+    Parameters
+    ----------
+    figure
+        `data` and `layout`.
+    """
+    from plotly.graph_objects import Figure as PlotlyFigure
+
+    template = {"layout": _TEMPLATE["layout"] | {"paper_bgcolor": "#fff", "plot_bgcolor": "#fff", "showlegend": True}}
+    return PlotlyFigure(data=figure["data"], layout=figure["layout"] | {"template": template})
+
+
 def dark_colours() -> Markup:
     """Return CSS rules that replace the colours of the light page by those of the dark page."""
     rules = []

@@ -15,7 +15,6 @@ from .evaluation import residuals as residuals
 from .files import check_given_once as check_given_once
 from .files import check_outputs as check_outputs
 from .files import check_unseen as check_unseen
-from .files import description_text as description_text
 from .files import with_uncertainty as with_uncertainty
 from .files import with_values as with_values
 from .files import write_unfinished as write_unfinished

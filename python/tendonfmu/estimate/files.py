@@ -16,14 +16,13 @@ from numpy.typing import NDArray
 from tendonfmu.errors import InputError, InternalError
 from tendonfmu.estimate.structure import Structure, own_copy, set_number
 from tendonfmu.files import check_output, check_output_folder, read_json, write_text
-from tendonfmu.model import FingerDescription, native
+from tendonfmu.model import Finger, description_text, native
 from tendonfmu.recordings import Recording
 
 Numbers = NDArray[np.float64]
 
 UNFINISHED = "tendonfmu-fit-unfinished-1"
 DIGITS = 10  # of a fitted number: far finer than any standard error, and static friction stays above coulomb
-_WIDTH = 160  # longest line of JSON that is not broken: a law with all digits fits
 
 
 def check_outputs(output: Path, report: Path | None, figures: Path | None, inputs: Sequence[Path]) -> None:
@@ -136,7 +135,7 @@ def _measured(recording: Recording) -> Numbers:
 # --- descriptions -----------------------------------------------------------------------------------------------------
 
 
-def with_values(structure: Structure, values: Numbers) -> FingerDescription:
+def with_values(structure: Structure, values: Numbers) -> Finger:
     """Replace the estimated numbers in the description of the start.
 
     Parameters
@@ -160,14 +159,12 @@ def with_values(structure: Structure, values: Numbers) -> FingerDescription:
         data["sensor_fault"] = dict(structure.sensor_fault)
     text = description_text(data).encode()
     try:
-        return FingerDescription(structure.start.path, text, data, native.image_from_json(text))
+        return Finger(structure.start.path, text, data, native.image_from_json(text))
     except native.NativeError as refused:  # not the user's fault: a fit keeps within every bound
         raise InternalError(f"{structure.start.path}: the fitted description is refused: {refused}") from refused
 
 
-def with_uncertainty(
-    finger: FingerDescription, directions: Sequence[Sequence[Sequence[float]]], level: float | None
-) -> FingerDescription:
+def with_uncertainty(finger: Finger, directions: Sequence[Sequence[Sequence[float]]], level: float | None) -> Finger:
     """Set `contact.uncertainty`, and `contact.uncertainty_level` if a level is given.
 
     Parameters
@@ -182,32 +179,7 @@ def with_uncertainty(
     contact = {**finger.data["contact"], "uncertainty": directions}
     data = {**finger.data, "contact": contact if level is None else {**contact, "uncertainty_level": level}}
     text = description_text(data).encode()
-    return FingerDescription(finger.path, text, data, native.image_from_json(text))
-
-
-def description_text(data: Mapping[str, Any]) -> str:
-    """Return a description as JSON with each law, or list of numbers, on one line.
-
-    Parameters
-    ----------
-    data
-        Parsed description.
-    """
-    return _laid_out(data, "") + "\n"
-
-
-def _laid_out(value: Any, indent: str) -> str:
-    flat = json.dumps(value, ensure_ascii=False)
-    inner = list(value.values()) if isinstance(value, dict) else value if isinstance(value, list) else []
-    leaf = not any(isinstance(each, dict | list) for each in inner)
-    if not inner or (leaf and len(indent) + len(flat) <= _WIDTH):
-        return flat
-    deeper = indent + "  "
-    if isinstance(value, dict):
-        parts = [f"{json.dumps(key, ensure_ascii=False)}: {_laid_out(each, deeper)}" for key, each in value.items()]
-        return "{\n" + ",\n".join(deeper + part for part in parts) + f"\n{indent}}}"
-    parts = [_laid_out(each, deeper) for each in value]
-    return "[\n" + ",\n".join(deeper + part for part in parts) + f"\n{indent}]"
+    return Finger(finger.path, text, data, native.image_from_json(text))
 
 
 # --- an interrupted fit -----------------------------------------------------------------------------------------------

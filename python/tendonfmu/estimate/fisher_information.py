@@ -184,14 +184,14 @@ def _sign(number: Unknown) -> int:
 class _Run:
     """A finger with some numbers changed, advanced over a motion part by part."""
 
-    def __init__(self, finger: native.Finger, steps: Sequence[tuple[str, float]]) -> None:
+    def __init__(self, finger: native.Instance, steps: Sequence[tuple[str, float]]) -> None:
         plain = {path: finger.get(path) for path, _ in steps}
         finger.set({path: plain[path] + step for path, step in steps})
         self._state = finger.save_state()
         finger.set(plain)
         self._bias = np.zeros((1, finger.joints))
 
-    def advance(self, finger: native.Finger, part: Mapping[str, Numbers]) -> tuple[Numbers, Numbers]:
+    def advance(self, finger: native.Instance, part: Mapping[str, Numbers]) -> tuple[Numbers, Numbers]:
         """Return [N, n] T of eq. (10) and the bias increments Δb over the part (N·m)."""
         finger.restore_state(self._state)
         found = finger.run(part)

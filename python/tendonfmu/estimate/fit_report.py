@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tendonfmu.estimate.evaluation import Evaluation, residual_entry
 from tendonfmu.estimate.verdicts import Fitted
 from tendonfmu.files import finite
-from tendonfmu.model import FingerDescription, native
+from tendonfmu.model import Finger, native
 from tendonfmu.recordings import consistency, whiteness
 from tendonfmu.statistics import effective_samples
 
@@ -67,7 +67,7 @@ class Outcome:
         Uncertainty of the modelled friction torque; None if not asked for.
     """
 
-    fitted: FingerDescription
+    fitted: Finger
     run: Run
     options: Mapping[str, Any]
     warnings: Sequence[str]
@@ -95,7 +95,7 @@ def build_report(found: Outcome) -> dict[str, Any]:
         Report "tendonfmu-fit-1" (schema/fit_report.schema.json).
     """
     run = found.run
-    units = {parameter.path: parameter.unit for parameter in native.Finger(found.fitted.image).parameters()}
+    units = {parameter.path: parameter.unit for parameter in native.Instance(found.fitted.image).parameters()}
     report = {
         "format": FORMAT,
         "finger": found.fitted.name,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import json
 import os
 import warnings
 from collections.abc import Callable, Mapping, Sequence
@@ -22,7 +21,6 @@ from tendonfmu.estimate.evaluation import Evaluation, evaluate, model_over, resi
 from tendonfmu.estimate.files import (
     Unfinished,
     check_given_once,
-    description_text,
     resumed_start,
     with_uncertainty,
     with_values,
@@ -34,13 +32,14 @@ from tendonfmu.estimate.previous_fit import CHANGE, PreviousFit, read_previous_f
 from tendonfmu.estimate.structure import Choice, build_structure
 from tendonfmu.estimate.uncertainty import parameter_uncertainty
 from tendonfmu.estimate.verdicts import Fitted, Knowledge, judge_numbers
-from tendonfmu.model import FingerDescription, native, read_finger
+from tendonfmu.model import FingerSource, description_text, read_finger
 from tendonfmu.recordings import (
     FitRecording,
     Held,
-    Recording,
+    RecordingSource,
     admit,
     bias_settings,
+    listed_sources,
     motion_of,
     prepare,
     read_recording,
@@ -50,8 +49,6 @@ from tendonfmu.recordings import (
 )
 
 Numbers = NDArray[np.float64]
-Finger = FingerDescription | Mapping[str, Any] | str | os.PathLike[str]
-Source = Recording | str | os.PathLike[str]
 
 METHODS = {"batch": (learn_batch, 60), "ekf": (learn_ekf, 2)}  # and the default of `max_passes`
 LEAST_NIS, MOST_NIS, MOST_LAG_ONE = 0.5, 2.0, 0.3  # values outside give a warning
@@ -115,7 +112,7 @@ class FrictionFit(ConstructorArguments):
 
     def __init__(
         self,
-        finger: Finger,
+        finger: FingerSource,
         method: str = "batch",
         *,
         kinematics: int = 1,
@@ -168,7 +165,11 @@ class FrictionFit(ConstructorArguments):
     # --- fit ----------------------------------------------------------------------------------------------------------
 
     def fit(
-        self, recordings: Source | Sequence[Source], compare: Source | Sequence[Source] = (), *, checked: bool = False
+        self,
+        recordings: RecordingSource | Sequence[RecordingSource],
+        compare: RecordingSource | Sequence[RecordingSource] = (),
+        *,
+        checked: bool = False,
     ) -> FrictionFit:
         """Estimate the numbers from recordings, each with its own bias path, and return the object itself.
 
@@ -178,7 +179,7 @@ class FrictionFit(ConstructorArguments):
         Parameters
         ----------
         recordings, compare
-            Recordings of free motion, or their files, to train on; and recordings to judge only.
+            Recordings of free motion, DataFrames or files, to train on; and recordings to judge only.
         checked
             Whether the caller has compared the recordings with the finger and reported the findings.
 
@@ -190,7 +191,7 @@ class FrictionFit(ConstructorArguments):
         self._check_options()
         self.finished_ = False
         self.unfinished_: Unfinished | None = None
-        finger = _read_finger(self.finger)
+        finger = read_finger(self.finger)
         previous = None if self.previous is None else read_previous_fit(Path(self.previous))
         if previous is not None:
             finger = with_previous_values(finger, previous)
@@ -198,8 +199,9 @@ class FrictionFit(ConstructorArguments):
         structure = build_structure(finger, Choice(self.sides, *map(_listed_text, chosen)))
         self.structure_, self.start_ = structure, structure.start
         held = Held(self.holdout, self.holdout_block, strict=True)
-        check_given_once(_listed(recordings), _listed(compare))
-        training, others = ([_read_recording(each) for each in _listed(group)] for group in (recordings, compare))
+        given, compared_with = listed_sources(recordings), listed_sources(compare)
+        check_given_once(given, compared_with)
+        training, others = ([read_recording(each) for each in group] for group in (given, compared_with))
         if not training:
             raise InputError("no recording; expected at least one")
         found = [] if checked else admit(self.start_, [*training, *others])
@@ -244,8 +246,8 @@ class FrictionFit(ConstructorArguments):
             if not sound:
                 raise InputError(f"{name} = {value!r}: expected {expectation}")
 
-    def _prepared(self, source: Source, held: Held) -> FitRecording:
-        return prepare(self.start_, _read_recording(source), self.kinematics, held)
+    def _prepared(self, source: RecordingSource, held: Held) -> FitRecording:
+        return prepare(self.start_, read_recording(source), self.kinematics, held)
 
     def _motion_warnings(self, of_recordings: bool) -> list[str]:
         self.coverage_: list[EffectCoverage] = coverage_of(self.start_.data, *motion_of(self.recordings_))
@@ -351,7 +353,7 @@ class FrictionFit(ConstructorArguments):
     def _tell_uncertainty(self, learned: Learned) -> dict[str, Any]:
         """Write `contact.uncertainty` into the fitted description and return its entry in the report."""
         found = parameter_uncertainty(self.structure_, learned, self.description_.data, self.training_)
-        level = (_read_finger(self.finger).data["contact"] or {}).get("uncertainty_level")
+        level = (read_finger(self.finger).data["contact"] or {}).get("uncertainty_level")
         self.description_ = with_uncertainty(self.description_, found.directions, level)
         return found.entry
 
@@ -368,7 +370,7 @@ class FrictionFit(ConstructorArguments):
 
     # --- what was learned, on other recordings ------------------------------------------------------------------------
 
-    def predict(self, recording: Source) -> Numbers:
+    def predict(self, recording: RecordingSource) -> Numbers:
         """Predict the torque of a recording, before the bias learns from the sample itself.
 
         Returns
@@ -380,14 +382,14 @@ class FrictionFit(ConstructorArguments):
         prepared, left = self._left(recording)
         return np.asarray(prepared.target - left)
 
-    def score(self, recording: Source) -> float:
+    def score(self, recording: RecordingSource) -> float:
         """Compute 1 − Σ residual² / Σ (torque − mean)² over all joints and samples without contact; 1 is perfect."""
         prepared, left = self._left(recording)
         rows = prepared.tracked & ~np.isnan(left).any(axis=1)
         torque = prepared.target[rows]
         return float(1 - np.sum(left[rows] ** 2) / np.sum((torque - torque.mean(axis=0)) ** 2))
 
-    def _left(self, source: Source) -> tuple[FitRecording, Numbers]:
+    def _left(self, source: RecordingSource) -> tuple[FitRecording, Numbers]:
         self._require_fitted()
         prepared = self._prepared(source, Held())
         data = self.description_.data
@@ -417,26 +419,6 @@ class FrictionFit(ConstructorArguments):
         """Return the fitted description as JSON, as `tendonfmu fit -o` writes it."""
         self._require_fitted()
         return description_text(self.description_.data)
-
-
-def _read_finger(finger: Finger) -> FingerDescription:
-    if isinstance(finger, FingerDescription):
-        return finger
-    if isinstance(finger, Mapping):
-        text = json.dumps(finger).encode()
-        try:
-            return FingerDescription(Path("finger"), text, finger, native.image_from_json(text))
-        except native.NativeError as refused:
-            raise InputError(f"finger: {refused}") from None
-    return read_finger(Path(finger))
-
-
-def _read_recording(source: Source) -> Recording:
-    return source if isinstance(source, Recording) else read_recording(source)
-
-
-def _listed(sources: Source | Sequence[Source]) -> list[Source]:
-    return [sources] if isinstance(sources, Recording | str | os.PathLike) else list(sources)
 
 
 def _listed_text(patterns: str | Sequence[str]) -> Sequence[str]:

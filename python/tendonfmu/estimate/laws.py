@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.estimate.picture import FitPicture
-from tendonfmu.model import Effect, Finger, Law
+from tendonfmu.model import Effect, Instance, Law
 
 Numbers = NDArray[np.float64]
 
@@ -83,7 +83,7 @@ class LawBands:
     """
 
     def __init__(self, picture: FitPicture) -> None:
-        parameters = Finger.from_description(json.dumps(picture.fitted)).parameters()
+        parameters = Instance.from_description(json.dumps(picture.fitted)).parameters()
         paths = [parameter.path for parameter in parameters]
         self._covariance = np.asarray(picture.covariance)
         self._column = {

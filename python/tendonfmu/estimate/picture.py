@@ -35,7 +35,7 @@ class FittedUnknown(Protocol):
         "coulomb", "drop" (static − coulomb), "rate" (1/stribeck_velocity), "viscous", "static" (static and coulomb
         move together) or "value".
     parameters
-        Indices of the parameters that it moves, in the order of `native.Finger.parameters()`.
+        Indices of the parameters that it moves, in the order of `native.Instance.parameters()`.
     """
 
     @property
@@ -65,7 +65,7 @@ class FitSeries:
     residual
         [N, n] τ − T_eff before the bias update (`Estimator.innovations(...)[0]`); NaN for the first sample (N·m).
     model_torque
-        [N, n] T of eq. (10) without the bias (`friction_torque` − `bias_torque` of `native.Finger.run`) (N·m).
+        [N, n] T of eq. (10) without the bias (`friction_torque` − `bias_torque` of `native.Instance.run`) (N·m).
     joint_angle, joint_speed
         [N, n] the kinematics in use (rad, rad/s).
     used

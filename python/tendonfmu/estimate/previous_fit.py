@@ -20,7 +20,7 @@ from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.fit_report import FORMAT
 from tendonfmu.estimate.structure import described, estimable_numbers, own_copy, set_number
 from tendonfmu.files import read_json
-from tendonfmu.model import FingerDescription, read_finger
+from tendonfmu.model import Finger, read_finger
 
 Numbers = NDArray[np.float64]
 
@@ -95,7 +95,7 @@ def _of_report(path: Path, report: Mapping[str, Any]) -> PreviousFit:
     return PreviousFit(path, values, list(names), covariance, share)
 
 
-def with_previous_values(finger: FingerDescription, previous: PreviousFit) -> FingerDescription:
+def with_previous_values(finger: Finger, previous: PreviousFit) -> Finger:
     """Return the finger with the previous values of all numbers that both have.
 
     Parameters

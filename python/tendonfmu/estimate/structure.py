@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.fisher_information import Unknown, unknowns
-from tendonfmu.model import LEFT_OUT, FingerDescription, effects, native, sides
+from tendonfmu.model import LEFT_OUT, Finger, effects, native, sides, steps_of
 
 MAGNITUDES = ("static", "coulomb", "stribeck_velocity", "viscous")
 FIXED = -1
@@ -46,7 +46,7 @@ class Structure:
         `sensor_fault` of the description, which `start` lacks.
     """
 
-    start: FingerDescription
+    start: Finger
     numbers: list[Unknown]
     group: NDArray[np.int32]
     scale: NDArray[np.float64]
@@ -77,7 +77,7 @@ class Choice:
     scale: Sequence[str] = ()
 
 
-def build_structure(finger: FingerDescription, choice: Choice) -> Structure:
+def build_structure(finger: Finger, choice: Choice) -> Structure:
     """Choose the numbers of a finger that a fit estimates.
 
     Parameters
@@ -100,7 +100,7 @@ def build_structure(finger: FingerDescription, choice: Choice) -> Structure:
     owners = _owners(chosen, data, choice.share)
     data = _with_equal_values(data, chosen, owners)
     start = described(finger, data)
-    paths = [parameter.path for parameter in native.Finger(start.image).parameters()]
+    paths = [parameter.path for parameter in native.Instance(start.image).parameters()]
     index = {path: k for k, path in enumerate(paths)}
     group = np.full(len(paths), FIXED, dtype=np.int32)
     for number, owner in zip(chosen, owners, strict=True):
@@ -131,12 +131,12 @@ def _model_alone(data: Mapping[str, Any]) -> Mapping[str, Any]:
     return {**data, "contact": {key: value for key, value in contact.items() if not key.startswith("uncertainty")}}
 
 
-def values_of(structure: Structure, finger: FingerDescription) -> list[Unknown]:
+def values_of(structure: Structure, finger: Finger) -> list[Unknown]:
     """Return the estimated numbers with their values in another description of the same structure."""
     return _numbered(finger, structure.numbers)
 
 
-def _numbered(finger: FingerDescription, numbers: Sequence[Unknown]) -> list[Unknown]:
+def _numbered(finger: Finger, numbers: Sequence[Unknown]) -> list[Unknown]:
     by_path = {effect.path: effect for effect in effects(finger.data)}
     return [
         replace(
@@ -165,7 +165,7 @@ def estimable_numbers(data: Mapping[str, Any]) -> list[Unknown]:
     return [*unknowns(data), *_initial_torques(data)]
 
 
-def described(finger: FingerDescription, data: Mapping[str, Any]) -> FingerDescription:
+def described(finger: Finger, data: Mapping[str, Any]) -> Finger:
     """Return the finger with another description, checked by the core.
 
     Parameters
@@ -184,7 +184,7 @@ def described(finger: FingerDescription, data: Mapping[str, Any]) -> FingerDescr
         return finger
     text = json.dumps(data).encode()
     try:
-        return FingerDescription(finger.path, text, data, native.image_from_json(text))
+        return Finger(finger.path, text, data, native.image_from_json(text))
     except native.NativeError as refused:
         raise InputError(f"{finger.path}: {refused}") from None
 
@@ -390,7 +390,7 @@ def set_number(data: Any, path: str, value: float) -> None:
     value
         New value in the unit of the description.
     """
-    *way, last = _steps(path)
+    *way, last = steps_of(path)
     for step in way:
         data = data[step]
     data[last] = value
@@ -426,10 +426,6 @@ def get_number(data: Any, path: str) -> Any:
     KeyError
         The description lacks a key of the path.
     """
-    for step in _steps(path):
+    for step in steps_of(path):
         data = data[step]
     return data
-
-
-def _steps(path: str) -> list[Any]:
-    return [int(index) - 1 if index else name for name, index in re.findall(r"([a-z_]+)|\[(\d+)\]", path)]

@@ -238,9 +238,9 @@ class Motion:
 def friction_parts(data: Mapping[str, Any], arrays: Mapping[str, Numbers]) -> Numbers:
     """Compute [K, n, m + 3] the parts of T due to each tendon, joint friction, load friction and cover (N·m).
 
-    `arrays` are those of `native.Finger.run`, with measured angles and speeds.
+    `arrays` are those of `native.Instance.run`, with measured angles and speeds.
     """
     joints, tendons = len(data["joints"]), len(data["tendons"])
     none = [[[0.0] * (tendons + 3)]] * joints
     asked = {**data, "contact": {"threshold": [_NEVER] * joints, "uncertainty": none}, "sensor_fault": None}
-    return np.asarray(native.Finger.from_description(asked, 3).run(arrays, parts=True)["friction_parts"])
+    return np.asarray(native.Instance.from_description(asked, 3).run(arrays, parts=True)["friction_parts"])

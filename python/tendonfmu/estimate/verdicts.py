@@ -13,7 +13,7 @@ from tendonfmu.estimate.coverage import EffectCoverage
 from tendonfmu.estimate.fisher_information import Unknown
 from tendonfmu.estimate.identifiability import LIMIT, PRIOR, Verdict, explain, unvisited
 from tendonfmu.estimate.structure import Structure, values_of
-from tendonfmu.model import FingerDescription
+from tendonfmu.model import Finger
 
 Numbers = NDArray[np.float64]
 
@@ -121,7 +121,7 @@ class Knowledge:
     z: Numbers
     covariance: Numbers
     information: Numbers
-    fitted: FingerDescription
+    fitted: Finger
     coverage: Sequence[EffectCoverage]
     noise: float
 
@@ -251,7 +251,7 @@ def _cause(verdict: Verdict, cover: EffectCoverage | None) -> str:
     return verdict.cause or "combination"
 
 
-def _advice(cause: str, verdict: Verdict, cover: EffectCoverage | None, finger: FingerDescription) -> str:
+def _advice(cause: str, verdict: Verdict, cover: EffectCoverage | None, finger: Finger) -> str:
     drive = finger.joint_names[cover.effect.drive - 1] if cover is not None else ""
     unit = "m/s" if cover is not None and cover.effect.tendon else "rad/s"
     if cover is not None and cause == "never_moves":

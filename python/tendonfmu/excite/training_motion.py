@@ -33,7 +33,7 @@ from tendonfmu.estimate import (
 from tendonfmu.excite.excitation import Excitation, Plan, plan_excitation
 from tendonfmu.excite.joint_coverage import JointCoverage, joint_coverage
 from tendonfmu.excite.tension_plan import Variation
-from tendonfmu.model import FingerDescription, balanced_forces, native, pretension_vector, read_finger
+from tendonfmu.model import Finger, balanced_forces, native, pretension_vector, read_finger
 
 RIG_FORMAT = "tendonfmu-rig-1"
 DEFAULT_PRETENSION = 10.0  # N
@@ -78,7 +78,7 @@ class Subject:
         Lowest and highest angle of each joint [n] (rad), if a rig gives them.
     """
 
-    finger: FingerDescription
+    finger: Finger
     limits: list[tuple[float, float]] | None
 
 
@@ -143,7 +143,7 @@ def read_subject(path: Path) -> Subject:
     else:
         text = json.dumps(finger).encode()
         try:
-            found = FingerDescription(path, text, finger, native.image_from_json(text))
+            found = Finger(path, text, finger, native.image_from_json(text))
         except native.NativeError as refused:
             raise InputError(f"{path}: finger: {refused}") from None
     return Subject(found, _limits(path, data, len(found.joint_names)))

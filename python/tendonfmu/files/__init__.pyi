@@ -1,4 +1,7 @@
 from .finite_numbers import finite as finite
+from .frames import frame_of as frame_of
+from .frames import is_frame as is_frame
+from .frames import table_of_frame as table_of_frame
 from .json_node import Node as Node
 from .json_node import Refusal as Refusal
 from .json_node import read_json as read_json

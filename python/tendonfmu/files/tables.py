@@ -9,7 +9,7 @@ import csv
 import math
 import os
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ FORMATS = (".csv", ".parquet")
 COMPRESSION = 12  # of Parquet, zstd; a minute of a quantised recording at 500 Hz takes about 1 MB and 1 s
 
 Table = dict[str, NDArray[np.float64]]
-CheckNames = Callable[[Path, list[str]], None]
+CheckNames = Callable[[Path, list[str]], Sequence[str] | None]
 
 # float() accepts more (1_000, nan, infinity), but such text is no measurement.
 _NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*")
@@ -38,7 +38,8 @@ def read_table(path: str | os.PathLike[str], check_names: CheckNames, flags: Col
     path
         A .csv or .parquet file.
     check_names
-        Called with the file and its column names before any number is read; raises InputError.
+        Called with the file and its column names before any number is read. It returns the columns to read, or None
+        for all, and raises InputError.
     flags
         Columns that may also contain true and false.
 
@@ -60,13 +61,31 @@ def read_table(path: str | os.PathLike[str], check_names: CheckNames, flags: Col
         table = (_read_csv if file.suffix.lower() == ".csv" else _read_parquet)(file, check_names, flags)
     except OSError as error:
         raise InputError(f"{file}: cannot be read ({error.strerror or error})") from None
+    check_finite(file, table)
+    return table
+
+
+def check_finite(file: Path, table: Mapping[str, NDArray[np.float64]]) -> None:
+    """Check that a table has rows and holds finite numbers.
+
+    Parameters
+    ----------
+    file
+        Name of the table in messages.
+    table
+        Columns [N].
+
+    Raises
+    ------
+    InputError
+        Column and row, and what was expected.
+    """
     if not len(next(iter(table.values()))):
         raise InputError(f"{file}: no samples; expected at least one row below the column names")
     for name, column in table.items():
         if not np.isfinite(column).all():
             row = int(np.flatnonzero(~np.isfinite(column))[0]) + 1
             raise InputError(f"{file}: column {name}, row {row}: {column[row - 1]:g}; expected a finite number")
-    return table
 
 
 def check_format(file: Path) -> None:
@@ -86,7 +105,8 @@ def check_format(file: Path) -> None:
         raise InputError(f"{file}: unknown format {file.suffix!r}; expected .csv or .parquet")
 
 
-def _check_duplicates(file: Path, names: list[str]) -> None:
+def check_duplicates(file: Path, names: list[str]) -> None:
+    """Raise InputError if a column occurs twice."""
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"{file}: column {name!r} occurs {names.count(name)} times; expected once")
@@ -102,9 +122,10 @@ def _read_parquet(file: Path, check_names: CheckNames, flags: Collection[str]) -
     try:
         with pq.ParquetFile(file) as parquet:
             names = parquet.schema_arrow.names
-            _check_duplicates(file, names)
-            check_names(file, names)
-            columns = parquet.read().columns
+            check_duplicates(file, names)
+            wanted = check_names(file, names)
+            names = names if wanted is None else list(wanted)
+            columns = parquet.read(columns=names).select(names).columns
     except pa.ArrowException as error:
         raise InputError(f"{file}: not a whole Parquet file ({str(error).splitlines()[0]})") from None
     return {name: _numbers(file, name, column, flags) for name, column in zip(names, columns, strict=True)}
@@ -130,17 +151,18 @@ def _read_csv(file: Path, check_names: CheckNames, flags: Collection[str]) -> Ta
     names = [name.strip() for name in next(csv.reader([header]), [])]
     if not any(names):
         raise InputError(f"{file}: empty file; expected a line of column names")
-    _check_duplicates(file, names)
-    check_names(file, names)
-    columns = _parse_fast(rows, len(names)) if rows else np.empty((0, len(names)))
+    check_duplicates(file, names)
+    wanted = check_names(file, names)
+    read = range(len(names)) if wanted is None else [names.index(name) for name in wanted]
+    columns = _parse_fast(rows, len(names), read) if rows else np.empty((0, len(read)))
     if columns is None:
-        columns = _parse_by_field(file, names, rows, flags, cut_off)
+        columns = _parse_by_field(file, names, read, rows, flags, cut_off)
     if cut_off:
         raise InputError(
             f"{file}: truncated last line, row {len(rows) + 1}: {cut_off!r}; expected {len(names)} numbers "
             f"and a line end; the {len(rows)} rows before it are good"
         )
-    return {name: columns[:, i] for i, name in enumerate(names)}
+    return {names[i]: columns[:, k] for k, i in enumerate(read)}
 
 
 def _lines(file: Path) -> tuple[str, list[str], str]:
@@ -159,18 +181,18 @@ def _lines(file: Path) -> tuple[str, list[str], str]:
     return header, [line for line in lines if line.strip()], cut_off.strip()
 
 
-def _parse_fast(rows: list[str], columns: int) -> NDArray[np.float64] | None:
-    """Return the numbers [rows, columns], or None if a field needs a closer look."""
+def _parse_fast(rows: list[str], columns: int, read: Sequence[int]) -> NDArray[np.float64] | None:
+    """Return the numbers [rows, columns to read], or None if a field needs a closer look."""
     if any(row.count(",") != columns - 1 for row in rows):
         return None
     try:
-        return np.loadtxt(rows, dtype=np.float64, delimiter=",", comments=None, ndmin=2)
+        return np.loadtxt(rows, dtype=np.float64, delimiter=",", comments=None, ndmin=2, usecols=read)
     except ValueError:
         return None
 
 
 def _parse_by_field(
-    file: Path, names: list[str], rows: Iterable[str], flags: Collection[str], cut_off: str
+    file: Path, names: list[str], read: Sequence[int], rows: Iterable[str], flags: Collection[str], cut_off: str
 ) -> NDArray[np.float64]:
     """Return the same, field by field, and refuse the first invalid field by name."""
     parsed = []
@@ -183,8 +205,8 @@ def _parse_by_field(
             )
         if len(fields) != len(names):
             raise InputError(f"{file}: row {row}: {len(fields)} fields; expected {len(names)}")
-        parsed.append([_parse_field(file, name, row, field, flags) for name, field in zip(names, fields, strict=True)])
-    return np.array(parsed, dtype=np.float64).reshape(len(parsed), len(names))
+        parsed.append([_parse_field(file, names[i], row, fields[i], flags) for i in read])
+    return np.array(parsed, dtype=np.float64).reshape(len(parsed), len(read))
 
 
 def _parse_field(file: Path, name: str, row: int, field: str, flags: Collection[str]) -> float:

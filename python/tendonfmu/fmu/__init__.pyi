@@ -18,6 +18,8 @@ from .packaging import model_identifier as model_identifier
 from .packaging import pack as pack
 from .packaging import package_file as package_file
 from .running import check_model as check_model
+from .running import columns_of as columns_of
 from .running import finger_of as finger_of
+from .running import outputs_of as outputs_of
 from .running import run_model as run_model
 from .running import summary as summary

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from tendonfmu.model import FingerDescription, count
+from tendonfmu.model import Finger, count
 
 
-def documentation_page(description: FingerDescription, model: Mapping[str, Any]) -> str:
+def documentation_page(description: Finger, model: Mapping[str, Any]) -> str:
     """Return the HTML page of a friction FMU. model: the context of the FMU's XML (modelDescription/README.md)."""
     return render_documentation("documentation.html.jinja", model, summary=count(description))
 

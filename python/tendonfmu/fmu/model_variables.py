@@ -10,7 +10,7 @@ from typing import Any
 
 from tendonfmu.model import (
     Dependencies,
-    FingerDescription,
+    Finger,
     dependencies,
     extension_rows,
     native,
@@ -56,12 +56,12 @@ def read_table(text: str) -> VariableTable:
     return VariableTable(data, patterns)
 
 
-def describe_model(description: FingerDescription, table: VariableTable) -> dict[str, Any]:
+def describe_model(description: Finger, table: VariableTable) -> dict[str, Any]:
     """Return the template's context, except what belongs to the package: identifier, GUID, version, sources.
 
     See modelDescription/README.md.
     """
-    finger = native.Finger(description.image)
+    finger = native.Instance(description.image)
     sizes = group_sizes(finger.joints, finger.tendons)
     has = {"links": finger.has_links, "rest": finger.watches_rest, "sensor_fault": finger.watches_sensors}
     groups = present_groups(table, {need for need, given in has.items() if given})

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from tendonfmu.errors import InputError, InternalError
 from tendonfmu.files import whole_file
 from tendonfmu.fmu.model_variables import VariableTable, describe_model, read_table
-from tendonfmu.model import FingerDescription, native, read_finger
+from tendonfmu.model import Finger, FingerSource, native, read_finger
 
 if TYPE_CHECKING:
     from importlib.abc import Traversable
@@ -73,14 +73,14 @@ RESERVED = frozenset(
 
 
 def build_fmu(
-    description_path: Path, output_path: Path, *, binaries: Path | None = None, illustrated: bool = True
+    finger: FingerSource, output_path: Path, *, binaries: Path | None = None, illustrated: bool = True
 ) -> Path:
     """Package the FMU of a finger description.
 
     Parameters
     ----------
-    description_path
-        The finger description.
+    finger
+        The finger, its description, or the file of it.
     output_path
         The FMU. It is written whole or not at all.
     binaries
@@ -98,8 +98,7 @@ def build_fmu(
     InputError
         The description is refused, binaries are missing, or the output cannot be written.
     """
-    description = read_finger(description_path)
-    archive = pack(members(description, binaries=binaries, illustrated=illustrated))
+    archive = pack(members(read_finger(finger), binaries=binaries, illustrated=illustrated))
     with whole_file(output_path) as file:
         file.write_bytes(archive)
     return output_path
@@ -145,9 +144,7 @@ def guid(resource: bytes, table: VariableTable) -> str:
     return native.image_guid(resource, variable_generator().salt(table.data))
 
 
-def members(
-    description: FingerDescription, *, binaries: Path | None = None, illustrated: bool = True
-) -> dict[str, bytes]:
+def members(description: Finger, *, binaries: Path | None = None, illustrated: bool = True) -> dict[str, bytes]:
     """Return all files of the FMU.
 
     Parameters
@@ -192,7 +189,7 @@ def members(
     return content
 
 
-def _for_readers(description: FingerDescription, context: Mapping[str, Any]) -> dict[str, bytes]:
+def _for_readers(description: Finger, context: Mapping[str, Any]) -> dict[str, bytes]:
     from tendonfmu.drawing import draw_finger
     from tendonfmu.fmu.documentation import documentation_page
     from tendonfmu.model import finger_drawing

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import tempfile
+import os
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,8 +14,24 @@ from numpy.typing import NDArray
 from tendonfmu.errors import InputError
 from tendonfmu.files import FORMATS
 from tendonfmu.fmu.fmpy_client import Progress, run_fmu
-from tendonfmu.model import FingerDescription, finger_from_text, read_finger
+from tendonfmu.model import (
+    FLAGS,
+    NUMBERS,
+    OPTIONAL_NUMBERS,
+    PLACE,
+    REST,
+    SENSORS,
+    Finger,
+    FingerSource,
+    finger_from_text,
+    inputs_used,
+    native,
+    read_finger,
+    watches_motors,
+)
 from tendonfmu.recordings import Recording
+
+Outputs = dict[str, NDArray[Any]]
 
 
 def check_model(model: Path) -> None:
@@ -37,7 +53,7 @@ def check_model(model: Path) -> None:
         raise InputError(f"{model}: no such file; expected FINGER.json or FINGER.fmu")
 
 
-def finger_of(model: Path) -> FingerDescription | None:
+def finger_of(model: Path) -> Finger | None:
     """Return the description of a model.
 
     Parameters
@@ -47,7 +63,7 @@ def finger_of(model: Path) -> FingerDescription | None:
 
     Returns
     -------
-    FingerDescription or None
+    Finger or None
         None for an FMU without a description.
 
     Raises
@@ -67,38 +83,78 @@ def finger_of(model: Path) -> FingerDescription | None:
     return finger_from_text(model, text)
 
 
-def summary(table: Mapping[str, NDArray[Any]]) -> str:
+def columns_of(outputs: Mapping[str, NDArray[Any]]) -> Outputs:
+    """Return outputs as columns of a table.
+
+    Parameters
+    ----------
+    outputs
+        Outputs by name, [N] or [N, k].
+
+    Returns
+    -------
+    dict of arrays
+        Columns [N], such as `joint_torque[2]`, in the same order.
+    """
+    columns: Outputs = {}
+    for name, values in outputs.items():
+        if values.ndim == 1:
+            columns[name] = values
+        else:
+            columns |= {f"{name}[{i + 1}]": values[:, i] for i in range(values.shape[1])}
+    return columns
+
+
+def outputs_of(columns: Mapping[str, NDArray[Any]]) -> Outputs:
+    """Join the columns name[1], name[2], ... to [N, k]; columns without an index stay as they are.
+
+    Parameters
+    ----------
+    columns
+        Columns [N] of a table, as `columns_of` makes them.
+
+    Returns
+    -------
+    dict of arrays
+        Outputs by name, [N] or [N, k].
+    """
+    groups: dict[str, list[NDArray[Any]]] = {}
+    for name, column in columns.items():
+        groups.setdefault(name.partition("[")[0], []).append(column)
+    return {name: each[0] if name in columns else np.column_stack(each) for name, each in groups.items()}
+
+
+def summary(outputs: Mapping[str, NDArray[Any]]) -> str:
     """Describe the outputs in a line whose figures reveal a wrong unit.
 
     Parameters
     ----------
-    table
-        Outputs by column, from `run_model`.
+    outputs
+        Outputs by name, from `run_model`.
 
     Returns
     -------
     str
         Number of samples, duration, range of the joint angles, and samples in contact.
     """
-    time = table["time"]
-    angles = np.concatenate([column for name, column in table.items() if name.startswith("joint_angle[")])
+    time, angles = outputs["time"], outputs["joint_angle"]
     return (
         f"{len(time)} samples in {time[-1] - time[0]:.6g} s, "
-        f"joint angles {angles.min():.3g} to {angles.max():.3g} rad, {int(table['contact'].sum())} samples in contact"
+        f"joint angles {angles.min():.3g} to {angles.max():.3g} rad, {int(outputs['contact'].sum())} samples in contact"
     )
 
 
 def run_model(
-    model: Path, recording: Recording, *, kinematics_source: int = 1, progress: Progress | None = None
-) -> dict[str, NDArray[Any]]:
-    """Run a description or an FMU over a recording.
+    model: FingerSource, recording: Recording, *, kinematics_source: int = 1, progress: Progress | None = None
+) -> Outputs:
+    """Run a finger or an FMU over a recording.
 
-    A description is packaged into a temporary FMU.
+    A finger runs in the C library, which gives the same bits as its FMU.
 
     Parameters
     ----------
     model
-        FINGER.json or FINGER.fmu.
+        A finger, its description, the file of it, or an FMU.
     recording
         Signals of the same finger.
     kinematics_source
@@ -109,19 +165,34 @@ def run_model(
     Returns
     -------
     dict of arrays
-        Outputs by column [N], `time` first. See `run_fmu`.
+        `time` [N], then the FMU's outputs by name, [N] or [N, k].
 
     Raises
     ------
     InputError
-        As `check_model` and `run_fmu`; or the description is refused.
+        The model or the recording is refused, or they do not fit.
     """
-    check_model(model)
-    if model.suffix.lower() != ".json":
-        return run_fmu(model, recording, kinematics_source=kinematics_source, progress=progress)
-    from tendonfmu.fmu.packaging import build_fmu
+    if isinstance(model, str | os.PathLike):
+        file = model if isinstance(model, Path) else Path(model)
+        check_model(file)
+        if file.suffix.lower() != ".json":
+            columns = run_fmu(file, recording, kinematics_source=kinematics_source, progress=progress)
+            return outputs_of(columns)
+    outputs = _run_native(read_finger(model), recording, kinematics_source)
+    if progress is not None:
+        progress(len(recording))
+    return outputs
 
-    with tempfile.TemporaryDirectory(prefix="tendonfmu-") as folder:
-        fmu = Path(folder) / "finger.fmu"
-        build_fmu(model, fmu, illustrated=False)  # nobody sees its pictures
-        return run_fmu(fmu, recording, kinematics_source=kinematics_source, progress=progress)
+
+def _run_native(finger: Finger, recording: Recording, source: int) -> Outputs:
+    """Run a finger in the C library. Raises InputError."""
+    if source not in (1, 2, 3):
+        raise InputError(f"kinematics = {source!r}: expected 1, 2 or 3")
+    recording.require(finger.joints, finger.tendons, inputs_used(source, watches_motors(finger.data)))
+    try:
+        found = native.Instance(finger.image, source).run(recording.arrays())
+    except native.NativeError as refused:
+        raise InputError(f"{recording.path}: {refused}") from None
+    names = (*NUMBERS, *OPTIONAL_NUMBERS, *FLAGS, *PLACE, *REST, *SENSORS)
+    outputs = {name: found[name] for name in names if name in found}
+    return {"time": recording.time, **outputs}

@@ -3,9 +3,11 @@ from .balance import balanced_forces as balanced_forces
 from .balance import friction_probe as friction_probe
 from .balance import moment_arms as moment_arms
 from .balance import pretension_vector as pretension_vector
-from .description import FingerDescription as FingerDescription
+from .description import Finger as Finger
+from .description import FingerSource as FingerSource
 from .description import Law as Law
 from .description import count as count
+from .description import finger_from_data as finger_from_data
 from .description import finger_from_text as finger_from_text
 from .description import read_finger as read_finger
 from .description import sides as sides
@@ -14,6 +16,8 @@ from .description_defaults import EFFECT_NUMBERS as EFFECT_NUMBERS
 from .description_defaults import LIMITS as LIMITS
 from .description_defaults import RANGES as RANGES
 from .description_numbers import number_of as number_of
+from .description_path import steps_of as steps_of
+from .description_text import description_text as description_text
 from .extensions import LEFT_OUT as LEFT_OUT
 from .extensions import MAGNITUDES as MAGNITUDES
 from .extensions import extended_row as extended_row
@@ -26,7 +30,7 @@ from .friction_places import effects as effects
 from .friction_places import sliding_velocity as sliding_velocity
 from .friction_places import velocity_threshold as velocity_threshold
 from .friction_places import working_point_weights as working_point_weights
-from .native import Finger as Finger
+from .native import Instance as Instance
 from .native import NativeError as NativeError
 from .output_dependencies import Dependencies as Dependencies
 from .output_dependencies import dependencies as dependencies

@@ -82,7 +82,7 @@ def pretension_vector(data: Mapping[str, Any]) -> Numbers:
     return shares / mean if mean > 1e-9 else np.zeros(len(arms))
 
 
-def friction_probe(data: Mapping[str, Any]) -> native.Finger:
+def friction_probe(data: Mapping[str, Any]) -> native.Instance:
     """Make a finger that computes the friction model only.
 
     It does not track the bias and detects no contact; q and q̇ are inputs. Its `friction_torque` and `bias_torque`
@@ -95,7 +95,7 @@ def friction_probe(data: Mapping[str, Any]) -> native.Finger:
 
     Returns
     -------
-    native.Finger
+    native.Instance
         With kinematics source 3.
     """
     bias = {"drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": [0.0] * len(data["joints"])}
@@ -104,7 +104,7 @@ def friction_probe(data: Mapping[str, Any]) -> native.Finger:
             bias[key] = data["bias"][key]
     contact = {"threshold": [_NEVER] * len(data["joints"])}
     probe = {**data, "bias": bias, "contact": contact, "sensor_fault": None}
-    return native.Finger(native.image_from_json(json.dumps(probe)), kinematics_source=3)
+    return native.Instance(native.image_from_json(json.dumps(probe)), kinematics_source=3)
 
 
 def balanced_forces(data: Mapping[str, Any], motion: Mapping[str, Numbers], pretension: Numbers) -> Numbers:

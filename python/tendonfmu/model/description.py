@@ -6,16 +6,23 @@ The native reader alone decides what a description may hold. `schema/finger.sche
 from __future__ import annotations
 
 import json
+import os
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from tendonfmu.errors import InputError
+from tendonfmu.files import write_text
 from tendonfmu.model import native
+from tendonfmu.model.description_path import with_values_at
+from tendonfmu.model.description_text import description_text
 from tendonfmu.model.extensions import extension_numbers, extension_rows
+from tendonfmu.model.finger_html import finger_html
+from tendonfmu.model.routing_geometry import finger_drawing
 
+IN_MEMORY = Path("finger")  # stands for the file of a finger that was read from none
 FORMAT = "tendonfmu-finger-1"
 _OTHER_FORMATS = {
     "tendonfmu-rig-": "a rig",
@@ -28,30 +35,43 @@ Law = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class FingerDescription:
-    """A description that the native reader has accepted.
+class Finger:
+    """A finger: a description that the native reader has accepted. It cannot be changed; `replace` makes another one.
 
     Attributes
     ----------
     path
-        The file that it was read from.
+        The file that it was read from; `finger` if there is none.
     text
         Content of the file.
     data
-        The parsed JSON.
+        The parsed JSON, not to be changed.
     image
         The model image made from it.
     """
 
-    path: Path
-    text: bytes
-    data: Mapping[str, Any]
+    path: Path = field(compare=False)
+    text: bytes = field(compare=False)
+    data: Mapping[str, Any] = field(hash=False)
     image: bytes
+
+    def __repr__(self) -> str:
+        return f"<Finger {self.name}: {self.joints} joints, {self.tendons} tendons>"
 
     @property
     def name(self) -> str:
         """Name of the finger."""
         return str(self.data["name"])
+
+    @property
+    def joints(self) -> int:
+        """Number of joints n."""
+        return len(self.data["joints"])
+
+    @property
+    def tendons(self) -> int:
+        """Number of tendons m."""
+        return len(self.data["tendons"])
 
     @property
     def joint_names(self) -> list[str]:
@@ -68,6 +88,52 @@ class FingerDescription:
         """Routing matrix R [m][n] (m)."""
         return [[float(arm) for arm in tendon["moment_arms"]] for tendon in self.data["tendons"]]
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return the description as a dictionary of its own, in the form of the JSON file."""
+        copied: dict[str, Any] = json.loads(self.text)
+        return copied
+
+    def replace(self, values: Mapping[str, Any]) -> Finger:
+        """Return a finger with other values.
+
+        Parameters
+        ----------
+        values
+            Values by path, such as `{"tendons[1].stiffness": 5000.0}`. Paths are those of the FMU's parameters and of
+            the description; indices count from 1. A value may be a number, a text, or any part of a description; None
+            means absent.
+
+        Returns
+        -------
+        Finger
+            A new finger; this one stays as it is.
+
+        Raises
+        ------
+        InputError
+            A path does not exist, or a value is refused.
+        """
+        try:
+            data = with_values_at(self.to_dict(), _plain(dict(values)), native.Instance(self.image))
+        except InputError as refused:
+            raise InputError(f"{self.path}: {refused}") from None
+        return finger_from_data(data, self.path)
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write the description as a JSON file, whole or not at all.
+
+        Parameters
+        ----------
+        path
+            The file.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
+        """
+        write_text(Path(path), description_text(self.data))
+
     def summary(self) -> list[str]:
         """Describe the finger in lines of text.
 
@@ -77,6 +143,12 @@ class FingerDescription:
             One line each for joints, tendons, moment arms, stiffness, friction and numbers.
         """
         return _summary_lines(count(self))
+
+    def _repr_html_(self) -> str:
+        return finger_html(self.summary(), finger_drawing(self))
+
+
+FingerSource = Finger | Mapping[str, Any] | str | os.PathLike[str]
 
 
 @dataclass(frozen=True)
@@ -123,17 +195,17 @@ class Counts:
         return len(self.tendon_names)
 
 
-def read_finger(path: Path) -> FingerDescription:
+def read_finger(source: FingerSource) -> Finger:
     """Read a finger description.
 
     Parameters
     ----------
-    path
-        A JSON file.
+    source
+        A JSON file, parsed JSON, or a finger, which is returned as it is.
 
     Returns
     -------
-    FingerDescription
+    Finger
         A description that the native reader has accepted.
 
     Raises
@@ -141,6 +213,13 @@ def read_finger(path: Path) -> FingerDescription:
     InputError
         One line that starts with the path.
     """
+    if isinstance(source, Finger):
+        return source
+    if isinstance(source, Mapping):
+        return finger_from_data(_plain(dict(source)))
+    if not isinstance(source, str | os.PathLike):
+        raise InputError(f"finger: {type(source).__name__}; expected a path, a dictionary or a Finger")
+    path = source if isinstance(source, Path) else Path(source)
     try:
         text = path.read_bytes()
     except OSError as failed:
@@ -150,7 +229,30 @@ def read_finger(path: Path) -> FingerDescription:
     return finger_from_text(path, text)
 
 
-def finger_from_text(path: Path, text: bytes) -> FingerDescription:
+def finger_from_data(data: Mapping[str, Any], path: Path = IN_MEMORY) -> Finger:
+    """Make a finger from parsed JSON.
+
+    Parameters
+    ----------
+    data
+        Parsed description.
+    path
+        Name of the finger in error messages.
+
+    Returns
+    -------
+    Finger
+        A description that the native reader has accepted.
+
+    Raises
+    ------
+    InputError
+        One line that starts with the path.
+    """
+    return finger_from_text(path, description_text(data).encode())
+
+
+def finger_from_text(path: Path, text: bytes) -> Finger:
     """Read the text of a finger description.
 
     Parameters
@@ -162,7 +264,7 @@ def finger_from_text(path: Path, text: bytes) -> FingerDescription:
 
     Returns
     -------
-    FingerDescription
+    Finger
         A description that the native reader has accepted.
 
     Raises
@@ -175,7 +277,26 @@ def finger_from_text(path: Path, text: bytes) -> FingerDescription:
         image = native.image_from_json(text)
     except native.NativeError as refused:
         raise InputError(f"{path}: {refused}") from None
-    return FingerDescription(path=path, text=text, data=json.loads(text), image=image)
+    return Finger(path=path, text=text, data=json.loads(text), image=image)
+
+
+def _plain(data: dict[str, Any]) -> dict[str, Any]:
+    """Return a copy with only what JSON has; numbers and arrays of numpy become plain ones."""
+
+    def plain(value: Any) -> Any:
+        if hasattr(value, "tolist"):
+            return value.tolist()
+        if isinstance(value, Mapping):
+            return dict(value)
+        raise InputError(f"finger: {value!r}; expected a number, text, list, dictionary or None")
+
+    try:
+        copied: dict[str, Any] = json.loads(json.dumps(data, default=plain))
+    except (TypeError, ValueError, RecursionError) as refused:
+        if isinstance(refused, InputError):
+            raise
+        raise InputError(f"finger: {refused}; expected what JSON can hold") from None
+    return copied
 
 
 def _check_format(path: Path, text: bytes) -> None:
@@ -254,7 +375,7 @@ def _range(values: Iterable[float]) -> tuple[float, float]:
     return min(found), max(found)
 
 
-def count(description: FingerDescription) -> Counts:
+def count(description: Finger) -> Counts:
     """Count what a description holds.
 
     Parameters
@@ -269,7 +390,7 @@ def count(description: FingerDescription) -> Counts:
     """
     data = description.data
     found = list(laws(data))
-    parameters = native.Finger(description.image).parameters()
+    parameters = native.Instance(description.image).parameters()
     edges = _entries(data, "edge_friction")
     kinds = ("friction", "load_friction", "pulley_friction", "edge_friction")
     return Counts(

@@ -113,7 +113,7 @@ def image_guid(image: bytes, salt: int) -> str:
     return _native.image_guid(image, salt)
 
 
-class Finger:
+class Instance:
     """One finger of the C runtime: parameters, state, and runs over whole recordings in one call.
 
     Not to be used by two threads at a time.
@@ -132,7 +132,7 @@ class Finger:
             self._finger.kinematics_source = kinematics_source
 
     @classmethod
-    def from_description(cls, description: Mapping[str, Any] | str | bytes, kinematics_source: int = 1) -> Finger:
+    def from_description(cls, description: Mapping[str, Any] | str | bytes, kinematics_source: int = 1) -> Instance:
         """Make a finger from a description.
 
         Parameters
@@ -144,7 +144,7 @@ class Finger:
 
         Returns
         -------
-        Finger
+        Instance
             A new finger.
 
         Raises
@@ -356,7 +356,47 @@ class Finger:
             time = np.ascontiguousarray(recording["time"], dtype=np.float64)
             outputs: dict[str, Array] = self._finger.run(time, inputs[0], inputs[1], inputs[2], inputs[3], parts)
         flags = (name for name in outputs if outputs[name].dtype == np.uint8)
-        return outputs | {name: outputs[name].astype(bool) for name in flags}
+        return outputs | {name: outputs[name].view(bool) for name in flags}
+
+    def step_outputs(self) -> dict[str, Array]:
+        """Return the arrays that `step` writes.
+
+        Returns
+        -------
+        dict of arrays
+            Outputs of `run` without friction parts: [n], [m], [3] or [1]; flags are bool. Always the same arrays.
+        """
+        arrays = self._finger.step_outputs()
+        return {name: each.view(bool) if each.dtype == np.uint8 else each for name, each in arrays.items()}
+
+    def step(
+        self,
+        time: float,
+        tendon_force: Array | None,
+        tendon_position: Array | None = None,
+        joint_position: Array | None = None,
+        joint_velocity: Array | None = None,
+    ) -> None:
+        """Take one sample and write its outputs into the arrays of `step_outputs`.
+
+        Parameters
+        ----------
+        time
+            Time (s), after that of the sample before.
+        tendon_force, tendon_position
+            [m] (N and m), float64.
+        joint_position, joint_velocity
+            [n] (rad and rad/s), float64. Signals that the kinematics source does not use may be None.
+
+        Raises
+        ------
+        NativeError
+            The sample is refused. State and outputs are those of the sample before.
+        """
+        try:  # a context manager takes longer than the step
+            self._finger.step(time, tendon_force, tendon_position, joint_position, joint_velocity)
+        except ValueError as refused:
+            raise NativeError(str(refused)) from None
 
     def directional_derivative(self, direction: Mapping[str, Array]) -> dict[str, Array]:
         """Return the derivative of the last sample's outputs along a direction of its inputs.
@@ -388,5 +428,5 @@ class Finger:
 def run_recording(
     description: Mapping[str, Any] | str | bytes, recording: Mapping[str, Array], kinematics_source: int = 1
 ) -> dict[str, Array]:
-    """Run a new finger of a description over a recording; see `Finger.run`."""
-    return Finger.from_description(description, kinematics_source).run(recording)
+    """Run a new finger of a description over a recording; see `Instance.run`."""
+    return Instance.from_description(description, kinematics_source).run(recording)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.model import native
-from tendonfmu.model.description import FingerDescription
+from tendonfmu.model.description import Finger
 from tendonfmu.model.extensions import extension_rows
 from tendonfmu.model.signals import PLACE, REST, SENSORS, VECTORS
 
@@ -66,7 +66,7 @@ class Structure:
         return int(self.passes.shape[1])
 
 
-def structure_of(description: FingerDescription) -> Structure:
+def structure_of(description: Finger) -> Structure:
     """Return the structure of a finger.
 
     Parameters
@@ -88,7 +88,7 @@ def structure_of(description: FingerDescription) -> Structure:
 
 def _inverse_routing(image: bytes, tendons: int, joints: int) -> np.ndarray[Any, np.dtype[np.float64]]:
     """Return R⁺ [n, m] of the runtime: the slopes of the joint angles by the tendon positions."""
-    finger = native.Finger(image, kinematics_source=1)
+    finger = native.Instance(image, kinematics_source=1)
     finger.run({"time": np.zeros(1), "tendon_force": np.zeros((1, tendons)), "tendon_position": np.zeros((1, tendons))})
     columns = [finger.directional_derivative({"tendon_position": unit})["joint_angle"] for unit in np.eye(tendons)]
     return np.asarray(np.array(columns).T.reshape(joints, tendons), dtype=np.float64)

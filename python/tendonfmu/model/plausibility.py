@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from tendonfmu.model.description import FingerDescription, laws, sides
+from tendonfmu.model.description import Finger, laws, sides
 from tendonfmu.model.findings import Finding
 
 Numbers = NDArray[np.float64]
@@ -29,7 +29,7 @@ ALL_FRICTION = 1.0  # of the tendon's force; no pulley takes all of it
 UNREACHED = 1e-6  # of the torque that the tendons should make
 
 
-def description_findings(finger: FingerDescription) -> list[Finding]:
+def description_findings(finger: Finger) -> list[Finding]:
     """Find implausible values of a valid description.
 
     Parameters

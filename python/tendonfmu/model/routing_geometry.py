@@ -7,12 +7,12 @@ inside, so that they do not cross those that continue.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-
-from tendonfmu.model.description import FingerDescription
 
 JOINT_SPACING = 2.5
 HUB_RADIUS = 0.32  # of the disc that stands for a joint
@@ -26,6 +26,21 @@ BASE = 1.9  # from the springs to the first joint
 LABEL_SPACING = 0.3
 
 Points = NDArray[np.float64]
+
+
+class Described(Protocol):
+    """What is read here of a `Finger`."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def joint_names(self) -> list[str]: ...
+    @property
+    def tendon_names(self) -> list[str]: ...
+    @property
+    def moment_arms(self) -> list[list[float]]: ...
+    @property
+    def data(self) -> Mapping[str, Any]: ...
 
 
 @dataclass(frozen=True)
@@ -92,7 +107,7 @@ class FingerDrawing:
     height: float
 
 
-def finger_drawing(description: FingerDescription) -> FingerDrawing:
+def finger_drawing(description: Described) -> FingerDrawing:
     """Compute the geometry of a finger.
 
     Parameters

@@ -19,6 +19,9 @@ from .prepared import slack_sentences as slack_sentences
 from .recording import GROUP_PER as GROUP_PER
 from .recording import LABEL as LABEL
 from .recording import Recording as Recording
+from .recording import RecordingSource as RecordingSource
+from .recording import flagged_stretches as flagged_stretches
+from .recording import listed_sources as listed_sources
 from .recording import read_recording as read_recording
 from .residuals import BiasSettings as BiasSettings
 from .residuals import Model as Model

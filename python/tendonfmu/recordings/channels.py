@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.model import FingerDescription
+from tendonfmu.model import Finger
 from tendonfmu.recordings.faults import StuckSensor, expected_values, gaps, stuck_sensors
 from tendonfmu.recordings.recording import Recording
 from tendonfmu.recordings.signal_noise import value_step
@@ -160,7 +160,7 @@ def read_clock(time: Numbers) -> Clock | None:
     )
 
 
-def clipped_channels(recording: Recording, finger: FingerDescription) -> Iterator[Clipped]:
+def clipped_channels(recording: Recording, finger: Finger) -> Iterator[Clipped]:
     """Find forces, positions and angles that saturate.
 
     A turning point of a smooth signal also repeats its extreme value, but the signal approaches it slowly. A motor or a
@@ -228,7 +228,7 @@ def coarse_channels(recording: Recording) -> Iterator[Coarse]:
                 yield Coarse(f"{name}[{k + 1}]", step, extent)
 
 
-def held_channels(recording: Recording, finger: FingerDescription) -> list[Held]:
+def held_channels(recording: Recording, finger: Finger) -> list[Held]:
     """Find channels that hold a value while others change.
 
     These are stuck sensors, and channels that never change while most of their group do.

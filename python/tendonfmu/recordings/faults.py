@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.model import FingerDescription
+from tendonfmu.model import Finger
 from tendonfmu.recordings.recording import Recording
 
 Numbers = NDArray[np.float64]
@@ -89,7 +89,7 @@ def gap_sentences(recording: Recording) -> Iterator[str]:
         yield f"{len(found) - 3} more gaps; every part is fitted as a separate recording"
 
 
-def rate_sentences(recording: Recording, finger: FingerDescription) -> Iterator[str]:
+def rate_sentences(recording: Recording, finger: Finger) -> Iterator[str]:
     """Describe a sample rate that is too low to show reversals of friction, or higher than useful."""
     if len(recording) < 3:
         return
@@ -111,7 +111,7 @@ def rate_sentences(recording: Recording, finger: FingerDescription) -> Iterator[
         )
 
 
-def silent_tendons(recording: Recording, finger: FingerDescription) -> Iterator[str]:
+def silent_tendons(recording: Recording, finger: Finger) -> Iterator[str]:
     """Describe tendons whose force is zero throughout."""
     for i in np.flatnonzero(~recording.groups["tendon_force"].any(axis=0)):
         yield (
@@ -123,7 +123,7 @@ def silent_tendons(recording: Recording, finger: FingerDescription) -> Iterator[
 # --- stuck sensors ----------------------------------------------------------------------------------------------------
 
 
-def stuck_sensors(recording: Recording, finger: FingerDescription) -> list[StuckSensor]:
+def stuck_sensors(recording: Recording, finger: Finger) -> list[StuckSensor]:
     """Find channels that repeat a value for more than `STUCK` while the other channels show that they should change."""
     found: list[StuckSensor] = []
     for name, k, runs in _still(recording):
@@ -136,7 +136,7 @@ def stuck_sensors(recording: Recording, finger: FingerDescription) -> list[Stuck
     return found
 
 
-def expected_values(recording: Recording, finger: FingerDescription, group: str, k: int) -> Numbers | None:
+def expected_values(recording: Recording, finger: Finger, group: str, k: int) -> Numbers | None:
     """Return what a channel should read according to the other channels, up to a constant.
 
     Parameters
@@ -166,13 +166,13 @@ def expected_values(recording: Recording, finger: FingerDescription, group: str,
     return np.asarray(groups.get("joint_position", angle)[:, k] - np.cumsum(groups[group][:, k] * step))
 
 
-def tendon_angles(recording: Recording, finger: FingerDescription) -> Numbers:
+def tendon_angles(recording: Recording, finger: Finger) -> Numbers:
     """Return the joint angles [N, n] (rad) that follow from tendon positions and forces, R⁺(x0 − f0/k)."""
     position = recording.groups["tendon_position"] - _stretch(recording, finger)
     return np.asarray(position @ np.linalg.pinv(np.asarray(finger.moment_arms, dtype=float)).T)
 
 
-def _stretch(recording: Recording, finger: FingerDescription) -> Numbers:
+def _stretch(recording: Recording, finger: Finger) -> Numbers:
     """Return the stretch [N, m] (m) of the tendons' springs."""
     stiffness = np.array([float(tendon["stiffness"]) for tendon in finger.data["tendons"]])
     return np.asarray(recording.groups["tendon_force"] / stiffness)

@@ -14,7 +14,7 @@ from itertools import combinations, permutations
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.model import FingerDescription
+from tendonfmu.model import Finger
 from tendonfmu.recordings.faults import TURNS
 
 Numbers = NDArray[np.float64]
@@ -113,7 +113,7 @@ class Balance:
     """
 
     def __init__(
-        self, finger: FingerDescription, groups: Mapping[str, Numbers], noise: Mapping[str, Numbers] | None = None
+        self, finger: Finger, groups: Mapping[str, Numbers], noise: Mapping[str, Numbers] | None = None
     ) -> None:
         """Compute the moments.
 
@@ -221,7 +221,7 @@ class Balance:
         return [column for column in self.columns if column.startswith(f"{name}[")]
 
 
-def _equations(finger: FingerDescription, tendons: Indices, measured: bool) -> tuple[Numbers, Numbers]:
+def _equations(finger: Finger, tendons: Indices, measured: bool) -> tuple[Numbers, Numbers]:
     """Return rows [e, c] that are 0, and joint angles [n, c] by the tendons; columns as in `Balance`."""
     arms = np.asarray(finger.moment_arms, dtype=float)
     compliance = np.diag([1.0 / float(tendon["stiffness"]) for tendon in finger.data["tendons"]])
@@ -240,7 +240,7 @@ def taut_tendons(force: Numbers) -> Indices:
     return np.flatnonzero(force.any(axis=0))
 
 
-def tells(finger: FingerDescription, groups: Mapping[str, Numbers]) -> bool:
+def tells(finger: Finger, groups: Mapping[str, Numbers]) -> bool:
     """Return whether the equations can show anything: there are more of them than unknown joint angles."""
     return "joint_position" in groups or len(taut_tendons(groups["tendon_force"])) > len(finger.joint_names)
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.model import Finding, FingerDescription, is_direct_drive
+from tendonfmu.model import Finding, Finger, is_direct_drive
 from tendonfmu.recordings import match_text as text
 from tendonfmu.recordings.channels import (
     clipped_channels,
@@ -48,7 +48,7 @@ LEAST_KEPT = 0.2  # of the samples; the equations use at least as many
 LEFT_TO_THE_FIT = ("gaps", "held")  # kinds of findings
 
 
-def belongs(finger: FingerDescription, recordings: Sequence[Recording], *, unfit: float = UNFIT) -> list[Finding]:
+def belongs(finger: Finger, recordings: Sequence[Recording], *, unfit: float = UNFIT) -> list[Finding]:
     """Find signs that recordings do not belong to a finger, or are poor.
 
     Parameters
@@ -72,7 +72,7 @@ def belongs(finger: FingerDescription, recordings: Sequence[Recording], *, unfit
     return found
 
 
-def admit(finger: FingerDescription, recordings: Sequence[Recording], *, unfit: float = UNFIT) -> list[str]:
+def admit(finger: Finger, recordings: Sequence[Recording], *, unfit: float = UNFIT) -> list[str]:
     """Check recordings before a fit, and refuse those that do not belong to the finger.
 
     Gaps and stuck sensors are left to `recordings.prepared.prepare`. It knows which columns are used, and reports which
@@ -112,7 +112,7 @@ def refuse_errors(findings: Sequence[Finding]) -> list[str]:
     return [finding.line() for finding in findings]
 
 
-def _findings(finger: FingerDescription, recording: Recording, unfit: float) -> list[Finding]:
+def _findings(finger: Finger, recording: Recording, unfit: float) -> list[Finding]:
     counts = {"tendon": len(finger.tendon_names), "joint": len(finger.joint_names)}
     wrong = [name for name, values in recording.groups.items() if values.shape[1] != counts[GROUP_PER[name]]]
     if wrong:
@@ -152,7 +152,7 @@ def _of_clock(recording: Recording) -> Iterator[Finding]:
     yield from text.clock_warnings(recording.path, clock, recording.time)
 
 
-def _of_channels(finger: FingerDescription, recording: Recording, held: Sequence[Finding]) -> Iterator[Finding]:
+def _of_channels(finger: Finger, recording: Recording, held: Sequence[Finding]) -> Iterator[Finding]:
     coarse = list(coarse_channels(recording))
     clipped = list(clipped_channels(recording, finger))
     steps = {each.column for each in coarse}
@@ -171,7 +171,7 @@ def _of_channels(finger: FingerDescription, recording: Recording, held: Sequence
 # --- what the columns say of each other -------------------------------------------------------------------------------
 
 
-def _of_kinematics(finger: FingerDescription, recording: Recording, unfit: float) -> tuple[list[Finding], Recording]:
+def _of_kinematics(finger: Finger, recording: Recording, unfit: float) -> tuple[list[Finding], Recording]:
     """Return findings about signs, order and units of columns, and the recording with these corrected."""
     if len(recording) < FEWEST:
         return [], recording
@@ -198,7 +198,7 @@ def _of_kinematics(finger: FingerDescription, recording: Recording, unfit: float
     return found, recording
 
 
-def _likeliest(finger: FingerDescription, recording: Recording, found: Repair) -> Repair:
+def _likeliest(finger: Finger, recording: Recording, found: Repair) -> Repair:
     """Put first, of corrections that fit the equations equally, the one that fits velocities and friction best."""
     corrections = [found.correction, *found.alternatives]
     if len(corrections) == 1 or len(corrections) > MOST_COMPARED:
@@ -213,7 +213,7 @@ def _likeliest(finger: FingerDescription, recording: Recording, found: Repair) -
     return replace(found, correction=best[0], alternatives=tuple(best[1:]))
 
 
-def _balance(finger: FingerDescription, recording: Recording) -> tuple[Balance, bool]:
+def _balance(finger: Finger, recording: Recording) -> tuple[Balance, bool]:
     """Return the equations over the usable samples, and whether any joint moves in them."""
     groups = {name: values for name, values in recording.groups.items() if name in EQUATED}
     rows = _serving(finger, recording, groups)
@@ -227,7 +227,7 @@ def _balance(finger: FingerDescription, recording: Recording) -> tuple[Balance, 
     return Balance(finger, kept, noise), moves
 
 
-def _serving(finger: FingerDescription, recording: Recording, groups: Mapping[str, Numbers]) -> Flags:
+def _serving(finger: Finger, recording: Recording, groups: Mapping[str, Numbers]) -> Flags:
     """Return the samples [N] without a held channel and a slack tendon; all samples if too few are left."""
     changing = np.ones(len(recording), dtype=bool)
     for values in groups.values():
@@ -258,7 +258,7 @@ def _mended(recording: Recording, correction: Correction) -> Recording:
     return replace(recording, groups=groups)
 
 
-def _with_velocities(finger: FingerDescription, recording: Recording, found: list[Finding]) -> Recording:
+def _with_velocities(finger: Finger, recording: Recording, found: list[Finding]) -> Recording:
     """Add findings about joint velocities, and return the recording with these corrected."""
     for correction, slope in velocity_corrections(recording, finger):
         found.append(text.velocity(recording.path, correction, slope))
@@ -266,7 +266,7 @@ def _with_velocities(finger: FingerDescription, recording: Recording, found: lis
     return recording
 
 
-def _of_pushing(finger: FingerDescription, recording: Recording, mended: set[str]) -> Iterator[Finding]:
+def _of_pushing(finger: Finger, recording: Recording, mended: set[str]) -> Iterator[Finding]:
     """Report tendons that can only pull but have negative forces. mended: columns with a finding already."""
     share = (recording.groups["tendon_force"] < 0.0).mean(axis=0)
     for i, tendon in enumerate(finger.data["tendons"]):
@@ -278,7 +278,7 @@ def _of_pushing(finger: FingerDescription, recording: Recording, mended: set[str
         yield text.pushing(recording.path, column, finger.tendon_names[i], float(share[i]), float(force.min()), is_zero)
 
 
-def _is_sign_right(finger: FingerDescription, recording: Recording, i: int) -> bool:
+def _is_sign_right(finger: Finger, recording: Recording, i: int) -> bool:
     """Return whether the equations show that tendon i's force grows as its spring stretches."""
     if not tells(finger, recording.groups) or len(recording) < FEWEST:
         return False
@@ -287,7 +287,7 @@ def _is_sign_right(finger: FingerDescription, recording: Recording, i: int) -> b
     return balance.misfit(np.eye(len(balance.columns))) * GAIN < balance.misfit(flipped)
 
 
-def _of_reference(finger: FingerDescription, recording: Recording) -> Iterator[Finding]:
+def _of_reference(finger: Finger, recording: Recording) -> Iterator[Finding]:
     """Report external torques opposite to the tendons' torque: their difference should be friction only (eq. 9)."""
     external = recording.groups.get("external_torque")
     if external is None:
@@ -298,14 +298,14 @@ def _of_reference(finger: FingerDescription, recording: Recording) -> Iterator[F
         yield text.reference(recording.path, f"external_torque[{j + 1}]", float(left[j]), float(opposed[j]))
 
 
-def _of_power(finger: FingerDescription, recording: Recording) -> Iterator[Finding]:
+def _of_power(finger: Finger, recording: Recording) -> Iterator[Finding]:
     """Report joints that move against the pull of their tendons, which friction cannot cause."""
     share = power_shares(finger, recording)
     if share is not None and share.min() < -AGAINST:
         yield text.against(recording.path, share, finger.joint_names, _turning(finger, recording))
 
 
-def _turning(finger: FingerDescription, recording: Recording) -> list[Correction]:
+def _turning(finger: Finger, recording: Recording) -> list[Correction]:
     """Find signs and exchanges that fit the equations equally and make every joint follow its tendons."""
     balance, _ = _balance(finger, recording)
     given = np.eye(len(balance.columns))
@@ -325,7 +325,7 @@ def _turning(finger: FingerDescription, recording: Recording) -> list[Correction
     return [correction for opposed, _, correction in found if opposed == found[0][0]]
 
 
-def power_shares(finger: FingerDescription, recording: Recording) -> Numbers | None:
+def power_shares(finger: Finger, recording: Recording) -> Numbers | None:
     """Return the net work of the tendons on each joint as a share [n] of all work that they exchange with it.
 
     Over closed motions, friction alone gives 1 and springs give 0. Joints that do not move get 0. The result is None

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tendonfmu.errors import InputError
 from tendonfmu.model import (
     INPUTS_OF_SOURCE,
-    FingerDescription,
+    Finger,
     inputs_used,
     moment_arms,
     number_of,
@@ -135,7 +135,7 @@ class FitRecording:
         Returns
         -------
         dict of Numbers
-            Contiguous arrays by name, as `native.Finger.run` takes them.
+            Contiguous arrays by name, as `native.Instance.run` takes them.
         """
         return {name: np.ascontiguousarray(values[part]) for name, values in self.recording.arrays().items()}
 
@@ -162,7 +162,7 @@ class FitRecording:
         }
 
 
-def prepare(finger: FingerDescription, recording: Recording, kinematics: int, held: Held) -> FitRecording:
+def prepare(finger: Finger, recording: Recording, kinematics: int, held: Held) -> FitRecording:
     """Prepare a recording for a fit, and collect what is left out of it.
 
     Call `recordings.match.admit` first: it checks whether the recording belongs to the finger.
@@ -257,7 +257,7 @@ def _refuse_too_little(recording: Recording, parts: list[slice], usable: Flags, 
     )
 
 
-def slack_sentences(slack: Flags, finger: FingerDescription) -> list[str]:
+def slack_sentences(slack: Flags, finger: Finger) -> list[str]:
     """Describe tendons whose modelled force falls below zero.
 
     Parameters
@@ -289,7 +289,7 @@ def _percent(share: float) -> str:
 # --- stuck sensors ----------------------------------------------------------------------------------------------------
 
 
-def _stuck(recording: Recording, finger: FingerDescription, kinematics: int) -> tuple[Flags, list[str]]:
+def _stuck(recording: Recording, finger: Finger, kinematics: int) -> tuple[Flags, list[str]]:
     """Return the samples [N] to leave out because of stuck sensors, and sentences. Unused channels cost no samples."""
     out, sentences = np.zeros(len(recording), dtype=bool), []
     used = {"tendon_force", *INPUTS_OF_SOURCE[kinematics]}
@@ -388,7 +388,7 @@ def _sample_time(recording: FitRecording) -> Numbers:
     return step
 
 
-def refuse_stillness(finger: FingerDescription, recordings: list[FitRecording], moves: Mapping[str, bool]) -> list[str]:
+def refuse_stillness(finger: Finger, recordings: list[FitRecording], moves: Mapping[str, bool]) -> list[str]:
     """Refuse recordings without any motion, and describe joints that never move.
 
     Parameters
@@ -426,7 +426,7 @@ def refuse_stillness(finger: FingerDescription, recordings: list[FitRecording], 
     ]
 
 
-def require_noise(finger: FingerDescription, recordings: list[FitRecording]) -> None:
+def require_noise(finger: Finger, recordings: list[FitRecording]) -> None:
     """Refuse a finger whose residuals would get an infinite weight.
 
     Parameters

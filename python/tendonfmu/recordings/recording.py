@@ -6,41 +6,37 @@ A column is `time` (s) or one of the groups below with an index from 1, such as 
 from __future__ import annotations
 
 import os
-import re
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.files import read_table
+from tendonfmu.files import Table, frame_of, is_frame, read_table, table_of_frame, write_table
+from tendonfmu.recordings.columns import GROUP_PER as GROUP_PER
+from tendonfmu.recordings.columns import GROUPS as GROUPS
+from tendonfmu.recordings.columns import LABEL as LABEL
+from tendonfmu.recordings.columns import check_sizes, element_of, read_columns
 
-# group: unit, and whether every recording has it
-GROUPS: dict[str, tuple[str, bool]] = {
-    "tendon_force": ("N", True),
-    "tendon_position": ("m", True),
-    "joint_position": ("rad", False),
-    "joint_velocity": ("rad/s", False),
-    "external_torque": ("N.m", False),
-}
-GROUP_PER = {name: "tendon" if name.startswith("tendon") else "joint" for name in GROUPS}
-LABEL = "contact"
+if TYPE_CHECKING:
+    import pandas as pd
+
 LARGEST, LATEST = 1e12, 1e15  # largest signal, in its unit, and latest time (s) that the model accepts
+RecordingSource: TypeAlias = "Recording | pd.DataFrame | str | os.PathLike[str]"
 
-_ELEMENT = re.compile(r"([a-z_]+)\[([1-9][0-9]*)\]")
 
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Recording:
     """Measured samples of one finger.
 
     Attributes
     ----------
     path
-        File of the recording.
+        File of the recording, or the name that stands for it in messages.
     time
         Times [N] (s), strictly increasing.
     groups
@@ -49,6 +45,8 @@ class Recording:
         Contact label [N], or None.
     others
         Other columns that were asked for, [N] each.
+    label
+        Column that `contact` was read from.
     """
 
     path: Path
@@ -56,12 +54,178 @@ class Recording:
     groups: Mapping[str, NDArray[np.float64]]
     contact: NDArray[np.bool_] | None = None
     others: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    label: str = LABEL
 
     def __len__(self) -> int:
         return len(self.time)
 
+    def __repr__(self) -> str:
+        return f"<Recording {self.path}: {self._words()}>"
+
+    def _words(self) -> str:
+        sizes = [f"{array.shape[1]} {name}" for name, array in self.groups.items()]
+        labelled = [] if self.contact is None else [f"{int(self.contact.sum())} samples labelled {self.label}"]
+        duration = self.time[-1] - self.time[0] if len(self) else 0.0
+        return ", ".join([f"{len(self)} samples in {duration:.6g} s", *sizes, *labelled])
+
+    @classmethod
+    def from_frame(
+        cls, frame: pd.DataFrame, *, name: str = "DataFrame", label: str = LABEL, others: Collection[str] = ()
+    ) -> Recording:
+        """Make a recording from a pandas DataFrame, checked like a file.
+
+        Parameters
+        ----------
+        frame
+            Columns as of a file, in any order; the index is not used.
+        name
+            Name of the recording in messages.
+        label, others
+            As of `read_recording`.
+
+        Returns
+        -------
+        Recording
+            With copies of the numbers.
+
+        Raises
+        ------
+        InputError
+            The column or row that is wrong, and what was expected.
+
+        Warns
+        -----
+        InputWarning
+            Columns are ignored.
+        """
+        file, known = Path(name), {LABEL, label, *others}
+        table = table_of_frame(file, frame, partial(read_columns, known=known), flags=(LABEL, label))
+        return _of_table(file, table, label, others)
+
+    @classmethod
+    def from_arrays(
+        cls,
+        time: ArrayLike,
+        tendon_force: ArrayLike,
+        tendon_position: ArrayLike,
+        *,
+        joint_position: ArrayLike | None = None,
+        joint_velocity: ArrayLike | None = None,
+        external_torque: ArrayLike | None = None,
+        contact: ArrayLike | None = None,
+        name: str = "arrays",
+    ) -> Recording:
+        """Make a recording from arrays, checked like a file.
+
+        Arrays of float64 are not copied: do not change them while the recording is in use.
+
+        Parameters
+        ----------
+        time
+            Times [N] (s), strictly increasing.
+        tendon_force, tendon_position
+            Signals [N, m] (N and m).
+        joint_position, joint_velocity, external_torque
+            Signals [N, n] (rad, rad/s and N·m), or None.
+        contact
+            Label [N], 0 or 1, or None.
+        name
+            Name of the recording in messages.
+
+        Returns
+        -------
+        Recording
+            The checked recording.
+
+        Raises
+        ------
+        InputError
+            The array, and row, that is wrong, and what was expected.
+        """
+        file = Path(name)
+        given = (tendon_force, tendon_position, joint_position, joint_velocity, external_torque)
+        times = _numbers(file, "time", time, 1)
+        groups = {
+            group: _numbers(file, group, values, 2)
+            for group, values in zip(GROUPS, given, strict=True)
+            if values is not None or GROUPS[group][1]
+        }
+        label = None if contact is None else _numbers(file, LABEL, contact, 1)
+        if not len(times):
+            raise InputError(f"{file}: no samples; expected at least one")
+        for group, values in (groups if label is None else {**groups, LABEL: label}).items():
+            if len(values) != len(times):
+                raise InputError(f"{file}: {group}: {len(values)} rows; expected {len(times)} as of time")
+            if values.ndim == 2 and not values.shape[1]:
+                raise InputError(f"{file}: {group}: no columns; expected one per {GROUP_PER[group]}")
+        check_sizes(file, {group: values.shape[1] for group, values in groups.items()})
+        recording = cls(file, times, groups, None if label is None else _flags(file, LABEL, label))
+        check_numbers(recording)
+        return recording
+
+    @property
+    def frame(self) -> pd.DataFrame:
+        """The recording as a pandas DataFrame with the columns of a file; the label is 0 or 1."""
+        return frame_of(self._columns())
+
+    def _columns(self) -> dict[str, NDArray[Any]]:
+        columns: dict[str, NDArray[Any]] = {"time": self.time}
+        for name, array in self.groups.items():
+            columns |= {f"{name}[{i}]": array[:, i - 1] for i in range(1, array.shape[1] + 1)}
+        if self.contact is not None:
+            columns[self.label] = self.contact.astype(np.uint8)
+        return columns | dict(self.others)
+
+    def plot(self) -> Any:
+        """Draw all signals over time.
+
+        Returns
+        -------
+        plotly.graph_objects.Figure
+            A row per group of signals. Samples labelled as contact are shaded.
+        """
+        from tendonfmu.drawing import SeriesRow, series_figure
+
+        rows = [
+            SeriesRow(
+                f"{name.replace('_', ' ')} ({GROUPS[name][0].replace('.', '·')})",
+                {f"{name}[{i + 1}]": array[:, i] for i in range(array.shape[1])},
+            )
+            for name, array in self.groups.items()
+        ]
+        labelled = {} if self.contact is None else {"#E69F00": flagged_stretches(self.time, self.contact)}
+        return series_figure(str(self.path), "time (s)", self.time, rows, labelled)
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        ranges = [
+            f"<tr><td>{name}</td><td>{array.shape[1]}</td><td>{array.min():.4g} to {array.max():.4g} "
+            f"{GROUPS[name][0].replace('.', '·')}</td></tr>"
+            for name, array in self.groups.items()
+        ]
+        return (
+            f"<p><b>{escape(str(self.path))}</b>: {escape(self._words())}</p>"
+            f"<table><tr><th>signals</th><th>columns</th><th>range</th></tr>{''.join(ranges)}</table>"
+        )
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write the recording as .csv or .parquet, whole or not at all.
+
+        Parameters
+        ----------
+        path
+            The file.
+
+        Raises
+        ------
+        InputError
+            The format is unknown, or the file cannot be written.
+        """
+        write_table(path, self._columns())
+
     def arrays(self) -> dict[str, NDArray[np.float64]]:
-        """Return `time` and the groups in one dict, as `native.Finger.run` takes them.
+        """Return `time` and the groups in one dict, as `native.Instance.run` takes them.
 
         Returns
         -------
@@ -97,17 +261,17 @@ class Recording:
                 )
 
 
-def read_recording(path: str | os.PathLike[str], *, label: str = LABEL, others: Collection[str] = ()) -> Recording:
+def read_recording(source: RecordingSource, *, label: str = LABEL, others: Collection[str] = ()) -> Recording:
     """Read and check a recording.
 
     Parameters
     ----------
-    path
-        A .csv or .parquet file.
+    source
+        A .csv or .parquet file, or a pandas DataFrame. A recording is returned as it is.
     label
         Column of the contact label, 0 or 1.
     others
-        Other columns to keep, if the file has them.
+        Other columns to keep, if there are any.
 
     Returns
     -------
@@ -118,19 +282,102 @@ def read_recording(path: str | os.PathLike[str], *, label: str = LABEL, others: 
     ------
     InputError
         The file, column or row that is wrong, and what was expected.
+
+    Warns
+    -----
+    InputWarning
+        Columns are ignored.
     """
-    file = path if isinstance(path, Path) else Path(path)
-    known = {LABEL, label, *others}
-    table = read_table(file, partial(_check_columns, known=known), flags=(LABEL, label))
+    if isinstance(source, Recording):
+        return _labelled(source, label)
+    if is_frame(source):
+        return Recording.from_frame(source, label=label, others=others)
+    if not isinstance(source, str | os.PathLike):
+        raise InputError(f"recording: {type(source).__name__}; expected a path, a DataFrame or a Recording")
+    file = source if isinstance(source, Path) else Path(source)
+    table = read_table(file, partial(read_columns, known={LABEL, label, *others}), flags=(LABEL, label))
+    return _of_table(file, table, label, others)
+
+
+def listed_sources(sources: RecordingSource | Sequence[RecordingSource]) -> list[RecordingSource]:
+    """Return sources of recordings as a list; a single one may be given without a list.
+
+    Parameters
+    ----------
+    sources
+        A recording, DataFrame or path, or several of them.
+
+    Returns
+    -------
+    list
+        The same, at least as many as given.
+    """
+    alone = isinstance(sources, Recording | str | os.PathLike) or is_frame(sources)
+    try:
+        return [sources] if alone else list(sources)  # type: ignore[list-item, arg-type]
+    except TypeError:
+        raise InputError(f"recordings: {type(sources).__name__}; expected paths, DataFrames or Recordings") from None
+
+
+def flagged_stretches(time: NDArray[np.float64], flags: NDArray[Any]) -> list[tuple[float, float]]:
+    """Return the stretches of flagged samples.
+
+    Parameters
+    ----------
+    time
+        Times [N] (s).
+    flags
+        [N].
+
+    Returns
+    -------
+    list of tuple
+        Begin and end of each stretch (s); it lasts until the next sample.
+    """
+    steps = np.diff(np.concatenate([[0], np.asarray(flags).astype(bool).astype(int), [0]]))
+    begins, ends = np.flatnonzero(steps > 0), np.minimum(np.flatnonzero(steps < 0), len(time) - 1)
+    return [(float(time[a]), float(time[b])) for a, b in zip(begins, ends, strict=True)]
+
+
+def _labelled(recording: Recording, label: str) -> Recording:
+    """Return the recording with another of its columns as the label, if it was read with it."""
+    if label == recording.label:
+        return recording
+    values = recording.others.get(label)
+    return replace(recording, contact=None if values is None else _flags(recording.path, label, values), label=label)
+
+
+def _of_table(file: Path, table: Table, label: str, others: Collection[str]) -> Recording:
     time = table["time"]
     check_times(file, time)
     found = table.get(label)
-    if found is not None and not np.isin(found, (0.0, 1.0)).all():
-        row = int(np.flatnonzero(~np.isin(found, (0.0, 1.0)))[0]) + 1
-        raise InputError(f"{file}: column {label}, row {row}: {found[row - 1]:g}; expected 0 or 1")
+    contact = None if found is None else _flags(file, label, found)
     groups = {name: np.column_stack(columns) for name, columns in _grouped(table).items()}
     kept = {name: table[name] for name in others if name in table}
-    return Recording(file, time, groups, None if found is None else found.astype(bool), kept)
+    return Recording(file, time, groups, contact, kept, label)
+
+
+def _flags(file: Path, label: str, values: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return a label as flags. Raises InputError if a value is neither 0 nor 1."""
+    if not np.isin(values, (0.0, 1.0)).all():
+        row = int(np.flatnonzero(~np.isin(values, (0.0, 1.0)))[0]) + 1
+        raise InputError(f"{file}: column {label}, row {row}: {values[row - 1]:g}; expected 0 or 1")
+    return values.astype(bool)
+
+
+def _numbers(file: Path, name: str, values: ArrayLike | None, dimensions: int) -> NDArray[np.float64]:
+    """Return an array of numbers, without a copy where it is one."""
+    shape = "[N]" if dimensions == 1 else "[N, m]" if GROUP_PER[name] == "tendon" else "[N, n]"
+    try:
+        found = np.asarray(values)
+        if found.dtype.kind not in "fiub":
+            raise TypeError(f"{found.dtype} values")
+        numbers = found.astype(np.float64, copy=False)
+    except (TypeError, ValueError) as refused:
+        raise InputError(f"{file}: {name}: {refused}; expected numbers {shape}") from None
+    if numbers.ndim != dimensions:
+        raise InputError(f"{file}: {name}: shape {numbers.shape}; expected numbers {shape}")
+    return numbers
 
 
 def check_numbers(recording: Recording) -> None:
@@ -150,7 +397,9 @@ def check_numbers(recording: Recording) -> None:
 
 
 def check_times(file: Path, time: NDArray[np.float64]) -> None:
-    """Raise InputError unless times [N] are strictly increasing."""
+    """Raise InputError unless times [N] are finite and strictly increasing."""
+    if len(time) and not np.isfinite(time[0]):
+        raise InputError(f"{file}: column time, row 1: {time[0]:g}; expected a finite number")
     late = np.flatnonzero(~(np.diff(time) > 0))
     if late.size:
         row = int(late[0]) + 2
@@ -161,42 +410,11 @@ def check_times(file: Path, time: NDArray[np.float64]) -> None:
 
 
 def _grouped(table: Mapping[str, NDArray[np.float64]]) -> dict[str, list[NDArray[np.float64]]]:
-    """Return the columns of each group in the order of their index."""
+    """Return the columns of each group, groups in the order of `GROUPS`, columns in that of their index."""
     found: dict[str, dict[int, NDArray[np.float64]]] = {}
     for name, column in table.items():
-        if match := _ELEMENT.fullmatch(name):
-            found.setdefault(match[1], {})[int(match[2])] = column
-    return {name: [columns[i] for i in sorted(columns)] for name, columns in found.items()}
-
-
-def _check_columns(file: Path, names: list[str], known: Collection[str]) -> None:
-    """Refuse unknown and missing columns, and gaps in a group. known: columns in addition to time and the groups."""
-    for separator in ";\t":
-        if len(names) == 1 and separator in names[0]:
-            raise InputError(f"{file}: columns separated by {separator!r}; expected commas, and points in numbers")
-    if "time" not in names:
-        raise InputError(f"{file}: no column time; expected the time of every sample in s")
-    counts: dict[str, set[int]] = {name: set() for name in GROUPS}
-    for name in names:
-        match = _ELEMENT.fullmatch(name)
-        if match and match[1] in GROUPS:
-            counts[match[1]].add(int(match[2]))
-        elif name != "time" and name not in known:
-            groups = ", ".join(f"{group}[i]" for group in GROUPS)
-            raise InputError(f"{file}: unknown column {name!r}; expected time, {groups} or {LABEL}")
-    for name, indices in counts.items():
-        if not indices and GROUPS[name][1]:
-            raise InputError(f"{file}: no column {name}[1]; expected one {name}[i] per tendon, in {GROUPS[name][0]}")
-        for i in range(1, len(indices) + 1):
-            if i not in indices:
-                raise InputError(f"{file}: no column {name}[{i}], but {name}[{max(indices)}]; expected all from 1 on")
-    _check_sizes(file, {name: len(indices) for name, indices in counts.items() if indices})
-
-
-def _check_sizes(file: Path, sizes: Mapping[str, int]) -> None:
-    """Refuse groups of tendons that differ in their number of columns, and groups of joints likewise."""
-    first: dict[str, str] = {}
-    for name, size in sizes.items():
-        other = first.setdefault(GROUP_PER[name], name)
-        if size != sizes[other]:
-            raise InputError(f"{file}: {size} columns {name}[...], expected {sizes[other]} as of {other}[...]")
+        element = element_of(name)
+        if element is not None and element[0] in GROUPS:
+            found.setdefault(element[0], {})[element[1]] = column
+    ordered = {name: found[name] for name in GROUPS if name in found}
+    return {name: [columns[i] for i in sorted(columns)] for name, columns in ordered.items()}

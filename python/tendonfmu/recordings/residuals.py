@@ -60,7 +60,7 @@ def model_alone(
     data
         A valid finger description.
     arrays
-        Signals of `native.Finger.run`, one dict for each part.
+        Signals of `native.Instance.run`, one dict for each part.
     parts
         Slices of the recording. The finger starts anew in each.
     samples
@@ -74,7 +74,7 @@ def model_alone(
         Arrays over the whole recording.
     """
     joints, tendons = len(data["joints"]), len(data["tendons"])
-    probe = native.Finger(native.image_from_json(json.dumps(_without_filter(data))), kinematics_source=source)
+    probe = native.Instance(native.image_from_json(json.dumps(_without_filter(data))), kinematics_source=source)
     start = probe.save_state()
     torque, jump, angle, speed = (np.full((samples, joints), np.nan) for _ in range(4))
     slack = np.zeros((samples, tendons), dtype=bool)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.model import FingerDescription
+from tendonfmu.model import Finger
 from tendonfmu.recordings.faults import tendon_angles
 from tendonfmu.recordings.kinematics import FEWEST, Correction
 from tendonfmu.recordings.recording import Recording
@@ -20,7 +20,7 @@ NEAR = 1.15  # a slope within this factor of a unit's factor shows the unit
 UNITS = ((np.pi / 180, "degrees/s"), (2 * np.pi / 60, "rpm"), (1e-3, "mrad/s"), (2 * np.pi, "turns/s"))
 
 
-def velocity_corrections(recording: Recording, finger: FingerDescription) -> Iterator[tuple[Correction, float]]:
+def velocity_corrections(recording: Recording, finger: Finger) -> Iterator[tuple[Correction, float]]:
     """Yield corrections of columns of `joint_velocity`, each with the slope of the angle over the integral."""
     velocity = recording.groups.get("joint_velocity")
     if velocity is None or len(recording) < FEWEST:
@@ -44,7 +44,7 @@ def velocity_corrections(recording: Recording, finger: FingerDescription) -> Ite
                 yield Correction("scale", (column,), factor, unit), slope
 
 
-def _changes(recording: Recording, finger: FingerDescription, velocity: Numbers) -> tuple[Numbers, Numbers]:
+def _changes(recording: Recording, finger: Finger, velocity: Numbers) -> tuple[Numbers, Numbers]:
     """Return the change of each angle and the integral of each velocity over windows, [K, n] rad."""
     angle = recording.groups.get("joint_position")
     if angle is None:

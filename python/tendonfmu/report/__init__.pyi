@@ -1,4 +1,5 @@
 from . import diagnosis_page as diagnosis_page
+from . import diagnosis_report as diagnosis_report
 from . import diagnosis_text as diagnosis_text
 from . import excite_text as excite_text
 from . import fit_page as fit_page

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.diagnose import Cause, Diagnosis, Evidence, ResidualView
+from tendonfmu.diagnosis import Cause, Diagnosis, Evidence, ResidualView
 from tendonfmu.drawing import Band, Bars, Curve, Dots, Panel, Sheet
 from tendonfmu.report.diagnosis_text import Names, at_place, names_of, unit_of
 from tendonfmu.report.diagnosis_words import Words, words_of

@@ -10,11 +10,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from tendonfmu.diagnose import Diagnosis
+from tendonfmu.diagnosis import Diagnosis
 from tendonfmu.errors import InputError, own_fault
-from tendonfmu.estimate import description_text
 from tendonfmu.files import check_output, check_output_folder, is_about, write_text
 from tendonfmu.fmu import build_fmu
+from tendonfmu.model import description_text
 from tendonfmu.report.diagnosis_page import PAGE, write_diagnosis_page
 from tendonfmu.report.diagnosis_report import EXTENDED, EXTENDED_FMU, NOMINAL, REPORT, build_report, report_text
 from tendonfmu.tasks import uninterrupted

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from tendonfmu.diagnose import (
+from tendonfmu.diagnosis import (
     CONTACT,
     UNKNOWN,
     Cause,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.diagnose import (
+from tendonfmu.diagnosis import (
     Cause,
     ChangedSize,
     DetectionGain,

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from tendonfmu.diagnose import (
+from tendonfmu.diagnosis import (
     CONTACT,
     TITLES,
     Cause,
@@ -75,7 +75,7 @@ _KINDS = ("joints", "tendons")
 
 def title_of(effect: str) -> str:
     """Describe an effect of docs/reference/commands/diagnose.md in a few plain words."""
-    from tendonfmu.diagnose import CANDIDATES
+    from tendonfmu.diagnosis import CANDIDATES
 
     titles = {candidate.name: candidate.title for candidate in CANDIDATES} | TITLES
     return titles.get(effect, effect.replace("_", " "))

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from tendonfmu.diagnose import Diagnosis
+from tendonfmu.diagnosis import Diagnosis
 from tendonfmu.report.diagnosis_text import Names, at_place, left_of, unit_of
 from tendonfmu.report.diagnosis_words import words_of
 from tendonfmu.report.fit_summary import rounded

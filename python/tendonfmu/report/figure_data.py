@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.detect import score_detection
-from tendonfmu.model import FingerDescription
+from tendonfmu.model import Finger
+from tendonfmu.recordings import flagged_stretches
 
 Array = NDArray[Any]
 Interval = tuple[float, float]
@@ -128,7 +129,7 @@ class ReferenceFigure:
 
 
 def compensation_figure(
-    description: FingerDescription,
+    description: Finger,
     recording: Mapping[str, Array],
     outputs: Mapping[str, Array],
     *,
@@ -144,7 +145,7 @@ def compensation_figure(
     recording
         `time` [N]; `external_torque` [N, n] and `contact` [N] if there are labels.
     outputs
-        Outputs of `native.Finger.run`, [N, n] and [N].
+        Outputs of `native.Instance.run`, [N, n] and [N].
     title
         Heading.
     joints
@@ -172,14 +173,7 @@ def compensation_figure(
             )
             for j in joints
         ],
-        found=intervals(time, found & ~is_false),
-        false=intervals(time, is_false),
-        labelled=None if labels is None else intervals(time, labels),
+        found=flagged_stretches(time, found & ~is_false),
+        false=flagged_stretches(time, is_false),
+        labelled=None if labels is None else flagged_stretches(time, labels),
     )
-
-
-def intervals(time: Array, flags: Array) -> list[Interval]:
-    """Return begin and end (s) of each stretch of samples whose flag is set; a stretch lasts until the next sample."""
-    steps = np.diff(np.concatenate([[0], np.asarray(flags).astype(bool).astype(int), [0]]))
-    begins, ends = np.flatnonzero(steps > 0), np.minimum(np.flatnonzero(steps < 0), len(time) - 1)
-    return [(float(time[a]), float(time[b])) for a, b in zip(begins, ends, strict=True)]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.drawing import Band, Curve, Interval, Panel, Sheet
 from tendonfmu.estimate import FitPicture, FitSeries
-from tendonfmu.report.figure_data import intervals
+from tendonfmu.recordings import flagged_stretches
 from tendonfmu.report.fit_error_figures import correlation_sheet, error_sheet
 from tendonfmu.report.fit_law_figures import law_sheets
 
@@ -119,7 +119,7 @@ def _compared(picture: FitPicture) -> list[FitSeries]:
 
 def _window(time: Numbers, where: Flags, first: float) -> NDArray[np.bool_]:
     """Flag `SHOWN` seconds in the first stretch of `where` that is long enough, from `first` s on if possible."""
-    stretches = intervals(time, where) or [(float(time[0]), float(time[-1]))]
+    stretches = flagged_stretches(time, where) or [(float(time[0]), float(time[-1]))]
     wanted = float(time[0]) + first
     later = [(max(begin, wanted), end) for begin, end in stretches if end - max(begin, wanted) >= SHOWN]
     long = [(begin, end) for begin, end in stretches if end - begin >= SHOWN]
@@ -242,7 +242,7 @@ def _end_to_end(series: Sequence[FitSeries]) -> tuple[Numbers, list[Interval]]:
         time = each.time - each.time[0] + begin
         times.append(time)
         if each.held_out is not None:
-            stripes += intervals(time, each.held_out)
+            stripes += flagged_stretches(time, each.held_out)
         begin = float(time[-1])
     return np.concatenate(times), stripes
 

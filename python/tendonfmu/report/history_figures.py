@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tendonfmu.diagnose import NBSP, History, Line
+from tendonfmu.diagnosis import NBSP, History, Line
 from tendonfmu.drawing import Bars, Curve, Dots, Panel, Sheet
 from tendonfmu.report.diagnosis_text import Names, at_place
 from tendonfmu.report.history_text import headline, trend_sentence

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from tendonfmu.diagnose import History
+from tendonfmu.diagnosis import History
 from tendonfmu.drawing import Sheet, draw_panel, write_sheet
 from tendonfmu.files import whole_file
 from tendonfmu.report.diagnosis_text import Names

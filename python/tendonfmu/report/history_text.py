@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from tendonfmu.diagnose import History, Line, count_of, quantity, share_of
+from tendonfmu.diagnosis import History, Line, count_of, quantity, share_of
 from tendonfmu.report.diagnosis_text import Names, at_place, percent
 
 

@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.model import Finger
-from tendonfmu.report.figure_data import Interval, intervals
+from tendonfmu.model import Instance
+from tendonfmu.recordings import flagged_stretches
+from tendonfmu.report.figure_data import Interval
 from tendonfmu.simulate import Array, Plant, Rig, simulate
 
 Signals = Mapping[str, Array]
@@ -193,7 +194,7 @@ def model_friction(rig: Rig, joint: int, signals: Signals) -> NDArray[np.float64
     description = dict(rig.finger.data) | {"velocity_threshold": {"tendon": 0.0, "joint": 0.0}}
     alone = np.zeros_like(signals["joint_velocity"])
     alone[:, joint] = signals["joint_velocity"][:, joint]
-    found = Finger.from_description(description, KINEMATICS_MEASURED).run({**signals, "joint_velocity": alone})
+    found = Instance.from_description(description, KINEMATICS_MEASURED).run({**signals, "joint_velocity": alone})
     return np.asarray((found["friction_torque"] - found["bias_torque"])[:, joint])
 
 
@@ -289,7 +290,7 @@ def truth_figure(rig: Rig, joint: int, begin: float, end: float) -> TruthFigure:
         flexors=[arms[i][joint] > 0.0 for i in range(rig.tendons)],
         angle=truth[f"joint_position[{joint + 1}]"][shown],
         torques={label: truth[f"{name}[{joint + 1}]"][shown] for name, label in labels.items()},
-        contacts=intervals(time, truth["contact"][shown]),
+        contacts=flagged_stretches(time, truth["contact"][shown]),
     )
 
 

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.drawing import Band, Curve, Panel, Sheet
-from tendonfmu.report.figure_data import Interval, intervals
+from tendonfmu.recordings import flagged_stretches
+from tendonfmu.report.figure_data import Interval
 
 Table = Mapping[str, NDArray[Any]]
 
@@ -77,7 +78,7 @@ def _torque_unit(table: Table, joints: int) -> tuple[float, str]:
 
 
 def _torque_panels(table: Table, j: int, name: str, factor: float, unit: str) -> Iterator[Panel]:
-    time, contact = table["time"], tuple(intervals(table["time"], table[f"joint_contact[{j}]"]))
+    time, contact = table["time"], tuple(flagged_stretches(table["time"], table[f"joint_contact[{j}]"]))
     torque, friction, left, std = (
         factor * np.asarray(table[f"{key}[{j}]"], dtype=np.float64)
         for key in ("joint_torque", "friction_torque", "compensated_torque", "compensated_torque_std")
@@ -127,12 +128,14 @@ def _events_sheet(table: Table, joints: Sequence[str], tendons: Sequence[str], l
     time = table["time"]
     rows: list[tuple[str, str, list[Interval]]] = []
     if label is not None:
-        rows.append(("labelled contact", "labelled", intervals(time, label)))
+        rows.append(("labelled contact", "labelled", flagged_stretches(time, label)))
     rows += [
-        (f"contact, {name}", "contact", intervals(time, table[f"joint_contact[{j}]"]))
+        (f"contact, {name}", "contact", flagged_stretches(time, table[f"joint_contact[{j}]"]))
         for j, name in enumerate(joints, start=1)
     ]
-    slack = [(f"slack, {name}", "slack", intervals(time, table[f"slack[{i}]"])) for i, name in enumerate(tendons, 1)]
+    slack = [
+        (f"slack, {name}", "slack", flagged_stretches(time, table[f"slack[{i}]"])) for i, name in enumerate(tendons, 1)
+    ]
     rows += [row for row in slack if row[2]]  # only tendons that have been slack
     used = {style for _, style, found in rows if found}
     meanings = (("labelled", "contact as labelled"), ("contact", "contact as detected"), ("slack", "tendon slack"))

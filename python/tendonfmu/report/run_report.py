@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.model import FingerDescription
-from tendonfmu.report.figure_data import intervals
+from tendonfmu.model import Finger
+from tendonfmu.recordings import flagged_stretches
 
 FORMAT = "tendonfmu-run-1"
 
@@ -18,7 +18,7 @@ Table = Mapping[str, NDArray[Any]]
 
 
 def run_report(
-    model: Path, recording: Path, table: Table, finger: FingerDescription | None, *, kinematics: int, output: str
+    model: Path, recording: Path, table: Table, finger: Finger | None, *, kinematics: int, output: str
 ) -> dict[str, Any]:
     """Return the results of a run in numbers.
 
@@ -57,7 +57,7 @@ def run_report(
         "contact": {
             "samples": int(table["contact"].sum()),
             "share": _share(table["contact"]),
-            "intervals": intervals(time, table["contact"]),
+            "intervals": flagged_stretches(time, table["contact"]),
         },
         "joints": [_joint(table, j, name) for j, name in enumerate(joint_names, start=1)],
         "tendons": [

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.detect import GRACE, DetectionScore, Event, RocPoint, Scored, Track
-from tendonfmu.report.figure_data import Interval, intervals
+from tendonfmu.recordings import flagged_stretches
+from tendonfmu.report.figure_data import Interval
 from tendonfmu.statistics import intervals as statistics_intervals
 
 Numbers = NDArray[np.float64]
@@ -204,10 +205,10 @@ def contact_figure(scored: Scored) -> ContactFigure:
         time=time[rows],
         joints=joints,
         force=None if track.force is None else np.abs(track.force[rows]),
-        labelled=intervals(time, track.label & shown),
-        found=intervals(time, alarm & found & shown),
-        masked=intervals(time, alarm & masked & ~found & shown),
-        outside=intervals(time, alarm & ~masked & ~found & shown),
+        labelled=flagged_stretches(time, track.label & shown),
+        found=flagged_stretches(time, alarm & found & shown),
+        masked=flagged_stretches(time, alarm & masked & ~found & shown),
+        outside=flagged_stretches(time, alarm & ~masked & ~found & shown),
     )
 
 

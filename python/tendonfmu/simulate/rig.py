@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
 from tendonfmu.files import Node, Refusal, read_json
-from tendonfmu.model import FingerDescription, native, read_finger
+from tendonfmu.model import Finger, native, read_finger
 from tendonfmu.simulate.motion_plan import Joints, Motion, expand_motion
 from tendonfmu.simulate.pushes import Segment, expand_pushes
 from tendonfmu.statistics import LARGEST_SEED
@@ -70,7 +70,7 @@ class Rig:
     path: Path
     files: list[Path]
     data: Mapping[str, Any]
-    finger: FingerDescription
+    finger: Finger
     motion: Motion
     expanded: Mapping[str, Any]
     rate: float
@@ -284,7 +284,7 @@ def _expand(path: Path, files: list[Path], data: dict[str, Any]) -> Rig:
     return Rig(path, files, data, finger, motion, expanded, rate, duration, columns)
 
 
-def _finger(node: Node, path: Path, files: list[Path]) -> FingerDescription:
+def _finger(node: Node, path: Path, files: list[Path]) -> Finger:
     """Return the finger, given by its path or inline."""
     if isinstance(node.value, str):
         file = Path(node.text("path of a finger description, relative to this file"))
@@ -297,7 +297,7 @@ def _finger(node: Node, path: Path, files: list[Path]) -> FingerDescription:
         image = native.image_from_json(text)
     except native.NativeError as refused:
         raise Refusal(f"finger: {refused}") from None
-    return FingerDescription(path=path, text=text, data=node.value, image=image)
+    return Finger(path=path, text=text, data=node.value, image=image)
 
 
 def _links(physics: Node, joints: int) -> tuple[list[Segment], Joints]:

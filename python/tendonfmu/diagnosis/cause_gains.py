@@ -1,0 +1,245 @@
+"""How much each cause gains on unseen data; causes that gain nothing there are dropped."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.diagnosis.cause_search import look, predicted_of, series_of
+from tendonfmu.diagnosis.cause_selection import names_with
+from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, cause_parameters, fit_extended
+from tendonfmu.diagnosis.gain import Gain, measure_gain
+from tendonfmu.diagnosis.hypotheses import Hypothesis
+from tendonfmu.diagnosis.nominal_fit import fitted
+from tendonfmu.diagnosis.online_error import OnlineError
+from tendonfmu.diagnosis.search import NamedCause, Search
+from tendonfmu.diagnosis.signal_choice import estimation_recordings
+from tendonfmu.model import Finger
+from tendonfmu.recordings import FitRecording
+from tendonfmu.statistics import Interval, gain_interval
+
+Data = Mapping[str, Any]
+Numbers = NDArray[np.float64]
+Parameters = Mapping[str, tuple[float, str]]
+
+
+@dataclass(frozen=True)
+class Verified:
+    """The causes that unseen data confirm.
+
+    Attributes
+    ----------
+    causes
+        In order of gain, the largest first; places of one effect are one cause.
+    gains
+        Of each cause.
+    parameters
+        Numbers of each place of each cause.
+    without
+        For each cause, the fit that lacks it.
+    dropped
+        Causes that unseen data do not confirm.
+    nominal_data, extended_data
+        Descriptions as they run online.
+    extended
+        Extended description with the settings for estimation.
+    """
+
+    causes: tuple[NamedCause, ...]
+    gains: tuple[Interval, ...]
+    parameters: tuple[tuple[Parameters, ...], ...]
+    without: tuple[FittedModel, ...]
+    dropped: tuple[NamedCause, ...]
+    gain: Gain
+    nominal_data: Data
+    extended_data: Data
+    extended: Data
+
+
+def verify(
+    given: Finger,
+    found: Search,
+    training: Sequence[FitRecording],
+    tests: Sequence[FitRecording],
+    least_gain: float,
+    settings: FitSettings,
+    seed: int,
+) -> Verified:
+    """Measure the gain of each cause on unseen data and drop the weak ones.
+
+    `training` and `tests` are as measured. Without tests, the held-out parts of `training` are judged.
+    """
+    bench = _Bench(given, found, training, tests, settings, seed)
+    causes, dropped = merged(found.causes), []
+    while True:
+        fit = bench.fit(causes)
+        without = [bench.fit([*causes[:k], *causes[k + 1 :]]) for k in range(len(causes))]
+        gains = bench.gains(fit, without)
+        names = _names(causes, gains)
+        weak = [
+            k
+            for k, gain in enumerate(gains)
+            if not (gain.low > 0.0 and gain.value >= least_gain * names[k] and bench.runs_better(fit, without[k]))
+        ]
+        if not weak and causes and not bench.runs_better(fit, bench.nominal):
+            weak = list(range(len(causes)))  # each corrects what another one spoils
+        if not weak:
+            break
+        worst = min(weak, key=lambda k: gains[k].value)
+        dropped.append(replace(causes[worst], measured=gains[worst]))
+        causes = [*causes[:worst], *causes[worst + 1 :]]
+    order = sorted(range(len(causes)), key=lambda k: -gains[k].value)
+    ranked = [causes[k] for k in order]
+    between = [bench.online(bench.fit(ranked[: k + 1])) for k in range(len(ranked) - 1)]
+    nominal = bench.online(bench.nominal)
+    extended = bench.online(fit) if causes else nominal
+    return Verified(
+        causes=tuple(ranked),
+        gains=tuple(gains[k] for k in order),
+        parameters=_parameters(bench.nominal, fit, causes, order),
+        without=tuple(without[k] for k in order),
+        dropped=tuple(dropped),
+        gain=measure_gain(nominal, extended, training, tests, between=between, seed=seed),
+        nominal_data=nominal,
+        extended_data=extended,
+        extended=fit.data,
+    )
+
+
+def _names(causes: Sequence[NamedCause], gains: Sequence[Interval]) -> list[int]:
+    """Return, for each cause, the number of names up to and including it, the largest gain first."""
+    found, named = [1] * len(causes), list[str]()
+    for k in sorted(range(len(causes)), key=lambda k: -gains[k].value):
+        found[k] = names_with(causes[k].effect, named)
+        named.append(causes[k].effect)
+    return found
+
+
+def merged(causes: Sequence[NamedCause]) -> list[NamedCause]:
+    """Merge the places of one effect into one cause.
+
+    The merged cause can be confused with whatever one of its places can be confused with, except other named causes.
+    """
+    by_effect: dict[str, NamedCause] = {}
+    for cause in causes:
+        known = by_effect.get(cause.effect)
+        if known is None:
+            by_effect[cause.effect] = cause
+            continue
+        by_effect[cause.effect] = replace(
+            known,
+            joint=known.joint if known.joint == cause.joint else None,
+            tendon=known.tendon if known.tendon == cause.tendon else None,
+            accepted=(*known.accepted, *cause.accepted),
+            p_value=min(known.p_value, cause.p_value),
+            alike=(*known.alike, *cause.alike),
+        )
+    return [replace(cause, alike=_rivals(cause, by_effect)) for cause in by_effect.values()]
+
+
+def _rivals(cause: NamedCause, named: Collection[str]) -> tuple[Hypothesis, ...]:
+    """Return the best hypothesis of every other effect."""
+    found: dict[str, Hypothesis] = {}
+    for each in cause.alike:
+        if each.effect not in named:
+            found.setdefault(each.effect, each)
+    return tuple(found.values())
+
+
+def _parameters(
+    nominal: FittedModel, model: FittedModel, causes: Sequence[NamedCause], order: Sequence[int]
+) -> tuple[tuple[Parameters, ...], ...]:
+    """Return the numbers of each place of each cause, in this order."""
+    found = iter(cause_parameters(nominal.data, [each for cause in causes for each in cause.accepted], model))
+    by_cause = [tuple(next(found) for _ in cause.accepted) for cause in causes]
+    return tuple(by_cause[k] for k in order)
+
+
+class _Bench:
+    """Fits of any set of causes, and their residuals on unseen data."""
+
+    def __init__(
+        self,
+        given: Finger,
+        found: Search,
+        training: Sequence[FitRecording],
+        tests: Sequence[FitRecording],
+        settings: FitSettings,
+        seed: int,
+    ) -> None:
+        self._given, self._found, self._settings, self._seed = given, found, settings, seed
+        self._training, self._tests = training, tests
+        self._fits: dict[frozenset[int], FittedModel] = {}
+        self._errors: dict[int, tuple[FittedModel, Numbers]] = {}
+        self._signals = found.estimation.signals
+        self.nominal, self._fit_to = found.nominal, list(found.fitted_to)
+        if tests:  # the search has fitted to the same samples
+            for count, model in enumerate(found.models):
+                known = [each for cause in found.causes[:count] for each in cause.accepted]
+                self._fits[frozenset(map(id, known))] = model
+        else:
+            self._hold_out()
+
+    def _hold_out(self) -> None:
+        """Exclude the judged samples from the fits."""
+        finger = replace(self._given, data=self._signals.description(self._given.data))
+        own = estimation_recordings(finger, self._training, self._signals)
+        self._fit_to = [
+            replace(clean, train=clean.train & each.train) for clean, each in zip(self._fit_to, own, strict=True)
+        ]
+        self.nominal = fitted(self.nominal.data, self._fit_to, self._settings, given=self.nominal.given)
+
+    def fit(self, causes: Sequence[NamedCause]) -> FittedModel:
+        accepted = [each for cause in causes for each in cause.accepted]
+        key = frozenset(map(id, accepted))
+        if key not in self._fits:
+            known = self._found.causes
+            fit_to = self._predicted if accepted and known else self._fit_to
+            self._fits[key] = fit_extended(self.nominal, accepted, fit_to, self._settings)
+        return self._fits[key]
+
+    @cached_property
+    def _predicted(self) -> list[FitRecording]:
+        """Return the recordings with the forces that the model of all causes predicts."""
+        extended, estimation = self._found.extended.data, self._found.estimation
+        series = series_of(extended, estimation.recordings, estimation.grid, self._found.out)
+        predicted = predicted_of(extended, estimation.recordings, estimation.grid, series)
+        return [replace(clean, train=each.train) for clean, each in zip(predicted, self._fit_to, strict=True)]
+
+    def gains(self, model: FittedModel, without: Sequence[FittedModel]) -> list[Interval]:
+        after = self._error(model)
+        return [gain_interval(self._error(each), after, self._seed) for each in without]
+
+    def runs_better(self, model: FittedModel, without: FittedModel) -> bool:
+        """Return whether the first model leaves less of r."""
+        return self._unseen.square(self.online(model)) < self._unseen.square(self.online(without))
+
+    def _error(self, model: FittedModel) -> Numbers:
+        """Return Σ e² by stretch on unseen data [K].
+
+        A fifth of the training recordings would show little. Without tests, each fold is therefore unseen in turn and
+        the linear numbers are refitted, as in the search.
+        """
+        if id(model) not in self._errors:
+            if self._tests:
+                error = self._unseen.by_stretch(self.online(model))
+            else:
+                own = self._found.estimation
+                view = look(model.data, own.recordings, own.grid, own.least, self._found.out, candidates=())
+                error = view.selection.base
+            self._errors[id(model)] = (model, error)
+        return self._errors[id(model)][1]
+
+    @cached_property
+    def _unseen(self) -> OnlineError:
+        """Return the errors of models that run online; of the training recordings, all free motion counts."""
+        judged = self._tests or [replace(each, train=each.train | each.held_out) for each in self._training]
+        return OnlineError(self.online(self.nominal), judged)
+
+    def online(self, model: FittedModel) -> dict[str, Any]:
+        return self._found.estimation.online(model.data)

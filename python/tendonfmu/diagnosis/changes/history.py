@@ -1,0 +1,380 @@
+"""How the causes develop over many recordings of one finger: which ones grow, and how fast.
+
+::
+
+    found = diagnose_history("finger.json", ["2026-03-01.parquet", "2026-03-08.parquet", ...])
+
+The recordings are in order of time and each is compared with the reference. Each recording is diagnosed by itself; then
+the sizes of all causes that were named in any recording are estimated in all of them.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+import zlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.diagnosis.changes.trend import slope
+from tendonfmu.diagnosis.diagnosis import LEAST_GAIN, change_case, diagnose
+from tendonfmu.diagnosis.result import ChangedSize, Where
+from tendonfmu.errors import InputError
+from tendonfmu.model import Finger, read_finger
+from tendonfmu.statistics import Interval
+from tendonfmu.tasks import Job, rows_of, run_jobs
+
+Numbers = NDArray[np.float64]
+File = str | os.PathLike[str]
+
+WEEK = 7.0 * 86400.0  # s
+FEWEST = 3  # recordings needed for a trend
+_DATE = re.compile(r"(?<!\d)(\d{4})-?(\d{2})-?(\d{2})(?:[T_ -]?(\d{2})[-:h]?(\d{2})(?:[-:]?(\d{2}))?)?(?!\d)")
+
+
+@dataclass(frozen=True)
+class Size:
+    """A cause in one recording.
+
+    Attributes
+    ----------
+    size
+        Size in the reference and in this recording.
+    named
+        Whether the diagnosis of the recording names it.
+    gain
+        Gain there, 0 if it is not named.
+    """
+
+    recording: str
+    size: ChangedSize
+    named: bool
+    gain: float
+
+
+@dataclass(frozen=True)
+class Line:
+    """One cause over all recordings.
+
+    Attributes
+    ----------
+    where, title
+        Effect and place, and the effect in plain words.
+    sizes
+        Of each recording in which the cause could be estimated.
+    trend
+        Change of the size per unit of time of the history; None for fewer than FEWEST recordings.
+    since
+        First recording from which on the interval of the change excludes 0; None if there is none.
+    """
+
+    where: Where
+    title: str
+    sizes: tuple[Size, ...]
+    trend: Interval | None
+    since: str | None
+
+
+@dataclass(frozen=True)
+class History:
+    """All causes over all recordings.
+
+    Attributes
+    ----------
+    references, recordings
+        Names of the files.
+    times
+        Of the recordings [K]. If the names have dates: weeks since the reference, or since the first recording if the
+        reference has no date. Otherwise the number of the recording, from 1.
+    dated
+        Whether `times` are weeks.
+    lines
+        One for each cause, the most frequently named first.
+    verdicts
+        Of each recording.
+    failed
+        (recording, reason) for each recording that could not be diagnosed.
+    """
+
+    finger: str
+    references: tuple[str, ...]
+    recordings: tuple[str, ...]
+    times: tuple[float, ...]
+    dated: bool
+    lines: tuple[Line, ...]
+    verdicts: tuple[str, ...]
+    failed: tuple[tuple[str, str], ...]
+
+    @property
+    def unit(self) -> str:
+        """Unit of `times`: "week" or "recording"."""
+        return "week" if self.dated else "recording"
+
+
+def diagnose_history(
+    finger: Finger | File,
+    recordings: Sequence[File],
+    reference: Sequence[File] = (),
+    *,
+    rows: Path,
+    client: Any = None,
+    kinematics: int = 1,
+    least_gain: float = LEAST_GAIN,
+    seed: int = 0,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> History:
+    """Diagnose each recording against the reference and follow every cause over all of them.
+
+    A call with the same `rows` continues where an earlier one stopped.
+
+    Parameters
+    ----------
+    finger
+        Description, or its file.
+    recordings
+        Files in order of time.
+    reference
+        Recordings of the finger when it was well; without any, the first recording is the reference.
+    rows
+        Folder for the results of each recording.
+    client
+        Of `jobs.workers_of`; None to run here, one recording after another.
+    kinematics
+        Kinematics source, 1 to 3.
+    least_gain
+        Share of the remaining rms that a cause must remove.
+    seed
+        Seed of all random numbers.
+    progress
+        Called with the number of steps done and of all steps.
+
+    Returns
+    -------
+    History
+        Causes, sizes, trends and failed recordings.
+
+    Raises
+    ------
+    InputError
+        If a file or an option is at fault, or if there is nothing to compare with the reference.
+    """
+    given = read_finger(finger)
+    files = [str(each) for each in recordings]
+    before = [str(each) for each in reference] or files[:1]
+    later = files if reference else files[1:]
+    if not later:
+        raise InputError("history: one recording; expected two at least, or a reference")
+    options = (str(given.path), before, kinematics, least_gain, seed)
+    names = _names(later, options)
+    first = [Job(f"{name}.causes", (*options, file)) for name, file in zip(names, later, strict=True)]
+    total = 2 * len(later)
+    run_jobs(named_in, first, rows, client, progress=lambda done, _: progress(done, total))
+    causes = rows_of(first, rows)
+    keys = sorted({tuple(key) for row in causes for key in json.loads(row.get("keys") or "[]")}, key=str)
+    mark = _mark(keys)
+    second = [
+        Job(f"{name}.sizes.{mark}", (*options, file, json.dumps(keys)))
+        for name, file, row in zip(names, later, causes, strict=True)
+        if keys and not row.get("error")
+    ]
+    run_jobs(sizes_in, second, rows, client, progress=lambda done, _: progress(total - len(second) + done, total))
+    of = dict(zip((job.arguments[-2] for job in second), rows_of(second, rows), strict=True))
+    sizes = [of.get(file, {}) for file in later]
+    return _history(given.name, before, later, causes, sizes)
+
+
+def named_in(
+    finger: str, reference: Sequence[str], kinematics: int, least_gain: float, seed: int, recording: str
+) -> dict[str, Any]:
+    """Return a row: what has changed in one recording."""
+    found = diagnose(finger, [recording], reference=reference, kinematics=kinematics, least_gain=least_gain, seed=seed)
+    causes = {key_text(each.where): each.gain.value for each in found.causes}
+    return {
+        "recording": recording,
+        "verdict": found.verdict,
+        "keys": json.dumps([[each.where.effect, each.where.joint, each.where.tendon] for each in found.causes]),
+        "gains": json.dumps(causes),
+        "titles": json.dumps({key_text(each.where): each.title for each in found.causes}),
+    }
+
+
+def sizes_in(
+    finger: str, reference: Sequence[str], kinematics: int, least_gain: float, seed: int, recording: str, keys: str
+) -> dict[str, Any]:
+    """Return a row: the sizes of these effects at these places in one recording, all of them free."""
+    from tendonfmu.diagnosis.changes.diagnosis import sizes_now
+
+    case = change_case(finger, [recording], reference, [], kinematics, least_gain, True)
+    found = sizes_now(case, [tuple(key) for key in json.loads(keys)], seed=seed, jobs=1)
+    return {
+        "recording": recording,
+        "sizes": json.dumps({key_text(Where(*key)): _written(size) for key, size in found}),
+    }
+
+
+def key_text(where: Where) -> str:
+    return json.dumps([where.effect, where.joint, where.tendon])
+
+
+def _written(size: ChangedSize) -> dict[str, Any]:
+    ends = {name: getattr(size, name) for name in ("reference", "now", "change")}
+    return {
+        "number": size.number,
+        "unit": size.unit,
+        **{name: [each.value, each.low, each.high] for name, each in ends.items()},
+    }
+
+
+def _read(entry: dict[str, Any]) -> ChangedSize:
+    then, now, change = (Interval(*entry[name]) for name in ("reference", "now", "change"))
+    return ChangedSize(entry["number"], entry["unit"], then, now, change)
+
+
+# --- put together -----------------------------------------------------------------------------------------------------
+
+
+def _history(
+    finger: str,
+    references: Sequence[str],
+    recordings: Sequence[str],
+    causes: Sequence[dict[str, Any]],
+    sizes: Sequence[dict[str, Any]],
+) -> History:
+    failed = [
+        (recording, row["error"])
+        for recording, rows in zip(recordings, zip(causes, sizes, strict=True), strict=True)
+        for row in rows
+        if row.get("error")
+    ]
+    bad = {recording for recording, _ in failed}
+    kept = [k for k, recording in enumerate(recordings) if recording not in bad]
+    times, dated = times_of([*references, *(recordings[k] for k in kept)])
+    times = times[len(references) :]
+    if not dated:
+        times, dated = times_of([recordings[k] for k in kept])
+    titles: dict[str, str] = {}
+    for row in causes:
+        titles |= json.loads(row.get("titles") or "{}")
+    lines = [
+        _line(key, title, [recordings[k] for k in kept], [causes[k] for k in kept], [sizes[k] for k in kept], times)
+        for key, title in titles.items()
+    ]
+    return History(
+        finger=finger,
+        references=tuple(references),
+        recordings=tuple(recordings[k] for k in kept),
+        times=times,
+        dated=dated,
+        lines=tuple(sorted((each for each in lines if each.sizes), key=_importance, reverse=True)),
+        verdicts=tuple(str(causes[k]["verdict"]) for k in kept),
+        failed=tuple(dict(failed).items()),
+    )
+
+
+def _importance(line: Line) -> tuple[int, float]:
+    return sum(each.named for each in line.sizes), max(each.gain for each in line.sizes)
+
+
+def _line(
+    key: str,
+    title: str,
+    recordings: Sequence[str],
+    causes: Sequence[dict[str, Any]],
+    sizes: Sequence[dict[str, Any]],
+    times: Sequence[float],
+) -> Line:
+    found, when = [], []
+    for recording, cause, row, time in zip(recordings, causes, sizes, times, strict=True):
+        entry = json.loads(row.get("sizes") or "{}").get(key)
+        if entry is not None:
+            gain = float(json.loads(cause.get("gains") or "{}").get(key, 0.0))
+            found.append(Size(recording, _read(entry), gain > 0.0, gain))
+            when.append(time)
+    trend = slope(np.array(when), [each.size.now for each in found]) if len(found) >= FEWEST else None
+    return Line(Where(*json.loads(key)), title, tuple(found), trend, _since(found))
+
+
+def _since(sizes: Sequence[Size]) -> str | None:
+    since = None
+    for each in reversed(sizes):
+        change = each.size.change
+        if change.low <= 0.0 <= change.high:
+            break
+        since = each.recording
+    return since
+
+
+def times_of(recordings: Sequence[str]) -> tuple[tuple[float, ...], bool]:
+    """Return weeks since the first recording, if all names have dates in the given order; else 1, 2, ..."""
+    dates = [_date(Path(each).stem) for each in recordings]
+    known = [each for each in dates if each is not None]
+    if len(known) == len(dates) > 0 and all(a <= b for a, b in pairwise(known)):
+        return tuple((each - known[0]) / WEEK for each in known), True
+    return tuple(float(k) for k in range(1, len(dates) + 1)), False
+
+
+def _date(name: str) -> float | None:
+    """Return the date in a name, such as 2026-03-01 or 20260301T1230, in s."""
+    matched = _DATE.search(name)
+    if matched is None:
+        return None
+    year, month, day, hour, minute, second = (int(each or 0) for each in matched.groups())
+    try:
+        return datetime(year, month, day, hour, minute, second, tzinfo=timezone.utc).timestamp()
+    except ValueError:
+        return None
+
+
+def _names(recordings: Sequence[str], options: Sequence[Any]) -> list[str]:
+    """Return names of rows: number, stem, and a mark of all that the row depends on.
+
+    If any of this differs, the row is computed again.
+    """
+    finger, references = str(options[0]), list(options[1])
+    shared = [*options, *(_stamp(each) for each in (finger, *references))]
+    return [
+        f"{k:04d}_{Path(each).stem}_{_mark([*shared, each, _stamp(each)])}"
+        for k, each in enumerate(recordings, start=1)
+    ]
+
+
+def _mark(what: Any) -> str:
+    """Return a short hash that is the same in every process."""
+    return f"{zlib.crc32(json.dumps(what).encode()):08x}"
+
+
+def _stamp(file: str) -> list[int]:
+    try:
+        found = os.stat(file)
+    except OSError as failed:
+        raise InputError(f"{file}: {failed.strerror}") from None
+    return [found.st_size, found.st_mtime_ns]
+
+
+def share_of(line: Line) -> Interval | None:
+    """Return the trend as a share of the size in the reference.
+
+    Parameters
+    ----------
+    line
+        One cause of a history.
+
+    Returns
+    -------
+    Interval or None
+        Share per unit of time with its 95 % interval; None if the reference size is 0 or there is no trend.
+    """
+    base = line.sizes[0].size.reference.value
+    if line.trend is None or not base or not math.isfinite(line.trend.low):
+        return None
+    ends = sorted((line.trend.low / base, line.trend.high / base))
+    return Interval(line.trend.value / base, *ends)

@@ -1,0 +1,107 @@
+"""Whether a torque is present all the time now that was not in the reference: a load, a touch, or a sensor's zero."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from tendonfmu.diagnosis.result import ChangedSize, SteadyLoad
+from tendonfmu.diagnosis.series import Series
+from tendonfmu.statistics import Interval, gain_interval, make_folds
+
+Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+BEYOND = 2.0  # times what the reference itself leaves about its level, or the distance between its recordings
+LEVEL = 0.01  # largest share of stretches whose mean is on the other side
+
+
+def steady_load(series: Series, left: Numbers, is_now: Flags, seed: int = 0) -> SteadyLoad | None:
+    """Return the load at the joint where it is largest; None if no level moved far beyond the scatter of the reference.
+
+    `left` is measured less modelled torque, with all changes and including the bias, N·m [B, n].
+    """
+    found = []
+    for joint in range(left.shape[1]):
+        then, now = (_Side.of(series, left[:, joint], series.used & side) for side in (~is_now, is_now))
+        if min(len(then.means), len(now.means)) < 2:
+            continue
+        load = _at(joint, then, now, seed)
+        if load is not None:
+            found.append(load)
+    best = max(found, key=lambda each: abs(each.size.change.value), default=None)
+    return best and replace(best, p_value=min(1.0, best.p_value * left.shape[1]))
+
+
+@dataclass(frozen=True)
+class _Side:
+    """The mean torque of one side.
+
+    Attributes
+    ----------
+    level
+        Mean, N·m.
+    spread
+        Rms about the level, N·m.
+    apart
+        Largest distance of a recording's mean from the level, N·m.
+    means, squares, counts
+        By stretch of 2 s.
+    """
+
+    level: float
+    spread: float
+    apart: float
+    means: Numbers
+    squares: Numbers
+    counts: Numbers
+
+    @staticmethod
+    def of(series: Series, values: Numbers, used: Flags) -> _Side:
+        rows = np.flatnonzero(used)
+        if not len(rows):
+            return _Side(0.0, 0.0, 0.0, np.zeros(0), np.zeros(0), np.zeros(0))
+        own = values[rows]
+        level = float(own.mean())
+        by_recording = [float(own[series.recording[rows] == k].mean()) for k in np.unique(series.recording[rows])]
+        folds = make_folds(replace(series, used=used))
+        counts = np.bincount(folds.stretch, minlength=folds.stretches).astype(np.float64)
+        sums = [np.bincount(folds.stretch, values[folds.rows] ** k, minlength=folds.stretches) for k in (1, 2)]
+        return _Side(
+            level,
+            float(own.std()),
+            max(abs(each - level) for each in by_recording),
+            np.asarray(sums[0] / counts, dtype=np.float64),
+            np.asarray(sums[1], dtype=np.float64),
+            counts,
+        )
+
+    @property
+    def error(self) -> float:
+        """Standard error of the level."""
+        return float(np.std(self.means, ddof=1) / np.sqrt(len(self.means)))
+
+    def about(self, level: float) -> Numbers:
+        """Return Σ (x − level)² by stretch [K]."""
+        return np.asarray(self.squares - 2.0 * level * self.means * self.counts + level**2 * self.counts)
+
+
+def _at(joint: int, then: _Side, now: _Side, seed: int) -> SteadyLoad | None:
+    moved = now.level - then.level
+    if abs(moved) <= BEYOND * max(then.spread, then.apart):
+        return None
+    if float(np.mean(np.sign(now.means - then.level) != np.sign(moved))) > LEVEL:
+        return None
+    gain = gain_interval(now.about(then.level), now.about(now.level), seed)
+    error = float(np.hypot(then.error, now.error))
+    levels = (_interval(then.level, then.error), _interval(now.level, now.error), _interval(moved, error))
+    size = ChangedSize("torque", "N.m", *levels)
+    p_value = float(stats.ttest_ind(then.means, now.means, equal_var=False).pvalue)
+    return SteadyLoad(joint + 1, size, gain, p_value)
+
+
+def _interval(value: float, error: float) -> Interval:
+    return Interval(value, value - 1.96 * error, value + 1.96 * error)

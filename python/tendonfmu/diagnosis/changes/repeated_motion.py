@@ -1,0 +1,155 @@
+"""Which motions of the reference were repeated exactly; there, the change is the difference of aligned samples.
+
+No model of what is wrong in both is needed then.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import correlate
+
+from tendonfmu.diagnosis.series import Series
+
+Numbers = NDArray[np.float64]
+Rows = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+Array = NDArray[Any]
+
+SAME = 0.02  # of the angles' spread: a controller follows the same reference this closely
+ALIKE = 0.1  # of the forces: friction that grows with them then differs by as little
+LEAST = 5.0  # s; least length that both motions share
+NEAR = (
+    0.3  # s: the later one motion is, the fewer samples their correlation sums, which moves its peak by less than this
+)
+
+
+@dataclass(frozen=True)
+class Repeat:
+    """A motion that was repeated.
+
+    Attributes
+    ----------
+    then, now
+        Recordings, by number.
+    shift
+        From a time in `then` to the same place of the motion in `now`, s.
+    begin, end
+        Times in `then` of what both share, s.
+    """
+
+    then: int
+    now: int
+    shift: float
+    begin: float
+    end: float
+
+
+def find_repeats(series: Series, force: Numbers, then: Sequence[int], now: Sequence[int]) -> list[Repeat]:
+    """Return the repeated motions: new recordings that follow the motion of a reference recording under the same load.
+
+    Pretension must be the same, too. `force` [B, m], N, is predicted by the model from motion, load and pretension.
+    """
+    found = []
+    for number in now:
+        fits = [repeat for other in then if (repeat := _repeat(series, force, other, number)) is not None]
+        if fits:
+            found.append(max(fits, key=lambda each: each.end - each.begin))
+    return found
+
+
+def less_reference(values: Array, series: Series, repeats: Sequence[Repeat]) -> Array:
+    """Return values [B, ...] of the new recordings less those of the reference at the same place of the motion."""
+    found = values.copy()
+    for each in repeats:
+        rows, first, share = _places(series, each)
+        share = share.reshape(-1, *(1,) * (values.ndim - 1)).astype(values.dtype)
+        found[rows] -= values[first] * (1 - share) + values[first + 1] * share
+    return np.asarray(found)
+
+
+def outside(series: Series, repeats: Sequence[Repeat]) -> Flags:
+    """Return the blocks that add nothing to the differences [B].
+
+    They are all of the repeated motions of the reference, and the new recordings before and after the motion.
+    """
+    found = np.isin(series.recording, [each.then for each in repeats])
+    for each in repeats:
+        rows, first, _ = _places(series, each)
+        own = series.recording == each.now
+        own[rows[series.used[first] & series.used[first + 1]]] = False
+        found |= own
+    return found
+
+
+def _places(series: Series, repeat: Repeat) -> tuple[Rows, Rows, Numbers]:
+    """Return blocks of the new recording, the reference block before each, and how far each is beyond that block."""
+    then, now = (np.flatnonzero(series.recording == number) for number in (repeat.then, repeat.now))
+    when = series.time[now] - repeat.shift
+    inside = (when >= repeat.begin) & (when < repeat.end)
+    first = np.searchsorted(series.time[then], when[inside], side="right") - 1
+    first = np.clip(first, 0, len(then) - 2)
+    begin = series.time[then][first]
+    share = np.clip((when[inside] - begin) / (series.time[then][first + 1] - begin), 0.0, 1.0)
+    return now[inside], then[first], share
+
+
+# --- finding ----------------------------------------------------------------------------------------------------------
+
+
+def _repeat(series: Series, force: Numbers, then: int, now: int) -> Repeat | None:
+    rows = [series.recording == number for number in (then, now)]
+    time, angle = ([values[each] for each in rows] for values in (series.time, series.angle))
+    step = series.step
+    if min(len(each) for each in time) * step < LEAST or any(np.diff(each).max() > 1.5 * step for each in time):
+        return None
+    for lag in _lags(angle[0], angle[1], round(NEAR / step)):
+        begin, end = _shared(len(angle[0]), len(angle[1]), lag)
+        if (end - begin) * step < LEAST:
+            continue
+        one, other = angle[0][begin:end], angle[1][begin + lag : end + lag]
+        spread = np.ptp(one, axis=0)
+        apart = np.sqrt(np.mean((one - other) ** 2, axis=0))
+        moves = spread > 1e-6
+        if moves.any() and (apart[moves] <= SAME * spread[moves]).all() and _same_load(force, rows, begin, end, lag):
+            shift = float(time[1][begin + lag] - time[0][begin])
+            return Repeat(then, now, shift, float(time[0][begin]), float(time[0][end - 1]))
+    return None
+
+
+def _same_load(force: Numbers, rows: Sequence[Flags], begin: int, end: int, lag: int) -> bool:
+    one, other = force[rows[0]][begin:end], force[rows[1]][begin + lag : end + lag]
+    apart = np.sqrt(np.mean((one - other) ** 2, axis=0))
+    return bool((apart <= ALIKE * np.sqrt(np.mean(one**2, axis=0))).all())
+
+
+def _shared(one: int, other: int, lag: int) -> tuple[int, int]:
+    """Return the first block of the first motion that the second one has, too, and the one after the last."""
+    return max(0, -lag), min(one, other - lag)
+
+
+def _lags(one: Numbers, other: Numbers, near: int) -> Iterator[int]:
+    """Yield possible delays of the second motion, in blocks.
+
+    These are 0, for recordings that start alike, and the delay at which the angles differ least. The latter is searched
+    within `near` blocks of the largest correlation.
+    """
+    yield 0
+    whole = np.zeros(len(one) + len(other) - 1)
+    for a, b in zip((one - one.mean(axis=0)).T, (other - other.mean(axis=0)).T, strict=True):
+        scale = max(float(np.linalg.norm(a) * np.linalg.norm(b)), 1e-300)
+        whole += correlate(b, a, method="fft") / scale
+    best = int(np.argmax(whole)) - (len(one) - 1)
+    yield min(range(best - near, best + near + 1), key=lambda lag: _apart(one, other, lag))
+
+
+def _apart(one: Numbers, other: Numbers, lag: int) -> float:
+    """Return the mean square difference of the angles over what both share."""
+    begin, end = _shared(len(one), len(other), lag)
+    if end <= begin:
+        return np.inf
+    return float(np.mean((one[begin:end] - other[begin + lag : end + lag]) ** 2))

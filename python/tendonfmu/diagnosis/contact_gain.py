@@ -1,0 +1,156 @@
+"""How much the extended model improves contact detection, measured on labelled recordings.
+
+Both models are tuned alike on free motion: the thresholds of each are the lowest that keep the same rate of false
+alarms in the same free motion (`detect.tuning.ContactTuning`). Both are then scored on the labels: `detect.counting`
+counts events, false alarms and delays.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.detect import (
+    SETTLING,
+    ContactTuning,
+    DetectionScore,
+    Subject,
+    TuneWarning,
+    free_parts,
+    least_hours,
+    pooled,
+    run_track,
+)
+from tendonfmu.diagnosis.result import DetectionGain
+from tendonfmu.errors import InputError
+from tendonfmu.model import Finger, native
+from tendonfmu.recordings import FitRecording, Recording
+
+Data = Mapping[str, Any]
+Flags = NDArray[np.bool_]
+
+RATE = 6.0  # 1/h; false alarm rate that both are tuned for, or the lowest that the free motion supports
+CONFIDENCE = 0.9
+_SHORTEST = 4.0  # s; shortest stretch without contact that counts as free motion
+_MARGIN = 1.0  # s, on either side of a contact
+_SPARE = 1.3  # times the least time that supports a rate: recordings are cut into blocks
+
+
+def detection_gain(nominal: Data, extended: Data, recordings: Sequence[FitRecording]) -> DetectionGain | None:
+    """Return the gain for contact detection; None without labelled contact or if no thresholds can be tuned.
+
+    Thresholds cannot be tuned without free motion or with a bias that does not drift. `nominal` and `extended` are
+    fitted descriptions. `recordings` are all of the diagnosis, for training and tests. Recordings without any contact
+    are the free motion; if there are none, the stretches without contact of the others are used.
+    """
+    labelled = [each.recording for each in recordings if each.recording.contact is not None]
+    labelled = [each for each in labelled if each.contact is not None and each.contact.any()]
+    if not labelled:
+        return None
+    kinematics = recordings[0].kinematics
+    free = _free_motion(_described(nominal), [each.recording for each in recordings], kinematics)
+    if not free:
+        return None
+    hours = sum(float(each.time[-1] - each.time[0]) - SETTLING for each in free) / 3600
+    rate = max(RATE, _SPARE * least_hours(1.0, CONFIDENCE) / hours)
+    if rate > 3600:
+        return None
+    try:
+        tuned = [_tuned(data, free, kinematics, rate) for data in (nominal, extended)]
+    except InputError:  # no thresholds can be tuned, for example with a bias without drift
+        return None
+    before, after = (_score(data, labelled, kinematics) for data in tuned)
+    return DetectionGain(
+        events=len(before.events),
+        found_before=before.found,
+        found_after=after.found,
+        false_alarms_before=len(before.false_alarms),
+        false_alarms_after=len(after.false_alarms),
+        median_delay_before=_median(before),
+        median_delay_after=_median(after),
+        thresholds_before=_thresholds(tuned[0]),
+        thresholds_after=_thresholds(tuned[1]),
+    )
+
+
+# --- free motion ------------------------------------------------------------------------------------------------------
+
+
+def _free_motion(finger: Finger, recordings: Sequence[Recording], kinematics: int) -> list[Recording]:
+    whole = [each for each in recordings if each.contact is None or not each.contact.any()]
+    found = [each for each in whole if _is_free(finger, each, kinematics)]
+    if found:
+        return found
+    pieces = [piece for each in recordings if each.contact is not None for piece in _pieces(each, each.contact)]
+    return [piece for piece in pieces if _is_free(finger, piece, kinematics)]
+
+
+def _is_free(finger: Finger, recording: Recording, kinematics: int) -> bool:
+    """Return whether a recording is free motion: long enough, moving, and without a load on a reference sensor."""
+    try:
+        parts, _ = free_parts(finger, recording, kinematics)
+    except InputError:
+        return False
+    return any(part.counted.any() for part in parts)
+
+
+def _pieces(recording: Recording, contact: Flags) -> list[Recording]:
+    """Return the stretches that are not in or close to contact."""
+    time = recording.time
+    touched = time[contact]
+    after = np.searchsorted(touched, time - _MARGIN) < np.searchsorted(touched, time + _MARGIN, side="right")
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], (~after).astype(np.int8), [0]])))
+    found = []
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        if time[end - 1] - time[begin] >= _SHORTEST:
+            groups = {name: np.ascontiguousarray(values[begin:end]) for name, values in recording.groups.items()}
+            piece = Recording(Path(f"{recording.path}, from {time[begin]:.4g} s"), time[begin:end].copy(), groups)
+            found.append(replace(piece, contact=np.zeros(end - begin, dtype=bool)))
+    return found
+
+
+# --- tuned and scored -------------------------------------------------------------------------------------------------
+
+
+def _tuned(data: Data, free: Sequence[Recording], kinematics: int, rate: float) -> Data:
+    method = str((data["contact"] or {}).get("method") or "innovation")
+    tuning = ContactTuning(
+        _described(data),
+        false_alarms_per_hour=rate,
+        confidence=CONFIDENCE,
+        method=method,
+        kinematics=kinematics,
+        strict=True,
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", TuneWarning)
+        return tuning.tune(list(free), checked=True).description_.data
+
+
+def _score(data: Data, recordings: Sequence[Recording], kinematics: int) -> DetectionScore:
+    subject = Subject(Path("finger"), _described(data), packed=False)
+    return pooled([run_track(subject, each, kinematics, None).score() for each in recordings])
+
+
+def _thresholds(data: Data) -> tuple[float, ...]:
+    """Return the thresholds of the method that decides first [n], N·m."""
+    contact = data["contact"]
+    found = (contact.get("innovation") or contact)["threshold"]
+    return tuple(math.inf if each is None else float(each) for each in found)
+
+
+def _median(score: DetectionScore) -> float | None:
+    return float(np.median(score.delays)) if len(score.delays) else None
+
+
+def _described(data: Data) -> Finger:
+    text = json.dumps(data).encode()
+    return Finger(Path("finger"), text, data, native.image_from_json(text))

@@ -1,0 +1,238 @@
+"""Which stretches of a residual no smooth effect explains: a push, a stall, a slack tendon.
+
+Windows of several lengths slide over the part of the residual that neither a slow bias nor a flexible learner predicts
+on unseen blocks.
+
+- The bias is a running median here. Splines would bend towards a push and leave its mirror image on either side.
+- Each length has its own robust scale, so the colour of the noise does not matter.
+- The largest value that chance reaches is extrapolated from the quartiles of the block maxima (Gumbel distribution).
+  Heavy tails raise it, a few contaminated blocks do not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter, uniform_filter1d
+
+from tendonfmu.diagnosis.remainder_features import features
+from tendonfmu.diagnosis.remainder_learner import Learner
+from tendonfmu.diagnosis.result import Event
+from tendonfmu.statistics import Folds, Splines, make_folds
+
+if TYPE_CHECKING:
+    from tendonfmu.diagnosis.series import Series
+
+Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+LEVEL = 0.01  # probability of any event in recordings without one
+LEAST = 5.5  # robust standard deviations: least height of an event, whatever the quartiles give
+EDGE = 3.0  # of the shortest window, in robust standard deviations: an event extends as far as this
+SLOW = 4.0  # s of the running median, more than twice the longest push
+WIDTHS = {
+    0.1: 1.5,
+    0.2: 1.5,
+    0.4: 1.5,
+    0.8: SLOW,
+    1.6: SLOW,
+    3.2: 2 * SLOW,
+}  # s of a window -> s of the running median that it is compared with
+JUMP = 8.0  # times the usual speed: such motion is too rare to be learned, so a residual of LEAST is enough
+MERGED = 0.3  # s between parts of one event
+EXPLAINED = 0.5  # of the residual's variance: a learner that predicts more is subtracted
+PAD = 0.1  # s on either side
+MOST = 0.25  # of the time: something that is there more often is not an event
+MAD = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
+
+
+def scan_events(
+    series: Series, residual: Numbers, splines: Splines, recordings: Sequence[str], *, seed: int = 0
+) -> tuple[Event, ...]:
+    """Find events in a residual [B, n], N·m, of the nominal model, in order of recording and time.
+
+    `splines` [B, s] are those of the bias; their span has been removed from the residual. `recordings` are names, by
+    number.
+    """
+    residual = np.where(series.used[:, None], residual, 0.0)
+    plan = make_folds(series)
+    if not plan.enough:
+        return ()
+    learner = Learner(features(series, seed=seed), residual, splines, plan)
+    left = np.array(series.target)
+    guess = learner.predicted(learner.columns)
+    # a prediction of most of the residual is an effect; a smaller one may be the push, learned from its neighbours
+    helps = learner.gains(guess).sum(axis=0) > EXPLAINED * np.sum(learner.target**2, axis=0)
+    left[plan.rows] -= np.where(helps, guess, 0.0)
+    inside = _outlying(series, left, plan, np.zeros(left.shape, dtype=bool))
+    if inside.any():
+        # scan again with a bias that ignores the blocks found so far
+        inside = _outlying(series, left, plan, inside)
+    if float(inside[plan.rows].any(axis=1).mean()) > MOST:
+        return ()
+    left[plan.rows] = _flat(left, plan, inside, max(3, round(SLOW / series.step)))
+    return tuple(_event(series, left, inside, rows, recordings) for rows in _stretches(series, inside))
+
+
+def left_out(series: Series, events: Sequence[Event], recordings: Sequence[str]) -> Flags:
+    """Return whether each block lies in an event [B]."""
+    inside = np.zeros(len(series.time), dtype=bool)
+    for event in events:
+        own = series.recording == recordings.index(event.recording)
+        inside |= own & (series.time >= event.start) & (series.time <= event.end)
+    return inside
+
+
+def _flat(left: Numbers, plan: Folds, known: Flags, length: int) -> Numbers:
+    """Return the residual without its running median [U, n].
+
+    In known blocks the median is interpolated from their neighbours.
+    """
+    result = left[plan.rows]
+    for joint in range(left.shape[1]):
+        values, own = left[plan.rows, joint], known[plan.rows, joint]
+        if own.any() and not own.all():
+            calm = median_filter(values[~own], size=max(3, length // 4), mode="nearest")
+            values = np.where(own, np.interp(plan.rows, plan.rows[~own], calm), values)
+        result[:, joint] -= _slow(values, plan.run, length)
+    return np.asarray(result)
+
+
+def _slow(values: Numbers, run: NDArray[np.int64], length: int) -> Numbers:
+    """Return the running median within each run."""
+    result = np.empty(len(values))
+    for begin, end in pairwise(_ends(run)):
+        result[begin:end] = median_filter(values[begin:end], size=min(length, end - begin), mode="nearest")
+    return np.asarray(result)
+
+
+def _ends(run: NDArray[np.int64]) -> list[int]:
+    """Return the first row of each run, and the number of rows."""
+    return [0, *(np.flatnonzero(np.diff(run)) + 1).tolist(), len(run)]
+
+
+def _outlying(series: Series, left: Numbers, plan: Folds, known: Flags) -> Flags:
+    """Return the blocks of windows that exceed what chance reaches [B, n].
+
+    They are extended while the shortest window still stands out. `known` marks blocks that the bias ignores [B, n].
+    """
+    inside = np.zeros(left.shape, dtype=bool)
+    tests = len(WIDTHS) * left.shape[1]
+    flat = {slow: _flat(left, plan, known, max(3, round(slow / series.step))) for slow in set(WIDTHS.values())}
+    for joint in range(left.shape[1]):
+        core = np.zeros(len(plan.rows), dtype=bool)
+        jump = _jumps(series.velocity[plan.rows, joint])
+        for width, slow in WIDTHS.items():
+            length = max(1, round(width / series.step))
+            mean = _sliding(flat[slow][:, joint], plan.run, length)
+            scale = MAD * float(np.median(np.abs(mean)))
+            if scale > 0.0:
+                score = np.abs(mean) / scale
+                core |= _widened(score > _reach(score, plan, tests), plan.run, length)
+                core |= _widened(jump, plan.run, length) & _widened(score > LEAST, plan.run, length)
+        mean = np.abs(_sliding(flat[SLOW][:, joint], plan.run, max(1, round(min(WIDTHS) / series.step))))
+        raised = mean > EDGE * MAD * float(np.median(mean))
+        inside[plan.rows, joint] = _reached(core, raised, plan.run)
+    return inside
+
+
+def _jumps(velocity: Numbers) -> Flags:
+    """Return blocks with a speed that the joint has at no other time [U]: it came loose, or was thrown."""
+    speed = np.abs(velocity)
+    moving = speed[speed > np.median(speed)]
+    return np.asarray(speed > JUMP * np.quantile(moving, 0.9)) if len(moving) else np.zeros(len(speed), dtype=bool)
+
+
+def _reached(core: Flags, raised: Flags, run: NDArray[np.int64]) -> Flags:
+    """Return the stretches of raised rows of a run that touch a core; a core without raised rows stays as it is."""
+    edge = np.flatnonzero((np.diff(raised.astype(int)) != 0) | (np.diff(run) != 0)) + 1
+    result = np.zeros(len(core), dtype=bool)
+    for begin, end in pairwise([0, *edge.tolist(), len(core)]):
+        result[begin:end] = raised[begin] and core[begin:end].any()
+    lonely = core & ~np.isin(np.cumsum(np.diff(core, prepend=False)), np.cumsum(np.diff(core, prepend=False))[result])
+    return np.asarray(result | lonely)
+
+
+def _sliding(values: Numbers, run: NDArray[np.int64], length: int) -> Numbers:
+    """Return centred means over a window within each run; 0 in runs shorter than the window."""
+    result = np.zeros(len(values))
+    for begin, end in pairwise(_ends(run)):
+        if end - begin >= length:
+            mean = np.asarray(uniform_filter1d(values[begin:end], length, mode="constant"))
+            half = length // 2
+            result[begin + half : end - half] = mean[half : end - begin - half]
+    return result
+
+
+def _reach(score: Numbers, plan: Folds, tests: int) -> float:
+    """Return the value that chance reaches: Gumbel distribution through the quartiles of the block maxima."""
+    highest = np.zeros(plan.stretches)
+    np.maximum.at(highest, plan.stretch, score)
+    low, middle, high = np.quantile(highest, (0.25, 0.5, 0.75))
+    spread = (high - low) / (np.log(np.log(4.0)) - np.log(np.log(4.0 / 3.0)))
+    centre = middle + spread * np.log(np.log(2.0))
+    return max(LEAST, float(centre + spread * np.log(plan.stretches * tests / LEVEL)))
+
+
+def _widened(high: Flags, run: NDArray[np.int64], length: int) -> Flags:
+    """Return the blocks under a window of this length around each marked centre, in the same run."""
+    result = np.zeros(len(high), dtype=bool)
+    for centre in np.flatnonzero(high):
+        part = slice(max(0, centre - length // 2), centre + length // 2 + 1)
+        result[part] |= run[part] == run[centre]
+    return result
+
+
+def _stretches(series: Series, inside: Flags) -> list[NDArray[np.int64]]:
+    """Return the rows of each event.
+
+    Marked blocks of all joints are joined over short breaks and padded, within a segment.
+    """
+    marked = np.flatnonzero(inside.any(axis=1))
+    if not len(marked):
+        return []
+    apart = (np.diff(marked) * series.step > MERGED) | (np.diff(series.segment[marked]) != 0)
+    pad = round(PAD / series.step)
+    found = []
+    for rows in np.split(marked, np.flatnonzero(apart) + 1):
+        wide = np.arange(max(0, rows[0] - pad), min(len(series.time), rows[-1] + pad + 1))
+        found.append(wide[series.segment[wide] == series.segment[rows[0]]])
+    return found
+
+
+def _event(series: Series, left: Numbers, inside: Flags, rows: NDArray[np.int64], recordings: Sequence[str]) -> Event:
+    joints = np.flatnonzero(inside[rows].any(axis=0))
+    own = rows[series.used[rows]]
+    length = min(len(own), max(1, round(min(WIDTHS) / series.step)))
+    mean = uniform_filter1d(left[np.ix_(own, joints)], length, axis=0, mode="nearest")
+    peak = float(np.abs(mean).max())
+    first, last = float(series.time[rows[0]]), float(series.time[rows[-1]])
+    start, end = first - series.step / 2.0, last + series.step / 2.0
+    strongest = int(joints[np.argmax(np.abs(mean).max(axis=0))])
+    names = " and ".join(str(joint + 1) for joint in joints)
+    plural = "s" if len(joints) > 1 else ""
+    description = (
+        f"{end - start:.2g} s at joint{plural} {names}, up to {1000.0 * peak:.2g} mN·m that neither motion nor force "
+        f"explains{_circumstances(series, own, strongest)}"
+    )
+    name = recordings[int(series.recording[rows[0]])]
+    return Event(name, start, end, tuple(int(joint) + 1 for joint in joints), peak, description)
+
+
+def _circumstances(series: Series, rows: NDArray[np.int64], joint: int) -> str:
+    """Return what the recording shows at that time: a slack tendon, a jumping or resting joint."""
+    notes = []
+    usual = np.median(np.abs(series.force), axis=0)
+    slack = np.flatnonzero(np.abs(series.force[rows]).min(axis=0) < 0.05 * usual)
+    if len(slack):
+        notes.append(f"tendon {' and '.join(str(tendon + 1) for tendon in slack)} nearly slack")
+    speed = np.abs(series.velocity[:, joint])
+    if _jumps(speed)[rows].any():
+        notes.append(f"joint {joint + 1} jumps")
+    elif np.median(speed[rows]) < 0.03 * np.quantile(speed, 0.95):
+        notes.append(f"joint {joint + 1} stands still")
+    return f" ({', '.join(notes)})" if notes else ""

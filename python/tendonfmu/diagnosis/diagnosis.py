@@ -1,0 +1,471 @@
+"""What the simulation of a finger gets wrong, what causes it, and what correcting it gains.
+
+::
+
+    from tendonfmu.diagnosis import diagnose
+
+    found = diagnose("finger.json", ["monday.parquet"], tests=["tuesday.parquet"])
+    found.verdict, [cause.where for cause in found.causes], found.gain
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+
+from tendonfmu.diagnosis.cause_gains import Verified, verify
+from tendonfmu.diagnosis.cause_search import residual_alone, series_of
+from tendonfmu.diagnosis.cause_selection import CERTAIN, LEAST_SHARE
+from tendonfmu.diagnosis.changes.check import check_sides
+from tendonfmu.diagnosis.changes.diagnosis import PHASES as CHANGE_PHASES
+from tendonfmu.diagnosis.changes.diagnosis import ChangeCase, find_changes
+from tendonfmu.diagnosis.contact_gain import detection_gain
+from tendonfmu.diagnosis.effects import Candidate
+from tendonfmu.diagnosis.effects.friction_law_places import thresholds
+from tendonfmu.diagnosis.event_gain import event_gain
+from tendonfmu.diagnosis.evidence import evidence
+from tendonfmu.diagnosis.experiments.next_experiment import Experiments, Question, plan_experiments
+from tendonfmu.diagnosis.extension_fit import Accepted, FitSettings
+from tendonfmu.diagnosis.gain import require_unseen
+from tendonfmu.diagnosis.hypotheses import HERE, Hypothesis
+from tendonfmu.diagnosis.remainder import Remainder, measure_remainder
+from tendonfmu.diagnosis.residual_views import residual_views, whiteness
+from tendonfmu.diagnosis.result import Cause, Diagnosis, Event, FoundPlace, Invisible, Unexplained, Where
+from tendonfmu.diagnosis.search import NamedCause, Search, events_of, search, without_events
+from tendonfmu.diagnosis.series import make_grid
+from tendonfmu.diagnosis.signal_choice import choose
+from tendonfmu.diagnosis.size import size_of
+from tendonfmu.errors import InputError, own_fault
+from tendonfmu.estimate import check_unseen
+from tendonfmu.model import Finger, FingerSource, read_finger
+from tendonfmu.recordings import (
+    UNFIT_FOR_SEARCH,
+    FitRecording,
+    Held,
+    RecordingSource,
+    admit,
+    listed_sources,
+    prepare,
+    read_recording,
+    require_noise,
+)
+from tendonfmu.statistics import Interval, standard_error
+from tendonfmu.tasks import Phases, PhaseState
+
+Numbers = NDArray[np.float64]
+
+HELD = Held(0.2, 10.0)  # of the recordings, for the gain, if no tests are given
+HALF = Held(0.5, 10.0)  # for a change: its few numbers need less data, and single samples of r are mostly noise
+LEAST_GAIN = 0.03
+MOST_RIVALS = 3  # rivals of a cause for which an experiment is planned
+MOST_UNSEEN = 6  # invisible effects for which an experiment is planned
+SIGNALS = "signals, delay and presliding"
+PHASES = {
+    SIGNALS: 20.0,
+    "contact": 8.0,
+    "causes": 30.0,
+    "gain on unseen data": 20.0,
+    "what is left": 10.0,
+    "next experiment": 12.0,
+}
+
+
+def diagnose(
+    finger: FingerSource,
+    recordings: RecordingSource | Sequence[RecordingSource],
+    tests: RecordingSource | Sequence[RecordingSource] = (),
+    *,
+    kinematics: int = 1,
+    least_gain: float = LEAST_GAIN,
+    seed: int = 0,
+    jobs: int = 1,
+    checked: bool = False,
+    reference: RecordingSource | Sequence[RecordingSource] | None = None,
+    progress: Callable[[PhaseState], None] | None = None,
+) -> Diagnosis:
+    """Find what a description lacks; with reference recordings, find what has changed since them.
+
+    Without `tests`, every fifth stretch of 10 s of `recordings` is held out from the fit and used to measure the gain.
+    Causes are then judged on up to eight parts of all recordings, held out in turn.
+
+    Parameters
+    ----------
+    finger
+        Description, parsed JSON, or its file.
+    recordings
+        Of contact-free motion: recordings, DataFrames or files; samples labelled contact are left out.
+    tests
+        Recordings on which the gain is measured.
+    kinematics
+        Kinematics source, 1 to 3.
+    least_gain
+        Share of the remaining rms that a cause must remove, 0 to 0.5.
+    seed
+        Seed of all random numbers.
+    jobs
+        Threads of the fits.
+    checked
+        Whether the recordings were already checked against the finger and the warnings given.
+    reference
+        Recordings of the same finger when it was well, of another motion or the same. `recordings` and `tests` are then
+        those of now, several in order of time.
+    progress
+        Called with what is being done.
+
+    Returns
+    -------
+    Diagnosis
+        Verdict, causes, gains and everything else that a report shows.
+
+    Raises
+    ------
+    InputError
+        If a file or an option is at fault.
+    """
+    begun = perf_counter()
+    if reference is not None:
+        phases = Phases(CHANGE_PHASES, progress or (lambda state: None))
+        with threadpool_limits(limits=max(jobs, 1)):
+            changed = change_case(finger, recordings, reference, tests, kinematics, least_gain, checked)
+            with own_fault("diagnosis"):
+                different = find_changes(changed, least_gain=least_gain, seed=seed, jobs=jobs, phases=phases)
+                return replace(different, seconds=perf_counter() - begun)
+    phases = Phases(PHASES, progress or (lambda state: None))
+    with threadpool_limits(limits=max(jobs, 1)):
+        case = _case(finger, recordings, tests, kinematics, least_gain, checked)
+        with phases.start(SIGNALS):
+            chosen = choose(case.finger, case.whole, FitSettings(threads=jobs, path=case.finger.path))
+        with own_fault("diagnosis"):  # all input has been checked and fitted once
+            found = search(case.whole, chosen, least_gain=least_gain, seed=seed, phases=phases)
+            result = _Result(case, found, least_gain, seed, jobs, phases)
+            return replace(result.diagnosis(), seconds=perf_counter() - begun)
+
+
+# --- what is given ----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Case:
+    """Checked input. `training` has held-out stretches if there are no `tests`; `warnings` are about recordings."""
+
+    finger: Finger
+    training: list[FitRecording]
+    tests: list[FitRecording]
+    warnings: tuple[str, ...]
+
+    @property
+    def whole(self) -> list[FitRecording]:
+        """The training recordings without held-out stretches."""
+        nothing = [np.zeros_like(each.held_out) for each in self.training]
+        return [
+            replace(each, train=each.train | each.held_out, held_out=none)
+            for each, none in zip(self.training, nothing, strict=True)
+        ]
+
+
+def _case(
+    finger: FingerSource,
+    recordings: RecordingSource | Sequence[RecordingSource],
+    tests: RecordingSource | Sequence[RecordingSource],
+    kinematics: int,
+    least_gain: float,
+    checked: bool,
+    apart: Held = HELD,
+) -> _Case:
+    given_sources, test_sources = listed_sources(recordings), listed_sources(tests)
+    if not given_sources:
+        raise InputError("no recording; expected at least one")
+    if kinematics not in (1, 2, 3):
+        raise InputError(f"kinematics = {kinematics!r}: expected 1, 2 or 3")
+    if not 0.0 <= least_gain <= 0.5:
+        raise InputError(f"least_gain = {least_gain!r}: expected 0 to 0.5")
+    given = read_finger(finger)
+    held = Held() if test_sources else apart
+    read, others = ([read_recording(each) for each in group] for group in (given_sources, test_sources))
+    warnings = [] if checked else admit(given, [*read, *others], unfit=UNFIT_FOR_SEARCH)
+    training = [prepare(given, each, kinematics, held) for each in read]
+    unseen = [prepare(given, each, kinematics, Held()) for each in others]
+    require_noise(given, training)
+    require_unseen(training, unseen)
+    check_unseen([each.recording for each in training], [each.recording for each in unseen])
+    if not checked:
+        warnings += [f"{each.path.name}: {text}" for each in (*training, *unseen) for text in each.warnings]
+    return _Case(given, training, unseen, tuple(warnings))
+
+
+def change_case(
+    finger: FingerSource,
+    now: RecordingSource | Sequence[RecordingSource],
+    reference: RecordingSource | Sequence[RecordingSource],
+    tests: RecordingSource | Sequence[RecordingSource],
+    kinematics: int,
+    least_gain: float,
+    checked: bool,
+) -> ChangeCase:
+    """Read and check the recordings of now and of the reference, each by itself and against each other."""
+    own = _case(finger, now, tests, kinematics, least_gain, checked, HALF)
+    before = _case(own.finger, reference, [], kinematics, least_gain, checked)
+    then = before.whole
+    warnings = [*own.warnings, *(each for each in before.warnings if each not in own.warnings)]
+    warnings += check_sides(own.finger, then, [*own.training, *own.tests])
+    return ChangeCase(own.finger, then, own.training, own.tests, tuple(warnings))
+
+
+# --- what is reported -------------------------------------------------------------------------------------------------
+
+
+class _Result:
+    """Everything that is reported of a search."""
+
+    def __init__(self, case: _Case, found: Search, least_gain: float, seed: int, jobs: int, phases: Phases) -> None:
+        self._case, self._found, self._seed, self._phases = case, found, seed, phases
+        self._least_gain, self._settings = least_gain, FitSettings(threads=jobs, path=case.finger.path)
+        self._series = found.last.series
+
+    def diagnosis(self) -> Diagnosis:
+        """Return the diagnosis; its duration is still 0."""
+        found, case = self._found, self._case
+        with self._phases.start("gain on unseen data"):
+            verified = self._verified()
+        with self._phases.start("what is left"):
+            left = self._left(verified.extended)
+            before = found.first.residual
+            remainder = self._remainder(left)
+            unexplained = self._unexplained(remainder, left)
+        experiments, invisible = self._experiments(verified)
+        gain = verified.gain
+        share = np.array(unexplained.by_joint)
+        everything = [*case.training, *case.tests]
+        floor = np.array(gain.extended.test_rms) * np.sqrt(np.clip(1.0 - share, 0.0, 1.0))
+        return Diagnosis(
+            finger=case.finger.name,
+            verdict=_verdict(bool(verified.causes), unexplained.unknown),
+            recordings=tuple(str(each.path) for each in case.training),
+            tests=tuple(str(each.path) for each in case.tests),
+            held_out=gain.held_out,
+            seconds=0.0,
+            seed=self._seed,
+            signals=found.estimation.words,
+            least_gain=self._least_gain,
+            nominal=gain.nominal,
+            extended=gain.extended,
+            bias_only_rms=gain.bias_only_rms,
+            noise_floor=tuple(float(value) for value in floor),
+            floor_source="the part of the error on unseen stretches that nothing recorded predicts",
+            gain=gain.value,
+            steps=gain.steps,
+            causes=tuple(self._cause(k, verified, left) for k in range(len(verified.causes))),
+            too_small=tuple(
+                _too_small(each)
+                for each in [*verified.dropped, *found.small]
+                if each.effect not in {cause.effect for cause in verified.causes}
+            ),
+            invisible=invisible,
+            events=self._events,
+            unexplained=unexplained,
+            experiment=experiments.best,
+            views=residual_views(self._series, before, left, load=self._torque()),
+            whiteness=whiteness(self._series, before, left),
+            detection=detection_gain(verified.nominal_data, verified.extended_data, everything)
+            if verified.causes
+            else None,
+            nominal_data=verified.nominal_data,
+            extended_data=verified.extended_data,
+            warnings=(*case.warnings, *self._warnings()),
+            tested=len({each.key for each in found.last.selection.hypotheses}),
+            event_gain=event_gain(verified.extended_data, case.whole, found.events),
+            smoothing=found.estimation.signals,
+        )
+
+    def _warnings(self) -> list[str]:
+        folds = self._found.first.folds
+        found = list(self._found.extended.warnings)
+        if not folds.enough:
+            found.append("less than 8 s of motion: nothing can be held out, so no cause is named; record a minute")
+        elif folds.folds < 8:
+            found.append(
+                f"only {folds.stretches} stretches of 2 s: {folds.folds} parts are held out in place of 8, so a cause "
+                "has to be larger to be certain; record a minute"
+            )
+        return found
+
+    # --- gain ---
+
+    def _verified(self) -> Verified:
+        found, case = self._found, self._case
+        tests = case.tests
+        unseen = [self._events_in(each) for each in tests]
+        tests = [without_events(each, events) for each, events in zip(tests, unseen, strict=True)]
+        self._events = (*found.events, *(event for events in unseen for event in events))
+        training = [without_events(each, found.events) for each in case.training]
+        return verify(case.finger, found, training, tests, self._least_gain, self._settings, self._seed)
+
+    def _events_in(self, recording: FitRecording) -> Sequence[Event]:
+        data = self._found.estimation.online(self._found.extended.data)
+        return events_of(data, [recording], make_grid([recording]), self._seed)[0]
+
+    # --- causes ---
+
+    def _left(self, data: Mapping[str, Any]) -> Numbers:
+        """Return the residual of a model over all recordings that were estimated from, bias removed, N·m [B, n]."""
+        estimation = self._found.estimation
+        series = series_of(data, estimation.recordings, estimation.grid)
+        return residual_alone(data, replace(series, used=self._series.used))
+
+    def _cause(self, k: int, verified: Verified, after: Numbers) -> Cause:
+        named, parameters = verified.causes[k], verified.parameters[k]
+        everything = {path: value for own in parameters for path, value in own.items()}
+        before = self._left(verified.without[k].data)
+        candidate = named.accepted[0].candidate
+        places = tuple(
+            FoundPlace(each.place.joint, each.place.tendon, own)
+            for each, own in zip(named.accepted, parameters, strict=True)
+        )
+        return Cause(
+            where=Where(named.effect, named.joint, named.tendon),
+            title=candidate.title,
+            explanation=candidate.explanation,
+            p_value=named.p_value,
+            gain=verified.gains[k],
+            confusable_with=_wheres(named.alike),
+            parameters=everything,
+            size=size_of(candidate.name, places, thresholds(verified.extended_data)),
+            places=places,
+            evidence=evidence([each.place for each in named.accepted], candidate, self._series, before, after),
+        )
+
+    # --- what is left, and what to do next ---
+
+    def _remainder(self, residual: Numbers) -> Remainder:
+        view = self._found.last
+        force = [
+            segment.mean(view.predicted[segment.recording].recording.groups["tendon_force"][segment.part])
+            for segment in self._found.estimation.grid.segments
+        ]
+        return measure_remainder(view.series, residual, view.splines, force=np.concatenate(force), seed=self._seed)
+
+    def _unexplained(self, left: Remainder, residual: Numbers) -> Unexplained:
+        """Return the share of the remaining variance that unseen stretches show to be no noise.
+
+        It is unknown if correcting it would be material.
+        """
+        variance = np.mean(residual[self._series.used] ** 2, axis=0)
+        shares = np.clip(np.array(left.share), 0.0, 1.0)
+        whole = float(variance.sum())
+        share = float(shares @ variance) / whole if whole > 0 else 0.0
+        square = float(left.square.sum())
+        half = CERTAIN * standard_error(left.gain.sum(axis=1)) / square if square > 0 else 0.0
+        gain = Interval(*(1.0 - float(np.sqrt(1.0 - min(each, 1.0))) for each in (share, share - half, share + half)))
+        unknown = left.unknown and gain.value >= self._least_gain and gain.low > 0.0
+        description = left.description if unknown else ""
+        return Unexplained(share, description, tuple(shares.tolist()), left.p_value, bool(unknown), gain)
+
+    def _torque(self) -> Numbers:
+        """Return the torque to be explained, N·m [B, n]."""
+        estimation = self._found.estimation
+        return np.concatenate(
+            [
+                segment.mean(estimation.recordings[segment.recording].target[segment.part])
+                for segment in estimation.grid.segments
+            ]
+        )
+
+    def _experiments(self, verified: Verified) -> tuple[Experiments, tuple[Invisible, ...]]:
+        """Plan experiments for causes that cannot be distinguished and for effects that are not visible.
+
+        Each invisible effect is one question, at the place that comes nearest to being visible.
+        """
+        nominal, source = self._found.nominal.data, self._found.fitted_to[0].kinematics
+        rivals = [
+            Question(cause.accepted[0], rival)
+            for cause in verified.causes
+            for rival in [_ordinary(each) for each in cause.alike[:MOST_RIVALS]]
+            if all(each.place in each.candidate.places(nominal, source) for each in (cause.accepted[0], rival))
+        ]  # only laws that the nominal description has
+        unseen = self._unseen()
+        nearest: dict[str, Hypothesis] = {}
+        for hypothesis, _ in unseen:
+            own = _ordinary(hypothesis)
+            if own.place in own.candidate.places(nominal, source):  # only laws that the nominal description has
+                nearest.setdefault(hypothesis.effect, hypothesis)
+        asked = list(nearest)[:MOST_UNSEEN]
+        questions = [*rivals, *(Question(_ordinary(nearest[effect])) for effect in asked)]
+        noise = self._left(self._found.extended.data)[self._series.used].std(axis=0)
+        with self._phases.start("next experiment", len(questions) or None) as step:
+            planned = plan_experiments(
+                nominal,  # without the causes in question
+                self._found.fitted_to,
+                questions,
+                noise=[float(value) for value in noise],
+                seed=self._seed,
+                progress=lambda done, total: step(done),
+            )
+        said = {
+            effect: (planned.sentence(len(rivals) + k), planned.motion(len(rivals) + k))
+            for k, effect in enumerate(asked)
+        }
+        return planned, tuple(
+            Invisible(where_of(each), _candidate(each).title, share, *said.get(each.effect, ("", {})))
+            for each, share in unseen
+        )
+
+    def _unseen(self) -> list[tuple[Hypothesis, float]]:
+        """Return, for each invisible place, the shape that comes nearest to being visible, and its share.
+
+        The places nearest to being visible come first.
+        """
+        selection = self._found.last.selection
+        best: dict[tuple[str, int | None, int | None], tuple[Hypothesis, float]] = {}
+        for each, share in zip(selection.hypotheses, selection.shares, strict=True):
+            if each.level == HERE and (each.key not in best or share > best[each.key][1]):
+                best[each.key] = (each, share)
+        return sorted((pair for pair in best.values() if pair[1] < LEAST_SHARE), key=lambda pair: -pair[1])
+
+
+def where_of(hypothesis: Hypothesis) -> Where:
+    return Where(hypothesis.effect, hypothesis.joint, hypothesis.tendon)
+
+
+def _wheres(hypotheses: Sequence[Hypothesis]) -> tuple[Where, ...]:
+    return tuple(where_of(each) for each in hypotheses)
+
+
+def _candidate(hypothesis: Hypothesis) -> Candidate:
+    return hypothesis.members[0].proposal.candidate
+
+
+def _ordinary(hypothesis: Hypothesis) -> Accepted:
+    """Return an effect of ordinary size, at its first place."""
+    member = hypothesis.members[0]
+    return Accepted(member.proposal.candidate, member.proposal.place, dict(member.shape.shape))
+
+
+def _too_small(named: NamedCause) -> Cause:
+    """Return a cause that is certain but not material or not confirmed on unseen data.
+
+    It is in no description, so it has no numbers.
+    """
+    candidate = named.accepted[0].candidate
+    return Cause(
+        where=Where(named.effect, named.joint, named.tendon),
+        title=candidate.title,
+        explanation=candidate.explanation,
+        p_value=named.p_value,
+        gain=named.interval,
+        confusable_with=_wheres(named.alike),
+        parameters={},
+        size="",
+        places=tuple(FoundPlace(each.place.joint, each.place.tendon, {}) for each in named.accepted),
+    )
+
+
+def _verdict(causes: bool, unknown: bool) -> str:
+    if causes:
+        return "partly explained" if unknown else "explained"
+    return "unexplained" if unknown else "adequate"

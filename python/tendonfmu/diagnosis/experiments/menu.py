@@ -1,0 +1,318 @@
+"""What else could be recorded: a menu of motions, pretensions and known loads, mostly in the range that was recorded.
+
+An entry is a list of sections. Each is a training motion of `excite/excitation.py` with its own pretension and load. An
+entry is plain JSON (`Entry.as_json`), so a report can carry it and `tendonfmu excite --discriminate` can write it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.diagnosis.span import Span
+from tendonfmu.errors import InputError
+from tendonfmu.model import moment_arms, pretension_vector
+
+Numbers = NDArray[np.float64]
+Data = Mapping[str, Any]
+
+LEVELS = (0.5, 1.0, 2.0, 4.0)  # of the pretension that was recorded
+SLOW, FAST = 0.2, 2.5  # of the speed that was recorded
+SWING = 0.7  # Hz, of tensions; splines of a slow bias follow up to a third of it
+WIDER = 1.6  # times the range that was recorded
+SECONDS = 80.0  # s, of an entry
+LONG = 600.0  # s
+_SMALL = 0.08  # of a joint's range: small strokes
+_POSTURES = (0.2, 0.5, 0.8)  # of a joint's range: where small strokes are made
+_LEAST_RANGE, _LEAST_SPEED = 0.02, 0.05  # rad, rad/s
+_TAUT = 0.25  # of its pretension, which every pulling tendon keeps under the known load
+_LOOP_LOAD = 3.0  # times the recorded torque: known load on a finger that holds no pretension
+_SHARES = (0.5, 1.0, 2.0, 4.0)  # of a known load that holds the tendons
+_ALTERNATIONS = 2  # from one side to the other, of a known load
+
+
+@dataclass(frozen=True)
+class Section:
+    """A stretch of motion.
+
+    Attributes
+    ----------
+    ranges
+        (low, high) of each joint, rad [n].
+    max_speed
+        rad/s.
+    seconds
+        Duration, s.
+    pretension
+        Mean, N.
+    swing
+        Frequency at which the tensions swing, Hz, different from tendon to tendon; None for constant tensions.
+    lowest, highest
+        Limits of swinging tensions, N.
+    load
+        Known load at the joints, N·m [n].
+    max_acceleration
+        rad/s².
+    """
+
+    ranges: tuple[tuple[float, float], ...]
+    max_speed: float
+    seconds: float
+    pretension: float
+    swing: float | None = None
+    lowest: float = 0.0
+    highest: float = 0.0
+    load: tuple[float, ...] = ()
+    max_acceleration: float = 10.0
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One entry of the menu; `motion`, `tension` and `load` are words for a sentence, "" if as recorded."""
+
+    motion: str
+    sections: tuple[Section, ...]
+    tension: str = ""
+    load: str = ""
+
+    @property
+    def seconds(self) -> float:
+        return sum(section.seconds for section in self.sections)
+
+    @property
+    def words(self) -> str:
+        return ", ".join(part for part in (self.motion, self.tension, self.load) if part)
+
+    def as_json(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+def entry_from_json(value: Mapping[str, Any], joints: int) -> Entry:
+    """Return the entry of a report; raise InputError unless it is for a finger with that many joints."""
+    try:
+        sections = tuple(
+            Section(
+                **{
+                    **section,
+                    "ranges": tuple((float(low), float(high)) for low, high in section["ranges"]),
+                    "load": tuple(float(torque) for torque in section.get("load") or ()),
+                }
+            )
+            for section in value["sections"]
+        )
+        entry = Entry(str(value["motion"]), sections, str(value.get("tension", "")), str(value.get("load", "")))
+    except (KeyError, TypeError, ValueError) as wrong:
+        raise InputError(f"experiment.motion: {wrong}; expected an experiment of `tendonfmu diagnose`") from None
+    for k, section in enumerate(sections, start=1):
+        if len(section.ranges) != joints or len(section.load) not in (0, joints):
+            raise InputError(
+                f"experiment.motion.sections[{k}]: {len(section.ranges)} ranges and {len(section.load)} loads; "
+                f"expected {joints}, one per joint"
+            )
+    return entry
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """What was recorded.
+
+    Attributes
+    ----------
+    ranges
+        rad [n, 2].
+    speed
+        Fastest, rad/s.
+    pretension
+        Mean tendon force, N.
+    torque
+        Spread of the joint torque, N·m [n].
+    seconds
+        Length of the longest stretch.
+    load
+        Mean of the known load, N·m [n].
+    """
+
+    ranges: Numbers
+    speed: float
+    pretension: float
+    torque: Numbers
+    seconds: float
+    load: Numbers | None = None
+
+
+def recorded_of(span: Span, load: Numbers | None = None) -> Recorded:
+    """Return what was recorded; very small ranges are widened, because every joint must move. `load` is in N·m [n]."""
+    middle, half = span.angle.mean(axis=1), np.maximum(0.5 * np.ptp(span.angle, axis=1), 0.5 * _LEAST_RANGE)
+    return Recorded(
+        ranges=np.column_stack([middle - half, middle + half]),
+        speed=max(float(span.speed.max()), _LEAST_SPEED),
+        pretension=float(np.abs(span.force).mean()),
+        torque=span.torque,
+        seconds=span.duration,
+        load=load,
+    )
+
+
+def own_tension(data: Data) -> Numbers:
+    """Return tendon forces per newton of pretension [m]; zeros if the finger holds none by itself."""
+    try:
+        return pretension_vector(data)
+    except InputError:
+        return np.zeros(len(data["tendons"]))
+
+
+# --- motions ----------------------------------------------------------------------------------------------------------
+
+
+def motions(recorded: Recorded) -> Iterator[Entry]:
+    """Yield the motions at the recorded tension, the simplest first."""
+    whole = _as_ranges(recorded.ranges)
+    held = () if recorded.load is None else tuple(recorded.load.tolist())
+    usual = Section(whole, recorded.speed, SECONDS, recorded.pretension, load=held)
+    yield Entry("the same kind of motion", (usual,))
+    slow = SLOW * recorded.speed
+    yield Entry(
+        f"slow strokes of at most {slow:.2g} rad/s over the whole range",
+        (_long_enough(replace(usual, max_speed=slow)),),
+    )
+    yield _one_at_a_time(recorded, usual)
+    yield _small_strokes(recorded, usual)
+    fast = FAST * recorded.speed
+    yield Entry(
+        f"fast strokes of up to {fast:.2g} rad/s",
+        (replace(usual, max_speed=fast, max_acceleration=max(10.0, 10.0 * fast)),),
+    )
+    middle, half = recorded.ranges.mean(axis=1), 0.5 * WIDER * np.ptp(recorded.ranges, axis=1)
+    wide = _as_ranges(np.column_stack([middle - half, middle + half]))
+    yield Entry(
+        f"the same kind of motion over {WIDER:g} times the range, if the joints can", (replace(usual, ranges=wide),)
+    )
+    long = max(LONG, 2 * recorded.seconds)
+    yield Entry(
+        f"the same kind of motion for {long / 60:.0f} min without a pause, from cold", (replace(usual, seconds=long),)
+    )
+
+
+def _as_ranges(ranges: Numbers) -> tuple[tuple[float, float], ...]:
+    return tuple((float(low), float(high)) for low, high in ranges)
+
+
+def _long_enough(section: Section) -> Section:
+    """Return a section that lasts at least two strokes through the whole range and back."""
+    span = max(high - low for low, high in section.ranges)
+    return replace(section, seconds=max(section.seconds, 10.0 + 8 * span / section.max_speed))
+
+
+def _one_at_a_time(recorded: Recorded, usual: Section) -> Entry:
+    middle = recorded.ranges.mean(axis=1)
+    sections = []
+    for j in range(len(middle)):
+        ranges = np.column_stack([middle, middle])
+        ranges[j] = recorded.ranges[j]
+        alone = replace(usual, ranges=_as_ranges(ranges), seconds=max(SECONDS / len(middle), 16.0))
+        sections.append(_long_enough(alone))
+    what = "one joint at a time, the others at rest" if len(middle) > 1 else "the same kind of motion, in two halves"
+    return Entry(what, tuple(sections if len(middle) > 1 else [replace(sections[0], seconds=SECONDS / 2)] * 2))
+
+
+def _small_strokes(recorded: Recorded, usual: Section) -> Entry:
+    width = np.ptp(recorded.ranges, axis=1)
+    stroke = np.maximum(_SMALL * width, 0.5 * _LEAST_RANGE)
+    speed = max(2.0 * float(stroke.max()), _LEAST_SPEED)
+    sections = []
+    for share in _POSTURES:
+        middle = recorded.ranges[:, 0] + share * width
+        ranges = np.column_stack([middle - stroke / 2, middle + stroke / 2])
+        sections.append(replace(usual, ranges=_as_ranges(ranges), max_speed=speed, seconds=SECONDS / len(_POSTURES)))
+    return Entry(f"small strokes to and fro of {float(stroke.max()):.2g} rad at three postures", tuple(sections))
+
+
+# --- pretensions and loads --------------------------------------------------------------------------------------------
+
+
+def tensions(data: Data, entry: Entry) -> Iterator[Entry]:
+    """Yield the entry at several pretensions, and with tensions that swing faster than a bias drifts.
+
+    Nothing is yielded if the finger holds no pretension.
+    """
+    base = entry.sections[0].pretension
+    if not own_tension(data).any() or base <= 0:
+        return
+    levels = [level * base for level in LEVELS]
+    yield replace(
+        entry,
+        sections=tuple(
+            _shortened(section, len(levels), pretension=level) for level in levels for section in entry.sections
+        ),
+        tension="at pretensions of " + ", ".join(f"{level:.3g}" for level in levels[:-1]) + f" and {levels[-1]:.3g} N",
+    )
+    low, high = levels[0], levels[-2]
+    yield replace(
+        entry,
+        sections=tuple(replace(section, swing=SWING, lowest=low, highest=high) for section in entry.sections),
+        tension=f"the tensions swinging about every {1 / SWING:.2g} s between {low:.3g} and {high:.3g} N",
+    )
+
+
+def loads(data: Data, entry: Entry, recorded: Recorded) -> Iterator[Entry]:
+    """Yield the entry with a known load at the joints, on one side and on the other."""
+    first = entry.sections[0]
+    own = first.pretension * own_tension(data)
+    least = own if first.swing is None else np.minimum(own, first.lowest)
+    largest = known_load(data, least, recorded)
+    if not largest.any():
+        return
+    if _held_by_load(data, recorded):
+        sides = [share * largest for share in _SHARES]
+        how = f"of {', '.join(f'{share:g}' for share in _SHARES)} times as much"
+    else:
+        sides = [sign * largest for _ in range(_ALTERNATIONS) for sign in (1.0, -1.0)]
+        how = "on one side and on the other"
+    sections = tuple(
+        _shortened(section, len(sides), load=tuple(load.tolist())) for load in sides for section in entry.sections
+    )
+    sizes = ", ".join(f"{value:.2g}" for value in largest)
+    where = "N·m at the joint" if len(largest) == 1 else "N·m at the joints"
+    yield replace(
+        entry,
+        sections=sections,
+        load=f"with a known load of {sizes} {where}, {how} (column external_torque)",
+    )
+
+
+def _held_by_load(data: Data, recorded: Recorded) -> bool:
+    """Return whether a known load alone keeps pulling tendons taut; it must then stay on its side."""
+    pulls = any(not tendon.get("bidirectional") for tendon in data["tendons"])
+    return pulls and not own_tension(data).any() and recorded.load is not None and bool(recorded.load.any())
+
+
+def known_load(data: Data, tension: Numbers, recorded: Recorded) -> Numbers:
+    """Return a load that leaves every pulling tendon taut at these tensions (N, [m]), on either side, N·m [n].
+
+    If the recorded load holds the tendons, it is that load. Cable loops carry any load; they get some times the joint
+    torque.
+    """
+    if _held_by_load(data, recorded):
+        return np.asarray(recorded.load)
+    arms = moment_arms(data)
+    pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
+    if not tension.any() or not pulls.any():
+        return _LOOP_LOAD * recorded.torque
+    each = np.abs(arms).max(axis=0)  # N·m per N of one tendon
+    taken = np.abs(np.linalg.pinv(arms)).T @ each  # N, from each tendon, at most
+    return np.asarray(np.min((1 - _TAUT) * tension[pulls] / np.maximum(taken[pulls], 1e-12)) * each)
+
+
+def _shortened(section: Section, count: int, **changes: Any) -> Section:
+    """Return one of `count` sections that together last about as long; none is too short for a motion."""
+    least = 8.0 + 4 * max(high - low for low, high in section.ranges) / section.max_speed
+    return replace(section, seconds=max(section.seconds / count, least, 12.0), **changes)
+
+
+def combined(data: Data, motion: Entry, recorded: Recorded) -> Sequence[Entry]:
+    """Return a motion at several pretensions, each with a known load."""
+    return [loaded for tense in tensions(data, motion) for loaded in loads(data, tense, recorded)]

@@ -1,0 +1,474 @@
+"""Which further recording answers a question that the present ones cannot.
+
+The question is about two causes that look alike, or about one that refitting absorbs. The model predicts a recording
+for every entry of a menu. The columns of the causes in it come from the C core, as in a diagnosis. All numbers of the
+model, the slow bias and the other cause then explain as much of a cause as they can, in the new recording and in the
+old ones together. What is left is the Schur complement of their Gram matrix. Its ratio to the noise says how far apart
+the two predictions will be. This is the T-optimality of Atkinson and Fedorov, "The design of experiments for
+discriminating between two rival models", Biometrika 62 (1975).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+from scipy.sparse import identity
+from scipy.sparse.linalg import splu
+
+from tendonfmu.diagnosis.candidate_columns import CandidateColumns, candidate_columns
+from tendonfmu.diagnosis.effects.candidate import Candidate
+from tendonfmu.diagnosis.experiments.menu import Entry, combined, loads, motions, own_tension, recorded_of, tensions
+from tendonfmu.diagnosis.experiments.motion import expected_recording, perform
+from tendonfmu.diagnosis.extension_fit import Accepted
+from tendonfmu.diagnosis.result import Experiment, Where
+from tendonfmu.diagnosis.span import Span, span_of
+from tendonfmu.errors import InputError, InternalError
+from tendonfmu.estimate import EstimationError
+from tendonfmu.model import NativeError, moment_arms
+from tendonfmu.recordings import FitRecording, Model, Recording, bias_settings
+from tendonfmu.statistics import KNOTS, regular_blocks
+
+Numbers = NDArray[np.float64]
+Data = Mapping[str, Any]
+Progress = Callable[[int, int], None]
+
+VISIBLE = 0.33  # rms of what is left over that of the noise: about a tenth of its variance, found in 49 of 50 cases
+SHARE = 0.01  # of a cause that survives the refit: a smaller share is not visible, however large the cause is
+_RATE = 50.0  # 1/s, of a predicted recording
+_LEAST_RATE, _MOST_SAMPLES = 10.0, 3200
+_BLOCK = 0.02  # s
+_OLD_SECONDS = 60.0  # of each old recording that is used, s
+_BETTER = 1.5  # times the present distance
+_FAINTEST = 0.01  # times the noise: smaller values are rounding errors
+_SIMPLER = 0.7  # of the largest distance is sufficient for a simpler entry
+_RANK = 1e-9  # of the largest direction of a Gram matrix of columns of length 1: resolution of float32 columns
+
+
+@dataclass(frozen=True)
+class Question:
+    """What a recording is to show: the difference between `cause` and `rival`, or whether `cause` is there at all.
+
+    Magnitudes of () are those of an ordinary effect; a shape {} is the middle one of its grid. `rival` is None for the
+    second question.
+    """
+
+    cause: Accepted
+    rival: Accepted | None = None
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What an entry shows for one question.
+
+    Attributes
+    ----------
+    distance
+        Rms of what the entry adds to the remaining part of the cause, over that of the noise.
+    now
+        The same for the present recordings.
+    share
+        Share of the cause's variance that survives bias and refit, in all recordings together.
+    """
+
+    question: Question
+    entry: Entry
+    distance: float
+    now: float
+    share: float
+
+    @property
+    def tells(self) -> bool:
+        """Whether the entry is worth recording.
+
+        The size of an effect that was never seen is unknown. For such an effect it is enough that a refit leaves some
+        of it, and more than before.
+        """
+        better = self.distance >= max(_BETTER * self.now, _FAINTEST)
+        return self.share >= SHARE and (self.distance >= VISIBLE or (self.question.rival is None and better))
+
+    @property
+    def where(self) -> Where:
+        return _where(self.question.cause)
+
+
+@dataclass(frozen=True)
+class Experiments:
+    """The planned experiments.
+
+    Attributes
+    ----------
+    answers
+        For each question, the entry that answers it best.
+    best
+        What to do first: the experiment that answers most questions.
+    """
+
+    answers: tuple[Answer, ...]
+    best: Experiment
+    seed: int = 0
+
+    def motion(self, number: int) -> dict[str, Any]:
+        """Return what answers one question in the form of `Experiment.motion`; empty if no entry of the menu does."""
+        told = bool(self.answers) and self.answers[number].tells
+        return {**self.answers[number].entry.as_json(), "seed": self.seed} if told else {}
+
+    def sentence(self, number: int) -> str:
+        """Return the experiment for one question in plain words."""
+        return _sentence([self.answers[number]]) if self.answers else self.best.sentence
+
+
+def plan_experiments(
+    data: Data,
+    recordings: Sequence[FitRecording],
+    questions: Sequence[Question],
+    *,
+    noise: Sequence[float] | None = None,
+    span: Span | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Experiments:
+    """Choose experiments from the menu.
+
+    Parameters
+    ----------
+    data
+        The fitted description, without the causes in question.
+    noise
+        What a good model leaves in blocks of 20 ms, N·m [n]; None for the description's `bias.noise_std`.
+    span
+        Of the recordings.
+    progress
+        Called with the number of recordings predicted and of all.
+
+    Raises
+    ------
+    InputError
+        If a recording or the description is at fault.
+    """
+    if not questions:
+        return Experiments((), Experiment(""))
+    if not recordings:
+        raise InternalError("next experiment: no recording; expected those of the diagnosis")
+    found_span = span_of(data, recordings) if span is None else span
+    lab = _Laboratory(data, recordings, questions, noise, found_span, seed)
+    recorded = recorded_of(found_span, None if own_tension(data).any() else _mean_load(data, recordings))
+    *plain, long = motions(recorded)
+    varied = [*tensions(data, plain[0]), *loads(data, plain[0], recorded)]
+    scores = []
+    # effects that only change over time show in long recordings, which take long to predict
+    slow = any(
+        each is not None and each.candidate.coordinate == "time" for q in questions for each in (q.cause, q.rival)
+    )
+    first = [*plain, *varied, *([long] if slow else [])]
+    for k, entry in enumerate(first):
+        scores += lab.answers_of([entry])
+        if progress is not None:
+            progress(k + 1, len(first))
+    if not scores:
+        return Experiments((), Experiment("No available motion is possible with this finger"))
+    open_ = [q for q in range(len(questions)) if max(found[q].distance for found in scores) < VISIBLE]
+    if open_:
+        simple = [found for found in scores if not (found[0].entry.tension or found[0].entry.load)]
+        motion = max(simple or scores, key=lambda found: sum(found[q].distance for q in open_))[0].entry
+        scores += lab.answers_of(combined(data, motion, recorded))
+    answers = tuple(_best([found[q] for found in scores]) for q in range(len(questions)))
+    return Experiments(answers, _first_of_all(answers, scores, seed), seed)
+
+
+# --- what a recording would show --------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What one or several recordings show.
+
+    Attributes
+    ----------
+    gram
+        Products of all columns over the noise, without the slow bias [c, c].
+    whole
+        The same about their means.
+    power
+        Of the columns by joint [c, n].
+    blocks
+        Number of blocks.
+    """
+
+    gram: Numbers
+    whole: Numbers
+    power: Numbers
+    blocks: int
+
+    def __add__(self, other: _Seen) -> _Seen:
+        return _Seen(
+            self.gram + other.gram, self.whole + other.whole, self.power + other.power, self.blocks + other.blocks
+        )
+
+
+class _Laboratory:
+    """Predicts recordings and what they would show for the questions."""
+
+    def __init__(
+        self,
+        data: Data,
+        recordings: Sequence[FitRecording],
+        questions: Sequence[Question],
+        noise: Sequence[float] | None,
+        span: Span,
+        seed: int,
+    ) -> None:
+        self.data, self.questions, self.span, self.seed = data, questions, span, seed
+        self.kinematics = recordings[0].kinematics
+        settings = bias_settings(data)
+        given = [settings.noise] * len(data["joints"]) if noise is None else list(noise)
+        self.noise = np.maximum(np.array(given, dtype=float), 1e-9)
+        self.constant_bias = settings.drift == 0
+        self.candidates = [_restricted(each, data, span) for each in _asked(questions)]
+        self.columns: CandidateColumns | None = None
+        self.old = sum(
+            (self._look(_shortened(each)) for each in recordings[1:3]), self._look(_shortened(recordings[0]))
+        )
+
+    def answers_of(self, entries: Iterable[Entry]) -> list[list[Answer]]:
+        """Return the answers to all questions for each entry that this finger can make."""
+        found = []
+        for entry in entries:
+            # skip entries with too short a stroke, a slack tendon, or forces outside the valid range
+            with suppress(InputError, EstimationError, NativeError):
+                found.append(self.answers(entry))
+        return found
+
+    def answers(self, entry: Entry) -> list[Answer]:
+        """Return the answer to each question; raises InputError if the motion is not possible."""
+        seconds = sum(section.seconds for section in entry.sections)
+        rate = min(_RATE, max(_LEAST_RATE, _MOST_SAMPLES / seconds))
+        performed = perform(self.data, entry, rate, self.seed)
+        new = self._look(expected_recording(self.data, performed, self.kinematics))
+        return [self._answer(question, entry, new) for question in self.questions]
+
+    def _look(self, recording: FitRecording) -> _Seen:
+        blocks = regular_blocks([recording.time], [recording.parts], _BLOCK)
+        found = candidate_columns(self.data, [recording], blocks, candidates=self.candidates, span=self.span)
+        self.columns = found
+        values = np.concatenate([found.nominal, found.values], axis=2).astype(np.float64) / self.noise[:, None]
+        time = np.bincount(blocks.of[0], weights=recording.time) / blocks.sizes()
+        rest = _without_bias(time, values, self.constant_bias)
+        flat, all_ = (each.reshape(-1, each.shape[2]) for each in (rest, values - values.mean(axis=0)))
+        return _Seen(flat.T @ flat, all_.T @ all_, np.einsum("bjc,bjc->cj", rest, rest), blocks.count)
+
+    def _answer(self, question: Question, entry: Entry, new: _Seen) -> Answer:
+        both = self.old + new
+        left, before = self._left(question, both.gram), self._left(question, self.old.gram)
+        direction = self._direction(question.cause)
+        whole = float(direction @ both.whole @ direction)
+        return Answer(
+            question=question,
+            entry=entry,
+            distance=float(np.sqrt(max(left - before, 0.0) / self._rows(question.cause, new))),
+            now=float(np.sqrt(before / self._rows(question.cause, self.old))),
+            share=left / whole if whole > 0 else 0.0,
+        )
+
+    def _left(self, question: Question, gram: Numbers) -> float:
+        """Return the power of the cause at its magnitudes that neither the model nor the rival explains."""
+        explaining = list(range(self._offset))
+        if question.rival is not None:
+            explaining += self._all_columns(question.rival)
+        return _schur(gram, self._direction(question.cause), explaining)
+
+    @property
+    def _offset(self) -> int:
+        assert self.columns is not None
+        return len(self.columns.nominal_names)
+
+    def _place(self, cause: Accepted) -> int:
+        """Return the index of the cause's proposal."""
+        assert self.columns is not None
+        for k, proposal in enumerate(self.columns.proposals):
+            if proposal.candidate.name == cause.candidate.name and proposal.place == cause.place:
+                return k
+        raise InternalError(f"{_described(cause)}: not possible at this place; expected a place of the candidate")
+
+    def _direction(self, cause: Accepted) -> Numbers:
+        """Return the magnitudes of the cause in all columns [c]."""
+        assert self.columns is not None
+        shape = self.columns.proposals[self._place(cause)].shapes[0]
+        given = list(cause.magnitudes) if len(cause.magnitudes) else list(shape.expected)
+        found = np.zeros(self._offset + len(self.columns.names))
+        found[self._offset + shape.columns.start : self._offset + shape.columns.stop] = given
+        return found
+
+    def _all_columns(self, cause: Accepted) -> list[int]:
+        assert self.columns is not None
+        own = self.columns.proposals[self._place(cause)].columns
+        return list(range(self._offset + own.start, self._offset + own.stop))
+
+    def _rows(self, cause: Accepted, seen: _Seen) -> float:
+        """Return the number of blocks times joints in which the cause makes a noticeable torque."""
+        power = np.sum(np.square(self._direction(cause))[:, None] * seen.power, axis=0)
+        joints = int(np.sum(power > 0.05 * power.max())) if power.max() > 0 else 1
+        return float(seen.blocks * max(joints, 1))
+
+
+def _schur(gram: Numbers, direction: Numbers, explaining: Sequence[int]) -> float:
+    """Return the power of the columns along a direction that those `explaining` do not explain; at least 0."""
+    length = np.sqrt(np.maximum(np.diag(gram), 0.0))
+    used = [k for k in explaining if length[k] > 0]
+    mixed = gram @ direction
+    whole = float(direction @ mixed)
+    if not used or whole <= 0:
+        return max(whole, 0.0)
+    scaled = gram[np.ix_(used, used)] / np.outer(length[used], length[used])
+    power, axes = np.linalg.eigh(scaled)
+    kept = power > _RANK * power[-1]
+    along = axes[:, kept].T @ (mixed[used] / length[used])
+    left = whole - float(np.sum(along**2 / power[kept]))
+    return max(left, 0.0)
+
+
+def _without_bias(time: Numbers, values: Numbers, constant: bool) -> Numbers:
+    """Return values [B, n, c] without a slow bias: a constant, or cubic splines with the knots of the diagnosis."""
+    flat = values.reshape(len(values), -1)
+    if constant:
+        return np.asarray((flat - flat.mean(axis=0)).reshape(values.shape))
+    span = float(time[-1] - time[0])
+    inner = np.linspace(time[0] - 1e-9, time[-1] + 1e-9, max(1, round(span / KNOTS)) + 1)
+    outer = (inner[1] - inner[0]) * np.arange(1, 4)
+    knots = np.concatenate([inner[0] - outer[::-1], inner, inner[-1] + outer])
+    splines = BSpline.design_matrix(time, knots, 3)
+    known = splu((splines.T @ splines + 1e-12 * identity(splines.shape[1])).tocsc())
+    return np.asarray((flat - splines @ known.solve(splines.T @ flat)).reshape(values.shape))
+
+
+def _asked(questions: Sequence[Question]) -> list[Accepted]:
+    """Return every candidate at a place once, with the shape of its first mention."""
+    found: dict[tuple[str, Any], Accepted] = {}
+    for question in questions:
+        for each in (question.cause, question.rival):
+            if each is not None:
+                found.setdefault((each.candidate.name, each.place), each)
+    return list(found.values())
+
+
+def _restricted(cause: Accepted, data: Data, span: Span) -> Candidate:
+    """Return the candidate at that place only; its own shape comes first, then the others of its grid."""
+    grid = cause.candidate.find_shapes(data, cause.place, span)
+    own = dict(cause.shape) or (dict(grid[len(grid) // 2]) if grid else {})
+    shapes = [own, *(shape for shape in grid if dict(shape) != own)]
+    return replace(
+        cause.candidate, find_places=lambda *_: [cause.place], find_shapes=lambda *_: [dict(shape) for shape in shapes]
+    )
+
+
+def _mean_load(data: Data, recordings: Sequence[FitRecording]) -> Numbers:
+    """Return the mean known load on the joints, N·m [n]."""
+    arms = moment_arms(data)
+    loads = [(each.recording.groups["tendon_force"] @ arms - each.target).mean(axis=0) for each in recordings]
+    return (
+        np.asarray(np.mean(loads, axis=0))
+        if any(each.external is not None for each in recordings)
+        else np.zeros(arms.shape[1])
+    )
+
+
+def _shortened(recording: FitRecording) -> FitRecording:
+    """Return the beginning of its longest part, thinned to the sample rate that a predicted recording needs."""
+    part = max(recording.parts, key=lambda each: recording.time[each.stop - 1] - recording.time[each.start])
+    time = recording.time[part]
+    step = float(np.median(np.diff(time)))
+    every = max(1, int(1 / (2 * _RATE * step)))
+    rows = np.arange(part.start, part.stop)[time - time[0] <= _OLD_SECONDS][::every]
+    groups = {name: np.ascontiguousarray(values[rows]) for name, values in recording.recording.groups.items()}
+    whole = [slice(0, len(rows))]
+    model = {
+        name: np.ascontiguousarray(getattr(recording.model, name)[rows])
+        for name in ("torque", "jump", "joint_angle", "joint_speed", "slack")
+    }
+    return replace(
+        recording,
+        recording=Recording(recording.path, np.ascontiguousarray(recording.time[rows]), groups),
+        **{name: getattr(recording, name)[rows] for name in ("target", "train", "held_out", "contact_out", "faulty")},
+        parts=whole,
+        model=Model(**model),
+    )
+
+
+# --- the choice, in words ---------------------------------------------------------------------------------------------
+
+
+def _best(answers: Sequence[Answer]) -> Answer:
+    """Return the simplest entry that shows nearly as much as the best one; the simplest entries come first."""
+    able = [answer for answer in answers if answer.tells] or answers
+    largest = max(answer.distance for answer in able)
+    return next(answer for answer in able if answer.distance >= _SIMPLER * largest)
+
+
+def _first_of_all(answers: Sequence[Answer], scores: Sequence[Sequence[Answer]], seed: int) -> Experiment:
+    """Return the entry that distinguishes most pairs of causes, then shows most effects, and is the simplest of these.
+
+    An entry that changes tension and load at once is chosen only if no other one shows anything else that matters.
+    """
+
+    def told_by(found: Sequence[Answer]) -> tuple[int, int]:
+        told = [answer for answer in found if answer.tells]
+        return sum(answer.question.rival is not None for answer in told), len(told)
+
+    simple = [found for found in scores if not (found[0].entry.tension and found[0].entry.load)]
+    chosen = max(simple or scores, key=told_by)
+    pairs, count = told_by(chosen)
+    for found in scores:
+        if told_by(found)[0] > pairs or (not count and told_by(found)[1]):
+            chosen, (pairs, count) = found, told_by(found)
+    told = [answer for answer in chosen if answer.tells]
+    if not told:
+        return Experiment(_sentence([max(answers, key=lambda answer: answer.distance)]))
+    return Experiment(
+        sentence=_sentence(told),
+        separates=tuple(
+            (answer.where, _where(answer.question.rival)) for answer in told if answer.question.rival is not None
+        ),
+        makes_visible=tuple(answer.where for answer in told if answer.question.rival is None),
+        distance=min(answer.distance for answer in told),
+        motion={**chosen[0].entry.as_json(), "seed": seed},
+    )
+
+
+def _sentence(told: Sequence[Answer]) -> str:
+    """Put the first of the answers of one entry into words."""
+    first = told[0]
+    cause, rival = _described(first.question.cause), first.question.rival
+    if not first.tells:
+        what = f"{cause} from {_described(rival)}" if rival is not None else f"{cause} from the model's own numbers"
+        return (
+            f"No available experiment can distinguish {what}: at best {_times(first.distance)} the noise "
+            f"is left of it. {first.question.cause.candidate.explanation}"
+        )
+    what = f"{cause} from {_described(rival)}" if rival is not None else f"{cause} from the model's own numbers"
+    apart = "the predictions then differ by" if rival is not None else "an ordinary effect then leaves"
+    more = len(told) - 1
+    others = f". It also answers {more} more such question{'s' * (more > 1)}" if more else ""
+    return (
+        f"Record {first.entry.words}: it distinguishes {what}; {apart} {_times(first.distance)} the noise, now "
+        f"{_times(first.now)}{others}"
+    )
+
+
+def _times(distance: float) -> str:
+    return f"{distance:.2g} times"
+
+
+def _described(cause: Accepted) -> str:
+    joint, tendon = cause.place.joint, cause.place.tendon
+    parts = [f"tendon {tendon}"] * (tendon is not None) + [f"joint {joint}"] * (joint is not None)
+    name = cause.candidate.name.replace("_", " ")
+    return f"{name} of {' at '.join(parts)}" if parts else name
+
+
+def _where(cause: Accepted) -> Where:
+    return Where(cause.candidate.name, cause.place.joint, cause.place.tendon)

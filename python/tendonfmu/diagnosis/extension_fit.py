@@ -1,0 +1,372 @@
+"""How the extended finger is fitted: the nominal description with the terms of the accepted causes, all numbers again.
+
+Likelihood, bias settings and samples are those of the nominal fit (`FrictionFit`, method batch). The numbers are not
+judged one by one here, so that a selection can fit many times.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.errors import InputError
+from tendonfmu.estimate import (
+    Choice,
+    Interrupted,
+    Learned,
+    Settings,
+    Structure,
+    Watch,
+    build_structure,
+    get_number,
+    learn_batch,
+    verdicts,
+    with_values,
+)
+from tendonfmu.model import Finger, description_text, moment_arms, native
+from tendonfmu.recordings import FitRecording
+
+if TYPE_CHECKING:
+    from tendonfmu.diagnosis.effects.candidate import Candidate, Place
+
+Numbers = NDArray[np.float64]
+
+MOST_SAMPLES = 20_000  # samples that a fit learns from, about
+BOUND = 1e-6  # of the range: a number that is this near to a bound has reached it
+NEW = 3.0  # times its start: prior standard deviation of a new number
+_SIDE = re.compile(r"\.(positive|negative)(?=\.|$)")
+_POINT = re.compile(r"\.laws\[\d+\]")
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """An accepted cause: a candidate at a place, its non-linear numbers, and its magnitudes as estimated so far."""
+
+    candidate: Candidate
+    place: Place
+    shape: Mapping[str, float] = field(default_factory=dict)
+    magnitudes: Any = ()
+
+    def added_to(self, data: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the description with this cause's term."""
+        return self.candidate.extended(data, self.place, self.shape, self.magnitudes)
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """Options of a fit, as of `FrictionFit` with method batch.
+
+    Attributes
+    ----------
+    choice
+        Which numbers are fitted.
+    prior
+        Prior standard deviation, in units of each number's expected magnitude.
+    max_passes
+        Largest number of passes over the recordings.
+    tolerance
+        Length of the last step, in standard errors of all unknowns together.
+    threads
+        Number of threads; 0 for all cores.
+    path
+        File of the description, for messages.
+    """
+
+    choice: Choice = field(default_factory=Choice)
+    prior: float = 1.0
+    max_passes: int = 60
+    tolerance: float = 0.3
+    threads: int = 0
+    path: Path = Path("finger")
+
+
+@dataclass(frozen=True)
+class FittedModel:
+    """A description whose numbers were fitted.
+
+    Attributes
+    ----------
+    given
+        The description that says how large each number may be: its values are the standard deviations of the prior.
+    values, errors
+        By path of an estimated number, SI units. Errors are standard errors for white noise; NaN at a bound.
+    cost
+        ½ Σ e²/S including the prior.
+    at_bound
+        Paths of numbers at a bound.
+    warnings
+        Sentences.
+    """
+
+    data: Mapping[str, Any]
+    given: Mapping[str, Any]
+    values: Mapping[str, float]
+    errors: Mapping[str, float]
+    cost: float
+    at_bound: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    def text(self) -> str:
+        """Return the description as JSON, as `tendonfmu fit -o` writes it."""
+        return description_text(self.data)
+
+
+def fit_numbers(
+    data: Mapping[str, Any],
+    recordings: Sequence[FitRecording],
+    settings: FitSettings = FitSettings(),
+    *,
+    given: Mapping[str, Any] | None = None,
+) -> FittedModel:
+    """Fit the numbers of a description to the samples of `FitRecording.train`.
+
+    The torque to be explained is `FitRecording.target`, even if the forces of the recording are different ones. This is
+    so for `regressors.predicted_forces`: they lack the noise, which a term that scales with the force would otherwise
+    fit by shrinking the force.
+
+    Parameters
+    ----------
+    data
+        Where the fit starts.
+    given
+        The description that says how large numbers may be; None for `data` itself. A number that an earlier fit has
+        driven towards 0 can return if it is present in `given`.
+
+    Raises
+    ------
+    InputError
+        If the description is not valid.
+    """
+    origin = data if given is None else given
+    structure, learned = learn_numbers(data, recordings, settings, given=origin)
+    numbers = np.asarray(learned.estimator.values(learned.z))
+    finger = with_values(structure, numbers)
+    at_bound = _at_bound(learned)
+    errors = _standard_errors(structure, learned)
+    return FittedModel(
+        data=finger.data,
+        given=origin,
+        values={number.path: float(numbers[structure.index[number.path]]) for number in structure.numbers},
+        errors={path: np.nan if path in at_bound else error for path, error in errors.items()},
+        cost=float(learned.cost),
+        at_bound=at_bound,
+        warnings=tuple(learned.warnings),
+    )
+
+
+def learn_numbers(
+    data: Mapping[str, Any], recordings: Sequence[FitRecording], settings: FitSettings, *, given: Mapping[str, Any]
+) -> tuple[Structure, Learned]:
+    """Fit the numbers of a description and return everything known about the fit.
+
+    Parameters
+    ----------
+    data
+        Where the fit starts.
+    recordings
+        Their `train` samples are used, thinned to about MOST_SAMPLES.
+    settings
+        Options of the fit.
+    given
+        The description that says how large numbers may be.
+
+    Returns
+    -------
+    Structure
+        The description with its numbers and their scales.
+    Learned
+        Unknowns, covariance and cost.
+
+    Raises
+    ------
+    InputError
+        If the description is not valid.
+    KeyboardInterrupt
+        If the fit is interrupted.
+    """
+    every = -(-sum(int(recording.train.sum()) for recording in recordings) // MOST_SAMPLES)
+    recordings = [_thinned(_with_own_target(data, recording), max(every, 1)) for recording in recordings]
+    structure = _with_scale(build_structure(_described(data, settings.path), settings.choice), given)
+    options = Settings(
+        prior=settings.prior,
+        max_passes=settings.max_passes,
+        tolerance=settings.tolerance,
+        threads=settings.threads,
+        effective=False,  # a diagnosis has its own noise model (`whitening`)
+    )
+    try:
+        return structure, learn_batch(structure, recordings, Watch(None), options, None)
+    except Interrupted:  # the intermediate result of a partial fit is of no use
+        raise KeyboardInterrupt from None
+
+
+def fit_extended(
+    nominal: FittedModel,
+    causes: Sequence[Accepted],
+    recordings: Sequence[FitRecording],
+    settings: FitSettings = FitSettings(),
+) -> FittedModel:
+    """Fit the nominal model with the causes' terms, all numbers again, starting at the nominal fit.
+
+    `recordings` are those of the nominal fit, with the same masks. Raises InputError.
+    """
+    causes = possible(nominal.data, causes)
+    if not causes:
+        return nominal
+    begin = extended_description(nominal.data, causes)
+    choice = settings.choice
+    if choice.only:
+        new = {path for own in added_paths(nominal.data, causes) for path in own}
+        structure = build_structure(_described(begin, settings.path), Choice(choice.sides))
+        known = {number.path for number in structure.numbers}
+        choice = replace(choice, only=(*choice.only, *sorted(new & known)))
+    return fit_numbers(begin, recordings, replace(settings, choice=choice), given=nominal.given)
+
+
+def cause_parameters(
+    nominal: Mapping[str, Any], causes: Sequence[Accepted], model: FittedModel
+) -> tuple[Mapping[str, tuple[float, str]], ...]:
+    """Return the numbers of each cause in a model that was fitted with all of them: path -> (value, unit)."""
+    units = {parameter.path: parameter.unit for parameter in native.Instance.from_description(model.data).parameters()}
+    return tuple(_parameters(model, own, units) for own in added_paths(nominal, causes))
+
+
+def extended_description(data: Mapping[str, Any], causes: Sequence[Accepted]) -> Mapping[str, Any]:
+    """Return the description with the causes' terms, added one after the other."""
+    for cause in causes:
+        data = cause.added_to(data)
+    return data
+
+
+def added_paths(data: Mapping[str, Any], causes: Sequence[Accepted]) -> tuple[tuple[str, ...], ...]:
+    """Return, for each cause, the paths of the numbers that it adds or replaces.
+
+    It replaces numbers where a law is split into two sides or several working points.
+    """
+    found = []
+    for cause in causes:
+        extended = cause.added_to(data)
+        before = dict(_leaves(data))
+        # a number that is only written differently does not belong to the cause
+        found.append(tuple(path for path, value in _leaves(extended) if path not in before or before[path] != value))
+        data = extended
+    return tuple(found)
+
+
+def _parameters(model: FittedModel, paths: Sequence[str], units: Mapping[str, str]) -> dict[str, tuple[float, str]]:
+    """Return those of the paths that were estimated, and all numbers of extensions."""
+    own = (path for path in paths if path in model.values or (path in units and path.startswith("extensions[")))
+    return {path: (float(get_number(model.data, path)), units[path]) for path in own}
+
+
+# --- parts ------------------------------------------------------------------------------------------------------------
+
+
+def possible(data: Mapping[str, Any], causes: Sequence[Accepted]) -> list[Accepted]:
+    """Return the causes without those that change a law which only a cause outside of the list would add."""
+    found = []
+    for cause in causes:
+        try:
+            data = cause.added_to(data)
+        except (KeyError, StopIteration, AttributeError):  # the law that the cause would change is missing
+            continue
+        found.append(cause)
+    return found
+
+
+def _with_own_target(data: Mapping[str, Any], recording: FitRecording) -> FitRecording:
+    """Return the recording with the external torque that makes its target follow from its forces."""
+    groups = recording.recording.groups
+    known = groups["tendon_force"] @ moment_arms(data) - recording.target
+    given = groups.get("external_torque", np.zeros_like(known))
+    if np.allclose(known, given, rtol=1e-9, atol=1e-9 * float(np.abs(recording.target).max(initial=0.0))):
+        return recording
+    return replace(recording, recording=replace(recording.recording, groups={**groups, "external_torque": known}))
+
+
+def _thinned(recording: FitRecording, every: int) -> FitRecording:
+    """Train on every `every`-th sample.
+
+    More samples of coloured noise add no information, and the model still runs over all of them.
+    """
+    if every == 1:
+        return recording
+    return replace(recording, train=recording.train & (np.arange(len(recording.train)) % every == 0))
+
+
+def _described(data: Mapping[str, Any], path: Path) -> Finger:
+    text = json.dumps(data).encode()
+    try:
+        return Finger(path, text, data, native.image_from_json(text))
+    except native.NativeError as refused:
+        raise InputError(f"{path}: {refused}") from None
+
+
+def _with_scale(structure: Structure, given: Mapping[str, Any]) -> Structure:
+    """Set the expected magnitudes of the numbers.
+
+    They come from the given description if it has the number, or the law before it was split. A new number gets NEW
+    times its start.
+    """
+    scale = structure.scale.copy()
+    for number in structure.numbers:
+        for path in (number.path, number.with_path):
+            if path is None or not np.isnan(scale[structure.index[path]]):
+                continue
+            for known in (path, _SIDE.sub("", path), _SIDE.sub("", _POINT.sub("", path))):
+                value = _number_or_none(given, known)
+                if value:
+                    scale[structure.index[path]] = abs(value)
+                    break
+            else:
+                begin = _number_or_none(structure.start.data, path)
+                scale[structure.index[path]] = NEW * abs(begin) if begin else np.nan
+    return replace(structure, scale=scale)
+
+
+def _number_or_none(data: Mapping[str, Any], path: str) -> float | None:
+    try:
+        value = get_number(data, path)
+    except (KeyError, IndexError, TypeError):
+        return None
+    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
+
+
+def _at_bound(learned: Learned) -> tuple[str, ...]:
+    """Return the paths of the numbers whose unknown has reached a bound."""
+    found = []
+    for unknown, z in zip(learned.estimator.unknowns, learned.z, strict=True):
+        reach = BOUND * max(unknown.scale, abs(z))
+        if z - unknown.lower <= reach or unknown.upper - z <= reach:
+            found.append(unknown.path)
+    return tuple(found)
+
+
+def _leaves(data: Any, path: str = "") -> Iterator[tuple[str, float]]:
+    """Yield (path, value) of all numbers of a parsed description; indices start at 1."""
+    if isinstance(data, Mapping):
+        for key, value in data.items():
+            yield from _leaves(value, f"{path}.{key}" if path else key)
+    elif isinstance(data, list | tuple):
+        for k, value in enumerate(data, start=1):
+            yield from _leaves(value, f"{path}[{k}]")
+    elif isinstance(data, int | float) and not isinstance(data, bool):
+        yield path, float(data)
+
+
+def _standard_errors(structure: Structure, learned: Learned) -> dict[str, float]:
+    """Return the standard errors by path, from the covariance of the unknowns (delta method)."""
+    matrix = verdicts.slopes(learned.estimator, learned.z)[
+        [structure.index[number.path] for number in structure.numbers]
+    ]
+    variance = np.einsum("pu,uv,pv->p", matrix, learned.covariance, matrix)
+    return {
+        number.path: float(np.sqrt(max(part, 0.0))) for number, part in zip(structure.numbers, variance, strict=True)
+    }

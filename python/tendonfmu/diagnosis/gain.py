@@ -1,0 +1,316 @@
+"""How much an extension gains: both FMUs run over data that neither was fitted to, and their residuals are compared.
+
+The residual r is τ − T of eq. (10) − bias before the update. It is no output of an FMU: compensated_torque = (1 − K)·r
+is what the update leaves of it. So the core runs over the same samples. Where all outputs of FMU and core agree, the
+core's r is that of the FMU, and it shows how the bias jumped.
+
+With a known external torque, labelled contact or gaps, the bias filter runs once more over y − T (`track`), with the T
+of the FMU. In a recording without these, this gives r of the core again, and both are compared.
+"""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.diagnosis.result import ModelErrors
+from tendonfmu.errors import InputError, InternalError
+from tendonfmu.estimate import residuals
+from tendonfmu.fmu import build_fmu, run_fmu
+from tendonfmu.model import NUMBERS, description_text, native
+from tendonfmu.recordings import BiasSettings, FitRecording, Model, bias_settings, delayed_torque, rms
+from tendonfmu.statistics import BlockIndex, Interval, blocks_of, gain_interval
+
+Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Data = Mapping[str, Any]
+
+AGREEMENT = 1e-9  # of the largest value of an output's series: allowed difference of two implementations
+_NEVER = 1e9  # N·m; a contact threshold that is never passed
+_THRESHOLD = re.compile(r"contact\.(innovation\.)?threshold\[")
+_TINY = 1e-12  # N·m; lower limit of a scale, for series that are 0
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Errors and gain of an extended model.
+
+    Attributes
+    ----------
+    nominal, extended
+        Rms per joint on the samples trained on and on those of the test.
+    value
+        1 − rms_extended/rms_nominal over all joints on the test.
+    steps
+        Rms over all joints on the test of each model of a sequence, N·m.
+    blocks
+        Number of blocks of some seconds of the test; the intervals come from them.
+    held_out
+        Whether the test is held-out blocks of the training recordings.
+    agreement
+        Largest difference between the outputs of an FMU and of the core, in units of the output's largest value.
+    """
+
+    nominal: ModelErrors
+    extended: ModelErrors
+    bias_only_rms: tuple[float, ...]
+    value: Interval
+    steps: tuple[float, ...]
+    blocks: int
+    held_out: bool
+    agreement: float
+
+
+def measure_gain(
+    nominal: Data,
+    extended: Data,
+    training: Sequence[FitRecording],
+    tests: Sequence[FitRecording] = (),
+    *,
+    between: Sequence[Data] = (),
+    seed: int = 0,
+) -> Gain:
+    """Measure the gain of the extended over the nominal model.
+
+    The FMUs of `nominal` and `extended` are run; for the models between them only the core.
+
+    Parameters
+    ----------
+    nominal, extended
+        Fitted descriptions with the same `bias`.
+    tests
+        Recordings that nothing was fitted to. Without any, the `held_out` samples of the training recordings are used.
+    between
+        Models with some of the causes.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to test on.
+    InternalError
+        If an FMU does not agree with the core.
+    """
+    test = _Test.of(training, tests)
+    _check_settings(nominal, extended)
+    runs = {"nominal": [run_both(nominal, each) for each in test.recordings]}
+    same = extended == nominal
+    runs["extended"] = runs["nominal"] if same else [run_both(extended, each) for each in test.recordings]
+    left = {name: [run.residual for run in found] for name, found in runs.items()}
+    before, after = test.squares(left["nominal"]), test.squares(left["extended"])
+    sequence = [before, *(test.squares_of(data) for data in between), *([] if same else [after])]
+    return Gain(
+        nominal=ModelErrors(test.trained(nominal, left["nominal"]), test.tested(left["nominal"])),
+        extended=ModelErrors(test.trained(extended, left["extended"]), test.tested(left["extended"])),
+        bias_only_rms=test.tested([residuals(extended, each, None).residual for each in test.recordings]),
+        value=gain_interval(before, after, seed),
+        steps=tuple(float(np.sqrt(squares.sum() / max(test.count, 1))) for squares in sequence),
+        blocks=len(before),
+        held_out=test.held_out,
+        agreement=max(run.agreement for found in runs.values() for run in found),
+    )
+
+
+def require_unseen(training: Sequence[FitRecording], tests: Sequence[FitRecording]) -> None:
+    """Raise InputError if there is nothing to measure a gain on."""
+    _Test.of(training, tests)
+
+
+def _check_settings(nominal: Data, extended: Data) -> None:
+    if _filter_of(nominal) != _filter_of(extended):
+        raise InternalError("bias: different settings in the two descriptions, so their rms cannot be compared")
+
+
+def _filter_of(data: Data) -> BiasSettings:
+    """Return the settings of the bias filter without its initial value, which is fitted and may differ."""
+    return replace(bias_settings(data), initial_torque=None)
+
+
+def residual_of(data: Data, recording: FitRecording) -> Numbers:
+    """Return the residual r of a recording before the bias update, from a run of the core.
+
+    Friction remembers across gaps, as in an FMU; the bias starts anew after a gap.
+
+    Parameters
+    ----------
+    data
+        Description that runs.
+    recording
+        Recording prepared for it.
+
+    Returns
+    -------
+    array
+        r, N·m [N, n]; NaN where there is none.
+    """
+    return residuals(data, recording, _model(data, recording, _core_outputs(data, recording))).residual
+
+
+# --- an FMU and the core side by side ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class BothRun:
+    """The residual and how well FMU and core agree.
+
+    Attributes
+    ----------
+    residual
+        r, N·m [N, n].
+    agreement
+        Largest difference of the outputs of FMU and core, in units of the output's largest value. If the recording is
+        one piece of free motion, the difference of r counts, too.
+    """
+
+    residual: Numbers
+    agreement: float
+
+
+def run_both(data: Data, recording: FitRecording) -> BothRun:
+    """Pack the FMU of a description, run it over a recording without contact detection, and compute r from its T.
+
+    Raises InternalError if FMU and core do not agree.
+    """
+    outputs, beside = _fmu_outputs(data, recording), _core_outputs(data, recording)
+    agreement = max(_difference(outputs[name], beside[name]) for name in NUMBERS)
+    left = residuals(data, recording, _model(data, recording, {**beside, **outputs})).residual
+    if _one_piece(data, recording):
+        size = max(float(np.abs(beside["friction_torque"]).max()), float(np.abs(beside["joint_torque"]).max()))
+        agreement = max(agreement, float(np.abs(left[1:] - beside["residual"][1:]).max()) / max(size, _TINY))
+    if not agreement <= AGREEMENT:
+        raise InternalError(
+            f"{recording.path}: the FMU's outputs and the core's differ by {agreement:.3g} of their largest value; "
+            f"expected at most {AGREEMENT:g}"
+        )
+    return BothRun(left, agreement)
+
+
+def _fmu_outputs(data: Data, recording: FitRecording) -> dict[str, Numbers]:
+    """Return the outputs of the packed FMU by group [N, n].
+
+    Start values put its contact thresholds out of reach.
+    """
+    out_of_reach = {
+        parameter.path: min(_NEVER, parameter.maximum)
+        for parameter in native.Instance.from_description(data).parameters()
+        if _THRESHOLD.match(parameter.path)
+    }
+    with tempfile.TemporaryDirectory(prefix="tendonfmu-") as folder:
+        file = Path(folder) / "finger.json"
+        file.write_text(description_text(data), encoding="utf-8")
+        fmu = build_fmu(file, file.with_suffix(".fmu"), illustrated=False)
+        columns = run_fmu(fmu, recording.recording, kinematics_source=recording.kinematics, parameters=out_of_reach)
+    return {
+        name: np.column_stack([columns[f"{name}[{j}]"] for j in range(1, len(data["joints"]) + 1)]) for name in NUMBERS
+    }
+
+
+def _core_outputs(data: Data, recording: FitRecording) -> dict[str, Any]:
+    """Return the outputs of `native.Instance.run` without contact detection."""
+    free = {**data, "contact": {"threshold": [_NEVER] * len(data["joints"])}, "sensor_fault": None}
+    return native.Instance.from_description(free, recording.kinematics).run(recording.recording.arrays())
+
+
+def _model(data: Data, recording: FitRecording, outputs: Mapping[str, Any]) -> Model:
+    """Return T and Δb of a run.
+
+    The bias moves by Δb and by what the update takes from r, which is r − compensated_torque.
+    """
+    bias = outputs["bias_torque"]
+    torque = outputs["friction_torque"] - bias
+    jump = np.diff(bias, axis=0, prepend=bias[:1]) - (outputs["residual"] - outputs["compensated_torque"])
+    jump[0] = 0.0
+    return Model(
+        torque=torque - delayed_torque(data, recording.recording.groups, outputs["joint_torque"]),
+        jump=jump,
+        joint_angle=outputs["joint_angle"],
+        joint_speed=outputs["joint_speed"],
+        slack=outputs["slack"],
+    )
+
+
+def _one_piece(data: Data, recording: FitRecording) -> bool:
+    """Return whether the FMU's bias filter sees what a fit is judged on: all samples, with the same mean force."""
+    rows = data.get("extensions") or []
+    delayed = any(row["effect"] == "time_delay" and row["delay"] < 0 for row in rows)
+    same_noise = not (delayed and bias_settings(data).per_force)
+    return len(recording.parts) == 1 and recording.external is None and bool(recording.tracked.all()) and same_noise
+
+
+def _difference(mine: Numbers, other: Numbers) -> float:
+    """Return the largest difference in units of the largest value."""
+    return float(np.abs(mine - other).max()) / max(float(np.abs(other).max()), _TINY)
+
+
+# --- the samples of the test ------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Test:
+    """Recordings with the samples that are tested on, and their blocks."""
+
+    training: Sequence[FitRecording]
+    recordings: Sequence[FitRecording]
+    masks: Sequence[Flags]
+    blocks: Sequence[BlockIndex]
+    held_out: bool
+
+    @classmethod
+    def of(cls, training: Sequence[FitRecording], tests: Sequence[FitRecording]) -> _Test:
+        held_out = not tests
+        recordings = training if held_out else tests
+        masks = [_judged(each, each.held_out if held_out else each.tracked) for each in recordings]
+        if not any(mask.any() for mask in masks):
+            raise InputError(
+                f"{recordings[0].path}: no sample to measure the gain on; expected free motion of some seconds"
+            )
+        blocks = [blocks_of(each.time, mask) for each, mask in zip(recordings, masks, strict=True)]
+        return cls(training, recordings, masks, blocks, held_out)
+
+    def squares(self, left: Sequence[Numbers]) -> Numbers:
+        """Return block sums [B] of the squared residuals [N, n], over all joints and recordings."""
+        return np.concatenate(
+            [block.sums(np.sum(each**2, axis=1)) for block, each in zip(self.blocks, left, strict=True)]
+        )
+
+    def squares_of(self, data: Data) -> Numbers:
+        """Return the same for a description, run by the core."""
+        return self.squares([residual_of(data, each) for each in self.recordings])
+
+    @property
+    def count(self) -> int:
+        """Number of judged samples times joints."""
+        return sum(int(mask.sum()) for mask in self.masks) * int(self.recordings[0].target.shape[1])
+
+    def tested(self, left: Sequence[Numbers]) -> tuple[float, ...]:
+        return _pooled(left, self.masks)
+
+    def trained(self, data: Data, left: Sequence[Numbers]) -> tuple[float, ...]:
+        """Return the rms on the samples trained on.
+
+        `left` holds the residuals of the tested recordings; these are the training recordings if blocks were held out.
+        """
+        found = left if self.held_out else [residual_of(data, each) for each in self.training]
+        return _pooled(found, [_judged(each, each.train) for each in self.training])
+
+
+def _judged(recording: FitRecording, chosen: Flags) -> Flags:
+    """Return the chosen samples that have a residual [N].
+
+    The first sample of each part and those before the bias has started have none.
+    """
+    judged = np.zeros(len(recording.time), dtype=bool)
+    for part in recording.parts:
+        if recording.tracked[part].any():
+            judged[part.start + int(np.argmax(recording.tracked[part])) + 1 : part.stop] = True
+    return chosen & judged
+
+
+def _pooled(left: Sequence[Numbers], masks: Sequence[Flags]) -> tuple[float, ...]:
+    return tuple(rms(np.concatenate(left), np.concatenate(masks)))

@@ -1,0 +1,98 @@
+"""What the smallest size of an effect is that the sensors can show; smaller effects are not reported as causes.
+
+Play and the distance of presliding must be several times the noise of the positions. A delay must be more than half a
+sample, and more than the lag that filtering leaves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.diagnosis.effects import Candidate, Place
+from tendonfmu.diagnosis.hypotheses import LARGEST_SECANT, Hypothesis
+
+Numbers = NDArray[np.float64]
+
+OF_NOISE = 4.0  # standard deviations of the position noise
+OF_SAMPLE = 0.75  # samples: velocities are late by half a sample
+BEFORE_FIT = 0.5  # of the least size: only the fit shows how large an effect is
+
+
+@dataclass(frozen=True)
+class LeastSizes:
+    """What limits the sensors.
+
+    Attributes
+    ----------
+    joint_noise
+        Standard deviation of the noise of the joint positions, rad [n].
+    tendon_noise
+        Standard deviation of the noise of the tendon positions, m [m].
+    step
+        Time between samples, s.
+    lag
+        Lag of the filters, s.
+    """
+
+    joint_noise: Numbers
+    tendon_noise: Numbers
+    step: float
+    lag: float
+
+    def least(self, effect: str, joint: int | None, tendon: int | None) -> float:
+        """Return the least size in the unit of the effect's number; 0 if none is known."""
+        if effect == "time_delay":
+            return OF_SAMPLE * self.step + self.lag
+        if effect in ("backlash", "presliding"):
+            if joint is not None:
+                return OF_NOISE * float(self.joint_noise[joint - 1])
+            if tendon is not None:
+                return OF_NOISE * float(self.tendon_noise[tendon - 1])
+        return 0.0
+
+    def worth(self, candidate: Candidate, place: Place, shape: Mapping[str, float]) -> bool:
+        """Return whether a step of this size can lead to a size that the sensors resolve.
+
+        A column is valid for up to LARGEST_SECANT times its step.
+        """
+        least = self.least(candidate.name, place.joint, place.tendon)
+        return least == 0.0 or LARGEST_SECANT * abs(float(next(iter(shape.values())))) >= least
+
+    def shows(self, effect: str, place: Place, row: Mapping[str, Any] | None) -> bool:
+        """Return whether a fitted play or delay, a row of `extensions`, is large enough."""
+        number = {"backlash": "width", "time_delay": "delay"}.get(effect)
+        return row is None or number is None or abs(row[number]) >= self.least(effect, place.joint, place.tendon)
+
+    def resolved(self, hypothesis: Hypothesis, magnitudes: Sequence[float] | Numbers) -> bool:
+        """Return whether a hypothesis with these magnitudes [d] is large enough."""
+        if hypothesis.effect == "presliding":  # its size is the distance that was tried, not the magnitude
+            return True
+        least = self.least(hypothesis.effect, hypothesis.joint, hypothesis.tendon)
+        return least == 0.0 or _size(hypothesis, magnitudes) >= BEFORE_FIT * least
+
+
+def _size(hypothesis: Hypothesis, magnitudes: Sequence[float] | Numbers) -> float:
+    """Return the size of the hypothesis's first number at its first place."""
+    if not hypothesis.members:  # a number that the description already has
+        return abs(float(magnitudes[0]))
+    member = hypothesis.members[0]
+    shape: Mapping[str, float] = member.shape.shape
+    step = abs(float(next(iter(shape.values())))) if member.shape.secant and shape else 1.0
+    return abs(float(magnitudes[0])) * step
+
+
+def noise_of(raw: Numbers, smooth: Numbers) -> Numbers:
+    """Return the noise [d] of positions [N, d]: the spread of what smoothing removes, at least the quantisation noise.
+
+    The spread is a standard deviation from the median absolute deviation, so it is robust.
+    """
+    left = raw - smooth
+    spread = 1.4826 * np.median(np.abs(left - np.median(left, axis=0)), axis=0)
+    steps = np.abs(np.diff(raw, axis=0))
+    quantum = np.array([float(column[column > 0].min(initial=np.inf)) for column in steps.T])
+    return np.maximum(spread, np.where(np.isfinite(quantum) & (quantum > 1e-12), quantum / np.sqrt(12.0), 0.0))

@@ -1,0 +1,388 @@
+"""What a flexible learner uses to describe a motion: many simple functions of the states, in groups with plain names.
+
+The learner is linear in its weights. So whatever is done to the residual (removing bias splines, whitening) can be done
+to every column as well, and the null distribution of the learner's skill takes only one small matrix (remainder.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import combinations, pairwise, permutations
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+from scipy.signal import lfilter
+
+from tendonfmu.statistics import Line
+
+if TYPE_CHECKING:
+    from tendonfmu.diagnosis.series import Series
+
+Numbers = NDArray[np.float64]
+
+MEMORY = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)  # s: time constants of what friction may remember
+TRAVELS = (0.03, 0.1, 0.3, 1.0)  # scales of presliding, of the median stroke
+MOST_PAIRS = 30  # of tendons: those with neighbouring numbers first
+RANDOM = 100  # columns of random functions of two or three states
+MOVING = 0.03  # of the 95 % quantile of a speed: slower motion counts as rest
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One part of the remainder.
+
+    Attributes
+    ----------
+    joint
+        Number from 1.
+    group
+        Key of GROUPS, or "line".
+    subject
+        "joint 2", "tendons 1 and 3", or "".
+    line
+        The oscillation, for group "line".
+    """
+
+    joint: int
+    group: str
+    subject: str
+    line: Line | None = None
+
+
+@dataclass(frozen=True)
+class Features:
+    """Columns of the learner.
+
+    Attributes
+    ----------
+    values
+        Columns [B, D].
+    group
+        Of each column, a key of GROUPS.
+    subject
+        Of each column, the part of the finger that it describes.
+    """
+
+    values: Numbers
+    group: NDArray[np.str_]
+    subject: NDArray[np.str_]
+
+
+# name of a group -> what the residual follows, in plain words
+GROUPS = {
+    "angle": "the joint angle",
+    "friction over angle": "direction of motion and joint angle together (friction that changes with the angle)",
+    "velocity": "the joint velocity",
+    "force": "the tendon force",
+    "friction over force": "direction of motion and tendon force together (friction that changes with the load)",
+    "acceleration": "acceleration or products of velocities (inertial torques)",
+    "travel": "the travel since the last reversal (hysteresis)",
+    "memory of direction": "the directions of motion of the last seconds (a long hysteresis)",
+    "memory of speed": "how fast the hand moved in the last seconds (friction that remembers)",
+    "rest": "the time at rest before the motion",
+    "time": "the time since the start, with the direction of motion (slow change of friction)",
+    "rubbing": "the motion of two tendons against each other (rubbing)",
+    "tendon": "the velocity of a tendon",
+    "interaction": "several of angle, velocity, force and history together",
+}
+
+
+def features(series: Series, *, force: Numbers | None = None, seed: int = 0) -> Features:
+    """Compute all columns for the blocks of a series, standardised; constant columns are left out.
+
+    `force` [B, m], N, must be independent of the residual, so it is predicted by the model. The measured force is not
+    independent: the residual is computed from its torque, including the noise, so it would explain the residual.
+    Without a prediction, only the part of the measured force that makes no torque is used.
+    """
+    series = replace(series, force=_without_torque(series) if force is None else force)
+    columns: list[Numbers] = []
+    group: list[str] = []
+    subject: list[str] = []
+    states = _states(series)
+    for maker in (
+        _of_angles,
+        _of_velocities,
+        _of_forces,
+        _of_accelerations,
+        _of_memory,
+        _of_slides,
+        _of_time,
+        _of_tendons,
+    ):
+        for name, who, values in maker(series, states):
+            columns.append(values)
+            group += [name] * values.shape[1]
+            subject += [who] * values.shape[1]
+    values = _interactions(series, states, np.random.default_rng(seed))
+    columns.append(values)
+    group += ["interaction"] * values.shape[1]
+    subject += [""] * values.shape[1]
+    table = np.concatenate(columns, axis=1)
+    table -= table.mean(axis=0)
+    spread = table.std(axis=0)
+    kept = spread > 1e-9 * max(1.0, float(spread.max(initial=0.0)))
+    return Features(table[:, kept] / spread[kept], np.array(group)[kept], np.array(subject)[kept])
+
+
+def _without_torque(series: Series) -> Numbers:
+    """Return the part of the forces that makes no torque, N [B, m], for the moment arms that the motion shows."""
+    arms = np.linalg.lstsq(series.velocity, series.tendon_velocity[:, :, 0], rcond=1e-9)[0].T
+    pulling = arms @ np.linalg.pinv(arms, rcond=1e-9)
+    inner = series.force - series.force @ pulling
+    tiny = 1e-9 * max(float(np.abs(series.force).max(initial=0.0)), 1e-300)
+    return np.asarray(inner * (np.abs(inner).max(axis=0) > tiny))
+
+
+@dataclass(frozen=True)
+class _States:
+    """States of the motion.
+
+    Attributes
+    ----------
+    side
+        Sign of the last motion of the joints [B, n]; 0 before any.
+    moving
+        The side, fading to 0 at rest [B, n].
+    rest
+        Length of the last rest, s [B, n].
+    speed
+        95 % quantile of |velocity|, rad/s [n].
+    tendon_speed
+        The same of the tendon's velocity at its first joint, m/s [m].
+    """
+
+    side: Numbers
+    moving: Numbers
+    rest: Numbers
+    speed: Numbers
+    tendon_speed: Numbers
+
+
+_Made = Iterator[tuple[str, str, Numbers]]
+
+
+def _states(series: Series) -> _States:
+    speed = np.maximum(np.quantile(np.abs(series.velocity), 0.95, axis=0), 1e-12)
+    whole = series.tendon_velocity[:, :, 0]
+    tendon_speed = np.maximum(np.quantile(np.abs(whole), 0.95, axis=0), 1e-15)
+    starts = run_starts(series.segment)
+    return _States(
+        side=_last_side(series.velocity, MOVING * speed, starts),
+        moving=np.tanh(series.velocity / (MOVING * speed)),
+        rest=_rest_before(series.velocity, MOVING * speed, series.step, starts),
+        speed=speed,
+        tendon_speed=tendon_speed,
+    )
+
+
+def run_starts(label: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the index of the first block of each stretch of equal labels [B], and B at the end."""
+    return np.concatenate([[0], np.flatnonzero(np.diff(label)) + 1, [len(label)]]).astype(np.int64)
+
+
+def _last_side(velocity: Numbers, threshold: Numbers, starts: NDArray[np.int64]) -> Numbers:
+    """Return the sign of the last motion faster than the threshold [B, k]."""
+    moving = np.abs(velocity) > threshold
+    index = np.where(moving, np.arange(len(velocity))[:, None], -1)
+    index[starts[:-1]] = np.where(moving[starts[:-1]], index[starts[:-1]], -1)
+    last = np.maximum.accumulate(index, axis=0)
+    begin = np.repeat(starts[:-1], np.diff(starts))[:, None]
+    known = last >= begin
+    return np.where(known, np.sign(np.take_along_axis(velocity, np.maximum(last, 0), axis=0)), 0.0)
+
+
+def _rest_before(velocity: Numbers, threshold: Numbers, step: float, starts: NDArray[np.int64]) -> Numbers:
+    """Return the length of the last rest, s [B, k]: the present one while at rest, else the one before this motion."""
+    result = np.zeros_like(velocity)
+    for joint in range(velocity.shape[1]):
+        still = np.abs(velocity[:, joint]) <= threshold[joint]
+        for first, end in pairwise(starts):
+            part = still[first:end]
+            count = np.arange(1, len(part) + 1)
+            run = count - np.maximum.accumulate(np.where(part, 0, count))  # samples at rest so far, 0 in motion
+            held = np.maximum.accumulate(np.where(part, count, 0))  # the last sample at rest, from 1
+            result[first:end, joint] = np.where(held > 0, run[np.maximum(held - 1, 0)], 0) * step
+    return result
+
+
+def _filtered(signal: Numbers, time_constant: float, step: float, starts: NDArray[np.int64]) -> Numbers:
+    """Return the signal, low-passed with a time constant in s, starting from 0 in each recording."""
+    share = 1.0 - np.exp(-step / time_constant)
+    parts = [lfilter([share], [1.0, share - 1.0], signal[first:end], axis=0) for first, end in pairwise(starts)]
+    return np.concatenate(parts)
+
+
+def _spline(signal: Numbers, knots: int) -> Numbers:
+    """Return cubic splines over a signal [B]; [B, 0] if it is constant."""
+    if np.ptp(signal) <= 1e-12 * max(1.0, float(np.abs(signal).max())):
+        return np.empty((len(signal), 0))
+    places = np.unique(np.quantile(signal, np.linspace(0.01, 0.99, knots)))
+    if len(places) < 2:
+        return signal[:, None]
+    degree = min(3, len(places))
+    before, after = np.diff(places)[[0, -1]]
+    outer = np.arange(1, degree + 1)
+    knot = np.concatenate([places[0] - before * outer[::-1], places, places[-1] + after * outer])
+    curves = BSpline(knot, np.eye(len(places) + degree - 1), degree)
+    inside = np.clip(signal, places[0], places[-1])
+    values = curves(inside)
+    out = np.flatnonzero(signal != inside)
+    values[out] += (signal - inside)[out, None] * curves(inside[out], 1)
+    return np.asarray(values)
+
+
+def _bends(one: Numbers, two: Numbers) -> Numbers:
+    """Return smooth functions of two signals together [B, 9].
+
+    They are products of Legendre polynomials 1 to 3 of the signals' ranges.
+    """
+
+    def polynomials(signal: Numbers) -> Numbers:
+        low, high = np.quantile(signal, (0.01, 0.99))
+        inside = np.clip(2.0 * (signal - low) / max(high - low, 1e-12) - 1.0, -1.2, 1.2)
+        return np.polynomial.legendre.legvander(inside, 3)[:, 1:]
+
+    products = polynomials(one)[:, :, None] * polynomials(two)[:, None, :]
+    return products.reshape(len(one), -1)
+
+
+def _joint(index: int) -> str:
+    return f"joint {index + 1}"
+
+
+def _of_angles(series: Series, states: _States) -> _Made:
+    joints = series.angle.shape[1]
+    for joint in range(joints):
+        curve = _spline(series.angle[:, joint], 8)
+        yield "angle", _joint(joint), curve
+        both = (states.side[:, joint, None], states.moving[:, joint, None])
+        yield "friction over angle", _joint(joint), np.concatenate([curve * side for side in both], axis=1)
+    for one, two in permutations(range(joints), 2):
+        who = f"joints {min(one, two) + 1} and {max(one, two) + 1}"
+        curve = _bends(series.angle[:, one], series.angle[:, two])
+        yield "angle", who, curve if one < two else curve[:, :0]
+        other = _spline(series.angle[:, two], 4)
+        for side in (states.side[:, one, None], states.moving[:, one, None]):
+            yield "friction over angle", who, np.concatenate([curve * side, other * side], axis=1)
+
+
+def _of_velocities(series: Series, states: _States) -> _Made:
+    for joint in range(series.velocity.shape[1]):
+        ratio = series.velocity[:, joint] / states.speed[joint]
+        steps = [np.tanh(ratio / scale) for scale in (0.03, 0.1, 0.3, 1.0)]
+        yield "velocity", _joint(joint), np.stack([*steps, ratio, np.abs(ratio), ratio * np.abs(ratio)], axis=1)
+
+
+def _of_forces(series: Series, states: _States) -> _Made:
+    sides = states.side
+    for tendon in range(series.force.shape[1]):
+        force = series.force[:, tendon]
+        scale = max(float(np.abs(force).max()), 1e-12)
+        yield "force", f"tendon {tendon + 1}", _spline(force, 4)
+        for joint in range(sides.shape[1]):
+            who = f"tendon {tendon + 1} at joint {joint + 1}"
+            load, angle = force / scale, series.angle[:, joint]
+            both = (sides[:, joint], states.moving[:, joint])
+            yield "friction over force", who, np.stack([load**k * side for side in both for k in (1, 2)], axis=1)
+            yield "force", who, np.stack([load * angle, load * np.sin(2 * angle), load * angle**2], axis=1)
+
+
+def _of_accelerations(series: Series, states: _States) -> _Made:
+    joints = series.velocity.shape[1]
+    for joint in range(joints):
+        yield "acceleration", _joint(joint), series.acceleration[:, joint : joint + 1]
+        around = np.cos(series.angle[:, joint]) * series.acceleration[:, joint]
+        yield "acceleration", _joint(joint), around[:, None]
+    for one, two in combinations(range(joints), 2):
+        product = series.velocity[:, one] * series.velocity[:, two] / (states.speed[one] * states.speed[two])
+        yield "acceleration", f"joints {one + 1} and {two + 1}", product[:, None]
+
+
+def _of_memory(series: Series, states: _States) -> _Made:
+    starts = run_starts(series.segment)
+    for joint in range(series.velocity.shape[1]):
+        travel = np.abs(series.travel[:, joint])
+        stroke = max(float(np.quantile(travel, 0.9)), 1e-12)
+        side, moving = states.side[:, joint], states.moving[:, joint]
+        decays = [side * np.exp(-travel / (scale * stroke)) for scale in TRAVELS]
+        yield "travel", _joint(joint), np.stack(decays, axis=1)
+        signals = np.stack([side, np.abs(series.velocity[:, joint]) / states.speed[joint]], axis=1)
+        past = np.stack([_filtered(signals, each, series.step, starts) for each in MEMORY], axis=2)
+        yield "memory of direction", _joint(joint), past[:, 0]
+        quick = [past[:, 1] * side[:, None], past[:, 1] * moving[:, None]]
+        yield "memory of speed", _joint(joint), np.concatenate(quick, axis=1)
+        rested = np.log1p(states.rest[:, joint] / 0.1)
+        fresh = np.exp(-travel / (0.3 * stroke))
+        columns = [rested, rested * side, rested * moving, rested * side * fresh]
+        yield "rest", _joint(joint), np.stack(columns, axis=1)
+
+
+def _of_slides(series: Series, states: _States) -> _Made:
+    """Yield columns for friction of a tendon that depends on how much and how fast it slid recently."""
+    starts = run_starts(series.segment)
+    level = np.abs(series.force).mean(axis=0)
+    for tendon in range(series.force.shape[1]):
+        load = np.abs(series.force[:, tendon]) / level[tendon] if level[tendon] > 0.0 else np.ones(len(series.time))
+        slip = series.tendon_velocity[:, tendon]
+        ratio = np.abs(slip[:, 0]) / states.tendon_speed[tendon]
+        signals = np.stack([np.minimum(ratio / 0.2, 1.0), ratio], axis=1)
+        past = np.concatenate([_filtered(signals, each, series.step, starts) for each in MEMORY[2:5]], axis=1)
+        past -= past.mean(axis=0)
+        side = _last_side(slip, np.full(slip.shape[1], MOVING * states.tendon_speed[tendon]), starts)
+        columns = [past * (load * side[:, joint])[:, None] for joint in range(slip.shape[1])]
+        yield "memory of speed", f"tendon {tendon + 1}", np.concatenate(columns, axis=1)
+
+
+def _of_time(series: Series, states: _States) -> _Made:
+    starts = run_starts(series.recording)
+    since = series.time - np.repeat(series.time[starts[:-1]], np.diff(starts))
+    curve = _spline(since, 4)
+    for joint in range(series.velocity.shape[1]):
+        ratio = series.velocity[:, joint] / states.speed[joint]
+        moved = [curve * each[:, None] for each in (states.side[:, joint], states.moving[:, joint], ratio)]
+        yield "time", _joint(joint), np.concatenate(moved, axis=1)
+
+
+def _of_tendons(series: Series, states: _States) -> _Made:
+    tendons, joints = series.tendon_velocity.shape[1:]
+    mean_force = np.abs(series.force).mean(axis=0).clip(1e-12)
+    load = series.force / mean_force
+    for tendon in range(tendons):
+        for joint in range(joints):
+            ratio = series.tendon_velocity[:, tendon, joint] / states.tendon_speed[tendon]
+            steps = [np.tanh(ratio / scale) for scale in (0.03, 0.1, 0.3)]
+            values = np.stack([*steps, steps[1] * load[:, tendon]], axis=1)
+            yield "tendon", f"tendon {tendon + 1}", values
+    pairs = sorted(combinations(range(tendons), 2), key=lambda pair: pair[1] - pair[0])[:MOST_PAIRS]
+    for one, two in pairs:
+        pressed = np.sqrt(np.abs(load[:, one] * load[:, two]))
+        for joint in range(joints):
+            apart = series.tendon_velocity[:, one, joint] - series.tendon_velocity[:, two, joint]
+            speed = max(float(np.quantile(np.abs(apart), 0.95)), 1e-15)
+            step = np.tanh(apart / (0.05 * speed))
+            values = np.stack([step, np.tanh(apart / (0.3 * speed)), step * pressed], axis=1)
+            yield "rubbing", f"tendons {one + 1} and {two + 1}", values
+
+
+def _interactions(series: Series, states: _States, rng: np.random.Generator) -> Numbers:
+    """Return random waves of two or three states at a time, half of them with the sign of a motion."""
+    starts = run_starts(series.segment)
+    ratio = series.velocity / states.speed
+    recent = [_filtered(states.side, each, series.step, starts) for each in (0.3, 3.0)]
+    table = np.concatenate(
+        [series.angle, np.sign(ratio) * np.sqrt(np.abs(ratio)), series.force, np.abs(series.travel), *recent], axis=1
+    )
+    spread = table.std(axis=0)
+    table = (table - table.mean(axis=0))[:, spread > 1e-12] / spread[spread > 1e-12]
+    if not table.shape[1]:
+        return np.empty((len(table), 0))
+    columns = []
+    for index in range(RANDOM):
+        chosen = rng.choice(table.shape[1], size=min(table.shape[1], 2 + index % 2), replace=False)
+        wave = np.cos(table[:, chosen] @ rng.normal(0.0, 1.2, len(chosen)) + rng.uniform(0.0, 2.0 * np.pi))
+        side = states.side[:, rng.integers(states.side.shape[1])]
+        columns.append(wave * side if index % 4 < 2 else wave)
+    return np.stack(columns, axis=1)

@@ -1,0 +1,104 @@
+"""Which causes a report lists: those with a term in the extended model, then contact and unknown, which have none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from tendonfmu.diagnosis.contact_scan import LEVEL as SCAN_LEVEL
+from tendonfmu.diagnosis.result import Cause, Diagnosis, Where
+from tendonfmu.diagnosis.size import quantity
+
+CONTACT, UNKNOWN = "contact", "unknown"
+LOAD = "load"  # a contact that lasts for the whole recording; only in a comparison with a reference
+TITLES = {
+    LOAD: "a load on the finger that was not there, or a sensor's zero that has moved",
+    CONTACT: "something touches the finger, or stops it",
+    UNKNOWN: "something that no effect on the list explains",
+}
+_EXPLANATIONS = {
+    LOAD: "The mean torque that the model does not explain has moved far beyond its scatter in the reference. Friction "
+    "cannot cause that. Look whether something touches or pulls the finger, and what the sensors show without a "
+    "tendon. At run time the bias follows it.",
+    CONTACT: "In some stretches a torque appears and disappears that no friction explains. They are left out of the "
+    "fit. The gain is the share of the error on the training recordings that leaving them out removes.",
+    UNKNOWN: "Part of the remaining error can be predicted from what was recorded, but it has the shape of no effect "
+    "on the list. The gain is the share of the error in unseen stretches that predicting it removes.",
+}
+LEAST_GAIN = 0.1  # lower end of a contact's gain: contact is judged on the recordings in which it was found
+LEAST_PEAK = 6.0  # least peak of a contact, in rms of what the extended model leaves
+
+
+def reported_causes(found: Diagnosis) -> list[Cause]:
+    """Return the causes that a report lists, in order of gain.
+
+    Contact and unknown come last. Each is listed only if its gain is certainly above 0: the lower end of its 95 %
+    interval is positive, for contact at least LEAST_GAIN.
+
+    Parameters
+    ----------
+    found
+        The result of `diagnose`.
+
+    Returns
+    -------
+    list of Cause
+        The causes of `found`, then a steady load, contact and unknown where they apply.
+    """
+    return [*found.causes, *_load(found), *_contact(found), *_unknown(found)]
+
+
+def _load(found: Diagnosis) -> Iterator[Cause]:
+    load = found.load
+    if load is None or not load.gain.low > 0.0:
+        return
+    size = load.size
+    yield Cause(
+        where=Where(CONTACT, load.joint),
+        title=TITLES[LOAD],
+        explanation=_EXPLANATIONS[LOAD],
+        p_value=load.p_value,
+        gain=load.gain,
+        confusable_with=(Where("force_offset"), Where("gravity", load.joint)),
+        parameters={},
+        size=f"{quantity(size.change.value, size.unit, sign=True)} all the time",
+        changed=size,
+    )
+
+
+def _contact(found: Diagnosis) -> Iterator[Cause]:
+    events = [event for event in found.events if event.peak >= LEAST_PEAK * max(found.extended.train_rms)]
+    gain = found.event_gain
+    if not events or gain is None or not gain.low >= LEAST_GAIN:
+        return
+    joints = {joint for event in events for joint in event.joints}
+    joint = joints.pop() if len(joints) == 1 else None
+    count = "one event" if len(events) == 1 else f"{len(events)} events"
+    seconds = sum(event.end - event.start for event in events)
+    yield Cause(
+        where=Where(CONTACT, joint),
+        title=TITLES[CONTACT],
+        explanation=_EXPLANATIONS[CONTACT],
+        p_value=SCAN_LEVEL,  # probability of any event in recordings without one
+        gain=gain,
+        confusable_with=(),
+        parameters={},
+        size=f"{count}, {seconds:.1f} s in all",
+    )
+
+
+def _unknown(found: Diagnosis) -> Iterator[Cause]:
+    rest = found.unexplained
+    if not rest.unknown or not rest.gain.low > 0.0:
+        return
+    yield Cause(
+        where=Where(UNKNOWN, int(np.argmax(rest.by_joint)) + 1 if any(rest.by_joint) else None),
+        title=TITLES[UNKNOWN],
+        explanation=_EXPLANATIONS[UNKNOWN],
+        p_value=rest.p_value,
+        gain=rest.gain,
+        confusable_with=(),
+        parameters={},
+        size=rest.description.rstrip("."),
+    )

@@ -1,0 +1,138 @@
+"""How the residual looks from all sides: over time, angle, velocity, force, load and travel; spectrum and whiteness."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import welch
+
+from tendonfmu.diagnosis.result import ResidualView
+from tendonfmu.statistics import make_folds
+
+if TYPE_CHECKING:
+    from tendonfmu.diagnosis.series import Series
+
+Numbers = NDArray[np.float64]
+
+BINS = 24
+POINTS = 1200  # of a curve over time
+LONGEST_LAG = 1.0  # s
+
+
+def residual_views(
+    series: Series, before: Numbers, after: Numbers, *, load: Numbers | None = None
+) -> tuple[ResidualView, ...]:
+    """Return all pictures of the residual, joint after joint.
+
+    Parameters
+    ----------
+    before, after
+        Residual of the nominal and of the extended model, N·m [B, n].
+    load
+        Torque of the tendons, or known load, N·m [B, n]; without it the view over the load is left out.
+    """
+    return tuple(view for joint in range(before.shape[1]) for view in _of_joint(series, before, after, load, joint))
+
+
+def _of_joint(
+    series: Series, before: Numbers, after: Numbers, load: Numbers | None, joint: int
+) -> Iterator[ResidualView]:
+    used = series.used
+    pair = before[used, joint], after[used, joint]
+    yield _over_time(series, before[:, joint], after[:, joint], joint)
+    yield _binned("angle", f"angle of joint {joint + 1}", "rad", series.angle[used, joint], *pair, joint)
+    yield _binned("velocity", f"velocity of joint {joint + 1}", "rad/s", series.velocity[used, joint], *pair, joint)
+    yield _binned("tendon_force", "mean tendon force", "N", np.abs(series.force[used]).mean(axis=1), *pair, joint)
+    if load is not None:
+        yield _binned("load", f"torque at joint {joint + 1}", "N·m", load[used, joint], *pair, joint)
+    turned = series.travel[used, joint] * np.sign(series.velocity[used, joint])
+    yield _binned("travel", "travel since reversal, with its direction", "rad", turned, *pair, joint)
+    yield _spectrum(series, before[:, joint], after[:, joint], joint)
+    yield _autocorrelation(series, before[:, joint], after[:, joint], joint)
+
+
+def _over_time(series: Series, before: Numbers, after: Numbers, joint: int) -> ResidualView:
+    """Average over equal pieces, recordings one after another; NaN between them and where nothing is used."""
+    size = max(1, -(-len(before) // POINTS))
+    pieces = -(-len(before) // size)
+    piece = np.arange(len(before)) // size
+    used = series.used
+    count = np.bincount(piece[used], minlength=pieces)
+
+    def mean(values: Numbers) -> Numbers:
+        total = np.bincount(piece[used], values[used], minlength=pieces)
+        return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+    clock = _running_time(series)
+    return ResidualView(joint + 1, "time", "time", "s", clock[np.arange(pieces) * size], mean(before), mean(after))
+
+
+def _running_time(series: Series) -> Numbers:
+    """Return the time of each block; every recording starts where the one before ended."""
+    new = np.flatnonzero(np.diff(series.recording, prepend=series.recording[:1] - 1))
+    ends = np.append(new[1:], len(series.time)) - 1
+    lengths = series.time[ends] - series.time[new] + series.step
+    begin = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
+    which = np.searchsorted(new, np.arange(len(series.time)), side="right") - 1
+    return np.asarray(series.time - series.time[new][which] + begin[which])
+
+
+def _binned(kind: str, label: str, unit: str, x: Numbers, before: Numbers, after: Numbers, joint: int) -> ResidualView:
+    """Average over bins of equal count; `before_std` is the scatter within the bin."""
+    order = np.argsort(x, kind="stable")
+    parts = [part for part in np.array_split(order, BINS) if len(part)]
+
+    def mean(values: Numbers) -> Numbers:
+        return np.array([values[part].mean() for part in parts])
+
+    scatter = np.array([before[part].std() for part in parts])
+    return ResidualView(joint + 1, kind, label, unit, mean(x), mean(before), mean(after), scatter)
+
+
+def _spectrum(series: Series, before: Numbers, after: Numbers, joint: int) -> ResidualView:
+    """Return Welch's power density, N²m²/Hz; runs without a gap are averaged by their length."""
+    rate, plan = 1.0 / series.step, make_folds(series)
+    ends = np.flatnonzero(np.diff(plan.run, append=-1)) + 1
+    runs = [plan.rows[begin:end] for begin, end in zip(np.append(0, ends[:-1]), ends, strict=True)]
+    size = min(512, max((len(run) for run in runs), default=1))
+    total, weight = np.zeros((2, size // 2 + 1)), 0.0
+    for run in runs:
+        if len(run) >= size:
+            density = welch(np.stack([before[run], after[run]]), rate, nperseg=size)[1]
+            total += density * len(run)
+            weight += len(run)
+    frequency = np.arange(size // 2 + 1, dtype=np.float64) / (size * series.step)
+    total /= max(weight, 1.0)
+    return ResidualView(joint + 1, "spectrum", "frequency", "Hz", frequency[1:], total[0, 1:], total[1, 1:])
+
+
+def _autocorrelation(series: Series, before: Numbers, after: Numbers, joint: int) -> ResidualView:
+    lags = np.arange(1, max(2, round(LONGEST_LAG / series.step)) + 1)
+    curves = [_correlations(series, values, lags) for values in (before, after)]
+    return ResidualView(joint + 1, "autocorrelation", "lag", "s", np.asarray(lags * series.step), curves[0], curves[1])
+
+
+def _correlations(series: Series, values: Numbers, lags: NDArray[np.int64]) -> Numbers:
+    """Return the correlation of values [B] with themselves a few blocks later, without pairs across a gap."""
+    plan = make_folds(series)
+    seen = values[plan.rows] - (values[plan.rows].mean() if len(plan.rows) else 0.0)
+    variance = float(np.mean(seen**2)) if len(seen) else 0.0
+    found = []
+    for lag in lags:
+        same = plan.run[lag:] == plan.run[:-lag]
+        count = int(same.sum())
+        mean = float(np.sum((seen[lag:] * seen[:-lag])[same])) / count if count else 0.0
+        found.append(mean / variance if variance > 0.0 else 0.0)
+    return np.array(found)
+
+
+def whiteness(series: Series, before: Numbers, after: Numbers) -> tuple[tuple[float, float], ...]:
+    """Return, for each joint, the correlation of neighbouring blocks before and after; 0 for white noise."""
+    one = np.array([1])
+    return tuple(
+        (float(_correlations(series, before[:, j], one)[0]), float(_correlations(series, after[:, j], one)[0]))
+        for j in range(before.shape[1])
+    )

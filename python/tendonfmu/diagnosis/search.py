@@ -1,0 +1,458 @@
+"""How a search gets from recordings to the causes that a description lacks: signals, starting point, cause after cause.
+
+After each cause, all numbers of the extended description are fitted again and everything is computed anew around it.
+The derivatives of a wrong model would otherwise ask for small pieces that only correct the linearisation. The search
+ends when no candidate is material and certain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.diagnosis.cause_search import View, bias_of, look, predicted_of, residual_alone, series_of
+from tendonfmu.diagnosis.cause_selection import CERTAIN, Judged, Pick, Selection, is_alike, rms_gain
+from tendonfmu.diagnosis.contact_scan import left_out, scan_events
+from tendonfmu.diagnosis.effects import CANDIDATES, Candidate, Place
+from tendonfmu.diagnosis.effects.presliding import is_spring
+from tendonfmu.diagnosis.extension_fit import (
+    Accepted,
+    FitSettings,
+    FittedModel,
+    extended_description,
+    fit_extended,
+    possible,
+)
+from tendonfmu.diagnosis.hypotheses import SCALING, Hypothesis, Key
+from tendonfmu.diagnosis.nominal_fit import fitted
+from tendonfmu.diagnosis.online_error import OnlineError
+from tendonfmu.diagnosis.result import Event
+from tendonfmu.diagnosis.series import Grid
+from tendonfmu.diagnosis.signal_choice import Estimation
+from tendonfmu.diagnosis.span import span_of
+from tendonfmu.diagnosis.starting_point import presliding_everywhere
+from tendonfmu.model import extended_row
+from tendonfmu.recordings import FitRecording
+from tendonfmu.statistics import Interval
+from tendonfmu.tasks import Phases, Step
+
+Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+MOST_CAUSES = 8
+SIGNIFICANCE = 0.01  # family-wise
+MOST_FITTED = 3  # effects that columns cannot distinguish
+WIDESPREAD = {"presliding"}  # in every finger, and different from place to place
+MOST_REFUSED = 4  # selected effects that the fit or the test did not confirm
+
+
+@dataclass(frozen=True)
+class NamedCause:
+    """A cause as it was found.
+
+    Attributes
+    ----------
+    effect, joint, tendon
+        Where it is; None everywhere.
+    accepted
+        Its places, in the form that a description takes.
+    gain, error
+        1 − rms with / rms without on held-out folds, and its standard error.
+    alike
+        What the data cannot distinguish from it.
+    hypothesis
+        As it was selected; None if it is part of the start.
+    measured
+        Gain on unseen data as it runs online.
+    """
+
+    effect: str
+    joint: int | None
+    tendon: int | None
+    accepted: tuple[Accepted, ...]
+    gain: float
+    error: float
+    p_value: float
+    alike: tuple[Hypothesis, ...]
+    hypothesis: Hypothesis | None = None
+    measured: Interval | None = None
+
+    @property
+    def key(self) -> Key:
+        return self.effect, self.joint, self.tendon
+
+    @property
+    def interval(self) -> Interval:
+        """The measured gain; without one, the gain on held-out folds with its 95 % interval."""
+        return self.measured or Interval(self.gain, self.gain - 1.96 * self.error, self.gain + 1.96 * self.error)
+
+
+@dataclass(frozen=True)
+class Search:
+    """The result of a search.
+
+    Attributes
+    ----------
+    estimation
+        Signals and recordings.
+    nominal, extended
+        Fitted descriptions with the settings for estimation.
+    first, last
+        What each of them lacks and leaves.
+    causes
+        In the order in which they were found.
+    models
+        The nominal model, then the model after each cause [causes + 1].
+    small
+        Effects that are certain but not material.
+    events
+        Contact and stalls.
+    out
+        Blocks that lie in events [B].
+    fitted_to
+        Recordings with the forces that the model predicts, without events.
+    """
+
+    estimation: Estimation
+    nominal: FittedModel
+    extended: FittedModel
+    first: View
+    last: View
+    causes: tuple[NamedCause, ...]
+    models: tuple[FittedModel, ...]
+    small: tuple[NamedCause, ...]
+    events: tuple[Event, ...]
+    out: Flags
+    fitted_to: Sequence[FitRecording]
+
+
+def accepted_of(hypothesis: Hypothesis, magnitudes: Numbers) -> tuple[Accepted, ...]:
+    """Return the places of a hypothesis with its common magnitudes [d], in the form that `extension_fit` takes."""
+    return tuple(
+        Accepted(
+            member.proposal.candidate,
+            member.proposal.place,
+            dict(member.shape.shape),
+            tuple(float(weight * value) for weight, value in zip(member.weights, magnitudes, strict=True)),
+        )
+        for member in hypothesis.members
+    )
+
+
+def search(
+    recordings: Sequence[FitRecording],
+    chosen: Estimation,
+    *,
+    least_gain: float,
+    seed: int,
+    phases: Phases,
+) -> Search:
+    """Search for the causes that a description lacks.
+
+    `recordings` are as measured; their `train` says where to look. `chosen` holds what is estimated from.
+    """
+    settings = chosen.settings
+    with phases.start("contact"):
+        events, out = events_of(chosen.model.data, chosen.recordings, chosen.grid, seed)
+    nominal = chosen.nominal
+    own = [without_blocks(each, k, chosen.grid, out) for k, each in enumerate(chosen.recordings)]
+    clean = predicted_of(nominal.data, own, chosen.grid, series_of(nominal.data, own, chosen.grid, out))
+    nominal = fitted(nominal.data, clean, settings, given=nominal.given)
+    touched = chosen.recordings  # still including the events
+    chosen = replace(chosen, nominal=nominal, recordings=own)
+    online = OnlineError(chosen.online(nominal.data), [without_events(each, events) for each in recordings])
+    with phases.start("causes", MOST_CAUSES) as step:
+        rounds = _Rounds(chosen, out, online, least_gain, settings)
+        rounds.run(step)
+    if events:
+        # drop events that the causes explain
+        left, _ = events_of(rounds.models[-1].data, touched, chosen.grid, seed)
+        events = tuple(event for event in events if any(_overlap(event, other) for other in left))
+    return Search(
+        estimation=chosen,
+        nominal=nominal,
+        extended=rounds.models[-1],
+        first=rounds.first,
+        last=rounds.view,
+        causes=tuple(rounds.causes),
+        models=tuple(rounds.models),
+        small=(*rounds.refused, *rounds.small()),
+        events=events,
+        out=out,
+        fitted_to=clean,
+    )
+
+
+def _overlap(one: Event, other: Event) -> bool:
+    return one.recording == other.recording and one.start < other.end and other.start < one.end
+
+
+def events_of(
+    data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, seed: int
+) -> tuple[tuple[Event, ...], Flags]:
+    """Find the stretches that no friction explains in the residual of a model.
+
+    Parameters
+    ----------
+    data
+        Fitted description.
+    recordings
+        Prepared for it.
+    grid
+        Blocks of the recordings.
+    seed
+        Seed of the learner's random functions.
+
+    Returns
+    -------
+    tuple of Event
+        In order of recording and time.
+    array of bool
+        Blocks that lie in an event [B].
+    """
+    series = series_of(data, recordings, grid)
+    names = [str(recording.path) for recording in recordings]
+    events = scan_events(series, residual_alone(data, series), bias_of(data, series), names, seed=seed)
+    return events, left_out(series, events, names)
+
+
+def without_events(recording: FitRecording, events: Sequence[Event]) -> FitRecording:
+    """Return the recording without the samples that lie in its events."""
+    inside = np.zeros(len(recording.time), dtype=bool)
+    for event in events:
+        if event.recording == str(recording.path):
+            inside |= (recording.time >= event.start) & (recording.time <= event.end)
+    return replace(recording, train=recording.train & ~inside, held_out=recording.held_out & ~inside)
+
+
+def without_blocks(recording: FitRecording, number: int, grid: Grid, out: Flags) -> FitRecording:
+    """Return a recording that does not train on the samples of some blocks.
+
+    Parameters
+    ----------
+    recording
+        The recording.
+    number
+        Its number in the grid, from 0.
+    grid
+        Blocks of all recordings.
+    out
+        Blocks to leave out [B].
+
+    Returns
+    -------
+    FitRecording
+        With `train` False in these blocks.
+    """
+    train = recording.train.copy()
+    for segment in grid.segments:
+        if segment.recording == number:
+            begin = segment.part.start
+            rows = np.flatnonzero(np.repeat(out[segment.blocks], segment.samples))
+            train[begin + rows] = False
+    return replace(recording, train=train)
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """A cause and the model fitted with it; the model is None if there is none.
+
+    `error` is Σ e² on held-out folds by stretch [K].
+    """
+
+    cause: NamedCause
+    model: FittedModel | None
+    error: Numbers
+
+
+class _Rounds:
+    """Adds cause after cause; keeps models and views after each."""
+
+    def __init__(
+        self,
+        chosen: Estimation,
+        out: Flags,
+        online: OnlineError,
+        least_gain: float,
+        settings: FitSettings,
+    ) -> None:
+        self.causes: list[NamedCause] = []
+        self.refused: list[NamedCause] = []
+        self.models = [chosen.nominal]
+        self._chosen, self._out, self._online = chosen, out, online
+        self._least_gain, self._settings = least_gain, settings
+        # before the start is fitted, only the residual of the nominal model is needed
+        self.view = self.first = self._look(chosen.nominal, () if chosen.start.causes else CANDIDATES)
+
+    def run(self, step: Step) -> None:
+        for accepted in self._chosen.start.causes:
+            self._take(self._tried(_together(accepted)), ())
+        if not self.view.columns.proposals:
+            self.view = self._look(self.models[-1])
+        self._search(step)
+        if self._tries_presliding():
+            self._search(step)
+
+    def _search(self, step: Step) -> None:
+        while len(self.causes) < MOST_CAUSES and len(self.refused) < MOST_REFUSED:
+            step(len(self.causes))
+            # Refused effects explain something, so no other effect is credited with that. A correction of the torque
+            # itself is excluded: it lowers any error by shrinking the torque.
+            known = {each.key for each in self.refused if each.effect not in SCALING}
+            tried = {each.effect for each in self.refused}
+            selection = self.view.beside(known)
+            picked = selection.best(self._least_gain, tried)
+            if picked is None:
+                break
+            trial = self._best_fitted(selection, picked)
+            if trial.cause.p_value >= SIGNIFICANCE or not self._take(trial):
+                self.refused.append(trial.cause)
+
+    def _best_fitted(self, selection: Selection, picked: Pick) -> _Trial:
+        """Fit the effects that the columns cannot distinguish and take the best: columns of a wrong model mislead."""
+        own = self._named(picked.judged, selection)
+        rivals = [self._named(selection.refined(each.effect), selection) for each in _to_fit(picked)]
+        trials = [self._tried(each) for each in (own, *(each for each in rivals if each.p_value < SIGNIFICANCE))]
+        best = min(trials, key=lambda each: float(each.error.sum()))
+        same = [each for each in trials if each.model is not None and is_alike(each.error, best.error)]
+        # an effect that is already present explains the data without a new name
+        widespread = WIDESPREAD & {each.effect for each in self.causes}
+        best = next((each for each in same if each.cause.effect in widespread), best)
+        fitted_effects = {each.cause.effect for each in trials}
+        alike = [each.cause.hypothesis for each in same if each is not best and each.cause.hypothesis is not None]
+        alike += [each for each in picked.alike if each.effect not in fitted_effects]
+        best = self._at_best_place(best, selection)
+        return replace(best, cause=replace(best.cause, alike=tuple(alike)))
+
+    def _at_best_place(self, trial: _Trial, selection: Selection) -> _Trial:
+        """Fit the effect at the nearly best places, too, and take the best.
+
+        Derivatives distinguish the places of a large effect less well than fitted models.
+        """
+        judged = selection.refined(trial.cause.effect)
+        if trial.cause.hypothesis is not judged.hypothesis:
+            return trial
+        others = [self._named(each, selection) for each in selection.near(judged)[: MOST_FITTED - 1]]
+        trials = [trial, *(self._tried(each) for each in others if each.p_value < SIGNIFICANCE)]
+        return min(trials, key=lambda each: float(each.error.sum()))
+
+    def _tries_presliding(self) -> bool:
+        """Try presliding with a short distance if none was taken; return whether it was taken.
+
+        Its distance may be far below the scanned ones.
+        """
+        chosen = self._chosen
+        if any(each.effect == "presliding" for each in [*self.causes, *self.refused]):
+            return False
+        span = span_of(self.models[-1].data, chosen.recordings)
+        tried = presliding_everywhere(self.models[-1].data, chosen.recordings[0].kinematics, span)
+        return bool(tried) and self._take(self._tried(_together(tried[0])))
+
+    def _named(self, judged: Judged, selection: Selection) -> NamedCause:
+        own = judged.hypothesis
+        accepted = accepted_of(own, judged.magnitudes)
+        gain, error = selection.gain(judged)
+        p_value = self.view.p_value(own)
+        return NamedCause(own.effect, own.joint, own.tendon, accepted, gain, error, p_value, (), own)
+
+    def _tried(self, cause: NamedCause) -> _Trial:
+        """Fit the description with a further cause."""
+        everything = [each for known in [*self.causes, cause] for each in known.accepted]
+        accepted = possible(self.models[0].data, everything)
+        if len(accepted) < len(everything):
+            return _Trial(cause, None, np.array([np.inf]))
+        own = self._chosen.recordings
+        # predict with the cause: forces predicted without a delay are not late, so no fit would find a delay in them
+        begin = extended_description(self.models[-1].data, cause.accepted)
+        clean = predicted_of(begin, own, self._chosen.grid, series_of(begin, own, self._chosen.grid, self._out))
+        model = fit_extended(self.models[0], accepted, clean, self._settings)
+        # fit again with the forces predicted with the cause
+        clean = predicted_of(
+            model.data, own, self._chosen.grid, series_of(model.data, own, self._chosen.grid, self._out)
+        )
+        model = fitted(model.data, clean, self._settings, given=self.models[0].given)
+        if not self._resolved(cause, model):
+            return _Trial(cause, None, np.array([np.inf]))
+        return _Trial(cause, model, self._look(model, ()).selection.base)
+
+    def _take(self, trial: _Trial, candidates: Sequence[Candidate] = CANDIDATES) -> bool:
+        """Keep a further cause if it lowers the error on unseen stretches materially and certainly.
+
+        The error of the model that runs online must fall, too. `candidates` are computed around the new model.
+        """
+        before, after, model, cause = self.view.selection.base, trial.error, trial.model, trial.cause
+        gain, error = rms_gain(before, after) if model is not None else (0.0, 0.0)
+        if model is None or gain < self._least_gain or gain <= CERTAIN * error or not self._runs_better(model):
+            return False
+        if cause.p_value >= SIGNIFICANCE:  # a cause of the start has no column in the view before
+            cause = replace(cause, p_value=_step_p_value(before, after))
+        self.causes.append(replace(cause, gain=gain, error=error))
+        self.models.append(model)
+        self.view = self._look(model, candidates)
+        return True
+
+    def _runs_better(self, model: FittedModel) -> bool:
+        """Return whether the model runs better online than the last one.
+
+        Both its error without a slow bias and its r must be smaller.
+        """
+        before, after = (self._chosen.online(each.data) for each in (self.models[-1], model))
+        left, found = (self._online.by_stretch(each).sum() for each in (before, after))
+        return bool(found < left and self._online.square(after) < self._online.square(before))
+
+    def _resolved(self, cause: NamedCause, model: FittedModel) -> bool:
+        """Return whether the sensors can show a play or delay of the fitted size, and presliding is no spring."""
+        if cause.effect == "presliding" and is_spring(model.data, span_of(model.data, self._chosen.recordings)):
+            return False
+        own = [extended_row(model.data, cause.effect, each.place) for each in cause.accepted]
+        least = self._chosen.least
+        return all(least.shows(cause.effect, each.place, row) for each, row in zip(cause.accepted, own, strict=True))
+
+    def _look(self, model: FittedModel, candidates: Sequence[Candidate] = CANDIDATES) -> View:
+        chosen = self._chosen
+        return look(model.data, chosen.recordings, chosen.grid, chosen.least, self._out, candidates=candidates)
+
+    def small(self) -> list[NamedCause]:
+        """Return the best place of every effect that is certain but not material."""
+        found = []
+        known = {each.effect for each in self.refused}
+        for judged in self.view.selection.ranked():
+            gain, error = self.view.selection.gain(judged)
+            if (
+                judged.hypothesis.effect not in known
+                and gain > CERTAIN * error
+                and (p_value := self.view.p_value(judged.hypothesis)) < SIGNIFICANCE
+            ):
+                found.append(_small(judged, gain, error, p_value))
+        return found
+
+
+def _to_fit(picked: Pick) -> list[Hypothesis]:
+    """Return the effects that cannot be distinguished from a pick and may replace it.
+
+    A correction of the torque itself may replace only another such correction, because it lowers any error.
+    """
+    scaling = picked.hypothesis.effect in SCALING
+    return [each for each in picked.alike if scaling or each.effect not in SCALING][: MOST_FITTED - 1]
+
+
+def _together(places: tuple[Accepted, ...]) -> NamedCause:
+    """Return a cause of the start, at one place or everywhere."""
+    place = places[0].place if len(places) == 1 else Place()
+    return NamedCause(places[0].candidate.name, place.joint, place.tendon, places, 0.0, 0.0, 1.0, ())
+
+
+def _small(judged: Judged, gain: float, error: float, p_value: float) -> NamedCause:
+    own = judged.hypothesis
+    return NamedCause(own.effect, own.joint, own.tendon, accepted_of(own, judged.magnitudes), gain, error, p_value, ())
+
+
+def _step_p_value(before: Numbers, after: Numbers) -> float:
+    """Return the p-value of a gain by stretch [K]: a one-sided t test."""
+    from scipy.stats import ttest_1samp
+
+    return float(ttest_1samp(before - after, 0.0, alternative="greater").pvalue) if len(before) > 1 else 1.0

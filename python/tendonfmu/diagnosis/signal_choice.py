@@ -1,0 +1,255 @@
+"""Which signals the numbers are estimated from, smoothed or raw ones: those with the smaller error on unseen stretches.
+
+Both are compared at frequencies that both contain: the residual of raw signals is smoothed like the other one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.diagnosis.candidate_columns import candidate_columns, without_uncertainty
+from tendonfmu.diagnosis.cause_search import bias_of, blocks_of, nominal_scale, series_of
+from tendonfmu.diagnosis.cause_selection import CERTAIN, rms_gain
+from tendonfmu.diagnosis.effects.presliding import is_spring
+from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, fit_extended
+from tendonfmu.diagnosis.least_sizes import LeastSizes, noise_of
+from tendonfmu.diagnosis.nominal_fit import fitted
+from tendonfmu.diagnosis.online_error import OnlineError
+from tendonfmu.diagnosis.series import Grid, make_grid
+from tendonfmu.diagnosis.span import span_of
+from tendonfmu.diagnosis.starting_point import Start, scan
+from tendonfmu.model import Finger, moment_arms
+from tendonfmu.recordings import FEWEST as FEWEST_SAMPLES
+from tendonfmu.recordings import FitRecording, Held, Signals, joint_position_noise, prepare, smoothing_of, zero_phase
+from tendonfmu.statistics import Grams, make_folds
+
+Numbers = NDArray[np.float64]
+
+NOISIEST = 1000.0  # rad; the largest noise that `position_filter` accepts
+NOISE_CUTOFF = 15.0  # Hz: faster motion of the positions is noise
+ENOUGH = 90.0  # s of motion that suffice to choose signals and a starting point
+BETTER = 0.7  # of the error of smoothed signals, which raw ones must stay below, because they need a filter with a lag
+
+
+@dataclass(frozen=True)
+class Estimation:
+    """The signals and models that the estimation starts from.
+
+    Attributes
+    ----------
+    recordings
+        `train` says which samples are used.
+    least
+        Sizes that the sensors can show.
+    nominal
+        The given structure, fitted with these settings.
+    start
+        Delay and presliding that the search starts with.
+    model
+        The model fitted with `start`.
+    given
+        The given description, with the filter that suits it online.
+    """
+
+    signals: Signals
+    recordings: list[FitRecording]
+    grid: Grid
+    least: LeastSizes
+    nominal: FittedModel
+    start: Start
+    model: FittedModel
+    settings: FitSettings
+    given: Mapping[str, Any]
+
+    def online(self, data: Mapping[str, Any]) -> dict[str, Any]:
+        """Return an estimated description with the settings for raw samples."""
+        return self.signals.restored(data, self.given)
+
+    @property
+    def words(self) -> str:
+        """Which signals are used, for the report."""
+        filtered = "position_filter" in self.given
+        return f"{self.signals.words}; online {'the position filter' if filtered else 'the velocity filter'}"
+
+
+def choose(given: Finger, recordings: Sequence[FitRecording], settings: FitSettings) -> Estimation:
+    """Choose signals and starting point for recordings as they were measured.
+
+    Of long recordings only a part is compared. Raises InputError.
+    """
+    smoothing = smoothing_of([each.recording for each in recordings], given.data)
+    raw = Signals()
+    part = _part_of(given, recordings)
+    if smoothing is None:
+        signals, start = raw, _compared(given, part, raw, settings, None).start
+    else:
+        smooth = _compared(given, part, smoothing, settings, None)
+        rough = _compared(given, part, raw, settings, smooth)
+        lags = any(each.kinematics != 3 for each in recordings)
+        is_raw = rough.error < (BETTER if lags else 1.0) * smooth.error
+        signals, start = (raw, rough.start) if is_raw else (smoothing, smooth.start)
+    finger = replace(given, data=signals.description(given.data))
+    own = estimation_recordings(finger, recordings, signals)
+    nominal = fitted(finger.data, own, settings)
+    model = fit_extended(nominal, start.accepted, own, settings) if start.causes else nominal
+    least = least_sizes(given.data, recordings, float(np.median(np.diff(own[0].time))))
+    chosen = Estimation(signals, own, make_grid(own), least, nominal, start, model, settings, given.data)
+    return _with_filter(chosen, recordings)
+
+
+def _part_of(given: Finger, recordings: Sequence[FitRecording]) -> list[FitRecording]:
+    """Return the first seconds of each recording, ENOUGH in total.
+
+    Signals and starting point vary little along a recording.
+    """
+    share = ENOUGH / max(sum(each.duration for each in recordings), 1e-300)
+    if share >= 1.0:
+        return list(recordings)
+    found = []
+    for each in recordings:
+        end = int(np.searchsorted(each.time, each.time[0] + share * (each.time[-1] - each.time[0])))
+        if end < FEWEST_SAMPLES or not each.train[:end].any():
+            continue
+        whole = each.recording
+        part = replace(
+            whole,
+            time=whole.time[:end],
+            groups={name: values[:end] for name, values in whole.groups.items()},
+            contact=None if whole.contact is None else whole.contact[:end],
+        )
+        own = prepare(given, part, each.kinematics, Held())
+        found.append(replace(own, train=own.train & each.train[:end]))
+    return found or list(recordings)
+
+
+def _with_filter(chosen: Estimation, recordings: Sequence[FitRecording]) -> Estimation:
+    """Add an online position filter if the estimated models then leave a smaller error on raw samples.
+
+    The comparison is with the description's own velocity filter. A model estimated from raw signals keeps its own
+    filter.
+    """
+    long_enough = all(len(each.time) >= FEWEST_SAMPLES for each in recordings)
+    if chosen.signals.cutoff is None or "position_filter" in chosen.given or not long_enough:
+        return chosen
+    if any(each.kinematics == 3 for each in recordings):
+        return chosen
+    noise = np.max([joint_position_noise(chosen.given, each) for each in recordings], axis=0)
+    if noise.max() > NOISIEST:
+        return chosen
+    filtered = replace(chosen, given={**chosen.given, "position_filter": {"noise": [float(value) for value in noise]}})
+    error = OnlineError(chosen.online(chosen.nominal.data), recordings)
+    before, after = (error.by_stretch(each.online(each.model.data)) for each in (chosen, filtered))
+    gain, spread = rms_gain(before, after)
+    return filtered if gain > CERTAIN * spread else chosen
+
+
+@dataclass(frozen=True)
+class _Compared:
+    """A starting point with certain signals; `error` is the rms on unseen stretches, N·m."""
+
+    signals: Signals
+    start: Start
+    error: float
+
+
+def _compared(
+    given: Finger,
+    recordings: Sequence[FitRecording],
+    signals: Signals,
+    settings: FitSettings,
+    known: _Compared | None,
+) -> _Compared:
+    """Find the starting point with these signals, or take it from `known`, which used other signals."""
+    finger = replace(given, data=signals.description(given.data))
+    own = estimation_recordings(finger, recordings, signals)
+    grid = make_grid(own)
+    nominal = fitted(finger.data, own, settings)
+    if known is None:
+        least = least_sizes(given.data, recordings, float(np.median(np.diff(own[0].time))))
+        starts = scan(nominal.data, own, grid, least.least("time_delay", None, None))
+        # with a known delay, try the two best distances: the derivative of one need not lead to the better
+        tried = [starts[0], *[each for each in starts[1:] if each.presliding != starts[0].presliding][:1]]
+    else:
+        tried = [known.start]
+    cutoff = signals.cutoff or (known.signals.cutoff if known else None)
+    span = span_of(nominal.data, own)
+    found = []
+    for start in tried:
+        model = fit_extended(nominal, start.accepted, own, settings) if start.causes else nominal
+        if is_spring(model.data, span):  # a spring is missing, and would not be found beside long presliding
+            start = replace(start, presliding=())
+            model = fit_extended(nominal, start.accepted, own, settings) if start.causes else nominal
+        found.append(_Compared(signals, start, _error(model.data, own, grid, cutoff)))
+    return min(found, key=lambda each: each.error)
+
+
+def estimation_recordings(finger: Finger, recordings: Sequence[FitRecording], signals: Signals) -> list[FitRecording]:
+    """Return recordings whose signals are smoothed as chosen.
+
+    Parameters
+    ----------
+    finger
+        Description that the recordings are prepared for.
+    recordings
+        As they were measured.
+    signals
+        The chosen signals; without a cutoff the recordings are returned unchanged.
+
+    Returns
+    -------
+    list of FitRecording
+        Samples that are not trained on or held out in `recordings` are not in these either.
+    """
+    if signals.cutoff is None:
+        return list(recordings)
+    found = []
+    for each in recordings:
+        own = prepare(finger, signals.recording(each.recording), each.kinematics, Held())
+        at = np.minimum(np.searchsorted(each.time, own.time), len(each.time) - 1)
+        found.append(replace(own, train=own.train & each.train[at], held_out=each.held_out[at]))
+    return found
+
+
+def least_sizes(data: Mapping[str, Any], recordings: Sequence[FitRecording], step: float) -> LeastSizes:
+    """Measure the sensor noise of recordings; `step` is the time between the samples that are estimated from, s."""
+    joints: list[Numbers] = []
+    tendons: list[Numbers] = []
+    stiffness = np.array([tendon["stiffness"] for tendon in data["tendons"]])
+    for recording in recordings:
+        groups = recording.recording.groups
+        angle, force = recording.model.joint_angle, groups["tendon_force"]
+        reached = (
+            groups["tendon_position"] - force / stiffness
+            if "tendon_position" in groups
+            else angle @ moment_arms(data).T
+        )
+        for part in recording.parts:
+            rate = 1.0 / float(np.median(np.diff(recording.time[part])))
+            for values, noise in ((angle[part], joints), (reached[part], tendons)):
+                noise.append(noise_of(values, zero_phase(values, NOISE_CUTOFF, rate)))
+    return LeastSizes(np.max(joints, axis=0), np.max(tendons, axis=0), step, 0.0)
+
+
+def _error(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, cutoff: float | None) -> float:
+    """Return the rms on held-out folds, N·m, with the description's numbers refitted.
+
+    Target and derivatives are smoothed at the cutoff, Hz.
+    """
+    plain = without_uncertainty(data)
+    series = series_of(plain, recordings, grid)
+    columns = candidate_columns(plain, recordings, blocks_of(grid, recordings), candidates=())
+    target, nominal = series.target.copy(), np.asarray(columns.nominal, dtype=np.float64)
+    if cutoff is not None and cutoff < 0.4 / grid.step:
+        for segment in grid.segments:
+            if segment.count > 10:
+                rows = segment.blocks
+                target[rows] = zero_phase(target[rows], cutoff, 1.0 / grid.step)
+                nominal[rows] = zero_phase(nominal[rows], cutoff, 1.0 / grid.step)
+    folds = make_folds(series)
+    grams = Grams(folds, target, nominal, columns.values, bias_of(plain, series), nominal_scale(plain))
+    return float(np.sqrt(grams.without / max(len(folds.rows) * target.shape[1], 1)))

@@ -1,0 +1,262 @@
+"""How large a cause is, in plain words with physical units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+from tendonfmu.diagnosis.result import FoundPlace
+from tendonfmu.model import LEFT_OUT
+
+Thresholds = tuple[float, float]
+Parameters = Mapping[str, tuple[float, str]]  # path -> (value, unit)
+Numbers = dict[str, list[tuple[float, str]]]  # last part of the path -> (value, unit) of each number
+
+NBSP = "\u00a0"
+_SHOWN = 3  # numbers that are listed for an effect without words of its own
+_PREFIXED = ("m", "N.m", "N", "s", "rad", "m/s", "rad/s", "m/rad", "N.m/rad", "N.m.s/rad")
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_STEPS = ((0.1, 1.0, ""), (1e-4, 1e3, "m"), (0.0, 1e6, "µ"))  # least magnitude, factor, prefix
+
+
+def size_of(effect: str, places: Sequence[FoundPlace], thresholds: Thresholds) -> str:
+    """Return a size such as "a play of 0.32 mm"; for several places the largest one and their number.
+
+    `thresholds` are the velocities at which tendons, m/s, and joints, rad/s, begin to move.
+    """
+    told = [each for each in places if each.parameters]
+    if not told:
+        return ""
+    sizes = list(dict.fromkeys(size_at(effect, each.parameters, thresholds) for each in told))
+    if len(told) == 1:
+        return sizes[0]
+    if len(sizes) == 1:
+        return f"{sizes[0]}, at each of {len(told)} places"
+    units = {_first(each)[1] for each in told}
+    if len(units) > 1:  # for example everywhere and at a joint
+        return f"{sizes[0]}; other at {count_of(len(told) - 1, 'place')}"
+    largest = max(told, key=lambda each: abs(_first(each)[0]))
+    return f"{size_at(effect, largest.parameters, thresholds)} at the largest of {len(told)} places"
+
+
+def size_at(effect: str, parameters: Parameters, thresholds: Thresholds) -> str:
+    """Return the size of an effect at one place in plain words.
+
+    Parameters
+    ----------
+    effect
+        Name of the effect.
+    parameters
+        Numbers of that place in the extended description: path -> (value, unit).
+    thresholds
+        Velocities at which tendons, m/s, and joints, rad/s, begin to move.
+
+    Returns
+    -------
+    str
+        Such as "a play of 0.32 mm"; names and values if the effect has no words of its own.
+    """
+    if effect == "presliding" and (told := _travel(parameters, thresholds)):
+        return told
+    numbers: Numbers = {}
+    for path, number in parameters.items():
+        numbers.setdefault(path.rsplit(".", 1)[-1], []).append(number)
+    words = _WORDS.get(effect)
+    try:
+        return words(numbers) if words is not None else _listed(parameters)
+    except (KeyError, ValueError):  # the effect is given by other numbers, for example by a law instead of a row
+        return _listed(parameters)
+
+
+def _travel(parameters: Parameters, thresholds: Thresholds) -> str:
+    """Return the travel of presliding at all places, whose number is a time: time × threshold of motion."""
+    if [unit for _, unit in parameters.values()] != ["s"]:
+        return ""
+    ((time, _),) = parameters.values()
+    tendon, joint = (quantity(time * each, unit) for each, unit in zip(thresholds, ("m", "rad"), strict=True))
+    return f"over {tendon} at tendons, {joint} at joints"
+
+
+def _first(place: FoundPlace) -> tuple[float, str]:
+    return next(iter(place.parameters.values()))
+
+
+def count_of(number: int, what: str) -> str:
+    """Return a number with a noun, such as "3 causes".
+
+    Parameters
+    ----------
+    number
+        How many.
+    what
+        Noun in the singular; an "s" makes the plural.
+
+    Returns
+    -------
+    str
+        Number and noun.
+    """
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
+
+
+def quantity(value: float, unit: str, *, sign: bool = False) -> str:
+    """Format a value with three digits and a suitable unit prefix.
+
+    Parameters
+    ----------
+    value
+        In `unit`.
+    unit
+        SI unit as in the FMU, such as "N.m"; "" or "1" for a plain number, which is shown in per cent.
+    sign
+        Whether positive values get a "+".
+
+    Returns
+    -------
+    str
+        Such as "+3.2 mN·m"; value and unit are joined by a no-break space.
+    """
+    if unit in ("", "1"):
+        text, told = f"{100 * value:.3g}", "%"
+    else:
+        least = next(step for step in _STEPS if abs(value) >= step[0])
+        _, factor, prefix = least if unit in _PREFIXED and value != 0 else _STEPS[0]
+        text, told = f"{factor * value:.3g}", prefix + unit.replace(".", "·").replace("2", "²").replace("3", "³")
+    mantissa, _, exponent = text.partition("e")
+    if exponent:
+        text = f"{mantissa}·10{str(int(exponent)).translate(_RAISED)}"
+    plus = "+" if sign and value > 0 else ""
+    return f"{plus}{text.replace('-', '−')}{NBSP}{told}"
+
+
+def _listed(parameters: Parameters) -> str:
+    """Return names and values of the first few numbers."""
+    names = [path.rsplit(".", 1)[-1].replace("_", " ") for path in parameters]
+    shown = [f"{name} {quantity(*number)}" for name, number in zip(names, parameters.values(), strict=True)]
+    more = len(shown) - _SHOWN
+    return ", ".join(shown[:_SHOWN]) + (f" and {more} more" if more > 0 else "")
+
+
+# --- words of an effect -----------------------------------------------------------------------------------------------
+
+
+def _one(numbers: Numbers, name: str) -> tuple[float, str]:
+    return numbers[name][0]
+
+
+def _of(text: str, name: str) -> Callable[[Numbers], str]:
+    """Return a function that fills the largest number of that name into the text."""
+    return lambda numbers: text.format(quantity(*max(numbers[name], key=lambda number: abs(number[0]))))
+
+
+def _wave(text: str) -> Callable[[Numbers], str]:
+    """Return a function that fills the amplitude of a sine and a cosine into the text."""
+
+    def words(numbers: Numbers) -> str:
+        (sine, unit), (cosine, _) = (numbers.get(name, [(0.0, "1")])[0] for name in ("sine", "cosine"))
+        unit = unit if "sine" in numbers else _one(numbers, "cosine")[1]
+        return text.format(quantity(math.hypot(sine, cosine), unit))
+
+    return words
+
+
+def _with(words: Callable[[Numbers], str], name: str, more: str) -> Callable[[Numbers], str]:
+    """Return a function that adds `more` to the words if the mechanism's number is given and not the default."""
+
+    def found(numbers: Numbers) -> str:
+        value = numbers.get(name, [(LEFT_OUT[name], "1")])[0][0]
+        return words(numbers) + ("" if value == LEFT_OUT[name] else more.format(f"{value:.3g}".replace("-", "−")))
+
+    return found
+
+
+def _correction(what: str) -> Callable[[Numbers], str]:
+    """Return a function that says whether a value is larger or smaller than described."""
+
+    def words(numbers: Numbers) -> str:
+        value, unit = _one(numbers, "correction")
+        return f"{what} {quantity(abs(value), unit)} {'larger' if value > 0 else 'smaller'} than measured"
+
+    return words
+
+
+def _per_force(whose: str) -> Callable[[Numbers], str]:
+    """Return words for a friction torque that grows with a force; its number is a length, N·m per N."""
+
+    def words(numbers: Numbers) -> str:
+        value = max(number for number, _ in numbers["coulomb"])
+        return f"{quantity(value, 'N.m')} of friction for each newton of {whose}"
+
+    return words
+
+
+def _drift(numbers: Numbers) -> str:
+    (amplitude, _), constant = _one(numbers, "amplitude"), _one(numbers, "time_constant")
+    change = "more" if amplitude > 0 else "less"
+    return (
+        f"{quantity(abs(amplitude), '1')} {change} friction in the end, with a time constant of {quantity(*constant)}"
+    )
+
+
+def _standstill(numbers: Numbers) -> str:
+    velocity = quantity(*_one(numbers, "stribeck_velocity"))
+    if "amplitude" not in numbers:
+        (static, unit), (coulomb, _) = _one(numbers, "static"), _one(numbers, "coulomb")
+        return f"{quantity(static, unit)} near standstill, {quantity(coulomb, unit)} beyond about {velocity}"
+    amplitude, unit = _one(numbers, "amplitude")
+    change = "more" if amplitude > 0 else "less"
+    return f"{quantity(abs(amplitude), unit)} {change} friction near standstill, up to about {velocity}"
+
+
+def _delay(numbers: Numbers) -> str:
+    value, unit = _one(numbers, "delay")
+    return f"the forces come {quantity(abs(value), unit)} {'later' if value > 0 else 'earlier'} than the positions"
+
+
+def _sides(numbers: Numbers) -> str:
+    """Return the two sides, positive before negative as in a description.
+
+    Of several working points, the one is used where the sides differ most.
+    """
+    coulomb = numbers["coulomb"]
+    pairs = list(zip(coulomb[::2], coulomb[1::2], strict=True))
+    (one, unit), (other, _) = max(pairs, key=lambda pair: abs(pair[0][0] - pair[1][0]))
+    return f"{quantity(one, unit)} in the positive direction, {quantity(other, unit)} in the negative one"
+
+
+def _arm(numbers: Numbers) -> str:
+    return f"{quantity(*_one(numbers, 'correction'), sign=True)} on the described arm"
+
+
+_WORDS: Mapping[str, Callable[[Numbers], str]] = {
+    "viscous_friction": _of("viscous {}", "viscous"),
+    "stribeck": _standstill,
+    "edge_friction": _of("up to {} of the tendon force", "coulomb"),
+    "pulley_friction": _of("up to {} of the tendon force", "coulomb"),
+    "joint_friction": _of("{} of friction", "coulomb"),
+    "joint_load_friction": _per_force("all tendon forces"),
+    "preload_friction": _with(_of("{} of friction", "coulomb"), "beyond", ", {} times as much at the joints beyond"),
+    "load_friction": _per_force("tendon force"),
+    "cover_stiffness": _of("a spring of {}", "stiffness"),
+    "cover_hardening": _of("a cubic spring of {}", "stiffness"),
+    "gravity": _wave("{} at most"),
+    "inertia": _of("{}", "inertia"),
+    "presliding": _of("over {}", "displacement"),
+    "friction_drift": _drift,
+    "force_gain": _correction("the true force is"),
+    "force_offset": _correction("the true force is"),
+    "time_delay": _delay,
+    "moment_arm": _arm,
+    "moment_arm_variation": _of("the arm changes by {}", "slope"),
+    "pulley_eccentricity": _with(
+        _wave("the arm goes up and down by {}"), "turns", ", {} times while the joint would turn once"
+    ),
+    "tendon_nonlinearity": _of("the spring stiffens by {}", "hardening"),
+    "joint_coupling": _with(
+        _of("a spring of {} between the joints", "stiffness"),
+        "reaction",
+        ", of which the next joint feels {} times as much",
+    ),
+    "backlash": _of("a play of {}", "width"),
+    "asymmetric_friction": _sides,
+}

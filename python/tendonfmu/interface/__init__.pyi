@@ -1,0 +1,14 @@
+from .building import build as build
+from .detecting import ScoreResult as ScoreResult
+from .detecting import TuneResult as TuneResult
+from .detecting import score as score
+from .detecting import tune as tune
+from .diagnosing import Diagnosis as Diagnosis
+from .diagnosing import diagnose as diagnose
+from .fitting import FitInterrupted as FitInterrupted
+from .fitting import FitResult as FitResult
+from .fitting import fit as fit
+from .live import Runner as Runner
+from .live import Sample as Sample
+from .running import RunResult as RunResult
+from .running import run as run

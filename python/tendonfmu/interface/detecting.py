@@ -1,0 +1,266 @@
+"""Tunes and scores contact detection (`tendonfmu tune`, `score`)."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tendonfmu.detect import ContactTuning, Scored, score_recordings, score_report, tune_report
+from tendonfmu.drawing import GREY, ORANGE, SeriesRow, series_figure
+from tendonfmu.files import write_text
+from tendonfmu.interface.notebook import html_of
+from tendonfmu.model import Finger, FingerSource
+from tendonfmu.recordings import RecordingSource, flagged_stretches
+from tendonfmu.report import score_text, tune_text
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TuneResult:
+    """A finger with tuned contact detection.
+
+    Attributes
+    ----------
+    tuning
+        The finished tuning, with everything that it found.
+    """
+
+    tuning: ContactTuning
+
+    def __repr__(self) -> str:
+        return f"<TuneResult {self.finger.name}: tuned for {self.attained_rate:.3g} false alarms per hour>"
+
+    @property
+    def finger(self) -> Finger:
+        """The tuned finger."""
+        return self.tuning.description_
+
+    @property
+    def attained_rate(self) -> float:
+        """Rate of false alarms that it is tuned for (1/h): the one asked for, or what the free motion supports."""
+        return self.tuning.rate_
+
+    @property
+    def report(self) -> Mapping[str, Any]:
+        """All results, as `tendonfmu tune --report` writes them."""
+        return tune_report.build_report(self.tuning)
+
+    @property
+    def warnings(self) -> list[str]:
+        """Remarks on the recordings and the result, one sentence each."""
+        return list(self.tuning.warnings_)
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write the tuned description, as `tendonfmu tune -o`. Raises InputError if it cannot be written."""
+        self.finger.write(path)
+
+    def plot(self) -> Any:
+        """Draw the false alarms over a factor on all bounds, as counted and on blocks that were held out.
+
+        Returns
+        -------
+        plotly.graph_objects.Figure
+            The chosen bounds have the factor 1.
+        """
+        tail = self.report["tail"]
+        counted = {
+            "as counted": np.array([point["in_sample"]["per_hour"] for point in tail]),
+            "held out": np.array([point["held_out"]["per_hour"] for point in tail]),
+        }
+        factors = np.array([point["factor"] for point in tail])
+        return series_figure(repr(self)[1:-1], "factor on all bounds", factors, [SeriesRow("alarms (1/h)", counted)])
+
+    def _repr_html_(self) -> str:
+        return html_of(repr(self)[1:-1], tune_text.tables(self.tuning), tune_text.lines(self.tuning))
+
+
+def tune(
+    finger: FingerSource,
+    recordings: RecordingSource | Sequence[RecordingSource],
+    *,
+    false_alarms_per_hour: float = 6.0,
+    confidence: float = 0.9,
+    method: str = "innovation",
+    bias_time: float | None = None,
+    release_time: float = 2.0,
+    kinematics: int = 1,
+    strict: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> TuneResult:
+    """Tune contact detection on free motion for a stated rate of false alarms.
+
+    Parameters
+    ----------
+    finger
+        A fitted finger, its description, or the file of it.
+    recordings
+        Free motion at several pretensions: recordings, DataFrames or files. One alone needs no list.
+    false_alarms_per_hour, confidence
+        Highest rate accepted in free motion like that of the recordings (1/h), and the probability that it is not
+        exceeded.
+    method
+        "innovation", "cusum" or "threshold", that of the paper.
+    bias_time
+        Time constant of the bias (s); None: unchanged.
+    release_time
+        Time in contact until the bias is tracked again (s); math.inf: never.
+    kinematics
+        1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
+    strict
+        Whether too little free motion for the rate is an error. Otherwise it is tuned for the rate that it supports.
+    progress
+        Called with steps done and steps.
+
+    Returns
+    -------
+    TuneResult
+        The tuned finger.
+
+    Raises
+    ------
+    InputError
+        A recording has contact or is not sound, there is too little of it, or an option is out of range.
+
+    Warns
+    -----
+    TuneWarning
+        Remarks on the recordings and the result; also in `TuneResult.warnings`.
+    """
+    tuning = ContactTuning(
+        finger,
+        false_alarms_per_hour=false_alarms_per_hour,
+        confidence=confidence,
+        method=method,
+        bias_time=bias_time,
+        release_time=release_time,
+        kinematics=kinematics,
+        strict=strict,
+        progress=progress,
+    )
+    return TuneResult(tuning.tune(recordings))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ScoreResult:
+    """Contact detection measured against labels.
+
+    Attributes
+    ----------
+    scored
+        The finished score, with everything that it found.
+    """
+
+    scored: Scored
+
+    def __repr__(self) -> str:
+        return f"<ScoreResult: {self.found} of {self.events} events found, {self.false_alarms} false alarms>"
+
+    @property
+    def events(self) -> int:
+        """Number of labelled contacts."""
+        return self.scored.summary.events
+
+    @property
+    def found(self) -> int:
+        """How many of them were found."""
+        return self.scored.summary.found
+
+    @property
+    def false_alarms(self) -> int:
+        """Number of alarms that begin neither in an event nor just after one."""
+        return self.scored.summary.false_alarms
+
+    @property
+    def median_delay(self) -> float:
+        """Median time from the onset of an event to its alarm (s); NaN if none was found."""
+        return self.scored.summary.delay["median"].value
+
+    @property
+    def report(self) -> Mapping[str, Any]:
+        """All results, as `tendonfmu score -o` writes them."""
+        return score_report.build_report(self.scored)
+
+    @property
+    def warnings(self) -> list[str]:
+        """Remarks on the recordings, one sentence each."""
+        return list(self.scored.warnings)
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write the report, as `tendonfmu score -o`. Raises InputError if it cannot be written."""
+        write_text(Path(path), score_report.report_text(self.report))
+
+    def plot(self, recording: int = 0) -> Any:
+        """Draw the compensated torque over time, with the labels and the alarms.
+
+        Parameters
+        ----------
+        recording
+            Which one of the recordings, from 0.
+
+        Returns
+        -------
+        plotly.graph_objects.Figure
+            A row per joint. Labels are shaded grey, alarms orange.
+        """
+        track = self.scored.tracks[recording]
+        time, torque = track.recording.time, track.outputs["compensated_torque"]
+        rows = []
+        for j in range(torque.shape[1]):
+            curves = {"compensated": torque[:, j]}
+            if track.external is not None:
+                curves["sensor"] = track.external[:, j]
+            rows.append(SeriesRow(f"joint {j + 1} (N·m)", curves))
+        shaded = {GREY: flagged_stretches(time, track.label), ORANGE: flagged_stretches(time, track.alarm)}
+        return series_figure(f"{track.recording.path}", "time (s)", time, rows, shaded)
+
+    def _repr_html_(self) -> str:
+        return html_of(repr(self)[1:-1], score_text.tables(self.scored), score_text.lines(self.scored))
+
+
+def score(
+    finger: FingerSource,
+    recordings: RecordingSource | Sequence[RecordingSource],
+    *,
+    labels: str | None = None,
+    force: str | None = None,
+    kinematics: int = 1,
+    seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+) -> ScoreResult:
+    """Measure contact detection against labels: events found and missed, false alarms, delay, torque, ROC.
+
+    Parameters
+    ----------
+    finger
+        A finger, its description, the file of it, or an FMU.
+    recordings
+        Labelled recordings or free motion: recordings, DataFrames or files. One alone needs no list.
+    labels
+        Column that is 1 in contact, else 0; None: `contact`, where there is one.
+    force
+        Column of the sensed force (N), or None.
+    kinematics
+        1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
+    seed
+        Seed of the resampling for the intervals.
+    progress
+        Called with runs done and runs.
+
+    Returns
+    -------
+    ScoreResult
+        The score of all recordings together, and of each.
+
+    Raises
+    ------
+    InputError
+        A file, a column or an option does not allow a score.
+    """
+    found = score_recordings(
+        finger, recordings, labels=labels, force=force, kinematics=kinematics, seed=seed, progress=progress
+    )
+    return ScoreResult(found)

@@ -1,0 +1,111 @@
+"""Paths of a finger description, such as `tendons[1].edge_friction[2].coulomb`: read and written in the parsed JSON.
+
+Indices count from 1. The FMU's parameters have the same paths.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from tendonfmu.errors import InputError
+from tendonfmu.model.native import Instance
+
+Step = str | int  # a key, or an index from 0
+
+_PATH = re.compile(r"[a-z_]+(\[[1-9][0-9]*\])*(\.[a-z_]+(\[[1-9][0-9]*\])*)*")
+_PADDED = ("pulley_friction", "edge_friction")  # short lists stand for lists with null at the end
+
+
+def steps_of(path: str) -> list[Step]:
+    """Split a path into keys and indices.
+
+    Parameters
+    ----------
+    path
+        Path of a number of a description.
+
+    Returns
+    -------
+    list of str or int
+        Keys, and indices from 0.
+    """
+    return [int(index) - 1 if index else name for name, index in re.findall(r"([a-z_]+)|\[(\d+)\]", path)]
+
+
+def with_values_at(data: dict[str, Any], values: Mapping[str, Any], instance: Instance) -> dict[str, Any]:
+    """Write values into a description, in place, and return it.
+
+    Objects and lists that are absent are made. A list gets the numbers that the model assumes without it.
+
+    Parameters
+    ----------
+    data
+        Parsed description, which may be changed.
+    values
+        JSON values by path.
+    instance
+        The model of `data`.
+
+    Returns
+    -------
+    dict
+        `data`. It may be no valid description.
+
+    Raises
+    ------
+    InputError
+        A path is malformed, or leads to no place.
+    """
+    for path, value in values.items():
+        if not isinstance(path, str) or not _PATH.fullmatch(path):
+            raise InputError(f"{path!r}: expected a path such as tendons[1].stiffness or contact.threshold[1]")
+        steps = steps_of(path)
+        place: Any = data
+        for k, step in enumerate(steps[:-1]):
+            place = _entered(place, steps, k, step, instance)
+        _check_step(place, steps, len(steps) - 1, instance.joints)
+        place[steps[-1]] = value
+    return data
+
+
+def _entered(place: Any, steps: Sequence[Step], k: int, step: Step, instance: Instance) -> Any:
+    """Return what is at a step. It is made if it is absent."""
+    _check_step(place, steps, k, instance.joints)
+    found = place.get(step) if isinstance(step, str) else place[step]
+    if found is None:
+        found = _assumed(_text(steps[: k + 1]), step, instance) if isinstance(steps[k + 1], int) else {}
+        place[step] = found
+    return found
+
+
+def _assumed(path: str, key: Step, instance: Instance) -> list[Any]:
+    """Return the list that the model assumes where the description has none."""
+    if key in _PADDED:
+        return [None] * instance.joints
+    known = {parameter.path for parameter in instance.parameters()}
+    found: list[Any] = []
+    while f"{path}[{len(found) + 1}]" in known:
+        found.append(instance.get(f"{path}[{len(found) + 1}]"))
+    return found
+
+
+def _check_step(place: Any, steps: Sequence[Step], k: int, joints: int) -> None:
+    """Raise InputError if a step does not lead from a place to another one."""
+    step, path = steps[k], _text(steps[: k + 1])
+    if isinstance(step, str):
+        if not isinstance(place, dict):
+            raise InputError(f"{path}: no such path; {_text(steps[:k])} has no keys")
+        return
+    if not isinstance(place, list):
+        raise InputError(f"{path}: no such path; {_text(steps[:k])} is no list")
+    if k and steps[k - 1] in _PADDED:
+        place += [None] * (joints - len(place))
+    if step >= len(place):
+        expected = f"1 to {len(place)}" if place else "no index, since the list is empty"
+        raise InputError(f"{path}: no such path; expected {expected}")
+
+
+def _text(steps: Sequence[Step]) -> str:
+    return "".join(f"[{step + 1}]" if isinstance(step, int) else f".{step}" for step in steps).lstrip(".")

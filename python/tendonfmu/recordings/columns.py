@@ -1,0 +1,148 @@
+"""Which columns a recording has, which of a table's columns are read, and which are an error or ignored."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+
+from tendonfmu.errors import InputError, InputWarning
+
+# group: unit, and whether every recording has it
+GROUPS: dict[str, tuple[str, bool]] = {
+    "tendon_force": ("N", True),
+    "tendon_position": ("m", True),
+    "joint_position": ("rad", False),
+    "joint_velocity": ("rad/s", False),
+    "external_torque": ("N.m", False),
+}
+GROUP_PER = {name: "tendon" if name.startswith("tendon") else "joint" for name in GROUPS}
+LABEL = "contact"
+
+_ELEMENT = re.compile(r"([a-z_]+)\[([1-9][0-9]*)\]")
+_ONE_OF_OURS = re.compile(r"([a-z]+?)([0-9]*)")
+_GROUP_OF_LETTERS = {name.replace("_", ""): name for name in GROUPS}
+_OTHER_TABLES = "`tendonfmu convert table` reads tables with other columns"
+
+
+def element_of(column: str) -> tuple[str, int] | None:
+    """Return group and index, from 1, of a column such as `tendon_force[3]`; None if it is of another form."""
+    match = _ELEMENT.fullmatch(column)
+    return None if match is None else (match[1], int(match[2]))
+
+
+def read_columns(file: Path, names: Sequence[str], known: Collection[str]) -> list[str]:
+    """Return the columns of a table that a recording has.
+
+    Warns once of all the others.
+
+    Parameters
+    ----------
+    file
+        Name of the table in messages.
+    names
+        All columns.
+    known
+        Columns that are read in addition to `time` and the groups.
+
+    Returns
+    -------
+    list of str
+        Columns to read, in the order of the table.
+
+    Raises
+    ------
+    InputError
+        A column is missing, or one of ours in another spelling.
+
+    Warns
+    -----
+    InputWarning
+        Columns are ignored.
+    """
+    for separator in ";\t":
+        if len(names) == 1 and separator in names[0]:
+            raise InputError(
+                f"{file}: columns separated by {separator!r}; expected commas, and points in numbers; {_OTHER_TABLES}"
+            )
+    ours = [name for name in names if name == "time" or name in known or (element_of(name) or ("",))[0] in GROUPS]
+    ignored = [name for name in names if name not in ours]
+    for name in ignored:
+        right = right_spelling(name)
+        if right is not None:
+            raise InputError(f"{file}: column {name!r}; expected the name {right}; {_OTHER_TABLES}")
+    if "time" not in ours:
+        raise InputError(f"{file}: no column time; expected the time of every sample in s")
+    _check_groups(file, [found for found in map(element_of, ours) if found is not None])
+    if ignored:
+        listed = ", ".join(repr(name) for name in ignored)
+        groups = ", ".join(f"{group}[i]" for group in GROUPS)
+        warnings.warn(
+            f"{file}: ignored columns: {listed}; a recording has time, {groups} and {LABEL}",
+            InputWarning,
+            stacklevel=2,
+        )
+    return ours
+
+
+def right_spelling(column: str) -> str | None:
+    """Return the right name of a column that is one of ours in another spelling.
+
+    Parameters
+    ----------
+    column
+        A name that is none of ours, such as `Tendon_Force_01`.
+
+    Returns
+    -------
+    str or None
+        The right name, such as `tendon_force[1]`; None if it is not like one of ours.
+    """
+    match = _ONE_OF_OURS.fullmatch(re.sub(r"[\s_.\-()\[\]{}]", "", column).lower())
+    if match is None:
+        return None
+    word, index = match[1], match[2].lstrip("0")
+    if word in ("time", LABEL) and not match[2]:
+        return word
+    if word not in _GROUP_OF_LETTERS:
+        return None
+    group = _GROUP_OF_LETTERS[word]
+    return f"{group}[{index}]" if index else f"{group}[1], {group}[2], ..., with indices from 1"
+
+
+def _check_groups(file: Path, elements: Sequence[tuple[str, int]]) -> None:
+    """Refuse missing groups, gaps in a group, and groups of different size."""
+    counts: dict[str, set[int]] = {name: set() for name in GROUPS}
+    for group, index in elements:
+        if group in counts:
+            counts[group].add(index)
+    for name, indices in counts.items():
+        if not indices and GROUPS[name][1]:
+            raise InputError(f"{file}: no column {name}[1]; expected one {name}[i] per tendon, in {GROUPS[name][0]}")
+        for i in range(1, len(indices) + 1):
+            if i not in indices:
+                raise InputError(f"{file}: no column {name}[{i}], but {name}[{max(indices)}]; expected all from 1 on")
+    check_sizes(file, {name: len(indices) for name, indices in counts.items() if indices})
+
+
+def check_sizes(file: Path, sizes: Mapping[str, int]) -> None:
+    """Refuse groups of tendons that differ in their number of columns, and groups of joints likewise.
+
+    Parameters
+    ----------
+    file
+        Name of the table in messages.
+    sizes
+        Number of columns by group.
+
+    Raises
+    ------
+    InputError
+        Two groups differ.
+    """
+    first: dict[str, str] = {}
+    for name, size in sizes.items():
+        other = first.setdefault(GROUP_PER[name], name)
+        if size != sizes[other]:
+            raise InputError(f"{file}: {size} columns {name}[...], expected {sizes[other]} as of {other}[...]")

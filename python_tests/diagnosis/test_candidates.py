@@ -1,0 +1,475 @@
+"""The candidates of a diagnosis: where they are proposed, and that their columns are what the C core makes of them.
+
+Derivatives are compared with differences of whole runs of the core; the term's own torque is tested elsewhere.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from tendonfmu.diagnosis.block_runs import block_prediction
+from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal, Shape, candidate_columns
+from tendonfmu.diagnosis.derivative_passes import nominal_directions, plan_passes
+from tendonfmu.diagnosis.effects import CANDIDATES, Candidate, Place, Variant, by_name
+from tendonfmu.diagnosis.effects.description_edit import add_to_number
+from tendonfmu.diagnosis.span import Span, span_of
+from tendonfmu.errors import InputError
+from tendonfmu.estimate.structure import own_copy
+from tendonfmu.model import native
+from tendonfmu.model.balance import balanced_forces, moment_arms
+from tendonfmu.model.description import Finger
+from tendonfmu.recordings.prepared import FitRecording, Held, prepare
+from tendonfmu.recordings.recording import Recording
+from tendonfmu.statistics.block_averages import BlockSums, SampleBlocks, regular_blocks
+
+Numbers = NDArray[np.float64]
+Data = dict[str, Any]
+
+# docs/reference/semantics.md#names-of-effects, without `contact` and `unknown`, which are no terms of a model
+CONTRACT = (
+    "viscous_friction", "stribeck", "asymmetric_friction", "edge_friction", "pulley_friction", "joint_friction",
+    "joint_load_friction", "preload_friction", "load_friction", "cover_stiffness", "cover_hardening", "gravity",
+    "inertia", "presliding", "friction_drift", "force_gain", "force_offset", "time_delay", "moment_arm",
+    "moment_arm_variation", "pulley_eccentricity", "tendon_nonlinearity", "joint_coupling", "backlash",
+)  # fmt: skip
+COORDINATES = {"velocity", "angle", "force", "time", "travel", "acceleration", "load"}
+EXACT = 1e-5  # of a column's largest value
+NOTHING = 1e-11  # N·m at an ordinary magnitude: a column that is all zero but for rounding
+
+
+def law(static: float, coulomb: float, velocity: float, viscous: float = 0.0) -> dict[str, float]:
+    return {"static": static, "coulomb": coulomb, "stribeck_velocity": velocity, "viscous": viscous}
+
+
+def finger_data() -> Data:
+    """Two joints, four tendons; every effect is absent somewhere, and most are present elsewhere."""
+    thick, plain = law(0.024, 0.02, 0.004, 0.2), law(0.02, 0.02, 0.005)
+    both = {"positive": law(0.02, 0.02, 0.005, 0.1), "negative": law(0.025, 0.025, 0.005, 0.1)}
+    arms = ([0.009, 0.0], [-0.009, 0.0], [0.004, 0.008], [-0.004, -0.008])
+    edges: list[list[Any]] = [[thick], [], [plain, plain], [both, {"angles": [-0.3, 0.3], "laws": [plain, thick]}]]
+    pulleys: list[list[Any]] = [[], [], [], [plain]]
+    tendons = [
+        {"stiffness": 8000.0, "moment_arms": arm, "edge_friction": edge, "pulley_friction": pulley}
+        for arm, edge, pulley in zip(arms, edges, pulleys, strict=True)
+    ]
+    joints = [
+        {"friction": law(0.006, 0.005, 0.1, 0.001), "cover": {"stiffness": 0.02, "rest_angle": 0.1}},
+        {"load_friction": law(3e-5, 3e-5, 0.1)},
+    ]
+    return {
+        "format": "tendonfmu-finger-1",
+        "name": "candidates",
+        "joints": joints,
+        "tendons": tendons,
+        "contact": {"threshold": [0.03, 0.03]},
+        "extensions": [{"effect": "gravity", "joint": 1, "sine": 0.002, "cosine": 0.001}],
+    }
+
+
+def described(data: Mapping[str, Any]) -> Finger:
+    text = json.dumps(data).encode()
+    return Finger(Path("finger"), text, data, native.image_from_json(text))
+
+
+def moved(data: Data, seconds: float, seed: int, gap: bool = False) -> Recording:
+    """Free motion with rests and reversals at 500 Hz, under forces that the friction asks for."""
+    draw, rate = np.random.default_rng(seed), 500
+    time = np.arange(int(seconds * rate)) / rate
+    angle = np.zeros((len(time), 2))
+    for j in range(2):
+        for _ in range(3):
+            size, speed, phase = draw.uniform(0.1, 0.3), draw.uniform(0.2, 0.7), draw.uniform(0, 6)
+            angle[:, j] += size * np.sin(2 * np.pi * speed * time + phase)
+    going = np.cumsum(np.sin(2 * np.pi * time / 5) < 0.8) / rate
+    angle = np.stack([np.interp(going, time, angle[:, j]) for j in range(2)], axis=1)
+    motion: dict[str, Numbers] = {
+        "time": time,
+        "joint_position": angle,
+        "joint_velocity": np.gradient(angle, time, axis=0),
+    }
+    force = balanced_forces(data, motion, 10 + 2 * np.sin(2 * np.pi * time / 11))
+    position = angle @ moment_arms(data).T + force / 8000.0
+    force += 0.002 * draw.standard_normal(force.shape)
+    if gap:
+        time = time + 3.0 * (time > seconds / 2)
+    groups = {"tendon_force": force, "tendon_position": position, **motion}
+    del groups["time"]
+    return Recording(Path(f"recording {seed}"), time, groups, None)
+
+
+class Case:
+    """Columns of two recordings, one with a gap, in blocks that leave some samples out."""
+
+    def __init__(self, bias: Mapping[str, Any] | None = None) -> None:
+        self.data = finger_data() | ({} if bias is None else {"bias": bias})
+        finger = described(self.data)
+        made = (moved(self.data, 6.0, 1, gap=True), moved(self.data, 5.0, 2))
+        self.recordings: list[FitRecording] = [prepare(finger, each, 1, Held()) for each in made]
+        whole = regular_blocks([each.time for each in made], [each.parts for each in self.recordings], 0.024)
+        shortened = [each.copy() for each in whole.of]
+        shortened[0][:7] = -1
+        shortened[1][400:500] = -1
+        kept = np.unique(np.concatenate(shortened))
+        number = {int(old): new for new, old in enumerate(kept[kept >= 0])} | {-1: -1}
+        numbered = tuple(np.array([number[int(b)] for b in each]) for each in shortened)
+        self.blocks = SampleBlocks(numbered, len(number) - 1)
+        self.span: Span = span_of(self.data, self.recordings)
+        self.columns: CandidateColumns = candidate_columns(self.data, self.recordings, self.blocks, span=self.span)
+
+    def prediction(self, data: Mapping[str, Any]) -> Numbers:
+        return block_prediction(data, self.recordings, self.blocks)
+
+    def shapes(self, name: str) -> list[tuple[Proposal, Shape, Variant]]:
+        return [
+            (proposal, shape, proposal.candidate.variant(self.data, proposal.place, shape.shape))
+            for proposal in self.columns.proposals
+            if proposal.candidate.name == name
+            for shape in proposal.shapes
+        ]
+
+
+@pytest.fixture(scope="module")
+def case() -> Case:
+    return Case()
+
+
+@pytest.fixture(scope="module")
+def remembering() -> Case:
+    return Case({"entry_load": True, "forget_rate": 0.0})
+
+
+def by_difference(case: Case, base: Data, numbers: Mapping[str, float], step: float, one_sided: bool) -> Numbers:
+    def prediction(size: float) -> Numbers:
+        changed = own_copy(base)
+        for path, share in numbers.items():
+            add_to_number(changed, path, size * share)
+        return case.prediction(changed)
+
+    low = 0.0 if one_sided else -step
+    return np.asarray((prediction(step) - prediction(low)) / (step - low))
+
+
+def assert_column(found: NDArray[Any], expected: Numbers, ordinary: float, what: str) -> None:
+    largest = max(float(np.abs(expected).max()), NOTHING / ordinary / EXACT)
+    assert np.abs(found - expected).max() < EXACT * largest, what
+
+
+# --- which there are --------------------------------------------------------------------------------------------------
+
+
+def test_every_effect_of_the_contract_has_a_candidate() -> None:
+    assert tuple(candidate.name for candidate in CANDIDATES) == CONTRACT
+
+
+@pytest.mark.parametrize("candidate", CANDIDATES, ids=lambda each: each.name)
+def test_a_candidate_says_what_a_user_needs(candidate: Candidate) -> None:
+    assert candidate.sign in (-1, 0, 1)
+    assert candidate.coordinate in COORDINATES
+    assert candidate.confused_with and set(candidate.confused_with) <= set(CONTRACT) - {candidate.name}
+    assert candidate.explanation.endswith(".") and candidate.explanation.count(". ") <= 2
+    assert candidate.title and candidate.excited_by and candidate.unit and candidate.number
+
+
+def test_an_unknown_effect_is_refused() -> None:
+    with pytest.raises(InputError, match="effect 'rust': no candidate of this name; expected one of viscous_friction"):
+        by_name("rust")
+
+
+def test_every_candidate_is_proposed(case: Case) -> None:
+    assert {proposal.candidate.name for proposal in case.columns.proposals} == set(CONTRACT)
+
+
+# --- places -----------------------------------------------------------------------------------------------------------
+
+
+def test_places_follow_the_structure(case: Case) -> None:
+    """Literal places of the finger above, by hand."""
+    expected = {
+        "viscous_friction": {(2, 3), (1, 3), (1, 4), (2, None)},
+        "stribeck": {(1, 3), (2, 3), (1, 4), (2, None)},
+        "asymmetric_friction": {(1, 1), (1, 3), (2, 3), (2, 4), (1, 4), (1, None), (2, None)},
+        "edge_friction": {(1, 2), (2, 3)},
+        "pulley_friction": {(1, 3)},
+        "joint_friction": {(2, None)},
+        "joint_load_friction": {(1, None)},
+        "cover_stiffness": {(2, None)},
+        "gravity": {(2, None)},
+        "joint_coupling": {(1, None)},
+        "time_delay": {(None, None)},
+        "load_friction": {(1, 1), (1, 2), (1, 3), (2, 3), (1, 4), (2, 4)},
+        "preload_friction": {(1, 1), (1, 2), (1, 3), (2, 3), (1, 4), (2, 4)},
+        "friction_drift": {(None, None), (1, None), (2, None), (None, 1), (None, 3), (None, 4)},
+        "presliding": {(None, None)},
+        "force_gain": {(None, 1), (None, 2), (None, 3), (None, 4)},
+    }
+    for name, places in expected.items():
+        found = {(place.joint, place.tendon) for place in by_name(name).places(case.data)}
+        assert found == places, name
+
+
+def presliding_places(data: Data, rows: list[Data], **settings: Any) -> set[tuple[int | None, int | None]]:
+    places = by_name("presliding").places({**data, "extensions": rows, **settings})
+    return {(place.joint, place.tendon) for place in places}
+
+
+def test_presliding_is_everywhere_first_and_at_single_places_beside_it(case: Case) -> None:
+    whole = {"effect": "presliding", "displacement": 0.05}
+    own = {"effect": "presliding", "joint": 1, "displacement": 0.002}
+    single = {(1, None), (2, None), (None, 1), (None, 3), (None, 4)}
+    assert presliding_places(case.data, []) == {(None, None)}
+    assert presliding_places(case.data, [whole]) == single
+    assert presliding_places(case.data, [whole, own]) == single - {(1, None)}
+    # a threshold of 0 gives "everywhere" no scale
+    assert presliding_places(case.data, [], velocity_threshold={"tendon": 0.0, "joint": 0.05}) == single
+
+
+def test_distances_of_presliding_follow_the_motion_and_what_there_is(case: Case) -> None:
+    candidate = by_name("presliding")
+
+    def distances(data: Data, place: Place) -> list[float]:
+        return [each.shape["displacement"] for each in candidate.variants(data, place, case.span)]
+
+    thresholds = {"tendon": 0.0005, "joint": 0.05}
+    data = case.data | {"velocity_threshold": thresholds, "extensions": []}
+    times = [*(case.span.travel / 0.05), *(case.span.tendon_travel[[0, 2, 3]] / 0.0005)]
+    everywhere = distances(data, Place())
+    assert everywhere == sorted(everywhere) and len(everywhere) >= 3
+    assert everywhere[0] < 0.01 * np.median(times) and 0.05 * np.median(times) < everywhere[-1] < np.median(times)
+    slower = data | {"velocity_threshold": {key: 2.0 * value for key, value in thresholds.items()}}
+    assert distances(slower, Place()) == pytest.approx([each / 2.0 for each in everywhere])
+    # beside it a place is tried with less and with more than it has
+    known = data | {"extensions": [{"effect": "presliding", "displacement": 0.04}]}
+    for place, threshold in ((Place(1), 0.05), (Place(tendon=3), 0.0005)):
+        low, high = distances(known, place)
+        assert low < 0.04 * threshold < high
+
+
+def test_kinematics_decide_what_can_matter(case: Case) -> None:
+    tendons = {Place(tendon=i) for i in range(1, 5)}
+    assert set(by_name("backlash").places(case.data, 2)) == {Place(joint=1), Place(joint=2)}
+    assert by_name("backlash").places(case.data, 3) == []
+    assert set(by_name("tendon_nonlinearity").places(case.data, 1)) == tendons
+    assert by_name("tendon_nonlinearity").places(case.data, 2) == []
+
+
+@pytest.mark.parametrize("name", CONTRACT)
+def test_what_is_present_is_not_proposed_again(case: Case, name: str) -> None:
+    """Extended by a candidate, a finger is accepted, and this place with this law is no place of it any more."""
+    candidate = by_name(name)
+    for proposal, shape, variant in case.shapes(name):
+        extended = candidate.extended(case.data, proposal.place, shape.shape, shape.expected)
+        native.image_from_json(json.dumps(extended))
+        kind = {key: value for key, value in shape.shape.items() if key in ("pulley", "load")}
+        after = candidate.variants(extended, proposal.place, case.span)
+        again = [each for each in after if {key: each.shape.get(key) for key in kind} == kind]
+        if proposal.place in candidate.places(extended) and not variant.rows:
+            again = [each for each in again if each.shape.keys() == shape.shape.keys()]
+            assert again == [], proposal.place
+        elif variant.rows or variant.secant_rows:
+            assert proposal.place not in candidate.places(extended) or name == "stribeck"
+
+
+# --- columns ----------------------------------------------------------------------------------------------------------
+
+
+def test_prediction_is_what_a_run_says(case: Case) -> None:
+    """G = T + all jumps, by plain averaging of each part's run."""
+    still = {"drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": [0.0, 0.0]}
+    alone = {**case.data, "bias": still, "contact": {"threshold": [1e9, 1e9]}}
+    for recording, block in zip(case.recordings, case.blocks.of, strict=True):
+        whole = np.full((len(recording.time), 2), np.nan)
+        for part in recording.parts:
+            whole[part] = native.run_recording(alone, recording.arrays(part))["friction_torque"]
+        for number in np.unique(block[block >= 0]):
+            mean = whole[block == number].mean(axis=0)
+            assert case.columns.prediction[number] == pytest.approx(mean, rel=1e-9, abs=1e-13)
+
+
+@pytest.mark.parametrize("name", CONTRACT)
+def test_columns_are_differences_of_the_core(case: Case, name: str) -> None:
+    """Derivatives at a strength of zero by small steps, secants by the term at full strength."""
+    assert_all_columns(case, name)
+
+
+@pytest.mark.parametrize(
+    "name", ["viscous_friction", "asymmetric_friction", "edge_friction", "friction_drift", "gravity"]
+)
+def test_columns_where_stiction_remembers_its_load(remembering: Case, name: str) -> None:
+    assert_all_columns(remembering, name)
+
+
+def late_forces(case: Case, delay: float) -> Numbers:
+    """τ − G with forces measured late, less τ − G as it is, by whole runs."""
+    still = {"drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": [0.0, 0.0]}
+    alone = {**case.data, "bias": still, "contact": {"threshold": [1e9, 1e9]}}
+    found = np.zeros_like(case.columns.prediction)
+    for recording, block in zip(case.recordings, case.blocks.of, strict=True):
+        whole = np.zeros((len(recording.time), 2))
+        for part in recording.parts:
+            arrays = recording.arrays(part)
+            force = [np.interp(arrays["time"] - delay, arrays["time"], one) for one in arrays["tendon_force"].T]
+            late = native.run_recording(alone, {**arrays, "tendon_force": np.stack(force, axis=1)})
+            now = native.run_recording(alone, arrays)
+            whole[part] = late["compensated_torque"] - now["compensated_torque"]
+        for number in np.unique(block[block >= 0]):
+            found[number] = whole[block == number].mean(axis=0)
+    return found
+
+
+def assert_all_columns(case: Case, name: str) -> None:
+    shapes = case.shapes(name)
+    assert shapes
+    for _, shape, variant in shapes:
+        values = case.columns.values[:, :, shape.columns]
+        assert values.shape[2] == variant.count
+        if name == "time_delay":
+            assert_column(values[:, :, 0], late_forces(case, shape.shape["delay"]), 1.0, f"{name} {shape.shape}")
+            continue
+        if shape.secant:
+            expected = case.prediction(variant.secant or {}) - case.columns.prediction
+            assert np.abs(expected).max() > 1e-5 or name == "presliding"
+            assert_column(values[:, :, 0], expected, 1.0, f"{name} {shape.shape}")
+            continue
+        assert case.prediction(variant.data) == pytest.approx(case.columns.prediction, rel=1e-9, abs=1e-10)
+        for k, column in enumerate(variant.columns):
+            step = 1e-4 * column.expected
+            expected = by_difference(case, variant.data, column.numbers, step, one_sided=column.sign > 0)
+            assert_column(values[:, :, k], expected, column.expected, f"{name} {shape.shape} {column.path}")
+
+
+@pytest.mark.parametrize("which", ["case", "remembering"])
+def test_nominal_columns_are_differences_of_the_core(request: pytest.FixtureRequest, which: str) -> None:
+    case = request.getfixturevalue(which)
+    names, directions = nominal_directions(case.data)
+    assert case.columns.nominal_names == names and len(names) == case.columns.nominal.shape[2]
+    assert {"joints[1].friction.rate", "tendons[4].edge_friction[1].negative.coulomb", "extensions[1].sine"} <= set(
+        names
+    )
+    for k, (name, direction) in enumerate(zip(names, directions, strict=True)):
+        path = next(iter(direction))
+        value = native.Instance.from_description(case.data).get(path)
+        found = case.columns.nominal[:, :, k]
+        if name.endswith(".rate"):  # by 1/v_s
+            expected = -(value**2) * by_difference(case, case.data, direction, 1e-4 * value, one_sided=False)
+            assert np.abs(found - expected).max() < 1e-4 * np.abs(expected).max(), name
+        else:
+            expected = by_difference(case, case.data, direction, 1e-4 * value, one_sided=False)
+            assert_column(found, expected, value, name)
+
+
+def test_a_pass_takes_many_terms_and_those_that_exclude_each_other_part(case: Case) -> None:
+    grid = [variant for _, _, variant in case.shapes("stribeck") if not variant.rows]
+    drift = [variant for _, _, variant in case.shapes("friction_drift")]
+    velocities = {variant.shape["stribeck_velocity"] for variant in grid if not variant.shape.get("load")}
+    passes = plan_passes(case.data, [(variant, 0) for variant in drift + grid])
+    assert len(velocities) >= 2
+    assert len(passes) == max(len({v.shape["stribeck_velocity"] for v in grid if v.paths == w.paths}) for w in grid)
+    assert len(passes[0].data()["extensions"]) == 1 + len(drift)
+
+
+# --- what a magnitude means -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "place", "shape", "magnitudes"),
+    [
+        ("viscous_friction", Place(1, 3), {}, (0.4,)),
+        ("stribeck", Place(1, 3), {"stribeck_velocity": 0.0015}, (0.004,)),
+        ("asymmetric_friction", Place(1, 1), {}, (0.2, -0.1)),
+        ("edge_friction", Place(1, 2), {}, (0.015, 0.1)),
+        ("edge_friction", Place(2, 3), {"angle_low": -0.5, "angle_middle": 0.0, "angle_high": 0.4}, (0.3, -0.2)),
+        ("pulley_friction", Place(1, 3), {}, (0.01, 0.05)),
+        ("joint_friction", Place(2), {}, (0.003, 0.0005)),
+        ("cover_stiffness", Place(2), {}, (0.01,)),
+        ("gravity", Place(2), {}, (-0.004, 0.003)),
+        ("moment_arm", Place(2, 4), {}, (-0.0004,)),
+        ("preload_friction", Place(1, 3), {}, (0.3,)),
+        ("friction_drift", Place(), {"time_constant": 3.0}, (-0.2,)),
+    ],
+    ids=str,
+)
+def test_columns_explain_an_extended_finger(
+    case: Case, name: str, place: Place, shape: dict[str, float], magnitudes: tuple[float, ...]
+) -> None:
+    """What an extended finger adds is its columns times the magnitudes, but for the square of small friction."""
+    candidate = by_name(name)
+    assert place in candidate.places(case.data)
+    extended = candidate.extended(case.data, place, shape, magnitudes)
+    variant = candidate.variant(case.data, place, shape)
+    target = case.prediction(extended) - case.columns.prediction
+    columns = [
+        by_difference(case, variant.data, column.numbers, 1e-4 * column.expected, one_sided=column.sign > 0)
+        for column in variant.columns
+    ]
+    made = sum(size * column for size, column in zip(magnitudes, columns, strict=True))
+    assert np.abs(target).max() > 5e-5
+    assert np.linalg.norm(target - made) < 0.03 * np.linalg.norm(target)
+
+
+@pytest.mark.parametrize("name", CONTRACT)
+def test_a_fit_estimates_what_is_added(case: Case, name: str) -> None:
+    """All numbers of the term, also from magnitudes of 0: what is 0 would stay 0."""
+    before = set(nominal_directions(case.data)[0])
+    for proposal, shape, variant in case.shapes(name):
+        extended = proposal.candidate.extended(case.data, proposal.place, shape.shape, [0.0] * variant.count)
+        added = set(nominal_directions(extended)[0]) - before
+        wanted = {f"extensions[{len(extended['extensions'])}]."} if variant.rows or variant.secant_rows else set()
+        for path in () if wanted else (path for column in variant.columns for path in column.numbers):
+            wanted.add(path.removesuffix("static") + "drop" if path.endswith(".static") else path)
+        assert all(any(each.startswith(path) for each in added | before) for path in wanted), (proposal.place, wanted)
+        assert added, (name, proposal.place, shape.shape)
+
+
+def test_magnitudes_are_counted(case: Case) -> None:
+    with pytest.raises(InputError, match="magnitudes: 1 numbers; expected 2, one per column"):
+        by_name("gravity").extended(case.data, Place(2), {}, [1.0])
+
+
+def test_sizes_stay_within_what_a_description_takes(case: Case) -> None:
+    """A candidate's magnitude is an estimate, and may be anything."""
+    for name, place, shape, most in (
+        ("time_delay", Place(), {"delay": -0.03}, 50.0),
+        ("friction_drift", Place(), {"time_constant": 3.0}, -40.0),
+        ("force_gain", Place(tendon=1), {}, -3.0),
+        ("asymmetric_friction", Place(1, 3), {}, 9.0),
+        ("edge_friction", Place(1, 2), {}, -5.0),
+    ):
+        candidate = by_name(name)
+        sizes = [most] * candidate.variant(case.data, place, shape).count
+        native.image_from_json(json.dumps(candidate.extended(case.data, place, shape, sizes)))
+
+
+# --- averages ---------------------------------------------------------------------------------------------------------
+
+
+def test_jumps_are_added_up_over_stretches() -> None:
+    draw = np.random.default_rng(3)
+    values = draw.standard_normal((97, 2, 5))
+    jumps = draw.standard_normal((97, 2, 5)) * (draw.random((97, 1, 1)) < 0.2)
+    mix = draw.standard_normal((5, 3))
+    block = np.sort(draw.integers(0, 12, 97))
+    block[(block == 4) | (block == 0)] = -1
+    sums = np.zeros((12, 2, 3))
+    stretches = BlockSums(sums, mix)
+    for begin, end in ((0, 1), (1, 40), (40, 41), (41, 97)):
+        stretches.add(block[begin:end], values[begin:end], jumps[begin:end])
+    whole = (values + np.cumsum(jumps, axis=0)) @ mix
+    for number in range(12):
+        assert sums[number] == pytest.approx(whole[block == number].sum(axis=0), abs=1e-12)
+
+
+def test_regular_blocks_have_no_gap_in_them() -> None:
+    time = np.concatenate([np.arange(25) * 0.004, 7.0 + np.arange(13) * 0.004, 9.0 + np.arange(4) * 0.05])
+    parts = [slice(0, 25), slice(25, 38), slice(38, 42)]
+    blocks = regular_blocks([time], [parts], 0.02)
+    assert blocks.of[0].tolist() == [k // 5 for k in range(25)] + [5 + k // 5 for k in range(13)] + [8, 9, 10, 11]
+    assert blocks.count == 12 and blocks.sizes().sum() == 42
+    with pytest.raises(InputError, match="length of a block = 0 s: expected above 0"):
+        regular_blocks([time], [parts], 0.0)

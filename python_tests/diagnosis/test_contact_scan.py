@@ -1,0 +1,94 @@
+"""Events in a residual: pushes and stalls are found, noise, heavy tails and smooth effects are none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from synthetic_series import make_series, nuisance_of, residual_of, with_effect
+from tendonfmu.diagnosis.contact_scan import left_out, scan_events
+from tendonfmu.diagnosis.result import Event
+from tendonfmu.diagnosis.series import Series
+from tendonfmu.statistics.splines import bias_splines
+
+PUSHES = ((8.0, 8.4, 0, 1.0), (21.0, 22.4, 1, -1.0), (37.0, 37.8, 1, 1.0), (50.0, 51.1, 0, -1.0))  # s, s, joint, sign
+
+
+def events_of(series: Series) -> tuple[Event, ...]:
+    return scan_events(series, residual_of(series, nuisance_of(series)), bias_splines(series), ["rec"])
+
+
+def pushed(series: Series) -> Series:
+    """Four pushes of six times the rms of the residual, with flanks of 50 ms."""
+    rms = residual_of(series, nuisance_of(series)).std(axis=0)
+    target = series.target.copy()
+    for start, end, joint, sign in PUSHES:
+        shape = np.clip(np.minimum(series.time - start, end - series.time) / 0.05, 0.0, 1.0)
+        target[:, joint] += sign * 6.0 * rms[joint] * shape
+    return replace(series, target=target)
+
+
+@pytest.mark.parametrize("seed", [11, 12])
+def test_pushes_are_found_with_time_and_joint(seed: int) -> None:
+    series = pushed(make_series(seed))
+    found = events_of(series)
+    assert len(found) == len(PUSHES)
+    for event, (start, end, joint, _) in zip(found, PUSHES, strict=True):
+        assert joint + 1 in event.joints
+        assert event.start == pytest.approx(start, abs=0.2)
+        assert event.end == pytest.approx(end, abs=0.2)
+        assert 0.04 < event.peak < 0.12
+    out = left_out(series, found, ["rec"])
+    assert out[(series.time > 21.1) & (series.time < 22.3)].all()
+    assert not out[(series.time > 24.0) & (series.time < 36.0)].any()
+
+
+@pytest.mark.parametrize("seed", [21, 22, 23])
+def test_noise_has_no_events(seed: int) -> None:
+    assert events_of(make_series(seed)) == ()
+
+
+def test_neither_have_heavy_tails() -> None:
+    series = make_series(24)
+    heavy = 0.006 * np.random.default_rng(1).standard_t(3, size=series.target.shape)
+    assert events_of(replace(series, target=series.target + heavy)) == ()
+
+
+def test_neither_has_a_strong_smooth_effect() -> None:
+    """Friction at one end of the range, as strong as the noise: seldom visited, but no event."""
+    series = make_series(25)
+    signal = np.tanh(series.velocity[:, 0] / 0.02) * np.clip(series.angle[:, 0] - 0.2, 0.0, None)
+    assert events_of(with_effect(series, nuisance_of(series), signal, joint=0, strength=1.0)) == ()
+
+
+def test_says_what_is_seen_meanwhile() -> None:
+    series = make_series(26)
+    stall = (series.time > 30.0) & (series.time < 31.0)
+    target, velocity, force = series.target.copy(), series.velocity.copy(), series.force.copy()
+    target[stall, 1] += 0.09
+    velocity[stall, 1] = 0.0
+    force[stall, 2] = 0.0
+    found = events_of(replace(series, target=target, velocity=velocity, force=force))
+    event = max(found, key=lambda each: each.peak)
+    assert event.recording == "rec"
+    assert event.joints == (2,)
+    assert "joint 2 stands still" in event.description
+    assert "tendon 3 nearly slack" in event.description
+
+
+def test_a_joint_that_comes_loose_needs_less_of_a_residual() -> None:
+    """Reversals as rough as the stall hide it from the block maxima; its motion is like no other."""
+    series = make_series(27)
+    target, velocity = series.target.copy(), series.velocity.copy()
+    for turn in range(4, 60, 5):
+        target[turn * 100 : turn * 100 + 25, 0] += 0.05
+    loose = (series.time > 41.0) & (series.time < 41.3)
+    target[loose, 0] += 0.05
+    assert events_of(replace(series, target=target)) == ()
+    velocity[np.flatnonzero(loose)[:8], 0] = 60.0
+    (event,) = events_of(replace(series, target=target, velocity=velocity))
+    assert event.start == pytest.approx(41.0, abs=0.3)
+    assert event.end == pytest.approx(41.3, abs=0.3)
+    assert "joint 1 jumps" in event.description

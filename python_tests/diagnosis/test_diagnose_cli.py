@@ -1,0 +1,262 @@
+"""The command `tendonfmu diagnose` as a user calls it, and `excite --discriminate`."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from html import unescape
+from importlib import import_module
+from importlib.resources import files as files_of
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+
+pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
+
+import diagnosis_examples as examples
+from command import Call
+from repository_paths import ROOT, TESTS
+from tendonfmu.cli.several_values import several_values
+from tendonfmu.diagnosis.effects import CANDIDATES
+from tendonfmu.diagnosis.result import Diagnosis
+from tendonfmu.errors import InputError, InternalError
+from tendonfmu.estimate.files import check_unseen
+from tendonfmu.files.tables import read_table
+from tendonfmu.recordings.recording import Recording
+from tendonfmu.report.diagnosis_files import write_diagnosis
+from tendonfmu.tasks.phases import PhaseState
+
+COMMANDS = ROOT / "docs" / "reference" / "commands"
+PAGE = (COMMANDS / "diagnose.md").read_text(encoding="utf-8")
+NAMED = {"diagnosis.html", "diagnosis.json", "extended.json", "extended.fmu", "nominal.json"}
+
+Called = list[tuple[Any, ...]]
+
+
+@pytest.fixture
+def answering(monkeypatch: pytest.MonkeyPatch) -> Callable[[Diagnosis], Called]:
+    """Puts a diagnosis in the place of the computation; gives what it was asked."""
+
+    def put(found: Diagnosis) -> Called:
+        asked: Called = []
+
+        def answer(finger: Path, recordings: Sequence[Path], tests: Sequence[Path], **options: Any) -> Diagnosis:
+            options["progress"](PhaseState(1, 2, "fitting", 1, 2, 0.0, None))
+            asked.append((finger.name, [each.name for each in recordings], [each.name for each in tests], options))
+            return found
+
+        monkeypatch.setattr("tendonfmu.interface.diagnosing.find", answer)
+        return asked
+
+    return put
+
+
+def brief(found: Diagnosis) -> Diagnosis:
+    """Without what takes long to draw."""
+    return replace(found, views=found.views[:1])
+
+
+def files_in(folder: Path) -> set[str]:
+    return {file.name for file in folder.iterdir()}
+
+
+def test_it_writes_everything(call: Call, answering: Callable[[Diagnosis], Called]) -> None:
+    found = examples.three_causes()
+    asked = answering(found)
+    words = "diagnose f.json a.csv b.csv --test c.csv d.csv -o new/out --seed 3 --kinematics 3 --jobs 2"
+    answer = call(*words.split(), "--least-gain", "0.1")
+    assert answer.status == 0
+    finger, recordings, tests, options = asked[0]
+    assert (finger, recordings, tests) == ("f.json", ["a.csv", "b.csv"], ["c.csv", "d.csv"])
+    assert (options["seed"], options["kinematics"], options["jobs"], options["least_gain"]) == (3, 3, 2, 0.1)
+    report = json.loads(Path("new/out/diagnosis.json").read_text(encoding="utf-8"))
+    jsonschema.validate(report, json.loads((files_of("tendonfmu") / "schema" / "diagnosis.schema.json").read_text()))
+    assert set(report["files"]) == files_in(Path("new/out")) == NAMED
+    assert files_in(Path("new")) == {"out"}  # nothing is left beside it
+    assert [line for line in answer.err.splitlines() if line.startswith("tendonfmu: warning: ")] == [
+        f"tendonfmu: warning: {sentence}" for sentence in found.warnings
+    ]
+    assert "Three causes together explain part of what the model gets wrong." in answer.out
+    assert "new/out/diagnosis.html: all results, to be read in a browser" in answer.err
+    assert json.loads(Path("new/out/extended.json").read_text()) == found.extended_data
+    for name in ("extended.json", "nominal.json"):
+        assert call("check", f"new/out/{name}").status == 0
+
+
+def test_an_earlier_diagnosis_is_replaced_and_nothing_else(
+    call: Call, answering: Callable[[Diagnosis], Called]
+) -> None:
+    answering(brief(examples.three_causes()))
+    assert call("diagnose", "f.json", "a.csv", "-o", "out").status == 0
+    Path("out/notes.png").write_text("mine")
+    earlier = json.loads(Path("out/diagnosis.json").read_text(encoding="utf-8"))
+    earlier["files"].append("cause_1.png")  # as of a version that wrote figures
+    Path("out/diagnosis.json").write_text(json.dumps(earlier))
+    Path("out/cause_1.png").write_text("a figure")
+    answering(brief(examples.adequate()))
+    answer = call("diagnose", "f.json", "a.csv", "-o", "out", "--json")
+    report = json.loads(Path("out/diagnosis.json").read_text(encoding="utf-8"))
+    assert answer.status == 0 and json.loads(answer.out) == report
+    assert report["verdict"] == "adequate" and report["causes"] == []
+    assert files_in(Path("out")) == {*report["files"], "notes.png"} == {*NAMED, "notes.png"}
+
+
+def test_the_same_diagnosis_gives_the_same_files(tmp_path: Path) -> None:
+    found = brief(examples.one_cause())
+    for name in ("one", "two"):
+        write_diagnosis(found, tmp_path / name)
+    for name in files_in(tmp_path / "one"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), name
+
+
+def test_what_fails_leaves_the_folder_as_it_was(tmp_path: Path) -> None:
+    write_diagnosis(brief(examples.adequate()), tmp_path / "out")
+    before = {file.name: file.read_bytes() for file in (tmp_path / "out").iterdir()}
+    broken = replace(brief(examples.three_causes()), extended_data={"format": "tendonfmu-finger-1", "name": "broken"})
+    with pytest.raises(InternalError, match="joints"):
+        write_diagnosis(broken, tmp_path / "out")
+    assert {file.name: file.read_bytes() for file in (tmp_path / "out").iterdir()} == before
+    assert files_in(tmp_path) == {"out"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("f.json", "a.csv", "-o", "f.json"), "f.json: a file; expected a folder"),
+        (("out/extended.json", "a.csv", "-o", "out"), "out/extended.json: the same file as the input"),
+        (("f.json", "a.csv", "./a.csv", "-o", "new"), "a.csv: given twice; expected each recording once"),
+        (("f.json", "a.csv", "--test", "a.csv", "-o", "new"), "a.csv: a test, but trained on as well; expected"),
+        (("f.json", "a.csv", "--test", "link.csv", "-o", "new"), "link.csv: a test, but trained on as well"),
+        (("f.json", "a.csv", "--test", "copy.csv", "-o", "new"), "copy.csv: a test, but trained on as well, as a.csv"),
+        (("f.json", "a.csv", "copy.csv", "-o", "new"), "copy.csv: given twice, as a.csv"),
+        (("f.json", "a.csv", "-o", "new", "--least-gain", "0.6"), "--least-gain"),
+        (("f.json", "a.csv", "-o", "new", "--least-gain", "-0.01"), "--least-gain"),
+        (("f.json", "a.csv", "-o", "new", "--least-gain", "nan"), "--least-gain"),
+        (("f.json", "a.csv", "-o", "new", "--least-gain", "3%"), "--least-gain"),
+        (("f.json", "-o", "new"), "RECORDING"),
+        (("f.json", "a.csv"), "-o"),
+        (("f.json", "a.csv", "-o", "new", "--kinematics", "4"), "--kinematics"),
+        (("f.json", "a.csv", "-o", "new", "--jobs", "0"), "--jobs"),
+        (("nothing.json", "a.csv", "-o", "new"), "nothing.json: No such file"),
+        (("finger.json", "nothing.csv", "-o", "new"), "nothing.csv"),
+    ],
+)
+def test_bad_usage_is_one_line(call: Call, tmp_path: Path, arguments: tuple[str, ...], words: str) -> None:
+    (tmp_path / "out").mkdir()
+    for name in ("f.json", "a.csv", "out/extended.json"):
+        (tmp_path / name).write_text("{}")
+    (tmp_path / "a.csv").write_text("time,tendon_force[1]\n")
+    (tmp_path / "copy.csv").write_text("time,tendon_force[1]\n")
+    (tmp_path / "link.csv").symlink_to(tmp_path / "a.csv")
+    (tmp_path / "finger.json").write_text(json.dumps(examples.adequate().nominal_data))
+    answer = call("diagnose", *arguments)
+    assert answer.status == 2 and words in answer.err and answer.err.count("\n") == 1 and answer.out == ""
+    assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize(
+    ("given", "read"),
+    [
+        ("f a --test b c -o d", "f a --test b --test c -o d"),
+        ("f a --test=b c --seed 1 e", "f a --test=b --test c --seed 1 e"),
+        ("--test b f a", "--test b f a"),
+        ("f --test b a", "f --test b a"),
+        ("-o d f a --test b -- c", "-o d f a --test b -- c"),
+        ("f a --test b --test c d", "f a --test b --test c --test d"),
+        ("f a --test", "f a --test"),
+    ],
+)
+def test_several_tests_after_the_recordings(given: str, read: str) -> None:
+    assert several_values(given.split(), {"--test", "-o", "--seed"}) == read.split()
+
+
+def test_least_gain_is_three_percent(call: Call, answering: Callable[[Diagnosis], Called]) -> None:
+    asked = answering(brief(examples.adequate()))
+    assert call("diagnose", "f.json", "a.csv", "-o", "out").status == 0
+    assert asked[0][3]["least_gain"] == 0.03
+
+
+def test_a_test_that_holds_what_is_trained_on_is_refused() -> None:
+    """Whatever its file's name and format, and when it begins."""
+    motion = np.random.default_rng(1).normal(size=(50, 2))
+    groups = {"tendon_force": motion, "tendon_position": motion[:, ::-1]}
+    monday = Recording(Path("monday.csv"), np.arange(50) / 100, groups)
+    copy = Recording(Path("copy.parquet"), 7.0 + np.arange(50) / 100, {k: v.copy() for k, v in groups.items()})
+    other = Recording(Path("other.csv"), monday.time, {**groups, "tendon_force": motion + 1e-3})
+    check_unseen([monday], [other])
+    with pytest.raises(InputError, match=r"copy\.parquet: a test, but trained on as well: the same samples as monday"):
+        check_unseen([monday], [other, copy])
+
+
+def test_options_and_effects_are_on_the_page(call: Call) -> None:
+    shown = call("diagnose", "--help").out
+    options = set(re.findall(r"--[a-z][a-z-]+", shown)) - {"--help"}
+    assert len(options) > 5
+    assert {option for option in options if option not in PAGE} == {"--output"}
+    rows = [f"| `{each.name}` | {each.title} | {each.excited_by} |" for each in CANDIDATES]
+    missing = [row for row in rows if row not in PAGE]
+    assert missing == [], "docs/reference/commands/diagnose.md, The effects: \n" + "\n".join(rows)
+
+
+# --- the next experiment ----------------------------------------------------------------------------------------------
+
+
+def test_a_motion_that_discriminates_takes_no_plan_of_its_own(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "finger.json").write_text(json.dumps(examples.adequate().nominal_data))
+    answer = call("excite", "finger.json", "--discriminate", "out", "-o", "m.csv", "--duration", "60")
+    assert answer.status == 2 and "--duration: given with --discriminate out" in answer.err
+    answer = call("excite", "finger.json", "--discriminate", "out", "-o", "m.csv")
+    assert answer.status == 2 and "diagnosis.json" in answer.err and answer.err.count("\n") == 1
+    write_diagnosis(replace(brief(examples.adequate()), experiment=examples.NO_EXPERIMENT), tmp_path / "out")
+    answer = call("excite", "finger.json", "--discriminate", "out", "-o", "m.csv")
+    assert answer.status == 2 and "no further experiment" in answer.err and not Path("m.csv").exists()
+
+
+def test_the_next_experiment_is_written(call: Call, tmp_path: Path) -> None:
+    found = brief(examples.three_causes())
+    (tmp_path / "finger.json").write_text(json.dumps(found.nominal_data))
+    write_diagnosis(found, tmp_path / "out")
+    told = json.loads(
+        call("excite", "finger.json", "--discriminate", "out", "-o", "m.csv", "--rate", "50", "--json").out
+    )
+    answer = call("excite", "finger.json", "--discriminate", "out", "-o", "m.csv", "--rate", "50")
+    assert answer.status == 0, answer.err
+    assert told["format"] == "tendonfmu-discriminating-motion-1" and told["sentence"] in answer.out
+    motion = read_table(tmp_path / "m.csv", lambda *_: None)
+    assert motion["time"][1] == 0.02 and motion["time"][-1] >= 59.9
+    assert motion["pretension"].max() == pytest.approx(25.0)
+    assert np.ptp(motion["joint_position[1]"]) < 1e-9 and np.ptp(motion["joint_position[2]"]) > 0.5
+    assert np.abs(motion["joint_velocity[2]"]).max() <= 0.4 * 1.001
+    assert found.experiment.sentence in answer.out and "m.csv: 3" in answer.err
+
+
+# --- for real ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_hidden_spring_is_found(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A spring hidden in recordings that code of its own has made: the command names it and writes a model with it."""
+    monkeypatch.syspath_prepend(str(TESTS / "hidden_effects"))
+    rig, hiding = import_module("matched_rig"), import_module("effects_hidden")
+    hand = rig.random_hand(21, joints=1, presliding=False, source=2, rate=250.0)
+    hand, label = hiding.hide(hand, "cover_stiffness", 3.0, seed=21, motion=3, seconds=40.0)
+    for name, seed in (("train", 3), ("test", 4)):
+        (tmp_path / name).mkdir()
+        rig.record(hand, seed=seed, seconds=40.0).write(tmp_path / name)
+    words = "diagnose train/nominal.json train/recording.parquet --test test/recording.parquet -o out --kinematics 2"
+    answer = call(*words.split())
+    assert answer.status == 0, answer.err
+    report = json.loads(Path("out/diagnosis.json").read_text(encoding="utf-8"))
+    jsonschema.validate(report, json.loads((files_of("tendonfmu") / "schema" / "diagnosis.schema.json").read_text()))
+    first = report["causes"][0]
+    assert "cover_stiffness" in {first["effect"], *(other["effect"] for other in first["confusable_with"])}
+    assert first["joint"] == label["joint"] and report["gain"]["interval"][0] > 0
+    assert report["extended"]["test_rms"][0] < report["nominal"]["test_rms"][0] < report["nominal"]["bias_only_rms"][0]
+    page = Path("out/diagnosis.html").read_text(encoding="utf-8")
+    assert first["size"] in page and first["title"] in unescape(page)
+    run = "run out/extended.fmu test/recording.parquet -o run.csv --kinematics 2"
+    assert call(*run.split()).status == 0

@@ -1,0 +1,284 @@
+"""The refit with causes and the gain: the FMUs' residuals are those of step 5, the gain and its interval are true."""
+
+from __future__ import annotations
+
+import copy
+import json
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from fit_cases import lasting_finger
+from fit_data import make_recording, wavy_forces, wavy_motion
+from repository_paths import ROOT
+from tendonfmu.diagnosis.contact_gain import detection_gain
+from tendonfmu.diagnosis.effects import CANDIDATES, Place
+from tendonfmu.diagnosis.extension_fit import (
+    Accepted,
+    FitSettings,
+    cause_parameters,
+    extended_description,
+    fit_extended,
+    fit_numbers,
+)
+from tendonfmu.diagnosis.gain import measure_gain, residual_of, run_both
+from tendonfmu.diagnosis.online_error import OnlineError
+from tendonfmu.errors import InputError, InternalError
+from tendonfmu.estimate.estimation import HAS_ESTIMATION
+from tendonfmu.model import native
+from tendonfmu.model.description import Finger, read_finger
+from tendonfmu.recordings.prepared import FitRecording, Held, prepare
+from tendonfmu.recordings.recording import Recording, read_recording
+from tendonfmu.statistics.paired_gain import blocks_of, gain_interval
+
+Array = NDArray[Any]
+EXAMPLES = ROOT / "examples"
+NOISE = 0.002
+needs_estimation = pytest.mark.skipif(not HAS_ESTIMATION, reason="SKIPPED: no estimation (built without Eigen)")
+
+
+def described(data: dict[str, Any]) -> Finger:
+    text = json.dumps(data).encode()
+    return Finger(Path("finger"), text, data, native.image_from_json(text))
+
+
+def nominal() -> dict[str, Any]:
+    return lasting_finger(noise_std=NOISE)
+
+
+def hidden(*rows: dict[str, Any]) -> dict[str, Any]:
+    return {**nominal(), "extensions": list(rows)}
+
+
+@lru_cache
+def recorded(truth: str, seed: int, seconds: float = 30.0, rate: float = 100.0) -> Recording:
+    """Made by the core of a description (JSON), kinematics source 3."""
+    motion = wavy_motion(seed, seconds, rate, 2)
+    made = make_recording(json.loads(truth), motion, wavy_forces(seed, motion["time"], 4), seed)
+    groups = dict(made.recording)
+    return Recording(Path(f"made_{seed}"), groups.pop("time"), groups)
+
+
+def prepared(truth: dict[str, Any], seed: int, holdout: float = 0.0, seconds: float = 30.0) -> FitRecording:
+    return prepare(described(nominal()), recorded(json.dumps(truth), seed, seconds), 3, Held(holdout, 2.0))
+
+
+def accepted(name: str, place: Place, magnitudes: list[float], **shape: float) -> Accepted:
+    candidate = next(each for each in CANDIDATES if each.name == name)
+    return Accepted(candidate, place, shape, magnitudes)
+
+
+# --- the interval -----------------------------------------------------------------------------------------------------
+
+
+def coloured(rng: np.random.Generator, seconds: float, rate: float) -> tuple[Array, Array, Array]:
+    """time, residual of a nominal model and of an extended one: noise of 0.1 s, an effect that follows slow motion."""
+    samples = int(seconds * rate)
+
+    def remembering(time: float, columns: int) -> Array:
+        keep = np.exp(-1 / (rate * time))
+        start = int(5 * time * rate)
+        noise = rng.standard_normal((samples + start, columns))
+        return np.asarray(lfilter([np.sqrt(1 - keep**2)], [1, -keep], noise, axis=0)[start:])
+
+    motion, noise = remembering(1.0, 2), remembering(0.1, 2)
+    noise *= 0.6 + 0.4 * np.abs(motion)
+    return np.arange(samples) / rate, noise + 0.7 * np.sign(motion), noise + 0.05 * motion
+
+
+def test_the_interval_covers_the_true_gain() -> None:
+    rng = np.random.default_rng(7)
+    _, before, after = coloured(rng, 20_000.0, 50.0)
+    true = 1 - np.sqrt(np.sum(after**2) / np.sum(before**2))
+    covered, below, naive = 0, 0, 0
+    cases = 200
+    for _ in range(cases):
+        time, before, after = coloured(rng, 60.0, 50.0)
+        blocks = blocks_of(time, np.ones(len(time), dtype=bool))
+        squares = [np.sum(each**2, axis=1) for each in (before, after)]
+        found = gain_interval(blocks.sums(squares[0]), blocks.sums(squares[1]))
+        covered += found.low <= true <= found.high
+        below += true < found.low
+        # samples taken for independent: what the blocks are for
+        ratio = (squares[1] / squares[1].sum() - squares[0] / squares[0].sum()) / 2
+        reach = 1.96 * np.sqrt(np.sum(ratio**2)) * (1 - found.value)
+        naive += found.value - reach <= true <= found.value + reach
+    assert 0.92 <= covered / cases <= 0.98
+    assert 0.005 <= below / cases <= 0.06
+    assert naive / cases < 0.85
+
+
+def test_a_gain_is_that_of_the_rms() -> None:
+    before, after = np.array([4.0, 8.0, 4.0, 4.0]), np.array([1.0, 2.0, 1.0, 1.0])
+    found = gain_interval(before, after)
+    assert found.value == pytest.approx(0.5)
+    assert found.low == pytest.approx(0.5) and found.high == pytest.approx(0.5)  # the same in every block
+    assert np.isnan(gain_interval(before[:2], after[:2]).low)
+    assert gain_interval(np.zeros(4), np.zeros(4)).value == 0.0
+
+
+def test_blocks_do_not_pass_over_what_is_left_out() -> None:
+    time = np.arange(4000) / 100
+    chosen = np.ones(4000, dtype=bool)
+    chosen[1450:1550] = False
+    chosen[3000:3010] = False
+    blocks = blocks_of(time, chosen)
+    assert (blocks.index[~chosen] == -1).all() and (blocks.index[chosen] >= 0).all()
+    sizes = np.bincount(blocks.index[chosen], minlength=blocks.count)
+    assert sizes.min() >= 150 and sizes.max() <= 300
+    for k in range(blocks.count):
+        rows = np.flatnonzero(blocks.index == k)
+        assert rows[-1] - rows[0] + 1 == len(rows)
+    assert blocks.sums(np.ones(4000)).sum() == chosen.sum()
+
+
+# --- the residual -----------------------------------------------------------------------------------------------------
+
+KEYS: dict[str, Any] = {"entry_load": True, "forgetting": "absorption"}
+ROWS: list[list[dict[str, Any]]] = [
+    [],
+    [
+        {"effect": "presliding", "tendon": 1, "displacement": 2e-4},
+        {"effect": "friction_drift", "amplitude": 0.3, "time_constant": 5.0},
+        {"effect": "backlash", "joint": 1, "width": 0.01},
+        {"effect": "force_gain", "tendon": 2, "correction": 0.05},
+    ],
+    [{"effect": "time_delay", "delay": -0.012}, {"effect": "inertia", "joint": 2, "inertia": 1e-5}],
+]
+
+
+@pytest.mark.parametrize("rows", ROWS, ids=["plain", "memories", "delay"])
+@pytest.mark.parametrize("source", [1, 3])
+def test_the_fmu_leaves_what_the_core_leaves(rows: list[dict[str, Any]], source: int) -> None:
+    """r after the update is (1 − K)·r: in free motion without known load the filter beside gives the core's r again."""
+    data = hidden(*rows)
+    data["bias"] |= KEYS
+    made = recorded(json.dumps(nominal()), 3, 8.0)
+    free = Recording(made.path, made.time, {k: v for k, v in made.groups.items() if k != "external_torque"})
+    recording = prepare(described(nominal()), free, source, Held())
+    found = run_both(data, recording)
+    assert found.agreement < 1e-12
+    apart = {**data, "contact": {"threshold": [1e9, 1e9]}}
+    core = native.run_recording(apart, free.arrays(), source)["residual"]
+    np.testing.assert_allclose(found.residual[1:], core[1:], rtol=0, atol=1e-12 * np.abs(core).max())
+    np.testing.assert_allclose(residual_of(data, recording)[1:], core[1:], rtol=0, atol=1e-12 * np.abs(core).max())
+
+
+def test_a_known_load_leaves_noise() -> None:
+    """The true model leaves the noise that the bias filter predicts, though the FMU itself knows of no load."""
+    recording = prepared(nominal(), 1)
+    assert recording.external is not None
+    assert np.nanstd(run_both(nominal(), recording).residual) == pytest.approx(NOISE, rel=0.15)
+    unknown = {k: v for k, v in recording.recording.groups.items() if k != "external_torque"}
+    smooth = prepare(described(nominal()), Recording(recording.path, recording.time, unknown), 3, Held())
+    assert np.nanstd(run_both(nominal(), smooth).residual) < 0.5 * NOISE  # the noise of this recording is in its load
+
+
+# --- refit and gain ---------------------------------------------------------------------------------------------------
+
+
+@needs_estimation
+def test_a_hidden_effect_is_fitted_and_its_gain_is_true() -> None:
+    """Two causes, one of them not there: sizes, gains of each, and the gain on far more data of the same kind."""
+    truth = hidden({"effect": "presliding", "joint": 1, "displacement": 0.02})
+    training, test = prepared(truth, 1), prepared(truth, 2)
+    settings = FitSettings(threads=1)
+    before = fit_numbers(nominal(), [training], settings)
+    causes = [
+        accepted("presliding", Place(1), [1.0], displacement=0.01),
+        accepted("cover_hardening", Place(2), [0.001]),
+    ]
+    found = fit_extended(before, causes, [training], settings)
+    parameters = cause_parameters(before.data, causes, found)
+    value, unit = parameters[0]["extensions[1].displacement"]
+    assert value == pytest.approx(0.02, rel=0.1) and unit == "rad"
+    assert list(parameters[1]) == ["extensions[2].stiffness"]
+    without = [fit_extended(before, [other], [training], settings).data for other in causes[::-1]]
+    result = measure_gain(before.data, found.data, [training], [test], between=[without[1]])
+    long = prepared(truth, 2, seconds=90.0)
+    squares = [np.nansum(residual_of(data, long) ** 2) for data in (before.data, found.data)]
+    assert result.value.low <= 1 - np.sqrt(squares[1] / squares[0]) <= result.value.high
+    assert result.value.low > 0.1
+    error = OnlineError(before.data, [test])
+    after = error.by_stretch(found.data)
+    gains = [gain_interval(error.by_stretch(each), after) for each in without]
+    assert gains[0].low > 0.1 and gains[1].high < 0.02
+    assert not result.held_out and result.agreement < 1e-12
+    first, _, last = result.steps
+    assert 1 - last / first == pytest.approx(result.value.value)
+    assert result.steps[1] == pytest.approx(last, rel=0.02)
+    assert all(a < b for a, b in zip(result.extended.test_rms, result.bias_only_rms, strict=True))
+    assert np.allclose(result.extended.train_rms, NOISE, rtol=0.2)
+    blocks = measure_gain(before.data, found.data, [prepared(truth, 1, holdout=0.3)])
+    assert blocks.held_out and blocks.value.low > 0 and blocks.blocks >= 4
+
+
+@needs_estimation
+def test_a_number_that_was_driven_to_nothing_comes_back() -> None:
+    """Its expected size is that of the description that was given, not what is left of it."""
+    training = prepared(nominal(), 1)
+    starved = copy.deepcopy(nominal())
+    law = starved["joints"][0]["friction"]
+    law["static"], law["coulomb"] = 1e-9 + law["static"] - law["coulomb"], 1e-9
+    settings = FitSettings(threads=1)
+    path = "joints[1].friction.coulomb"
+    known = fit_numbers(nominal(), [training], settings).values[path]
+    assert fit_numbers(starved, [training], settings, given=nominal()).values[path] == pytest.approx(known, rel=0.2)
+    assert fit_numbers(starved, [training], settings).values[path] < 1e-4 * known  # pinned to what it starts from
+
+
+@needs_estimation
+def test_forces_without_noise_explain_the_measured_torque() -> None:
+    """Noise in the forces is in the target and in a term that scales with them, which shrinks it; the target of the
+    recording is explained also at forces without it.
+    """
+    motion = wavy_motion(5, 30.0, 100.0, 2)
+    made = make_recording(nominal(), motion, wavy_forces(5, motion["time"], 4), 5, noise_in_forces=True)
+    groups = dict(made.recording)
+    noisy = prepare(described(nominal()), Recording(Path("noisy"), groups.pop("time"), groups), 3, Held())
+    spread = np.linalg.pinv(np.array([tendon["moment_arms"] for tendon in nominal()["tendons"]]))
+    clean = {**groups, "tendon_force": groups["tendon_force"] - made.noise @ spread}
+    quiet = replace(noisy, recording=replace(noisy.recording, groups=clean))
+    cause = [accepted("force_gain", Place(tendon=1), [0.02])]
+    begin = extended_description(nominal(), cause)
+    settings = FitSettings(threads=1)
+    path = "extensions[1].correction"
+    shrunk, found = (fit_numbers(begin, [each], settings) for each in (noisy, quiet))
+    assert abs(found.values[path]) < 3 * found.errors[path]
+    assert abs(found.values[path]) < abs(shrunk.values[path])
+
+
+@needs_estimation
+def test_what_cannot_be_compared_is_refused() -> None:
+    training = prepared(nominal(), 1)
+    with pytest.raises(InputError, match="no sample to measure the gain on"):
+        measure_gain(nominal(), nominal(), [training])
+    other = copy.deepcopy(nominal())
+    other["bias"]["noise_std"] = 0.1
+    with pytest.raises(InternalError, match="bias: different settings in the two"):
+        measure_gain(nominal(), other, [training], [prepared(nominal(), 2)])
+
+
+# --- detection --------------------------------------------------------------------------------------------------------
+
+
+def test_detection_before_and_after() -> None:
+    """Half the friction of a finger that was recorded with pushes: tuned alike, the true one finds more, or sooner."""
+    finger = read_finger(EXAMPLES / "fingers" / "index_finger.json")
+    files = ("index_finger_free.parquet", "index_finger_pushes.parquet")
+    recordings = [prepare(finger, read_recording(EXAMPLES / "demo_recording" / each), 1, Held()) for each in files]
+    poor = copy.deepcopy(dict(finger.data))
+    for tendon in poor["tendons"]:
+        tendon.pop("edge_friction", None)
+        tendon.pop("pulley_friction", None)
+    found = detection_gain(poor, finger.data, recordings)
+    assert found is not None and found.events > 5
+    assert (found.found_after, -found.false_alarms_after) >= (found.found_before, -found.false_alarms_before)
+    assert np.mean(found.thresholds_after) < np.mean(found.thresholds_before)
+    assert detection_gain(poor, finger.data, recordings[:1]) is None

@@ -1,0 +1,303 @@
+"""Many recordings in order of time: their dates, what grows and how fast, what is kept, and the files."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
+
+from command import Call
+from dask_on_loopback import dask_processes
+from real_browser import Elements, figures_of, needs_nothing_else
+from tendonfmu.diagnosis.changes import history as change_history
+from tendonfmu.diagnosis.changes.history import History, Line, Size, diagnose_history, share_of, times_of
+from tendonfmu.diagnosis.changes.trend import slope
+from tendonfmu.diagnosis.result import ChangedSize, Where
+from tendonfmu.errors import InputError
+from tendonfmu.files.finite_numbers import finite
+from tendonfmu.report.diagnosis_text import Names
+from tendonfmu.report.history_files import history_report, write_history
+from tendonfmu.report.history_text import headline, trend_sentence
+from tendonfmu.statistics.interval import Interval
+from tendonfmu.tasks.jobs import workers_of
+from worn_finger import WELL, Worn, record, write_files
+
+NAMES = Names(("", "tip"), ("", ""))
+WEEKS = ("2026-03-02", "2026-03-09", "2026-03-16", "2026-03-23")
+
+
+# --- dates ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("names", "times", "dated"),
+    [
+        (("a/2026-03-01.csv", "b/2026-03-08.csv", "2026-03-29.parquet"), (0.0, 1.0, 4.0), True),
+        (("run_20260301T1200.csv", "run_20260302T0000.csv"), (0.0, 0.5 / 7), True),
+        (("20260301_120000x.csv", "20260301_120030x.csv"), (0.0, 30.0 / 604800.0), True),
+        (("2026-03-08.csv", "2026-03-08.pq"), (0.0, 0.0), True),
+        (("monday.csv", "tuesday.csv", "friday.csv"), (1.0, 2.0, 3.0), False),
+        (("2026-03-01.csv", "tuesday.csv"), (1.0, 2.0), False),
+        (("2026-03-08.csv", "2026-03-01.csv"), (1.0, 2.0), False),
+        (("2026-13-01.csv", "2026-14-01.csv"), (1.0, 2.0), False),
+        (("9920260301.csv", "9920260302.csv"), (1.0, 2.0), False),
+        ((), (), False),
+    ],
+)
+def test_times_are_weeks_where_all_names_have_dates_in_order(
+    names: Sequence[str], times: tuple[float, ...], dated: bool
+) -> None:
+    found, weeks = times_of(names)
+    assert weeks is dated and found == pytest.approx(times)
+
+
+# --- the slope --------------------------------------------------------------------------------------------------------
+
+
+def intervals(values: Sequence[float], errors: Sequence[float]) -> list[Interval]:
+    return [Interval(v, v - 1.96 * e, v + 1.96 * e) for v, e in zip(values, errors, strict=True)]
+
+
+def test_a_straight_line_has_its_slope_with_the_error_of_its_sizes() -> None:
+    times, errors = np.arange(5.0), np.full(5, 0.1)
+    found = slope(times, intervals(list(3.0 - 0.5 * times), list(errors)))
+    assert found.value == pytest.approx(-0.5)
+    assert found.high - found.value == pytest.approx(1.96 * 0.1 / np.sqrt(10.0)) == found.value - found.low
+
+
+def test_a_size_that_is_not_known_hardly_counts() -> None:
+    times = np.arange(4.0)
+    found = slope(times, intervals([1.0, 2.0, 3.0, 40.0], [0.01, 0.01, 0.01, 1e4]))
+    assert found.value == pytest.approx(1.0, abs=1e-3)
+
+
+def test_scatter_beyond_the_errors_widens_the_interval() -> None:
+    """As much as an unweighted line has it."""
+    times = np.arange(8.0)
+    values = 2.0 * times + np.array([1.0, -1.0] * 4)
+    found = slope(times, intervals(list(values), [0.01] * 8))
+    fit, covariance = np.polyfit(times, values, 1, cov=True)
+    assert found.value == pytest.approx(fit[0])
+    assert found.high - found.value == pytest.approx(1.96 * np.sqrt(covariance[0, 0]), rel=1e-6)
+
+
+def test_one_time_has_no_slope() -> None:
+    found = slope(np.array([2.0, 2.0]), intervals([1.0, 3.0], [0.1, 0.1]))
+    assert (found.value, found.low, found.high) == (0.0, -np.inf, np.inf)
+
+
+# --- rows -------------------------------------------------------------------------------------------------------------
+
+Calls = list[tuple[str, str]]
+
+
+@pytest.fixture
+def answering(monkeypatch: pytest.MonkeyPatch) -> Calls:
+    """Puts answers in the place of both computations; gives what was asked. A file's text is its friction."""
+    asked: Calls = []
+
+    def named(*options: Any) -> dict[str, Any]:
+        recording = options[-1]
+        asked.append(("named", Path(recording).name))
+        text = Path(recording).read_text()
+        if text == "broken":
+            raise InputError(f"{recording}: no column; expected some")
+        far = float(text) > 1.25
+        keys = [["joint_friction", 1, None]] if far else []
+        return {
+            "recording": recording,
+            "verdict": "explained" if far else "adequate",
+            "keys": json.dumps(keys),
+            "gains": json.dumps({json.dumps(key): 0.4 for key in keys}),
+            "titles": json.dumps({json.dumps(key): "friction in the joint" for key in keys}),
+        }
+
+    def sizes(*options: Any) -> dict[str, Any]:
+        recording, keys = options[-2:]
+        asked.append(("sizes", Path(recording).name))
+        now = float(Path(recording).read_text())
+        entry = {
+            "number": "coulomb",
+            "unit": "N.m",
+            "reference": [1.0, 1.0, 1.0],
+            "now": [now, now - 0.02, now + 0.02],
+            "change": [now - 1.0, now - 1.02, now - 0.98],
+        }
+        return {"recording": recording, "sizes": json.dumps({json.dumps(key): entry for key in json.loads(keys)})}
+
+    monkeypatch.setattr(change_history, "named_in", named)
+    monkeypatch.setattr(change_history, "sizes_in", sizes)
+    return asked
+
+
+@pytest.fixture
+def history(tmp_path: Path, answering: Calls) -> Callable[[], History]:
+    """Of what is in the files at that moment."""
+    write_files(tmp_path)
+    for date, friction in zip(("2026-02-23", *WEEKS), ("1.0", "1.01", "1.1", "1.2", "1.3"), strict=True):
+        (tmp_path / f"{date}.csv").write_text(friction)
+    files = [tmp_path / f"{date}.csv" for date in WEEKS]
+    then = [tmp_path / "2026-02-23.csv"]
+    return lambda: diagnose_history(tmp_path / "finger.json", files, then, rows=tmp_path / "out")
+
+
+def test_what_was_named_in_one_recording_is_sized_in_all(history: Callable[[], History]) -> None:
+    found = history()
+    assert found.dated and found.times == (1.0, 2.0, 3.0, 4.0) and found.failed == ()
+    assert found.verdicts == ("adequate", "adequate", "adequate", "explained")
+    (line,) = found.lines
+    assert line.where == Where("joint_friction", 1) and [each.named for each in line.sizes] == [False] * 3 + [True]
+    assert [each.size.now.value for each in line.sizes] == [1.01, 1.1, 1.2, 1.3]
+    assert [each.gain for each in line.sizes] == [0.0, 0.0, 0.0, 0.4]
+    assert line.trend is not None and line.trend.value == pytest.approx(0.097)
+    assert line.since is not None and Path(line.since).stem == WEEKS[1]  # from where on the interval is off 1
+    share = share_of(line)
+    assert share is not None and share.value == pytest.approx(0.097)
+    said = trend_sentence(line, found, NAMES).replace("\u00a0", " ")
+    assert "grows 9.7 % a week" in said and said.endswith(f"off the reference since {WEEKS[1]}.csv")
+    assert headline(found) == "1 change in 4 recordings."
+
+
+def test_without_a_reference_it_is_the_first(tmp_path: Path, history: Callable[[], History]) -> None:
+    files = [tmp_path / f"{date}.csv" for date in WEEKS]
+    found = diagnose_history(tmp_path / "finger.json", files, rows=tmp_path / "out")
+    assert [Path(each).stem for each in found.references] == [WEEKS[0]]
+    assert [Path(each).stem for each in found.recordings] == list(WEEKS[1:])
+    with pytest.raises(InputError, match="one recording; expected two at least, or a reference"):
+        diagnose_history(tmp_path / "finger.json", files[:1], rows=tmp_path / "out")
+
+
+def test_what_is_known_is_not_computed_again(history: Callable[[], History], answering: Calls) -> None:
+    one = history()
+    assert sorted(answering) == sorted((kind, f"{date}.csv") for kind in ("named", "sizes") for date in WEEKS)
+    answering.clear()
+    assert history() == one and answering == []
+
+
+def test_a_file_that_changed_is_computed_again(
+    tmp_path: Path, history: Callable[[], History], answering: Calls
+) -> None:
+    history()
+    answering.clear()
+    (tmp_path / f"{WEEKS[1]}.csv").write_text("1.15")
+    assert history().lines[0].sizes[1].size.now.value == 1.15
+    assert answering == [("named", f"{WEEKS[1]}.csv"), ("sizes", f"{WEEKS[1]}.csv")]
+    answering.clear()
+    there = (tmp_path / "finger.json").stat()
+    os.utime(tmp_path / "finger.json", ns=(there.st_atime_ns, there.st_mtime_ns + 10**9))
+    history()
+    assert len(answering) == 8  # all depend on the finger
+
+
+def test_another_cause_is_sized_in_all(tmp_path: Path, history: Callable[[], History], answering: Calls) -> None:
+    (tmp_path / f"{WEEKS[3]}.csv").write_text("1.22")
+    assert history().lines == () and [kind for kind, _ in answering] == ["named"] * 4
+    answering.clear()
+    (tmp_path / f"{WEEKS[3]}.csv").write_text("1.30")
+    assert len(history().lines) == 1
+    assert [kind for kind, _ in answering] == ["named", *["sizes"] * 4]
+
+
+def test_what_fails_is_left_out_and_named(tmp_path: Path, history: Callable[[], History], answering: Calls) -> None:
+    (tmp_path / f"{WEEKS[1]}.csv").write_text("broken")
+    found = history()
+    assert [Path(each).stem for each in found.recordings] == [WEEKS[0], *WEEKS[2:]]
+    ((name, why),) = found.failed
+    assert Path(name).stem == WEEKS[1] and "no column; expected some" in why
+    assert ("sizes", f"{WEEKS[1]}.csv") not in answering
+    assert found.times == (1.0, 3.0, 4.0) and len(found.lines[0].sizes) == len(found.verdicts) == 3
+    page = next(iter(write_history(found, NAMES, tmp_path / "out"))).read_text("utf-8")
+    assert "no column; expected some" in page
+    report = json.loads(json.dumps(finite(history_report(found))))
+    assert report["format"] == "tendonfmu-history-1" and report["unit_of_time"] == "week"
+    assert [each["time"] for each in report["recordings"]] == [1.0, 3.0, 4.0]
+    assert [Path(each["file"]).stem for each in report["failed"]] == [WEEKS[1]] and len(report["causes"]) == 1
+
+
+# --- files ------------------------------------------------------------------------------------------------------------
+
+
+def test_the_table_has_a_row_per_recording_and_cause(tmp_path: Path, history: Callable[[], History]) -> None:
+    found = history()
+    written = write_history(found, NAMES, tmp_path / "out")
+    assert {each.name for each in written} == {"history.html", "history.csv", "history.png"}
+    assert all(each.stat().st_size > 0 for each in written)
+    with (tmp_path / "out" / "history.csv").open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert list(rows[0]) == [
+        *("recording", "time_weeks", "effect", "joint", "tendon", "number", "unit", "reference", "now"),
+        *("now_low", "now_high", "named", "gain"),
+    ]
+    assert [float(row["now"]) for row in rows] == [1.01, 1.1, 1.2, 1.3]
+    assert [row["named"] for row in rows] == ["0", "0", "0", "1"]
+    assert {(row["effect"], row["joint"], row["tendon"], row["unit"]) for row in rows} == {
+        ("joint_friction", "1", "0", "N.m")
+    }
+    assert [float(row["time_weeks"]) for row in rows] == [1.0, 2.0, 3.0, 4.0]
+
+
+def plain(text: str) -> str:
+    return " ".join(" ".join(Elements(text).words).replace("\u00a0", " ").split())
+
+
+def test_the_page_needs_nothing_from_elsewhere(tmp_path: Path, history: Callable[[], History]) -> None:
+    write_history(history(), NAMES, tmp_path / "out")
+    page = (tmp_path / "out" / "history.html").read_text("utf-8")
+    needs_nothing_else(page)
+    (figure,) = figures_of(page)
+    assert next(trace["y"] for trace in figure["data"] if trace["mode"] == "markers")[0] == 1.3
+    assert not re.search(r"[\s\"]nan|NaN|inf[\s\"]", page.split("<body>")[1].split("<script")[0])
+    text = plain(page)
+    assert "1 change in 4 recordings." in text and "grows 9.7 % a week" in text and "1 of 4" in text
+
+
+HOSTILE = "<script>alert('x')</script>&\""
+
+
+def test_names_are_escaped_and_nothing_is_a_history_too(tmp_path: Path) -> None:
+    size = ChangedSize("coulomb", "1", Interval(0.0, 0.0, 0.0), Interval(0.1, 0.0, 0.2), Interval(0.1, 0.0, 0.2))
+    line = Line(Where("edge_friction", 2, 1), HOSTILE, (Size(HOSTILE, size, True, 0.1),), None, None)
+    found = History(HOSTILE, (HOSTILE,), (HOSTILE,), (1.0,), False, (line,), ("explained",), ((HOSTILE, HOSTILE),))
+    write_history(found, Names(("", HOSTILE), (HOSTILE, "")), tmp_path)
+    page = (tmp_path / "history.html").read_text("utf-8")
+    assert page.count("<script") == 3 and page.count("&lt;script&gt;") >= 6
+    nothing = History("finger", ("a",), ("b", "c"), (1.0, 2.0), False, (), ("adequate", "adequate"), ())
+    (tmp_path / "none").mkdir()
+    written = write_history(nothing, NAMES, tmp_path / "none")
+    assert {each.name for each in written} == {"history.html", "history.csv"}
+    assert "Nothing has changed in 2 recordings." in plain((tmp_path / "none" / "history.html").read_text("utf-8"))
+
+
+# --- for real ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_friction_that_grows_is_followed_on_two_workers(call: Call, tmp_path: Path) -> None:
+    """A scheduler and two workers, processes of their own on the loopback; the same call again runs nothing."""
+    pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")
+    shares = (1.1, 1.25, 1.4)
+    fingers = {date: Worn(dry=share * WELL.dry) for date, share in zip(WEEKS, shares, strict=False)}
+    recordings = {date: record(worn, motion=2, noise=k, seconds=16.0) for k, (date, worn) in enumerate(fingers.items())}
+    files = write_files(tmp_path, well=record(motion=2, noise=9, seconds=16.0), **recordings)
+    now, then = [files[date] for date in fingers], [files["well"]]
+    with dask_processes(2) as processes, workers_of(processes.address) as client:
+        found = diagnose_history(files["finger"], now, then, rows=tmp_path / "out", client=client, kinematics=3)
+    assert found.failed == () and found.times == (0.0, 1.0, 2.0)
+    line = next(each for each in found.lines if each.where.effect == "joint_friction")
+    for each, share in zip(line.sizes, shares, strict=True):
+        grown = each.size.now.value / each.size.reference.value
+        assert grown == pytest.approx(share, abs=0.06)
+    assert line.trend is not None and line.trend.low > 0.0
+    assert line.trend.value == pytest.approx(0.15 * WELL.dry, rel=0.1)
+    rows = {file: file.stat().st_mtime_ns for file in (tmp_path / "out" / "rows").iterdir()}
+    again = diagnose_history(files["finger"], now, then, rows=tmp_path / "out", kinematics=3)
+    assert again == found and {file: file.stat().st_mtime_ns for file in rows} == rows

@@ -1,0 +1,241 @@
+"""The next experiment: what the menu's choice promises is what rivals really leave of a recording of it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from tendonfmu.diagnosis.effects import CANDIDATES, Place
+from tendonfmu.diagnosis.experiments.discrimination import discriminating_motion
+from tendonfmu.diagnosis.experiments.menu import (
+    WIDER,
+    Entry,
+    Recorded,
+    Section,
+    combined,
+    entry_from_json,
+    loads,
+    motions,
+    tensions,
+)
+from tendonfmu.diagnosis.experiments.motion import expected_recording, perform
+from tendonfmu.diagnosis.experiments.next_experiment import Experiments, Question, plan_experiments
+from tendonfmu.diagnosis.extension_fit import Accepted, FitSettings, extended_description, fit_numbers
+from tendonfmu.errors import InputError, InternalError
+from tendonfmu.estimate.estimation import HAS_ESTIMATION
+from tendonfmu.files.json_node import Node
+from tendonfmu.files.tables import write_table
+from tendonfmu.model.balance import moment_arms, pretension_vector
+from tendonfmu.model.native import NativeError
+from tendonfmu.recordings.prepared import FitRecording
+from tendonfmu.simulate.motion_plan import Joints, expand_motion
+
+Array = NDArray[Any]
+NOISE = 0.001  # N·m
+LAW = {"static": 0.03, "coulomb": 0.03, "stribeck_velocity": 0.01}
+FINGER: dict[str, Any] = {
+    "format": "tendonfmu-finger-1",
+    "name": "plain",
+    "joints": [
+        {"name": "base", "friction": {"static": 0.006, "coulomb": 0.006, "stribeck_velocity": 0.1}},
+        {"name": "tip"},
+    ],
+    "tendons": [
+        {"name": f"tendon_{k}", "stiffness": 4000.0, "moment_arms": arms, "edge_friction": [LAW, None]}
+        for k, arms in enumerate([[0.009, 0.006], [0.009, -0.006], [-0.008, 0.005], [-0.008, -0.005]])
+    ],
+    "bias": {"drift_variance": 0.0, "noise_std": NOISE},
+    "contact": {"threshold": [1.0, 1.0]},
+}
+RANGES = ((-0.4, 0.4), (-0.5, 0.5))
+RATE = 100.0
+needs_estimation = pytest.mark.skipif(not HAS_ESTIMATION, reason="SKIPPED: no estimation (built without Eigen)")
+
+
+def usual(seconds: float = 30.0, pretension: float = 10.0) -> Entry:
+    return Entry("recorded", (Section(RANGES, 1.0, seconds, pretension),))
+
+
+def recording_of(data: dict[str, Any], entry: Entry, seed: int = 0, noise: float = NOISE) -> FitRecording:
+    """What a finger that is exactly `data` records of an entry, with white noise on the torque."""
+    found = expected_recording(data, perform(data, entry, RATE), 3)
+    torque = found.model.torque + np.cumsum(found.model.jump, axis=0)
+    target = torque + noise * np.random.default_rng(seed).standard_normal(torque.shape)
+    load = found.recording.groups["tendon_force"] @ moment_arms(data) - target
+    groups = {**found.recording.groups, "external_torque": load}
+    return replace(found, target=target, recording=replace(found.recording, groups=groups))
+
+
+def accepted(name: str, place: Place, magnitudes: tuple[float, ...] = ()) -> Accepted:
+    return Accepted(next(each for each in CANDIDATES if each.name == name), place, {}, magnitudes)
+
+
+JOINT, LOAD = accepted("joint_friction", Place(2), (0.004, 0.0)), accepted("joint_load_friction", Place(2), (1e-4, 0.0))
+GAIN = accepted("force_gain", Place(tendon=1))
+
+
+@pytest.fixture(scope="module")
+def planned() -> Experiments:
+    """After one recording at one pretension: friction in joint 2, or friction that its load makes? And a gain?"""
+    if not HAS_ESTIMATION:
+        pytest.skip("SKIPPED: no estimation (built without Eigen)")
+    old = recording_of(FINGER, usual())
+    return plan_experiments(FINGER, [old], [Question(JOINT, LOAD), Question(GAIN)], noise=[NOISE, NOISE])
+
+
+def test_load_and_plain_friction_are_told_by_the_pretension(planned: Experiments) -> None:
+    """At one pretension friction that grows with the load is constant, as plain friction is."""
+    answer = planned.answers[0]
+    assert answer.tells and answer.entry.tension != ""
+    assert len({section.pretension for section in answer.entry.sections}) > 1 or answer.entry.sections[0].swing
+    assert answer.distance > 3 * answer.now and answer.distance > 0.33
+    assert planned.best.separates and planned.best.separates[0][0].effect == "joint_friction"
+    assert "tension" in planned.sentence(0) and "joint load friction" in planned.sentence(0)
+    gain = planned.answers[1]
+    assert gain.tells and (gain.entry.tension or gain.entry.load) and gain.distance > 2 * gain.now
+
+
+def test_the_rival_leaves_as_much_as_promised(planned: Experiments) -> None:
+    """A finger with the one cause, fitted with the other: the likelihood pays for what the plan says, in the recording
+    that there is and the new one together; the same motion again tells nothing.
+    """
+    truth = dict(extended_description(FINGER, [JOINT]))
+    rival = extended_description(FINGER, [LOAD])
+    old = recording_of(truth, usual(), seed=1)
+    left = []
+    for entry in (usual(40.0), planned.answers[0].entry):
+        new = recording_of(truth, entry, seed=2)
+        costs = [fit_numbers(data, [old, new], FitSettings(threads=1)).cost for data in (truth, rival)]
+        left.append(np.sqrt(max(2 * (costs[1] - costs[0]), 0.0) / len(new.time)))
+    assert left[1] == pytest.approx(planned.answers[0].distance, rel=0.1)
+    assert left[0] < 0.05 * left[1]
+
+
+# --- the menu ---------------------------------------------------------------------------------------------------------
+
+
+def all_entries() -> list[Entry]:
+    recorded = Recorded(np.array(RANGES), 1.0, 10.0, np.array([0.02, 0.02]), 30.0)
+    plain = list(motions(recorded))
+    varied = [each for first in plain[:2] for each in (*tensions(FINGER, first), *loads(FINGER, first, recorded))]
+    return [*plain[:-1], *varied, *combined(FINGER, plain[3], recorded)]
+
+
+@pytest.mark.parametrize("entry", all_entries(), ids=lambda entry: entry.words[:60])
+def test_a_motion_stays_where_it_was_recorded(entry: Entry) -> None:
+    """Within its ranges, taut, as fast as it says, at rest at both ends; the same after a report."""
+    again = entry_from_json(json.loads(json.dumps(entry.as_json())), 2)
+    assert again == entry
+    rate = 50.0
+    found = perform(FINGER, entry, rate)
+    for j in range(2):
+        ends = [section.ranges[j] for section in entry.sections]
+        low, high = min(low for low, _ in ends), max(high for _, high in ends)
+        assert low - 1e-9 <= found.position[:, j].min() and found.position[:, j].max() <= high + 1e-9
+        wider = WIDER if "times the range" in entry.motion else 1.0
+        assert wider * RANGES[j][0] - 1e-9 <= low and high <= wider * RANGES[j][1] + 1e-9
+    lowest = min(section.pretension if section.swing is None else section.lowest for section in entry.sections)
+    assert found.tension.min() >= lowest * min(pretension_vector(FINGER)) * (1 - 1e-9)
+    fastest = max(section.max_speed for section in entry.sections)
+    assert np.abs(found.velocity).max() <= fastest * (1 + 1e-9)
+    middle = (found.position[2:] - found.position[:-2]) * rate / 2
+    assert np.abs(middle - found.velocity[1:-1]).max() < 0.05 * fastest
+    assert not found.velocity[[0, -1]].any() and not found.acceleration[[0, -1]].any()
+    np.testing.assert_allclose(np.diff(found.time), 1 / rate)
+    # the tensions hold themselves, and every tendon stays taut under them, its friction and the known load
+    np.testing.assert_allclose(found.tension @ moment_arms(FINGER), 0.0, atol=1e-9)
+    expected = expected_recording(FINGER, found, 3)
+    assert expected.recording.groups["tendon_force"].min() > 0
+    assert bool(entry.load) == bool(found.load.any())
+
+
+def test_a_menu_has_what_a_finger_can_do() -> None:
+    """One joint with a cable loop holds no pretension: known loads only."""
+    loop = {
+        "joints": [{"friction": LAW}],
+        "tendons": [{"stiffness": 1e5, "moment_arms": [0.005], "bidirectional": True}],
+    }
+    recorded = Recorded(np.array([[-1.0, 1.0]]), 2.0, 3.0, np.array([0.02]), 30.0)
+    entry = next(motions(recorded))
+    assert list(tensions(loop, entry)) == []
+    (loaded,) = loads(loop, entry, recorded)
+    assert [section.load for section in loaded.sections] == [pytest.approx((sign * 0.06,)) for sign in (1, -1, 1, -1)]
+    assert combined(loop, entry, recorded) == []
+
+
+def test_a_tendon_that_a_load_holds() -> None:
+    """One pulling tendon against a known load: no pretension, the load changes in size and keeps its side."""
+    jaw = {
+        "joints": [{"friction": LAW}],
+        "tendons": [{"stiffness": 1e5, "moment_arms": [0.005]}],
+        "bias": FINGER["bias"],
+        "contact": {"threshold": [1.0]},
+        "format": FINGER["format"],
+        "name": "jaw",
+    }
+    recorded = Recorded(np.array([[-1.0, 1.0]]), 2.0, 30.0, np.array([0.02]), 30.0, np.array([0.1]))
+    entry = next(motions(recorded))
+    assert list(tensions(jaw, entry)) == []
+    (loaded,) = loads(jaw, entry, recorded)
+    assert [section.load[0] for section in loaded.sections] == pytest.approx([0.05, 0.1, 0.2, 0.4])
+    for each in (entry, loaded):
+        found = expected_recording(jaw, perform(jaw, each, 50.0), 3)
+        assert found.recording.groups["tendon_force"].min() > 0
+
+
+# --- the motion for the robot -----------------------------------------------------------------------------------------
+
+
+def report(folder: Path, planned: Experiments) -> Path:
+    folder.mkdir(exist_ok=True)
+    experiment = {"sentence": planned.best.sentence, "motion": planned.best.motion}
+    found = {"format": "tendonfmu-diagnosis-1", "next_experiment": planned.best.sentence, "experiment": experiment}
+    (folder / "diagnosis.json").write_text(json.dumps(found), encoding="utf-8")
+    return folder
+
+
+def test_the_motion_can_be_run(planned: Experiments, tmp_path: Path) -> None:
+    """It is a motion file of a rig, and has the pretensions that the plan asks for."""
+    found = discriminating_motion(report(tmp_path, planned), FINGER, limits=[(-0.6, 0.6), (-0.6, 0.6)])
+    file = tmp_path / "motion.csv"
+    write_table(file, found.columns())
+    motion = expand_motion(
+        Node({"kind": "file", "file": str(file)}, "motion"), Joints([-0.6, -0.6], [0.6, 0.6]), 0, None
+    )
+    levels = np.array(motion.pretension["value"])
+    for section in found.entry.sections:
+        assert section.swing is not None or np.isclose(levels, section.pretension).any()
+    assert found.sentence == planned.best.sentence
+    assert any(found.entry.words in line for line in found.lines())
+
+
+def test_a_wrong_folder_is_refused(planned: Experiments, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="expected the folder of a `tendonfmu diagnose`"):
+        discriminating_motion(tmp_path / "nothing", FINGER)
+    folder = report(tmp_path, planned)
+    with pytest.raises(InputError, match=r"joint 1 moves from .* expected within its limits -0.1 to 0.1 rad"):
+        discriminating_motion(folder, FINGER, limits=[(-0.1, 0.1), (-0.6, 0.6)])
+    one = {"joints": [{}], "tendons": [{"stiffness": 1e4, "moment_arms": [0.01]}]}
+    with pytest.raises(InputError, match=r"experiment.motion.sections\[1\]: 2 ranges.*expected 1"):
+        discriminating_motion(folder, one)
+    (folder / "diagnosis.json").write_text('{"format": "tendonfmu-fit-1"}', encoding="utf-8")
+    with pytest.raises(InputError, match='format = "tendonfmu-fit-1"; expected "tendonfmu-diagnosis-1"'):
+        discriminating_motion(folder, FINGER)
+    (folder / "diagnosis.json").write_text('{"format": "tendonfmu-diagnosis-1", "experiment": {}}', encoding="utf-8")
+    with pytest.raises(InputError, match="no further experiment to plan"):
+        discriminating_motion(folder, FINGER)
+
+
+@needs_estimation
+def test_no_question_no_experiment() -> None:
+    old = recording_of(FINGER, usual(10.0))
+    assert plan_experiments(FINGER, [old], []).best.sentence == ""
+    nowhere = Accepted(GAIN.candidate, Place(tendon=9))
+    with pytest.raises((InternalError, IndexError, NativeError)):  # a fault of who asks, not of an input
+        plan_experiments(FINGER, [old], [Question(nowhere)])

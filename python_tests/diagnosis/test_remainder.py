@@ -1,0 +1,113 @@
+"""What of a residual is explainable: silent on noise, sure of what no candidate is; and its pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from synthetic_series import low_passed, make_series, nuisance_of, residual_of, with_effect
+from tendonfmu.diagnosis.remainder import measure_remainder
+from tendonfmu.diagnosis.residual_views import residual_views, whiteness
+from tendonfmu.diagnosis.series import Series
+from tendonfmu.statistics.splines import bias_splines
+
+Numbers = NDArray[np.float64]
+
+
+def rubbing(series: Series) -> Numbers:
+    apart = series.tendon_velocity[:, 0, 1] - series.tendon_velocity[:, 2, 1]
+    return np.asarray(np.tanh(apart / (0.02 * np.abs(apart).max())))
+
+
+def memory(series: Series) -> Numbers:
+    recent = low_passed(np.abs(series.velocity[:, 1]), 4.0)
+    return np.asarray(np.tanh(series.velocity[:, 1] / 0.02) * (recent / recent.mean() - 1.0))
+
+
+def oscillation(series: Series) -> Numbers:
+    return np.sin(2.0 * np.pi * 3.7 * series.time)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_noise_is_not_unknown(seed: int) -> None:
+    series = make_series(100 + seed)
+    nuisance = nuisance_of(series)
+    found = measure_remainder(series, residual_of(series, nuisance), bias_splines(series))
+    assert not found.unknown
+    assert found.description == ""
+    assert found.p_value > 0.01
+    assert max(found.share) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("signal", "strength", "groups"),
+    [
+        (rubbing, 1.0, {"rubbing", "tendon", "velocity"}),
+        (memory, 4.0, {"memory of speed"}),
+        (oscillation, 0.3, {"line"}),
+    ],
+)
+def test_finds_what_no_candidate_is(signal: Callable[[Series], Numbers], strength: float, groups: set[str]) -> None:
+    series = make_series(7)
+    nuisance = nuisance_of(series)
+    hidden = with_effect(series, nuisance, signal(series), joint=1, strength=strength)
+    found = measure_remainder(hidden, residual_of(hidden, nuisance), bias_splines(hidden))
+    assert found.unknown
+    assert found.findings[0].joint == 2
+    assert "Joint 2" in found.description
+    assert found.findings[0].group in groups
+    # of all there is, a shape that must be learned from 60 s gives a fifth at least
+    whole = strength / (1.0 + strength)
+    assert whole / 5.0 < found.share[1] < whole + 0.07
+    assert found.gain[:, 1].sum() == pytest.approx(found.share[1] * found.square[1], rel=0.05)
+    if signal is oscillation:
+        line = found.findings[0].line
+        assert line is not None
+        assert line.frequency == pytest.approx(3.7, abs=0.02)
+        assert "3.7 Hz" in found.description
+
+
+def test_blocks_that_are_not_used_do_not_matter_and_it_repeats() -> None:
+    series = make_series(3, seconds=40.0)
+    nuisance = nuisance_of(series)
+    residual = residual_of(series, nuisance)
+    gap = (series.time > 12.0) & (series.time < 15.0)
+    masked = replace(series, used=~gap)
+    one = measure_remainder(masked, residual, bias_splines(masked), seed=5)
+    spoilt = np.where(gap[:, None], 10.0, residual)
+    other = measure_remainder(masked, spoilt, bias_splines(masked), seed=5)
+    assert other.p_value == one.p_value
+    np.testing.assert_array_equal(other.prediction[~gap], one.prediction[~gap])
+    assert not other.prediction[gap].any()
+
+
+def test_too_short_is_not_judged() -> None:
+    series = make_series(3, seconds=8.0)
+    nuisance = nuisance_of(series)
+    found = measure_remainder(series, residual_of(series, nuisance), bias_splines(series))
+    assert not found.unknown
+    assert found.p_value == 1.0
+
+
+def test_views_show_the_curve_the_spectrum_and_the_memory() -> None:
+    series = make_series(4, seconds=40.0)
+    drive = 0.01 * np.random.default_rng(2).standard_normal((len(series.time), 2))
+    after = np.asarray(lfilter([1.0], [1.0, -0.7], drive, axis=0))
+    views = {
+        (view.joint, view.kind): view for view in residual_views(series, series.angle**3, after, load=series.angle)
+    }
+    assert len(views) == 16
+    curve = views[1, "angle"]
+    np.testing.assert_allclose(curve.before, curve.x**3, atol=0.01)
+    spectrum = views[2, "spectrum"]
+    assert np.trapezoid(spectrum.after, spectrum.x) == pytest.approx(np.var(after[:, 1]), rel=0.1)
+    np.testing.assert_allclose(views[1, "autocorrelation"].after[:3], 0.7 ** np.arange(1, 4), atol=0.06)
+    assert whiteness(series, after, drive)[0] == pytest.approx((0.7, 0.0), abs=0.05)
+    clock = views[1, "time"].x
+    assert np.all(np.diff(clock) > 0.0)
+    assert clock[-1] == pytest.approx(40.0, abs=0.1)

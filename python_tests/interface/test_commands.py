@@ -1,0 +1,145 @@
+"""Each command is its function plus reading and writing: same options, same defaults, same results."""
+
+from __future__ import annotations
+
+import inspect
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from command import Call
+from repository_paths import ROOT
+
+pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
+
+import tendonfmu as tf
+from tendonfmu.cli import detect, diagnose, program, run
+
+DEMO = ROOT / "examples/demo_recording"
+FINGER, INDEX = DEMO / "two_joints.json", DEMO / "index_finger_calibrated.json"
+# what a command writes, and how it shows progress
+OF_COMMANDS = {"output", "report", "figures", "progress", "as_json", "quiet"}
+COMMANDS: dict[str, tuple[Callable[..., Any], Callable[..., Any], set[str]]] = {
+    "build": (program.build, tf.build, set()),
+    "run": (run.run, tf.run, set()),
+    "fit": (program.fit, tf.fit, set()),
+    "tune": (detect.tune, tf.tune, set()),
+    "score": (detect.score, tf.score, set()),
+    "diagnose": (diagnose.diagnose, tf.diagnose, {"history", "scheduler"}),
+}
+# what a function takes in place of a command's None
+EMPTY = {"compare", "only", "fix", "share", "scale", "test"}
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_options_have_the_names_and_defaults_of_the_command(name: str) -> None:
+    command, function, others = COMMANDS[name]
+
+    def options(of: Callable[..., Any]) -> dict[str, Any]:
+        found = inspect.signature(of).parameters.values()
+        return {each.name: each.default for each in found if each.default is not inspect.Parameter.empty}
+
+    expected = {key: value for key, value in options(command).items() if key not in OF_COMMANDS | others}
+    expected |= dict.fromkeys(EMPTY & set(expected), ())
+    assert {key: value for key, value in options(function).items() if key != "progress"} == expected
+
+
+@pytest.fixture(scope="module")
+def frame() -> pd.DataFrame:
+    """Twenty seconds."""
+    return pd.read_parquet(DEMO / "two_joints_training.parquet").iloc[:10000]
+
+
+@pytest.fixture(scope="module")
+def recording_file(frame: pd.DataFrame, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("recording") / "monday.parquet"
+    frame.to_parquet(file)
+    return file
+
+
+@pytest.mark.filterwarnings("ignore::tendonfmu.estimate.fitting.FitWarning")
+def test_fit(frame: pd.DataFrame, recording_file: Path, tmp_path: Path, call: Call) -> None:
+    options = ("--fix", "*.cover.*", "--holdout", 0.2)
+    answer = call("fit", FINGER, recording_file, "-o", tmp_path / "f.json", "--report", tmp_path / "r.json", *options)
+    assert answer.status == 0, answer
+    report = json.loads((tmp_path / "r.json").read_text())
+    values = [each["value"] for each in report["parameters"]]
+    for recordings in (frame, [tf.read_recording(recording_file)], str(recording_file)):
+        found = tf.fit(tf.read_finger(FINGER).to_dict(), recordings, fix="*.cover.*", holdout=0.2)
+        # rounding differs with where the arrays are in memory
+        assert found.parameters["value"].tolist() == pytest.approx(values, rel=1e-6)
+    table = found.parameters
+    assert list(table.index) == [each["path"] for each in report["parameters"]] and "cover" not in "".join(table.index)
+    assert table["standard_error"].tolist() == pytest.approx(
+        [each["standard_error"] for each in report["parameters"]], rel=1e-3
+    )
+    assert table["identified"].tolist() == [each["identified"] for each in report["parameters"]]
+    assert table["identified"].dtype == bool and table["value"].dtype == float
+    assert found.held_out_rms is not None
+    for own, reported in ((found.residual_rms, "train"), (found.held_out_rms, "held_out")):
+        assert own.tolist() == pytest.approx(report["residual"][reported]["rms"], rel=1e-6)
+    found.write(tmp_path / "own.json")
+    assert tf.read_finger(tmp_path / "own.json") == found.finger
+    assert "numbers identified" in found._repr_html_()
+
+
+@pytest.mark.filterwarnings("ignore::tendonfmu.detect.tuning.TuneWarning")
+def test_tune(frame: pd.DataFrame, recording_file: Path, tmp_path: Path, call: Call) -> None:
+    answer = call("tune", FINGER, recording_file, "-o", tmp_path / "t.json", "--report", tmp_path / "r.json")
+    assert answer.status == 0, answer
+    found = tf.tune(FINGER, frame)
+    assert set(found.finger.to_dict()["contact"]) == set(tf.read_finger(tmp_path / "t.json").to_dict()["contact"])
+    assert found.attained_rate == json.loads((tmp_path / "r.json").read_text())["tuned_for_per_hour"] > 6.0
+    with pytest.raises(tf.InputError, match="min"):
+        tf.tune(FINGER, frame, strict=True)
+    assert "false alarms per hour" in found._repr_html_()
+
+
+def test_score(tmp_path: Path, call: Call) -> None:
+    pushes = pd.read_parquet(DEMO / "index_finger_pushes.parquet").iloc[:8000]
+    pushes.rename(columns={"contact": "touch"}).to_parquet(tmp_path / "touch.parquet")
+    answer = call("score", INDEX, tmp_path / "touch.parquet", "--labels", "touch", "-o", tmp_path / "s.json")
+    assert answer.status == 0, answer
+    touched = tf.read_recording(tmp_path / "touch.parquet", label="touch")
+    found = tf.score(INDEX, [touched], labels="touch")
+    report = json.loads((tmp_path / "s.json").read_text())
+    numbers = (found.events, found.found, found.false_alarms, found.median_delay)
+    assert numbers == tuple(report[name] for name in ("events", "found", "false_alarms", "median_delay_s"))
+    assert found.events > 1
+    again = tf.score(tf.read_finger(INDEX), pushes)
+    assert (again.events, again.found, again.median_delay) == (found.events, found.found, found.median_delay)
+    again.write(tmp_path / "own.json")
+    assert json.loads((tmp_path / "own.json").read_text())["events"] == found.events
+    assert f"{found.found} of {found.events} events found" in found._repr_html_()
+    with pytest.raises(tf.InputError, match=r"DataFrame: no column pressed; expected a label"):
+        tf.score(INDEX, pushes, labels="pressed")
+
+
+def test_diagnose(frame: pd.DataFrame, tmp_path: Path) -> None:
+    """Five seconds, which need not tell anything: what a diagnosis finds is tested elsewhere."""
+    found = tf.diagnose(FINGER, frame.iloc[:2500])
+    assert found.verdict in ("adequate", "explained", "partly explained", "unexplained")
+    assert found.report["verdict"] == found.verdict and found.report["gain"]["value"] == found.gain.value
+    assert [each.effect for each in found.causes] == [each["effect"] for each in found.report["causes"]]
+    written = found.write(tmp_path / "diagnosis")
+    assert {file.name for file in written} >= {"diagnosis.html", "diagnosis.json", "extended.json", "extended.fmu"}
+    assert tf.read_finger(tmp_path / "diagnosis/extended.json") == found.extended
+    torques = tf.run(found.extended, frame.iloc[:100]).outputs["friction_torque"]
+    tf.build(found.extended, tmp_path / "f.fmu")
+    assert np.array_equal(tf.run(tmp_path / "f.fmu", frame.iloc[:100]).outputs["friction_torque"], torques)
+    assert found.verdict in found._repr_html_()
+
+
+def test_sources_that_no_function_takes() -> None:
+    for function in (tf.fit, tf.tune, tf.score, tf.diagnose):
+        with pytest.raises(tf.InputError, match="no recording; expected at least one"):
+            function(FINGER, [])
+        with pytest.raises(tf.InputError, match="int; expected paths, DataFrames or Recordings"):
+            function(FINGER, 3)
+        with pytest.raises(tf.InputError, match="int; expected a path, a dictionary or a Finger"):
+            function(3, [DEMO / "two_joints_training.parquet"])

@@ -1,0 +1,88 @@
+"""How fingers, recordings and results show themselves: HTML with escaped texts, and figures with all that they name."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import diagnosis_examples as examples
+from real_browser import Elements
+from repository_paths import ROOT
+
+pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
+
+import tendonfmu as tf
+from tendonfmu.drawing import sheets_figure
+from tendonfmu.interface import Diagnosis
+from tendonfmu.report import diagnosis_sheets
+
+INDEX = ROOT / "examples/demo_recording/index_finger_calibrated.json"
+PUSHES = ROOT / "examples/demo_recording/index_finger_pushes.parquet"
+EVIL = "<script>&amp;"
+
+
+def axes_of(figure: Any, letter: str) -> list[str]:
+    return [name for name in figure.to_plotly_json()["layout"] if name.startswith(f"{letter}axis")]
+
+
+def test_a_finger_shows_its_properties_and_routing() -> None:
+    finger = tf.read_finger(INDEX).replace({"name": EVIL, "joints[2].name": EVIL, "tendons[3].name": EVIL})
+    page = finger._repr_html_()
+    assert "<script>" not in page and "&lt;script&gt;&amp;amp;" in page
+    elements = Elements(page)
+    assert len([tag for tag, _ in elements.tags if tag == "polyline"]) == finger.tendons
+    assert "5500 to 8000 N/m" in page
+
+
+def test_a_recording_shows_its_signals() -> None:
+    frame = pd.read_parquet(PUSHES)
+    recording = tf.Recording.from_frame(frame, name=EVIL)
+    page = recording._repr_html_()
+    assert "<script>" not in page and "30000 samples" in page and "tendon_force" in page
+    figure = recording.plot()
+    assert len(axes_of(figure, "y")) == len(recording.groups) == 4
+    assert {trace.name for trace in figure.data} == set(frame.columns) - {"time", "contact"}
+    pushes = int((np.diff(frame["contact"].astype(int), prepend=0) > 0).sum())
+    assert len(figure.layout.shapes) == pushes * len(recording.groups)
+    force = next(trace for trace in figure.data if trace.name == "tendon_force[3]")
+    assert force.y.max() == frame["tendon_force[3]"].max()  # thinned to extremes
+    assert "<script>" not in figure.layout.title.text
+
+
+def test_a_run_shows_every_joint() -> None:
+    out = tf.run(INDEX, PUSHES)
+    figure = out.plot()
+    assert len(axes_of(figure, "y")) == 4 and len(figure.data) == 12
+    assert sum(trace.showlegend for trace in figure.data) == 3
+    page = out._repr_html_()
+    assert "compensated_torque[4]" in page and "samples in contact" in page
+
+
+@pytest.mark.parametrize("make", [examples.three_causes, examples.adequate])
+def test_a_diagnosis_shows_the_panels_of_its_page(make: Any) -> None:
+    found = Diagnosis(replace(make(), finger=EVIL))
+    figure, panels = found.plot(), [panel for sheet in diagnosis_sheets(found.found) for panel in sheet.panels]
+    assert len(axes_of(figure, "x")) == len(panels) > 3
+    placed = [annotation for annotation in figure.layout.annotations if annotation.text]
+    assert len(placed) == len(panels)
+    domains = {tuple(figure.layout[name].domain) for name in axes_of(figure, "x")}
+    assert len(domains) == 2 and all(0 <= low < high <= 1 for low, high in domains)
+    page = found._repr_html_()
+    assert "<script>" not in page and found.verdict in page
+    assert [each.effect for each in found.causes] == [each["effect"] for each in found.report["causes"]]
+
+
+def test_no_panel_is_no_error() -> None:
+    assert len(sheets_figure("nothing", []).data) == 0
+
+
+def test_results_name_themselves(tmp_path: Path) -> None:
+    finger = tf.read_finger(INDEX)
+    assert repr(finger) == "<Finger index_finger: 4 joints, 8 tendons>"
+    assert repr(tf.Runner(finger)) == "<Runner of <Finger index_finger: 4 joints, 8 tendons>, kinematics 1>"
+    assert repr(tf.read_recording(PUSHES)).startswith(f"<Recording {PUSHES}: 30000 samples in 59.998 s, ")

@@ -1,0 +1,235 @@
+"""What the functions take: a finger as object, dictionary or path; a recording as object, DataFrame, arrays or path."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from repository_paths import ROOT
+
+pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
+
+import tendonfmu as tf
+
+FINGER = ROOT / "examples/demo_recording/two_joints.json"
+RECORDING = ROOT / "examples/demo_recording/two_joints_unseen.parquet"
+
+
+@pytest.fixture(scope="module")
+def finger() -> tf.Finger:
+    return tf.read_finger(FINGER)
+
+
+@pytest.fixture(scope="module")
+def recording() -> tf.Recording:
+    return tf.read_recording(RECORDING)
+
+
+# --- fingers ----------------------------------------------------------------------------------------------------------
+
+
+def test_a_finger_is_read_from_path_text_dictionary_and_finger(finger: tf.Finger) -> None:
+    assert tf.read_finger(str(FINGER)) == finger
+    assert tf.read_finger(finger) is finger
+    given = json.loads(FINGER.read_text())
+    found = tf.read_finger(given)
+    assert found == finger and hash(found) == hash(finger)
+    given["tendons"][0]["stiffness"] = 1.0
+    assert found == finger  # it has its own copy
+    assert (finger.name, finger.joints, finger.tendons) == ("two_joints", 2, 4)
+
+
+def test_a_dictionary_may_hold_numbers_of_numpy(finger: tf.Finger) -> None:
+    data = finger.to_dict()
+    data["tendons"][0]["moment_arms"] = np.array(data["tendons"][0]["moment_arms"])
+    data["tendons"][0]["stiffness"] = np.float64(data["tendons"][0]["stiffness"])
+    assert tf.read_finger(data) == finger
+
+
+@pytest.mark.parametrize(
+    ("source", "words"),
+    [
+        ({}, "finger: format: missing"),
+        ({"format": "tendonfmu-rig-1"}, "a rig; expected a finger description"),
+        (3, "finger: int; expected a path, a dictionary or a Finger"),
+        ({"format": "tendonfmu-finger-1", "name": object()}, "expected a number, text, list, dictionary or None"),
+        ("missing.json", "missing.json: No such file or directory; expected a finger description"),
+    ],
+)
+def test_what_is_no_finger_is_refused(source: Any, words: str) -> None:
+    with pytest.raises(tf.InputError) as refused:
+        tf.read_finger(source)
+    assert words in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_a_finger_cannot_be_changed(finger: tf.Finger) -> None:
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        finger.text = b""  # type: ignore[misc]
+    copied = finger.to_dict()
+    copied["name"] = "another"
+    copied["tendons"].clear()
+    assert (finger.name, finger.tendons) == ("two_joints", 4)
+
+
+def test_replace_makes_another_finger(finger: tf.Finger, tmp_path: Path) -> None:
+    """Paths of the FMU, also those of numbers that the description leaves to the defaults."""
+    found = finger.replace(
+        {
+            "name": "changed",
+            "tendons[1].stiffness": np.float64(5000.0),
+            "contact.threshold_per_force[2]": 0.01,
+            "joints[2].cover": {"stiffness": 0.02},
+            "joints[2].cover.rest_angle": 0.1,
+            "tendons[1].pulley_friction[1]": {"static": 0.02, "coulomb": 0.01, "stribeck_velocity": 0.1},
+            "bias.noise_time": 0.01,
+        }
+    )
+    data = found.to_dict()
+    assert found.name == "changed" and data["tendons"][0]["stiffness"] == 5000.0
+    assert data["contact"]["threshold_per_force"] == [0.0, 0.01]
+    assert data["joints"][1]["cover"] == {"stiffness": 0.02, "rest_angle": 0.1}
+    assert data["tendons"][0]["pulley_friction"][0]["static"] == 0.02
+    assert data["bias"]["noise_time"] == 0.01
+    assert finger == tf.read_finger(FINGER)
+    found.write(tmp_path / "changed.json")
+    assert tf.read_finger(tmp_path / "changed.json") == found
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"tendons[9].stiffness": 1.0}, "tendons[9]: no such path; expected 1 to 4"),
+        ({"tendons[1].stiffnes": 1.0}, "tendons[1].stiffnes: unknown key; expected one of"),
+        ({"tendons[1].stiffness": -1.0}, "tendons[1].stiffness = -1: expected above 0"),
+        ({"tendons[1].stiffness": float("nan")}, "stiffness"),
+        ({"name[1]": 2.0}, "name[1]: no such path; name is no list"),
+        ({"tendons[0].stiffness": 1.0}, "'tendons[0].stiffness': expected a path such as"),
+        ({"": 1.0}, "'': expected a path such as"),
+        ({"contact.threshold[1]": "high"}, "contact.threshold[1]"),
+        ({"joints[1].cover.rest_angle": 0.1}, "joints[1].cover.stiffness"),
+    ],
+)
+def test_replace_names_what_it_refuses(finger: tf.Finger, values: dict[str, Any], words: str) -> None:
+    if "cover" in next(iter(values)):
+        finger = finger.replace({"joints[1].cover": None})
+    with pytest.raises(tf.InputError) as refused:
+        finger.replace(values)
+    assert str(refused.value).startswith(f"{FINGER}: ") and words in str(refused.value)
+
+
+# --- recordings -------------------------------------------------------------------------------------------------------
+
+
+def test_a_recording_becomes_a_frame_and_comes_back(recording: tf.Recording, tmp_path: Path) -> None:
+    frame = recording.frame
+    assert list(frame.columns) == [
+        "time",
+        *(f"{group}[{i}]" for group in ("tendon_force", "tendon_position") for i in range(1, 5)),
+    ]
+    pd.testing.assert_frame_equal(frame, pd.read_parquet(RECORDING)[frame.columns].astype(float), check_exact=True)
+    shuffled = tf.Recording.from_frame(frame[frame.columns[::-1]].set_index("time", drop=False))
+    pd.testing.assert_frame_equal(shuffled.frame, frame, check_exact=True)
+    shuffled.write(tmp_path / "again.csv")
+    pd.testing.assert_frame_equal(tf.read_recording(tmp_path / "again.csv").frame, frame, check_exact=True)
+
+
+def test_arrays_are_not_copied() -> None:
+    time, force = np.arange(3.0), np.ones((4, 3)).T  # of Fortran's order
+    position, label = np.zeros((3, 4)), [0, 1, 1]
+    found = tf.Recording.from_arrays(time, tendon_force=force, tendon_position=position, contact=label)
+    assert np.shares_memory(found.time, time) and np.shares_memory(found.groups["tendon_position"], position)
+    assert np.shares_memory(found.groups["tendon_force"], force)
+    assert found.contact is not None and found.contact.tolist() == [False, True, True]
+    assert found.frame["contact"].tolist() == [0, 1, 1]
+
+
+SMALL = {"time": [0.0, 0.1], "tendon_force[1]": [1.0, 2.0], "tendon_position[1]": [0.0, 0.1]}
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"time": [0.0, 0.0]},
+        {"tendon_force[1]": [1.0, np.nan]},
+        {"tendon_force[2]": [1.0, 2.0]},
+        {"tendon_force_1": [1.0, 2.0]},
+        {"contact": [0.0, 0.5]},
+        {"time": None},
+    ],
+)
+def test_a_frame_is_refused_with_the_words_of_a_file(changed: dict[str, Any], tmp_path: Path) -> None:
+    frame = pd.DataFrame({name: values for name, values in {**SMALL, **changed}.items() if values is not None})
+    frame.to_parquet(tmp_path / "r.parquet")
+    with pytest.raises(tf.InputError) as of_frame:
+        tf.Recording.from_frame(frame)
+    with pytest.raises(tf.InputError) as of_file:
+        tf.read_recording(tmp_path / "r.parquet")
+    line = str(of_frame.value)
+    assert line.startswith("DataFrame: ")
+    assert line.removeprefix("DataFrame: ") == str(of_file.value).removeprefix(f"{tmp_path / 'r.parquet'}: ")
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        (
+            {"time": pd.to_datetime(["2026-01-01", "2026-01-02"])},
+            "column time: datetime64[us] values; expected seconds as numbers, such as "
+            "(df['time'] - df['time'].iloc[0]).dt.total_seconds()",
+        ),
+        ({"time": pd.to_timedelta([0, 1], unit="s")}, "such as df['time'].dt.total_seconds()"),
+        ({"tendon_force[1]": ["1,5", "2,5"]}, "column tendon_force[1], row 1: '1,5'; expected a finite number"),
+        ({"tendon_force[1]": [True, False]}, "column tendon_force[1], row 1: bool values; expected numbers"),
+        ({"tendon_force[1]": pd.array([1, None], dtype="Int64")}, "column tendon_force[1], row 2: nan; expected"),
+    ],
+)
+def test_a_frame_of_other_types_is_refused(changed: dict[str, Any], words: str) -> None:
+    with pytest.raises(tf.InputError) as refused:
+        tf.Recording.from_frame(pd.DataFrame({**SMALL, **changed}), name="monday")
+    assert str(refused.value).startswith("monday: ") and words in str(refused.value).replace("[ns]", "[us]")
+
+
+def test_a_frame_may_have_numbers_of_any_kind() -> None:
+    columns = {
+        "time": pd.array([0, 1], dtype="Int64"),
+        "tendon_force[1]": np.array([1, 2], dtype=np.float32),
+        "tendon_position[1]": pd.Series([1, 2.5], dtype=object),
+        "contact": [False, True],
+    }
+    found = tf.Recording.from_frame(pd.DataFrame(columns))
+    assert found.groups["tendon_position"].tolist() == [[1.0], [2.5]]
+    assert found.contact is not None and found.contact.tolist() == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"tendon_force": np.ones(3)}, "arrays: tendon_force: shape (3,); expected numbers [N, m]"),
+        ({"tendon_force": np.ones((2, 2))}, "arrays: tendon_force: 2 rows; expected 3 as of time"),
+        ({"tendon_force": np.ones((3, 1))}, "2 columns tendon_position[...], expected 1 as of tendon_force[...]"),
+        ({"tendon_force": np.full((3, 2), np.nan)}, "column tendon_force[1], row 1: nan; expected a finite number"),
+        ({"tendon_force": [["a", "b"]] * 3}, "values; expected numbers [N, m]"),
+        ({"time": [0.0, 2.0, 1.0]}, "column time, row 3: 1.0 s after 2.0 s; expected increasing times"),
+        ({"time": [np.nan, 2.0, 3.0]}, "column time, row 1: nan"),
+        ({"contact": [0, 1, 2]}, "column contact, row 3: 2; expected 0 or 1"),
+        ({"joint_position": np.zeros((3, 0))}, "joint_position: no columns; expected one per joint"),
+        ({"time": [], "tendon_force": np.ones((0, 2)), "tendon_position": np.ones((0, 2))}, "no samples"),
+    ],
+)
+def test_arrays_are_checked(changed: dict[str, Any], words: str) -> None:
+    given = {"time": np.arange(3.0), "tendon_force": np.ones((3, 2)), "tendon_position": np.ones((3, 2)), **changed}
+    with pytest.raises(tf.InputError) as refused:
+        tf.Recording.from_arrays(**given)
+    assert words in str(refused.value)
+
+
+@pytest.mark.parametrize("source", [3, None, {"time": [0.0]}])
+def test_what_is_no_recording_is_refused(source: Any) -> None:
+    with pytest.raises(tf.InputError, match="expected a path, a DataFrame or a Recording"):
+        tf.read_recording(source)
