@@ -255,9 +255,9 @@ class bound_finger {
       return nullptr;
     }
     if (array->shape(0) != count) {
-      throw nb::value_error((std::string(name) + ": " + std::to_string(array->shape(0)) + " numbers; expected " +
-                             std::to_string(count))
-                                .c_str());
+      throw nb::value_error(
+          (std::string(name) + ": " + std::to_string(array->shape(0)) + " numbers; expected " + std::to_string(count))
+              .c_str());
     }
     return array->data();
   }

@@ -47,16 +47,16 @@ CALLS = {
 # What each command calls first of the package, so that a test can make it fail.
 FIRST = {
     "check": "tendonfmu.model.read_finger",
-    "build": "tendonfmu.fmu.build_fmu",
-    "run": "tendonfmu.fmu.run_model",
+    "build": "tendonfmu.interface.build",
+    "run": "tendonfmu.interface.run",
     "simulate": "tendonfmu.simulate.simulate",
     "convert": "tendonfmu.recordings.convert_file",
     "excite": "tendonfmu.excite.training_motion.excite",
-    "fit": "tendonfmu.estimate.FrictionFit",
+    "fit": "tendonfmu.interface.fit",
     "calibrate": "tendonfmu.calibrate.calibrate",
-    "diagnose": "tendonfmu.diagnosis.diagnose",
-    "tune": "tendonfmu.detect.ContactTuning",
-    "score": "tendonfmu.detect.score_recordings",
+    "diagnose": "tendonfmu.interface.diagnose",
+    "tune": "tendonfmu.interface.tune",
+    "score": "tendonfmu.interface.score",
     "campaign": "tendonfmu.diagnosis.read_cases",
     "demo": "tendonfmu.demo.Story",
 }

@@ -143,3 +143,15 @@ def test_sources_that_no_function_takes() -> None:
             function(FINGER, 3)
         with pytest.raises(tf.InputError, match="int; expected a path, a dictionary or a Finger"):
             function(3, [DEMO / "two_joints_training.parquet"])
+
+
+def test_a_command_says_once_which_columns_it_ignores(frame: pd.DataFrame, tmp_path: Path, call: Call) -> None:
+    file = tmp_path / "rec.parquet"
+    frame.iloc[:100].assign(current=1.0, phase="start").to_parquet(file)
+    for _ in range(2):  # also in the same process again
+        answer = call("run", FINGER, file, "-o", tmp_path / "out.csv")
+        assert answer.status == 0
+        first, *rest = answer.err.splitlines()
+        assert first.startswith(f"tendonfmu: warning: {file}: ignored columns: 'current', 'phase'; a recording has ")
+        assert not [line for line in rest if "warning" in line]
+    assert call("run", FINGER, file, "-o", tmp_path / "out.csv", "--quiet").err == ""
