@@ -66,9 +66,9 @@ def gravity_rows(angles: Numbers, torques: Numbers, axes: Numbers | None) -> tup
     matrix = np.array(columns).T
     numbers = np.linalg.lstsq(matrix, torques.ravel(), rcond=None)[0]
     missed = float(np.abs(torques.ravel() - matrix @ numbers).max())
-    rows = [
-        {"effect": "gravity", "joint": j + 1, "sine": float(sine), "cosine": float(cosine)}
-        for j, (sine, cosine) in enumerate(numbers.reshape(n, 2))
-        if max(abs(sine), abs(cosine)) > NONE
-    ]
+    rows = []
+    for j, pair in enumerate(numbers.reshape(n, 2)):
+        felt = {name: round(float(x), 12) for name, x in zip(("sine", "cosine"), pair, strict=True) if abs(x) > NONE}
+        if felt:
+            rows.append({"effect": "gravity", "joint": j + 1, **felt})
     return rows, missed
