@@ -52,7 +52,6 @@ class LiveModel:
         outputs = self.finger.run({"time": np.array([sample.time]), **columns})
         return {name: values[0] for name, values in outputs.items()}
 
-
     def keep_bias(self) -> None:
         """From now on everything counts as contact, so that the bias does not learn what presses on the finger."""
         self.finger.set({f"contact.threshold[{j}]": 0.0 for j in range(1, self.finger.joints + 1)})
