@@ -80,7 +80,7 @@ def test_a_recording_belongs_to_the_finger(tmp_path: Path) -> None:
     subprocess.run([sys.executable, EXAMPLE / "record.py", "-o", file, "--seconds", "4"], check=True)
     recording = read_recording(file)
     assert len(recording.time) == pytest.approx(4000, abs=2)
-    assert [each for each in belongs(read_finger(EXAMPLE / "finger_calibrated.json"), [recording])] == []
+    assert list(belongs(read_finger(EXAMPLE / "finger_calibrated.json"), [recording])) == []
 
 
 def test_edges_are_added_where_a_tendon_turns_a_joint(tmp_path: Path, call: Call) -> None:
