@@ -1,4 +1,4 @@
-"""The commands `import mjcf` and `export mjcf`: a finger from a MuJoCo model, and fitted numbers back into one."""
+"""The commands `import` and `export`: a finger from a MuJoCo model, and fitted numbers back into one."""
 
 from __future__ import annotations
 
@@ -7,47 +7,36 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tendonfmu.cli.console import say
+from tendonfmu.cli.console import print_json, say, warn
+from tendonfmu.cli.options import AsJson, Quiet
 from tendonfmu.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-ModelFile = Annotated[Path, typer.Argument(metavar="MODEL.xml", help="MuJoCo model (MJCF)")]
-Names = "NAME[,NAME]..."
-
-importing = typer.Typer(no_args_is_help=True, help="Make a finger description from another program's model.")
-exporting = typer.Typer(no_args_is_help=True, help="Write fitted numbers into another program's model.")
+MJCF = "mjcf"
+Format = Annotated[str, typer.Argument(metavar="mjcf", help="format of the model: MuJoCo's")]
+ModelFile = Annotated[Path, typer.Argument(metavar="MODEL.xml", help="MuJoCo model")]
+NAMES = "NAMES"  # separated by commas; the option may also be repeated
 
 
 def register(app: typer.Typer) -> None:
     """Add the commands to the program."""
-    app.add_typer(importing, name="import")
-    app.add_typer(exporting, name="export")
+    app.command("import")(import_model)
+    app.command("export")(export_model)
 
 
-# Without a callback, typer would take the only command of a group for the group itself.
-@importing.callback()
-def _importing() -> None:
-    pass
-
-
-@exporting.callback()
-def _exporting() -> None:
-    pass
-
-
-@importing.command("mjcf")
-def import_mjcf(
+def import_model(
+    kind: Format,
     model: ModelFile,
-    joints: Annotated[list[str], typer.Option(metavar=Names, help="joints of the finger, base first")],
+    joints: Annotated[list[str], typer.Option(metavar=NAMES, help="joints of the finger, base first: mcp,pip")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FINGER.json", help="description to write")],
     tendons: Annotated[
         list[str] | None,
-        typer.Option(metavar=Names, help="tendons of the finger \\[default: all driven ones that move it]"),
+        typer.Option(metavar=NAMES, help="tendons of the finger [default: all driven ones that move it]"),
     ] = None,
     bidirectional: Annotated[
-        list[str] | None, typer.Option(metavar=Names, help="tendons that are cable loops, which pull either way")
+        list[str] | None, typer.Option(metavar=NAMES, help="tendons that are cable loops, which pull either way")
     ] = None,
     range_: Annotated[
         list[str] | None,
@@ -59,24 +48,28 @@ def import_mjcf(
     gravity: Annotated[bool, typer.Option("--gravity", help="write the weight of the links as known load")] = False,
     stiffness: Annotated[
         float | None,
-        typer.Option(min=1e-3, max=1e12, help="N/m; of tendons whose stiffness the model does not have"),
+        typer.Option(min=1e-3, max=1e12, metavar="N/m", help="N/m; of tendons whose stiffness the model does not have"),
     ] = None,
     arm_tolerance: Annotated[
         float, typer.Option(min=0.0, max=1.0, metavar="SHARE", help="a moment arm that varies less is constant")
     ] = 0.02,
     threshold: Annotated[
-        float, typer.Option(min=1e-9, max=1e6, help="N.m; contact threshold to begin with, of all joints")
+        float,
+        typer.Option(min=1e-9, max=1e6, metavar="N.m", help="N.m; contact threshold to begin with, of all joints"),
     ] = 0.03,
-    name: Annotated[str | None, typer.Option(help="name of the finger \\[default: the model's]")] = None,
+    name: Annotated[str | None, typer.Option(metavar="NAME", help="of the finger [default: the model's]")] = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
-    r"""Make a finger description from joints and tendons of a MuJoCo model.
+    """Make a finger description from joints and tendons of a MuJoCo model.
 
     What the description does not have of the model is listed on standard
-    error. Needs the package mujoco: pip install 'tendonfmu\[mujoco]'.
+    error. Needs the package mujoco: pip install 'tendonfmu[mujoco]'.
     """
     from tendonfmu.files import check_output, write_text
     from tendonfmu.mjcf import ImportSettings, import_finger
 
+    _check_kind("import", kind)
     check_output(output, model)
     settings = ImportSettings(
         joints=_names(joints),
@@ -92,39 +85,49 @@ def import_mjcf(
     )
     finger = import_finger(model, settings)
     write_text(output, finger.text)
-    _report(finger.notes, finger.warnings, "left out", finger.left_out)
+    _say_rows(model, "", finger.notes)
+    for sentence in finger.warnings:
+        warn(sentence)
+    _say_rows(model, "left out: ", finger.left_out)
     say(f"{output}: {len(finger.data['joints'])} joints, {len(finger.data['tendons'])} tendons")
+    print_json(lambda: finger.report(model, output))
 
 
-@exporting.command("mjcf")
-def export_mjcf(
+def export_model(
+    kind: Format,
     finger: Annotated[Path, typer.Argument(metavar="FITTED.json", help="fitted finger description")],
     model: ModelFile,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT.xml", help="model to write")],
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
-    r"""Write friction, damping, springs and armature of a description into a MuJoCo model.
+    """Write friction, damping, springs and armature of a description into a MuJoCo model.
 
     Joints and tendons are found by their names; the rest of the model stays
     as it is. What MJCF cannot express is listed on standard error. Needs the
-    package mujoco: pip install 'tendonfmu\[mujoco]'.
+    package mujoco: pip install 'tendonfmu[mujoco]'.
     """
     from tendonfmu.files import check_output
     from tendonfmu.mjcf import export_numbers
     from tendonfmu.model import read_finger
 
+    _check_kind("export", kind)
     check_output(output, finger, model)
     written = export_numbers(read_finger(finger), model, output)
-    _report([change.line() for change in written.changes], [], "MJCF cannot express", written.left_out)
+    _say_rows(output, "", [change.line() for change in written.changes])
+    _say_rows(output, "MJCF cannot express: ", written.left_out)
     say(f"{output}: {len(written.changes)} numbers changed")
+    print_json(lambda: written.report(finger, model, output))
 
 
-def _report(notes: Sequence[str], warnings: Sequence[str], what: str, left_out: Sequence[str]) -> None:
-    for note in notes:
-        say(f"tendonfmu: {note}")
-    for warning in warnings:
-        say(f"tendonfmu: warning: {warning}")
-    for row in left_out:
-        say(f"tendonfmu: {what}: {row}")
+def _check_kind(command: str, kind: str) -> None:
+    if kind != MJCF:
+        raise InputError(f"{command}: {kind!r}: unknown format; expected {MJCF}")
+
+
+def _say_rows(file: Path, what: str, rows: Sequence[str]) -> None:
+    for row in rows:
+        say(f"{file}: {what}{row}")
 
 
 def _names(texts: Sequence[str]) -> list[str]:

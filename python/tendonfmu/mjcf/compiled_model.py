@@ -130,10 +130,10 @@ class CompiledModel:
     """
 
     def __init__(self, path: Path) -> None:
-        self._mujoco = _library()
-        self.path = path
         if not path.is_file():
             raise InputError(f"{path}: no such file; expected a MuJoCo model (MJCF)")
+        self._mujoco = _library()
+        self.path = path
         try:
             self._model = self._mujoco.MjModel.from_xml_path(str(path))
         except ValueError as refused:

@@ -92,6 +92,19 @@ class ImportedFinger:
         """The description as JSON."""
         return json.dumps(self.data, indent=2, ensure_ascii=False) + "\n"
 
+    def report(self, model: Path, output: Path) -> dict[str, Any]:
+        """Return what was done, for `--json`. output: the file of the description."""
+        return {
+            "format": "tendonfmu-import-1",
+            "model": str(model),
+            "finger": str(output),
+            "joints": [joint["name"] for joint in self.data["joints"]],
+            "tendons": [tendon["name"] for tendon in self.data["tendons"]],
+            "notes": self.notes,
+            "warnings": self.warnings,
+            "left_out": self.left_out,
+        }
+
 
 def import_finger(path: Path, settings: ImportSettings) -> ImportedFinger:
     """Make a finger description from a MuJoCo model.

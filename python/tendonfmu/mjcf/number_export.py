@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from tendonfmu.errors import InputError, InternalError, own_fault
 from tendonfmu.files import whole_file
@@ -68,6 +69,17 @@ class Export:
 
     changes: list[Change]
     left_out: list[str]
+
+    def report(self, finger: Path, model: Path, output: Path) -> dict[str, Any]:
+        """Return what was done, for `--json`. finger, model, output: files of the description, and of both models."""
+        return {
+            "format": "tendonfmu-export-1",
+            "finger": str(finger),
+            "model": str(model),
+            "output": str(output),
+            "changes": [asdict(change) for change in self.changes],
+            "left_out": self.left_out,
+        }
 
 
 def export_numbers(finger: FingerDescription, path: Path, output: Path) -> Export:
