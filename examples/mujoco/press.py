@@ -15,9 +15,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from tendon_finger import HERE, STEP, Array, LiveModel, TendonFinger
+from tendon_finger import HERE, STEP, Array, Runner, TendonFinger, step
 
 HOLD = 8.0  # s, each wanted force
 WANTED = (0.5, 1.0)  # N
@@ -42,23 +43,30 @@ class Run:
     true: Array  # [N], N
 
 
+def without_bias(description: Mapping[str, Any]) -> dict[str, Any]:
+    """The description with a bias of 0 that does not learn: it would take what presses for long as friction."""
+    nothing = [0.0] * len(description["joints"])
+    bias = {**description.get("bias", {}), "initial_torque": nothing}
+    return {**description, "bias": bias, "contact": {"threshold": nothing}}  # everything counts as contact
+
+
 class Feeling:
     """Estimates the plate's force from the tendons' sensors."""
 
-    def __init__(self, way: str, description: Mapping[str, object]) -> None:
+    def __init__(self, way: str, description: Mapping[str, Any]) -> None:
         self.way = way
-        self.model = LiveModel(description, kinematics_source=3)
-        self.weight = [row for row in description["extensions"] if row["effect"] == "gravity"]  # type: ignore[index]
+        self.model = Runner(without_bias(description), kinematics=3)
+        self.weight = [row for row in description["extensions"] if row["effect"] == "gravity"]
         self.free: list[float] = []
 
     def force(self, finger: TendonFinger, presses: bool, closes: bool = False) -> float:
         """Force between fingertip and plate as it is felt [N]."""
         sample = finger.sense()
-        outputs = self.model.step(sample)
+        outputs = step(self.model, sample)
         if self.way == WAYS[0]:
-            torque = outputs["compensated_torque"]
+            torque = outputs.compensated_torque
         else:
-            torque = outputs["joint_torque"] - self.held_weight(sample.joint_position)
+            torque = outputs.joint_torque - self.held_weight(sample.joint_position)
         direction = finger.press_direction()
         felt = float(direction @ torque / (direction @ direction))
         if closes:
@@ -81,15 +89,13 @@ class Feeling:
         return total
 
 
-def press(way: str, description: Mapping[str, object], hold: float = HOLD) -> Run:
+def press(way: str, description: Mapping[str, Any], hold: float = HOLD) -> Run:
     """Warm up, then hold the wanted forces on the plate. hold: s, each."""
     finger, feeling = TendonFinger(), Feeling(way, description)
     finger.data.qpos[:] = START
     s, rows = 0.0, []
     for k in range(round((WARM_UP + len(WANTED) * hold) / STEP)):
         t = k * STEP
-        if k == round(WARM_UP / STEP):
-            feeling.model.keep_bias()
         if t < WARM_UP:  # strokes at the speed of the later closing; the plate is out of reach
             before, s = s, STROKE * (0.5 - 0.5 * np.cos(2 * np.pi * t / PERIOD))
             wanted, plate = 0.0, PLATE - 0.1

@@ -7,15 +7,20 @@ from the tendon forces and the joints' motion what the tendons lose (losses.json
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.model import Finger, pretension_vector
+from tendonfmu.model import pretension_vector
+
+try:
+    from tendonfmu import Runner
+except ImportError:  # a version without the Python interface
+    from local_runner import Runner
 
 Array = NDArray[np.float64]
 HERE = Path(__file__).resolve().parent
@@ -37,24 +42,15 @@ class Sample:
     joint_velocity: Array  # [n], rad/s
 
 
-class LiveModel:
-    """A description as the core runs it, one sample at a time."""
-
-    def __init__(self, description: Mapping[str, object], kinematics_source: int) -> None:
-        self.finger = Finger.from_description(description, kinematics_source)
-
-    def step(self, sample: Sample) -> dict[str, Array]:
-        """Outputs of the model at a sample: [n] each, flags [1]."""
-        columns = {
-            name: getattr(sample, name)[None, :]
-            for name in ("tendon_force", "tendon_position", "joint_position", "joint_velocity")
-        }
-        outputs = self.finger.run({"time": np.array([sample.time]), **columns})
-        return {name: values[0] for name, values in outputs.items()}
-
-    def keep_bias(self) -> None:
-        """From now on everything counts as contact, so that the bias does not learn what presses on the finger."""
-        self.finger.set({f"contact.threshold[{j}]": 0.0 for j in range(1, self.finger.joints + 1)})
+def step(runner: Runner, sample: Sample) -> Any:
+    """Outputs of a description at a sample; its arrays hold until the next step."""
+    return runner.step(
+        sample.time,
+        tendon_force=sample.tendon_force,
+        tendon_position=sample.tendon_position,
+        joint_position=sample.joint_position,
+        joint_velocity=sample.joint_velocity,
+    )
 
 
 class TendonFinger:
@@ -65,7 +61,7 @@ class TendonFinger:
 
     def __init__(self, pretension: float = 10.0, seed: int = 1) -> None:
         description = json.loads(LOSSES.read_text(encoding="utf-8"))
-        self.losses = LiveModel(description, kinematics_source=3)
+        self.losses = Runner(description, kinematics=3)
         self.model = mujoco.MjModel.from_xml_path(str(MODEL))
         self.data = mujoco.MjData(self.model)
         self.random = np.random.default_rng(seed)
@@ -103,7 +99,7 @@ class TendonFinger:
         mujoco.mj_comPos(self.model, d)
         mujoco.mj_tendon(self.model, d)
         true = Sample(d.time, self.tension(), motors, self.angles, d.qvel.copy())
-        d.qfrc_applied[:] = -self.losses.step(true)["friction_torque"]
+        d.qfrc_applied[:] = -step(self.losses, true).friction_torque
         d.ctrl[:] = self.reference - motors  # a position servo of the tendon's length: the spring behind the motor
         mujoco.mj_step(self.model, d)
         mujoco.mj_kinematics(self.model, d)

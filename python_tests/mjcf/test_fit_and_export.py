@@ -20,7 +20,6 @@ from tendonfmu.estimate.fitting import FitWarning, FrictionFit
 from tendonfmu.files.tables import write_table
 from tendonfmu.mjcf.finger_import import ImportSettings, import_finger
 from tendonfmu.mjcf.number_export import export_numbers
-from tendonfmu.model.description import read_finger
 
 SECONDS, EVERY, SETTLE = 25.0, 4, 1.0  # s, steps a sample, s
 STIFFNESS = 6000.0  # N/m
@@ -80,7 +79,7 @@ def test_fitted_friction_is_that_of_the_model_that_moved(tmp_path: Path) -> None
         )  # sticking is no white noise; effective_samples takes it into account
         fitting.fit([tmp_path / "free.parquet"])
     (tmp_path / "fitted.json").write_text(fitting.description_text(), encoding="utf-8")
-    export_numbers(read_finger(tmp_path / "fitted.json"), tmp_path / "guessed.xml", tmp_path / "out.xml")
+    export_numbers(tmp_path / "fitted.json", tmp_path / "guessed.xml", tmp_path / "out.xml")
     found, true = (mujoco.MjModel.from_xml_path(str(tmp_path / "out.xml")), mujoco.MjModel.from_xml_string(machine()))
     errors = standard_errors(fitting.report_)
     for path, name, index in (

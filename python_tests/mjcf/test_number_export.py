@@ -20,14 +20,13 @@ from mjcf_models import fixed_model
 from tendonfmu.errors import InputError
 from tendonfmu.mjcf.finger_import import ImportSettings, import_finger
 from tendonfmu.mjcf.number_export import Export, export_numbers
-from tendonfmu.model.description import read_finger
 
 SETTINGS = ImportSettings(joints=("mcp", "pip"))
 
 
 def exported(folder: Path, data: dict[str, Any], model: str = "model.xml", output: str = "out.xml") -> Export:
     (folder / "fitted.json").write_text(json.dumps(data), encoding="utf-8")
-    return export_numbers(read_finger(folder / "fitted.json"), folder / model, folder / output)
+    return export_numbers(folder / "fitted.json", folder / model, folder / output)
 
 
 @pytest.fixture

@@ -109,11 +109,10 @@ def export_model(
     """
     from tendonfmu.files import check_output
     from tendonfmu.mjcf import export_numbers
-    from tendonfmu.model import read_finger
 
     _check_kind("export", kind)
     check_output(output, finger, model)
-    written = export_numbers(read_finger(finger), model, output)
+    written = export_numbers(finger, model, output)
     _say_rows(output, "", [change.line() for change in written.changes])
     _say_rows(output, "MJCF cannot express: ", written.left_out)
     say(f"{output}: {len(written.changes)} numbers changed")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from tendonfmu.mjcf.compiled_model import CompiledModel, Joint
 from tendonfmu.mjcf.finger_import import links_inertia
 from tendonfmu.mjcf.tendon_choice import motors_of
 from tendonfmu.mjcf.xml_source import XmlSource
-from tendonfmu.model import FingerDescription, Law, effects, extension_rows, sides
+from tendonfmu.model import Law, effects, extension_rows, read_finger, sides
 
 SAME = 1e-9  # relative; a number that differs by less is not written again
 WRITTEN = ("inertia", "preload_friction")  # extensions that MJCF may express
@@ -82,13 +82,13 @@ class Export:
         }
 
 
-def export_numbers(finger: FingerDescription, path: Path, output: Path) -> Export:
+def export_numbers(finger: Path, path: Path, output: Path) -> Export:
     """Write the numbers of a description into a model.
 
     Parameters
     ----------
     finger
-        A description whose joints and tendons have the names of the model's.
+        File of a description whose joints and tendons have the names of the model's.
     path
         An MJCF file.
     output
@@ -102,14 +102,15 @@ def export_numbers(finger: FingerDescription, path: Path, output: Path) -> Expor
     Raises
     ------
     InputError
-        MuJoCo refuses the model, or a joint or tendon is not in it or not in its XML.
+        The description or the model is refused, or a joint or tendon is not in the model or not in its XML.
     """
+    data = read_finger(finger).data
     model = CompiledModel(path)
-    joints = [model.joint_named(name) for name in _names(finger, "joints")]
-    for name in _names(finger, "tendons"):
+    joints = [model.joint_named(name) for name in _names(finger, data, "joints")]
+    for name in _names(finger, data, "tendons"):
         model.tendon_named(name)
     left_out: list[str] = []
-    wanted = [*_of_joints(finger, model, joints, left_out), *_of_tendons(finger, model, left_out)]
+    wanted = [*_of_joints(data, model, joints, left_out), *_of_tendons(data, model, left_out)]
     changes = [change for change in wanted if not math.isclose(change.before, change.after, rel_tol=SAME)]
     source = XmlSource(path)
     for change in changes:
@@ -124,16 +125,16 @@ def export_numbers(finger: FingerDescription, path: Path, output: Path) -> Expor
     with whole_file(output) as temporary:
         temporary.write_bytes(text)
         _check_written(temporary, changes)
-    return Export(changes, [*left_out, *_inexpressible(finger)])
+    return Export(changes, [*left_out, *_inexpressible(data)])
 
 
-def _names(finger: FingerDescription, key: str) -> list[str]:
+def _names(file: Path, data: Mapping[str, Any], key: str) -> list[str]:
     """Return the names of joints or tendons, by which the model's are found."""
     kind = key.removesuffix("s")
-    for k, row in enumerate(finger.data[key], start=1):
+    for k, row in enumerate(data[key], start=1):
         if row.get("name") is None:
-            raise InputError(f"{finger.path}: {key}[{k}].name: missing; expected the name of a {kind} of the model")
-    return [str(row["name"]) for row in finger.data[key]]
+            raise InputError(f"{file}: {key}[{k}].name: missing; expected the name of a {kind} of the model")
+    return [str(row["name"]) for row in data[key]]
 
 
 def _check_written(file: Path, changes: Sequence[Change]) -> None:
@@ -155,11 +156,11 @@ def _value(model: CompiledModel, kind: str, name: str, attribute: str) -> float:
 
 
 def _of_joints(
-    finger: FingerDescription, model: CompiledModel, joints: Sequence[Joint], left_out: list[str]
+    data: Mapping[str, Any], model: CompiledModel, joints: Sequence[Joint], left_out: list[str]
 ) -> Iterator[Change]:
-    inertia = {row["joint"]: float(row["inertia"]) for row in extension_rows(finger.data) if row["effect"] == "inertia"}
+    inertia = {row["joint"]: float(row["inertia"]) for row in extension_rows(data) if row["effect"] == "inertia"}
     links = links_inertia(model, joints)
-    for j, (joint, row) in enumerate(zip(joints, finger.data["joints"], strict=True)):
+    for j, (joint, row) in enumerate(zip(joints, data["joints"], strict=True)):
         wanted: dict[str, float] = {}
         law, cover = row.get("friction"), row.get("cover")
         if law is not None:
@@ -182,11 +183,11 @@ def _of_joints(
             yield Change("joint", joint.name, attribute, _value(model, "joint", joint.name, attribute), value)
 
 
-def _of_tendons(finger: FingerDescription, model: CompiledModel, left_out: list[str]) -> Iterator[Change]:
-    for k, row in enumerate(extension_rows(finger.data), start=1):
+def _of_tendons(data: Mapping[str, Any], model: CompiledModel, left_out: list[str]) -> Iterator[Change]:
+    for k, row in enumerate(extension_rows(data), start=1):
         if row["effect"] != "preload_friction":
             continue
-        tendon = finger.data["tendons"][row["tendon"] - 1]
+        tendon = data["tendons"][row["tendon"] - 1]
         first = next((j for j, arm in enumerate(tendon["moment_arms"], start=1) if arm != 0.0), None)
         reason = None
         if row.get("joint") != first:
@@ -220,18 +221,18 @@ def _beyond_coulomb(name: str, law: Law) -> Iterator[str]:
         yield f"joint {name}: static friction {static:.3g} N·m, above coulomb (Stribeck effect)"
 
 
-def _inexpressible(finger: FingerDescription) -> Iterator[str]:
+def _inexpressible(data: Mapping[str, Any]) -> Iterator[str]:
     names = {
         "edge_friction": "friction before joints, a share of the tendon force",
         "pulley_friction": "friction at pulleys, a share of the tendon force",
         "load_friction": "friction in joints, by the sum of the tendon forces",
     }
     for kind, words in names.items():
-        rows = [effect for effect in effects(finger.data) if effect.kind == kind]
+        rows = [effect for effect in effects(data) if effect.kind == kind]
         sizes = [side["coulomb"] for effect in rows for law in effect.laws for side in sides(law)]
         if rows:
             yield f"{kind} at {len(rows)} places: {words}; coulomb {min(sizes):.3g} to {max(sizes):.3g}"
-    others = Counter(row["effect"] for row in extension_rows(finger.data) if row["effect"] not in WRITTEN)
+    others = Counter(row["effect"] for row in extension_rows(data) if row["effect"] not in WRITTEN)
     if others:
         yield "extensions: " + ", ".join(f"{count} {effect}" for effect, count in others.items())
     yield "moment arms and stiffness of tendons stay the model's; bias and contact have no counterpart"
