@@ -166,6 +166,20 @@ def test_passive_springs_and_loops_on_request(tmp_path: Path) -> None:
     assert [tendon["stiffness"] for tendon in soft.data["tendons"]] == [900.0, 900.0]
 
 
+def test_coefficients_that_are_no_lengths_are_warned_of(tmp_path: Path) -> None:
+    """As of hands whose fixed tendons couple joints with coefficients of 1."""
+    text = fixed_model().replace('coef="-0.009"', 'coef="1"').replace('coef="-0.006"', 'coef="1"')
+    (warning,) = imported(tmp_path, text).warnings
+    assert "tendon deep: a fixed tendon with coefficients up to 1" in warning
+
+
+def test_weight_that_the_rows_cannot_hold_is_warned_of(tmp_path: Path) -> None:
+    """Axes at right angles, taken as parallel without links."""
+    text = fixed_model(gravity=-9.81).replace('<joint name="pip"', '<joint name="pip" axis="1 0 0"')
+    crossed = imported(tmp_path, text.replace('pos="0.015 0 0"', 'pos="0.015 0.02 0"'), gravity=True)
+    assert any("gravity: the rows miss up to" in warning and "--tip" in warning for warning in crossed.warnings)
+
+
 # --- the command ------------------------------------------------------------------------------------------------------
 
 

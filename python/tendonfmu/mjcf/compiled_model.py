@@ -294,10 +294,6 @@ class CompiledModel:
             dense[i, columns[part]] = values[part]
         return dense
 
-    def tendon_lengths(self) -> Numbers:
-        """Return the lengths of all tendons (m) at the angles placed."""
-        return np.array(self._data.ten_length)
-
     def holding_torque(self, joints: Sequence[Joint]) -> Numbers:
         """Return the torque [n] (N·m) that holds the weight of everything beyond each joint, at the angles placed."""
         m, d = self._model, self._data

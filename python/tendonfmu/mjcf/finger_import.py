@@ -23,6 +23,7 @@ from tendonfmu.model import NativeError, native
 FORMAT = "tendonfmu-finger-1"
 UNLIMITED = 1.0  # rad (m); range on both sides of the reference of a joint without limits
 STRIBECK = 0.1  # rad/s; without effect as long as static equals coulomb
+LONGEST_ARM = 0.3  # m; larger coefficients of fixed tendons are no lengths, such as 1 where joints are coupled
 WEIGHTLESS = 0.02  # share of the largest holding torque that `gravity` rows may miss without a warning
 
 
@@ -312,6 +313,12 @@ def _arm_warnings(
 ) -> Iterator[str]:
     varying = False
     for tendon, row in zip(tendons, arms, strict=True):
+        largest = max(abs(arm.arm) for arm in row)
+        if not tendon.is_spatial and largest > LONGEST_ARM:
+            yield (
+                f"tendon {tendon.name}: a fixed tendon with coefficients up to {largest:g}, which count as moment arms "
+                "in m; expected lengths, or forces that are torques"
+            )
         for joint, arm, (low, high) in zip(joints, row, ranges, strict=True):
             if arm.varies <= tolerance:
                 continue

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,10 +26,13 @@ class Inclusion:
         The <include>, taken out of the tree.
     content
         The elements that stand in its place.
+    folder
+        Folder of the file.
     """
 
     element: Any
     content: list[Any]
+    folder: Path
 
 
 class XmlSource:
@@ -56,8 +60,7 @@ class XmlSource:
         """Put the content of included files in place of each <include>, as MuJoCo does before it reads a model."""
         root = self._tree.getroot()
         while (include := next(root.iter("include"), None)) is not None:
-            # MuJoCo looks for all of them from the folder of the main file
-            file = self.path.parent / include.get("file", "")
+            file = self._included_file(include)
             content = list(_parse(file).getroot())
             parent = include.getparent()
             place = parent.index(include)
@@ -66,8 +69,20 @@ class XmlSource:
             if content:
                 content[-1].tail = include.tail
                 include.tail = None
-            self._inclusions.append(Inclusion(include, content))
+            self._inclusions.append(Inclusion(include, content, file.parent))
             parent.remove(include)
+
+    def _included_file(self, include: Any) -> Path:
+        """Return the file of an <include>: beside the main file or beside the file that includes it, as in MuJoCo.
+
+        The name is then that from the main file, which will hold the <include> if the file around it is put in place.
+        """
+        name, main = include.get("file", ""), self.path.parent
+        around = {include, *include.iterancestors()}
+        folder = next((each.folder for each in reversed(self._inclusions) if around & set(each.content)), main)
+        if not (main / name).is_file() and (folder / name).is_file():
+            include.set("file", Path(os.path.relpath(folder / name, main)).as_posix())
+        return main / str(include.get("file", ""))
 
     def element(self, kind: str, name: str) -> Any:
         """Return the element of a joint or tendon.
@@ -134,11 +149,8 @@ class XmlSource:
         bytes
             UTF-8.
         """
-        kept = []
         for inclusion in reversed(self._inclusions):  # those within others first
-            if self._is_changed(inclusion):
-                kept.append(inclusion)
-            else:
+            if not self._is_changed(inclusion):
                 _take_back(inclusion)
         return bytes(etree.tostring(self._tree, encoding="utf-8")) + b"\n"
 
