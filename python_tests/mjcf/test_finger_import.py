@@ -166,6 +166,17 @@ def test_passive_springs_and_loops_on_request(tmp_path: Path) -> None:
     assert [tendon["stiffness"] for tendon in soft.data["tendons"]] == [900.0, 900.0]
 
 
+def test_friction_that_the_model_does_not_have_is_noted(tmp_path: Path) -> None:
+    text = fixed_model().replace('damping="0.002" frictionloss="0.006"', "")
+    finger = imported(tmp_path, text.replace('frictionloss="0.004"', 'damping="0.003"'))
+    assert "friction" not in finger.data["joints"][0]
+    law = finger.data["joints"][1]["friction"]
+    assert (law["coulomb"], law["viscous"]) == (0.0, 0.003)
+    notes = "\n".join(finger.notes)
+    assert "joint mcp: neither frictionloss nor damping" in notes
+    assert "joint pip: damping without frictionloss" in notes and "--scale" in notes
+
+
 def test_coefficients_that_are_no_lengths_are_warned_of(tmp_path: Path) -> None:
     """As of hands whose fixed tendons couple joints with coefficients of 1."""
     text = fixed_model().replace('coef="-0.009"', 'coef="1"').replace('coef="-0.006"', 'coef="1"')

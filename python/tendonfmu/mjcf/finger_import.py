@@ -346,6 +346,12 @@ def _sources(
         yield f"tendon {', '.join(names)}: stiffness {source}"
     for tendon in tendons:
         yield from (f"tendon {tendon.name}: {drive}" for drive in drives_of(model, tendon))
+    damped = [joint.name for joint in joints if joint.damping and not joint.frictionloss]
+    if damped:
+        yield (
+            f"joint {', '.join(damped)}: damping without frictionloss, so coulomb is 0; write a value to begin with, "
+            "or give `fit` --scale 'joints[*].friction.coulomb=0.01'"
+        )
     bare = [joint.name for joint in joints if not joint.frictionloss and not joint.damping]
     if bare:
         yield (
