@@ -349,8 +349,8 @@ def _sources(
     damped = [joint.name for joint in joints if joint.damping and not joint.frictionloss]
     if damped:
         yield (
-            f"joint {', '.join(damped)}: damping without frictionloss, so coulomb is 0; write a value to begin with, "
-            "or give `fit` --scale 'joints[*].friction.coulomb=0.01'"
+            f"joint {', '.join(damped)}: damping without frictionloss, so coulomb is 0; `fit` needs a value above 0 to "
+            "begin with"
         )
     bare = [joint.name for joint in joints if not joint.frictionloss and not joint.damping]
     if bare:
