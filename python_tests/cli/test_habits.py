@@ -35,6 +35,8 @@ CALLS = {
     "run": ["{finger}", "{recording}", "-o", "out.csv"],
     "simulate": ["{rig}", "-o", "out.csv"],
     "convert": ["emps", "{recording}", "-o", "out.csv"],
+    "import": ["mjcf", "{model}", "--joints", "hinge", "-o", "imported.json"],
+    "export": ["mjcf", "{finger}", "{model}", "-o", "out.xml"],
     "excite": ["{finger}", "-o", "motion.csv", "--duration", "20"],
     "fit": ["{finger}", "{recording}", "-o", "fitted.json"],
     "calibrate": ["{finger}", "{recording}", "-o", "calibration"],
@@ -51,6 +53,8 @@ FIRST = {
     "run": "tendonfmu.interface.run",
     "simulate": "tendonfmu.simulate.simulate",
     "convert": "tendonfmu.recordings.convert_file",
+    "import": "tendonfmu.mjcf.import_finger",
+    "export": "tendonfmu.mjcf.export_numbers",
     "excite": "tendonfmu.excite.training_motion.excite",
     "fit": "tendonfmu.interface.fit",
     "calibrate": "tendonfmu.calibrate.calibrate",
@@ -74,6 +78,7 @@ def options_of(name: str) -> dict[str, Any]:
 def case(tmp_path: Path) -> dict[str, str]:
     (tmp_path / "finger.json").write_text(json.dumps(FINGER))
     (tmp_path / "rig.json").write_text(json.dumps(fmu_rig()))
+    (tmp_path / "model.xml").write_text("<mujoco/>")
     (tmp_path / "cases.json").write_text(
         json.dumps({"format": "tendonfmu-campaign-1", "cases": [{"name": "a", "group": "null", "maker": "m.py:f"}]})
     )
@@ -82,7 +87,8 @@ def case(tmp_path: Path) -> dict[str, str]:
     rows = [[0.01 * k, *(5.0 for _ in tendons), *(1e-4 * k for _ in tendons)] for k in range(50)]
     lines = [",".join(names), *(",".join(map(repr, row)) for row in rows)]
     (tmp_path / "recording.csv").write_text("\n".join(lines) + "\n")
-    return {"finger": "finger.json", "rig": "rig.json", "cases": "cases.json", "recording": "recording.csv"}
+    files = {"finger": "finger.json", "rig": "rig.json", "cases": "cases.json", "recording": "recording.csv"}
+    return {**files, "model": "model.xml"}
 
 
 def words(name: str, case: dict[str, str]) -> list[str]:

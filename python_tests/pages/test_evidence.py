@@ -68,7 +68,7 @@ def test_a_block_says_its_time_and_calls_what_is_there(block: Block) -> None:
     assert all(need in evidence.PACKAGES or re.fullmatch(r"\.\./shared/\w+", need) for need in block.needs)
     lines = re.sub(r"#.*", "", block.commands)
     assert any("shared" in need for need in block.needs) or "../shared/" not in lines
-    commands = {command.callback.__name__ for command in app.registered_commands if command.callback}
+    commands = {command.name or command.callback.__name__ for command in app.registered_commands if command.callback}
     called = re.findall(r"(?:^|\bdo )\s*(python|tendonfmu|cmake) (\S+)", lines, re.MULTILINE)
     assert called
     for program, what in called:

@@ -40,6 +40,7 @@ BEYOND_C = {
 
 ONLY = {
     "fmpy": "fmu/fmpy_client.py",
+    "mujoco": "mjcf/compiled_model.py",
     "tendonfmu._native": "model/native.py",
     "tendonfmu._plant": "simulate/plant.py",
     "tendonfmu._estimation": "estimate/estimation.py",
@@ -56,6 +57,7 @@ COMMANDS = {
     "cli/convert.py",
     "cli/detect.py",
     "cli/diagnose.py",
+    "cli/import_mjcf.py",
     "cli/options.py",
     "cli/run.py",
     "cli/several_values.py",

@@ -26,6 +26,7 @@ PACKAGES = (
     "excite",
     "fmu",
     "simulate",
+    "mjcf",
     "detect",
     "diagnosis",
     "report",

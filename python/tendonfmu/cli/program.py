@@ -20,6 +20,7 @@ from tendonfmu.cli import check as cli_check
 from tendonfmu.cli import convert as cli_convert
 from tendonfmu.cli import detect as cli_detect
 from tendonfmu.cli import diagnose as cli_diagnose
+from tendonfmu.cli import import_mjcf as cli_import_mjcf
 from tendonfmu.cli import run as cli_run
 from tendonfmu.cli.console import (
     BAD_INPUT,
@@ -230,6 +231,7 @@ def simulate(
 
 
 cli_convert.register(app)
+cli_import_mjcf.register(app)
 
 
 @app.command()

@@ -1,0 +1,10 @@
+"""Models of MuJoCo (MJCF): a finger description made from one, and fitted numbers written back into one.
+
+Only `compiled_model` calls MuJoCo. `tendon_choice`, `moment_arms`, `gravity` and `link_geometry` read the compiled
+model, `left_out` lists what a description cannot hold, and `finger_import` puts all of it together. The way back:
+`number_export` decides what MJCF can express, `xml_source` changes the XML.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,361 @@
+"""How MuJoCo is called: a compiled model, its joints, tendons and actuators, and what it computes at given angles.
+
+Only this module imports mujoco. Numbers are in SI units, as MuJoCo compiles them, whatever the angle unit of the file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.errors import InputError
+
+Numbers = NDArray[np.float64]
+KINDS = ("free", "ball", "slide", "hinge")  # of joints, in the order of MuJoCo's mjtJoint
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint of the model.
+
+    Attributes
+    ----------
+    name, kind
+        Name, and one of `KINDS`.
+    index, body
+        In the model, from 0.
+    position, velocity
+        Place of its first coordinate in MuJoCo's qpos and qvel.
+    limits
+        (rad; m of a slide), or None.
+    stiffness, rest
+        Of its spring (N·m/rad; rad).
+    damping, frictionloss, armature
+        (N·m·s/rad; N·m; kg·m²).
+    is_nonlinear
+        Whether its spring or damper has terms of higher order.
+    """
+
+    name: str
+    kind: str
+    index: int
+    body: int
+    position: int
+    velocity: int
+    limits: tuple[float, float] | None
+    stiffness: float
+    rest: float
+    damping: float
+    frictionloss: float
+    armature: float
+    is_nonlinear: bool
+
+
+@dataclass(frozen=True)
+class Tendon:
+    """A tendon of the model.
+
+    Attributes
+    ----------
+    name
+        Name.
+    index
+        In the model, from 0.
+    is_spatial
+        Whether it runs through sites and around geoms. A fixed tendon is a sum of joint angles times coefficients.
+    stiffness, damping, frictionloss, armature
+        (N/m; N·s/m; N; kg).
+    is_limited
+        Whether its length has limits.
+    """
+
+    name: str
+    index: int
+    is_spatial: bool
+    stiffness: float
+    damping: float
+    frictionloss: float
+    armature: float
+    is_limited: bool
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """An actuator that acts on a joint or a tendon.
+
+    Attributes
+    ----------
+    name
+        Name.
+    tendon, joint
+        Index of what it acts on; the other is None.
+    gear
+        Force on the tendon or joint per unit of actuator force.
+    position_gain
+        Force per length of a position servo (N/m), else None.
+    """
+
+    name: str
+    tendon: int | None
+    joint: int | None
+    gear: float
+    position_gain: float | None
+
+
+def _library() -> Any:
+    try:
+        import mujoco
+    except ImportError:
+        raise InputError("mujoco: not installed; expected the extra: pip install 'tendonfmu[mujoco]'") from None
+    return mujoco
+
+
+class CompiledModel:
+    """A model that MuJoCo has compiled, with the joint angles at which it is evaluated.
+
+    Parameters
+    ----------
+    path
+        An MJCF file.
+
+    Raises
+    ------
+    InputError
+        MuJoCo is missing or refuses the file; the message has MuJoCo's text.
+    """
+
+    def __init__(self, path: Path) -> None:
+        if not path.is_file():
+            raise InputError(f"{path}: no such file; expected a MuJoCo model (MJCF)")
+        self._mujoco = _library()
+        self.path = path
+        try:
+            self._model = self._mujoco.MjModel.from_xml_path(str(path))
+        except ValueError as refused:
+            raise InputError(f"{path}: MuJoCo refuses the model: {' '.join(str(refused).split())}") from None
+        self._data = self._mujoco.MjData(self._model)
+        self.joints = [self._joint(k) for k in range(self._model.njnt)]
+        self.tendons = [self._tendon(k) for k in range(self._model.ntendon)]
+        self.actuators = [self._actuator(k) for k in range(self._model.nu)]
+
+    # --- what is in it ------------------------------------------------------------------------------------------------
+
+    @property
+    def name(self) -> str:
+        """Name of the model; MuJoCo's "MuJoCo Model" where it has none."""
+        return bytes(self._model.names).split(b"\0", 1)[0].decode()
+
+    def _joint(self, k: int) -> Joint:
+        m = self._model
+        dof, place = int(m.jnt_dofadr[k]), int(m.jnt_qposadr[k])
+        spring, damper = _higher_order(m, "jnt_stiffnesspoly", k), _higher_order(m, "dof_dampingpoly", dof)
+        return Joint(
+            name=m.joint(k).name,
+            kind=KINDS[int(m.jnt_type[k])],
+            index=k,
+            body=int(m.jnt_bodyid[k]),
+            position=place,
+            velocity=dof,
+            limits=(float(m.jnt_range[k, 0]), float(m.jnt_range[k, 1])) if m.jnt_limited[k] else None,
+            stiffness=float(m.jnt_stiffness[k]),
+            rest=float(m.qpos_spring[place]),
+            damping=float(m.dof_damping[dof]),
+            frictionloss=float(m.dof_frictionloss[dof]),
+            armature=float(m.dof_armature[dof]),
+            is_nonlinear=spring or damper,
+        )
+
+    def _tendon(self, k: int) -> Tendon:
+        m = self._model
+        spatial = int(m.wrap_type[m.tendon_adr[k]]) != int(self._mujoco.mjtWrap.mjWRAP_JOINT)
+        return Tendon(
+            name=m.tendon(k).name,
+            index=k,
+            is_spatial=spatial,
+            stiffness=float(m.tendon_stiffness[k]),
+            damping=float(m.tendon_damping[k]),
+            frictionloss=float(m.tendon_frictionloss[k]),
+            armature=float(m.tendon_armature[k]) if hasattr(m, "tendon_armature") else 0.0,
+            is_limited=bool(m.tendon_limited[k]),
+        )
+
+    def _actuator(self, k: int) -> Actuator:
+        m, types = self._model, self._mujoco.mjtTrn
+        kind, target = int(m.actuator_trntype[k]), int(m.actuator_trnid[k, 0])
+        gear = float(m.actuator_gear[k, 0])
+        gain, bias = float(m.actuator_gainprm[k, 0]), float(m.actuator_biasprm[k, 1])
+        affine = int(m.actuator_biastype[k]) == int(self._mujoco.mjtBias.mjBIAS_AFFINE)
+        is_servo = affine and gain > 0.0 and np.isclose(bias, -gain)
+        return Actuator(
+            name=m.actuator(k).name or f"actuator {k + 1}",
+            tendon=target if kind == int(types.mjTRN_TENDON) else None,
+            joint=target if kind in (int(types.mjTRN_JOINT), int(types.mjTRN_JOINTINPARENT)) else None,
+            gear=gear,
+            position_gain=gain * gear**2 if is_servo else None,
+        )
+
+    def joint_named(self, name: str) -> Joint:
+        """Return a joint by its name.
+
+        Parameters
+        ----------
+        name
+            Name in the model.
+
+        Returns
+        -------
+        Joint
+            The joint.
+
+        Raises
+        ------
+        InputError
+            The model has no such joint.
+        """
+        return self.joints[self._index_of("joint", name, [joint.name for joint in self.joints])]
+
+    def tendon_named(self, name: str) -> Tendon:
+        """Return a tendon by its name.
+
+        Parameters
+        ----------
+        name
+            Name in the model.
+
+        Returns
+        -------
+        Tendon
+            The tendon.
+
+        Raises
+        ------
+        InputError
+            The model has no such tendon.
+        """
+        return self.tendons[self._index_of("tendon", name, [tendon.name for tendon in self.tendons])]
+
+    def _index_of(self, kind: str, name: str, names: list[str]) -> int:
+        if not name or name not in names:
+            known = ", ".join(filter(None, names)) or "none with a name"
+            raise InputError(f"{self.path}: {kind} {name}: not in the model; it has {known}")
+        return names.index(name)
+
+    def ancestors(self, body: int) -> list[int]:
+        """Return a body and those that carry it, up to the world (0)."""
+        chain = [body]
+        while chain[-1] != 0:
+            chain.append(int(self._model.body_parentid[chain[-1]]))
+        return chain
+
+    def equalities(self) -> list[tuple[str, str, tuple[int, ...]]]:
+        """Return (name, "joint" or "tendon", indices) of each equality constraint between joints or tendons."""
+        m, types = self._model, self._mujoco.mjtEq
+        kinds = {int(types.mjEQ_JOINT): "joint", int(types.mjEQ_TENDON): "tendon"}
+        rows = []
+        for k in range(m.neq):
+            kind = kinds.get(int(m.eq_type[k]))
+            if kind is not None:
+                ends = tuple(int(end) for end in (m.eq_obj1id[k], m.eq_obj2id[k]) if end >= 0)
+                rows.append((m.equality(k).name or f"equality {k + 1}", kind, ends))
+        return rows
+
+    # --- what it computes ---------------------------------------------------------------------------------------------
+
+    def place(self, joints: Sequence[Joint], angles: Numbers) -> None:
+        """Set the angles [n] of some joints, all others to their reference, and compute all positions at rest."""
+        m, d = self._model, self._data
+        d.qpos[:] = m.qpos0
+        d.qvel[:] = 0.0
+        d.qpos[[joint.position for joint in joints]] = angles
+        for compute in (self._mujoco.mj_kinematics, self._mujoco.mj_comPos, self._mujoco.mj_tendon):
+            compute(m, d)
+
+    def tendon_jacobian(self) -> Numbers:
+        """Return the change of each tendon's length by each velocity of the model at the angles placed.
+
+        Returns
+        -------
+        ndarray
+            [tendons, velocities] (m/rad; 1 of a slide).
+        """
+        m, d = self._model, self._data
+        # Until version 3.3 the structure of a sparse matrix was in the data, and a dense one was kept as it is.
+        owner = m if hasattr(m, "ten_J_rownnz") else d
+        if owner is d and not self._mujoco.mj_isSparse(m):
+            return np.array(d.ten_J).reshape(m.ntendon, m.nv)
+        dense, values, columns = np.zeros((m.ntendon, m.nv)), d.ten_J.ravel(), owner.ten_J_colind.ravel()
+        for i in range(m.ntendon):
+            part = slice(int(owner.ten_J_rowadr[i]), int(owner.ten_J_rowadr[i] + owner.ten_J_rownnz[i]))
+            dense[i, columns[part]] = values[part]
+        return dense
+
+    def holding_torque(self, joints: Sequence[Joint]) -> Numbers:
+        """Return the torque [n] (N·m) that holds the weight of everything beyond each joint, at the angles placed."""
+        m, d = self._model, self._data
+        self._mujoco.mj_forward(m, d)
+        weight = d.qfrc_bias - (d.qfrc_gravcomp if hasattr(d, "qfrc_gravcomp") else 0.0)
+        return np.array(weight[[joint.velocity for joint in joints]])
+
+    def inertia(self, joints: Sequence[Joint]) -> Numbers:
+        """Return the inertia matrix [n, n] (kg·m²) of some joints at the angles placed, armature left out."""
+        m, d = self._model, self._data
+        self._mujoco.mj_forward(m, d)
+        places = [joint.velocity for joint in joints]
+        rows = np.zeros((len(joints), len(joints)))
+        for j, place in enumerate(places):
+            unit, product = np.zeros(m.nv), np.zeros(m.nv)
+            unit[place] = 1.0
+            self._mujoco.mj_mulM(m, d, product, unit)
+            rows[j] = product[places]
+        return rows - np.diag([joint.armature for joint in joints])
+
+    def axis_and_anchor(self, joint: Joint) -> tuple[Numbers, Numbers]:
+        """Return direction and place of a joint's axis [3], [3] (m) in the world frame, at the angles placed."""
+        return np.array(self._data.xaxis[joint.index]), np.array(self._data.xanchor[joint.index])
+
+    def base_frame(self, joint: Joint) -> tuple[Numbers, Numbers]:
+        """Return rotation [3, 3] and origin [3] (m) of the body that carries a joint's body."""
+        body = int(self._model.body_parentid[joint.body])
+        return np.array(self._data.xmat[body]).reshape(3, 3), np.array(self._data.xpos[body])
+
+    def point(self, name: str) -> tuple[int, Numbers]:
+        """Return body and place [3] (m, world frame) of a site, geom or body.
+
+        Parameters
+        ----------
+        name
+            Its name.
+
+        Returns
+        -------
+        int
+            Index of its body.
+        ndarray
+            Its place at the angles placed.
+
+        Raises
+        ------
+        InputError
+            The model has none of this name.
+        """
+        m, d, kinds = self._model, self._data, self._mujoco.mjtObj
+        for kind, bodies, places in (
+            (kinds.mjOBJ_SITE, m.site_bodyid, d.site_xpos),
+            (kinds.mjOBJ_GEOM, m.geom_bodyid, d.geom_xpos),
+            (kinds.mjOBJ_BODY, None, d.xpos),
+        ):
+            k = int(self._mujoco.mj_name2id(m, kind, name))
+            if k >= 0:
+                return (k if bodies is None else int(bodies[k])), np.array(places[k])
+        raise InputError(f"{self.path}: {name}: no site, geom or body of this name in the model")
+
+
+def _higher_order(model: Any, name: str, index: int) -> bool:
+    """Return whether a row of polynomial coefficients, which older versions lack, has any."""
+    rows = getattr(model, name, None)
+    return rows is not None and bool(np.any(rows[index]))

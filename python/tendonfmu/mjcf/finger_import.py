@@ -1,0 +1,392 @@
+"""A finger description made from joints and tendons of a MuJoCo model."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tendonfmu.errors import InputError
+from tendonfmu.mjcf.compiled_model import CompiledModel, Joint, Numbers, Tendon
+from tendonfmu.mjcf.gravity import gravity_rows, holding_torques
+from tendonfmu.mjcf.left_out import left_out
+from tendonfmu.mjcf.link_geometry import LinkGeometry, link_geometry
+from tendonfmu.mjcf.moment_arms import MomentArm, moment_arms, sampled_angles
+from tendonfmu.mjcf.tendon_choice import choose_tendons, drives_of, motors_of, stiffness_of
+from tendonfmu.model import NativeError, native
+
+FORMAT = "tendonfmu-finger-1"
+UNLIMITED = 1.0  # rad (m); range on both sides of the reference of a joint without limits
+STRIBECK = 0.1  # rad/s; without effect as long as static equals coulomb
+LONGEST_ARM = 0.3  # m; larger coefficients of fixed tendons are no lengths, such as 1 where joints are coupled
+WEIGHTLESS = 0.02  # share of the largest holding torque that `gravity` rows may miss without a warning
+
+
+@dataclass(frozen=True)
+class ImportSettings:
+    """What is taken from a model.
+
+    Attributes
+    ----------
+    joints
+        Names of joints, base first.
+    tendons
+        Names of tendons; None takes all that are driven and move a joint.
+    ranges
+        Ranges of joints by name (rad), in place of the model's limits.
+    bidirectional
+        Names of tendons that are cable loops.
+    tip
+        Site, geom or body that is the fingertip; None leaves `links` out.
+    gravity
+        Whether to write the links' weight as rows `gravity`.
+    stiffness
+        Of tendons whose stiffness the model does not have (N/m); None takes them as rigid.
+    tolerance
+        Share up to which a moment arm counts as constant.
+    threshold
+        `contact.threshold` of all joints (N·m).
+    name
+        Of the finger; None takes the model's.
+    """
+
+    joints: Sequence[str]
+    tendons: Sequence[str] | None = None
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    bidirectional: Sequence[str] = ()
+    tip: str | None = None
+    gravity: bool = False
+    stiffness: float | None = None
+    tolerance: float = 0.02
+    threshold: float = 0.03
+    name: str | None = None
+
+
+@dataclass(frozen=True)
+class ImportedFinger:
+    """A description made from a model.
+
+    Attributes
+    ----------
+    data
+        The description.
+    notes
+        Where numbers come from that the model has in another form.
+    warnings
+        What the description has less exactly than the model, with figures.
+    left_out
+        What of these joints and tendons the description does not have.
+    """
+
+    data: dict[str, Any]
+    notes: list[str]
+    warnings: list[str]
+    left_out: list[str]
+
+    @property
+    def text(self) -> str:
+        """The description as JSON."""
+        return json.dumps(self.data, indent=2, ensure_ascii=False) + "\n"
+
+    def report(self, model: Path, output: Path) -> dict[str, Any]:
+        """Return what was done, for `--json`. output: the file of the description."""
+        return {
+            "format": "tendonfmu-import-1",
+            "model": str(model),
+            "finger": str(output),
+            "joints": [joint["name"] for joint in self.data["joints"]],
+            "tendons": [tendon["name"] for tendon in self.data["tendons"]],
+            "notes": self.notes,
+            "warnings": self.warnings,
+            "left_out": self.left_out,
+        }
+
+
+def import_finger(path: Path, settings: ImportSettings) -> ImportedFinger:
+    """Make a finger description from a MuJoCo model.
+
+    Parameters
+    ----------
+    path
+        An MJCF file.
+    settings
+        Which joints and tendons, and what of them.
+
+    Returns
+    -------
+    ImportedFinger
+        A valid description, and what it does not have.
+
+    Raises
+    ------
+    InputError
+        MuJoCo refuses the model, a joint or tendon is not in it, or they make no finger; one line that names it.
+    """
+    model = CompiledModel(path)
+    joints = _chain(model, settings.joints)
+    ranges, notes = joint_ranges(model, joints, settings.ranges)
+    angles = sampled_angles(ranges)
+    tendons = choose_tendons(model, joints, angles, settings.tendons)
+    for name in settings.bidirectional:
+        if model.tendon_named(name) not in tendons:
+            raise InputError(f"{path}: --bidirectional {name}: not among the tendons of the finger")
+    arms = moment_arms(model, joints, tendons, angles, settings.tolerance)
+    _check_moved(model, joints, arms)
+    links = None if settings.tip is None else _links(model, joints, settings.tip)
+    weight, warnings = _weight(model, joints, angles, links) if settings.gravity else ([], [])
+    rows = [*_tendon_rows(model, tendons, arms), *_inertia_rows(model, joints), *weight]
+    data: dict[str, Any] = {
+        "format": FORMAT,
+        "name": settings.name or model.name,
+        "joints": [_joint(joint) for joint in joints],
+        "tendons": [_tendon(model, each, row, settings) for each, row in zip(tendons, arms, strict=True)],
+        "contact": {"threshold": [settings.threshold] * len(joints)},
+    }
+    if rows:
+        data["extensions"] = rows
+    if links is not None:
+        data |= {"links": links.links, "tip": links.tip}
+    _check_accepted(model, data)
+    return ImportedFinger(
+        data=data,
+        notes=[*notes, *_sources(model, joints, tendons, settings)],
+        warnings=[*_arm_warnings(joints, tendons, arms, ranges, settings.tolerance), *warnings],
+        left_out=left_out(model, joints, tendons, angles, settings.gravity, links is not None),
+    )
+
+
+# --- joints -----------------------------------------------------------------------------------------------------------
+
+
+def _chain(model: CompiledModel, names: Sequence[str]) -> list[Joint]:
+    """Return the joints of these names. They must be hinges or slides on one chain, base first."""
+    joints = [model.joint_named(name) for name in names]
+    if not joints:
+        raise InputError(f"{model.path}: no joint given; expected --joints with names, base first")
+    for joint in joints:
+        if joint.kind not in ("hinge", "slide"):
+            raise InputError(f"{model.path}: joint {joint.name}: a {joint.kind} joint; expected a hinge or a slide")
+        if names.count(joint.name) > 1:
+            raise InputError(f"{model.path}: joint {joint.name}: given twice")
+    for before, after in pairwise(joints):
+        if _carries(model, before, after):
+            continue
+        if _carries(model, after, before):
+            raise InputError(
+                f"{model.path}: joint {after.name}: carries joint {before.name}, which is given before it; "
+                "expected the joints base first"
+            )
+        raise InputError(
+            f"{model.path}: joint {after.name}: not carried by joint {before.name}; expected one chain of joints"
+        )
+    return joints
+
+
+def _carries(model: CompiledModel, base: Joint, other: Joint) -> bool:
+    if base.body == other.body:
+        return base.index < other.index
+    return base.body in model.ancestors(other.body)
+
+
+def joint_ranges(
+    model: CompiledModel, joints: Sequence[Joint], given: Mapping[str, tuple[float, float]]
+) -> tuple[Numbers, list[str]]:
+    """Return the ranges of joints.
+
+    Parameters
+    ----------
+    model, joints
+        The model and its joints.
+    given
+        Ranges by name, in place of the model's limits (rad).
+
+    Returns
+    -------
+    Numbers
+        [n, 2] (rad).
+    list of str
+        A note on each range that had to be guessed.
+
+    Raises
+    ------
+    InputError
+        A range is given for another joint.
+    """
+    names = [joint.name for joint in joints]
+    for name in given:
+        if name not in names:
+            raise InputError(f"--range {name}: not among the joints {', '.join(names)}")
+    ranges, notes = [], []
+    for joint in joints:
+        if joint.name not in given and joint.limits is None:
+            notes.append(f"joint {joint.name}: no limits in the model, ±{UNLIMITED:g} taken; --range sets others")
+        ranges.append(given.get(joint.name) or joint.limits or (-UNLIMITED, UNLIMITED))
+    return np.array(ranges), notes
+
+
+def _joint(joint: Joint) -> dict[str, Any]:
+    row: dict[str, Any] = {"name": joint.name}
+    if joint.stiffness:
+        row["cover"] = {"stiffness": joint.stiffness, "rest_angle": joint.rest}
+    if joint.frictionloss or joint.damping:
+        loss = joint.frictionloss
+        row["friction"] = {"static": loss, "coulomb": loss, "stribeck_velocity": STRIBECK, "viscous": joint.damping}
+    return row
+
+
+def _inertia_rows(model: CompiledModel, joints: Sequence[Joint]) -> Iterator[dict[str, Any]]:
+    """Yield the inertia, armature and links, of joints with armature."""
+    own = links_inertia(model, joints)
+    for j, joint in enumerate(joints):
+        if joint.armature:
+            yield {"effect": "inertia", "joint": j + 1, "inertia": float(joint.armature + own[j])}
+
+
+def links_inertia(model: CompiledModel, joints: Sequence[Joint]) -> Numbers:
+    """Return the links' inertia about each joint, in the middle of the model's joint ranges.
+
+    Parameters
+    ----------
+    model, joints
+        The model and its joints.
+
+    Returns
+    -------
+    Numbers
+        [n] (kg·m²), without armature.
+    """
+    ranges, _ = joint_ranges(model, joints, {})
+    model.place(joints, ranges.mean(axis=1))
+    return np.array(np.diag(model.inertia(joints)), dtype=np.float64)
+
+
+# --- tendons ----------------------------------------------------------------------------------------------------------
+
+
+def _check_moved(model: CompiledModel, joints: Sequence[Joint], arms: Sequence[Sequence[MomentArm]]) -> None:
+    for j, joint in enumerate(joints):
+        if all(row[j].arm == 0.0 for row in arms):
+            raise InputError(
+                f"{model.path}: joint {joint.name}: moved by none of the tendons; "
+                "expected more tendons (--tendons, springs too), or to leave the joint out"
+            )
+
+
+def _tendon(
+    model: CompiledModel, tendon: Tendon, arms: Sequence[MomentArm], settings: ImportSettings
+) -> dict[str, Any]:
+    stiffness, _ = stiffness_of(model, tendon, settings.stiffness)
+    row = {"name": tendon.name, "stiffness": stiffness, "moment_arms": [arm.arm for arm in arms]}
+    return row | ({"bidirectional": True} if tendon.name in settings.bidirectional else {})
+
+
+def _tendon_rows(
+    model: CompiledModel, tendons: Sequence[Tendon], arms: Sequence[Sequence[MomentArm]]
+) -> Iterator[dict[str, Any]]:
+    """Yield extensions: arms that vary with the angle, and friction that does not depend on the force."""
+    for i, row in enumerate(arms):
+        for j, arm in enumerate(row):
+            if arm.slope:
+                yield {"effect": "moment_arm_variation", "joint": j + 1, "tendon": i + 1, "slope": arm.slope}
+    for i, tendon in enumerate(tendons):
+        first = _first_joint(arms[i])
+        if tendon.frictionloss and first is not None and not motors_of(model, tendon):
+            yield {"effect": "preload_friction", "joint": first, "tendon": i + 1, "coulomb": tendon.frictionloss}
+
+
+def _first_joint(arms: Sequence[MomentArm]) -> int | None:
+    """Return the first joint (from 1) that a tendon turns, where all of its length slides; None without any."""
+    return next((j for j, arm in enumerate(arms, start=1) if arm.arm != 0.0), None)
+
+
+def _arm_warnings(
+    joints: Sequence[Joint],
+    tendons: Sequence[Tendon],
+    arms: Sequence[Sequence[MomentArm]],
+    ranges: Numbers,
+    tolerance: float,
+) -> Iterator[str]:
+    varying = False
+    for tendon, row in zip(tendons, arms, strict=True):
+        largest = max(abs(arm.arm) for arm in row)
+        if not tendon.is_spatial and largest > LONGEST_ARM:
+            yield (
+                f"tendon {tendon.name}: a fixed tendon with coefficients up to {largest:g}, which count as moment arms "
+                "in m; expected lengths, or forces that are torques"
+            )
+        for joint, arm, (low, high) in zip(joints, row, ranges, strict=True):
+            if arm.varies <= tolerance:
+                continue
+            varying = True
+            what = (
+                f"moment_arm_variation leaves {100 * arm.left:.1f} %"
+                if arm.slope
+                else "no line in this joint's angle describes it: the mean is taken"
+            )
+            yield (
+                f"tendon {tendon.name}, joint {joint.name}: moment arm {1e3 * arm.low:.4g} to {1e3 * arm.high:.4g} mm "
+                f"over {low:.3g} to {high:.3g} rad, {100 * arm.varies:.1f} % from a constant; {what}"
+            )
+    if varying:
+        yield "angles made of tendon positions take constant moment arms: record joint angles, use --kinematics 2"
+
+
+def _sources(
+    model: CompiledModel, joints: Sequence[Joint], tendons: Sequence[Tendon], settings: ImportSettings
+) -> Iterator[str]:
+    sources: dict[str, list[str]] = {}
+    for tendon in tendons:
+        sources.setdefault(stiffness_of(model, tendon, settings.stiffness)[1], []).append(tendon.name)
+    for source, names in sources.items():
+        yield f"tendon {', '.join(names)}: stiffness {source}"
+    for tendon in tendons:
+        yield from (f"tendon {tendon.name}: {drive}" for drive in drives_of(model, tendon))
+    damped = [joint.name for joint in joints if joint.damping and not joint.frictionloss]
+    if damped:
+        yield (
+            f"joint {', '.join(damped)}: damping without frictionloss, so coulomb is 0; `fit` needs a value above 0 to "
+            "begin with"
+        )
+    bare = [joint.name for joint in joints if not joint.frictionloss and not joint.damping]
+    if bare:
+        yield (
+            f"joint {', '.join(bare)}: neither frictionloss nor damping in the model, so no friction in the "
+            "description; add a law where you expect friction"
+        )
+
+
+# --- the whole --------------------------------------------------------------------------------------------------------
+
+
+def _links(model: CompiledModel, joints: Sequence[Joint], tip: str) -> LinkGeometry:
+    for joint in joints:
+        if joint.kind != "hinge":
+            raise InputError(f"{model.path}: --tip: joint {joint.name} is a {joint.kind}; links need hinges")
+    return link_geometry(model, joints, tip)
+
+
+def _weight(
+    model: CompiledModel, joints: Sequence[Joint], angles: Numbers, links: LinkGeometry | None
+) -> tuple[list[dict[str, Any]], list[str]]:
+    """Return rows `gravity`, and a warning where they miss much of the weight."""
+    torques = holding_torques(model, joints, angles)
+    rows, missed = gravity_rows(angles, torques, None if links is None else links.axes)
+    largest = float(np.abs(torques).max())
+    if missed <= WEIGHTLESS * largest:
+        return rows, []
+    reason = "with --tip the axes' directions are taken into account" if links is None else "the axes are not parallel"
+    return rows, [
+        f"gravity: the rows miss up to {1e3 * missed:.3g} of {1e3 * largest:.3g} mN·m of the links' weight; {reason}"
+    ]
+
+
+def _check_accepted(model: CompiledModel, data: Mapping[str, Any]) -> None:
+    try:
+        native.image_from_json(json.dumps(data))
+    except NativeError as refused:
+        raise InputError(f"{model.path}: these joints and tendons make no finger: {refused}") from None

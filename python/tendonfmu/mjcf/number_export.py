@@ -1,0 +1,238 @@
+"""Numbers of a description written into a MuJoCo model, and what MJCF cannot express of it."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from tendonfmu.errors import InputError, InternalError, own_fault
+from tendonfmu.files import whole_file
+from tendonfmu.mjcf.compiled_model import CompiledModel, Joint
+from tendonfmu.mjcf.finger_import import links_inertia
+from tendonfmu.mjcf.tendon_choice import motors_of
+from tendonfmu.mjcf.xml_source import XmlSource
+from tendonfmu.model import Law, effects, extension_rows, read_finger, sides
+
+SAME = 1e-9  # relative; a number that differs by less is not written again
+WRITTEN = ("inertia", "preload_friction")  # extensions that MJCF may express
+UNITS = {
+    ("joint", "frictionloss"): "N·m",
+    ("joint", "damping"): "N·m·s/rad",
+    ("joint", "stiffness"): "N·m/rad",
+    ("joint", "springref"): "rad",
+    ("joint", "armature"): "kg·m²",
+    ("tendon", "frictionloss"): "N",
+}
+
+
+@dataclass(frozen=True)
+class Change:
+    """A number of the model that differs.
+
+    Attributes
+    ----------
+    kind, name
+        "joint" or "tendon", and its name.
+    attribute
+        Attribute of MJCF.
+    before, after
+        In SI units.
+    """
+
+    kind: str
+    name: str
+    attribute: str
+    before: float
+    after: float
+
+    def line(self) -> str:
+        """Describe it in a line."""
+        unit = UNITS[self.kind, self.attribute]
+        return f"{self.kind} {self.name}: {self.attribute} {self.before:.4g} → {self.after:.4g} {unit}"
+
+
+@dataclass(frozen=True)
+class Export:
+    """What was written.
+
+    Attributes
+    ----------
+    changes
+        Numbers that differ from the model's.
+    left_out
+        What MJCF cannot express of the description, and numbers that the description does not have.
+    """
+
+    changes: list[Change]
+    left_out: list[str]
+
+    def report(self, finger: Path, model: Path, output: Path) -> dict[str, Any]:
+        """Return what was done, for `--json`. finger, model, output: files of the description, and of both models."""
+        return {
+            "format": "tendonfmu-export-1",
+            "finger": str(finger),
+            "model": str(model),
+            "output": str(output),
+            "changes": [asdict(change) for change in self.changes],
+            "left_out": self.left_out,
+        }
+
+
+def export_numbers(finger: Path, path: Path, output: Path) -> Export:
+    """Write the numbers of a description into a model.
+
+    Parameters
+    ----------
+    finger
+        File of a description whose joints and tendons have the names of the model's.
+    path
+        An MJCF file.
+    output
+        The file to write. Where the model refers to other files it must be in the folder of the model.
+
+    Returns
+    -------
+    Export
+        What has changed, and what is left out.
+
+    Raises
+    ------
+    InputError
+        The description or the model is refused, or a joint or tendon is not in the model or not in its XML.
+    """
+    data = read_finger(finger).data
+    model = CompiledModel(path)
+    joints = [model.joint_named(name) for name in _names(finger, data, "joints")]
+    for name in _names(finger, data, "tendons"):
+        model.tendon_named(name)
+    left_out: list[str] = []
+    wanted = [*_of_joints(data, model, joints, left_out), *_of_tendons(data, model, left_out)]
+    changes = [change for change in wanted if not math.isclose(change.before, change.after, rel_tol=SAME)]
+    source = XmlSource(path)
+    for change in changes:
+        unit = source.angle_unit() if change.attribute == "springref" else 1.0
+        source.set_number(change.kind, change.name, change.attribute, change.after / unit)
+    text = source.text()
+    file = source.first_file()
+    if file is not None and output.resolve().parent != path.resolve().parent:
+        raise InputError(
+            f"{output}: the model refers to {file} beside it; expected an output in the folder of {path.name}"
+        )
+    with whole_file(output) as temporary:
+        temporary.write_bytes(text)
+        _check_written(temporary, changes)
+    return Export(changes, [*left_out, *_inexpressible(data)])
+
+
+def _names(file: Path, data: Mapping[str, Any], key: str) -> list[str]:
+    """Return the names of joints or tendons, by which the model's are found."""
+    kind = key.removesuffix("s")
+    for k, row in enumerate(data[key], start=1):
+        if row.get("name") is None:
+            raise InputError(f"{file}: {key}[{k}].name: missing; expected the name of a {kind} of the model")
+    return [str(row["name"]) for row in data[key]]
+
+
+def _check_written(file: Path, changes: Sequence[Change]) -> None:
+    """Compile the text that was written: its numbers must be those wanted."""
+    with own_fault("the model that was written"):
+        model = CompiledModel(file)
+        for change in changes:
+            found = _value(model, change.kind, change.name, change.attribute)
+            if not math.isclose(found, change.after, rel_tol=SAME, abs_tol=1e-15):
+                raise InternalError(f"{change.line()}: MuJoCo reads {found:g}")
+
+
+def _value(model: CompiledModel, kind: str, name: str, attribute: str) -> float:
+    row = model.joint_named(name) if kind == "joint" else model.tendon_named(name)
+    return float(getattr(row, "rest" if attribute == "springref" else attribute))
+
+
+# --- what MJCF expresses ----------------------------------------------------------------------------------------------
+
+
+def _of_joints(
+    data: Mapping[str, Any], model: CompiledModel, joints: Sequence[Joint], left_out: list[str]
+) -> Iterator[Change]:
+    inertia = {row["joint"]: float(row["inertia"]) for row in extension_rows(data) if row["effect"] == "inertia"}
+    links = links_inertia(model, joints)
+    for j, (joint, row) in enumerate(zip(joints, data["joints"], strict=True)):
+        wanted: dict[str, float] = {}
+        law, cover = row.get("friction"), row.get("cover")
+        if law is not None:
+            wanted |= {"frictionloss": _mean(law, "coulomb"), "damping": _mean(law, "viscous")}
+            left_out += _beyond_coulomb(joint.name, law)
+        elif joint.frictionloss or joint.damping:
+            left_out.append(f"joint {joint.name}: no friction law in the description; the model's numbers stay")
+        if cover is not None:
+            wanted |= {"stiffness": float(cover["stiffness"]), "springref": float(cover.get("rest_angle") or 0.0)}
+        if j + 1 in inertia:
+            rotor = inertia[j + 1] - links[j]
+            # to rounding, links and armature may add up to the links alone
+            wanted["armature"] = max(rotor, 0.0)
+            if rotor < -SAME * links[j]:
+                left_out.append(
+                    f"joint {joint.name}: inertia {inertia[j + 1]:.3g} kg·m², less than the {links[j]:.3g} of its "
+                    "links in the model; armature 0"
+                )
+        for attribute, value in wanted.items():
+            yield Change("joint", joint.name, attribute, _value(model, "joint", joint.name, attribute), value)
+
+
+def _of_tendons(data: Mapping[str, Any], model: CompiledModel, left_out: list[str]) -> Iterator[Change]:
+    for k, row in enumerate(extension_rows(data), start=1):
+        if row["effect"] != "preload_friction":
+            continue
+        tendon = data["tendons"][row["tendon"] - 1]
+        first = next((j for j, arm in enumerate(tendon["moment_arms"], start=1) if arm != 0.0), None)
+        reason = None
+        if row.get("joint") != first:
+            reason = "not before the tendon's first joint alone"
+        elif row.get("beyond") not in (None, 1, 1.0):
+            reason = "joints beyond feel another share"
+        elif motors_of(model, model.tendon_named(tendon["name"])):
+            reason = "the model's tendon includes its motor"
+        if reason is not None:
+            left_out.append(f"extensions[{k}], preload_friction of tendon {tendon['name']}: {reason}")
+            continue
+        before = _value(model, "tendon", tendon["name"], "frictionloss")
+        yield Change("tendon", tendon["name"], "frictionloss", before, float(row["coulomb"]))
+
+
+def _mean(law: Law, number: str) -> float:
+    """Return a number of a law, of both sides of an asymmetric one the mean."""
+    return sum(float(side.get(number) or 0.0) for side in sides(law)) / len(sides(law))
+
+
+# --- what it cannot express -------------------------------------------------------------------------------------------
+
+
+def _beyond_coulomb(name: str, law: Law) -> Iterator[str]:
+    both = sides(law)
+    if len(both) == 2:
+        values = " and ".join(f"{side['coulomb']:.3g}" for side in both)
+        yield f"joint {name}: friction by direction, coulomb {values} N·m; the mean is written"
+    static = sum(side["static"] for side in both) / len(both)
+    if any(side["static"] != side["coulomb"] for side in both):
+        yield f"joint {name}: static friction {static:.3g} N·m, above coulomb (Stribeck effect)"
+
+
+def _inexpressible(data: Mapping[str, Any]) -> Iterator[str]:
+    names = {
+        "edge_friction": "friction before joints, a share of the tendon force",
+        "pulley_friction": "friction at pulleys, a share of the tendon force",
+        "load_friction": "friction in joints, by the sum of the tendon forces",
+    }
+    for kind, words in names.items():
+        rows = [effect for effect in effects(data) if effect.kind == kind]
+        sizes = [side["coulomb"] for effect in rows for law in effect.laws for side in sides(law)]
+        if rows:
+            yield f"{kind} at {len(rows)} places: {words}; coulomb {min(sizes):.3g} to {max(sizes):.3g}"
+    others = Counter(row["effect"] for row in extension_rows(data) if row["effect"] not in WRITTEN)
+    if others:
+        yield "extensions: " + ", ".join(f"{count} {effect}" for effect, count in others.items())
+    yield "moment arms and stiffness of tendons stay the model's; bias and contact have no counterpart"

@@ -1,0 +1,226 @@
+"""`tendonfmu export mjcf`: numbers written back, what cannot be, and the rest of the file as it was."""
+
+from __future__ import annotations
+
+import copy
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
+pytest.importorskip("mujoco", reason="SKIPPED: mujoco is not installed (requirements-foreign.lock)")
+
+import mujoco
+from lxml import etree
+
+from command import Call
+from mjcf_models import fixed_model
+from tendonfmu.errors import InputError
+from tendonfmu.mjcf.finger_import import ImportSettings, import_finger
+from tendonfmu.mjcf.number_export import Export, export_numbers
+
+SETTINGS = ImportSettings(joints=("mcp", "pip"))
+
+
+def exported(folder: Path, data: dict[str, Any], model: str = "model.xml", output: str = "out.xml") -> Export:
+    (folder / "fitted.json").write_text(json.dumps(data), encoding="utf-8")
+    return export_numbers(folder / "fitted.json", folder / model, folder / output)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "model.xml").write_text(fixed_model(), encoding="utf-8")
+    return tmp_path
+
+
+@pytest.fixture
+def data(folder: Path) -> dict[str, Any]:
+    """The model's own description."""
+    return import_finger(folder / "model.xml", SETTINGS).data
+
+
+def fitted(data: dict[str, Any]) -> dict[str, Any]:
+    """The description with other numbers wherever MJCF has one."""
+    changed = copy.deepcopy(data)
+    changed["joints"][0]["friction"] |= {"static": 0.0123456789012345, "coulomb": 0.0123456789012345, "viscous": 0.003}
+    changed["joints"][0]["cover"] = {"stiffness": 0.05, "rest_angle": -0.2}
+    for row in changed["extensions"]:
+        if row["effect"] == "preload_friction":
+            row["coulomb"] = 0.7
+        elif row["joint"] == 2:
+            row["inertia"] += 1e-5
+    return changed
+
+
+def test_what_nothing_changes_is_written_as_it_was(folder: Path, data: dict[str, Any]) -> None:
+    assert exported(folder, data).changes == []
+    before, after = (etree.tostring(etree.parse(str(folder / name))) for name in ("model.xml", "out.xml"))
+    assert before == after
+
+
+@pytest.mark.parametrize("angle", ["radian", "degree"])
+def test_numbers_come_back_through_export_and_import(folder: Path, angle: str) -> None:
+    unit = {"radian": 1.0, "degree": 57.29577951308232}[angle]
+    text = fixed_model(angle=angle, low=-0.5 * unit, high=1.2 * unit, rest=0.1 * unit)
+    (folder / "model.xml").write_text(text, encoding="utf-8")
+    wanted = fitted(import_finger(folder / "model.xml", SETTINGS).data)
+    written = exported(folder, wanted)
+    assert {(change.name, change.attribute) for change in written.changes} == {
+        ("mcp", "frictionloss"),
+        ("mcp", "damping"),
+        ("mcp", "stiffness"),
+        ("mcp", "springref"),
+        ("pip", "armature"),
+        ("long", "frictionloss"),
+    }
+    back = import_finger(folder / "out.xml", SETTINGS).data
+    assert back["tendons"] == wanted["tendons"]
+    for got, own in zip(back["joints"], wanted["joints"], strict=True):
+        for key in own.keys() - {"name"}:
+            assert got[key] == pytest.approx(own[key], rel=1e-12)
+    for got, own in zip(back["extensions"], wanted["extensions"], strict=True):
+        assert got.pop("effect") == own.pop("effect") and got == pytest.approx(own, rel=1e-9)
+
+
+def test_the_rest_of_the_file_stays(folder: Path, data: dict[str, Any]) -> None:
+    """Line by line: only the elements of the joints and the tendon differ."""
+    exported(folder, fitted(data))
+    before = etree.tostring(etree.parse(str(folder / "model.xml"))).decode().splitlines()
+    after = (folder / "out.xml").read_text(encoding="utf-8").splitlines()
+    differing = [old for old, new in zip(before, after, strict=True) if old != new]
+    assert len(differing) == 3
+    assert all(any(name in line for name in ('"mcp"', '"pip"', '"long"')) for line in differing)
+
+
+def test_numbers_of_a_default_class_are_overridden_at_the_joint_alone(folder: Path, data: dict[str, Any]) -> None:
+    data["joints"][1]["friction"] = {"static": 0.0, "coulomb": 0.0, "stribeck_velocity": 0.1}
+    exported(folder, data)
+    model = mujoco.MjModel.from_xml_path(str(folder / "out.xml"))
+    assert model.dof_damping[model.joint("pip").dofadr[0]] == 0.0
+    assert model.dof_damping[model.joint("mcp").dofadr[0]] == 0.002
+    assert 'class="rubbing"><joint damping="0.002" frictionloss="0.006"/>' in (folder / "out.xml").read_text()
+
+
+def test_what_mjcf_cannot_express_is_listed(folder: Path, data: dict[str, Any]) -> None:
+    law = {"static": 0.03, "coulomb": 0.02, "stribeck_velocity": 0.01}
+    data["joints"][0]["friction"] = {"positive": law, "negative": law | {"coulomb": 0.01}}
+    data["joints"][1].pop("friction")
+    data["joints"][1]["load_friction"] = law
+    data["tendons"][0]["edge_friction"] = [law, law]
+    data["tendons"][0]["pulley_friction"] = [law, None]
+    data["extensions"] += [
+        {"effect": "gravity", "joint": 1, "sine": 0.01},
+        {"effect": "preload_friction", "tendon": 1, "joint": 2, "coulomb": 0.1},
+    ]
+    next(row for row in data["extensions"] if row["effect"] == "inertia")["inertia"] = 1e-7
+    written = exported(folder, data)
+    text = "\n".join(written.left_out)
+    for words in (
+        "joint mcp: friction by direction, coulomb 0.02 and 0.01",
+        "joint mcp: static friction 0.03",
+        "joint pip: no friction law",
+        "edge_friction at 2 places",
+        "pulley_friction at 1 places",
+        "load_friction at 1 places",
+        "1 gravity",
+        "preload_friction of tendon deep: not before the tendon's first joint",
+        "joint mcp: inertia 1e-07",
+    ):
+        assert words in text, text
+    values = {(change.name, change.attribute): change.after for change in written.changes}
+    assert values["mcp", "frictionloss"] == pytest.approx(0.015) and values["mcp", "armature"] == 0.0
+
+
+# --- included files ---------------------------------------------------------------------------------------------------
+
+
+def divided(folder: Path) -> None:
+    """The model in three files: tendons and bodies are included, the bodies' joints by yet another file."""
+    text = fixed_model()
+    begin, end = text.index("<worldbody>"), text.index("</worldbody>") + len("</worldbody>")
+    tendons = text.index("<tendon>"), text.index("</tendon>") + len("</tendon>")
+    (folder / "bodies.xml").write_text(f"<mujoco><!-- bodies -->{text[begin:end]}</mujoco>", encoding="utf-8")
+    (folder / "tendons.xml").write_text(f"<any>{text[tendons[0] : tendons[1]]}</any>", encoding="utf-8")
+    whole = text[:begin] + '<include file="bodies.xml"/>' + text[end : tendons[0]]
+    whole += '<include file="tendons.xml"/>' + text[tendons[1] :]
+    (folder / "model.xml").write_text(whole, encoding="utf-8")
+
+
+def test_included_files_with_changed_numbers_stand_in_the_text(folder: Path, data: dict[str, Any]) -> None:
+    divided(folder)
+    data["joints"][0]["friction"]["viscous"] = 0.01
+    exported(folder, data)
+    text = (folder / "out.xml").read_text(encoding="utf-8")
+    assert "<!-- bodies -->" in text and '<include file="tendons.xml"/>' in text and "bodies.xml" not in text
+    assert import_finger(folder / "out.xml", SETTINGS).data["joints"][0]["friction"]["viscous"] == 0.01
+    assert 'damping="0.01"' not in (folder / "bodies.xml").read_text(encoding="utf-8")
+
+
+def test_without_a_change_all_includes_stay(folder: Path, data: dict[str, Any]) -> None:
+    divided(folder)
+    assert exported(folder, data).changes == []
+    assert (folder / "out.xml").read_bytes().strip() == (folder / "model.xml").read_bytes().strip()
+
+
+def test_files_included_from_a_folder_by_names_relative_to_it(folder: Path, data: dict[str, Any]) -> None:
+    """The tendons' file is included by the bodies' file, both in a folder; only the bodies change."""
+    divided(folder)
+    (folder / "parts").mkdir()
+    for name in ("bodies.xml", "tendons.xml"):
+        (folder / name).rename(folder / "parts" / name)
+    bodies = (folder / "parts" / "bodies.xml").read_text(encoding="utf-8")
+    bodies = bodies.replace("</mujoco>", '<include file="tendons.xml"/></mujoco>')
+    (folder / "parts" / "bodies.xml").write_text(bodies, encoding="utf-8")
+    whole = (folder / "model.xml").read_text(encoding="utf-8").replace('<include file="tendons.xml"/>', "")
+    whole = whole.replace("bodies.xml", "parts/bodies.xml")
+    (folder / "model.xml").write_text(whole, encoding="utf-8")
+    data["joints"][0]["friction"]["viscous"] = 0.01
+    exported(folder, data)
+    assert '<include file="parts/tendons.xml"/>' in (folder / "out.xml").read_text(encoding="utf-8")
+    assert import_finger(folder / "out.xml", SETTINGS).data["joints"][0]["friction"]["viscous"] == 0.01
+
+
+# --- refusals ---------------------------------------------------------------------------------------------------------
+
+
+def test_files_beside_the_model_must_stay_beside_the_output(folder: Path, data: dict[str, Any]) -> None:
+    divided(folder)
+    (folder / "elsewhere").mkdir()
+    with pytest.raises(InputError, match=r"bodies\.xml.*in the folder of model\.xml"):
+        exported(folder, data, output="elsewhere/out.xml")
+    assert list((folder / "elsewhere").iterdir()) == []
+
+
+def test_names_that_the_model_does_not_have(folder: Path, data: dict[str, Any], call: Call) -> None:
+    for key, kind in (("joints", "joint"), ("tendons", "tendon")):
+        changed = copy.deepcopy(data)
+        changed[key][0]["name"] = "ring"
+        (folder / "fitted.json").write_text(json.dumps(changed), encoding="utf-8")
+        answer = call("export", "mjcf", "fitted.json", "model.xml", "-o", "out.xml")
+        assert answer.status == 2 and f"{kind} ring" in answer.err and "it has" in answer.err
+        changed[key][0].pop("name")
+        with pytest.raises(InputError, match=rf"{key}\[1\]\.name: missing"):
+            exported(folder, changed)
+    assert not (folder / "out.xml").exists()
+
+
+def test_copies_made_by_replicate_are_refused_by_name(folder: Path) -> None:
+    text = """<mujoco><worldbody><replicate count="2" offset="0 0.1 0"><body>
+      <joint name="hinge" axis="0 1 0" frictionloss="0.1"/><geom size="0.01"/></body></replicate></worldbody>
+      <tendon><fixed name="a"><joint joint="hinge0" coef="0.01"/></fixed></tendon>
+      <actuator><motor tendon="a"/></actuator></mujoco>"""
+    (folder / "model.xml").write_text(text, encoding="utf-8")
+    data = import_finger(folder / "model.xml", ImportSettings(joints=("hinge0",))).data
+    data["joints"][0]["friction"]["coulomb"] = data["joints"][0]["friction"]["static"] = 0.2
+    with pytest.raises(InputError, match=r"joint hinge0: no element of this name"):
+        exported(folder, data)
+
+
+def test_the_command_lists_changes(folder: Path, data: dict[str, Any], call: Call) -> None:
+    (folder / "fitted.json").write_text(json.dumps(fitted(data)), encoding="utf-8")
+    answer = call("export", "mjcf", "fitted.json", "model.xml", "-o", "out.xml")
+    assert answer.status == 0 and answer.out == ""
+    assert "joint mcp: damping 0.002 → 0.003 N·m·s/rad" in answer.err and "6 numbers changed" in answer.err
+    assert "MJCF cannot express: " in answer.err
