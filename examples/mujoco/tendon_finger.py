@@ -15,12 +15,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu import Runner
 from tendonfmu.model import pretension_vector
-
-try:
-    from tendonfmu import Runner
-except ImportError:  # a version without the Python interface
-    from local_runner import Runner
 
 Array = NDArray[np.float64]
 HERE = Path(__file__).resolve().parent
