@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tendonfmu.cli.console import say
+from tendonfmu.cli.console import print_tables, say, show
 from tendonfmu.errors import InputError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from tendonfmu.recordings import Inspection, Proposal
+
 TABLE = "table"  # the format whose columns a map describes
+INSPECT = "inspect"
 
 
 def register(app: typer.Typer) -> None:
@@ -23,11 +27,20 @@ def register(app: typer.Typer) -> None:
 
 
 def convert(
-    source: Annotated[str, typer.Argument(metavar="FORMAT", help="davinci, emps or table")],
+    source: Annotated[str, typer.Argument(metavar="FORMAT", help="davinci, emps, table, or inspect")],
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="third-party recording; for table any log in CSV or Parquet")
+        Path,
+        typer.Argument(
+            metavar="FILE",
+            help="third-party recording; for table and inspect any log: CSV, Parquet, MATLAB, HDF5, MCAP, ROS 2 bag",
+        ),
     ],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="REC.csv", help="recording, .csv or .parquet")],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="REC.csv", help="recording, .csv, .parquet or .mcap; inspect: MAP.json to write"
+        ),
+    ] = None,
     radius: Annotated[
         float | None,
         typer.Option(
@@ -59,16 +72,28 @@ def convert(
         Path | None,
         typer.Option(metavar="FINGER.json", help="table: description of the one-joint machine to write"),
     ] = None,
+    json_: Annotated[bool, typer.Option("--json", help="inspect: print all results as JSON")] = False,
 ) -> None:
-    """Convert a third-party recording into a recording of tendonfmu."""
+    """Convert a third-party recording or any log into a recording of tendonfmu.
+
+    convert inspect LOG lists what is in a log and proposes a map; convert table
+    LOG --map MAP.json -o REC.parquet converts it.
+    """
     given = {"radius": radius, "pretension": pretension, "mass": mass, "decimation": decimation}
     options = {name: value for name, value in given.items() if value is not None}
-    if source == TABLE:
-        _convert_table(file, output, options, map_, finger)
+    if source == INSPECT:
+        _refuse_options(source, {**options, "map": map_, "finger": finger}, "-o and --json")
+        _inspect(file, output, json_)
         return
-    for name, value in (("map", map_), ("finger", finger)):
-        if value is not None:
-            raise InputError(f"convert {source}: --{name}: not an option of this format; expected convert {TABLE}")
+    if json_:
+        raise InputError(f"convert {source}: --json: not an option of this format; expected convert {INSPECT}")
+    if output is None:
+        raise InputError(f"convert {source}: --output: missing; expected the recording to write, -o REC.parquet")
+    if source == TABLE:
+        _refuse_options(source, options, "--map or --finger")
+        _convert_table(file, output, map_, finger)
+        return
+    _refuse_options(source, {"map": map_, "finger": finger}, f"convert {TABLE}")
     from tendonfmu.files import check_format, check_output, write_table
     from tendonfmu.recordings import convert_file
 
@@ -76,37 +101,110 @@ def convert(
     check_output(output, file)
     table = convert_file(source, file, options)
     write_table(output, table)
-    _say_written(output, table["time"])
+    _say_written(output, len(table["time"]), float(table["time"][-1] - table["time"][0]))
 
 
-def _convert_table(
-    file: Path, output: Path, options: Mapping[str, float], map_file: Path | None, finger: Path | None
-) -> None:
+def _refuse_options(source: str, options: Mapping[str, Any], expected: str) -> None:
+    """Refuse the first option that was given and is not of this format."""
+    for name, value in options.items():
+        if value is not None:
+            raise InputError(f"convert {source}: --{name}: not an option of this format; expected {expected}")
+
+
+def _inspect(file: Path, output: Path | None, as_json: bool) -> None:
+    """Print what is in a log, and write the proposed map."""
+    from tendonfmu.files import check_output, write_text
+    from tendonfmu.recordings import inspect_log, inspection_document, propose
+
+    if output is not None:
+        if output.suffix.lower() != ".json":
+            raise InputError(f"{output}: unknown format {output.suffix!r}; expected a map, .json")
+        check_output(output, file)
+    found = inspect_log(file)
+    proposal = propose(found)
+    if as_json:
+        show(json.dumps(inspection_document(found, proposal), indent=1, allow_nan=False, ensure_ascii=False))
+    else:
+        _print_inspection(found, proposal)
+    for note in found.notes:
+        say(f"tendonfmu: warning: {note}")
+    if output is not None:
+        write_text(output, json.dumps(proposal.document, indent=1, ensure_ascii=False) + "\n")
+        undecided = [line.column for line in proposal.lines if "?" in (line.source, line.unit)]
+        left = f'; "?" is left to you: {", ".join(undecided)}' if undecided else ""
+        say(f"{output}: a map of {len(proposal.lines)} columns{left}")
+
+
+def _print_inspection(found: Inspection, proposal: Proposal) -> None:
+    from rich.markup import escape
+
+    from tendonfmu.recordings import clock_line, field_rows, proposal_rows, time_factor
+
+    headings = ("field", "type", "unit", "values", "missing", "least", "most")
+    for topic in found.topics:
+        rows = [[escape(cell) for cell in row] for row in field_rows(topic)]
+        line = clock_line(topic, time_factor(proposal, topic))
+        print_tables([(escape(topic.topic.name), headings, rows)], [escape(line)], "")
+    rows = [[escape(cell) for cell in row] for row in proposal_rows(proposal)]
+    print_tables([("proposed map", ("column", "field", "unit", "sure", "why"), rows)], [], "why")
+
+
+def _convert_table(file: Path, output: Path, map_file: Path | None, finger: Path | None) -> None:
     """Convert a log by its map, and write the description of a one-joint machine."""
-    from tendonfmu.files import check_format, check_output, whole_file, write_table
-    from tendonfmu.recordings import convert_table, describe_joint, description_text
+    from tendonfmu.files import check_output, check_output_format
 
-    for name in options:
-        raise InputError(f"convert {TABLE}: --{name}: not an option of this format; expected --map or --finger")
     if map_file is None:
-        raise InputError(f"convert {TABLE}: --map: missing; expected a map of columns (JSON)")
-    check_format(output)
-    outputs = [output] if finger is None else [output, finger]
-    for each in outputs:
+        raise InputError(
+            f"convert {TABLE}: --map: missing; expected a map of columns (JSON), see tendonfmu convert {INSPECT}"
+        )
+    check_output_format(output)
+    for each in [output] if finger is None else [output, finger]:
         check_output(each, file, map_file)
     if finger is not None and finger.resolve() == output.resolve():
         raise InputError(f"{finger}: the same file for recording and description; expected two names")
+    if finger is None:
+        _convert_in_blocks(file, output, map_file)
+    else:
+        _convert_with_finger(file, output, map_file, finger)
+
+
+def _convert_in_blocks(file: Path, output: Path, map_file: Path) -> None:
+    """Convert a log; if its map allows, only some rows are in memory at any time."""
+    from tendonfmu.files import write_blocks
+    from tendonfmu.recordings import Conversion
+
+    conversion = Conversion(file, map_file)
+    count, first, last = 0, 0.0, 0.0
+
+    def counted() -> Iterator[dict[str, NDArray[Any]]]:
+        nonlocal count, first, last
+        for columns in conversion.recording():
+            first = first if count else float(columns["time"][0])
+            count, last = count + len(columns["time"]), float(columns["time"][-1])
+            yield columns
+
+    write_blocks(output, counted())
+    _say_notes(conversion.notes)
+    _say_written(output, count, last - first)
+
+
+def _convert_with_finger(file: Path, output: Path, map_file: Path, finger: Path) -> None:
+    from tendonfmu.files import write_table, write_text
+    from tendonfmu.recordings import convert_table, describe_joint, description_text
+
     log = convert_table(file, map_file)
-    description = None if finger is None else description_text(describe_joint(log))
+    description = description_text(describe_joint(log))
     write_table(output, log.columns)
-    for note in log.notes:
+    _say_notes(log.notes)
+    _say_written(output, len(log.columns["time"]), float(log.columns["time"][-1] - log.columns["time"][0]))
+    write_text(finger, description)
+    say(f"{finger}: the machine described as a finger; `tendonfmu fit` estimates its numbers")
+
+
+def _say_notes(notes: list[str]) -> None:
+    for note in notes:
         say(f"tendonfmu: {note}")
-    _say_written(output, log.columns["time"])
-    if finger is not None and description is not None:
-        with whole_file(finger) as temporary:
-            temporary.write_text(description, encoding="utf-8")
-        say(f"{finger}: the machine described as a finger; `tendonfmu fit` estimates its numbers")
 
 
-def _say_written(output: Path, time: NDArray[Any]) -> None:
-    say(f"{output}: {len(time)} samples, {time[-1] - time[0]:.3f} s")
+def _say_written(output: Path, count: int, duration: float) -> None:
+    say(f"{output}: {count} samples, {duration:.3f} s")

@@ -14,7 +14,17 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.errors import InputError
-from tendonfmu.recordings.converters.log import LONGEST, NUMBER, OTHER, TEXT, TIME_NAMES, Block, Field, Topic, as_numbers
+from tendonfmu.recordings.converters.log import (
+    LONGEST,
+    NUMBER,
+    OTHER,
+    TEXT,
+    TIME_NAMES,
+    Block,
+    Field,
+    Topic,
+    as_numbers,
+)
 
 ROWS = 1 << 18  # of a block
 
@@ -48,7 +58,9 @@ class Array:
 
     def fields(self) -> Iterator[tuple[Field, int | None]]:
         """Yield the fields, each with the column that it is; None: of the only one."""
-        kind = {"b": NUMBER, "i": NUMBER, "u": NUMBER, "f": NUMBER, "S": TEXT, "U": TEXT, "O": TEXT}.get(self.dtype.kind, OTHER)
+        kind = {"b": NUMBER, "i": NUMBER, "u": NUMBER, "f": NUMBER, "S": TEXT, "U": TEXT, "O": TEXT}.get(
+            self.dtype.kind, OTHER
+        )
         kind_name = str(self.dtype)
         if len(self.shape) < 2 or self.shape[1] == 1:
             yield Field(self.name, kind, kind_name, self.unit), None
@@ -58,6 +70,16 @@ class Array:
         else:
             sizes = " x ".join(str(size) for size in self.shape)
             yield Field(self.name, OTHER, f"{kind_name} {sizes}", self.unit), None
+
+
+def rows_of(values: Any, start: int, stop: int) -> Any:
+    """Return rows of an array or dataset."""
+    return values[start:stop]
+
+
+def turned_rows(values: Any, start: int, stop: int) -> Any:
+    """Return columns of an array or dataset as rows."""
+    return np.asarray(values[:, start:stop]).T
 
 
 class ArraysLog:
@@ -133,7 +155,9 @@ def _together(arrays: Sequence[Array]) -> list[list[Array]]:
     found = []
     for length in dict.fromkeys(array.shape[0] for array in arrays):
         alike = [array for array in arrays if array.shape[0] == length]
-        groups = {name: [each for each in alike if each.topic == name] for name in dict.fromkeys(a.topic for a in alike)}
+        groups = {
+            name: [each for each in alike if each.topic == name] for name in dict.fromkeys(a.topic for a in alike)
+        }
         timed = [name for name, members in groups.items() if _has_clock(name, members)]
         if len(timed) < 2:
             first = timed or list(groups)[:1]

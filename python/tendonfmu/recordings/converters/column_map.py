@@ -1,8 +1,8 @@
 """What MAP.json of `tendonfmu convert table` says: which column of a log becomes which of ours, in which unit.
 
-Each of our columns is  sign · scale · factor of the unit · (reading − offset). Where `convert inspect` could not decide,
-a value is "?", which is refused here. docs/reference/commands/convert.md
-explains the keys, and `schema/map.schema.json` defines them for editors.
+Each of our columns is  sign · scale · factor of the unit · (reading − offset). Where `convert inspect` could not
+decide, a value is "?", which is refused here. docs/reference/commands/convert.md explains the keys, and
+`schema/map.schema.json` defines them for editors.
 """
 
 from __future__ import annotations
@@ -343,9 +343,9 @@ def _read_stamp(node: Node, column: str | int, stamp: str) -> MappedColumn:
         if not node.member(key).absent:
             node.member(key).refuse(f'no such key with "unit": "{stamp}"; time counts from the first row')
     zone, pattern = node.member("zone"), node.member("pattern")
-    for key in (zone, pattern):
-        if not key.absent and stamp != "datetime":
-            key.refuse('no such key without "unit": "datetime"')
+    for text in (zone, pattern):
+        if not text.absent and stamp != "datetime":
+            text.refuse('no such key without "unit": "datetime"')
     name = "UTC" if zone.absent else zone.text("the name of a time zone, such as Europe/Berlin")
     try:
         zoneinfo.ZoneInfo(name)

@@ -85,7 +85,9 @@ def _rank(field: Field, prefix: str) -> int | None:
     """Return how likely a field is a clock, 0 most likely, or None."""
     name = field.name.lower()
     inner = name[len(prefix) :] if name.startswith(prefix.lower()) else name
-    last = re.split(r"[/.]", name)[-1]
+    # without a unit: "Time [s]", "t_ms"
+    inner = re.sub(r"[_ ]*(\[.*\]|\(.*\)|_(s|sec|ms|msec|us|usec|ns|nsec))$", "", inner)
+    last = re.split(r"[/.]", re.sub(r"[\[(].*$", "", name))[-1]
     for k, wanted in enumerate(TIME_NAMES):
         if inner == wanted:
             return k
@@ -110,7 +112,7 @@ class Log(Protocol):
     """
 
     file: Path
-    topics: Sequence[Topic]
+    topics: list[Topic]
     notes: list[str]
     open_ended: bool
 

@@ -17,10 +17,10 @@ TEXTS = (".csv", ".txt", ".tsv", ".dat", ".log")
 
 # suffix: module and name of what opens it
 FORMATS = {
-    **{suffix: ("text_log", "TextLog") for suffix in TEXTS},
+    **dict.fromkeys(TEXTS, ("text_log", "TextLog")),
     ".parquet": ("parquet_log", "ParquetLog"),
     ".mat": ("matlab_log", "open_matlab"),
-    **{suffix: ("hdf5_log", "open_hdf5") for suffix in (".h5", ".hdf5", ".hdf")},
+    **dict.fromkeys((".h5", ".hdf5", ".hdf"), ("hdf5_log", "open_hdf5")),
     ".mcap": ("mcap_log", "McapLog"),
     ".db3": ("ros2_bag_log", "open_bag"),
 }
@@ -51,7 +51,9 @@ def open_log(file: Path, settings: LogFormat) -> Log:
     known = ", ".join(FORMATS)
     if not file.is_dir():
         if suffix not in FORMATS or (file.suffix.lower() == ".gz" and suffix not in TEXTS):
-            raise InputError(f"{file}: unknown format {suffix!r}; expected {known}, texts also with .gz, or a bag's folder")
+            raise InputError(
+                f"{file}: unknown format {suffix!r}; expected {known}, texts also with .gz, or a bag's folder"
+            )
         if not file.is_file():
             raise InputError(f"{file}: no such file; expected a log, {known}")
     module, name = FOLDER if file.is_dir() else FORMATS[suffix]

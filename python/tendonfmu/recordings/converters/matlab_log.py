@@ -7,6 +7,7 @@ fully; a note says how to save them as a struct.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.errors import InputError
-from tendonfmu.recordings.converters.arrays_log import Array, ArraysLog
+from tendonfmu.recordings.converters.arrays_log import Array, ArraysLog, rows_of, turned_rows
 from tendonfmu.recordings.converters.column_map import LogFormat
 from tendonfmu.recordings.converters.hdf5_log import damaged, open_file
 
@@ -71,19 +72,19 @@ def _walk(file: Path, name: str, value: Any, topic: str, notes: list[str]) -> It
     elif isinstance(value, np.ndarray) and value.dtype == object:
         if value.size and isinstance(value.flat[0], str):
             cells = value.ravel()
-            yield Array(topic, name, (len(cells),), cells.dtype, lambda a, b, v=cells: v[a:b])
+            yield Array(topic, name, (len(cells),), cells.dtype, functools.partial(rows_of, cells))
             return
         for k, inner in enumerate(value.flat, start=1):
             yield from _walk(file, f"{name}[{k}]", inner, topic, notes)
     elif isinstance(value, np.ndarray) and value.ndim and value.size and value.dtype.names is None:
         found = value.T if value.ndim == 2 and value.shape[0] < value.shape[1] else value
-        yield Array(topic, name, found.shape, found.dtype, lambda a, b, v=found: v[a:b])
+        yield Array(topic, name, found.shape, found.dtype, functools.partial(rows_of, found))
 
 
 def _of_object(file: Path, name: str) -> str:
     return (
-        f"{file}: {name} is a MATLAB object (timetable, datetime, ...), which is not read; in MATLAB save it as a struct: "
-        "S = table2struct(timetable2table(T), 'ToScalar', true), times by posixtime, then save('log.mat', 'S')"
+        f"{file}: {name} is a MATLAB object (timetable, datetime, ...), which is not read; in MATLAB save it as a "
+        "struct: S = table2struct(timetable2table(T), 'ToScalar', true), times by posixtime, then save('log.mat', 'S')"
     )
 
 
@@ -121,5 +122,5 @@ def _of_dataset(name: str, node: Any, topic: str) -> Array:
     """Return a matrix, which MATLAB stores by columns and HDF5 shows by rows; time runs along the longer side."""
     if len(node.shape) == 2 and node.shape[0] <= node.shape[1]:
         shape = (node.shape[1], node.shape[0])
-        return Array(topic, name, shape, node.dtype, lambda a, b, d=node: np.asarray(d[:, a:b]).T)
-    return Array(topic, name, node.shape, node.dtype, lambda a, b, d=node: d[a:b])
+        return Array(topic, name, shape, node.dtype, functools.partial(turned_rows, node))
+    return Array(topic, name, node.shape, node.dtype, functools.partial(rows_of, node))

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from tendonfmu.errors import InputError
+from tendonfmu.files import require_extra
 from tendonfmu.recordings.converters.column_map import LogFormat
-from tendonfmu.recordings.converters.extra import require
 from tendonfmu.recordings.converters.log import Block, Topic
 from tendonfmu.recordings.converters.mcap_records import McapRecords
 from tendonfmu.recordings.converters.messages import Collector, FieldLister, Received
@@ -44,7 +44,9 @@ class McapLog:
         self.topics: list[Topic] = lister.topics()
         if not self.topics:
             said = "; ".join([*self._unknown.values(), *self.notes])
-            raise InputError(f"{file}: no messages that can be read{f' ({said})' if said else ''}; expected at least one")
+            raise InputError(
+                f"{file}: no messages that can be read{f' ({said})' if said else ''}; expected at least one"
+            )
         self.notes.clear()
 
     def _messages(self) -> Iterator[Received]:
@@ -80,7 +82,7 @@ class McapLog:
         if encoding == "cdr" and schema is not None:
             return types.decoder(schema.name, schema.data.decode("utf-8", "replace"), schema.encoding)
         if encoding == "protobuf" and schema is not None:
-            factory = require("mcap_protobuf.decoder", str(self.file)).DecoderFactory()
+            factory = require_extra("mcap_protobuf.decoder", str(self.file)).DecoderFactory()
             found: Decoder | None = factory.decoder_for(encoding, schema)
             return None if found is None else _guarded(found)
         self._unknown[channel.topic] = f"{channel.topic}: messages in {encoding!r}"

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from tendonfmu.errors import InputError
-from tendonfmu.recordings.converters.extra import require
+from tendonfmu.files import require_extra
 
 MAGIC = b"\x89MCAP0\r\n"
 FOOTER = 0x02
@@ -37,8 +37,8 @@ class McapRecords:
     def __init__(self, file: Path) -> None:
         self.file = file
         self.cut = ""
-        self._records = require("mcap.records", str(file))
-        self._stream = require("mcap.data_stream", str(file)).ReadDataStream
+        self._records = require_extra("mcap.records", str(file))
+        self._stream = require_extra("mcap.data_stream", str(file)).ReadDataStream
 
     def __iter__(self) -> Iterator[Any]:
         """Yield records of the package mcap: Schema, Channel and Message."""
@@ -103,8 +103,9 @@ class McapRecords:
             raise InputError(f"{self.file}: compression {compression!r} is not known; expected zstd, lz4 or none")
         if not compression:
             return data
-        module = require("zstandard" if compression == "zstd" else "lz4.frame", str(self.file))
+        module = require_extra("zstandard" if compression == "zstd" else "lz4.frame", str(self.file))
         stream = module.ZstdDecompressor().decompressobj() if compression == "zstd" else module.LZ4FrameDecompressor()
+        damage: type[Exception] = module.ZstdError if compression == "zstd" else RuntimeError
         plain = b""
         try:
             # in small pieces: of a damaged piece nothing comes back
@@ -112,7 +113,7 @@ class McapRecords:
                 if getattr(stream, "eof", False):
                     break
                 plain += stream.decompress(data[at : at + (1 << 16)])
-        except (module.ZstdError if compression == "zstd" else RuntimeError):
+        except damage:
             pass
         return plain
 

@@ -4,7 +4,7 @@
 | --- | --- |
 | `/imu.linear_acceleration.x` | a field of a field |
 | `/hand/tendons.effort[3]` | the third element of an array; indices start at 1 |
-| `/joint_states.position[knuckle]` | the element that belongs to that name: the message has a list of names of the same length |
+| `/joint_states.position[knuckle]` | the element of that name: the message lists names, as many as elements |
 | `/joint_states.header.stamp` | a time, in ns |
 | `/joint_states.@log_time`, `@publish_time` | when the message was recorded, sent; in ns |
 """

@@ -47,8 +47,8 @@ class ParquetLog:
 
     def _cut_off(self, error: Exception) -> InputError:
         return InputError(
-            f"{self.file}: not a whole Parquet file ({str(error).splitlines()[0]}); its index is at its end, so nothing "
-            "can be recovered: copy the file again, or write it again from its source"
+            f"{self.file}: not a whole Parquet file ({str(error).splitlines()[0]}); its index is at its end, so "
+            "nothing can be recovered: copy the file again, or write it again from its source"
         )
 
     def blocks(self, wanted: Mapping[str, Sequence[str]], texts: Sequence[str] = ()) -> Iterator[tuple[str, Block]]:
@@ -64,14 +64,17 @@ class ParquetLog:
             unique = len(set(schema.names)) == len(schema.names)
             try:
                 for batch in parquet.iter_batches(ROWS, columns=columns if unique else None):
-                    yield "", {
-                        name: self._values(
-                            schema.field(place).name,
-                            batch.column(schema.field(place).name) if unique else batch.column(place),
-                            row,
-                        )
-                        for name, place in places.items()
-                    }
+                    yield (
+                        "",
+                        {
+                            name: self._values(
+                                schema.field(place).name,
+                                batch.column(schema.field(place).name) if unique else batch.column(place),
+                                row,
+                            )
+                            for name, place in places.items()
+                        },
+                    )
                     row += batch.num_rows
             except (pa.ArrowException, OSError) as error:
                 raise self._cut_off(error) from None

@@ -55,8 +55,8 @@ class Ranges:
         found = []
         if self._step and not STEPS[0] <= self._step <= STEPS[1]:
             found.append(
-                f"{self._file}: warning: {self._map.columns['time'].path}: {self._step:.3g} s from sample to sample; is its "
-                "unit right?"
+                f"{self._file}: warning: {self._map.columns['time'].path}: {self._step:.3g} s from sample to "
+                "sample; is its unit right?"
             )
         if self._map.joint is not None:
             return found
@@ -68,8 +68,8 @@ class Ranges:
             if too_large or too_small:
                 what = "more than a finger has" if too_large else "hardly a motion"
                 found.append(
-                    f"{self._file}: warning: {self._map.columns[key].path}: {low:.4g} to {high:.4g} {_si(group)}, {what}; is "
-                    "its unit right?"
+                    f"{self._file}: warning: {self._map.columns[key].path}: {low:.4g} to {high:.4g} {_si(group)}, "
+                    f"{what}; is its unit right?"
                 )
         return found
 

@@ -55,15 +55,15 @@ def on_one_clock(
         if gaps.any() and not rule.leave_out_gaps:
             at = float(time[int(np.argmax(gaps))])
             raise InputError(
-                f"{file}: {label}a gap of {largest:.4g} s, the first near time {at:.6g} s; expected at most {limit:.4g} s, "
-                'or "resample": {"gaps": "leave out"} or a "largest_gap" in the map'
+                f"{file}: {label}a gap of {largest:.4g} s, the first near time {at:.6g} s; expected at most "
+                f'{limit:.4g} s, or "resample": {{"gaps": "leave out"}} or a "largest_gap" in the map'
             )
         in_gap |= gaps
     if in_gap.any():
         notes.append(f"{file}: {np.count_nonzero(in_gap)} of {len(time)} samples lie in gaps and are left out")
         time = time[~in_gap]
     if not len(time):
-        raise InputError(f"{file}: no sample outside gaps; expected a smaller \"rate\" or a larger \"largest_gap\"")
+        raise InputError(f'{file}: no sample outside gaps; expected a smaller "rate" or a larger "largest_gap"')
     found = {"time": time}
     for name, columns in topics.items():
         for key, values in columns.items():
@@ -72,7 +72,9 @@ def on_one_clock(
             if name == main and rule.rate is None:
                 found[key] = values[np.isin(columns["time"], time)]
             else:
-                found[key] = _held(time, columns["time"], values) if key == LABEL else np.interp(time, columns["time"], values)
+                found[key] = (
+                    _held(time, columns["time"], values) if key == LABEL else np.interp(time, columns["time"], values)
+                )
     return found, notes
 
 

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from tendonfmu.errors import InputError
+from tendonfmu.files import require_extra
 from tendonfmu.recordings.converters.column_map import LogFormat
-from tendonfmu.recordings.converters.extra import require
 from tendonfmu.recordings.converters.log import Block, Log, Topic
 from tendonfmu.recordings.converters.mcap_log import McapLog
 from tendonfmu.recordings.converters.messages import Collector, FieldLister, Received
@@ -30,7 +30,11 @@ def open_bag(file: Path, settings: LogFormat) -> Log:
     parts = sorted(file.glob("*.mcap"), key=_in_order) or sorted(file.glob("*.db3"), key=_in_order)
     if not parts:
         packed = next((each.name for each in file.iterdir() if each.suffix == ".zstd"), "")
-        what = f"compressed files, such as {packed}; unpack them: zstd -d --rm *.zstd" if packed else "no .mcap or .db3 file"
+        what = (
+            f"compressed files, such as {packed}; unpack them: zstd -d --rm *.zstd"
+            if packed
+            else "no .mcap or .db3 file"
+        )
         raise InputError(f"{file}: a folder with {what}; expected a ROS 2 bag")
     return McapLog(file, settings, parts) if parts[0].suffix == ".mcap" else Db3Log(file, settings, parts)
 
@@ -66,7 +70,9 @@ class Db3Log:
         self.topics: list[Topic] = lister.topics()
         if not self.topics:
             said = "; ".join([*self._unknown, *self.notes])
-            raise InputError(f"{file}: no messages that can be read{f' ({said})' if said else ''}; expected at least one")
+            raise InputError(
+                f"{file}: no messages that can be read{f' ({said})' if said else ''}; expected at least one"
+            )
         self.notes.clear()
 
     def _messages(self) -> Iterator[Received]:
@@ -124,7 +130,7 @@ class Db3Log:
     def _late(self, decode: Any, data: bytes) -> Any:
         def decoded() -> Any:
             if data[:4] == ZSTD_MARK:
-                return decode(require("zstandard", str(self.file)).ZstdDecompressor().decompress(data))
+                return decode(require_extra("zstandard", str(self.file)).ZstdDecompressor().decompress(data))
             return decode(data)
 
         return decoded

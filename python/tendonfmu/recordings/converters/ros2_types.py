@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from tendonfmu.recordings.converters.extra import require
+from tendonfmu.files import require_extra
 
 
 class Ros2Types:
@@ -19,7 +19,7 @@ class Ros2Types:
     """
 
     def __init__(self, file: Path) -> None:
-        self._typesys = require("rosbags.typesys", str(file))
+        self._typesys = require_extra("rosbags.typesys", str(file))
         self._own = self._typesys.get_typestore(self._typesys.Stores.EMPTY)
         self._usual: Any = None
 

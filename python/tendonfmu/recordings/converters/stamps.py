@@ -60,13 +60,14 @@ def _of_numbers(file: Path, column: MappedColumn, readings: NDArray[Any], row: i
         return whole * unit
     if column.stamp == "datetime":
         raise InputError(
-            f'{file}: column {column.source}, row {row + 1}: {readings[0]!r}; expected a time; for a number write '
+            f"{file}: column {column.source}, row {row + 1}: {readings[0]!r}; expected a time; for a number write "
             f'"unit": "epoch_s" (or ms, us, ns) at {column.path}'
         )
     _refuse(file, column, ~(np.abs(readings) <= LATEST / unit), readings, row, f"a time in {column.stamp}")
     whole = np.floor(readings)
     # the integer part apart: a product of a double would lose nanoseconds
-    return whole.astype(np.int64) * unit + np.round((readings - whole) * unit).astype(np.int64)
+    stamps: NDArray[np.int64] = whole.astype(np.int64) * unit + np.round((readings - whole) * unit).astype(np.int64)
+    return stamps
 
 
 def _of_digits(file: Path, column: MappedColumn, readings: Any, row: int) -> NDArray[np.int64]:
@@ -94,7 +95,9 @@ def _exact(file: Path, column: MappedColumn, text: str | None, row: int) -> int:
             return int(value.to_integral_value())
     except InvalidOperation:
         pass
-    raise InputError(f"{file}: column {column.source}, row {row + 1}: {text or ''!r}; expected a time in {column.stamp}")
+    raise InputError(
+        f"{file}: column {column.source}, row {row + 1}: {text or ''!r}; expected a time in {column.stamp}"
+    )
 
 
 def _of_texts(file: Path, column: MappedColumn, readings: Any, row: int) -> NDArray[np.int64]:
@@ -103,7 +106,9 @@ def _of_texts(file: Path, column: MappedColumn, readings: Any, row: int) -> NDAr
 
     texts = pc.utf8_trim_whitespace(readings)
     if column.pattern:
-        return np.array([_by_pattern(file, column, text, row + k) for k, text in enumerate(texts.to_pylist())], np.int64)
+        return np.array(
+            [_by_pattern(file, column, text, row + k) for k, text in enumerate(texts.to_pylist())], np.int64
+        )
     zoned = pc.match_substring_regex(texts, ZONED)
     try:
         if pc.all(zoned).as_py():
@@ -129,12 +134,12 @@ def _by_iso(file: Path, column: MappedColumn, text: str | None, row: int) -> int
             if column.zone == "UTC":
                 return int(moment)
             local = datetime.datetime.fromtimestamp(moment // NANOSECONDS, datetime.timezone.utc)
-            return _in_zone(local, column.zone) * NANOSECONDS + moment % NANOSECONDS
+            return _in_zone(local, column.zone) * NANOSECONDS + int(moment) % NANOSECONDS
         return int(pa.scalar(text or "").cast(pa.timestamp("ns", "UTC")).value)
     except pa.ArrowInvalid:
         raise InputError(
-            f"{file}: column {column.source}, row {row + 1}: {text or ''!r}; expected a time as in 2026-05-01T12:00:00.5Z, "
-            f'or a "pattern" at {column.path}'
+            f"{file}: column {column.source}, row {row + 1}: {text or ''!r}; expected a time as in "
+            f'2026-05-01T12:00:00.5Z, or a "pattern" at {column.path}'
         ) from None
 
 

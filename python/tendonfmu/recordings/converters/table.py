@@ -1,7 +1,7 @@
 """How a user's log becomes a recording, with a map of columns: docs/reference/commands/convert.md.
 
-Rows pass in blocks where each row of the recording depends on one row of the log. A one-joint machine, several clocks, a
-new rate and sorting need the whole log.
+Rows pass in blocks where each row of the recording depends on one row of the log. A one-joint machine, several clocks,
+a new rate and sorting need the whole log.
 """
 
 from __future__ import annotations
@@ -64,12 +64,15 @@ class Conversion:
         What was left out or computed. Complete after the last block.
     in_blocks
         Whether `blocks` needs little memory, however long the log is.
+    velocity_cutoff
+        As in `ConvertedLog`.
     """
 
     def __init__(self, file: Path, map_file: Path) -> None:
         self.map = read_map(map_file)
         self.log: Log = open_log(file, self.map.log)
         self.notes: list[str] = []
+        self.velocity_cutoff = 0.0
         self._topics: dict[str, Topic] = {}
         self._names: dict[str, dict[str, str]] = {}
         for key, column in self.map.columns.items():
@@ -96,12 +99,13 @@ class Conversion:
             owner, source = find_field(self.log, clock.source, f"{self.map.path}: {clock.path}")
             if owner.name != name:
                 raise InputError(
-                    f"{self.map.path}: {clock.path}.column = {clock.source!r}: a field of {owner.name}; expected one of {name}"
+                    f"{self.map.path}: {clock.path}.column = {clock.source!r}: a field of {owner.name}; "
+                    f"expected one of {name}"
                 )
             if bool(clock.stamp) != bool(time.stamp):
                 raise InputError(
-                    f'{self.map.path}: {clock.path}: a clock of another kind than {time.path}; expected "unit": "datetime" '
-                    "or epoch_... for both, or for none"
+                    f'{self.map.path}: {clock.path}: a clock of another kind than {time.path}; expected "unit": '
+                    '"datetime" or epoch_... for both, or for none'
                 )
             self._clocks[name] = clock
             self._names[name]["time"] = source
@@ -125,6 +129,20 @@ class Conversion:
             yield columns
         self.notes += ranges.notes()
 
+    def recording(self) -> Iterator[dict[str, Series]]:
+        """Yield the columns of the recording, also of a one-joint machine; as `blocks`, at least one block."""
+        count = 0
+        for columns in self.blocks():
+            count += 1
+            if self.map.joint is None:
+                yield columns
+            else:
+                made, self.velocity_cutoff, notes = joint_columns(self.log.file, columns, self.map.joint)
+                self.notes += notes
+                yield made
+        if not count:
+            raise InputError(f"{self.log.file}: no samples; expected at least one row of numbers")
+
     def _readers(self) -> dict[str, TopicRows]:
         settings = self.map.log
         readers = {}
@@ -141,7 +159,9 @@ class Conversion:
             yield name, readers[name].rows(block)
         for name, reader in readers.items():
             if not reader.count:
-                raise InputError(f"{self.log.file}: no samples{f' of {name}' if name else ''}; expected at least one row")
+                raise InputError(
+                    f"{self.log.file}: no samples{f' of {name}' if name else ''}; expected at least one row"
+                )
             if reader.left_out:
                 self.notes.append(f"{self.log.file}: {reader.left_out} rows without a number are left out")
 
@@ -201,15 +221,9 @@ def convert_table(file: Path, map_file: Path) -> ConvertedLog:
         The file, column or key, and row that is wrong, and what was expected.
     """
     conversion = Conversion(file, map_file)
-    blocks = list(conversion.blocks())
-    if not blocks:
-        raise InputError(f"{file}: no samples; expected at least one row")
+    blocks = list(conversion.recording())
     columns = {key: np.concatenate([block[key] for block in blocks]) for key in blocks[0]}
-    wanted = conversion.map
-    if wanted.joint is None:
-        return ConvertedLog(columns, wanted, notes=conversion.notes)
-    made, cutoff, notes = joint_columns(file, columns, wanted.joint)
-    return ConvertedLog(made, wanted, cutoff, [*conversion.notes, *notes])
+    return ConvertedLog(columns, conversion.map, conversion.velocity_cutoff, conversion.notes)
 
 
 def _check_contact(file: Path, wanted: ColumnMap, columns: Mapping[str, Series], rows: Rows) -> None:

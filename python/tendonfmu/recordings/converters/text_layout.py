@@ -184,7 +184,11 @@ def _names_at(
     rows = [len(fields_of(line, separator)) for _, line in plain[-50:]]
     width = Counter(rows).most_common(1)[0][0]
     first = next(
-        (k for k, line in plain if len(fields_of(line, separator)) == width and _is_row(fields_of(line, separator), decimal)),
+        (
+            k
+            for k, line in plain
+            if len(fields_of(line, separator)) == width and _is_row(fields_of(line, separator), decimal)
+        ),
         None,
     )
     # the last line before the first row that has a name for each column; a comment may hold the names

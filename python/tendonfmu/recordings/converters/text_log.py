@@ -51,6 +51,7 @@ class TextLog:
     def __init__(self, file: Path, settings: LogFormat) -> None:
         self.file = file
         self.notes: list[str] = []
+        self._tail_notes: list[str] = []
         self.compressed = file.suffix.lower() == ".gz"
         begin = b"".join(_first(self._bytes([]), 1 << 18))
         self.encoding, note = find_encoding(file, begin, settings.encoding)
@@ -59,7 +60,9 @@ class TextLog:
         for text in self._texts(begin_only=True):
             head += text.split("\n")[:-1]
         self.layout: Layout = find_layout(file, head[: (settings.skip or 0) + SAMPLE], settings)
-        self.rows_at_head = [fields_of(line, self.layout.separator) for line in head[self.layout.start :] if line.strip()]
+        self.rows_at_head = [
+            fields_of(line, self.layout.separator) for line in head[self.layout.start :] if line.strip()
+        ]
         self.topics = [Topic("", tuple(self._fields()))]
 
     def _fields(self) -> Iterator[Field]:
@@ -153,7 +156,6 @@ class TextLog:
         names = list(wanted.get("", ()))
         places = {name: self._place(name) for name in names}
         row, skip = 0, self.layout.start
-        self._tail_notes: list[str] = []
         for text in self._texts():
             if skip:
                 lines = text.split("\n")
@@ -210,9 +212,7 @@ class TextLog:
             for name, place in places.items()
         }
 
-    def _parse_by_field(
-        self, lines: list[str], places: Mapping[str, int], texts: Sequence[str], row: int
-    ) -> Block:
+    def _parse_by_field(self, lines: list[str], places: Mapping[str, int], texts: Sequence[str], row: int) -> Block:
         """Return the same, and refuse the first invalid field by name."""
         import pyarrow as pa
 
@@ -269,4 +269,3 @@ def _first(chunks: Iterator[bytes], most: int) -> Iterator[bytes]:
         most -= len(chunk)
         if most <= 0:
             return
-

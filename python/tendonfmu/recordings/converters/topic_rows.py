@@ -111,7 +111,8 @@ class TopicRows:
         advice = ', or "missing": "leave out" in "log" of the map' if np.isnan(values[k]) else ""
         found = "no number ('' or nan)" if np.isnan(values[k]) else f"{values[k]:g}"
         raise InputError(
-            f"{self._file}: column {self.columns[key].source}, row {row + k + 1}: {found}; expected a finite number{advice}"
+            f"{self._file}: column {self.columns[key].source}, row {row + k + 1}: {found}; "
+            f"expected a finite number{advice}"
         )
 
     def _numeric(self, key: str, values: Any, row: int) -> NDArray[Any]:
@@ -205,6 +206,6 @@ def clock_of(file: Path, topic: Topic, main: Topic, name: str, time: MappedColum
     likely = topic.clocks()
     example = likely[0] if likely else f"{topic.prefix}{TIME_NAMES[0]}"
     raise InputError(
-        f"{file}: {topic.name} has another clock than {main.name}, and no {relative}; expected its time in the map, such "
-        f'as "log": {{"clocks": {{"{topic.name}": {{"column": "{example}", "unit": ...}}}}}}'
+        f"{file}: {topic.name} has another clock than {main.name}, and no {relative}; expected its time in the map, "
+        f'such as "log": {{"clocks": {{"{topic.name}": {{"column": "{example}", "unit": ...}}}}}}'
     )

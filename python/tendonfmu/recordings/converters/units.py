@@ -13,7 +13,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from tendonfmu.recordings.converters.extra import require
+from tendonfmu.files import require_extra
 
 POUND_FORCE = 4.4482216152605  # N, by definition
 INCH = 0.0254  # m, by definition
@@ -116,12 +116,14 @@ def quantity(name: str) -> tuple[str, str] | None:
 
 @functools.cache
 def _registry() -> Any:
-    pint = require("pint", "the unit")
+    import pint
+
     return pint.UnitRegistry()
 
 
 def _factor_by_pint(name: str, reference: str) -> float | None:
     """Return the factor to `reference`, or None. Root units keep the radian, which has no dimension, apart from 1."""
+    require_extra("pint", f"unit {name!r}")
     registry = _registry()
     try:
         found = registry.Quantity(1.0, registry.parse_units(name)).to_root_units()

@@ -8,7 +8,7 @@ from typing import Any
 from tendonfmu.errors import InputError
 
 
-def require(module: str, what: str) -> Any:
+def require_extra(module: str, what: str) -> Any:
     """Import a module of the extra `logs`.
 
     Parameters
