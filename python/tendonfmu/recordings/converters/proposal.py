@@ -26,6 +26,8 @@ QUANTITY = {
 BY_QUANTITY = {"force": "tendon_force", "length": "tendon_position", "angle": "joint_position", "torque": "torque"}
 BY_QUANTITY["angular speed"] = "joint_velocity"
 
+SI = {"force": "N", "length": "m", "angle": "rad", "angular speed": "rad/s", "torque": "N.m"}
+
 TENDON = {"tendon", "tendons", "cable", "spool", "motor", "motors", "actuator", "wire", "winch", "excursion", "x0"}
 MOTION = {
     "position",
@@ -210,6 +212,10 @@ def _line(found: Inspection, column: str, group: str, summary: FieldSummary, sho
     named = summary.field
     words = set(words_of(named.name))
     said = stated(named.name, named.unit)
+    if re.search(rf"(^|[./]){re.escape(column)}$", named.name) and not named.unit:
+        return Line(
+            column, _source(found, summary), SI[QUANTITY[group]], SURE, "the name of a recording's column, in SI"
+        )
     if group == "tendon_position" and said is not None and said[1] == "angle":
         guess = Guess(
             UNDECIDED,

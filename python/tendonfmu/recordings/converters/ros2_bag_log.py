@@ -6,9 +6,13 @@ as far as SQLite and MCAP allow.
 
 from __future__ import annotations
 
+import os
 import re
+import shutil
 import sqlite3
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -80,7 +84,11 @@ class Db3Log:
             yield from self._of(part)
 
     def _of(self, part: Path) -> Iterator[Received]:
-        connection = _connect(part)
+        with _whole_pages(part) as readable:
+            yield from self._of_whole_pages(part, readable)
+
+    def _of_whole_pages(self, part: Path, readable: Path) -> Iterator[Received]:
+        connection = _connect(readable)
         kept, cut = 0, ""
         try:
             topics = self._topics(part, connection)
@@ -159,10 +167,32 @@ def _connect(part: Path) -> sqlite3.Connection:
     return connection
 
 
+@contextmanager
+def _whole_pages(part: Path) -> Iterator[Path]:
+    """Yield a file whose last page is whole: SQLite takes what is missing of a page for zeros."""
+    page, _ = _pages(part)
+    size = part.stat().st_size
+    if not page or size % page == 0:
+        yield part
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / part.name
+        shutil.copyfile(part, copy)
+        os.truncate(copy, size - size % page)
+        yield copy
+
+
 def _is_short(part: Path) -> bool:
     """Return whether a file has fewer pages than its head states."""
+    page, count = _pages(part)
+    return count * page > part.stat().st_size
+
+
+def _pages(part: Path) -> tuple[int, int]:
+    """Return the size of a page, 0 if the file has no head, and the number of pages that the head states."""
     with open(part, "rb") as raw:
         head = raw.read(32)
+    if len(head) < 32 or not head.startswith(b"SQLite format 3"):
+        return 0, 0
     size = int.from_bytes(head[16:18], "big")
-    size = 65536 if size == 1 else size
-    return int.from_bytes(head[28:32], "big") * size > part.stat().st_size
+    return 65536 if size == 1 else size, int.from_bytes(head[28:32], "big")

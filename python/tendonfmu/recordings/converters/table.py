@@ -182,11 +182,11 @@ class Conversion:
         for name, rows in self._rows(readers):
             parts[name].append(rows)
         found = {}
-        main = readers[self._main]
-        for name, reader in readers.items():
-            rows = reader.in_order(Rows.joined(parts[name]), self.notes)
-            first = {**reader.first, "time": main.first["time"]}
-            found[name] = as_columns(rows, reader.columns, first)
+        ordered = {name: reader.in_order(Rows.joined(parts[name]), self.notes) for name, reader in readers.items()}
+        start = ordered[self._main].readings["time"][0]
+        for name, rows in ordered.items():
+            first = {key: values[0] for key, values in rows.readings.items()}
+            found[name] = as_columns(rows, readers[name].columns, {**first, "time": start})
             _check_contact(self.log.file, self.map, found[name], rows)
         self.notes = [*self.log.notes, *self.notes]
         if len(found) == 1 and (self.map.resample is None or self.map.resample.rate is None):

@@ -140,7 +140,8 @@ class TopicRows:
             what = "the same time" if time[k] == time[k - 1] else "time goes back"
             raise InputError(
                 f"{self._file}: column {self.columns['time'].source}, row {number}: {what}, {time[k].item()!r} after "
-                f'{time[k - 1].item()!r}; expected increasing times, or "disorder": "sort" in "log" of the map'
+                f"{time[k - 1].item()!r}; expected increasing times. Divide the log there; or, if rows are only "
+                'shuffled or repeated, set "disorder": "sort" in "log" of the map'
             )
         if len(time):
             self._last = time[-1]
