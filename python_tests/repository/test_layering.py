@@ -54,6 +54,7 @@ COMMANDS = {
     "cli/campaign.py",
     "cli/check.py",
     "cli/convert.py",
+    "cli/describe.py",
     "cli/detect.py",
     "cli/diagnose.py",
     "cli/options.py",

@@ -10,7 +10,9 @@ from .converters.inspection_text import inspection_document as inspection_docume
 from .converters.inspection_text import proposal_rows as proposal_rows
 from .converters.inspection_text import time_factor as time_factor
 from .converters.one_joint_description import describe_joint as describe_joint
+from .converters.one_joint_description import describe_recorded_joint as describe_recorded_joint
 from .converters.one_joint_description import description_text as description_text
+from .converters.one_joint_description import joint_description as joint_description
 from .converters.proposal import Proposal as Proposal
 from .converters.proposal import propose as propose
 from .converters.table import Conversion as Conversion

@@ -166,8 +166,7 @@ class TextLog:
             block, count = self._parse(text, places, texts, row)
             row += count
             yield "", block
-        lost = [note if "last line" in note else f"{note} ({row} rows are kept)" for note in self._tail_notes]
-        self.notes = [*self._hints, *lost]
+        self.notes = [*self._hints, *(f"{note}; {row} rows are kept" for note in self._tail_notes)]
 
     def _place(self, name: str) -> int:
         if name.startswith(NUMBERED) and name not in self.layout.names:
