@@ -62,8 +62,15 @@ def describe(
     numbers = {"torque": torque, "speed": speed, "coulomb": coulomb, "viscous": viscous, "inertia": inertia}
     if recording is None:
         check_output(output)
-        rest = {"coulomb": coulomb, "viscous": viscous, "inertia": inertia or 0.0, "moment_arm": moment_arm}
-        document = joint_description(name, 1.0 if torque is None else torque, 5.0 if speed is None else speed, **rest)
+        document = joint_description(
+            name,
+            1.0 if torque is None else torque,
+            5.0 if speed is None else speed,
+            coulomb=coulomb,
+            viscous=viscous,
+            inertia=inertia or 0.0,
+            moment_arm=moment_arm,
+        )
     else:
         for option, value in numbers.items():
             if value is not None:

@@ -32,7 +32,7 @@ from tendonfmu.recordings.converters.text_layout import (
     is_number,
 )
 
-CHUNK = 8 << 20  # bytes of text at once
+CHUNK = 4 << 20  # bytes of text at once
 
 
 class TextLog:
