@@ -159,6 +159,41 @@ def test_a_motor_may_turn_many_times(call: Call, tmp_path: Path) -> None:
     assert answer.status == 0 and "nothing found" in answer.out and answer.err == "", answer
 
 
+# --- describe joint ---------------------------------------------------------------------------------------------------
+
+
+def test_a_description_without_a_log(call: Call, tmp_path: Path) -> None:
+    """It is sound, holds what was given, and a recording fits it to the friction of the machine."""
+    answer = call("describe", "joint", "--name", "axis 3", "--torque", "4", "--coulomb", "0.5", "-o", "axis.json")
+    assert answer.status == 0 and "axis 3" in answer.err, answer
+    data = read_finger(tmp_path / "axis.json").data
+    law = data["joints"][0]["friction"]
+    assert (data["name"], law["coulomb"], law["viscous"]) == ("axis 3", 0.5, pytest.approx(0.02 * 4 / 5))
+    machine_log(tmp_path, machine(noise=0.02))
+    assert call("convert", "table", "log.csv", "--map", "map.json", "-o", "rec.parquet").status == 0
+    assert call("check", "axis.json", "rec.parquet").status == 0
+    assert call("fit", "axis.json", "rec.parquet", "--kinematics", "3", "-o", "fitted.json").status == 0
+    fitted = read_finger(tmp_path / "fitted.json").data["joints"][0]["friction"]
+    assert (fitted["coulomb"], fitted["viscous"]) == pytest.approx((COULOMB, VISCOUS), rel=0.03)
+
+
+def test_a_description_from_a_recording_is_that_of_convert(call: Call, tmp_path: Path) -> None:
+    machine_log(tmp_path, machine(noise=0.02))
+    made = call("convert", "table", "log.csv", "--map", "map.json", "-o", "rec.parquet", "--finger", "one.json")
+    assert made.status == 0
+    assert call("describe", "joint", "--name", "joint", "--recording", "rec.parquet", "-o", "other.json").status == 0
+    assert json.loads((tmp_path / "one.json").read_text()) == json.loads((tmp_path / "other.json").read_text())
+    for arguments, words in (
+        (["finger", "--name", "a"], ["'finger'", "joint"]),
+        (["joint", "--name", " "], ["--name"]),
+        (["joint", "--name", "a", "--recording", "rec.parquet", "--torque", "3"], ["--torque", "--recording"]),
+        (["joint", "--name", "a", "--recording", "absent.csv"], ["absent.csv"]),
+    ):
+        answer = call("describe", *arguments, "-o", "new.json")
+        assert answer.status == 2 and len(answer.err.splitlines()) == 1, answer
+        assert all(word in answer.err for word in words) and not (tmp_path / "new.json").exists()
+
+
 # --- the example ------------------------------------------------------------------------------------------------------
 
 
