@@ -23,7 +23,9 @@ from repository_paths import ROOT
 from tendonfmu.errors import InputError
 from tendonfmu.files.tables import read_table, write_table
 from tendonfmu.model.description import read_finger
+from tendonfmu.recordings.converters import units
 from tendonfmu.recordings.converters.column_map import read_map
+from tendonfmu.recordings.converters.log_file import FORMATS
 from tendonfmu.recordings.converters.one_joint import central_velocity
 from tendonfmu.recordings.converters.one_joint_description import starting_numbers
 from tendonfmu.recordings.converters.table import convert_table
@@ -235,12 +237,16 @@ def blocks(language: str) -> list[str]:
 def test_the_page_names_every_key_and_unit() -> None:
     """In the tables of keys, and in that of units; its maps are sound, the first one is the example's."""
     keys = set(re.findall(r"`(\w+)`", "\n".join(re.findall(r"^\| `.*$", PAGE, re.MULTILINE))))
+    resample = set(SCHEMA["properties"]["resample"]["properties"])
     log = set(SCHEMA["properties"]["log"]["properties"])
     joints = {key for kind in SCHEMA["properties"]["joint"]["oneOf"] for key in kind["properties"]}
-    assert log | joints | set(SCHEMA["$defs"]["time"]["properties"]) <= keys
+    assert log | joints | resample | set(SCHEMA["$defs"]["time"]["properties"]) <= keys
     for name in ("time", "force", "torque", "length", "angle", "speed", "angular_speed"):
-        row = f"| {name.replace('_', ' ')} | {', '.join(SCHEMA['$defs'][name]['properties']['unit']['enum'])} |"
-        assert row in PAGE, row
+        offered = SCHEMA["$defs"][name]["properties"]["unit"]["anyOf"][0]["enum"]
+        common = [unit for unit in offered if unit not in units.STAMPS]
+        assert f"| {name.replace('_', ' ')} | {', '.join(common)} |" in PAGE, name
+    assert all(f"`{stamp}`" in PAGE for stamp in units.STAMPS)
+    assert all(f"`{suffix}`" in PAGE for suffix in FORMATS)
     for text in blocks("json"):
         VALIDATOR.validate(json.loads(text))
     assert json.loads(blocks("json")[0]) == json.loads((EXAMPLE / "map.json").read_text(encoding="utf-8"))

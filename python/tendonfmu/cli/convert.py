@@ -136,17 +136,14 @@ def _inspect(file: Path, output: Path | None, as_json: bool) -> None:
 
 
 def _print_inspection(found: Inspection, proposal: Proposal) -> None:
-    from rich.markup import escape
-
     from tendonfmu.recordings import clock_line, field_rows, proposal_rows, time_factor
 
     headings = ("field", "type", "unit", "values", "missing", "least", "most")
     for topic in found.topics:
-        rows = [[escape(cell) for cell in row] for row in field_rows(topic)]
         line = clock_line(topic, time_factor(proposal, topic))
-        print_tables([(escape(topic.topic.name), headings, rows)], [escape(line)], "")
-    rows = [[escape(cell) for cell in row] for row in proposal_rows(proposal)]
-    print_tables([("proposed map", ("column", "field", "unit", "sure", "why"), rows)], [], "why")
+        print_tables([(topic.topic.name, headings, list(field_rows(topic)))], [line], "")
+    columns = ("column", "field", "unit", "sure", "why")
+    print_tables([("proposed map", columns, list(proposal_rows(proposal)))], [], "why")
 
 
 def _convert_table(file: Path, output: Path, map_file: Path | None, finger: Path | None) -> None:
