@@ -142,12 +142,11 @@ def test_joint_states_are_found_by_name(call: Call, tmp_path: Path) -> None:
 def test_bad_usage(call: Call, tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("t,force\n1,2\n")
     for arguments, words in (
-        (["inspect", "log.csv", "--map", "map.json"], ["--map", "-o and --json"]),
+        (["inspect", "log.csv", "--map", "map.json"], ["--map", "expected -o"]),
         (["inspect", "log.csv", "-o", "map.csv"], ["map.csv", ".json"]),
         (["inspect", "absent.csv"], ["absent.csv", "no such file"]),
         (["inspect", "log.csv", "-o", "log.json/x.json"], ["log.json"]),
         (["table", "log.csv", "--map", "map.json"], ["--output", "missing"]),
-        (["davinci", "log.csv", "-o", "rec.csv", "--json"], ["--json", "inspect"]),
     ):
         answer = call("convert", *arguments)
         assert answer.status == 2 and len(answer.err.splitlines()) == 1, answer

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tendonfmu.cli.console import print_tables, say, show
+from tendonfmu.cli.console import print_json, print_tables, say, warn
+from tendonfmu.cli.options import AsJson, Quiet
 from tendonfmu.errors import InputError
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def convert(
     radius: Annotated[
         float | None,
         typer.Option(
-            min=1e-6, max=1.0, help="m; davinci: radius of the pulley with the recorded torque \\[default: 0.005]"
+            min=1e-6, max=1.0, help="m; davinci: radius of the pulley with the recorded torque [default: 0.005]"
         ),
     ] = None,
     pretension: Annotated[
@@ -52,17 +53,17 @@ def convert(
         typer.Option(
             min=0.0,
             max=1e6,
-            help="N; davinci: pretension of the loop, records the closing cable only \\[default: 0, net force]",
+            help="N; davinci: pretension of the loop, records the closing cable only [default: 0, net force]",
         ),
     ] = None,
     mass: Annotated[
         float | None,
         typer.Option(
-            min=0.0, max=1e6, help="kg; emps: moved mass, whose inertial force is known load \\[default: 95.1089]"
+            min=0.0, max=1e6, help="kg; emps: moved mass, whose inertial force is known load [default: 95.1089]"
         ),
     ] = None,
     decimation: Annotated[
-        int | None, typer.Option(min=1, max=1000, help="emps: keep one in so many samples, smoothed \\[default: 10]")
+        int | None, typer.Option(min=1, max=1000, help="emps: keep one in so many samples, smoothed [default: 10]")
     ] = None,
     map_: Annotated[
         Path | None,
@@ -72,7 +73,8 @@ def convert(
         Path | None,
         typer.Option(metavar="FINGER.json", help="table: description of the one-joint machine to write"),
     ] = None,
-    json_: Annotated[bool, typer.Option("--json", help="inspect: print all results as JSON")] = False,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
     """Convert a third-party recording or any log into a recording of tendonfmu.
 
@@ -82,18 +84,20 @@ def convert(
     given = {"radius": radius, "pretension": pretension, "mass": mass, "decimation": decimation}
     options = {name: value for name, value in given.items() if value is not None}
     if source == INSPECT:
-        _refuse_options(source, {**options, "map": map_, "finger": finger}, "-o and --json")
-        _inspect(file, output, json_)
-        return
-    if json_:
-        raise InputError(f"convert {source}: --json: not an option of this format; expected convert {INSPECT}")
-    if output is None:
+        _refuse_options(source, {**options, "map": map_, "finger": finger}, "-o")
+        report = _inspect(file, output)
+    elif output is None:
         raise InputError(f"convert {source}: --output: missing; expected the recording to write, -o REC.parquet")
-    if source == TABLE:
+    elif source == TABLE:
         _refuse_options(source, options, "--map or --finger")
-        _convert_table(file, output, map_, finger)
-        return
-    _refuse_options(source, {"map": map_, "finger": finger}, f"convert {TABLE}")
+        report = _convert_table(file, output, map_, finger)
+    else:
+        _refuse_options(source, {"map": map_, "finger": finger}, f"convert {TABLE}")
+        report = _convert_data_set(source, file, output, options)
+    print_json(lambda: report)
+
+
+def _convert_data_set(source: str, file: Path, output: Path, options: Mapping[str, float]) -> dict[str, Any]:
     from tendonfmu.files import check_format, check_output, write_table
     from tendonfmu.recordings import convert_file
 
@@ -101,7 +105,7 @@ def convert(
     check_output(output, file)
     table = convert_file(source, file, options)
     write_table(output, table)
-    _say_written(output, len(table["time"]), float(table["time"][-1] - table["time"][0]))
+    return _written(output, len(table["time"]), float(table["time"][-1] - table["time"][0]), [])
 
 
 def _refuse_options(source: str, options: Mapping[str, Any], expected: str) -> None:
@@ -111,8 +115,8 @@ def _refuse_options(source: str, options: Mapping[str, Any], expected: str) -> N
             raise InputError(f"convert {source}: --{name}: not an option of this format; expected {expected}")
 
 
-def _inspect(file: Path, output: Path | None, as_json: bool) -> None:
-    """Print what is in a log, and write the proposed map."""
+def _inspect(file: Path, output: Path | None) -> dict[str, Any]:
+    """Print what is in a log, write the proposed map, and return both."""
     from tendonfmu.files import check_output, write_text
     from tendonfmu.recordings import inspect_log, inspection_document, propose
 
@@ -122,17 +126,15 @@ def _inspect(file: Path, output: Path | None, as_json: bool) -> None:
         check_output(output, file)
     found = inspect_log(file)
     proposal = propose(found)
-    if as_json:
-        show(json.dumps(inspection_document(found, proposal), indent=1, allow_nan=False, ensure_ascii=False))
-    else:
-        _print_inspection(found, proposal)
+    _print_inspection(found, proposal)
     for note in found.notes:
-        say(f"tendonfmu: warning: {note}")
+        warn(note)
     if output is not None:
         write_text(output, json.dumps(proposal.document, indent=1, ensure_ascii=False) + "\n")
         undecided = [line.column for line in proposal.lines if "?" in (line.source, line.unit)]
         left = f'; "?" is left to you: {", ".join(undecided)}' if undecided else ""
         say(f"{output}: a map of {len(proposal.lines)} columns{left}")
+    return inspection_document(found, proposal)
 
 
 def _print_inspection(found: Inspection, proposal: Proposal) -> None:
@@ -146,7 +148,7 @@ def _print_inspection(found: Inspection, proposal: Proposal) -> None:
     print_tables([("proposed map", columns, list(proposal_rows(proposal)))], [], "why")
 
 
-def _convert_table(file: Path, output: Path, map_file: Path | None, finger: Path | None) -> None:
+def _convert_table(file: Path, output: Path, map_file: Path | None, finger: Path | None) -> dict[str, Any]:
     """Convert a log by its map, and write the description of a one-joint machine."""
     from tendonfmu.files import check_output, check_output_format
 
@@ -160,12 +162,11 @@ def _convert_table(file: Path, output: Path, map_file: Path | None, finger: Path
     if finger is not None and finger.resolve() == output.resolve():
         raise InputError(f"{finger}: the same file for recording and description; expected two names")
     if finger is None:
-        _convert_in_blocks(file, output, map_file)
-    else:
-        _convert_with_finger(file, output, map_file, finger)
+        return _convert_in_blocks(file, output, map_file)
+    return _convert_with_finger(file, output, map_file, finger)
 
 
-def _convert_in_blocks(file: Path, output: Path, map_file: Path) -> None:
+def _convert_in_blocks(file: Path, output: Path, map_file: Path) -> dict[str, Any]:
     """Convert a log; if its map allows, only some rows are in memory at any time."""
     from tendonfmu.files import write_blocks
     from tendonfmu.recordings import Conversion
@@ -181,27 +182,36 @@ def _convert_in_blocks(file: Path, output: Path, map_file: Path) -> None:
             yield columns
 
     write_blocks(output, counted())
-    _say_notes(conversion.notes)
-    _say_written(output, count, last - first)
+    return _written(output, count, last - first, conversion.notes)
 
 
-def _convert_with_finger(file: Path, output: Path, map_file: Path, finger: Path) -> None:
+def _convert_with_finger(file: Path, output: Path, map_file: Path, finger: Path) -> dict[str, Any]:
     from tendonfmu.files import write_table, write_text
     from tendonfmu.recordings import convert_table, describe_joint, description_text
 
     log = convert_table(file, map_file)
     description = description_text(describe_joint(log))
     write_table(output, log.columns)
-    _say_notes(log.notes)
-    _say_written(output, len(log.columns["time"]), float(log.columns["time"][-1] - log.columns["time"][0]))
     write_text(finger, description)
+    time = log.columns["time"]
+    report = _written(output, len(time), float(time[-1] - time[0]), log.notes)
     say(f"{finger}: the machine described as a finger; `tendonfmu fit` estimates its numbers")
+    return report
 
 
-def _say_notes(notes: list[str]) -> None:
+def _written(output: Path, count: int, duration: float, notes: list[str]) -> dict[str, Any]:
+    """Say what was written and what was left out or recovered, and return it."""
     for note in notes:
-        say(f"tendonfmu: {note}")
-
-
-def _say_written(output: Path, count: int, duration: float) -> None:
+        # what the user should look at: doubtful units, and logs that were cut off
+        if ": warning: " in note or " are kept" in note:
+            warn(note.replace(": warning: ", ": ", 1))
+        else:
+            say(note)
     say(f"{output}: {count} samples, {duration:.3f} s")
+    return {
+        "format": "tendonfmu-conversion-1",
+        "recording": str(output),
+        "samples": count,
+        "duration": duration,
+        "notes": notes,
+    }

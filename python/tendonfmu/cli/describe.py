@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from tendonfmu.cli.console import say
+from tendonfmu.cli.console import print_json, say
+from tendonfmu.cli.options import AsJson, Quiet
 from tendonfmu.errors import InputError
 
 JOINT = "joint"
@@ -28,24 +29,26 @@ def describe(
         typer.Option(metavar="REC", help="recording from which its numbers are taken, .csv or .parquet"),
     ] = None,
     torque: Annotated[
-        float | None, typer.Option(min=1e-9, max=LARGEST, help="N.m; largest torque of the drive \\[default: 1]")
+        float | None, typer.Option(min=1e-9, max=LARGEST, help="N.m; largest torque of the drive [default: 1]")
     ] = None,
     speed: Annotated[
-        float | None, typer.Option(min=1e-9, max=LARGEST, help="rad/s; largest speed of the joint \\[default: 5]")
+        float | None, typer.Option(min=1e-9, max=LARGEST, help="rad/s; largest speed of the joint [default: 5]")
     ] = None,
     coulomb: Annotated[
-        float | None, typer.Option(min=0.0, max=LARGEST, help="N.m; Coulomb friction \\[default: 5 % of the torque]")
+        float | None, typer.Option(min=0.0, max=LARGEST, help="N.m; Coulomb friction [default: 5 % of the torque]")
     ] = None,
     viscous: Annotated[
         float | None,
-        typer.Option(min=0.0, max=LARGEST, help="N.m.s/rad; viscous friction \\[default: 2 % of torque/speed]"),
+        typer.Option(min=0.0, max=LARGEST, help="N.m.s/rad; viscous friction [default: 2 % of torque/speed]"),
     ] = None,
     inertia: Annotated[
-        float | None, typer.Option(min=1e-12, max=LARGEST, help="kg.m2; moved inertia \\[default: 1 % of torque/speed]")
+        float | None, typer.Option(min=1e-12, max=LARGEST, help="kg.m2; moved inertia [default: 1 % of torque/speed]")
     ] = None,
     moment_arm: Annotated[
         float, typer.Option(min=1e-4, max=10.0, help="m; 1 if the recording has torque as tendon force")
     ] = 1.0,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
     """Write the description of a machine with one joint, for logs of torque and angle.
 
@@ -86,3 +89,4 @@ def describe(
         f"{output}: {name}, coulomb {law['coulomb']:g} N.m, viscous {law['viscous']:g} N.m.s/rad to start from; "
         "`tendonfmu fit` estimates them"
     )
+    print_json(lambda: document)
