@@ -23,7 +23,9 @@ from repository_paths import ROOT
 from tendonfmu.errors import InputError
 from tendonfmu.files.tables import read_table, write_table
 from tendonfmu.model.description import read_finger
+from tendonfmu.recordings.converters import units
 from tendonfmu.recordings.converters.column_map import read_map
+from tendonfmu.recordings.converters.log_file import FORMATS
 from tendonfmu.recordings.converters.one_joint import central_velocity
 from tendonfmu.recordings.converters.one_joint_description import starting_numbers
 from tendonfmu.recordings.converters.table import convert_table
@@ -159,6 +161,41 @@ def test_a_motor_may_turn_many_times(call: Call, tmp_path: Path) -> None:
     assert answer.status == 0 and "nothing found" in answer.out and answer.err == "", answer
 
 
+# --- describe joint ---------------------------------------------------------------------------------------------------
+
+
+def test_a_description_without_a_log(call: Call, tmp_path: Path) -> None:
+    """It is sound, holds what was given, and a recording fits it to the friction of the machine."""
+    answer = call("describe", "joint", "--name", "axis 3", "--torque", "4", "--coulomb", "0.5", "-o", "axis.json")
+    assert answer.status == 0 and "axis 3" in answer.err, answer
+    data = read_finger(tmp_path / "axis.json").data
+    law = data["joints"][0]["friction"]
+    assert (data["name"], law["coulomb"], law["viscous"]) == ("axis 3", 0.5, pytest.approx(0.02 * 4 / 5))
+    machine_log(tmp_path, machine(noise=0.02))
+    assert call("convert", "table", "log.csv", "--map", "map.json", "-o", "rec.parquet").status == 0
+    assert call("check", "axis.json", "rec.parquet").status == 0
+    assert call("fit", "axis.json", "rec.parquet", "--kinematics", "3", "-o", "fitted.json").status == 0
+    fitted = read_finger(tmp_path / "fitted.json").data["joints"][0]["friction"]
+    assert (fitted["coulomb"], fitted["viscous"]) == pytest.approx((COULOMB, VISCOUS), rel=0.03)
+
+
+def test_a_description_from_a_recording_is_that_of_convert(call: Call, tmp_path: Path) -> None:
+    machine_log(tmp_path, machine(noise=0.02))
+    made = call("convert", "table", "log.csv", "--map", "map.json", "-o", "rec.parquet", "--finger", "one.json")
+    assert made.status == 0
+    assert call("describe", "joint", "--name", "joint", "--recording", "rec.parquet", "-o", "other.json").status == 0
+    assert json.loads((tmp_path / "one.json").read_text()) == json.loads((tmp_path / "other.json").read_text())
+    for arguments, words in (
+        (["finger", "--name", "a"], ["'finger'", "joint"]),
+        (["joint", "--name", " "], ["--name"]),
+        (["joint", "--name", "a", "--recording", "rec.parquet", "--torque", "3"], ["--torque", "--recording"]),
+        (["joint", "--name", "a", "--recording", "absent.csv"], ["absent.csv"]),
+    ):
+        answer = call("describe", *arguments, "-o", "new.json")
+        assert answer.status == 2 and len(answer.err.splitlines()) == 1, answer
+        assert all(word in answer.err for word in words) and not (tmp_path / "new.json").exists()
+
+
 # --- the example ------------------------------------------------------------------------------------------------------
 
 
@@ -200,12 +237,16 @@ def blocks(language: str) -> list[str]:
 def test_the_page_names_every_key_and_unit() -> None:
     """In the tables of keys, and in that of units; its maps are sound, the first one is the example's."""
     keys = set(re.findall(r"`(\w+)`", "\n".join(re.findall(r"^\| `.*$", PAGE, re.MULTILINE))))
+    resample = set(SCHEMA["properties"]["resample"]["properties"])
     log = set(SCHEMA["properties"]["log"]["properties"])
     joints = {key for kind in SCHEMA["properties"]["joint"]["oneOf"] for key in kind["properties"]}
-    assert log | joints | set(SCHEMA["$defs"]["time"]["properties"]) <= keys
+    assert log | joints | resample | set(SCHEMA["$defs"]["time"]["properties"]) <= keys
     for name in ("time", "force", "torque", "length", "angle", "speed", "angular_speed"):
-        row = f"| {name.replace('_', ' ')} | {', '.join(SCHEMA['$defs'][name]['properties']['unit']['enum'])} |"
-        assert row in PAGE, row
+        offered = SCHEMA["$defs"][name]["properties"]["unit"]["anyOf"][0]["enum"]
+        common = [unit for unit in offered if unit not in units.STAMPS]
+        assert f"| {name.replace('_', ' ')} | {', '.join(common)} |" in PAGE, name
+    assert all(f"`{stamp}`" in PAGE for stamp in units.STAMPS)
+    assert all(f"`{suffix}`" in PAGE for suffix in FORMATS)
     for text in blocks("json"):
         VALIDATOR.validate(json.loads(text))
     assert json.loads(blocks("json")[0]) == json.loads((EXAMPLE / "map.json").read_text(encoding="utf-8"))

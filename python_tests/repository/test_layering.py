@@ -55,6 +55,7 @@ COMMANDS = {
     "cli/campaign.py",
     "cli/check.py",
     "cli/convert.py",
+    "cli/describe.py",
     "cli/detect.py",
     "cli/diagnose.py",
     "cli/import_mjcf.py",

@@ -141,7 +141,7 @@ def print_tables(tables: Iterable[Any], lines: Iterable[str], left: str) -> None
     stream = _of_results()
     if stream is None:
         return
-    console = Console(file=stream)
+    console = Console(file=stream, markup=False)  # names such as tendon_force[1] are no markup
     if not console.is_terminal:  # a file has no width: keep each row on one line
         console.width = 160
     with reader_may_leave(stream):

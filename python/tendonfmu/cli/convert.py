@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tendonfmu.cli.console import say
+from tendonfmu.cli.console import print_json, print_tables, say, warn
+from tendonfmu.cli.options import AsJson, Quiet
 from tendonfmu.errors import InputError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from tendonfmu.recordings import Inspection, Proposal
+
 TABLE = "table"  # the format whose columns a map describes
+INSPECT = "inspect"
 
 
 def register(app: typer.Typer) -> None:
@@ -23,15 +28,24 @@ def register(app: typer.Typer) -> None:
 
 
 def convert(
-    source: Annotated[str, typer.Argument(metavar="FORMAT", help="davinci, emps or table")],
+    source: Annotated[str, typer.Argument(metavar="FORMAT", help="davinci, emps, table, or inspect")],
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="third-party recording; for table any log in CSV or Parquet")
+        Path,
+        typer.Argument(
+            metavar="FILE",
+            help="third-party recording; for table and inspect any log: CSV, Parquet, MATLAB, HDF5, MCAP, ROS 2 bag",
+        ),
     ],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="REC.csv", help="recording, .csv or .parquet")],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="REC.csv", help="recording, .csv, .parquet or .mcap; inspect: MAP.json to write"
+        ),
+    ] = None,
     radius: Annotated[
         float | None,
         typer.Option(
-            min=1e-6, max=1.0, help="m; davinci: radius of the pulley with the recorded torque \\[default: 0.005]"
+            min=1e-6, max=1.0, help="m; davinci: radius of the pulley with the recorded torque [default: 0.005]"
         ),
     ] = None,
     pretension: Annotated[
@@ -39,17 +53,17 @@ def convert(
         typer.Option(
             min=0.0,
             max=1e6,
-            help="N; davinci: pretension of the loop, records the closing cable only \\[default: 0, net force]",
+            help="N; davinci: pretension of the loop, records the closing cable only [default: 0, net force]",
         ),
     ] = None,
     mass: Annotated[
         float | None,
         typer.Option(
-            min=0.0, max=1e6, help="kg; emps: moved mass, whose inertial force is known load \\[default: 95.1089]"
+            min=0.0, max=1e6, help="kg; emps: moved mass, whose inertial force is known load [default: 95.1089]"
         ),
     ] = None,
     decimation: Annotated[
-        int | None, typer.Option(min=1, max=1000, help="emps: keep one in so many samples, smoothed \\[default: 10]")
+        int | None, typer.Option(min=1, max=1000, help="emps: keep one in so many samples, smoothed [default: 10]")
     ] = None,
     map_: Annotated[
         Path | None,
@@ -59,16 +73,31 @@ def convert(
         Path | None,
         typer.Option(metavar="FINGER.json", help="table: description of the one-joint machine to write"),
     ] = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
-    """Convert a third-party recording into a recording of tendonfmu."""
+    """Convert a third-party recording or any log into a recording of tendonfmu.
+
+    convert inspect LOG lists what is in a log and proposes a map; convert table
+    LOG --map MAP.json -o REC.parquet converts it.
+    """
     given = {"radius": radius, "pretension": pretension, "mass": mass, "decimation": decimation}
     options = {name: value for name, value in given.items() if value is not None}
-    if source == TABLE:
-        _convert_table(file, output, options, map_, finger)
-        return
-    for name, value in (("map", map_), ("finger", finger)):
-        if value is not None:
-            raise InputError(f"convert {source}: --{name}: not an option of this format; expected convert {TABLE}")
+    if source == INSPECT:
+        _refuse_options(source, {**options, "map": map_, "finger": finger}, "-o")
+        report = _inspect(file, output)
+    elif output is None:
+        raise InputError(f"convert {source}: --output: missing; expected the recording to write, -o REC.parquet")
+    elif source == TABLE:
+        _refuse_options(source, options, "--map or --finger")
+        report = _convert_table(file, output, map_, finger)
+    else:
+        _refuse_options(source, {"map": map_, "finger": finger}, f"convert {TABLE}")
+        report = _convert_data_set(source, file, output, options)
+    print_json(lambda: report)
+
+
+def _convert_data_set(source: str, file: Path, output: Path, options: Mapping[str, float]) -> dict[str, Any]:
     from tendonfmu.files import check_format, check_output, write_table
     from tendonfmu.recordings import convert_file
 
@@ -76,37 +105,113 @@ def convert(
     check_output(output, file)
     table = convert_file(source, file, options)
     write_table(output, table)
-    _say_written(output, table["time"])
+    return _written(output, len(table["time"]), float(table["time"][-1] - table["time"][0]), [])
 
 
-def _convert_table(
-    file: Path, output: Path, options: Mapping[str, float], map_file: Path | None, finger: Path | None
-) -> None:
+def _refuse_options(source: str, options: Mapping[str, Any], expected: str) -> None:
+    """Refuse the first option that was given and is not of this format."""
+    for name, value in options.items():
+        if value is not None:
+            raise InputError(f"convert {source}: --{name}: not an option of this format; expected {expected}")
+
+
+def _inspect(file: Path, output: Path | None) -> dict[str, Any]:
+    """Print what is in a log, write the proposed map, and return both."""
+    from tendonfmu.files import check_output, write_text
+    from tendonfmu.recordings import inspect_log, inspection_document, propose
+
+    if output is not None:
+        if output.suffix.lower() != ".json":
+            raise InputError(f"{output}: unknown format {output.suffix!r}; expected a map, .json")
+        check_output(output, file)
+    found = inspect_log(file)
+    proposal = propose(found)
+    _print_inspection(found, proposal)
+    for note in found.notes:
+        warn(note)
+    if output is not None:
+        write_text(output, json.dumps(proposal.document, indent=1, ensure_ascii=False) + "\n")
+        undecided = [line.column for line in proposal.lines if "?" in (line.source, line.unit)]
+        left = f'; "?" is left to you: {", ".join(undecided)}' if undecided else ""
+        say(f"{output}: a map of {len(proposal.lines)} columns{left}")
+    return inspection_document(found, proposal)
+
+
+def _print_inspection(found: Inspection, proposal: Proposal) -> None:
+    from tendonfmu.recordings import clock_line, field_rows, proposal_rows, time_factor
+
+    headings = ("field", "type", "unit", "values", "missing", "least", "most")
+    for topic in found.topics:
+        line = clock_line(topic, time_factor(proposal, topic))
+        print_tables([(topic.topic.name, headings, list(field_rows(topic)))], [line], "")
+    columns = ("column", "field", "unit", "sure", "why")
+    print_tables([("proposed map", columns, list(proposal_rows(proposal)))], [], "why")
+
+
+def _convert_table(file: Path, output: Path, map_file: Path | None, finger: Path | None) -> dict[str, Any]:
     """Convert a log by its map, and write the description of a one-joint machine."""
-    from tendonfmu.files import check_format, check_output, whole_file, write_table
-    from tendonfmu.recordings import convert_table, describe_joint, description_text
+    from tendonfmu.files import check_output, check_output_format
 
-    for name in options:
-        raise InputError(f"convert {TABLE}: --{name}: not an option of this format; expected --map or --finger")
     if map_file is None:
-        raise InputError(f"convert {TABLE}: --map: missing; expected a map of columns (JSON)")
-    check_format(output)
-    outputs = [output] if finger is None else [output, finger]
-    for each in outputs:
+        raise InputError(
+            f"convert {TABLE}: --map: missing; expected a map of columns (JSON), see tendonfmu convert {INSPECT}"
+        )
+    check_output_format(output)
+    for each in [output] if finger is None else [output, finger]:
         check_output(each, file, map_file)
     if finger is not None and finger.resolve() == output.resolve():
         raise InputError(f"{finger}: the same file for recording and description; expected two names")
+    if finger is None:
+        return _convert_in_blocks(file, output, map_file)
+    return _convert_with_finger(file, output, map_file, finger)
+
+
+def _convert_in_blocks(file: Path, output: Path, map_file: Path) -> dict[str, Any]:
+    """Convert a log; if its map allows, only some rows are in memory at any time."""
+    from tendonfmu.files import write_blocks
+    from tendonfmu.recordings import Conversion
+
+    conversion = Conversion(file, map_file)
+    count, first, last = 0, 0.0, 0.0
+
+    def counted() -> Iterator[dict[str, NDArray[Any]]]:
+        nonlocal count, first, last
+        for columns in conversion.recording():
+            first = first if count else float(columns["time"][0])
+            count, last = count + len(columns["time"]), float(columns["time"][-1])
+            yield columns
+
+    write_blocks(output, counted())
+    return _written(output, count, last - first, conversion.notes)
+
+
+def _convert_with_finger(file: Path, output: Path, map_file: Path, finger: Path) -> dict[str, Any]:
+    from tendonfmu.files import write_table, write_text
+    from tendonfmu.recordings import convert_table, describe_joint, description_text
+
     log = convert_table(file, map_file)
-    description = None if finger is None else description_text(describe_joint(log))
+    description = description_text(describe_joint(log))
     write_table(output, log.columns)
-    for note in log.notes:
-        say(f"tendonfmu: {note}")
-    _say_written(output, log.columns["time"])
-    if finger is not None and description is not None:
-        with whole_file(finger) as temporary:
-            temporary.write_text(description, encoding="utf-8")
-        say(f"{finger}: the machine described as a finger; `tendonfmu fit` estimates its numbers")
+    write_text(finger, description)
+    time = log.columns["time"]
+    report = _written(output, len(time), float(time[-1] - time[0]), log.notes)
+    say(f"{finger}: the machine described as a finger; `tendonfmu fit` estimates its numbers")
+    return report
 
 
-def _say_written(output: Path, time: NDArray[Any]) -> None:
-    say(f"{output}: {len(time)} samples, {time[-1] - time[0]:.3f} s")
+def _written(output: Path, count: int, duration: float, notes: list[str]) -> dict[str, Any]:
+    """Say what was written and what was left out or recovered, and return it."""
+    for note in notes:
+        # what the user should look at: doubtful units, and logs that were cut off
+        if ": warning: " in note or " are kept" in note:
+            warn(note.replace(": warning: ", ": ", 1))
+        else:
+            say(note)
+    say(f"{output}: {count} samples, {duration:.3f} s")
+    return {
+        "format": "tendonfmu-conversion-1",
+        "recording": str(output),
+        "samples": count,
+        "duration": duration,
+        "notes": notes,
+    }

@@ -18,6 +18,7 @@ from tendonfmu.cli import calibrate as cli_calibrate
 from tendonfmu.cli import campaign as cli_campaign
 from tendonfmu.cli import check as cli_check
 from tendonfmu.cli import convert as cli_convert
+from tendonfmu.cli import describe as cli_describe
 from tendonfmu.cli import detect as cli_detect
 from tendonfmu.cli import diagnose as cli_diagnose
 from tendonfmu.cli import import_mjcf as cli_import_mjcf
@@ -232,6 +233,7 @@ def simulate(
 
 cli_convert.register(app)
 cli_import_mjcf.register(app)
+cli_describe.register(app)
 
 
 @app.command()

@@ -23,7 +23,7 @@ def run(
     model: Model,
     recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="recording, .csv or .parquet")],
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="OUT.csv", help="table to write, .csv or .parquet; -: as CSV")
+        Path, typer.Option("-o", "--output", metavar="OUT.csv", help="table: .csv, .parquet or .mcap; -: as CSV")
     ],
     report: Annotated[
         Path | None, typer.Option(metavar="PAGE.html|DIR", help="page of the run; in a folder run.html")

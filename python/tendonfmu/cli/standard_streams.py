@@ -88,25 +88,25 @@ def _kept(content: bytes, folder: Path) -> Path:
 
 
 def check_table(output: Path, *inputs: Path) -> None:
-    """Check that a table can be written: a .csv or .parquet file that is no input, or `-` for standard output.
+    """Check that a table can be written: a .csv, .parquet or .mcap file that is no input, or `-` for standard output.
 
     Raises
     ------
     InputError
         It cannot; or standard output is wanted for the table and for `--json`.
     """
-    from tendonfmu.files import check_format, check_output
+    from tendonfmu.files import check_output, check_output_format
 
     PRINTED.table = output == DASH
     if PRINTED.table and PRINTED.json:
         raise InputError("--output -: given with --json; expected a file, since both print on standard output")
     if not PRINTED.table:
-        check_format(output)
+        check_output_format(output)
         check_output(output, *inputs)
 
 
 def write_table(output: Path, table: Mapping[str, NDArray[Any]]) -> None:
-    """Write columns [N] to a .csv or .parquet file, or as CSV to standard output."""
+    """Write columns [N] to a .csv, .parquet or .mcap file, or as CSV to standard output."""
     from tendonfmu.files import csv_lines
     from tendonfmu.files import write_table as write_file
 

@@ -1,6 +1,7 @@
 """How files are read and written: whole or not at all.
 
-`writing` writes whole files, `tables` reads and writes tables of numbers (CSV, Parquet), `json_node` reads JSON and
+`writing` writes whole files, `tables` reads and writes tables of numbers (CSV, Parquet), `mcap_table` writes them for
+PlotJuggler and Foxglove, `extras` imports the libraries of the extra `logs`, `json_node` reads JSON and
 keeps the path of each value for error messages, and `finite_numbers` replaces numbers that JSON does not allow by null.
 """
 

@@ -1,3 +1,4 @@
+from .extras import require_extra as require_extra
 from .finite_numbers import finite as finite
 from .frames import frame_of as frame_of
 from .frames import is_frame as is_frame
@@ -8,8 +9,10 @@ from .json_node import read_json as read_json
 from .tables import FORMATS as FORMATS
 from .tables import Table as Table
 from .tables import check_format as check_format
+from .tables import check_output_format as check_output_format
 from .tables import csv_lines as csv_lines
 from .tables import read_table as read_table
+from .tables import write_blocks as write_blocks
 from .tables import write_table as write_table
 from .writing import check_output as check_output
 from .writing import check_output_folder as check_output_folder

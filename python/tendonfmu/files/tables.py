@@ -1,11 +1,12 @@
-"""How tables of finite numbers are read and written, CSV and Parquet: exact, whole, with errors by column and row.
+"""How tables of finite numbers are read and written: exact, whole, with errors by column and row.
 
-Rows count from 1, without the line of names.
+CSV and Parquet are read and written, MCAP is written. Rows count from 1, without the line of names.
 """
 
 from __future__ import annotations
 
 import csv
+import itertools
 import math
 import os
 import re
@@ -17,10 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
+from tendonfmu.files.extras import require_extra
+from tendonfmu.files.mcap_table import write_mcap
 from tendonfmu.files.writing import whole_file
 
 FORMATS = (".csv", ".parquet")
+OUTPUTS = (*FORMATS, ".mcap")
 COMPRESSION = 12  # of Parquet, zstd; a minute of a quantised recording at 500 Hz takes about 1 MB and 1 s
+LONG_COMPRESSION = 3  # of tables that come in several blocks: a third of the time, and 10 % more bytes
 
 Table = dict[str, NDArray[np.float64]]
 CheckNames = Callable[[Path, list[str]], Sequence[str] | None]
@@ -103,6 +108,25 @@ def check_format(file: Path) -> None:
     """
     if file.suffix.lower() not in FORMATS:
         raise InputError(f"{file}: unknown format {file.suffix!r}; expected .csv or .parquet")
+
+
+def check_output_format(file: Path) -> None:
+    """Check the suffix of a table that is written for other programs too.
+
+    Parameters
+    ----------
+    file
+        A file, which need not exist.
+
+    Raises
+    ------
+    InputError
+        The suffix is none of `OUTPUTS`, or its library is not installed.
+    """
+    if file.suffix.lower() not in OUTPUTS:
+        raise InputError(f"{file}: unknown format {file.suffix!r}; expected .csv, .parquet or .mcap")
+    if file.suffix.lower() == ".mcap":
+        require_extra("mcap.writer", str(file))
 
 
 def check_duplicates(file: Path, names: list[str]) -> None:
@@ -221,12 +245,12 @@ def _parse_field(file: Path, name: str, row: int, field: str, flags: Collection[
 
 
 def write_table(path: str | os.PathLike[str], table: Mapping[str, NDArray[Any]]) -> None:
-    """Write columns of equal length as CSV or Parquet, by the suffix: whole or not at all.
+    """Write columns of equal length as CSV, Parquet or MCAP, by the suffix: whole or not at all.
 
     Parameters
     ----------
     path
-        A .csv or .parquet file.
+        A .csv, .parquet or .mcap file.
     table
         Columns [N]. Numbers read back the same; flags become 0 and 1.
 
@@ -235,17 +259,29 @@ def write_table(path: str | os.PathLike[str], table: Mapping[str, NDArray[Any]])
     InputError
         The format is unknown, or the file cannot be written.
     """
-    file = Path(path)
-    check_format(file)
-    with whole_file(file) as temporary:
-        if file.suffix.lower() == ".csv":
-            with open(temporary, "w", encoding="utf-8", newline="\n") as out:
-                out.writelines(csv_lines(table))
-        else:
-            import pyarrow as pa
-            import pyarrow.parquet as pq
+    write_blocks(path, [table])
 
-            pq.write_table(pa.table(_columns(table)), temporary, compression="zstd", compression_level=COMPRESSION)
+
+def write_blocks(path: str | os.PathLike[str], blocks: Iterable[Mapping[str, NDArray[Any]]]) -> None:
+    """Write a table that comes in blocks of rows, as `write_table` does; only one block is in memory.
+
+    Parameters
+    ----------
+    path
+        A .csv, .parquet or .mcap file.
+    blocks
+        Columns [N] of the same names, at least one block. A block is a row group of Parquet.
+
+    Raises
+    ------
+    InputError
+        The format is unknown, or the file cannot be written.
+    """
+    file = Path(path)
+    check_output_format(file)
+    write = {".csv": _write_csv, ".parquet": _write_parquet}.get(file.suffix.lower(), write_mcap)
+    with whole_file(file) as temporary:
+        write(temporary, map(_columns, blocks))
 
 
 def csv_lines(table: Mapping[str, NDArray[Any]]) -> Iterator[str]:
@@ -269,5 +305,27 @@ def csv_lines(table: Mapping[str, NDArray[Any]]) -> Iterator[str]:
 
 
 def _columns(table: Mapping[str, NDArray[Any]]) -> Table:
+    """Return a table with flags as 0 and 1."""
     columns = {name: np.asarray(values) for name, values in table.items()}
     return {name: column.astype(np.uint8) if column.dtype == bool else column for name, column in columns.items()}
+
+
+def _write_csv(file: Path, blocks: Iterable[Mapping[str, NDArray[Any]]]) -> None:
+    with open(file, "w", encoding="utf-8", newline="\n") as out:
+        for k, columns in enumerate(blocks):
+            out.writelines(itertools.islice(csv_lines(columns), 1 if k else 0, None))
+
+
+def _write_parquet(file: Path, blocks: Iterable[Mapping[str, NDArray[Any]]]) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    rest = iter(blocks)
+    first, second = next(rest), next(rest, None)
+    if second is None:
+        pq.write_table(pa.table(first), file, compression="zstd", compression_level=COMPRESSION)
+        return
+    schema = pa.table(first).schema
+    with pq.ParquetWriter(file, schema, compression="zstd", compression_level=LONG_COMPRESSION) as out:
+        for columns in itertools.chain((first, second), rest):
+            out.write_table(pa.table(columns, schema=schema))

@@ -1,15 +1,19 @@
 """What MAP.json of `tendonfmu convert table` says: which column of a log becomes which of ours, in which unit.
 
-Each of our columns is  sign · scale · factor of the unit · (reading − offset). docs/reference/commands/convert.md
-explains the keys, and `schema/map.schema.json` defines them for editors.
+Each of our columns is  sign · scale · factor of the unit · (reading − offset). Where `convert inspect` could not
+decide, a value is "?", which is refused here. docs/reference/commands/convert.md explains the keys, and
+`schema/map.schema.json` defines them for editors.
 """
 
 from __future__ import annotations
 
+import codecs
 import re
+import zoneinfo
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +25,7 @@ from tendonfmu.recordings.recording import GROUPS, LABEL
 
 FORMAT = "tendonfmu-map-1"
 LARGEST = 1e12  # of offsets and scales, as of the signals of a recording
+UNDECIDED = "?"  # written by `convert inspect`, refused by `convert table`
 SEPARATORS = (",", ";", "\t", "|", " ")
 
 TURNING = {
@@ -58,19 +63,27 @@ class MappedColumn:
         sign · scale · unit.
     offset
         The reading that stands for zero, in the log's unit. None: the first reading.
+    stamp
+        One of `units.STAMPS` if the readings are points in time, or "".
+    zone
+        Time zone of texts without one.
+    pattern
+        Pattern of texts (`datetime.strptime`), or "": ISO 8601.
     """
 
     path: str
     source: str | int
     factor: float = 1.0
-    offset: float | None = 0.0
+    offset: float | int | None = 0.0
+    stamp: str = ""
+    zone: str = "UTC"
+    pattern: str = ""
 
-    def values(self, readings: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the values [N] in SI of readings [N]."""
-        offset = readings[0] if self.offset is None else self.offset
+    def values(self, readings: NDArray[Any]) -> NDArray[np.float64]:
+        """Return the values [N] in SI of readings [N], integer or float. The offset is a number."""
         # no unnecessary arithmetic: numbers in SI must not change by rounding
-        shifted = readings - offset if offset else readings
-        return shifted * self.factor if self.factor != 1.0 else shifted
+        shifted = readings - self.offset if self.offset else readings
+        return (shifted * self.factor if self.factor != 1.0 else shifted).astype(np.float64)
 
 
 @dataclass(frozen=True)
@@ -94,24 +107,48 @@ class Joint:
 
 @dataclass(frozen=True)
 class LogFormat:
-    """How a CSV log is written.
+    """How a log is written, and what to do about its faults.
 
     Attributes
     ----------
-    separator
-        None: found in the first line.
-    decimal
-        "." or ",".
-    skip
-        Lines before the header.
-    header
-        Whether the log has a line of names.
+    separator, decimal, skip, header, units_row, encoding
+        Of texts. None: found in the first lines.
+    leave_out_missing
+        Whether rows without a number are left out; otherwise they are refused.
+    sort
+        Whether rows are sorted by time, and all but the first with the same time left out; otherwise they are refused.
+    clocks
+        Column of time by topic, where it is not the obvious one.
     """
 
     separator: str | None = None
-    decimal: str = "."
-    skip: int = 0
-    header: bool = True
+    decimal: str | None = None
+    skip: int | None = None
+    header: bool | None = None
+    units_row: bool | None = None
+    encoding: str | None = None
+    leave_out_missing: bool = False
+    sort: bool = False
+    clocks: Mapping[str, MappedColumn] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Resampling:
+    """How topics come onto one clock.
+
+    Attributes
+    ----------
+    rate
+        Samples per second. None: the times of the column `time`.
+    largest_gap
+        s; None: ten times the median step of each topic.
+    leave_out_gaps
+        Whether samples in larger gaps are left out; otherwise the gap is refused.
+    """
+
+    rate: float | None = None
+    largest_gap: float | None = None
+    leave_out_gaps: bool = False
 
 
 @dataclass(frozen=True)
@@ -128,12 +165,15 @@ class ColumnMap:
         The one-joint machine, or None.
     log
         Format of the log.
+    resample
+        None: only if the columns have several clocks.
     """
 
     path: Path
     columns: Mapping[str, MappedColumn]
     joint: Joint | None = None
     log: LogFormat = field(default_factory=LogFormat)
+    resample: Resampling | None = None
 
 
 def read_map(path: Path) -> ColumnMap:
@@ -145,37 +185,81 @@ def read_map(path: Path) -> ColumnMap:
         raise InputError(f"{path}: {refused}") from None
 
 
+def read_log_format(path: Path | None) -> LogFormat:
+    """Read the key `log` of a map, which may be incomplete otherwise. Raise InputError."""
+    if path is None:
+        return LogFormat()
+    try:
+        return _read_log(Node(read_json(path, "a map of columns")).member("log"))
+    except Refusal as refused:
+        raise InputError(f"{path}: {refused}") from None
+
+
 def _read(path: Path, node: Node) -> ColumnMap:
-    node.keys(("format", "log", "columns", "joint"))
+    node.keys(("format", "comment", "log", "columns", "joint", "resample"))
     node.member("format").choice(FORMAT)
-    log = _read_log(node.member("log"))
+    log, resample = _read_log(node.member("log")), _read_resampling(node.member("resample"))
     columns, joint = node.member("columns"), node.member("joint")
     if columns.absent == joint.absent:
         joint.refuse('either "columns" or "joint", one of the two')
     if joint.absent:
-        return ColumnMap(path, dict(_read_columns(columns)), None, log)
+        return ColumnMap(path, dict(_read_columns(columns)), None, log, resample)
     found, machine = _read_joint(joint)
-    return ColumnMap(path, found, machine, log)
+    return ColumnMap(path, found, machine, log, resample)
 
 
 def _read_log(node: Node) -> LogFormat:
     if node.absent:
         return LogFormat()
-    node.keys(("separator", "decimal", "skip", "header"))
-    separator = node.member("separator")
-    decimal = node.member("decimal")
-    header = node.member("header")
-    if not header.absent and not isinstance(header.value, bool):
-        header.refuse("true or false")
+    node.keys(("separator", "decimal", "skip", "header", "units_row", "encoding", "missing", "disorder", "clocks"))
+    separator, decimal, skip = node.member("separator"), node.member("decimal"), node.member("skip")
+    encoding, missing, disorder = node.member("encoding"), node.member("missing"), node.member("disorder")
     found = LogFormat(
         separator=None if separator.absent else separator.choice(*SEPARATORS),
-        decimal="." if decimal.absent else decimal.choice(".", ","),
-        skip=node.member("skip").integer(0, 10000, 0),
-        header=header.absent or header.value,
+        decimal=None if decimal.absent else decimal.choice(".", ","),
+        skip=None if skip.absent else skip.integer(0, 10000),
+        header=_flag(node.member("header")),
+        units_row=_flag(node.member("units_row")),
+        encoding=None if encoding.absent else _encoding(encoding),
+        leave_out_missing=not missing.absent and missing.choice("refuse", "leave out") == "leave out",
+        sort=not disorder.absent and disorder.choice("refuse", "sort") == "sort",
+        clocks=_read_clocks(node.member("clocks")),
     )
-    if found.separator == found.decimal:
+    if found.separator is not None and found.separator == found.decimal:
         decimal.refuse("another character than the separator")
     return found
+
+
+def _flag(node: Node) -> bool | None:
+    if not node.absent and not isinstance(node.value, bool):
+        node.refuse("true or false")
+    return None if node.absent else bool(node.value)
+
+
+def _encoding(node: Node) -> str:
+    try:
+        return codecs.lookup(node.text("the name of an encoding")).name
+    except LookupError:
+        node.refuse("the name of an encoding, such as utf-8, utf-16 or latin-1")
+
+
+def _read_clocks(node: Node) -> dict[str, MappedColumn]:
+    if node.absent:
+        return {}
+    names = node.keys(node.value if isinstance(node.value, dict) else ()).value
+    return {name: _read_column(node.member(name), units.TIME) for name in names}
+
+
+def _read_resampling(node: Node) -> Resampling | None:
+    if node.absent:
+        return None
+    node.keys(("rate", "largest_gap", "gaps"))
+    rate, gap, gaps = node.member("rate"), node.member("largest_gap"), node.member("gaps")
+    return Resampling(
+        None if rate.absent else rate.number(0.0, 1e6, "Hz", above=True),
+        None if gap.absent else gap.number(0.0, 1e6, "s", above=True),
+        not gaps.absent and gaps.choice("refuse", "leave out") == "leave out",
+    )
 
 
 def _read_columns(node: Node) -> Iterator[tuple[str, MappedColumn]]:
@@ -220,13 +304,23 @@ def _read_joint(node: Node) -> tuple[dict[str, MappedColumn], Joint]:
 
 
 def _read_column(node: Node, known: Mapping[str, float]) -> MappedColumn:
-    node.keys(("column", "unit", "sign", "scale", "offset"))
-    source = node.member("column")
+    extra = ("zone", "pattern") if known is units.TIME else ()
+    node.keys(("column", "unit", "sign", "scale", "offset", "comment", *extra))
+    source, unit = node.member("column"), node.member("unit")
+    for undecided in (source, unit):
+        if undecided.value == UNDECIDED:
+            undecided.refuse(
+                f"a decision that `convert inspect` has left to you: {_expected(undecided is source, known)}"
+            )
     if isinstance(source.value, int) and not isinstance(source.value, bool) and source.value >= 1:
         column: str | int = source.value
     else:
         column = source.text("the name of a column of the log, or its number from 1")
-    unit = node.member("unit")
+    if known is units.TIME and unit.value in units.STAMPS:
+        return _read_stamp(node, column, str(unit.value))
+    for key in extra:
+        if not node.member(key).absent:
+            node.member(key).refuse('no such key without "unit": "datetime"')
     sign = node.member("sign").integer(-1, 1, 1)
     if sign == 0:
         node.member("sign").refuse("1 or -1")
@@ -237,10 +331,36 @@ def _read_column(node: Node, known: Mapping[str, float]) -> MappedColumn:
     return MappedColumn(node.path, column, sign * scale * _factor(unit, known), start)
 
 
+def _expected(source: bool, known: Mapping[str, float]) -> str:
+    if source:
+        return "the name of a column of the log"
+    return f"one of {', '.join([*known, *units.STAMPS] if known is units.TIME else known)}"
+
+
+def _read_stamp(node: Node, column: str | int, stamp: str) -> MappedColumn:
+    """Read a column of points in time. The recording's time counts from the first of them."""
+    for key in ("sign", "scale", "offset"):
+        if not node.member(key).absent:
+            node.member(key).refuse(f'no such key with "unit": "{stamp}"; time counts from the first row')
+    zone, pattern = node.member("zone"), node.member("pattern")
+    for text in (zone, pattern):
+        if not text.absent and stamp != "datetime":
+            text.refuse('no such key without "unit": "datetime"')
+    name = "UTC" if zone.absent else zone.text("the name of a time zone, such as Europe/Berlin")
+    try:
+        zoneinfo.ZoneInfo(name)
+    except (zoneinfo.ZoneInfoNotFoundError, ValueError, OSError):
+        zone.refuse("the name of a time zone, such as Europe/Berlin")
+    shape = "" if pattern.absent else pattern.text("a pattern of Python's strptime, such as %d.%m.%Y %H:%M:%S.%f")
+    return MappedColumn(node.path, column, 1e-9, None, stamp, name, shape)
+
+
 def _factor(unit: Node, known: Mapping[str, float]) -> float:
     """Return the factor of the unit. A missing unit is refused unless the quantity has none."""
     if known is units.NONE and unit.absent:
         return 1.0
-    if not isinstance(unit.value, str) or unit.value not in known:
-        unit.refuse(f"one of {', '.join(known)}")
-    return known[str(unit.value)]
+    value = units.factor(unit.value, known) if isinstance(unit.value, str) and unit.value else None
+    if value is None:
+        names = [*known, *units.STAMPS] if known is units.TIME else list(known)
+        unit.refuse(f"one of {', '.join(names)}" + ("" if known is units.NONE else ", or another unit of this kind"))
+    return value

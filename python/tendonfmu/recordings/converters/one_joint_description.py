@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.recordings.converters.one_joint import CUTOFF
+from tendonfmu.recordings.converters.one_joint import CUTOFF, SHARE_OF_RATE, central_velocity
 from tendonfmu.recordings.converters.table import ConvertedLog
+from tendonfmu.recordings.recording import Recording
 from tendonfmu.recordings.signal_noise import value_step
 
 Series = NDArray[np.float64]
@@ -23,6 +24,8 @@ Series = NDArray[np.float64]
 STIFFNESS = 1e9  # N/m: the drive is rigid, q = x0
 SLOWEST = 1e-3  # of the largest speed; below, the joint counts as at rest
 THRESHOLD = 5.0  # times the residual of the straight line (rms); `tendonfmu tune` finds better thresholds
+# of the drive's largest torque, where nothing is measured; geared drives lose some 5 to 30 % in all
+COULOMB_SHARE, VISCOUS_SHARE, INERTIA_SHARE, NOISE_SHARE = 0.05, 0.02, 0.01, 0.005
 LEAST_SHARE = 1e-3  # of the torque's rms; starting value of a magnitude for which least squares gives less
 
 
@@ -49,35 +52,136 @@ def describe_joint(log: ConvertedLog) -> dict[str, Any]:
         raise InputError(
             f'{log.map.path}: joint: missing; expected "joint" instead of "columns" where --finger is to be written'
         )
-    columns = log.columns
-    velocity = columns["joint_velocity[1]"]
-    cutoff = log.velocity_cutoff or CUTOFF
-    slowest = slowest_motion(velocity, columns["joint_position[1]"], cutoff)
-    start = starting_numbers(columns, slowest)
-    law = {
-        "static": start["coulomb"],
-        "coulomb": start["coulomb"],
-        "stribeck_velocity": float(f"{np.abs(velocity).max() / 10:.3g}"),
-        "viscous": start["viscous"],
+    return _measured(joint.name, log.columns, log.velocity_cutoff or CUTOFF, 1.0)
+
+
+def describe_recorded_joint(name: str, recording: Recording, moment_arm: float) -> dict[str, Any]:
+    """Make the finger description of a one-joint machine, with starting numbers from its recording.
+
+    Parameters
+    ----------
+    name
+        Name of the machine and of its joint.
+    recording
+        A recording with one tendon.
+    moment_arm
+        Of the tendon (m).
+
+    Returns
+    -------
+    dict
+        A finger description, as in the JSON file.
+
+    Raises
+    ------
+    InputError
+        The recording has several tendons, or the joint does not move.
+    """
+    recording.require(1, 1, ())
+    groups = {f"{group}[1]": values[:, 0] for group, values in recording.groups.items()}
+    torque = moment_arm * groups["tendon_force[1]"]
+    angle = groups.get("joint_position[1]", groups["tendon_position[1]"] / moment_arm)
+    velocity = groups.get("joint_velocity[1]")
+    if velocity is None:
+        rate = 1.0 / float(np.median(np.diff(recording.time)))
+        velocity = central_velocity(recording.time, angle, min(CUTOFF, SHARE_OF_RATE * rate))
+    if not np.abs(velocity).max() > 0.0:
+        raise InputError(f"{recording.path}: the joint does not move; expected a recording of motion")
+    columns = {"time": recording.time, "tendon_force[1]": torque, "joint_position[1]": angle}
+    columns["joint_velocity[1]"] = velocity
+    known = groups.get("external_torque[1]")
+    if known is not None:
+        columns["external_torque[1]"] = known
+    return _measured(name, columns, CUTOFF, moment_arm)
+
+
+def joint_description(
+    name: str,
+    torque: float,
+    speed: float,
+    *,
+    coulomb: float | None = None,
+    viscous: float | None = None,
+    inertia: float = 0.0,
+    moment_arm: float = 1.0,
+) -> dict[str, Any]:
+    """Make the finger description of a one-joint machine from what its data sheet says.
+
+    Parameters
+    ----------
+    name
+        Name of the machine and of its joint.
+    torque
+        Largest torque of the drive (N.m).
+    speed
+        Largest speed of the joint (rad/s).
+    coulomb
+        Coulomb friction (N.m). None: 5 % of the torque.
+    viscous
+        Viscous friction (N.m.s/rad). None: 2 % of the torque at the largest speed.
+    inertia
+        Moved inertia (kg.m2). 0: a small one to start from, 1 % of what the torque accelerates to the speed in 1 s.
+    moment_arm
+        Of the tendon that stands for the drive (m).
+
+    Returns
+    -------
+    dict
+        A finger description, as in the JSON file.
+    """
+    numbers = {
+        "coulomb": COULOMB_SHARE * torque if coulomb is None else coulomb,
+        "viscous": VISCOUS_SHARE * torque / speed if viscous is None else viscous,
+        "inertia": inertia or INERTIA_SHARE * torque / speed,
+        "offset": 0.0,
+        "missed": NOISE_SHARE * torque,
     }
+    numbers = {key: float(f"{value:.6g}") for key, value in numbers.items()}
+    return _description(name, numbers, SLOWEST * speed, speed / 10, CUTOFF, moment_arm, known=False)
+
+
+def _measured(name: str, columns: dict[str, Series], cutoff: float, moment_arm: float) -> dict[str, Any]:
+    """Return the description whose numbers are those of the straight line."""
+    velocity = columns["joint_velocity[1]"]
+    slowest = slowest_motion(velocity, columns["joint_position[1]"], cutoff)
+    numbers = starting_numbers(columns, slowest)
     known = "external_torque[1]" in columns
-    inertia = {"effect": "inertia", "joint": 1, "inertia": start["inertia"]}
+    return _description(name, numbers, slowest, float(np.abs(velocity).max()) / 10, cutoff, moment_arm, known)
+
+
+def _description(
+    name: str,
+    numbers: dict[str, float],
+    slowest: float,
+    stribeck_velocity: float,
+    cutoff: float,
+    moment_arm: float,
+    known: bool,
+) -> dict[str, Any]:
+    """Return a description. known: the recordings hold the known load, which includes the torque of inertia."""
+    law = {
+        "static": numbers["coulomb"],
+        "coulomb": numbers["coulomb"],
+        "stribeck_velocity": float(f"{stribeck_velocity:.3g}"),
+        "viscous": numbers["viscous"],
+    }
+    inertia = {"effect": "inertia", "joint": 1, "inertia": numbers["inertia"]}
     return {
         "format": "tendonfmu-finger-1",
-        "name": joint.name,
-        "joints": [{"name": joint.name, "friction": law}],
-        "tendons": [{"name": "drive", "bidirectional": True, "stiffness": STIFFNESS, "moment_arms": [1.0]}],
-        "velocity_threshold": {"tendon": slowest, "joint": slowest},
+        "name": name,
+        "joints": [{"name": name, "friction": law}],
+        "tendons": [{"name": "drive", "bidirectional": True, "stiffness": STIFFNESS, "moment_arms": [moment_arm]}],
+        "velocity_threshold": {"tendon": float(f"{slowest * moment_arm:.3g}"), "joint": float(f"{slowest:.3g}")},
         "velocity_filter_cutoff": cutoff,
         # one offset for a recording: a bias that learns would follow the friction that is to be estimated
         "bias": {
             "drift_variance": 0.0,
-            "noise_std": start["missed"],
+            "noise_std": numbers["missed"],
             "initial_variance": 0.0,
             "forget_rate": 0.0,
-            "initial_torque": [start["offset"]],
+            "initial_torque": [numbers["offset"]],
         },
-        "contact": {"threshold": [float(f"{THRESHOLD * start['missed']:.4g}")]},
+        "contact": {"threshold": [float(f"{THRESHOLD * numbers['missed']:.4g}")]},
         "extensions": [] if known else [inertia],
     }
 

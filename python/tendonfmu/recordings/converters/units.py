@@ -1,19 +1,25 @@
-"""Which units a map of columns may name, each with its exact factor to SI: si = factor · value.
+"""Which units a map of columns may name, each with its factor to SI: si = factor · value.
 
-A metre of a sliding axis stands for a radian of a joint (see `one_joint`); no unit is both a length and an angle.
+The tables hold the common units with their exact factors. Any other name is looked up in pint, which is part of the
+extra `logs` and takes most of a second to import; the common units work without it. Angles are kept apart from plain
+numbers, and no unit is both a length and an angle. A metre of a sliding axis stands for a radian (see `one_joint`).
 """
 
 from __future__ import annotations
 
 import difflib
+import functools
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from tendonfmu.files import require_extra
 
 POUND_FORCE = 4.4482216152605  # N, by definition
 INCH = 0.0254  # m, by definition
 
 TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
-FORCE = {"N": 1.0, "mN": 1e-3, "kN": 1e3, "kgf": 9.80665, "lbf": POUND_FORCE}
+FORCE = {"N": 1.0, "mN": 1e-3, "kN": 1e3, "kgf": 9.80665, "gf": 9.80665e-3, "lbf": POUND_FORCE}
 TORQUE = {
     "N.m": 1.0,
     "mN.m": 1e-3,
@@ -29,6 +35,9 @@ SPEED = {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "m/min": 1.0 / 60}
 ANGULAR_SPEED = {"rad/s": 1.0, "mrad/s": 1e-3, "deg/s": math.pi / 180, "rpm": 2 * math.pi / 60, "turn/s": 2 * math.pi}
 NONE = {"1": 1.0}
 
+# Units of time that are points in time. `datetime` is a text, or a field that its format declares a time.
+STAMPS = {"epoch_s": 10**9, "epoch_ms": 10**6, "epoch_us": 10**3, "epoch_ns": 1, "datetime": 1}  # ns per unit
+
 # units in which each column of a recording may be given
 OF_COLUMN = {
     "time": TIME,
@@ -39,6 +48,92 @@ OF_COLUMN = {
     "external_torque": TORQUE,
     "contact": NONE,
 }
+
+# what loggers and engineers write, and the name in the tables
+ALIASES = {
+    **{"sec": "s", "secs": "s", "second": "s", "seconds": "s", "[s]": "s", "msec": "ms", "millisecond": "ms"},
+    **{"milliseconds": "ms", "usec": "us", "µs": "us", "μs": "us", "microseconds": "us", "nsec": "ns"},
+    **{"nanoseconds": "ns", "minutes": "min", "newton": "N", "newtons": "N", "Newton": "N", "kg-force": "kgf"},
+    **{"Nm": "N.m", "N*m": "N.m", "N·m": "N.m", "N-m": "N.m", "N m": "N.m", "mNm": "mN.m", "mN*m": "mN.m"},
+    **{"mN·m": "mN.m", "Nmm": "N.mm", "N*mm": "N.mm", "N·mm": "N.mm", "Ncm": "N.cm", "N*cm": "N.cm"},
+    **{"kgfcm": "kgf.cm", "kgcm": "kgf.cm", "kg.cm": "kgf.cm", "inlbf": "lbf.in", "in.lbf": "lbf.in"},
+    **{"meter": "m", "metre": "m", "meters": "m", "metres": "m", "millimeter": "mm", "millimetre": "mm"},
+    **{"millimeters": "mm", "millimetres": "mm", "µm": "um", "μm": "um", "in": "inch", "inches": "inch"},
+    **{"radian": "rad", "radians": "rad", "°": "deg", "degree": "deg", "degrees": "deg", "rev": "turn"},
+    **{"revolution": "turn", "revolutions": "turn", "turns": "turn", "rps": "turn/s", "rev/s": "turn/s"},
+    **{"°/s": "deg/s", "degree/s": "deg/s", "degrees/s": "deg/s", "deg/sec": "deg/s", "rad/sec": "rad/s"},
+    **{"RPM": "rpm", "1/min": "rpm", "rev/min": "rpm", "mps": "m/s"},
+}
+
+
+QUANTITIES = {
+    "time": TIME,
+    "force": FORCE,
+    "torque": TORQUE,
+    "length": LENGTH,
+    "angle": ANGLE,
+    "speed": SPEED,
+    "angular speed": ANGULAR_SPEED,
+}
+
+
+def factor(name: str, known: Mapping[str, float]) -> float | None:
+    """Return the factor of a unit to SI.
+
+    Parameters
+    ----------
+    name
+        Name of the unit.
+    known
+        The table of the quantity.
+
+    Returns
+    -------
+    float or None
+        None if it is no unit of the quantity.
+
+    Raises
+    ------
+    InputError
+        The name is in no table, and pint is not installed.
+    """
+    usual = ALIASES.get(name, name)
+    if usual in known:
+        return known[usual]
+    if known is NONE or any(usual in table for table in QUANTITIES.values()):
+        return None
+    return _factor_by_pint(name, next(unit for unit, value in known.items() if value == 1.0))
+
+
+def quantity(name: str) -> tuple[str, str] | None:
+    """Return (name in the tables, quantity) of a common unit, or None."""
+    usual = ALIASES.get(name, name)
+    for what, table in QUANTITIES.items():
+        if usual in table:
+            return usual, what
+    return None
+
+
+@functools.cache
+def _registry() -> Any:
+    import pint
+
+    return pint.UnitRegistry()
+
+
+def _factor_by_pint(name: str, reference: str) -> float | None:
+    """Return the factor to `reference`, or None. Root units keep the radian, which has no dimension, apart from 1."""
+    require_extra("pint", f"unit {name!r}")
+    registry = _registry()
+    try:
+        found = registry.Quantity(1.0, registry.parse_units(name)).to_root_units()
+    except Exception:  # pint raises errors of its parser and of Python's tokenizer for texts that are no unit
+        return None
+    wanted = registry.Quantity(1.0, registry.parse_units(reference.replace(".", "*"))).to_root_units()
+    if found.units != wanted.units:
+        return None
+    value = float(found.magnitude / wanted.magnitude)
+    return value if math.isfinite(value) and value > 0.0 else None
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

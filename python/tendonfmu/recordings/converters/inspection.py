@@ -1,0 +1,243 @@
+"""What is in a log: its topics and fields, with counts, rates, ranges and gaps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.errors import InputError
+from tendonfmu.recordings.converters.column_map import LogFormat, MappedColumn
+from tendonfmu.recordings.converters.log import NUMBER, NUMBERED, OTHER, TEXT, TIME, Field, Log, Topic
+from tendonfmu.recordings.converters.log_file import open_log
+from tendonfmu.recordings.converters.stamps import nanoseconds
+from tendonfmu.recordings.converters.text_log import TextLog
+from tendonfmu.recordings.converters.unit_guess import stated
+
+GAP = 10.0  # median steps
+
+
+@dataclass
+class FieldSummary:
+    """A field and its values.
+
+    Attributes
+    ----------
+    field
+        The field.
+    key
+        With which it is read: its name, or its number if the name is not unique.
+    count, missing
+        Rows, and those without a number.
+    low, high
+        Range of the numbers.
+    example
+        First text.
+    only_flags
+        Whether all numbers are 0 or 1.
+    """
+
+    field: Field
+    key: str
+    count: int = 0
+    missing: int = 0
+    low: float = np.inf
+    high: float = -np.inf
+    example: str = ""
+    only_flags: bool = True
+
+    def add(self, values: Any) -> None:
+        """Take a block of the field."""
+        self.count += len(values)
+        if not isinstance(values, np.ndarray):
+            self.missing += int(values.null_count)
+            self.example = self.example or next((str(each) for each in values[:100] if each.is_valid), "")
+            return
+        finite = values[np.isfinite(values)]
+        self.missing += len(values) - len(finite)
+        if len(finite):
+            self.low, self.high = min(self.low, float(finite.min())), max(self.high, float(finite.max()))
+            self.only_flags = self.only_flags and bool(np.isin(finite, (0, 1)).all())
+
+
+@dataclass
+class ClockSummary:
+    """The times of a topic, in the unit of its field; ns for points in time.
+
+    Attributes
+    ----------
+    name
+        The field.
+    stamp
+        Kind of a point in time that the field holds without doubt, or "".
+    first, last
+        First and last time.
+    step
+        Median step, of the first block.
+    largest
+        Largest step.
+    gaps
+        Steps of more than `GAP` median steps.
+    repeated, backwards
+        Steps of zero, and negative ones.
+    rows
+        Number of times.
+    """
+
+    name: str
+    stamp: str = ""
+    first: float = 0.0
+    last: float = 0.0
+    step: float = 0.0
+    largest: float = 0.0
+    gaps: int = 0
+    repeated: int = 0
+    backwards: int = 0
+    rows: int = 0
+    whole: bool = True
+    _end: Any = None
+
+    def add(self, values: NDArray[Any]) -> None:
+        """Take a block of the times."""
+        values = values[np.isfinite(values)]
+        if not len(values):
+            return
+        if self._end is None:
+            self.first = float(values[0])
+        else:
+            values = np.concatenate([[self._end], values])
+            self.rows -= 1
+        self._end, self.last, self.rows = values[-1], float(values[-1]), self.rows + len(values)
+        steps = np.diff(values)
+        if not len(steps):
+            return
+        self.step = self.step or float(np.median(steps))
+        self.largest = max(self.largest, float(steps.max()))
+        self.gaps += int(np.count_nonzero(steps > GAP * self.step)) if self.step > 0 else 0
+        self.repeated += int(np.count_nonzero(steps == 0))
+        self.backwards += int(np.count_nonzero(steps < 0))
+        self.whole = self.whole and bool((np.floor(values) == values).all())
+
+    def seconds(self, step: float, factor: float | None) -> float | None:
+        """Return a step in s, or None if the unit is not known."""
+        return step * 1e-9 if self.stamp else None if factor is None else step * factor
+
+
+@dataclass
+class TopicSummary:
+    """A topic, its fields and its clock, if one of its fields can be one."""
+
+    topic: Topic
+    fields: list[FieldSummary]
+    clock: ClockSummary | None
+
+
+@dataclass
+class Inspection:
+    """What is in a log.
+
+    Attributes
+    ----------
+    file
+        The log.
+    topics
+        Its topics.
+    settings
+        How a text is written, as keys of `log` in a map; empty for other formats.
+    notes
+        What was recovered or could not be read.
+    messages
+        Whether the log holds messages, whose units are those of ROS if nothing else is said.
+    """
+
+    file: Path
+    topics: list[TopicSummary]
+    settings: dict[str, Any] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    messages: bool = False
+
+
+def inspect_log(file: Path) -> Inspection:
+    """Read a log and summarise it.
+
+    Parameters
+    ----------
+    file
+        The log.
+
+    Returns
+    -------
+    Inspection
+        Its topics, fields and clocks.
+
+    Raises
+    ------
+    InputError
+        It cannot be read.
+    """
+    log = open_log(file, LogFormat())
+    found = [_fresh(topic) for topic in log.topics]
+    wanted = {each.topic.name: [f.key for f in each.fields if f.field.kind != OTHER] for each in found}
+    texts = [f.key for each in found for f in each.fields if f.field.kind == TEXT]
+    by_name = {each.topic.name: each for each in found}
+    for name, block in log.blocks(wanted, texts):
+        _add(log, by_name[name], block)
+    return Inspection(file, found, _settings(log), list(log.notes), log.open_ended)
+
+
+def _fresh(topic: Topic) -> TopicSummary:
+    names = [each.name for each in topic.fields]
+    keys = [name if names.count(name) == 1 else f"{NUMBERED}{k}" for k, name in enumerate(names, start=1)]
+    fields = [FieldSummary(each, key) for each, key in zip(topic.fields, keys, strict=True)]
+    of_time = [each.name for each in topic.fields if (found := stated(each.name, each.unit)) and found[1] == "time"]
+    clocks = [name for name in [*topic.clocks(), *of_time] if names.count(name) == 1]
+    kind = next((each.kind for each in topic.fields if clocks and each.name == clocks[0]), "")
+    return TopicSummary(topic, fields, ClockSummary(clocks[0], "datetime" if kind == TIME else "") if clocks else None)
+
+
+def _add(log: Log, topic: TopicSummary, block: dict[str, Any]) -> None:
+    for each in topic.fields:
+        values = block.get(each.key)
+        if values is None:
+            continue
+        each.add(values)
+        if topic.clock is None or each.key != topic.clock.name:
+            continue
+        if each.field.kind == TEXT and (topic.clock.stamp or not topic.clock.rows):
+            values = _as_times(log, each.field.name, values)
+            topic.clock.stamp = "datetime" if values is not None else ""
+        if isinstance(values, np.ndarray):
+            topic.clock.add(values)
+
+
+def _as_times(log: Log, name: str, texts: Any) -> NDArray[np.int64] | None:
+    """Return texts as ns since 1970, or None if they are no times."""
+    try:
+        return nanoseconds(log.file, MappedColumn("time", name, 1e-9, None, "datetime"), texts)
+    except InputError:
+        return None
+
+
+def _settings(log: Log) -> dict[str, Any]:
+    """Return what was found in the first lines, so that `convert table` reads the log in the same way."""
+    if not isinstance(log, TextLog):
+        return {}
+    layout = log.layout
+    found: dict[str, Any] = {"separator": layout.separator, "decimal": layout.decimal}
+    if log.encoding not in ("utf-8", "utf-8-sig"):
+        found["encoding"] = log.encoding
+    if layout.skip:
+        found["skip"] = layout.skip
+    if not layout.header:
+        found["header"] = False
+    if layout.units:
+        found["units_row"] = True
+    return found
+
+
+def is_numeric(summary: FieldSummary) -> bool:
+    """Return whether a field holds numbers."""
+    return summary.field.kind == NUMBER and summary.count > summary.missing

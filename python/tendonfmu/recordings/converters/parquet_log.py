@@ -1,0 +1,121 @@
+"""How Parquet logs are read, batch by batch. Their index is at the end, so a file that is cut off cannot be read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tendonfmu.errors import InputError
+from tendonfmu.recordings.converters.column_map import LogFormat
+from tendonfmu.recordings.converters.log import NUMBER, NUMBERED, OTHER, TEXT, TIME, Block, Field, Topic, as_numbers
+
+ROWS = 1 << 18  # of a block
+
+
+class ParquetLog:
+    """A Parquet log.
+
+    Parameters
+    ----------
+    file
+        The log.
+    settings
+        Of the map.
+    """
+
+    open_ended = False
+
+    def __init__(self, file: Path, settings: LogFormat) -> None:
+        self.file = file
+        self.notes: list[str] = []
+        with self._opened() as parquet:
+            schema, rows = parquet.schema_arrow, parquet.metadata.num_rows
+        fields = [Field(field.name, _kind(field.type), str(field.type), _unit(field)) for field in schema]
+        self.topics = [Topic("", tuple(fields), rows)]
+
+    def _opened(self) -> Any:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        try:
+            return pq.ParquetFile(self.file)
+        except (pa.ArrowException, OSError) as error:
+            raise self._cut_off(error) from None
+
+    def _cut_off(self, error: Exception) -> InputError:
+        return InputError(
+            f"{self.file}: not a whole Parquet file ({str(error).splitlines()[0]}); its index is at its end, so "
+            "nothing can be recovered: copy the file again, or write it again from its source"
+        )
+
+    def blocks(self, wanted: Mapping[str, Sequence[str]], texts: Sequence[str] = ()) -> Iterator[tuple[str, Block]]:
+        """Read columns; see `log.Log`."""
+        import pyarrow as pa
+
+        names = list(wanted.get("", ()))
+        places = {name: self._place(name) for name in names}
+        row = 0
+        with self._opened() as parquet:
+            schema = parquet.schema_arrow
+            columns = sorted({schema.field(place).name for place in places.values()})
+            unique = len(set(schema.names)) == len(schema.names)
+            try:
+                for batch in parquet.iter_batches(ROWS, columns=columns if unique else None):
+                    yield (
+                        "",
+                        {
+                            name: self._values(
+                                schema.field(place).name,
+                                batch.column(schema.field(place).name) if unique else batch.column(place),
+                                row,
+                            )
+                            for name, place in places.items()
+                        },
+                    )
+                    row += batch.num_rows
+            except (pa.ArrowException, OSError) as error:
+                raise self._cut_off(error) from None
+
+    def _place(self, name: str) -> int:
+        names = [field.name for field in self.topics[0].fields]
+        if name.startswith(NUMBERED) and name not in names:
+            return int(name[len(NUMBERED) :]) - 1
+        return names.index(name)
+
+    def _values(self, name: str, column: Any, row: int) -> Any:
+        """Return a column as numbers or texts. A missing number becomes NaN."""
+        import pyarrow as pa
+
+        kind = _kind(column.type)
+        if kind == TEXT:
+            return column
+        if kind == TIME:
+            return np.asarray(column.cast(pa.timestamp("ns", column.type.tz)).cast(pa.int64()).to_numpy(False))
+        if kind == OTHER:
+            at = next((k for k, value in enumerate(column, start=1) if value.is_valid), 1)
+            raise InputError(f"{self.file}: column {name}, row {row + at}: {column.type} values; expected numbers")
+        if pa.types.is_boolean(column.type):
+            column = column.cast(pa.int8())
+        if pa.types.is_integer(column.type) and not column.null_count:
+            return as_numbers(column.to_numpy(False))
+        return np.asarray(column.cast(pa.float64(), safe=False).to_numpy(False), dtype=np.float64)
+
+
+def _kind(kind: Any) -> str:
+    import pyarrow as pa
+
+    if pa.types.is_timestamp(kind):
+        return TIME
+    if pa.types.is_string(kind) or pa.types.is_large_string(kind):
+        return TEXT
+    numeric = (pa.types.is_integer, pa.types.is_floating, pa.types.is_boolean, pa.types.is_decimal, pa.types.is_null)
+    return NUMBER if any(is_kind(kind) for is_kind in numeric) else OTHER
+
+
+def _unit(field: Any) -> str:
+    """Return the unit that the metadata of a column states, as pandas and others write it, or ""."""
+    stated = field.metadata or {}
+    return next((stated[key].decode("utf-8", "replace") for key in (b"unit", b"units") if key in stated), "")
