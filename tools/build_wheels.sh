@@ -63,7 +63,8 @@ EOF
 make_constraints() { sed -nE 's/^([a-z0-9-]+==[^ ]+( ; [^\\]+)?) \\$/\1/p' requirements.lock >"$output/constraints.txt"; }
 
 build_source() {
-  rm -rf "$output/dist" "$output/source"
+  # Every file of a source distribution has the same time, so ninja would take objects of other sources for these.
+  rm -rf "$output/dist" "$output/source" "$output/objects"
   mkdir -p "$output/dist" "$output/source"
   timed "source distribution" "$python" -c \
     "import sys; from scikit_build_core.build import build_sdist as build; build(sys.argv[1])" "$output/dist"
@@ -79,8 +80,9 @@ compile_wheel() {
 }
 
 repair_wheel() {
-  PATH="$root/.venv/bin:$PATH" "$python" -m auditwheel repair --plat "$policy" --wheel-dir "$output/dist" "$1" &&
-    "$python" tools/wheel/check_wheel.py "$output/dist" --glibc "$glibc"
+  PATH="$root/.venv/bin:$PATH" "$python" -m auditwheel repair --plat "$policy" --wheel-dir "$output/dist" "$1" || return 1
+  if [[ $1 == *-abi3-* ]]; then "$python" -m abi3audit --strict --verbose "$1" || return 1; fi
+  "$python" tools/wheel/check_wheel.py "$output/dist" --glibc "$glibc"
 }
 
 # Which wheel pip would take is pip's to say: asked by each interpreter, without dependencies.
@@ -90,7 +92,7 @@ wheel_for() {
 }
 
 build_wheels() {
-  local interpreter raw
+  local interpreter raw reason
   for interpreter in "$@"; do
     if wheel_for "$interpreter"; then continue; fi
     rm -rf "$output/raw"

@@ -23,7 +23,9 @@ def largest_difference(a: dict[str, float], b: dict[str, float]) -> float:
     """Largest relative difference of two fits; infinite if they hold other numbers."""
     if a.keys() != b.keys():
         return float("inf")
-    return max((abs(a[key] - b[key]) / max(abs(a[key]), abs(b[key]), 1e-300) for key in a if a[key] != b[key]), default=0.0)
+    return max(
+        (abs(a[key] - b[key]) / max(abs(a[key]), abs(b[key]), 1e-300) for key in a if a[key] != b[key]), default=0.0
+    )
 
 
 def findings(trials: dict[str, dict[str, Any]]) -> list[str]:
