@@ -2,8 +2,8 @@
 
     python tools/wheel/compare_trials.py tried-3.10.json tried-3.11.json ... [tried-tree.json]
 
-The bits of run and simulate are the same everywhere. The numbers of a fit are the same in all wheels; the package of another
-compiler (tried-tree.json) may differ by TOLERANCE, since Eigen sums in the order that the compiler chooses.
+The bits of run and simulate are the same everywhere. The numbers of a fit are the same in all wheels; the package of
+another compiler (tried-tree.json) may differ by TOLERANCE, since Eigen sums in the order that the compiler chooses.
 Exit status: 0 alike, 1 not.
 """
 

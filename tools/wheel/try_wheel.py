@@ -2,7 +2,7 @@
 
     PYTHON tools/wheel/try_wheel.py FOLDER [--version VERSION] [--rig RIG.json]
 
-Every file goes into FOLDER, which is made. Runs with any environment that has the package: it needs nothing else, neither
+Every file goes into FOLDER, which is made. Runs in any environment that has the package and needs nothing else, neither
 a compiler nor pytest. Two installations compute the same where their objects are the same:
 
     bits     name of a result: SHA-256 of its numbers; the same for every Python, compiler and processor
