@@ -11,6 +11,7 @@
 #   TENDONFMU_HAS_ESTIMATION       parameters can be estimated: then also the targets Eigen3::Eigen and Threads::Threads
 
 option(TENDONFMU_HEADERS_FROM_PYTHON "Take nlohmann-json and Eigen from Python packages, even where the system has them" OFF)
+set(TENDONFMU_HEADERS_PYTHON "" CACHE FILEPATH "Python that has these packages; default: the one that is built for")
 
 if(TENDONFMU_PYTHON)
   # scikit-build-core names the component of the stable interface where the wheel is to have it (wheel.py-api in pyproject.toml).
@@ -23,9 +24,13 @@ endif()
 # fmpy's import takes half a second.
 function(tendonfmu_python_folder folder name path)
   set(found "")
-  if(Python_EXECUTABLE)
+  set(interpreter "${TENDONFMU_HEADERS_PYTHON}")
+  if(NOT interpreter)
+    set(interpreter "${Python_EXECUTABLE}")
+  endif()
+  if(interpreter)
     execute_process(
-      COMMAND "${Python_EXECUTABLE}" -c
+      COMMAND "${interpreter}" -c
               "import sys; from importlib.metadata import distribution; print(distribution(sys.argv[1]).locate_file(sys.argv[2]))"
               "${name}" "${path}"
       OUTPUT_VARIABLE found ERROR_QUIET OUTPUT_STRIP_TRAILING_WHITESPACE)

@@ -71,11 +71,14 @@ build_source() {
   tar -xzf "$output"/dist/*.tar.gz -C "$output/source" --strip-components 1
 }
 
-# One build folder for all interpreters: what knows no Python is compiled once.
+# One build folder and one place of headers for all interpreters: what knows no Python is compiled once.
 compile_wheel() {
-  CC=$output/cc CXX=$output/c++ PATH="$root/.venv/bin:$PATH" CMAKE_GENERATOR=Ninja PIP_CONSTRAINT=$output/constraints.txt \
-    SKBUILD_BUILD_DIR=$output/objects \
-    SKBUILD_CMAKE_DEFINE="TENDONFMU_HEADERS_FROM_PYTHON=ON;TENDONFMU_SUNDIALS_FOLDER=$root/build/sundials;CMAKE_LIBRARY_ARCHITECTURE=$("$python" -c 'import sysconfig; print(sysconfig.get_config_var("MULTIARCH"))')" \
+  local machine defines
+  machine=$("$python" -c 'import sysconfig; print(sysconfig.get_config_var("MULTIARCH"))')
+  defines="TENDONFMU_HEADERS_FROM_PYTHON=ON;TENDONFMU_HEADERS_PYTHON=$python"
+  defines+=";TENDONFMU_SUNDIALS_FOLDER=$root/build/sundials;CMAKE_LIBRARY_ARCHITECTURE=$machine"
+  CC=$output/cc CXX=$output/c++ PATH="$root/.venv/bin:$PATH" CMAKE_GENERATOR=Ninja SKBUILD_CMAKE_DEFINE=$defines \
+    SKBUILD_BUILD_DIR=$output/objects PIP_CONSTRAINT=$output/constraints.txt PYTHONPATH='' \
     "$1" -m pip wheel --disable-pip-version-check --no-input --no-deps --wheel-dir "$output/raw" "$output/source"
 }
 
@@ -149,10 +152,13 @@ for index in "${!pythons[@]}"; do
   name=$("${pythons[$index]}" -c 'import sys; print("%d.%d" % sys.version_info[:2])')
   if [ "$index" -eq "$last" ]; then try_wheel "${pythons[$index]}" "$name" "${EXTRAS:-}"; else try_wheel "${pythons[$index]}" "$name"; fi
 done
-if [ -x .venv/bin/tendonfmu ]; then
+tree=$("$python" -I -c 'import importlib.metadata as m; print(m.version("tendonfmu"))' 2>/dev/null || true)
+if [ "$tree" = "$version" ]; then
   timed "the same with the package in .venv" "$python" tools/wheel/try_wheel.py "$scratch/work-tree" \
     --version "$version" --rig examples/rigs/index_finger.json
   cp "$output/log" "$output/tried-tree.json"
+else
+  say "NOT compared with the package in .venv: it is ${tree:-not installed}"
 fi
 "$python" tools/wheel/compare_trials.py "$output"/tried-*.json
 ls -l "$output/dist"
