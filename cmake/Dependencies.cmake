@@ -24,13 +24,14 @@ endif()
 # fmpy's import takes half a second.
 function(tendonfmu_python_folder folder name path)
   set(found "")
-  set(interpreter "${TENDONFMU_HEADERS_PYTHON}")
-  if(NOT interpreter)
-    set(interpreter "${Python_EXECUTABLE}")
+  set(interpreter "${Python_EXECUTABLE}")
+  if(TENDONFMU_HEADERS_PYTHON)
+    # -I: pip's PYTHONPATH, by which a build finds its own packages, is not for another interpreter.
+    set(interpreter "${TENDONFMU_HEADERS_PYTHON}" -I)
   endif()
   if(interpreter)
     execute_process(
-      COMMAND "${interpreter}" -c
+      COMMAND ${interpreter} -c
               "import sys; from importlib.metadata import distribution; print(distribution(sys.argv[1]).locate_file(sys.argv[2]))"
               "${name}" "${path}"
       OUTPUT_VARIABLE found ERROR_QUIET OUTPUT_STRIP_TRAILING_WHITESPACE)
