@@ -1,6 +1,7 @@
 # Finds what the parts need and says plainly what is missing.
 #
-#   nlohmann_json::nlohmann_json   reads the finger description (runtime/description)
+#   nlohmann_json::nlohmann_json   reads the finger description (runtime/description); from the system or, as Eigen,
+#                                  from a Python package
 #   Python_EXECUTABLE              runs the generators; with TENDONFMU_PYTHON also the headers of extension modules
 #   TENDONFMU_FMI_INCLUDE_DIR      folder of fmi2Functions.h, taken from the installed Python package fmpy
 #   tendonfmu_fmi_headers          the same as an INTERFACE target
@@ -9,26 +10,54 @@
 #   TENDONFMU_HAS_PLANT            the simulated finger can be built: then also the targets tendonfmu_sundials and Eigen3::Eigen
 #   TENDONFMU_HAS_ESTIMATION       parameters can be estimated: then also the targets Eigen3::Eigen and Threads::Threads
 
-find_package(nlohmann_json 3.9 QUIET)
-if(NOT nlohmann_json_FOUND)
-  message(FATAL_ERROR "nlohmann-json >= 3.9 not found: install nlohmann-json3-dev (Debian, Ubuntu) or nlohmann-json (Homebrew)")
-endif()
+option(TENDONFMU_HEADERS_FROM_PYTHON "Take nlohmann-json and Eigen from Python packages, even where the system has them" OFF)
+set(TENDONFMU_HEADERS_PYTHON "" CACHE FILEPATH "Python that has these packages; default: the one that is built for")
 
 if(TENDONFMU_PYTHON)
-  find_package(Python 3.10 REQUIRED COMPONENTS Interpreter Development.Module)
+  # scikit-build-core names the component of the stable interface where the wheel is to have it (wheel.py-api in pyproject.toml).
+  find_package(Python 3.10 REQUIRED COMPONENTS Interpreter Development.Module ${SKBUILD_SABI_COMPONENT})
 elseif(TENDONFMU_BUILD_FMU)
   find_package(Python 3.10 REQUIRED COMPONENTS Interpreter)
 endif()
 
+# Sets `folder` to PATH in the site-packages of the installed Python distribution NAME, or to nothing. Nothing is imported:
+# fmpy's import takes half a second.
+function(tendonfmu_python_folder folder name path)
+  set(found "")
+  set(interpreter "${Python_EXECUTABLE}")
+  if(TENDONFMU_HEADERS_PYTHON)
+    # -I: pip's PYTHONPATH, by which a build finds its own packages, is not for another interpreter.
+    set(interpreter "${TENDONFMU_HEADERS_PYTHON}" -I)
+  endif()
+  if(interpreter)
+    execute_process(
+      COMMAND ${interpreter} -c
+              "import sys; from importlib.metadata import distribution; print(distribution(sys.argv[1]).locate_file(sys.argv[2]))"
+              "${name}" "${path}"
+      OUTPUT_VARIABLE found ERROR_QUIET OUTPUT_STRIP_TRAILING_WHITESPACE)
+    file(TO_CMAKE_PATH "${found}" found)
+  endif()
+  set(${folder} "${found}" PARENT_SCOPE)
+endfunction()
+
+# Both are header-only. `pip install` of the source distribution brings them as Python packages (pyproject.toml).
+if(NOT TENDONFMU_HEADERS_FROM_PYTHON)
+  find_package(nlohmann_json 3.9 QUIET)
+endif()
+if(NOT TARGET nlohmann_json::nlohmann_json)
+  tendonfmu_python_folder(json_folder nlohmann-json nlohmann_json/include)
+  if(NOT EXISTS "${json_folder}/nlohmann/json.hpp")
+    message(FATAL_ERROR "nlohmann-json >= 3.9 not found: install nlohmann-json3-dev (Debian, Ubuntu), nlohmann-json (Homebrew) "
+                        "or the Python package nlohmann-json")
+  endif()
+  message(STATUS "nlohmann-json: ${json_folder}")
+  add_library(nlohmann_json::nlohmann_json INTERFACE IMPORTED)
+  target_include_directories(nlohmann_json::nlohmann_json SYSTEM INTERFACE "${json_folder}")
+endif()
+
 if(TENDONFMU_BUILD_FMU)
   if(NOT EXISTS "${TENDONFMU_FMI_INCLUDE_DIR}/fmi2Functions.h")
-    # find_spec locates the package without importing it: fmpy's import takes half a second.
-    execute_process(
-      COMMAND "${Python_EXECUTABLE}" -c
-              "import importlib.util as u; s = u.find_spec('fmpy'); print(s.submodule_search_locations[0] if s else '')"
-      OUTPUT_VARIABLE fmpy_folder
-      OUTPUT_STRIP_TRAILING_WHITESPACE)
-    file(TO_CMAKE_PATH "${fmpy_folder}/c-code" fmi_folder)
+    tendonfmu_python_folder(fmi_folder fmpy fmpy/c-code)
     set(TENDONFMU_FMI_INCLUDE_DIR "${fmi_folder}" CACHE PATH "Folder of fmi2Functions.h" FORCE)
   endif()
   if(NOT EXISTS "${TENDONFMU_FMI_INCLUDE_DIR}/fmi2Functions.h")
@@ -58,10 +87,16 @@ endif()
 # For the simulated finger and the estimation of parameters: the rest is built without it.
 set(eigen_missing "")
 if(TENDONFMU_PLANT OR TENDONFMU_ESTIMATION)
-  # Compared here: Eigen 5 does not call itself compatible with 3.4, and is.
-  find_package(Eigen3 QUIET NO_MODULE)
+  # Versions are compared here: Eigen 5 does not call itself compatible with 3.4, and is.
+  if(NOT TENDONFMU_HEADERS_FROM_PYTHON)
+    find_package(Eigen3 QUIET NO_MODULE)
+  endif()
+  if(NOT TARGET Eigen3::Eigen)
+    tendonfmu_python_folder(eigen_folder cmeel-eigen cmeel.prefix)
+    find_package(Eigen3 QUIET NO_MODULE PATHS "${eigen_folder}" NO_DEFAULT_PATH)
+  endif()
   if(NOT TARGET Eigen3::Eigen OR Eigen3_VERSION VERSION_LESS 3.4)
-    set(eigen_missing "Eigen >= 3.4 not found: install libeigen3-dev (Debian, Ubuntu) or eigen (Homebrew)")
+    set(eigen_missing "Eigen >= 3.4 not found: install libeigen3-dev (Debian, Ubuntu), eigen (Homebrew) or the Python package cmeel-eigen")
   endif()
 endif()
 

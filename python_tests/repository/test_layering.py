@@ -30,7 +30,7 @@ C_LIBRARY = {
 }
 # what a kernel or a platform needs beyond C, and the only files that may
 BEYOND_C = {
-    "kernel_choice.c": {"cpuid.h", "intrin.h"},
+    "processor.h": {"cpuid.h", "intrin.h"},
     "quad_sse2.h": {"emmintrin.h"},
     "quad_avx2.h": {"immintrin.h"},
     "resource.c": {"windows.h"},

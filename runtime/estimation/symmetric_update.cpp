@@ -1,5 +1,7 @@
 #include "symmetric_update.h"
 
+#include "processor.h"
+
 namespace tendonfmu::estimation {
 namespace {
 
@@ -9,12 +11,10 @@ struct update_choice {
   update_choice() {
     std::size_t count = 0;
 #if defined(TENDONFMU_ESTIMATION_AVX2)
-    __builtin_cpu_init();
-    // these ask the operating system too: it must keep the registers
-    if (__builtin_cpu_supports("avx512f")) {
+    if (has_avx512f()) {
       list[count++] = avx512_symmetric_update;
     }
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
+    if (has_avx2_and_fma()) {
       list[count++] = avx2_symmetric_update;
     }
 #endif
