@@ -1,5 +1,7 @@
+from .detect import TuneWarning as TuneWarning
 from .errors import InputError as InputError
 from .errors import InputWarning as InputWarning
+from .estimate import FitWarning as FitWarning
 from .interface import Diagnosis as Diagnosis
 from .interface import FitResult as FitResult
 from .interface import Runner as Runner

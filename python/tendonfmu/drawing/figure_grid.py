@@ -22,7 +22,10 @@ COLOURS = (BLUE, VERMILION, GREEN, PURPLE, SKY, ORANGE, DARK, GREY)
 _COLUMNS = 2
 _ROW = 240  # CSS pixels, height of a row of panels
 _SERIES = 190  # CSS pixels, height of a row of curves
-_GAP = (0.08, 60.0)  # between columns, share of the width; between rows, CSS pixels
+_GAP = (0.13, 78.0)  # between columns, share of the width; between rows, CSS pixels
+_BOTTOM = 50.0  # CSS pixels below
+_LINE = 18  # CSS pixels of a line of keys
+_MOST_LETTERS = (90, 36)  # in a line of keys, and in one of the heading of a panel
 
 
 @dataclass(frozen=True)
@@ -116,19 +119,24 @@ def sheets_figure(title: str, sheets: Sequence[Sheet]) -> Any:
         The figure.
     """
     panels = [(sheet, panel) for sheet in sheets for panel in sheet.panels if not isinstance(panel, MatrixPanel)]
-    rows = max(1, math.ceil(len(panels) / _COLUMNS))
-    height = 110.0 + (_ROW + _GAP[1]) * rows
+    columns = max(1, min(_COLUMNS, len(panels)))
+    rows = max(1, math.ceil(len(panels) / columns))
+    keys = _keys(sheets)
+    top = 75.0 + _LINE * len(keys)
+    inside = (_ROW + _GAP[1]) * rows - _GAP[1]
     data: list[Figure] = []
-    heading = f"{html.escape(title)}<br><sup>{_keys(sheets)}</sup>"
-    layout: Figure = {"title": {"text": heading}, "height": height, "showlegend": False, "margin": {"t": 90}}
+    heading = f"{html.escape(title)}<br><sup>{'<br>'.join(keys)}</sup>"
+    placed = {"text": heading, "y": 1, "yanchor": "top", "pad": {"t": 12}}
+    layout: Figure = {"title": placed, "showlegend": False}
+    layout |= {"height": top + inside + _BOTTOM, "margin": {"t": top, "b": _BOTTOM}}
     layout |= {"shapes": [], "annotations": [], "hovermode": "closest"}
     for k, (sheet, panel) in enumerate(panels):
-        across = _cell(_COLUMNS - 1 - k % _COLUMNS, _COLUMNS, _GAP[0])
-        upward = _cell(k // _COLUMNS, rows, _GAP[1] / height)
+        across = _cell(columns - 1 - k % columns, columns, _GAP[0])
+        upward = _cell(k // columns, rows, _GAP[1] / inside)
         _place(figure_of(panel, dict(sheet.keys)), k + 1, (across, upward), data, layout)
         layout["annotations"].append(
             {
-                "text": f"<b>{html.escape(_heading(sheet, panel))}</b>",
+                "text": f"<b>{_heading(sheet, panel)}</b>",
                 "x": across[0],
                 "y": upward[1],
                 "xref": "paper",
@@ -139,15 +147,26 @@ def sheets_figure(title: str, sheets: Sequence[Sheet]) -> Any:
     return plotly_figure(_first_axes(data, layout))
 
 
-def _keys(sheets: Sequence[Sheet]) -> str:
-    """Return the meanings of the styles, each in its colour."""
+def _keys(sheets: Sequence[Sheet]) -> list[str]:
+    """Return the meanings of the styles, each in its colour, in lines."""
     meanings = {style: meaning for sheet in sheets for style, meaning in sheet.keys}
     colours = {meaning: STYLES[style].colour for style, meaning in meanings.items()}
-    return " ".join(f'<span style="color:{colour}">■ {html.escape(each)}</span>' for each, colour in colours.items())
+    lines: list[list[str]] = [[]]
+    for meaning in colours:
+        if len("".join([*lines[-1], meaning])) > _MOST_LETTERS[0]:
+            lines.append([])
+        lines[-1].append(meaning)
+    shown = {each: f'<span style="color:{colour}">■ {html.escape(each)}</span>' for each, colour in colours.items()}
+    return [" ".join(shown[meaning] for meaning in line) for line in lines]
 
 
 def _heading(sheet: Sheet, panel: Panel) -> str:
-    return panel.title if panel.title and sheet.panels[0] is not panel else f"{sheet.title}: {panel.title}".rstrip(": ")
+    """Return the title of a panel; of the first one with that of its sheet, in two lines if it is long."""
+    if not panel.title or sheet.panels[0] is panel:
+        together = f"{sheet.title}: {panel.title}".rstrip(": ")
+        between = "<br>" if panel.title and len(together) > _MOST_LETTERS[1] else ": "
+        return between.join(html.escape(part) for part in (sheet.title, panel.title) if part)
+    return html.escape(panel.title)
 
 
 def _cell(k: int, count: int, gap: float) -> Interval:

@@ -98,7 +98,10 @@ def plotly_figure(figure: Figure) -> Any:
     """
     from plotly.graph_objects import Figure as PlotlyFigure
 
-    template = {"layout": _TEMPLATE["layout"] | {"paper_bgcolor": "#fff", "plot_bgcolor": "#fff", "showlegend": True}}
+    # the title is at the left: the buttons are at the right
+    title = {"x": 0, "xref": "container", "xanchor": "left", "pad": {"l": 12}, "font": {"size": 14}}
+    own = {"paper_bgcolor": "#fff", "plot_bgcolor": "#fff", "showlegend": True, "title": title}
+    template = {"layout": _TEMPLATE["layout"] | own}
     return PlotlyFigure(data=figure["data"], layout=figure["layout"] | {"template": template})
 
 

@@ -92,15 +92,21 @@ class Diagnosis:
         """
         return write_diagnosis(self.found, Path(folder))
 
-    def plot(self) -> Any:
+    def plot(self, residuals: bool = True) -> Any:
         """Draw the evidence for each cause, then the residual at each joint, before and after.
+
+        Parameters
+        ----------
+        residuals
+            Whether the residuals are drawn, eight panels a joint.
 
         Returns
         -------
         plotly.graph_objects.Figure
             The figures of diagnosis.html.
         """
-        return sheets_figure(repr(self)[1:-1], diagnosis_sheets(self.found))
+        sheets = [each for each in diagnosis_sheets(self.found) if residuals or each.section != "views"]
+        return sheets_figure(repr(self)[1:-1], sheets)
 
     def _repr_html_(self) -> str:
         return html_of(repr(self)[1:-1], diagnosis_text.tables(self.found), diagnosis_text.lines(self.found))

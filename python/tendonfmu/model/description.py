@@ -85,7 +85,7 @@ class Finger:
 
     @property
     def moment_arms(self) -> list[list[float]]:
-        """Routing matrix R [m][n] (m)."""
+        """Routing matrix R [m, n] (m)."""
         return [[float(arm) for arm in tendon["moment_arms"]] for tendon in self.data["tendons"]]
 
     def to_dict(self) -> dict[str, Any]:
