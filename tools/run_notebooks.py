@@ -21,7 +21,7 @@ _SECONDS = 600  # a cell, on a busy machine
 
 
 def run_notebook(file: Path, folder: Path) -> Any:
-    """Return a notebook with its outputs. What it writes goes to `folder/notebooks`, beside links to the examples.
+    """Return a notebook with its outputs. What it writes goes to `folder/notebooks`, beside links to their data.
 
     Parameters
     ----------
@@ -37,9 +37,9 @@ def run_notebook(file: Path, folder: Path) -> Any:
     """
     place = folder / "notebooks"
     place.mkdir(exist_ok=True)
-    data = folder / "demo_recording"
-    if not data.exists():
-        data.symlink_to(EXAMPLES / "demo_recording", target_is_directory=True)
+    for name in ("demo_recording", "fingers"):
+        if not (folder / name).exists():
+            (folder / name).symlink_to(EXAMPLES / name, target_is_directory=True)
     notebook = nbformat.read(file, as_version=4)
     # Figures as JSON, which the site draws with one copy of plotly.js.
     environment = {**os.environ, "PLOTLY_RENDERER": "plotly_mimetype"}

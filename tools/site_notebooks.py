@@ -20,7 +20,7 @@ _FIGURE = "application/vnd.plotly.v1+json"
 _LINK = re.compile(r"(\[[^\]]+\]\()([^)\s#:]+)")
 _ANSI = re.compile(r"\x1b\[[0-9;]*m")
 _WARNING = re.compile(r"^\S+\.py:\d+: (\w*Warning: .*)\n(?:  .*\n)?", re.MULTILINE)  # with the place and its line
-_NOTE = '!!! note\n    The site was built without the package: this page has no outputs. Open `{}` to run it.'
+_NOTE = "!!! note\n    The site was built without the package: this page has no outputs. Open `{}` to run it."
 
 
 def page_of(name: str) -> str:
@@ -96,7 +96,8 @@ def _script(name: str, figure: dict[str, Any]) -> str:
 def _place(name: str, figure: dict[str, Any], *, first: bool) -> str:
     plotly = f'<script src="{Path(PLOTLY).name}"></script>' if first else ""
     height = figure["layout"].get("height", 450)
-    return f'<div class="notebook-figure" id="{name}" style="height: {height:g}px"></div>{plotly}<script src="{name}.js"></script>'
+    place = f'<div class="notebook-figure" id="{name}" style="height: {height:g}px"></div>'
+    return f'{place}{plotly}<script src="{name}.js"></script>'
 
 
 def _relocated(link: re.Match[str]) -> str:

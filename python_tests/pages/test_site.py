@@ -20,7 +20,8 @@ HEADERS = sorted((ROOT / "runtime" / "include").glob("*.h"))
 
 def test_every_page_is_in_the_menu() -> None:
     menu = set(re.findall(r"[\w/]+\.md", (ROOT / "mkdocs.yml").read_text(encoding="utf-8")))
-    assert menu == {path.relative_to(DOCS).as_posix() for path in DOCS.rglob("*.md")}
+    pages = {path.relative_to(DOCS).as_posix() for path in DOCS.rglob("*.md")}
+    assert menu == pages | {f"notebooks/{path.stem}.md" for path in (ROOT / "examples/notebooks").glob("*.ipynb")}
 
 
 @pytest.mark.parametrize("header", HEADERS, ids=lambda header: header.stem)

@@ -25,7 +25,7 @@ _SERIES = 190  # CSS pixels, height of a row of curves
 _GAP = (0.13, 78.0)  # between columns, share of the width; between rows, CSS pixels
 _BOTTOM = 50.0  # CSS pixels below
 _LINE = 18  # CSS pixels of a line of keys
-_MOST_LETTERS = (90, 36)  # in a line of keys, and in one of the heading of a panel
+_MOST_LETTERS = (70, 36)  # in a line of keys, and in one of the heading of a panel
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ def sheets_figure(title: str, sheets: Sequence[Sheet]) -> Any:
                 "xref": "paper",
                 "yref": "paper",
             }
-            | {"xanchor": "left", "yanchor": "bottom", "showarrow": False, "font": {"size": 12}}
+            | {"xanchor": "left", "yanchor": "bottom", "showarrow": False, "align": "left", "font": {"size": 12}}
         )
     return plotly_figure(_first_axes(data, layout))
 

@@ -1,0 +1,155 @@
+"""examples/notebooks: stored without outputs; they run, and show what their texts claim. Pages of the site from them."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from repository_paths import ROOT
+
+sys.path.append(str(ROOT / "tools"))
+
+import site_notebooks
+
+NOTEBOOKS = sorted((ROOT / "examples" / "notebooks").glob("*.ipynb"))
+LONG = pytest.mark.long
+FIGURE = "application/vnd.plotly.v1+json"
+PAIR = {"cell_type": "code", "id": "one", "metadata": {}, "execution_count": 1}
+
+
+def outputs_of(notebook: Any) -> dict[str, list[Any]]:
+    return {cell["id"]: cell["outputs"] for cell in notebook["cells"] if cell["cell_type"] == "code"}
+
+
+def figures_of(outputs: list[Any]) -> list[Any]:
+    return [each["data"][FIGURE] for each in outputs if FIGURE in each.get("data", {})]
+
+
+def table_of(outputs: list[Any]) -> dict[str, list[str]]:
+    """Cells of the table of a DataFrame by the name of the row."""
+    page = next(each["data"]["text/html"] for each in outputs if "text/html" in each.get("data", {}))
+    rows = re.findall(r"<tr>\s*<th>(.*?)</th>(.*?)</tr>", page, re.DOTALL)
+    return {name: re.findall(r"<td>(.*?)</td>", cells) for name, cells in rows if "<td>" in cells}
+
+
+def printed(outputs: list[Any]) -> str:
+    return "".join(each["text"] for each in outputs if each.get("name") == "stdout")
+
+
+@pytest.fixture(scope="module")
+def run_notebook() -> Any:
+    pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
+    pytest.importorskip("nbclient", reason="SKIPPED: nbclient is not installed")
+    pytest.importorskip("ipykernel", reason="SKIPPED: ipykernel is not installed")
+    from run_notebooks import run_notebook
+
+    return run_notebook
+
+
+@pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
+def test_a_notebook_is_stored_without_outputs_and_uses_public_names(file: Path) -> None:
+    notebook = json.loads(file.read_text(encoding="utf-8"))
+    assert set(notebook["metadata"]) == {"kernelspec", "language_info"}
+    code = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    assert all(cell["outputs"] == [] and cell["execution_count"] is None for cell in code)
+    source = "".join("".join(cell["source"]) for cell in code)
+    assert "from tendonfmu" not in source and not re.search(r"\btf\.\w+\._|\btf\._", source)
+
+
+@pytest.mark.slow
+def test_run_and_fit(run_notebook: Any, tmp_path: Path) -> None:
+    found = outputs_of(run_notebook(NOTEBOOKS[0], tmp_path))
+    assert "<svg" in found["finger"][0]["data"]["text/html"]
+    assert {trace["name"] for trace in figures_of(found["run"])[0]["data"]} == {"pulled", "friction", "compensated"}
+    assert any("not white" in each.get("text", "") for each in found["fit"])  # what the last cell refers to
+    parameters = table_of(found["parameters"])
+    assert len(parameters) == 16 and all(row[-1] == "True" for row in parameters.values())
+    assert len(figures_of(found["plot"])) == 1
+    for no_model, given, fitted in table_of(found["unseen"]).values():
+        assert float(fitted) < 0.95 * float(given) < 0.15 * float(no_model)
+    assert (tmp_path / "notebooks" / "two_joints_fitted.fmu").is_file()
+
+
+@LONG
+def test_diagnose_and_extend(run_notebook: Any, tmp_path: Path) -> None:
+    found = outputs_of(run_notebook(NOTEBOOKS[1], tmp_path))
+    hidden = table_of(found["truth"])
+    size = re.search(r"weight at joint (\d): ([\d.]+)\s*mN·m", printed(found["causes"]))
+    assert size and hidden["joint"] == [size[1]] and hidden["effect"] == ["gravity"]
+    # 2 %: ten standard errors of the fitted weight
+    assert float(size[2]) == pytest.approx(1000 * float(hidden["magnitude"][0]), rel=0.02)
+    gains = {name: [float(each) for each in row] for name, row in table_of(found["causes"]).items()}
+    assert list(gains) == ["gravity", "all"] and gains["gravity"][0] > gains["all"][0] > gains["all"][1] > 0.2
+    assert len(figures_of(found["plot"])) == 1
+    for given, fitted, extended in table_of(found["extend"]).values():
+        assert float(extended) < 0.8 * float(fitted) < 0.8 * float(given)
+    assert (tmp_path / "notebooks" / "diagnosis" / "diagnosis.html").is_file()
+
+
+@LONG
+def test_detect_and_tune(run_notebook: Any, tmp_path: Path) -> None:
+    found = outputs_of(run_notebook(NOTEBOOKS[2], tmp_path))
+    assert len(figures_of(found["plot"])[0]["layout"]["shapes"]) >= 4 * 2 * 11
+    assert any("21.1 min more for 6" in each.get("text", "") for each in found["tune"])
+    rows = table_of(found["compare"])
+    assert [row[0] for row in rows.values()] == ["8 of 11", "11 of 11", "11 of 11"]
+    delays = [int(row[2].split()[0]) for row in rows.values()]
+    assert delays[1] <= delays[2] < delays[0]
+    text = printed(found["live"])
+    assert re.search(r"contact at 9\.\d+ s", text) and text.count("mN·m") == 4
+
+
+def test_an_error_in_a_cell_is_an_error(run_notebook: Any, tmp_path: Path) -> None:
+    from nbclient.exceptions import CellExecutionError
+
+    cell = {"cell_type": "code", "id": "a", "metadata": {}, "execution_count": None, "outputs": [], "source": "1 / 0"}
+    file = tmp_path / "bad.ipynb"
+    file.write_text(json.dumps({"cells": [cell], "metadata": {}, "nbformat": 4, "nbformat_minor": 5}))
+    with pytest.raises(CellExecutionError, match="ZeroDivisionError"):
+        run_notebook(file, tmp_path)
+
+
+def test_a_page_has_text_code_and_outputs() -> None:
+    figure = {"data": [{"y": [1.0]}], "layout": {"height": 321.0}}
+    warned = "/tmp/ipykernel_1/2.py:1: FitWarning: not white\n  fit = tf.fit()\n"
+    notebook = {
+        "cells": [
+            {"cell_type": "markdown", "source": ["# Title\n", "[a](2_diagnose_and_extend.ipynb), [b](../README.md)"]},
+            PAIR | {"source": "x = 1", "outputs": [{"output_type": "stream", "name": "stderr", "text": warned}]},
+            PAIR | {"id": "two", "source": "y", "outputs": [{"data": {FIGURE: figure, "text/html": "no"}}]},
+            PAIR | {"id": "three", "source": "z", "outputs": [{"data": {"text/html": ["<b>", "t</b>"]}}]},
+            PAIR | {"id": "four", "source": "w", "outputs": [{"data": {"text/plain": "<Path>"}}]},
+        ]
+    }
+    page, scripts = site_notebooks.markdown_of(notebook, "name")
+    assert page.startswith(
+        "# Title\n[a](2_diagnose_and_extend.md), [b](../../examples/README.md)\n\n```python\nx = 1\n```"
+    )
+    assert ">FitWarning: not white</pre>" in page and "/tmp" not in page and "tf.fit()" not in page
+    assert "<b>t</b>" in page and "&lt;Path&gt;" in page and "no" not in page.split("```")[6]
+    assert list(scripts) == ["name-two-0.js"]
+    assert 'id="name-two-0" style="height: 321px"' in page and page.count("plotly.min.js") == 1
+    call = re.fullmatch(r"Plotly\.newPlot\((.*)\);", scripts["name-two-0.js"])
+    assert call and json.loads(f"[{call[1]}]")[:2] == ["name-two-0", figure["data"]]
+
+
+def test_pages_without_outputs_say_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(site_notebooks, "EXECUTED", tmp_path)
+    pages = site_notebooks.notebook_pages()
+    assert set(pages) == {f"notebooks/{file.stem}.md" for file in NOTEBOOKS}
+    assert all(page.startswith("# ") and "has no outputs" in page for page in pages.values())
+
+
+def test_outputs_of_an_earlier_notebook_are_not_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(site_notebooks, "EXECUTED", tmp_path)
+    stored = json.loads(NOTEBOOKS[0].read_text(encoding="utf-8"))
+    stored["cells"][-1]["source"] = "another text"
+    (tmp_path / NOTEBOOKS[0].name).write_text(json.dumps(stored), encoding="utf-8")
+    (tmp_path / NOTEBOOKS[1].name).write_text(NOTEBOOKS[1].read_text(encoding="utf-8"), encoding="utf-8")
+    noted = ["has no outputs" in page for page in site_notebooks.notebook_pages().values()]
+    assert noted == [True, False, True]
