@@ -1,4 +1,4 @@
-"""examples/notebooks: stored without outputs; they run, and show what their texts claim. Pages of the site from them."""
+"""examples/notebooks: stored without outputs, and run; they show what their texts claim. The pages of the site."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def test_a_page_has_text_code_and_outputs() -> None:
         "cells": [
             {"cell_type": "markdown", "source": ["# Title\n", "[a](2_diagnose_and_extend.ipynb), [b](../README.md)"]},
             PAIR | {"source": "x = 1", "outputs": [{"output_type": "stream", "name": "stderr", "text": warned}]},
-            PAIR | {"id": "two", "source": "y", "outputs": [{"data": {FIGURE: figure, "text/html": "no"}}]},
+            PAIR | {"id": "two", "source": "y", "outputs": [{"data": {FIGURE: figure, "text/html": "hidden"}}]},
             PAIR | {"id": "three", "source": "z", "outputs": [{"data": {"text/html": ["<b>", "t</b>"]}}]},
             PAIR | {"id": "four", "source": "w", "outputs": [{"data": {"text/plain": "<Path>"}}]},
         ]
@@ -131,7 +131,7 @@ def test_a_page_has_text_code_and_outputs() -> None:
         "# Title\n[a](2_diagnose_and_extend.md), [b](../../examples/README.md)\n\n```python\nx = 1\n```"
     )
     assert ">FitWarning: not white</pre>" in page and "/tmp" not in page and "tf.fit()" not in page
-    assert "<b>t</b>" in page and "&lt;Path&gt;" in page and "no" not in page.split("```")[6]
+    assert "<b>t</b>" in page and "&lt;Path&gt;" in page and "hidden" not in page
     assert list(scripts) == ["name-two-0.js"]
     assert 'id="name-two-0" style="height: 321px"' in page and page.count("plotly.min.js") == 1
     call = re.fullmatch(r"Plotly\.newPlot\((.*)\);", scripts["name-two-0.js"])
