@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import html
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,6 +25,7 @@ from tendonfmu.report import diagnosis_sheets
 
 INDEX = ROOT / "examples/demo_recording/index_finger_calibrated.json"
 PUSHES = ROOT / "examples/demo_recording/index_finger_pushes.parquet"
+TRAINING = ROOT / "examples/demo_recording/two_joints_training.parquet"
 EVIL = "<script>&amp;"
 
 
@@ -72,9 +75,32 @@ def test_a_diagnosis_shows_the_panels_of_its_page(make: Any) -> None:
     assert len(placed) == len(panels)
     domains = {tuple(figure.layout[name].domain) for name in axes_of(figure, "x")}
     assert len(domains) == 2 and all(0 <= low < high <= 1 for low, high in domains)
+    evidence = [panel for sheet in diagnosis_sheets(found.found) if sheet.section != "views" for panel in sheet.panels]
+    assert len(axes_of(found.plot(residuals=False), "x")) == len(evidence) < len(panels)
     page = found._repr_html_()
     assert "<script>" not in page and found.verdict in page
     assert [each.effect for each in found.causes] == [each["effect"] for each in found.report["causes"]]
+
+
+def test_keys_of_a_figure_are_in_lines_above_the_panels() -> None:
+    found = Diagnosis(examples.three_causes())
+    layout = found.plot().layout
+    meanings = {meaning for sheet in diagnosis_sheets(found.found) for _, meaning in sheet.keys}
+    heading, *keys = layout.title.text.removesuffix("</sup>").split("<br>")
+    assert heading == repr(found)[1:-1] and len(keys) > 1
+    shown = [re.sub(r"<.*?>", "", line) for line in keys]
+    assert all(len(line) < 90 for line in shown)  # a page of 640 px
+    assert {each.strip() for line in shown for each in line.split("■")[1:]} == {html.escape(each) for each in meanings}
+    assert layout.margin.t >= 75 + 18 * len(keys)
+
+
+def test_warnings_name_the_line_of_the_caller() -> None:
+    with pytest.warns(tf.FitWarning) as found:
+        tf.fit(ROOT / "examples/demo_recording/two_joints.json", TRAINING, only="joints[1].friction.coulomb", passes=2)
+    assert {each.filename for each in found if each.category is tf.FitWarning} == {__file__}
+    with pytest.warns(tf.TuneWarning) as found:
+        tf.tune(INDEX, INDEX.with_name("index_finger_free.parquet"))
+    assert {each.filename for each in found if each.category is tf.TuneWarning} == {__file__}
 
 
 def test_no_panel_is_no_error() -> None:

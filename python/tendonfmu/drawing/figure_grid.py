@@ -149,8 +149,7 @@ def sheets_figure(title: str, sheets: Sequence[Sheet]) -> Any:
 
 def _keys(sheets: Sequence[Sheet]) -> list[str]:
     """Return the meanings of the styles, each in its colour, in lines."""
-    meanings = {style: meaning for sheet in sheets for style, meaning in sheet.keys}
-    colours = {meaning: STYLES[style].colour for style, meaning in meanings.items()}
+    colours = {meaning: STYLES[style].colour for sheet in sheets for style, meaning in sheet.keys}
     lines: list[list[str]] = [[]]
     for meaning in colours:
         if len("".join([*lines[-1], meaning])) > _MOST_LETTERS[0]:
