@@ -62,6 +62,7 @@ def test_a_run_shows_every_joint() -> None:
     figure = out.plot()
     assert len(axes_of(figure, "y")) == 4 and len(figure.data) == 12
     assert sum(trace.showlegend for trace in figure.data) == 3
+    assert [figure.layout[name].matches for name in axes_of(figure, "x")] == [None, "x", "x", "x"]  # zoomed together
     page = out._repr_html_()
     assert "compensated_torque[4]" in page and "samples in contact" in page
 

@@ -83,7 +83,7 @@ def series_figure(
         last = k == len(rows)
         layout[f"yaxis{k}"] = {"domain": [low, high], "title": {"text": html.escape(row.label)}, "anchor": f"x{k}"}
         layout[f"yaxis{k}"]["type"] = "log" if row.log_y else "linear"
-        layout[f"xaxis{k}"] = {"anchor": f"y{k}", "matches": "x1", "showticklabels": last}
+        layout[f"xaxis{k}"] = {"anchor": f"y{k}", "showticklabels": last} | ({"matches": "x1"} if k > 1 else {})
         if last:
             layout[f"xaxis{k}"]["title"] = {"text": html.escape(x_label)}
         curves = [Curve(name, x, np.asarray(values, dtype=float)) for name, values in row.curves.items()]
