@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds the documentation site with MkDocs into FOLDER (default build/site): tools/build_site.sh [FOLDER]
 # Broken links, anchors and references are errors. MkDocs has an environment of its own, build/site-venv.
-# The notebooks are run by $PYTHON if it has the package, else their pages have no outputs.
+# The notebooks are run by $PYTHON if it has the package; else they are shown as last run, or without outputs.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 output=$(realpath -m "${1:-build/site}")
@@ -18,7 +18,7 @@ if "${PYTHON:-python3}" -c 'import ipykernel, nbclient, tendonfmu._native' 2>/de
     exit 1
   }
 else
-  echo "${PYTHON:-python3} has no tendonfmu, nbclient or ipykernel: the notebooks are shown without outputs" >&2
+  echo "${PYTHON:-python3} has no tendonfmu, nbclient or ipykernel: notebooks are shown as last run, or without outputs" >&2
 fi
 # A notice of the theme about other software is no finding of this build.
 export NO_MKDOCS_2_WARNING=1
