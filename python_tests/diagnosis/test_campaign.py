@@ -190,7 +190,7 @@ def test_workers_of_dask_write_the_rows(tmp_path: Path) -> None:
     assert all("f.json" in row["error"] and row["run_seconds"] >= 0 for row in rows)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_worker_of_a_cluster_dies_and_every_case_is_counted_once(tmp_path: Path) -> None:
     """Diagnoses on two workers that are processes of their own on the loopback; one is killed after the first row."""
     pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")

@@ -12,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 import oracle_fit
+from repetitions import repeated
 from fit_cases import groups, image_of, twin_of
 from oracle_extensions import read_rows
 from oracle_trace import Trace, run_recorder, with_values
@@ -86,7 +87,7 @@ def test_torques_and_friction_by_formula(seed: int) -> None:
         assert (np.abs(found - wanted) / scale)[kept][..., columns].max() < ROUNDING
 
 
-@pytest.mark.parametrize("seed", FINGERS)
+@pytest.mark.parametrize("seed", repeated(FINGERS, 3, 5, 8))  # these have all effects
 def test_all_numbers_by_differences(seed: int) -> None:
     """But for samples at which the step turns a decision (a threshold, a play, a neighbour in time)."""
     each = case(seed)

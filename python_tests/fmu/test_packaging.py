@@ -235,7 +235,7 @@ def test_fmpy_finds_nothing(description: dict[str, Any], packed: Pack) -> None:
     assert validate_fmu(str(packed(description))) == []
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_fmpy_finds_nothing_in_the_index_finger(tmp_path: Path) -> None:
     assert validate_fmu(str(build_fmu(INDEX_FINGER, tmp_path / "index.fmu"))) == []
 
@@ -278,7 +278,7 @@ def simulate(fmu: Path, recording: dict[str, Any]) -> Any:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="SKIPPED: fmpy compiles by cmake, which is not there")
 def test_the_compiled_source_fmu_gives_the_same_bits(tmp_path: Path) -> None:
     description, recording = random_case(6)

@@ -44,9 +44,7 @@ def asserting(own: Mapping[str, set[str]], imported: set[str]) -> set[str]:
     while known != before:
         before = set(known)
         known |= {
-            name
-            for name, called in own.items()
-            if called & known or any(each.startswith("assert_") for each in called)
+            name for name, called in own.items() if called & known or any(each.startswith("assert_") for each in called)
         }
     return known
 
