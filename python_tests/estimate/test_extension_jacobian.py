@@ -12,12 +12,12 @@ import pytest
 from numpy.typing import NDArray
 
 import oracle_fit
-from repetitions import repeated
 from fit_cases import groups, image_of, twin_of
 from oracle_extensions import read_rows
 from oracle_trace import Trace, run_recorder, with_values
 from random_extensions import MAGNITUDES, MAKE
 from random_fingers import Description, random_case
+from repetitions import repeated
 from tendonfmu.estimate import estimation
 
 if not estimation.HAS_ESTIMATION:
