@@ -154,6 +154,17 @@ def test_the_folder_holds_finger_fmu_page_and_report(calibrated: tuple[Calibrati
     assert "compensated_torque[2]" in run_fmu(out / "finger.fmu", short)
 
 
+def test_the_command_goes_on_where_the_folder_ends(
+    call: Call, calibrated: tuple[Calibration, Path], folder: Path
+) -> None:
+    given = ("--test", folder / UNSEEN, "--pushes", folder / "pushes.parquet")
+    answer = call("calibrate", folder / FINGER, folder / FREE, *given, "-o", calibrated[1])
+    assert answer.status == 0, answer.err
+    report = json.loads((calibrated[1] / "calibration.json").read_text(encoding="utf-8"))
+    assert report["steps"]["repeated"] == ["diagnosis", "fit", "tune", "score"]
+    assert verdict(report)[1] in answer.out
+
+
 def test_what_is_unchanged_is_not_done_again(
     call: Call, calibrated: tuple[Calibration, Path], folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -15,6 +15,7 @@ import pytest
 
 from plant_rigs import needs_plant
 from random_rigs import random_rig
+from repetitions import repeated
 from rig_cases import INDEX_RIGS, RIGS, accepted, place_of, with_everything
 
 SCHEMA = json.loads((files("tendonfmu") / "schema" / "rig.schema.json").read_text(encoding="utf-8"))
@@ -127,7 +128,8 @@ def assert_agreement(folder: Path, rig: dict[str, Any], what: str) -> None:
 
 
 @needs_plant
-def test_schema_and_readers_agree_on_changed_values(tmp_path: Path) -> None:
+@pytest.mark.parametrize("every", repeated([4, 1], 0))
+def test_schema_and_readers_agree_on_changed_values(tmp_path: Path, every: int) -> None:
     """Both accept the same, but for relations between values that a schema cannot express."""
     data = with_everything()
     agreed = 0
@@ -139,6 +141,7 @@ def test_schema_and_readers_agree_on_changed_values(tmp_path: Path) -> None:
             if path[0] == "finger" or one_of_many or (pushes is RECIPE and path[0] != "pushes"):
                 continue
             for change in CHANGES:
-                assert_agreement(tmp_path, varied(rig, path, change), f"{path} = {change!r}")
                 agreed += 1
+                if agreed % every == 0:
+                    assert_agreement(tmp_path, varied(rig, path, change), f"{path} = {change!r}")
     assert agreed > 1500
