@@ -5,7 +5,8 @@
     python tools/planted_faults.py ../faults                   # an hour on two cores
 
 Each fault is one changed line (`tools/planted_faults.json`). After the change, `./test` runs in the copy: first ctest,
-then pytest up to its first failure. A fault that neither notices wants a test. The files are put back after each.
+then pytest up to its first failure, the folders of tests that are near first. A fault that neither notices wants a test.
+The files are put back after each.
 """
 
 from __future__ import annotations
@@ -26,11 +27,12 @@ COMPILED = (".c", ".h", ".cpp")
 
 @dataclass(frozen=True)
 class Fault:
-    """what: in words. area: core, fit, detect, diagnose, fmu, simulate or converters. old: a text that the file holds
-    once, replaced by new."""
+    """what: in words. area: core, fit, detect, diagnose, fmu or converters. near: the folder of tests that run first.
+    old: a text that the file holds once, replaced by new."""
 
     what: str
     area: str
+    near: str
     file: str
     old: str
     new: str
@@ -78,7 +80,10 @@ def noticed_by(fault: Fault, folder: Path, logs: Path, number: int) -> str:
                 return "does not compile"
             if not run(folder, log, "ctest", "--test-dir", "build/tests", "--stop-on-failure", "--parallel", "2"):
                 return first_failure(log)
-        return "" if run(folder, log, "./test", "-x", "-q") else first_failure(log) or "./test"
+        for where in (f"python_tests/{fault.near}", "python_tests"):
+            if not run(folder, log, "./test", "-x", "-q", where):
+                return first_failure(log) or "./test"
+        return ""
 
 
 def main() -> None:

@@ -35,7 +35,7 @@ def test_every_fault_fits_its_file(planted_faults: Any) -> None:
 def test_a_fault_is_planted_and_taken_out(planted_faults: Any, tmp_path: Path) -> None:
     file = tmp_path / "law.h"
     file.write_text("a + b", encoding="utf-8")
-    fault = planted_faults.Fault("other sign", "core", "law.h", "+", "-")
+    fault = planted_faults.Fault("other sign", "core", "model", "law.h", "+", "-")
     with fault.planted(tmp_path):
         assert file.read_text(encoding="utf-8") == "a - b"
     assert file.read_text(encoding="utf-8") == "a + b"
