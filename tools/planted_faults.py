@@ -5,7 +5,7 @@
     python tools/planted_faults.py ../faults                   # an hour on two cores
 
 Each fault is one changed line (`tools/planted_faults.json`). After the change, `./test` runs in the copy: first ctest,
-then pytest up to its first failure, the folders of tests that are near first. A fault that neither notices wants a test.
+then pytest up to its first failure, beginning with the tests that are near. A fault that neither notices wants a test.
 The files are put back after each.
 """
 
