@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
 
+from repetitions import repeated
 from synthetic_series import make_series
 from tendonfmu.diagnosis.changes.load import steady_load
 from tendonfmu.diagnosis.diagnosis import diagnose
@@ -111,7 +112,7 @@ def loaded(rest: float) -> Diagnosis:
     )
 
 
-@pytest.mark.parametrize("rest", [0.0, pytest.param(2.0, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("rest", repeated([0.0, 2.0], 0))
 def test_a_load_is_told_as_contact_and_not_as_friction(rest: float) -> None:
     """The bias of a recording that begins in motion is learned at its first jump; that makes no difference."""
     found = loaded(rest)
@@ -134,6 +135,7 @@ def test_the_mean_of_a_change_is_no_load(zeroed: float) -> None:
     assert found.load is None
 
 
+@pytest.mark.long
 def test_a_load_beside_a_change_is_told() -> None:
     now = record(replace(WELL, dry=1.4 * WELL.dry, load=0.02), motion=5, noise=2)
     found = diagnose(finger(), [recording(now)], reference=[recording(record(motion=2), "then.parquet")], kinematics=3)

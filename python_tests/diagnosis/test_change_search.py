@@ -70,6 +70,7 @@ def test_what_is_wrong_in_both_is_not_blamed() -> None:
     assert (humming.verdict, humming.causes) == ("adequate", ())
 
 
+@pytest.mark.long
 def test_a_change_is_named_beside_what_is_wrong_in_both() -> None:
     (cause,) = changes(now=replace(HUMMING, dry=DRIER.dry), then=HUMMING).causes
     assert cause.where.effect == "joint_friction" and cause.changed is not None
@@ -88,7 +89,6 @@ def test_a_change_is_named_beside_what_is_wrong_in_both() -> None:
             (replace(WELL, edge=(0.039, 0.03)), REPEAT, "edge_friction", (1, 1), "coulomb", 0.03, 0.009),
             (replace(WELL, cover=0.039), OTHER, "cover_stiffness", (1, None), "stiffness", 0.03, 0.009),
         ],
-        0,
         2,
     ),
     ids=["friction grows", "friction falls", "edge grows", "cover stiffens"],
@@ -175,7 +175,9 @@ def test_order_and_seed_do_not_matter() -> None:
 # --- unseen recordings ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("test", "named"), [(DRIER, ["joint_friction"]), (WELL, [])], ids=["drier", "well"])
+@pytest.mark.parametrize(
+    ("test", "named"), repeated([(DRIER, ["joint_friction"]), (WELL, [])], 1), ids=["drier", "well"]
+)
 def test_a_test_recording_judges(test: Worn, named: list[str]) -> None:
     """A change that the test does not show is not named: the finger of that recording is well."""
     found = changes(now=DRIER, test=test)

@@ -36,9 +36,7 @@ NAMES = list(QUIRKS)
 USUAL = [
     NAMES.index(name)
     for name in (
-        "nothing_odd",
         "other_tendon_count",
-        "gaps",
         "hardly_free",
         "own_presliding",
         "drift_zero",
@@ -131,7 +129,7 @@ def test_a_pair_gets_a_diagnosis_or_a_refusal(seed: int, tmp_path: Path) -> None
 
 
 def test_the_pairs_are_many_and_always_the_same() -> None:
-    assert COUNT >= 300 and 4 * len(QUIRKS) <= COUNT and len(set(USUAL)) == 8
+    assert COUNT >= 300 and 4 * len(QUIRKS) <= COUNT and len(set(USUAL)) == 6
     first, again = make_pair(17), make_pair(17)
     assert first.description == again.description and first.quirks == again.quirks
     for one, other in zip(first.all, again.all, strict=True):

@@ -16,7 +16,7 @@ import oracle
 from analytic_cases import DRY, LAW, Case, finger, one_edge, recording
 from random_fingers import random_case, random_law, random_moment_arms
 from repetitions import repeated
-from runners import RUNNERS, Runner
+from runners import NATIVE, ORACLE, RUNNERS, Runner
 
 CASES = analytic_cases.CASES + analytic_force_cases.CASES + analytic_extension_cases.CASES
 
@@ -42,6 +42,7 @@ def slow_crossings(step: float) -> dict[str, Any]:
     return recording(time, 10.0 + 2.0 * np.sin(3.0 * time), np.sin(2.0 * time) ** 3, np.cos(time))
 
 
+@pytest.mark.parametrize("runner", [ORACLE, NATIVE], ids=lambda runner: runner.name)
 def test_halving_the_step_changes_only_what_the_signals_change(runner: Runner) -> None:
     """At common times the difference is of the order of the step (an entry or exit is seen a step later)."""
     bias = {"drift_variance": 1e-4, "noise_std": 0.02, "noise_time": 0.01, "initial_variance": 1e-4}

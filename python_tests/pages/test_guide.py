@@ -16,6 +16,7 @@ import pytest
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
 from plant_rigs import needs_plant
+from repetitions import repeated
 from repository_paths import ROOT
 
 GUIDE = ROOT / "docs" / "guide"
@@ -32,7 +33,7 @@ START = re.compile(
 )
 SAVED = {"your_finger": "two_joints.json", "simulated_finger": "softer.json"}  # what the page has the reader save
 CHECK_ONLY = ["-Wall", "-Wextra", "-Werror", "-fsyntax-only", f"-I{ROOT / 'runtime' / 'include'}"]
-FITS = [pytest.param(name, marks=pytest.mark.long) for name in ("calibrate", "fit", "diagnose", "change")]
+FITS = ("calibrate", "fit", "diagnose", "change")
 
 
 def text(name: str) -> str:
@@ -75,14 +76,14 @@ def follow(name: str, folder: Path) -> None:
             assert done.returncode == 0, f"{code}\n{done.stderr}"
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["your_finger", "detect", "in_your_loop", "in_your_simulator", "from_python", *FITS])
+@pytest.mark.parametrize("name", repeated(("your_finger", "detect", "in_your_loop", "in_your_simulator", *FITS), 0))
 def test_a_reader_can_follow(name: str, tmp_path: Path) -> None:
-    if name in ("calibrate", "fit", "diagnose", "change", "from_python"):
+    if name in FITS:
         pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not installed with its estimation")
     follow(name, tmp_path)
 
 
+@pytest.mark.long
 def test_a_reader_can_follow_from_the_finger_to_the_recording(tmp_path: Path) -> None:
     """your_recording uses the finger of the page before."""
     finger = next(code for language, code in BLOCK.findall(text("your_finger")) if language == "json")
@@ -91,7 +92,7 @@ def test_a_reader_can_follow_from_the_finger_to_the_recording(tmp_path: Path) ->
 
 
 @needs_plant
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_reader_can_simulate(tmp_path: Path) -> None:
     follow("simulated_finger", tmp_path)
     assert (tmp_path / "softer.parquet").is_file()

@@ -287,7 +287,7 @@ def test_the_numbers_are_the_published_ones_within_one_percent(recordings: dict[
 
 
 @measured
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_script_finds_the_mass_too() -> None:
     """The rows of its first table: published, published M, all fitted, at 1 kHz, the same decimated."""
     pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not installed with its estimation")

@@ -252,7 +252,7 @@ def test_the_page_names_every_key_and_unit() -> None:
     assert json.loads(blocks("json")[0]) == json.loads((EXAMPLE / "map.json").read_text(encoding="utf-8"))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.skipif(not DATA.is_dir(), reason="SKIPPED: no EMPS data")
 def test_the_measured_machine_of_the_page(call: Call, tmp_path: Path) -> None:
     """Its own lines: half against half nothing has changed; 2 N put in by hand are found, to 10 %."""

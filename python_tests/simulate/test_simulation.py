@@ -157,7 +157,7 @@ def test_progress_is_told_to_the_end(tmp_path: Path) -> None:
 def test_the_processor_does_not_show(integrator: str, tmp_path: Path) -> None:
     """The C library's functions differ in the last bit between processors with and without fused multiply-add."""
     for name, environment in {"with": {}, "without": {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4"}}.items():
-        command = [sys.executable, "-m", "tendonfmu.cli", "simulate", str(RIGS / "index_finger.json")]
+        command = [sys.executable, "-m", "tendonfmu.cli", "simulate", str(written(tmp_path, short_rig()))]
         files = ["-o", f"{name}.parquet", "--truth", f"{name}_truth.parquet"]
         subprocess.run(
             [*command, *files, "--integrator", integrator],
