@@ -179,6 +179,7 @@ def test_a_campaign_is_resumed_and_survives_a_case_that_fails(
     assert (report["rates"][0]["hits"], report["rates"][0]["cases"]) == (0, 2)
 
 
+@pytest.mark.long
 def test_workers_of_dask_write_the_rows(tmp_path: Path) -> None:
     """Real worker processes; their case fails at once, for its recording is not there, and says so."""
     pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")

@@ -271,6 +271,7 @@ def error(finger: Path, recording: Path) -> float:
 
 
 @measured
+@pytest.mark.long
 def test_the_errors_are_those_of_the_benchmark(recordings: dict[str, Path]) -> None:
     assert error(recordings["emps"], recordings["DATA_EMPS"]) <= 4.1
     assert error(recordings["emps_asymmetric"], recordings["DATA_EMPS"]) <= 3.15

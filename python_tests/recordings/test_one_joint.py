@@ -199,7 +199,7 @@ def test_a_description_from_a_recording_is_that_of_convert(call: Call, tmp_path:
 # --- the example ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_example_finds_what_was_changed(call: Call, tmp_path: Path) -> None:
     """Week 5 has 20 % more Coulomb friction than week 1, week 3 has what week 1 had; every week moves differently.
 
