@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from fit_cases import plain
 from fit_data import make_recording, wavy_forces, wavy_motion
+from repetitions import repeated
 from tendonfmu.diagnosis.cause_gains import merged
 from tendonfmu.diagnosis.cause_search import bias_of, blocks_of, predicted_of, series_of
 from tendonfmu.diagnosis.diagnosis import PHASES
@@ -172,7 +173,7 @@ def scanned(made: FitRecording) -> Any:
     return scan(nominal.data, [made], grid, 0.004)
 
 
-@pytest.mark.parametrize(("samples", "source"), [(0, 3), (4, 3), (-4, 3), (4, 1)])
+@pytest.mark.parametrize(("samples", "source"), repeated([(0, 3), (4, 3), (-4, 3), (4, 1)], 1, 2))
 def test_the_scan_starts_at_the_true_delay(samples: int, source: int) -> None:
     starts = scanned(recorded(finger(), 24, source, 20.0, samples))
     assert starts[0].delay == pytest.approx(samples / RATE, abs=0.6 / RATE)

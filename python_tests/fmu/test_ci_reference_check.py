@@ -205,6 +205,7 @@ def test_the_workflow_runs_the_script() -> None:
     assert set(imported) - set(sys.stdlib_module_names) == {"fmpy", "numpy"}
 
 
+@pytest.mark.long
 def test_the_commands_and_the_table_of_the_page(tmp_path: Path) -> None:
     """README.md: first the commands that agree and their table, then the one that does not."""
     text = (EXAMPLE / "README.md").read_text(encoding="utf-8")

@@ -27,7 +27,16 @@ def runner(request: pytest.FixtureRequest) -> Runner:
     return chosen
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+# Calls from Python for each sample, and packed FMUs, take their time.
+RUNS = [
+    pytest.param(runner, case, id=f"{runner.name}-{case.name}", marks=pytest.mark.long if k % 4 and slow else [])
+    for runner in RUNNERS
+    for slow in [runner.name in ("single_steps", "fmu")]
+    for k, case in enumerate(CASES)
+]
+
+
+@pytest.mark.parametrize(("runner", "case"), RUNS)
 def test_case(runner: Runner, case: Case) -> None:
     if case.repeated_time and not runner.repeated_time:
         pytest.skip(f"{runner.name} takes recordings of strictly increasing time only")
