@@ -308,6 +308,20 @@ def decided(rounds: Fitted, first: str, *alike: str) -> tuple[str, list[str]]:
     return cause.effect, [each.effect for each in cause.alike]
 
 
+@pytest.mark.parametrize(
+    ("error", "taken"), [(np.tile([0.88, 0.92], 10), True), (np.tile([0.4, 1.4], 10), False)], ids=["even", "scattered"]
+)
+def test_a_fit_is_taken_where_the_error_falls_beyond_chance(error: Numbers, taken: bool) -> None:
+    """The rms falls by 5 %, in each stretch, or much in some while it grows in others."""
+    rounds, model = Fitted({}), FittedModel({}, {}, {}, {}, 0.0)
+    rounds.models, rounds._least_gain = [], 0.03
+    rounds.view = SimpleNamespace(selection=SimpleNamespace(base=np.ones(20)))  # type: ignore[assignment]
+    rounds._runs_better = lambda model: True  # type: ignore[method-assign]
+    rounds._look = lambda model, candidates: rounds.view  # type: ignore[method-assign]
+    assert rounds._take(_Trial(named("gravity", Place(1), 1e-9), model, error)) is taken
+    assert len(rounds.causes) == len(rounds.models) == int(taken)
+
+
 def test_fitted_models_decide_between_what_columns_cannot_tell_apart() -> None:
     rounds = Fitted({"preload_friction": 3.0, "cover_stiffness": 1.0, "gravity": 1.001, "moment_arm": 0.1})
     found = decided(rounds, "preload_friction", "cover_stiffness", "moment_arm", "gravity", "stribeck")
