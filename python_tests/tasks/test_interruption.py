@@ -151,7 +151,7 @@ def copied(earlier: Path, folder: Path) -> None:
         (folder / "out" / name).write_bytes(text)
 
 
-@pytest.mark.parametrize("moment", MOMENTS)
+@pytest.mark.parametrize("moment", repeated(MOMENTS, 1, 3))
 @pytest.mark.parametrize("number", STATUS, ids=lambda number: number.name)
 def test_nothing_is_left_and_nothing_is_lost(
     tmp_path: Path, earlier: Path, moment: str, number: signal.Signals
