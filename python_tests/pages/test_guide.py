@@ -33,7 +33,7 @@ START = re.compile(
 )
 SAVED = {"your_finger": "two_joints.json", "simulated_finger": "softer.json"}  # what the page has the reader save
 CHECK_ONLY = ["-Wall", "-Wextra", "-Werror", "-fsyntax-only", f"-I{ROOT / 'runtime' / 'include'}"]
-FITS = ("calibrate", "fit", "diagnose", "change")
+FITS = ("calibrate", "fit", "diagnose", "change", "from_python")
 
 
 def text(name: str) -> str:
