@@ -123,14 +123,16 @@ def test_little_motion_supports_a_higher_rate_and_says_what_is_missing(calibrate
     assert any("min more of free motion" in sentence for sentence in report["next"])
 
 
-@pytest.mark.slow
-def test_what_is_wrong_with_a_recording_is_said_once(folder: Path, tmp_path: Path) -> None:
+def test_what_is_wrong_with_a_recording_is_said_once(
+    calibrated: tuple[Calibration, Path], folder: Path, tmp_path: Path
+) -> None:
     """A gap, which the readers of each step see, too."""
     whole = read_recording(folder / FREE)
     rows = (whole.time < 10.0) | ((whole.time > 12.0) & (whole.time < 25.0))
     columns = {f"{name}[{k + 1}]": each[rows] for name, group in whole.groups.items() for k, each in enumerate(group.T)}
     write_table(tmp_path / "gap.parquet", {"time": whole.time[rows], **columns})
-    found = calibrate(folder / FINGER, [tmp_path / "gap.parquet"], tmp_path / "out")
+    previous = calibrated[1] / "finger.json"  # so that nothing is diagnosed
+    found = calibrate(folder / FINGER, [tmp_path / "gap.parquet"], tmp_path / "out", previous=previous)
     assert sum(" gap" in sentence for sentence in found.report["warnings"]) == 1, found.report["warnings"]
 
 
@@ -150,6 +152,17 @@ def test_the_folder_holds_finger_fmu_page_and_report(calibrated: tuple[Calibrati
         recording, time=recording.time[:50], groups={key: each[:50] for key, each in recording.groups.items()}
     )
     assert "compensated_torque[2]" in run_fmu(out / "finger.fmu", short)
+
+
+def test_the_command_goes_on_where_the_folder_ends(
+    call: Call, calibrated: tuple[Calibration, Path], folder: Path
+) -> None:
+    given = ("--test", folder / UNSEEN, "--pushes", folder / "pushes.parquet")
+    answer = call("calibrate", folder / FINGER, folder / FREE, *given, "-o", calibrated[1])
+    assert answer.status == 0, answer.err
+    report = json.loads((calibrated[1] / "calibration.json").read_text(encoding="utf-8"))
+    assert report["steps"]["repeated"] == ["diagnosis", "fit", "tune", "score"]
+    assert verdict(report)[1] in answer.out
 
 
 def test_what_is_unchanged_is_not_done_again(

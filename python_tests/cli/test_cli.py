@@ -19,6 +19,7 @@ import oracle
 import random_fingers
 from agreement import agree_with_oracle, few_left_out
 from command import Answer, Call
+from repetitions import repeated
 from repository_paths import ROOT
 from tendonfmu.files.tables import read_table, write_table
 
@@ -210,7 +211,7 @@ def columns_of_section_4(joints: int, tendons: int) -> list[str]:
     return ["time", *names, "contact", *(f"slack[{i}]" for i in range(1, tendons + 1))]
 
 
-@pytest.mark.parametrize("source", [1, 2, 3])
+@pytest.mark.parametrize("source", repeated([1, 2, 3], 0))
 def test_run_gives_every_sample_at_its_own_time(
     call: Call, finger: tuple[Path, Path, dict[str, Any], dict[str, Any]], tmp_path: Path, source: int
 ) -> None:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
 from plant_rigs import needs_plant
+from repetitions import repeated
 from repository_paths import ROOT
 from tendonfmu.detect.counting import score_detection
 from tendonfmu.files.tables import read_table
@@ -188,7 +189,7 @@ def is_same(name: str, recording: Recording, fresh: Table) -> bool:
 
 
 @needs_plant
-@pytest.mark.parametrize("name", list(RIGS))
+@pytest.mark.parametrize("name", repeated(RIGS, 2))
 def test_they_are_what_their_rigs_give(recordings: dict[str, Recording], name: str) -> None:
     fresh = simulate(read_rig(EXAMPLES / "rigs" / RIGS[name])).recording
     recording = recordings[name]
@@ -200,7 +201,7 @@ def test_they_are_what_their_rigs_give(recordings: dict[str, Recording], name: s
 
 
 @needs_plant
-@pytest.mark.parametrize("name", ["index_finger_free", "index_finger_free_x4"])
+@pytest.mark.parametrize("name", repeated(["index_finger_free", "index_finger_free_x4"], 0))
 def test_one_percent_of_other_friction_at_the_joints_shows(
     recordings: dict[str, Recording], description: dict[str, Any], tmp_path: Path, name: str
 ) -> None:

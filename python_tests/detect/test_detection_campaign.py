@@ -33,6 +33,7 @@ def coloured(seed: int, samples: int, deviation: float) -> Numbers:
     return deviation * np.asarray(lfilter([np.sqrt(1 - keep**2)], [1, -keep], white, axis=0))
 
 
+@pytest.mark.long
 def test_a_matched_detector_finds_what_its_theory_says() -> None:
     import matched_detector as matched
 

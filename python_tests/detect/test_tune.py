@@ -282,6 +282,9 @@ def test_the_demo_tuned_and_drawn(tuned: tuple[Path, str, str]) -> None:
     assert {key: contact[key] for key in RELEASE} == RELEASE and contact["release_time"] == RELEASE_TIME
     assert report["closed_loop"]["limit"] <= WISHED and report["held_out"]["limit"] <= WISHED
     assert [round(each["mean_force"]) for each in report["pretensions"]] == [10, 40]
+    as_chosen = next(each for each in report["tail"] if each["factor"] == 1.0)
+    assert (as_chosen["in_sample"], as_chosen["held_out"]) == (report["in_sample"], report["held_out"])
+    assert report["in_sample"]["alarms"] == 0 < report["held_out"]["alarms"], "chosen on the one, not on the other"
     assert "as it runs" in out and "at most" in out
     drawn = {file.name: file.read_bytes() for file in (folder / "fig").iterdir()}
     assert set(drawn) == {"tail.png", "bounds.png", "worst.png"}

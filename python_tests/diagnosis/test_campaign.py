@@ -179,6 +179,7 @@ def test_a_campaign_is_resumed_and_survives_a_case_that_fails(
     assert (report["rates"][0]["hits"], report["rates"][0]["cases"]) == (0, 2)
 
 
+@pytest.mark.long
 def test_workers_of_dask_write_the_rows(tmp_path: Path) -> None:
     """Real worker processes; their case fails at once, for its recording is not there, and says so."""
     pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")
@@ -190,7 +191,7 @@ def test_workers_of_dask_write_the_rows(tmp_path: Path) -> None:
     assert all("f.json" in row["error"] and row["run_seconds"] >= 0 for row in rows)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_worker_of_a_cluster_dies_and_every_case_is_counted_once(tmp_path: Path) -> None:
     """Diagnoses on two workers that are processes of their own on the loopback; one is killed after the first row."""
     pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")

@@ -443,7 +443,7 @@ def test_sizes_stay_within_what_a_description_takes(case: Case) -> None:
     ):
         candidate = by_name(name)
         sizes = [most] * candidate.variant(case.data, place, shape).count
-        native.image_from_json(json.dumps(candidate.extended(case.data, place, shape, sizes)))
+        assert native.image_from_json(json.dumps(candidate.extended(case.data, place, shape, sizes)))
 
 
 # --- averages ---------------------------------------------------------------------------------------------------------

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
 
+from repetitions import repeated
 from synthetic_series import make_series
 from tendonfmu.diagnosis.changes.load import steady_load
 from tendonfmu.diagnosis.diagnosis import diagnose
@@ -111,7 +112,7 @@ def loaded(rest: float) -> Diagnosis:
     )
 
 
-@pytest.mark.parametrize("rest", [0.0, pytest.param(2.0, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("rest", repeated([0.0, 2.0], 0))
 def test_a_load_is_told_as_contact_and_not_as_friction(rest: float) -> None:
     """The bias of a recording that begins in motion is learned at its first jump; that makes no difference."""
     found = loaded(rest)
@@ -123,3 +124,20 @@ def test_a_load_is_told_as_contact_and_not_as_friction(rest: float) -> None:
     assert "force_offset" in {each.effect for each in cause.confusable_with}
     assert cause.gain.low > 0.5 and "50" in cause.size and cause.changed == found.load.size
     assert found.gain.value == 0.0  # the bias takes it up at run time
+
+
+@pytest.mark.parametrize("zeroed", [0.0, 0.0128], ids=["shown", "zeroed away"])
+def test_the_mean_of_a_change_is_no_load(zeroed: float) -> None:
+    """A weight pulls with 12.8 mN·m in the mean of its recording, unless the sensors were zeroed under it."""
+    now = record(replace(WELL, mass=0.03, load=-zeroed), motion=5, noise=2)
+    found = diagnose(finger(), [recording(now)], reference=[recording(record(motion=2), "then.parquet")], kinematics=3)
+    assert [each.where.effect for each in found.causes] == ["gravity"]
+    assert found.load is None
+
+
+@pytest.mark.long
+def test_a_load_beside_a_change_is_told() -> None:
+    now = record(replace(WELL, dry=1.4 * WELL.dry, load=0.02), motion=5, noise=2)
+    found = diagnose(finger(), [recording(now)], reference=[recording(record(motion=2), "then.parquet")], kinematics=3)
+    assert [each.where.effect for each in found.causes] == ["joint_friction"]
+    assert found.load is not None and found.load.size.change.value == pytest.approx(0.02, rel=0.02)

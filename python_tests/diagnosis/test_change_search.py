@@ -15,6 +15,7 @@ import pytest
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
 
 from command import Call
+from repetitions import repeated
 from tendonfmu.diagnosis.diagnosis import diagnose
 from tendonfmu.diagnosis.result import Cause, Diagnosis
 from tendonfmu.model import native
@@ -69,6 +70,7 @@ def test_what_is_wrong_in_both_is_not_blamed() -> None:
     assert (humming.verdict, humming.causes) == ("adequate", ())
 
 
+@pytest.mark.long
 def test_a_change_is_named_beside_what_is_wrong_in_both() -> None:
     (cause,) = changes(now=replace(HUMMING, dry=DRIER.dry), then=HUMMING).causes
     assert cause.where.effect == "joint_friction" and cause.changed is not None
@@ -80,12 +82,15 @@ def test_a_change_is_named_beside_what_is_wrong_in_both() -> None:
 
 @pytest.mark.parametrize(
     ("now", "how", "effect", "place", "number", "then", "size"),
-    [
-        (DRIER, OTHER, "joint_friction", (1, None), "coulomb", 0.012, 0.0036),
-        (replace(WELL, dry=0.0084), OTHER, "joint_friction", (1, None), "coulomb", 0.012, -0.0036),
-        (replace(WELL, edge=(0.039, 0.03)), REPEAT, "edge_friction", (1, 1), "coulomb", 0.03, 0.009),
-        (replace(WELL, cover=0.039), OTHER, "cover_stiffness", (1, None), "stiffness", 0.03, 0.009),
-    ],
+    repeated(
+        [
+            (DRIER, OTHER, "joint_friction", (1, None), "coulomb", 0.012, 0.0036),
+            (replace(WELL, dry=0.0084), OTHER, "joint_friction", (1, None), "coulomb", 0.012, -0.0036),
+            (replace(WELL, edge=(0.039, 0.03)), REPEAT, "edge_friction", (1, 1), "coulomb", 0.03, 0.009),
+            (replace(WELL, cover=0.039), OTHER, "cover_stiffness", (1, None), "stiffness", 0.03, 0.009),
+        ],
+        2,
+    ),
     ids=["friction grows", "friction falls", "edge grows", "cover stiffens"],
 )
 def test_a_number_that_changed_by_30_percent_is_named_with_its_size(
@@ -156,7 +161,7 @@ def test_several_recordings_show_how_it_grows() -> None:
         assert grown == pytest.approx(worn.dry - WELL.dry, abs=0.03 * WELL.dry)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_order_and_seed_do_not_matter() -> None:
     """But for where parts of the recordings begin: sizes agree within a tenth of the smallest change."""
     one, other = growing(), growing((2, 1, 0), 7)
@@ -170,7 +175,9 @@ def test_order_and_seed_do_not_matter() -> None:
 # --- unseen recordings ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("test", "named"), [(DRIER, ["joint_friction"]), (WELL, [])], ids=["drier", "well"])
+@pytest.mark.parametrize(
+    ("test", "named"), repeated([(DRIER, ["joint_friction"]), (WELL, [])], 1), ids=["drier", "well"]
+)
 def test_a_test_recording_judges(test: Worn, named: list[str]) -> None:
     """A change that the test does not show is not named: the finger of that recording is well."""
     found = changes(now=DRIER, test=test)

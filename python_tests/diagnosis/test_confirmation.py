@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.stats import binom
 
 from made_columns import BLOCKS, JOINTS, STEP, coloured, series_with, waves
+from repetitions import repeated
 from synthetic_series import make_series, nuisance_of, with_effect
 from tendonfmu.diagnosis.confirmation import Confirmation
 from tendonfmu.diagnosis.series import Series
@@ -43,7 +44,7 @@ def by_chance(memory: float, wander: float, slowest: float, fastest: float) -> N
     return np.array(found)
 
 
-@pytest.mark.parametrize(("memory", "wander"), [(0.0, 0.0), (0.61, 0.02), (0.97, 0.0)])
+@pytest.mark.parametrize(("memory", "wander"), repeated([(0.0, 0.0), (0.61, 0.02), (0.97, 0.0)], 1))
 def test_noise_is_not_confirmed(memory: float, wander: float) -> None:
     """Of 102 columns of 0.1 to 3 Hz, in noise with a lag-one correlation up to 0.97."""
     found = by_chance(memory, wander, 0.1, 3.0)
@@ -52,7 +53,7 @@ def test_noise_is_not_confirmed(memory: float, wander: float) -> None:
     assert np.mean(found < 0.5) > 0.1, "it never says anything"
 
 
-@pytest.mark.parametrize(("memory", "wander"), [(0.0, 0.0), (0.97, 0.0)])
+@pytest.mark.parametrize(("memory", "wander"), repeated([(0.0, 0.0), (0.97, 0.0)], 1))
 def test_columns_as_slow_as_the_bias_are_hardly_confirmed(memory: float, wander: float) -> None:
     """Periods of 3 to 20 s beside splines with knots every 2 s. Of one number 1 to 5 % are at a nominal 1 %; without
     what is given back to the stretches it is 5 to 11 %, of four numbers 14 to 24 %."""
@@ -95,7 +96,7 @@ def test_what_was_tried_counts() -> None:
 # --- the power --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("memory", "size"), [(0.0, 0.12), (0.61, 0.2), (0.97, 0.3)])
+@pytest.mark.parametrize(("memory", "size"), repeated([(0.0, 0.12), (0.61, 0.2), (0.97, 0.3)], 1))
 def test_a_fraction_of_the_noise_is_confirmed(memory: float, size: float) -> None:
     """Amplitudes of 0.12 to 0.3 in noise of variance 1, 32 s; 400 tried."""
     found = []

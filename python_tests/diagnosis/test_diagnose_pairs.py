@@ -24,6 +24,7 @@ from command import Call
 from diagnose_pairs import COUNT, make_pair
 from diagnose_quirks import QUIRKS
 from odd_finger import Columns, Pair
+from repetitions import repeated
 from tendonfmu.diagnosis.diagnosis import diagnose
 from tendonfmu.errors import InputError
 from tendonfmu.files.tables import write_table
@@ -35,13 +36,7 @@ NAMES = list(QUIRKS)
 USUAL = [
     NAMES.index(name)
     for name in (
-        "nothing_odd",
         "other_tendon_count",
-        "no_friction_given",
-        "five_seconds",
-        "constant_signals",
-        "late_clock",
-        "gaps",
         "hardly_free",
         "own_presliding",
         "drift_zero",
@@ -134,7 +129,7 @@ def test_a_pair_gets_a_diagnosis_or_a_refusal(seed: int, tmp_path: Path) -> None
 
 
 def test_the_pairs_are_many_and_always_the_same() -> None:
-    assert COUNT >= 300 and 4 * len(QUIRKS) <= COUNT and len(set(USUAL)) == 12
+    assert COUNT >= 300 and 4 * len(QUIRKS) <= COUNT and len(set(USUAL)) == 6
     first, again = make_pair(17), make_pair(17)
     assert first.description == again.description and first.quirks == again.quirks
     for one, other in zip(first.all, again.all, strict=True):
@@ -195,13 +190,16 @@ def answered(monkeypatch: pytest.MonkeyPatch) -> Callable[[], int]:
     return lambda: calls
 
 
-def test_any_options_are_taken_or_refused_in_a_line(call: Call, tmp_path: Path, answered: Callable[[], int]) -> None:
+@pytest.mark.parametrize("count", repeated([50, 400], 0))
+def test_any_options_are_taken_or_refused_in_a_line(
+    call: Call, tmp_path: Path, answered: Callable[[], int], count: int
+) -> None:
     for name in ("finger.json", "a.csv", "b.csv"):
         (tmp_path / name).write_text(name)
     (tmp_path / "copy.csv").write_text("a.csv")
     before = {file.name for file in tmp_path.iterdir()}
     rng = np.random.default_rng(5)
-    for _ in range(400):
+    for _ in range(count):
         words = [str(rng.choice(WORDS)) for _ in range(int(rng.integers(0, 8)))]
         if rng.random() < 0.6:  # a command line that is nearly sound
             usual = ["finger.json", "a.csv", "-o", "out"]
@@ -211,4 +209,4 @@ def test_any_options_are_taken_or_refused_in_a_line(call: Call, tmp_path: Path, 
         if answer.status == 2:
             assert answer.err.startswith("tendonfmu: ") and answer.err.count("\n") == 1, (words, answer)
         assert {file.name for file in tmp_path.iterdir()} == before, words
-    assert answered() > 20
+    assert answered() > count / 20

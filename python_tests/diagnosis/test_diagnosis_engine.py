@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from fit_cases import plain
 from fit_data import make_recording, wavy_forces, wavy_motion
+from repetitions import repeated
 from tendonfmu.diagnosis.cause_gains import merged
 from tendonfmu.diagnosis.cause_search import bias_of, blocks_of, predicted_of, series_of
 from tendonfmu.diagnosis.diagnosis import PHASES
@@ -172,7 +173,7 @@ def scanned(made: FitRecording) -> Any:
     return scan(nominal.data, [made], grid, 0.004)
 
 
-@pytest.mark.parametrize(("samples", "source"), [(0, 3), (4, 3), (-4, 3), (4, 1)])
+@pytest.mark.parametrize(("samples", "source"), repeated([(0, 3), (4, 3), (-4, 3), (4, 1)], 1, 2))
 def test_the_scan_starts_at_the_true_delay(samples: int, source: int) -> None:
     starts = scanned(recorded(finger(), 24, source, 20.0, samples))
     assert starts[0].delay == pytest.approx(samples / RATE, abs=0.6 / RATE)
@@ -305,6 +306,20 @@ def decided(rounds: Fitted, first: str, *alike: str) -> tuple[str, list[str]]:
     picked: Any = SimpleNamespace(judged=Columns().refined(first), hypothesis=of(first), alike=tuple(map(of, alike)))
     cause = rounds._best_fitted(Columns(), picked).cause  # type: ignore[arg-type]
     return cause.effect, [each.effect for each in cause.alike]
+
+
+@pytest.mark.parametrize(
+    ("error", "taken"), [(np.tile([0.88, 0.92], 10), True), (np.tile([0.4, 1.4], 10), False)], ids=["even", "scattered"]
+)
+def test_a_fit_is_taken_where_the_error_falls_beyond_chance(error: Numbers, taken: bool) -> None:
+    """The rms falls by 5 %, in each stretch, or much in some while it grows in others."""
+    rounds, model = Fitted({}), FittedModel({}, {}, {}, {}, 0.0)
+    rounds.models, rounds._least_gain = [], 0.03
+    rounds.view = SimpleNamespace(selection=SimpleNamespace(base=np.ones(20)))  # type: ignore[assignment]
+    rounds._runs_better = lambda model: True  # type: ignore[method-assign]
+    rounds._look = lambda model, candidates: rounds.view  # type: ignore[method-assign]
+    assert rounds._take(_Trial(named("gravity", Place(1), 1e-9), model, error)) is taken
+    assert len(rounds.causes) == len(rounds.models) == int(taken)
 
 
 def test_fitted_models_decide_between_what_columns_cannot_tell_apart() -> None:

@@ -119,7 +119,7 @@ def test_each_rival_answers_on_a_recording(case: Case) -> None:
     assert answered["discrepancy"].names == ()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_discrepancy_predicts_where_it_has_learned(case: Case) -> None:
     """A correction with the wrong sign, or late, would make it worse. 70 % (1 − 1/√11) is what there is at most, and
     the bias filter takes most of a slow torque without any model."""

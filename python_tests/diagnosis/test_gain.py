@@ -16,6 +16,7 @@ from scipy.signal import lfilter
 
 from fit_cases import lasting_finger
 from fit_data import make_recording, wavy_forces, wavy_motion
+from repetitions import repeated
 from repository_paths import ROOT
 from tendonfmu.diagnosis.contact_gain import detection_gain
 from tendonfmu.diagnosis.effects import CANDIDATES, Place
@@ -92,6 +93,7 @@ def coloured(rng: np.random.Generator, seconds: float, rate: float) -> tuple[Arr
     return np.arange(samples) / rate, noise + 0.7 * np.sign(motion), noise + 0.05 * motion
 
 
+@pytest.mark.long
 def test_the_interval_covers_the_true_gain() -> None:
     rng = np.random.default_rng(7)
     _, before, after = coloured(rng, 20_000.0, 50.0)
@@ -154,7 +156,7 @@ ROWS: list[list[dict[str, Any]]] = [
 
 
 @pytest.mark.parametrize("rows", ROWS, ids=["plain", "memories", "delay"])
-@pytest.mark.parametrize("source", [1, 3])
+@pytest.mark.parametrize("source", repeated([1, 3], 0))
 def test_the_fmu_leaves_what_the_core_leaves(rows: list[dict[str, Any]], source: int) -> None:
     """r after the update is (1 − K)·r: in free motion without known load the filter beside gives the core's r again."""
     data = hidden(*rows)

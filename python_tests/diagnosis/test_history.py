@@ -15,9 +15,9 @@ import pytest
 
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
 
-from command import Call
 from dask_on_loopback import dask_processes
 from real_browser import Elements, figures_of, needs_nothing_else
+from repetitions import repeated
 from tendonfmu.diagnosis.changes import history as change_history
 from tendonfmu.diagnosis.changes.history import History, Line, Size, diagnose_history, share_of, times_of
 from tendonfmu.diagnosis.changes.trend import slope
@@ -280,17 +280,24 @@ def test_names_are_escaped_and_nothing_is_a_history_too(tmp_path: Path) -> None:
 # --- for real ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
-def test_friction_that_grows_is_followed_on_two_workers(call: Call, tmp_path: Path) -> None:
-    """A scheduler and two workers, processes of their own on the loopback; the same call again runs nothing."""
-    pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")
+@pytest.mark.parametrize("workers", repeated([0, 2], 0))
+def test_friction_that_grows_is_followed(tmp_path: Path, workers: int) -> None:
+    """Here, or on workers that are processes of their own on the loopback; the same call again runs nothing."""
     shares = (1.1, 1.25, 1.4)
     fingers = {date: Worn(dry=share * WELL.dry) for date, share in zip(WEEKS, shares, strict=False)}
     recordings = {date: record(worn, motion=2, noise=k, seconds=16.0) for k, (date, worn) in enumerate(fingers.items())}
     files = write_files(tmp_path, well=record(motion=2, noise=9, seconds=16.0), **recordings)
     now, then = [files[date] for date in fingers], [files["well"]]
-    with dask_processes(2) as processes, workers_of(processes.address) as client:
-        found = diagnose_history(files["finger"], now, then, rows=tmp_path / "out", client=client, kinematics=3)
+
+    def follow(client: Any = None) -> History:
+        return diagnose_history(files["finger"], now, then, rows=tmp_path / "out", client=client, kinematics=3)
+
+    if workers:
+        pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")
+        with dask_processes(workers) as processes, workers_of(processes.address) as client:
+            found = follow(client)
+    else:
+        found = follow()
     assert found.failed == () and found.times == (0.0, 1.0, 2.0)
     line = next(each for each in found.lines if each.where.effect == "joint_friction")
     for each, share in zip(line.sizes, shares, strict=True):
@@ -299,5 +306,4 @@ def test_friction_that_grows_is_followed_on_two_workers(call: Call, tmp_path: Pa
     assert line.trend is not None and line.trend.low > 0.0
     assert line.trend.value == pytest.approx(0.15 * WELL.dry, rel=0.1)
     rows = {file: file.stat().st_mtime_ns for file in (tmp_path / "out" / "rows").iterdir()}
-    again = diagnose_history(files["finger"], now, then, rows=tmp_path / "out", kinematics=3)
-    assert again == found and {file: file.stat().st_mtime_ns for file in rows} == rows
+    assert follow() == found and {file: file.stat().st_mtime_ns for file in rows} == rows

@@ -190,7 +190,7 @@ def written(file: Path, format_: str, source: Path, options: dict[str, float]) -
 
 
 @emps
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_carriage_s_causes_are_named(tmp_path: Path) -> None:
     """The published cause, and those that the publication does not have; nothing of the mass, which is known."""
     source = DATA / "emps" / "DATA_EMPS.mat"

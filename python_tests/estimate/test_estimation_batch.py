@@ -15,6 +15,7 @@ from fit_cases import few_unknowns, groups, image_of, off_start, random_fit_case
 from fit_data import make_recording, wavy_forces, wavy_motion
 from oracle_trace import Trace, with_values, without_contact
 from random_fingers import Description, Recording, random_recording
+from repetitions import repeated
 from tendonfmu.estimate import estimation
 
 if not estimation.HAS_ESTIMATION:
@@ -90,7 +91,7 @@ def random_parts(seed: int, samples: int, recordings: int) -> tuple[Description,
     return description, parts
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", repeated(range(12), 0, 1, 2, 3))
 def test_cost_gradient_and_information_are_those_of_the_dense_twin(seed: int) -> None:
     description, parts = random_parts(seed, 100, 1 + seed % 3)
     group = groups(description, shared_key(seed) if seed % 2 else lambda path: path)
@@ -130,7 +131,7 @@ BIASES: dict[str, Description] = {
 
 
 @pytest.mark.parametrize("name", BIASES)
-@pytest.mark.parametrize("left_out", [False, True], ids=["all used", "some left out"])
+@pytest.mark.parametrize("left_out", repeated([False, True], 1), ids=["all used", "some left out"])
 def test_every_bias_option(name: str, left_out: bool) -> None:
     description = small_finger()
     description["bias"] |= BIASES[name]
@@ -196,7 +197,7 @@ def filtered(rows: tuple[Array, ...], y: Array, time: Array, noise: float, drift
     return 0.5 * float(r @ r), J.T @ r, J.T @ J
 
 
-@pytest.mark.parametrize("threads", [0, 1, 2, 3])
+@pytest.mark.parametrize("threads", repeated([0, 1, 2, 3], 1, 3))
 def test_a_long_recording_on_any_number_of_threads(threads: int) -> None:
     """30,001 samples, longer than any block, against a filter that takes them one by one."""
     description = small_finger()
@@ -239,7 +240,7 @@ def test_a_coarse_pass_knows_about_as_much() -> None:
 # --- innovations
 
 
-@pytest.mark.parametrize("seed", range(9))
+@pytest.mark.parametrize("seed", repeated(range(9), 0, 1, 2))
 def test_innovations_are_the_contracts_residuals(seed: int) -> None:
     """r and b_eff of docs/reference/semantics.md#bias-tracker, with contact detection out of reach."""
     description, recording, source = random_fit_case(seed, 200)
@@ -262,7 +263,7 @@ def test_innovations_are_the_contracts_residuals(seed: int) -> None:
     assert (S[1:] > 0.0).all()
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", repeated(range(8), 0, 1, 2))
 def test_innovations_with_samples_left_out(seed: int) -> None:
     """Of left-out samples too: what the used ones before them foretell; S of the used ones alone."""
     description, parts = random_parts(seed, 100, 2)

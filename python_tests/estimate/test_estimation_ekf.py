@@ -14,6 +14,7 @@ from fit_cases import few_unknowns, groups, image_of, lasting_finger, random_fit
 from fit_data import make_recording, wavy_forces, wavy_motion
 from oracle_ekf import JosephFilter
 from random_fingers import Description, Recording
+from repetitions import repeated
 from tendonfmu.estimate import estimation
 
 if not estimation.HAS_ESTIMATION:
@@ -72,7 +73,7 @@ class Pair:
         np.testing.assert_allclose(learner.values(), self.twin.parameters(naive.z), rtol=0.0, atol=CLOSE * 1e3)
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", repeated(range(10), 0, 2))
 def test_random_fingers(seed: int) -> None:
     """All structures: asymmetric, working points, loops, slack, jumps, three kinematics."""
     description, recording, source = random_fit_case(seed, 120)
@@ -90,16 +91,16 @@ BIASES: dict[str, Description] = {
 }
 
 
-@pytest.mark.parametrize("name", BIASES)
+@pytest.mark.parametrize("name", repeated(BIASES, 2, 4, 6))
 def test_every_bias_option(name: str) -> None:
     description = lasting_finger()
     description["bias"] |= BIASES[name]
-    recording = recorded(description, 2, 15.0, 20.0)
+    recording = recorded(description, 2, 8.0, 20.0)
     Pair(description, groups(description)).run(recording, 3, recording["external_torque"])
 
 
 @pytest.mark.parametrize("first", [0, 7])
-@pytest.mark.parametrize("bias", [{}, {"noise_time": 0.02}, {"initial_torque": [0.02, -0.01]}], ids=str)
+@pytest.mark.parametrize("bias", repeated([{}, {"noise_time": 0.02}, {"initial_torque": [0.02, -0.01]}], 1), ids=str)
 def test_left_out_samples_foretell_and_do_not_teach(first: int, bias: Description) -> None:
     """Also where the first ones are left out: the bias starts later, with the same default variance."""
     description = lasting_finger(**bias)

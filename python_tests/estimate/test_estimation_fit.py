@@ -165,7 +165,7 @@ def test_solution_on_a_bound() -> None:
 
 def test_cost_never_increases() -> None:
     description = lasting_finger()
-    estimator = estimator_with(description, recorded(description, 10, 100.0, 1000.0))
+    estimator = estimator_with(description, recorded(description, 10, 40.0, 1000.0))
     seen: list[tuple[int, int, int, int, float, Array]] = []
 
     def progress(number: int, stride: int, done: int, total: int, cost: float, best: Array) -> None:
@@ -184,7 +184,7 @@ def test_cost_never_increases() -> None:
 
 def test_stopping_keeps_the_best_so_far() -> None:
     description = lasting_finger()
-    estimator = estimator_with(description, recorded(description, 10, 100.0, 1000.0))
+    estimator = estimator_with(description, recorded(description, 10, 40.0, 1000.0))
     z0 = perturbed(estimator, 4, 0.6)
     result = estimator.fit(z0, stride=1, tolerance=1e-6, progress=lambda number, *_: number < 3)
     assert result.stopped and not result.converged

@@ -17,6 +17,7 @@ import pytest
 from command import Answer, Call
 from fit_cases import small_finger
 from fit_finger import made_recording, moved_start, write_recording
+from repetitions import repeated
 from repository_paths import ROOT
 from tendonfmu.estimate.structure import get_number
 
@@ -206,7 +207,7 @@ def take_interrupts() -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="SKIPPED: no SIGINT for another process")
-@pytest.mark.parametrize(("method", "phase"), [("batch", b"pass 2"), ("ekf", b"filtering, pass 1")])
+@pytest.mark.parametrize(("method", "phase"), repeated([("batch", b"pass 2"), ("ekf", b"filtering, pass 1")], 0))
 def test_ctrl_c_leaves_the_best_so_far_and_resume_goes_on(
     call: Call, tmp_path: Path, method: str, phase: bytes
 ) -> None:

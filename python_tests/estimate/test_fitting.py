@@ -430,7 +430,7 @@ def test_the_page_s_example_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     for seed, day in ((1, "monday"), (2, "tuesday"), (5, "wednesday")):
         write_recording(made_recording(seed=seed), Path(f"{day}.parquet"))
     exec(compile(code, "fit.md", "exec"), {})
-    native.image_from_json(Path("fitted.json").read_bytes())
+    assert native.image_from_json(Path("fitted.json").read_bytes())
 
 
 def test_warnings_are_warnings() -> None:

@@ -115,6 +115,7 @@ def test_antagonists_are_named_together(index_report: dict[str, Any]) -> None:
     assert index_report["least_known_combinations"][0]["relative_standard_error"] > LIMIT
 
 
+@pytest.mark.long
 def test_varied_tensions_tell_more_apart(index_report: dict[str, Any]) -> None:
     """At the same mean force, the same strokes and the same number of them."""
     subject = read_subject(INDEX)

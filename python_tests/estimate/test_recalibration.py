@@ -74,7 +74,7 @@ def fitted_truth() -> dict[str, float]:
 
 @pytest.fixture(scope="module")
 def coloured_fits() -> dict[tuple[str, bool], list[FrictionFit]]:
-    recordings = [held_noise(seed, 20.0, 0.006) for seed in (1, 2, *range(4, 12))]  # in 3 a tendon goes slack
+    recordings = [held_noise(seed, 20.0, 0.006) for seed in (1, 2, 4, 5, 6)]  # in 3 a tendon goes slack
     passes: dict[str, dict[str, Any]] = {"batch": {}, "ekf": {"max_passes": 6}}  # as many as settle it
     cases = [("batch", True), ("batch", False), ("ekf", True), ("ekf", False)]
     return {
@@ -229,7 +229,7 @@ def test_a_previous_fit_of_another_finger_is_refused(previous: tuple[FrictionFit
 DATA = Path(os.environ.get("TENDONFMU_DATA") or ROOT.parent / "shared" / "data")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.skipif(not (DATA / "davinci_tool").is_dir(), reason=f"SKIPPED: no da Vinci recordings in {DATA}")
 def test_one_light_load_leaves_a_jaw_fit_for_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
     """bench/recalibration.py on the lightest and the heaviest load; docs/evidence/recalibration.md has all of them."""

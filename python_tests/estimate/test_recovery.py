@@ -40,6 +40,7 @@ def row() -> dict[str, float]:
     return run_seed(SEED, DURATION, RATE)
 
 
+@pytest.mark.long
 def test_the_recording_is_the_models_own(case: Any) -> None:
     """At the truth nothing is left but the noise: ½ Σ e²/S has the mean and the spread of so many unit normals."""
     from recovery_case import image
@@ -55,6 +56,7 @@ def test_the_recording_is_the_models_own(case: Any) -> None:
     assert case.least_force > 1.0
 
 
+@pytest.mark.long
 def test_the_fit_starts_off_the_truth(case: Any) -> None:
     from recovery_case import START_SPREAD, image
     from tendonfmu.estimate.estimation import Estimator
@@ -66,11 +68,13 @@ def test_the_fit_starts_off_the_truth(case: Any) -> None:
     assert json.dumps(case.truth) != json.dumps(case.start)
 
 
+@pytest.mark.long
 def test_an_excite_motion_tells_most_of_the_numbers(row: dict[str, float]) -> None:
     assert row["numbers"] == 472
     assert row["identifiable"] >= 0.7 * 472
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", ["batch", "ekf"])
 def test_they_are_found_within_their_errors(row: dict[str, float], method: str) -> None:
     """One seed; the errors of neighbours go along with one another, so the campaign's limits are too narrow here."""
@@ -78,6 +82,7 @@ def test_they_are_found_within_their_errors(row: dict[str, float], method: str) 
     assert 0.6 < row[f"{method}_variance"] < 1.6
 
 
+@pytest.mark.long
 def test_both_methods_agree(row: dict[str, float]) -> None:
     assert row["converged"] == 1
     assert row["apart_rms"] < 1.0

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import copy
 import json
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BPoly
 
+from command import Call
 from excite_fingers import INDEX, INDEX_DATA, INDEX_RANGES, SMALL, SMALL_RANGES
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.coverage import EffectCoverage, coverage_of, durations
@@ -47,9 +46,9 @@ def small_file(tmp_path: Path) -> Path:
     return path
 
 
-def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "tendonfmu.cli", "excite", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+@pytest.fixture
+def run(call: Call) -> Call:
+    return lambda *arguments: call("excite", *map(str, arguments))
 
 
 # --- the motion -------------------------------------------------------------------------------------------------------
@@ -367,10 +366,10 @@ def test_bad_rigs_are_refused(tmp_path: Path) -> None:
 # --- the command ------------------------------------------------------------------------------------------------------
 
 
-def test_command(small_file: Path, tmp_path: Path) -> None:
+def test_command(run: Call, small_file: Path, tmp_path: Path) -> None:
     out, found = tmp_path / "motion.csv", tmp_path / "report.json"
     done = run(small_file, "-o", out, "--duration", 30, "--report", found, "--seed", 4, "--pretension", 12)
-    assert done.returncode == 0, done.stderr
+    assert done.status == 0, done.err
     table = read_table(out, lambda file, names: None)
     motion = plan_excitation(SMALL, Plan(np.array([[-0.5, 0.6], [-0.5, 0.5]]), duration=30, seed=4, pretensions=(12,)))
     assert list(table) == list(motion.columns())
@@ -378,16 +377,16 @@ def test_command(small_file: Path, tmp_path: Path) -> None:
         np.testing.assert_array_equal(table[name], column)
     written = json.loads(found.read_text())
     assert written["format"] == "tendonfmu-excitation-1" and written["seed"] == 4 and "--seed 4" in written["command"]
-    assert "warning: joint tip: nothing is known: 0.5 rad either side" in done.stderr
-    assert "tendons[1].edge_friction[2]" in done.stdout and "numbers can be identified" in done.stdout
-    assert f"{written['identifiable']} of {written['numbers']} numbers" in done.stdout
+    assert "warning: joint tip: nothing is known: 0.5 rad either side" in done.err
+    assert "tendons[1].edge_friction[2]" in done.out and "numbers can be identified" in done.out
+    assert f"{written['identifiable']} of {written['numbers']} numbers" in done.out
 
 
-def test_command_with_varied_tensions(small_file: Path, tmp_path: Path) -> None:
+def test_command_with_varied_tensions(run: Call, small_file: Path, tmp_path: Path) -> None:
     out, found = tmp_path / "motion.csv", tmp_path / "report.json"
     words = ["--duration", 30, "--vary-tension", "5:25", "--vary-every", 4, "--max-acceleration", 15, "--report", found]
     done = run(small_file, "-o", out, *words)
-    assert done.returncode == 0, done.stderr
+    assert done.status == 0, done.err
     table = read_table(out, lambda file, names: None)
     span = np.array([[-0.5, 0.6], [-0.5, 0.5]])
     motion = plan_excitation(SMALL, Plan(span, duration=30, vary=Variation(5.0, 25.0, 4.0), max_acceleration=15.0))
@@ -396,9 +395,9 @@ def test_command_with_varied_tensions(small_file: Path, tmp_path: Path) -> None:
     written = json.loads(found.read_text())
     assert written["vary_tension"] == {"lowest": 5.0, "highest": 25.0, "every": 4.0}
     assert written["pretension"] is None and written["max_acceleration"] == 15.0
-    assert "tensions of 5 to 25 N, other ones every 4 s" in done.stdout
-    assert "a higher lowest tension of --vary-tension keeps it taut" in done.stdout or not any(written["slack"])
-    assert "loads the tendons in turn" not in done.stdout
+    assert "tensions of 5 to 25 N, other ones every 4 s" in done.out
+    assert "a higher lowest tension of --vary-tension keeps it taut" in done.out or not any(written["slack"])
+    assert "loads the tendons in turn" not in done.out
 
 
 @pytest.mark.parametrize(
@@ -422,18 +421,18 @@ def test_command_with_varied_tensions(small_file: Path, tmp_path: Path) -> None:
         (["--vary-tension", "5:20", "--vary-every", "1"], "vary-every"),
     ],
 )
-def test_command_refuses(small_file: Path, tmp_path: Path, arguments: list[str], message: str) -> None:
+def test_command_refuses(run: Call, small_file: Path, tmp_path: Path, arguments: list[str], message: str) -> None:
     done = run(small_file, "-o", tmp_path / "motion.csv", *arguments)
-    assert done.returncode == 2
-    assert message in done.stderr.splitlines()[-1]
+    assert done.status == 2
+    assert message in done.err.splitlines()[-1]
     assert not (tmp_path / "motion.csv").exists()
 
 
-def test_command_refuses_files(small_file: Path, tmp_path: Path) -> None:
+def test_command_refuses_files(run: Call, small_file: Path, tmp_path: Path) -> None:
     for finger, output, message in (
         (tmp_path / "none.json", tmp_path / "m.csv", "No such file"),
         (small_file, tmp_path / "m.txt", "expected .csv or .parquet"),
     ):
         done = run(finger, "-o", output)
-        assert done.returncode == 2 and message in done.stderr
-        assert len(done.stderr.splitlines()) == 1
+        assert done.status == 2 and message in done.err
+        assert len(done.err.splitlines()) == 1

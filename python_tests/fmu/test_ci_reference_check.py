@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 from reference import make_reference_traces as traces
 
+from command import Answer, run_script
 from repository_paths import ROOT, TESTS
 
 EXAMPLE = ROOT / "examples" / "ci_reference_check"
@@ -30,9 +31,8 @@ CHANGED = {
 Trace = Callable[[], Path]
 
 
-def check(fmu: Path, trace: Path, *more: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, str(EXAMPLE / "check_reference.py"), str(fmu), str(trace), *more]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+def check(fmu: Path, trace: Path, *more: str) -> Answer:
+    return run_script(EXAMPLE / "check_reference.py", fmu, trace, *more)
 
 
 def number_at(description: dict[str, Any], path: str) -> float:
@@ -65,9 +65,9 @@ def copied(tmp_path: Path) -> Path:
 @pytest.mark.parametrize("name", NAMES)
 def test_the_fmu_agrees_with_its_trace(fmus: Path, name: str) -> None:
     done = check(fmus / f"{name}.fmu", REFERENCE / name)
-    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.status == 0, done.out + done.err
     header = (REFERENCE / f"{name}_ref.csv").read_text(encoding="utf-8").split("\n", 1)[0].replace('"', "").split(",")
-    rows = [line.split() for line in done.stdout.splitlines()]
+    rows = [line.split() for line in done.out.splitlines()]
     assert [row[0] for row in rows[1:-1]] == header[1:]
     assert {row[-1] for row in rows[1:-1]} == {"agrees"}
     assert all(float(row[1]) <= float(row[2]) for row in rows[1:-1])
@@ -78,9 +78,9 @@ def test_a_changed_start_value_fails(fmus: Path, name: str) -> None:
     path, factor = CHANGED[name]
     value = factor * number_at(traces.read_description(name) | {"bias": {"forget_rate": 5.0}}, path)
     done = check(fmus / f"{name}.fmu", REFERENCE / name, "--set", f"{path}={value!r}")
-    assert done.returncode == 1, done.stdout + done.stderr
-    assert re.search(r"^compensated_torque\[\d\] .* DIFFERS$", done.stdout, re.MULTILINE)
-    assert re.search(r"^joint_torque\[1\] .* agrees$", done.stdout, re.MULTILINE)
+    assert done.status == 1, done.out + done.err
+    assert re.search(r"^compensated_torque\[\d\] .* DIFFERS$", done.out, re.MULTILINE)
+    assert re.search(r"^joint_torque\[1\] .* agrees$", done.out, re.MULTILINE)
 
 
 def test_a_rebuilt_fmu_of_another_finger_fails(tmp_path: Path) -> None:
@@ -91,15 +91,15 @@ def test_a_rebuilt_fmu_of_another_finger_fails(tmp_path: Path) -> None:
     (tmp_path / "other.json").write_text(json.dumps(description))
     build_fmu(tmp_path / "other.json", tmp_path / "other.fmu")
     done = check(tmp_path / "other.fmu", REFERENCE / "asymmetric_pair")
-    assert done.returncode == 1, done.stderr
-    assert "DIFFERS" in done.stdout
+    assert done.status == 1, done.err
+    assert "DIFFERS" in done.out
 
 
 def test_a_value_that_the_fmu_refuses_is_a_failed_run(fmus: Path) -> None:
     done = check(fmus / "cable_loop.fmu", REFERENCE / "cable_loop", "--set", "bias.forget_rate=-1")
-    assert done.returncode == 1
-    assert done.stderr.startswith("check_reference: ") and done.stderr.count("\n") == 1
-    assert "bias.forget_rate" in done.stderr
+    assert done.status == 1
+    assert done.err.startswith("check_reference: ") and done.err.count("\n") == 1
+    assert "bias.forget_rate" in done.err
 
 
 def spoil(trace: Path, end: str, pattern: str, replacement: str) -> None:
@@ -131,32 +131,32 @@ def test_a_bad_file_is_named(fmus: Path, copied: Path, spoiled: str) -> None:
     end, pattern, replacement, message = SPOILED[spoiled]
     spoil(copied, end, pattern, replacement)
     done = check(fmus / "cable_loop.fmu", copied)
-    assert done.returncode == 2, done.stdout
-    assert re.search(re.escape(f"cable_loop{end}") + ".*" + message, done.stderr), done.stderr
-    assert done.stderr.count("\n") == 1 and done.stdout == ""
+    assert done.status == 2, done.out
+    assert re.search(re.escape(f"cable_loop{end}") + ".*" + message, done.err), done.err
+    assert done.err.count("\n") == 1 and done.out == ""
 
 
 @pytest.mark.parametrize("end", ["_in.csv", "_ref.csv", "_ref.opt"])
 def test_a_missing_file_is_named(fmus: Path, copied: Path, end: str) -> None:
     copied.with_name(copied.name + end).unlink()
     done = check(fmus / "cable_loop.fmu", copied)
-    assert done.returncode == 2
-    assert f"cable_loop{end}: cannot be read; expected" in done.stderr
+    assert done.status == 2
+    assert f"cable_loop{end}: cannot be read; expected" in done.err
 
 
 def test_an_empty_file_is_named(fmus: Path, copied: Path) -> None:
     copied.with_name("cable_loop_in.csv").write_text("")
     done = check(fmus / "cable_loop.fmu", copied)
-    assert done.returncode == 2
-    assert "cable_loop_in.csv" in done.stderr
+    assert done.status == 2
+    assert "cable_loop_in.csv" in done.err
 
 
 def test_what_is_no_fmu_is_named(tmp_path: Path) -> None:
     for content in (b"", b"PK no archive"):
         (tmp_path / "bad.fmu").write_bytes(content)
         done = check(tmp_path / "bad.fmu", REFERENCE / "cable_loop")
-        assert done.returncode == 2 and "bad.fmu: " in done.stderr and done.stderr.count("\n") == 1
-    assert check(tmp_path / "none.fmu", REFERENCE / "cable_loop").returncode == 2
+        assert done.status == 2 and "bad.fmu: " in done.err and done.err.count("\n") == 1
+    assert check(tmp_path / "none.fmu", REFERENCE / "cable_loop").status == 2
 
 
 def test_an_fmu_without_binaries_is_named(fmus: Path, tmp_path: Path) -> None:
@@ -166,13 +166,13 @@ def test_an_fmu_without_binaries_is_named(fmus: Path, tmp_path: Path) -> None:
             if not name.startswith("binaries/"):
                 archive.writestr(name, source.read(name))
     done = check(target, REFERENCE / "cable_loop")
-    assert done.returncode == 2 and "binaries for c-code; expected" in done.stderr
+    assert done.status == 2 and "binaries for c-code; expected" in done.err
 
 
 @pytest.mark.parametrize("setting", ["bias.forget_rate", "=1", "forget=1"])
 def test_a_bad_setting_is_refused(fmus: Path, setting: str) -> None:
     done = check(fmus / "cable_loop.fmu", REFERENCE / "cable_loop", "--set", setting)
-    assert done.returncode == 2 and done.stdout == ""
+    assert done.status == 2 and done.out == ""
 
 
 def test_every_fmu_of_a_folder(fmus: Path, tmp_path: Path) -> None:
@@ -205,6 +205,7 @@ def test_the_workflow_runs_the_script() -> None:
     assert set(imported) - set(sys.stdlib_module_names) == {"fmpy", "numpy"}
 
 
+@pytest.mark.long
 def test_the_commands_and_the_table_of_the_page(tmp_path: Path) -> None:
     """README.md: first the commands that agree and their table, then the one that does not."""
     text = (EXAMPLE / "README.md").read_text(encoding="utf-8")

@@ -286,7 +286,22 @@ def test_fmpy_row_carries_the_sample_before(small_fmu_path: Path) -> None:
     np.testing.assert_allclose(rows["joint_torque[2]"][1:], torque[:-1], atol=1e-12)
 
 
-@pytest.mark.slow
+def test_the_flat_sources_give_the_same_results(small_fmu_path: Path, tmp_path: Path) -> None:
+    """Compiled as they are listed, without any flag and without optimisation: not a bit differs."""
+    compiler = tool("cc")
+    folder = tmp_path / "fmu"
+    with zipfile.ZipFile(small_fmu_path) as archive:
+        archive.extractall(folder)
+    element = ElementTree.parse(folder / "modelDescription.xml").getroot().find("CoSimulation")
+    assert element is not None
+    sources = [str(folder / "sources" / file.attrib["name"]) for file in element.iter("File")]
+    (binary,) = (folder / "binaries").rglob(f"{element.attrib['modelIdentifier']}.*")
+    binary.unlink()
+    subprocess.run([compiler, "-shared", "-fPIC", "-O0", *sources, "-o", str(binary), "-lm"], check=True)
+    assert simulated(folder).tobytes() == simulated(small_fmu_path).tobytes()
+
+
+@pytest.mark.long
 def test_source_fmu_compiled_by_fmpy_gives_the_same_results(small_fmu_path: Path, tmp_path: Path) -> None:
     """Flat sources, fmpy's own flags; the results may not differ by a bit."""
     from fmpy.build import build_platform_binary

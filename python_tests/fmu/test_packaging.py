@@ -22,6 +22,7 @@ from fmpy.validation import validate_fmu
 
 from fmu_binary import FINGER, Instance, fmi_platform, unpack
 from random_fingers import random_case, random_finger
+from repetitions import repeated
 from repository_paths import ROOT
 from tendonfmu.errors import InputError
 from tendonfmu.fmu.packaging import build_fmu, model_identifier
@@ -230,12 +231,12 @@ def test_a_failure_keeps_the_file_that_was_there(tmp_path: Path) -> None:
 # --- before fmpy ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("description", [TINY, FINGER], ids=["tiny", "small"])
+@pytest.mark.parametrize("description", repeated([TINY, FINGER], 0), ids=["tiny", "small"])
 def test_fmpy_finds_nothing(description: dict[str, Any], packed: Pack) -> None:
     assert validate_fmu(str(packed(description))) == []
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_fmpy_finds_nothing_in_the_index_finger(tmp_path: Path) -> None:
     assert validate_fmu(str(build_fmu(INDEX_FINGER, tmp_path / "index.fmu"))) == []
 
@@ -278,7 +279,7 @@ def simulate(fmu: Path, recording: dict[str, Any]) -> Any:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="SKIPPED: fmpy compiles by cmake, which is not there")
 def test_the_compiled_source_fmu_gives_the_same_bits(tmp_path: Path) -> None:
     description, recording = random_case(6)

@@ -14,6 +14,7 @@ from effects_hidden import BUILDERS, hide
 from friction_physics import contacts_of, motion_of, read_finger, torque_of, values_of, velocity_seen
 from hidden_unknown import UNKNOWN
 from matched_rig import Hand, Made, Noise, coloured, random_hand, record
+from repetitions import repeated
 from strength import group, kinematics, residual, strength_of
 from tendonfmu.model import native
 
@@ -113,7 +114,9 @@ def test_the_torque_stands_still_while_everything_rests() -> None:
     assert len(found.enters) > 3 and len(found.leaves) > 3
 
 
-@pytest.mark.parametrize("effect", ["gravity", "edge_friction", "inertia", "time_delay", "backlash", "rubbing"])
+@pytest.mark.parametrize(
+    "effect", repeated(["gravity", "edge_friction", "inertia", "time_delay", "backlash", "rubbing"], 0, 5)
+)
 def test_strength_is_what_was_asked_for(effect: str) -> None:
     """Asked of the finished hand, and against a refit: least squares of the whole effect leaves that variance."""
     hand, label = hide(

@@ -16,6 +16,7 @@ import pytest
 
 from fmu_binary import FINGER
 from random_fingers import random_case
+from repetitions import repeated
 from repository_paths import ROOT
 from tendonfmu.model.description import read_finger
 from tendonfmu.model.native import Instance
@@ -81,7 +82,7 @@ def steps_apart(finger: Instance, state: bytes, sample: Sample) -> Influence:
     return found
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", repeated(SEEDS, *range(0, len(SEEDS), 3)))
 def test_nothing_undeclared_influences(seed: int, tmp_path: Path) -> None:
     description, recording = random_case(seed, samples=160)
     allowed = pairs(declared(with_extension(description, seed), tmp_path))
@@ -159,7 +160,7 @@ def slopes(finger: Instance, recording: Sample) -> Influence:
     return found
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", repeated(SEEDS, *range(0, len(SEEDS), 3)))
 def test_each_declared_number_influences(seed: int, tmp_path: Path) -> None:
     description = with_extension(random_case(seed)[0], seed)
     recording = lively_recording(description, seed)

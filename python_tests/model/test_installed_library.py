@@ -18,6 +18,8 @@ import pytest
 from fit_finger import made_recording, moved_start, write_recording
 from repository_paths import ROOT
 
+pytestmark = pytest.mark.xdist_group("installed library")  # one worker builds for all of them
+
 FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
 
 CONSUMER_CMAKE = """\
@@ -146,15 +148,17 @@ def project_version() -> str:
 
 @pytest.fixture(scope="module")
 def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Built and installed, then moved: nothing in it may depend on where it was made."""
+    """Built and installed, then moved: nothing in it may depend on where it was made. The build is that of ./test where
+    there is one."""
     folder = tmp_path_factory.mktemp("library")
-    call(
-        *("cmake", "-G", "Ninja", "-S", ROOT, "-B", folder / "build", "-DCMAKE_INSTALL_LIBDIR=lib"),
-        *("-DTENDONFMU_BUILD_TESTS=OFF", "-DTENDONFMU_BUILD_FMU=OFF"),
-    )
-    call("cmake", "--build", folder / "build", "--parallel", "2")
-    call("cmake", "--install", folder / "build", "--prefix", folder / "made here")
-    shutil.rmtree(folder / "build")
+    build = ROOT / "build" / "tests"
+    if not (build / "CMakeCache.txt").exists():
+        build = folder / "build"
+        options = ("-DCMAKE_INSTALL_LIBDIR=lib", "-DTENDONFMU_BUILD_TESTS=OFF", "-DTENDONFMU_BUILD_FMU=OFF")
+        call("cmake", "-G", "Ninja", "-S", ROOT, "-B", build, *options)
+    call("cmake", "--build", build, "--parallel", "2")
+    call("cmake", "--install", build, "--prefix", folder / "made here")
+    shutil.rmtree(folder / "build", ignore_errors=True)
     return (folder / "made here").rename(folder / "moved")
 
 

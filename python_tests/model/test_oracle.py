@@ -15,7 +15,8 @@ import analytic_force_cases
 import oracle
 from analytic_cases import DRY, LAW, Case, finger, one_edge, recording
 from random_fingers import random_case, random_law, random_moment_arms
-from runners import RUNNERS, Runner
+from repetitions import repeated
+from runners import NATIVE, ORACLE, RUNNERS, Runner
 
 CASES = analytic_cases.CASES + analytic_force_cases.CASES + analytic_extension_cases.CASES
 
@@ -26,7 +27,16 @@ def runner(request: pytest.FixtureRequest) -> Runner:
     return chosen
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+# Calls from Python for each sample, and packed FMUs, take their time.
+RUNS = [
+    pytest.param(runner, case, id=f"{runner.name}-{case.name}", marks=pytest.mark.long if k % 4 and slow else [])
+    for runner in RUNNERS
+    for slow in [runner.name in ("single_steps", "fmu")]
+    for k, case in enumerate(CASES)
+]
+
+
+@pytest.mark.parametrize(("runner", "case"), RUNS)
 def test_case(runner: Runner, case: Case) -> None:
     if case.repeated_time and not runner.repeated_time:
         pytest.skip(f"{runner.name} takes recordings of strictly increasing time only")
@@ -37,10 +47,11 @@ def test_case(runner: Runner, case: Case) -> None:
 
 def slow_crossings(step: float) -> dict[str, Any]:
     """Smooth motion with rests and reversals, sampled every `step` s."""
-    time = np.arange(round(4.0 / step) + 1) * step
+    time = np.arange(round(2.0 / step) + 1) * step
     return recording(time, 10.0 + 2.0 * np.sin(3.0 * time), np.sin(2.0 * time) ** 3, np.cos(time))
 
 
+@pytest.mark.parametrize("runner", [ORACLE, NATIVE], ids=lambda runner: runner.name)
 def test_halving_the_step_changes_only_what_the_signals_change(runner: Runner) -> None:
     """At common times the difference is of the order of the step (an entry or exit is seen a step later)."""
     bias = {"drift_variance": 1e-4, "noise_std": 0.02, "noise_time": 0.01, "initial_variance": 1e-4}
@@ -84,7 +95,7 @@ def dissipative_finger(rng: np.random.Generator) -> dict[str, Any]:
     return finger(tendons, joints)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", repeated(range(20), 0, 1, 2))
 def test_friction_never_drives(runner: Runner, seed: int) -> None:
     """At constant velocity the friction of edges and joints takes power out: Σ_j T_j q̇_j ≥ 0."""
     rng = np.random.default_rng(seed)

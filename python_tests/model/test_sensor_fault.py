@@ -6,6 +6,7 @@ A motion turns the joint by q and stretches both springs by c: x0 = ±0.01·q + 
 
 from __future__ import annotations
 
+import functools
 import json
 from collections import Counter
 from pathlib import Path
@@ -30,7 +31,8 @@ FAULT = {
     "recovery_time": 2 * DT,
 }
 LEARNS = {"drift_variance": 1.0, "noise_std": 0.1, "initial_variance": 0.0}
-SEEDS = range(500, 524)
+SEEDS = range(512, 524)
+SLOW = ("single_steps", "fmu")  # a call from Python for each sample; packing
 
 
 @pytest.fixture(params=[ORACLE, NATIVE], ids=lambda runner: runner.name)
@@ -339,22 +341,27 @@ BRANCHES = {
 }  # fmt: skip
 
 
+@functools.cache
+def oracle_run(seed: int) -> oracle.Result:
+    return oracle.run(*failing_case(seed), 1 + seed % 3)
+
+
 def test_random_fingers_take_every_branch_of_the_watch() -> None:
     seen: Counter[str] = Counter()
     for seed in SEEDS:
-        seen += oracle.run(*failing_case(seed), 1 + seed % 3).branches
+        seen += oracle_run(seed).branches
     assert not [name for name in BRANCHES if seen[name] < 3], {name: seen[name] for name in BRANCHES}
 
 
 @pytest.mark.parametrize("runner", [each for each in RUNNERS if each is not ORACLE], ids=lambda runner: runner.name)
 def test_agrees_with_the_oracle(runner: Runner) -> None:
     results, wrong = [], []
-    for seed in SEEDS[::6] if runner.name == "fmu" else SEEDS:  # packing takes its time
+    for seed in SEEDS[:: 4 if runner.name in SLOW else 1]:
         description, recording = failing_case(seed)
         source = 1 + seed % 3
         outputs = runner(description, recording, source)
         assert {"sensor_fault", "contact_observable"} <= set(outputs)
-        found = agreement.agree_with_oracle(description, recording, source, outputs)
+        found = agreement.agree_with_oracle(description, recording, source, outputs, oracle_run(seed))
         results.append(found)
         if not found.agrees:
             wrong.append(f"finger {seed}, source {source}: {found}")

@@ -77,6 +77,7 @@ def test_the_snippets_of_fmpy(folder: Path) -> None:
     assert np.abs(found["smoother"]["compensated_torque[1]"] - expected).max() > 1e-5
 
 
+@pytest.mark.long
 def test_fmpy_compiles_the_sources(folder: Path) -> None:
     if shutil.which("cmake") is None:
         pytest.skip("SKIPPED: cmake is not installed")

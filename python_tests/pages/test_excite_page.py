@@ -34,6 +34,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
+@pytest.mark.long
 def test_the_example_interpolates_the_motion(folder: Path) -> None:
     code = re.search(r"```python\n(.*?)```", PAGE, re.DOTALL)
     assert code is not None
@@ -66,6 +67,7 @@ def test_every_cause_is_on_the_page(folder: Path) -> None:
 
 
 @needs_plant
+@pytest.mark.long
 def test_the_simulated_finger_plays_it(tmp_path: Path) -> None:
     """The page's commands and rig, in a folder with the repository's examples; 10 s of motion."""
     part = PAGE.split("## On the simulated finger")[1].split("\n## ")[0]

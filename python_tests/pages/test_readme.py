@@ -12,6 +12,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from repetitions import repeated
 from repository_paths import ROOT
 from tendonfmu.estimate.estimation import HAS_ESTIMATION
 
@@ -40,12 +41,13 @@ def test_links_lead_to_files_that_git_knows() -> None:
             assert path in known, f"{page.relative_to(ROOT)}: {target}"
 
 
-def test_commands_of_the_readme(tmp_path: Path) -> None:
-    """In order, in a folder that sees the examples: one builds what the next one runs."""
+@pytest.mark.parametrize("calibrate", repeated([False, True], 0))
+def test_commands_of_the_readme(tmp_path: Path, calibrate: bool) -> None:
+    """In order, in a folder that sees the examples: one builds what the next one runs. To calibrate takes long."""
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     assert len(COMMANDS) >= 4
-    wanted = [command for command in COMMANDS if HAS_ESTIMATION or not needs_estimation(command)]
-    if len(wanted) < len(COMMANDS):
+    wanted = [command for command in COMMANDS if (HAS_ESTIMATION and calibrate) or not needs_estimation(command)]
+    if calibrate and len(wanted) < len(COMMANDS):
         warnings.warn("NOT TESTED: tendonfmu calibrate of the README, built without Eigen", stacklevel=1)
     for command in wanted:
         words = [str(Path(sys.executable).parent / "tendonfmu"), *shlex.split(command)[1:]]
@@ -55,7 +57,7 @@ def test_commands_of_the_readme(tmp_path: Path) -> None:
     assert len(outputs) == 30000
     assert outputs["contact"].any()
     assert not outputs["contact"].all()
-    if HAS_ESTIMATION:
+    if HAS_ESTIMATION and calibrate:
         assert len(pd.read_csv(tmp_path / "free.csv")) == 20000
 
 

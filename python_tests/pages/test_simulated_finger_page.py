@@ -87,6 +87,7 @@ def test_every_figure_is_there() -> None:
 
 
 @needs_plant
+@pytest.mark.long
 def test_the_command_runs(tmp_path: Path) -> None:
     command = re.search(r"```sh\ntendonfmu (.*)\n```", PAGE)
     assert command

@@ -65,6 +65,7 @@ def test_the_small_finger_is_sound_and_can_be_pretensioned(folder: Path) -> None
     assert (folder / "two_joints.fmu").is_file()
 
 
+@pytest.mark.long
 def test_the_small_recording_gives_the_angles_it_was_made_of(folder: Path) -> None:
     subprocess.run([sys.executable, "-c", blocks(YOUR_RECORDING, "python")[0]], cwd=folder, check=True)
     recording = read_recording(folder / "two_joints.csv")

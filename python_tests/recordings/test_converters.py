@@ -79,7 +79,9 @@ def test_a_pretension_makes_the_closing_cable_a_tendon_that_pulls(tmp_path: Path
 def test_a_converted_file_is_a_recording(tmp_path: Path) -> None:
     write_table(tmp_path / "rec.csv", convert(written(tmp_path, GOOD), RADIUS))
     recording = read_recording(tmp_path / "rec.csv")
-    recording.require(1, 1, ("tendon_force", "tendon_position", "joint_position", "external_torque"))
+    groups = ("tendon_force", "tendon_position", "joint_position", "external_torque")
+    recording.require(1, 1, groups)
+    assert set(groups) <= recording.groups.keys()
 
 
 @pytest.mark.parametrize(

@@ -60,7 +60,7 @@ def run(jaw: Path, folder: Path, name: str) -> pd.DataFrame:
     return table[table["time"] <= FAULT.get(name, np.inf)]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", SLOW)
 def test_compensated_torque_follows_the_jaw_sensor(jaw: Path, tmp_path: Path, name: str) -> None:
     table = run(jaw, tmp_path, name)
@@ -78,7 +78,7 @@ def test_signs_and_units_by_the_error_without_a_friction_model(tmp_path: Path, n
     assert rms(friction[table["time"] >= SETTLED].to_numpy()) == pytest.approx(expected, abs=0.001)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_numbers_of_the_jaw_are_those_of_the_fit(tmp_path: Path) -> None:
     pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not installed with its estimation")
     fitted = tmp_path / "jaw.json"

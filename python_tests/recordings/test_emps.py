@@ -271,6 +271,7 @@ def error(finger: Path, recording: Path) -> float:
 
 
 @measured
+@pytest.mark.long
 def test_the_errors_are_those_of_the_benchmark(recordings: dict[str, Path]) -> None:
     assert error(recordings["emps"], recordings["DATA_EMPS"]) <= 4.1
     assert error(recordings["emps_asymmetric"], recordings["DATA_EMPS"]) <= 3.15
@@ -287,7 +288,7 @@ def test_the_numbers_are_the_published_ones_within_one_percent(recordings: dict[
 
 
 @measured
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_script_finds_the_mass_too() -> None:
     """The rows of its first table: published, published M, all fitted, at 1 kHz, the same decimated."""
     pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not installed with its estimation")

@@ -199,7 +199,7 @@ def test_a_description_from_a_recording_is_that_of_convert(call: Call, tmp_path:
 # --- the example ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_example_finds_what_was_changed(call: Call, tmp_path: Path) -> None:
     """Week 5 has 20 % more Coulomb friction than week 1, week 3 has what week 1 had; every week moves differently.
 
@@ -252,7 +252,7 @@ def test_the_page_names_every_key_and_unit() -> None:
     assert json.loads(blocks("json")[0]) == json.loads((EXAMPLE / "map.json").read_text(encoding="utf-8"))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.skipif(not DATA.is_dir(), reason="SKIPPED: no EMPS data")
 def test_the_measured_machine_of_the_page(call: Call, tmp_path: Path) -> None:
     """Its own lines: half against half nothing has changed; 2 N put in by hand are found, to 10 %."""

@@ -37,6 +37,7 @@ def case(table: Any) -> Any:
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_every_corruption_of_a_finger_is_explained(table: Any, case: Any) -> None:
     counts: Any = defaultdict(Counter)
     finger = table.described(case.nominal)

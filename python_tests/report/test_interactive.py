@@ -62,7 +62,8 @@ def test_plotly_knows_all_that_it_is_told(panel: Panel | MatrixPanel) -> None:
     """Its own library refuses a wrong name or value; the page's template is checked too."""
     figure = figure_of(panel, NAMES)
     template = json.loads(figures_json([panel], [NAMES]))["template"]
-    go.Figure(data=figure["data"], layout={**figure["layout"], "template": template})
+    known = go.Figure(data=figure["data"], layout={**figure["layout"], "template": template})
+    assert len(known.data) == len(figure["data"])
 
 
 def test_a_curve_has_its_numbers_and_its_gaps() -> None:

@@ -137,6 +137,7 @@ def test_the_truth_of_a_part_of_a_recording() -> None:
 
 
 @needs_plant
+@pytest.mark.long
 def test_the_script_makes_the_figures_of_the_page(tmp_path: Path) -> None:
     subprocess.run([sys.executable, RIGS / "make_figures.py", "-o", tmp_path], check=True)
     page = (RIGS.parents[1] / "docs" / "reference" / "simulated_finger.md").read_text(encoding="utf-8")

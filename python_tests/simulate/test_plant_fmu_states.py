@@ -21,6 +21,7 @@ from test_fmu_states import STATES, TABLE, checksum
 from fmu_binary import DISCARD, ERROR, OK, WARNING, Instance, UnpackedFmu, unpack
 from plant_fmu_rig import TOLERANCE, play
 from plant_rigs import needs_plant
+from repetitions import repeated
 from repository_paths import ROOT, SUPPORT
 from tendonfmu.simulate.fmu_packaging import build_plant_fmu
 
@@ -278,7 +279,7 @@ def restart_errors(
     }
 
 
-@pytest.mark.parametrize("tolerance", [1e-4, 1e-5, 1e-6, 1e-7, 1e-8])
+@pytest.mark.parametrize("tolerance", repeated([1e-4, 1e-5, 1e-6, 1e-7, 1e-8], 0, 3))
 def test_the_bound_on_restored_runs_of_the_index_finger(tolerance: float, tmp_path: Path) -> None:
     """Five cuts, a second each, as docs/reference/simulated_finger_fmu.md says."""
     fmu = unpack(build_plant_fmu(INDEX_FINGER, tmp_path / "index.fmu"), tmp_path / "index")

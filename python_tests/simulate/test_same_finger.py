@@ -18,6 +18,7 @@ pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not insta
 
 from plant_rigs import needs_plant
 from random_rigs import random_rig
+from repetitions import repeated
 from repository_paths import ROOT
 from tendonfmu.model.native import Instance
 from tendonfmu.recordings.recording import read_recording
@@ -73,7 +74,7 @@ def test_with_other_friction_it_leaves_more(factor: float) -> None:
 
 
 @needs_plant
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", repeated(SEEDS, 0, 1))
 def test_issue_3_the_same_third_on_a_rig_drawn_at_random(tmp_path: Path, seed: int) -> None:
     """With the index finger's filter and bias; nothing of it is fitted to the rig."""
     data = random_rig(seed, duration=60.0)

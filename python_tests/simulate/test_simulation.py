@@ -18,6 +18,7 @@ import pytest
 from command import Call
 from plant_rigs import needs_plant
 from random_rigs import random_rig
+from repetitions import repeated
 from rig_cases import RIGS, changed, index_rig, with_everything, written
 from tendonfmu.files.tables import write_table
 from tendonfmu.recordings.recording import read_recording
@@ -152,11 +153,11 @@ def test_progress_is_told_to_the_end(tmp_path: Path) -> None:
     not sys.platform.startswith("linux") or platform.machine() != "x86_64",
     reason="SAME BYTES ON ANOTHER PROCESSOR NOT TESTED: the C library of x86-64 Linux can be told to do without FMA",
 )
-@pytest.mark.parametrize("integrator", ["cvode", "fixed_step"])
+@pytest.mark.parametrize("integrator", repeated(["cvode", "fixed_step"], 0))
 def test_the_processor_does_not_show(integrator: str, tmp_path: Path) -> None:
     """The C library's functions differ in the last bit between processors with and without fused multiply-add."""
     for name, environment in {"with": {}, "without": {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4"}}.items():
-        command = [sys.executable, "-m", "tendonfmu.cli", "simulate", str(RIGS / "index_finger.json")]
+        command = [sys.executable, "-m", "tendonfmu.cli", "simulate", str(written(tmp_path, short_rig()))]
         files = ["-o", f"{name}.parquet", "--truth", f"{name}_truth.parquet"]
         subprocess.run(
             [*command, *files, "--integrator", integrator],

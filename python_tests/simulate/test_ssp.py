@@ -208,6 +208,7 @@ def test_the_package_never_takes_the_place_of_its_rig(tmp_path: Path) -> None:
     assert (base.read_bytes(), rig.read_bytes()) == before
 
 
+@pytest.mark.long
 def test_the_scripts_of_the_example(tmp_path: Path) -> None:
     def script(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, str(EXAMPLE / name), *arguments]

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import io
+import runpy
 from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from pathlib import Path
+from unittest import mock
 
 
 @dataclass(frozen=True)
@@ -14,3 +19,17 @@ class Answer:
 
 
 Call = Callable[..., Answer]
+
+
+def run_script(script: Path, *arguments: str | Path) -> Answer:
+    """Runs a script of Python as the main program, but in this process."""
+    out, err = io.StringIO(), io.StringIO()
+    with mock.patch("sys.argv", [str(script), *map(str, arguments)]), redirect_stdout(out), redirect_stderr(err):
+        try:
+            runpy.run_path(str(script), run_name="__main__")
+            status = 0
+        except SystemExit as ended:
+            status = ended.code if isinstance(ended.code, int) else int(ended.code is not None)
+            if isinstance(ended.code, str):
+                err.write(f"{ended.code}\n")
+    return Answer(status, out.getvalue(), err.getvalue())

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 
+from repetitions import repeated
 from repository_paths import SUPPORT
 
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
@@ -150,7 +151,7 @@ def copied(earlier: Path, folder: Path) -> None:
         (folder / "out" / name).write_bytes(text)
 
 
-@pytest.mark.parametrize("moment", MOMENTS)
+@pytest.mark.parametrize("moment", repeated(MOMENTS, 1, 3))
 @pytest.mark.parametrize("number", STATUS, ids=lambda number: number.name)
 def test_nothing_is_left_and_nothing_is_lost(
     tmp_path: Path, earlier: Path, moment: str, number: signal.Signals
@@ -204,7 +205,7 @@ def test_a_disk_that_fails_in_between_changes_nothing(
 # --- for real ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seconds", [1.0, 3.0, 8.0])
+@pytest.mark.parametrize("seconds", repeated([1.0, 3.0, 8.0], 1))
 def test_a_real_diagnosis_is_interrupted(tmp_path: Path, seconds: float) -> None:
     """Wherever it is then."""
     with as_file(files("tendonfmu") / "data") as data:

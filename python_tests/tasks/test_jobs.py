@@ -130,6 +130,7 @@ def log_lines(log: Path) -> list[str]:
     return log.read_text(encoding="utf-8").splitlines() if log.is_file() else []
 
 
+@pytest.mark.long
 def test_a_job_that_kills_every_worker_is_an_error_of_its_own(tmp_path: Path) -> None:
     """Nannies start the workers again; after the fourth death the job is given up, and the others have their rows."""
     pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")
@@ -171,6 +172,7 @@ def test_a_scheduler_that_dies_is_an_error_and_the_rest_is_resumed(tmp_path: Pat
     assert [row["number"] for row in rows_of(jobs, output)] == list(range(8))
 
 
+@pytest.mark.long
 def test_two_workers_take_half_the_time_of_one() -> None:
     """Jobs that only wait, so that a busy machine does not matter much: what is left is what the engine costs."""
     pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")

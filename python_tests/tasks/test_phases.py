@@ -161,4 +161,5 @@ def test_an_estimate_is_coarse(seconds: float | None, words: str) -> None:
 
 def test_a_display_takes_the_place_of_a_watch() -> None:
     watch: Callable[[PhaseState], None] = PhaseDisplay(False)
-    Phases(["reading"], watch)
+    with Phases(["reading"], watch).start("reading") as step:
+        assert step(1) is None

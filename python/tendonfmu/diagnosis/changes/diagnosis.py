@@ -334,9 +334,18 @@ class _Changes:
         return Unexplained(whole, words if unknown else "", share, p_value, unknown, gain)
 
     def _load(self) -> SteadyLoad | None:
+        """Return what remains of a load both with and without the means of the changes.
+
+        A weight pulls with its mean torque, or without it where the sensors were zeroed under the weight.
+        """
         search = self._search
-        found = steady_load(search.series, search.torque_left(), search.sides.now, self._seed)
-        return found if found is not None and found.gain.low > 0.0 else None
+        found: list[SteadyLoad] = []
+        for means in (False, True) if search.changes else (False,):
+            load = steady_load(search.series, search.torque_left(means), search.sides.now, self._seed)
+            if load is None or load.gain.low <= 0.0:
+                return None
+            found.append(load)
+        return min(found, key=lambda each: abs(each.size.change.value))
 
     def _floor(self) -> Numbers:
         """Return the rms of the new recordings, N·m [n]."""

@@ -427,18 +427,18 @@ class ChangeSearch:
         """Number of new recordings that repeat a motion of the reference exactly."""
         return len(self._repeats)
 
-    def torque_left(self) -> Numbers:
+    def torque_left(self, means: bool = False) -> Numbers:
         """Return measured less modelled torque, including the bias but without its own jumps, N·m [B, n].
 
-        The changes are included except for their means, which no motion can distinguish from a load or a sensor's zero.
+        The changes are included, with `means` also their means, which no motion can distinguish from a load or a
+        sensor's zero.
         """
         whole = [recording.target - exact_model(self.data, recording, jumps=False) for recording in self._recordings]
         left = np.concatenate([segment.mean(whole[segment.recording][segment.part]) for segment in self._grid.segments])
         if self.changes:
             moved = self.moved()
-            left -= np.where(
-                self.sides.now[:, None], moved - moved[self.series.used & self.sides.now].mean(axis=0), 0.0
-            )
+            mean = 0.0 if means else moved[self.series.used & self.sides.now].mean(axis=0)
+            left -= np.where(self.sides.now[:, None], moved - mean, 0.0)
         return np.asarray(left)
 
     @property
