@@ -431,7 +431,7 @@ def test_command_refuses(run: Call, small_file: Path, tmp_path: Path, arguments:
 def test_command_refuses_files(run: Call, small_file: Path, tmp_path: Path) -> None:
     for finger, output, message in (
         (tmp_path / "none.json", tmp_path / "m.csv", "No such file"),
-        (small_file, tmp_path / "m.txt", "expected .csv or .parquet"),
+        (small_file, tmp_path / "m.txt", "expected .csv, .parquet or .mcap"),
     ):
         done = run(finger, "-o", output)
         assert done.status == 2 and message in done.err

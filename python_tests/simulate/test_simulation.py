@@ -264,7 +264,7 @@ def test_ctrl_c_ends_a_long_simulation_at_once(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
-        (("-o", "rec.txt"), "rec.txt: unknown format '.txt'; expected .csv or .parquet"),
+        (("-o", "rec.txt"), "rec.txt: unknown format '.txt'; expected .csv, .parquet or .mcap"),
         (("-o", "none/rec.csv"), "none/rec.csv: no folder none; expected one that exists"),
         (("-o", "rec.csv", "--truth", "rec.csv"), "rec.csv: the same file for recording and truth; expected two names"),
         (("-o", "rec.csv", "--integrator", "euler"), "--integrator euler: expected cvode or fixed_step"),

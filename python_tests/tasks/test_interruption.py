@@ -228,6 +228,33 @@ def test_a_real_diagnosis_is_interrupted(tmp_path: Path, seconds: float) -> None
     assert took < PROMPT and list(tmp_path.iterdir()) == []
 
 
+LOST = """
+import signal, sys
+from tendonfmu.tasks import Phases, ended_by_signals
+
+class Swallows:
+    def __del__(self):
+        signal.raise_signal(signal.Signals[sys.argv[1]])
+
+with ended_by_signals() as ending:
+    phases = Phases(["first", "second"])
+    try:
+        with phases.start("first"):
+            Swallows()
+            print("swallowed")
+        with phases.start("second"):
+            print("never")
+    except KeyboardInterrupt:
+        print(ending.status)
+"""
+
+
+@pytest.mark.parametrize(("name", "status"), [("SIGINT", 130), ("SIGTERM", 143)])
+def test_an_interruption_that_a_finaliser_swallows_comes_at_the_next_phase(name: str, status: int) -> None:
+    done = subprocess.run([sys.executable, "-c", LOST, name], capture_output=True, text=True, preexec_fn=foreground)
+    assert done.stdout.split() == ["swallowed", str(status)], done.stderr
+
+
 # --- parts ------------------------------------------------------------------------------------------------------------
 
 

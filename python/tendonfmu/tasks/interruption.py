@@ -21,22 +21,45 @@ class Ending:
 
     Attributes
     ----------
-    status
-        128 + number of the signal; SIGINT if none was seen.
+    asked
+        Number of the signal, or None if none was seen.
     """
 
     def __init__(self) -> None:
-        self.status = 128 + signal.SIGINT
+        self.asked: int | None = None
 
-    def terminate(self, number: int, frame: FrameType | None) -> None:
-        """Handle a signal: remember its number and raise Terminated."""
-        self.status = 128 + number
-        raise Terminated
+    @property
+    def status(self) -> int:
+        """Exit status: 128 + number of the signal; SIGINT if none was seen."""
+        return 128 + (self.asked or signal.SIGINT)
+
+    def end(self, number: int, frame: FrameType | None) -> None:
+        """Handle a signal: remember its number, and raise KeyboardInterrupt or Terminated."""
+        self.asked = number
+        self.raise_again()
+
+    def raise_again(self) -> None:
+        """Raise what a signal has asked for, if any has."""
+        if self.asked is not None:
+            raise KeyboardInterrupt if self.asked == signal.SIGINT else Terminated
+
+
+_endings: list[Ending] = []  # of the blocks of `ended_by_signals`, innermost last
+
+
+def raise_lost_interruption() -> None:
+    """Raise the KeyboardInterrupt again that a signal asked for and somebody swallowed.
+
+    Python drops an exception that is raised in a finaliser or in a callback of ctypes, and prints it at most. A long
+    computation calls this between its phases, so that Ctrl-C ends it all the same.
+    """
+    if _endings:
+        _endings[-1].raise_again()
 
 
 @contextmanager
 def ended_by_signals() -> Iterator[Ending]:
-    """Let SIGTERM raise KeyboardInterrupt inside the block, as Ctrl-C does.
+    """Let SIGTERM raise KeyboardInterrupt inside the block, as Ctrl-C does, and remember that one of them came.
 
     Outside the main thread it does nothing.
 
@@ -49,10 +72,16 @@ def ended_by_signals() -> Iterator[Ending]:
     if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGTERM) != signal.SIG_DFL:
         yield ending
         return
-    signal.signal(signal.SIGTERM, ending.terminate)
+    before = signal.getsignal(signal.SIGINT)
+    signal.signal(signal.SIGTERM, ending.end)
+    if before == signal.default_int_handler:  # else Ctrl-C is ignored, as behind nohup, or somebody else's
+        signal.signal(signal.SIGINT, ending.end)
+    _endings.append(ending)
     try:
         yield ending
     finally:
+        _endings.remove(ending)
+        signal.signal(signal.SIGINT, before)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 

@@ -16,6 +16,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from time import perf_counter
 
+from tendonfmu.tasks.interruption import raise_lost_interruption
+
 PATIENCE = 3.0  # s; the remaining time is not estimated before
 LEAST_SHARE = 0.02  # of all the work; the remaining time is not extrapolated from less
 
@@ -100,6 +102,7 @@ class Phases:
         index = self._names.index(words)
 
         def step(done: int) -> None:
+            raise_lost_interruption()
             part = min(done / total, 1.0) if total else 0.0
             self._watch(self._state(index, done, total, part))
 
