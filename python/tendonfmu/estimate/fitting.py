@@ -348,7 +348,7 @@ class FrictionFit(ConstructorArguments):
         self.report_["warnings"] = list(self.warnings_)
         self.finished_ = True
         for sentence in self.warnings_:
-            warnings.warn(sentence, FitWarning, stacklevel=4)  # at the call of tendonfmu.fit
+            warnings.warn(sentence, FitWarning, stacklevel=5)  # at the call of tendonfmu.fit
 
     def _tell_uncertainty(self, learned: Learned) -> dict[str, Any]:
         """Write `contact.uncertainty` into the fitted description and return its entry in the report."""

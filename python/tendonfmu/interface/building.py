@@ -7,10 +7,12 @@ from pathlib import Path
 
 from tendonfmu.files import check_output
 from tendonfmu.fmu import build_fmu
+from tendonfmu.interface.options import with_checked_options
 from tendonfmu.model import FingerSource, read_finger
 from tendonfmu.simulate import build_plant_fmu, is_rig, read_rig
 
 
+@with_checked_options
 def build(
     finger: FingerSource, output: str | os.PathLike[str], *, binaries: str | os.PathLike[str] | None = None
 ) -> Path:

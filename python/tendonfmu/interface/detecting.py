@@ -14,6 +14,7 @@ from tendonfmu.detect import ContactTuning, Scored, score_recordings, score_repo
 from tendonfmu.drawing import GREY, ORANGE, SeriesRow, series_figure
 from tendonfmu.files import write_text
 from tendonfmu.interface.notebook import html_of
+from tendonfmu.interface.options import with_checked_options
 from tendonfmu.model import Finger, FingerSource
 from tendonfmu.recordings import RecordingSource, flagged_stretches
 from tendonfmu.report import score_text, tune_text
@@ -78,6 +79,7 @@ class TuneResult:
         return html_of(repr(self)[1:-1], tune_text.tables(self.tuning), tune_text.lines(self.tuning))
 
 
+@with_checked_options
 def tune(
     finger: FingerSource,
     recordings: RecordingSource | Sequence[RecordingSource],
@@ -221,6 +223,7 @@ class ScoreResult:
         return html_of(repr(self)[1:-1], score_text.tables(self.scored), score_text.lines(self.scored))
 
 
+@with_checked_options
 def score(
     finger: FingerSource,
     recordings: RecordingSource | Sequence[RecordingSource],

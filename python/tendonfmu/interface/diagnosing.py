@@ -14,6 +14,7 @@ from tendonfmu.diagnosis import diagnose as find
 from tendonfmu.drawing import sheets_figure
 from tendonfmu.estimate import check_given_once
 from tendonfmu.interface.notebook import html_of
+from tendonfmu.interface.options import with_checked_options
 from tendonfmu.model import Finger, FingerSource, finger_from_data
 from tendonfmu.recordings import RecordingSource, listed_sources
 from tendonfmu.report import diagnosis_report, diagnosis_sheets, diagnosis_text, write_diagnosis
@@ -112,6 +113,7 @@ class Diagnosis:
         return html_of(repr(self)[1:-1], diagnosis_text.tables(self.found), diagnosis_text.lines(self.found))
 
 
+@with_checked_options
 def diagnose(
     finger: FingerSource,
     recordings: RecordingSource | Sequence[RecordingSource],

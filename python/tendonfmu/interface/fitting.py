@@ -14,6 +14,7 @@ from tendonfmu.drawing import sheets_figure
 from tendonfmu.estimate import FrictionFit
 from tendonfmu.files import frame_of
 from tendonfmu.interface.notebook import html_of
+from tendonfmu.interface.options import with_checked_options
 from tendonfmu.model import Finger, FingerSource
 from tendonfmu.recordings import RecordingSource
 from tendonfmu.report import fit_text, law_sheets, torque_sheets
@@ -110,6 +111,7 @@ class FitResult:
 _TYPES: Mapping[str, Any] = {"start": float, "value": float, "standard_error": float, "identified": bool}
 
 
+@with_checked_options
 def fit(
     finger: FingerSource,
     recordings: RecordingSource | Sequence[RecordingSource],

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tendonfmu.errors import InputError
+from tendonfmu.interface.options import read_option
 from tendonfmu.model import FingerSource, inputs_used, native, read_finger, watches_motors
 
 Numbers = NDArray[np.float64]
@@ -95,8 +96,7 @@ class Runner:
     """
 
     def __init__(self, finger: FingerSource, kinematics: int = 1) -> None:
-        if kinematics not in (1, 2, 3):
-            raise InputError(f"kinematics = {kinematics!r}: expected 1, 2 or 3")
+        kinematics = read_option("kinematics", kinematics)
         self.finger = read_finger(finger)
         self.kinematics = kinematics
         self._instance = native.Instance(self.finger.image, kinematics)

@@ -15,6 +15,7 @@ from tendonfmu.files import frame_of, write_table
 from tendonfmu.fmu import columns_of, run_model
 from tendonfmu.fmu import summary as summary_of
 from tendonfmu.interface.notebook import html_of
+from tendonfmu.interface.options import with_checked_options
 from tendonfmu.model import FingerSource
 from tendonfmu.recordings import Recording, RecordingSource, flagged_stretches, read_recording
 
@@ -97,6 +98,7 @@ class RunResult:
         return html_of(f"{self.recording.path}", [("in N·m and rad", headings, rows)], [self.summary])
 
 
+@with_checked_options
 def run(
     finger: FingerSource,
     recording: RecordingSource,
