@@ -121,8 +121,8 @@ def test_score(tmp_path: Path, call: Call) -> None:
 
 
 def test_diagnose(frame: pd.DataFrame, tmp_path: Path) -> None:
-    """Five seconds, which need not tell anything: what a diagnosis finds is tested elsewhere."""
-    found = tf.diagnose(FINGER, frame.iloc[:2500])
+    """Ten seconds, which need not tell anything: what a diagnosis finds is tested elsewhere."""
+    found = tf.diagnose(FINGER, frame.iloc[:5000])
     assert found.verdict in ("adequate", "explained", "partly explained", "unexplained")
     assert found.report["verdict"] == found.verdict and found.report["gain"]["value"] == found.gain.value
     assert [each.effect for each in found.causes] == [each["effect"] for each in found.report["causes"]]
@@ -133,6 +133,16 @@ def test_diagnose(frame: pd.DataFrame, tmp_path: Path) -> None:
     tf.build(found.extended, tmp_path / "f.fmu")
     assert np.array_equal(tf.run(tmp_path / "f.fmu", frame.iloc[:100]).outputs["friction_torque"], torques)
     assert found.verdict in found._repr_html_()
+
+
+@pytest.mark.parametrize("tested", [False, True])
+def test_diagnose_refuses_what_is_too_short_to_hold_out(frame: pd.DataFrame, tested: bool) -> None:
+    """It said "adequate": but nothing can be named without parts that are held out."""
+    tests = [frame.iloc[5000:]] if tested else []
+    with pytest.raises(tf.InputError, match=r"DataFrame.*: 5 s of free motion; expected at least 8 s, better a minute"):
+        tf.diagnose(FINGER, frame.iloc[:2500], test=tests)
+    with pytest.raises(tf.InputError, match=r"^2 recordings: 6 s of free motion; expected at least 8 s"):
+        tf.diagnose(FINGER, [frame.iloc[:1500], frame.iloc[1500:3000]], test=tests)
 
 
 def test_sources_that_no_function_takes() -> None:

@@ -55,7 +55,7 @@ from tendonfmu.recordings import (
     read_recording,
     require_noise,
 )
-from tendonfmu.statistics import Interval, standard_error
+from tendonfmu.statistics import FEWEST_STRETCHES, STRETCH, Interval, standard_error
 from tendonfmu.tasks import Phases, PhaseState
 
 Numbers = NDArray[np.float64]
@@ -139,6 +139,7 @@ def diagnose(
     phases = Phases(PHASES, progress or (lambda state: None))
     with threadpool_limits(limits=max(jobs, 1)):
         case = _case(finger, recordings, tests, kinematics, least_gain, checked)
+        _require_motion(case.whole)
         with phases.start(SIGNALS):
             chosen = choose(case.finger, case.whole, FitSettings(threads=jobs, path=case.finger.path))
         with own_fault("diagnosis"):  # all input has been checked and fitted once
@@ -197,6 +198,18 @@ def _case(
     if not checked:
         warnings += [f"{each.path.name}: {text}" for each in (*training, *unseen) for text in each.warnings]
     return _Case(given, training, unseen, tuple(warnings))
+
+
+def _require_motion(recordings: Sequence[FitRecording]) -> None:
+    """Raise InputError if no part can be held out: no cause could be named, so "adequate" would mean nothing."""
+    least = FEWEST_STRETCHES * STRETCH
+    found = sum(float(np.median(np.diff(each.time))) * int(each.train.sum()) for each in recordings)
+    if found < least - 0.01:  # the last sample has no duration
+        name = str(recordings[0].path) if len(recordings) == 1 else f"{len(recordings)} recordings"
+        raise InputError(
+            f"{name}: {found:.2g} s of free motion; expected at least {least:g} s, better a minute: causes are judged "
+            "on parts that are held out in turn"
+        )
 
 
 def change_case(

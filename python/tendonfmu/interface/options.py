@@ -36,10 +36,7 @@ class Number:
 
     def __str__(self) -> str:
         kind = "a whole number" if self.whole else "a number"
-        if self.most < math.inf:
-            reach = f"{self.least:.16g} to {self.most:.16g}"
-        else:
-            reach = f"{self.least:.16g} or more"
+        reach = f"{self.least:.16g} to {self.most:.16g}" if self.most < math.inf else f"{self.least:.16g} or more"
         return f"{kind}, {reach}" + (", or None" if self.optional else "")
 
     def read(self, value: Any) -> float | int | None:
