@@ -52,7 +52,7 @@ from tendonfmu.recordings import (
     admit,
     listed_sources,
     prepare,
-    read_recording,
+    read_recordings,
     require_noise,
 )
 from tendonfmu.statistics import FEWEST_STRETCHES, STRETCH, Interval, standard_error
@@ -178,6 +178,7 @@ def _case(
     least_gain: float,
     checked: bool,
     apart: Held = HELD,
+    role: str = "recordings",
 ) -> _Case:
     given_sources, test_sources = listed_sources(recordings), listed_sources(tests)
     if not given_sources:
@@ -188,7 +189,7 @@ def _case(
         raise InputError(f"least_gain = {least_gain!r}: expected 0 to 0.5")
     given = read_finger(finger)
     held = Held() if test_sources else apart
-    read, others = ([read_recording(each) for each in group] for group in (given_sources, test_sources))
+    read, others = read_recordings(given_sources, role), read_recordings(test_sources, "test")
     warnings = [] if checked else admit(given, [*read, *others], unfit=UNFIT_FOR_SEARCH)
     training = [prepare(given, each, kinematics, held) for each in read]
     unseen = [prepare(given, each, kinematics, Held()) for each in others]
@@ -223,7 +224,7 @@ def change_case(
 ) -> ChangeCase:
     """Read and check the recordings of now and of the reference, each by itself and against each other."""
     own = _case(finger, now, tests, kinematics, least_gain, checked, HALF)
-    before = _case(own.finger, reference, [], kinematics, least_gain, checked)
+    before = _case(own.finger, reference, [], kinematics, least_gain, checked, role="reference")
     then = before.whole
     warnings = [*own.warnings, *(each for each in before.warnings if each not in own.warnings)]
     warnings += check_sides(own.finger, then, [*own.training, *own.tests])

@@ -43,6 +43,7 @@ from tendonfmu.recordings import (
     motion_of,
     prepare,
     read_recording,
+    read_recordings,
     refuse_stillness,
     require_noise,
     slack_sentences,
@@ -201,7 +202,7 @@ class FrictionFit(ConstructorArguments):
         held = Held(self.holdout, self.holdout_block, strict=True)
         given, compared_with = listed_sources(recordings), listed_sources(compare)
         check_given_once(given, compared_with)
-        training, others = ([read_recording(each) for each in group] for group in (given, compared_with))
+        training, others = read_recordings(given), read_recordings(compared_with, "compare")
         if not training:
             raise InputError("no recording; expected at least one")
         found = [] if checked else admit(self.start_, [*training, *others])

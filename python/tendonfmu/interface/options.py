@@ -43,11 +43,14 @@ class Number:
         """Return the value as a plain number. Raises ValueError if it is none of these."""
         if value is None and self.optional:
             return None
-        if isinstance(value, bool | np.bool_) or not isinstance(value, Integral if self.whole else Real):
+        if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
             raise ValueError
-        if not self.least <= value <= self.most:  # type: ignore[operator]
+        if self.whole and not isinstance(value, Integral):
             raise ValueError
-        return int(value) if self.whole else float(value)
+        number = int(value) if isinstance(value, Integral) and self.whole else float(value)
+        if not self.least <= number <= self.most:
+            raise ValueError
+        return number
 
 
 @dataclass(frozen=True)
