@@ -103,6 +103,13 @@ def test_tune(frame: pd.DataFrame, recording_file: Path, tmp_path: Path, call: C
 def test_score(tmp_path: Path, call: Call) -> None:
     pushes = pd.read_parquet(DEMO / "index_finger_pushes.parquet").iloc[:8000]
     pushes.rename(columns={"contact": "touch"}).to_parquet(tmp_path / "touch.parquet")
+    pushes.drop(columns="contact").iloc[:1000].to_parquet(tmp_path / "free.parquet")
+    free = call("score", INDEX, tmp_path / "free.parquet", "-o", tmp_path / "free.json")
+    assert (
+        free.err.count("no column contact") == 1
+        and "tendonfmu: warning: " in free.err
+        and "ScoreWarning" not in free.err
+    )
     answer = call("score", INDEX, tmp_path / "touch.parquet", "--labels", "touch", "-o", tmp_path / "s.json")
     assert answer.status == 0, answer
     touched = tf.read_recording(tmp_path / "touch.parquet", label="touch")
@@ -165,3 +172,9 @@ def test_a_command_says_once_which_columns_it_ignores(frame: pd.DataFrame, tmp_p
         assert first.startswith(f"tendonfmu: warning: {file}: ignored columns: 'current', 'phase'; a recording has ")
         assert not [line for line in rest if "warning" in line]
     assert call("run", FINGER, file, "-o", tmp_path / "out.csv", "--quiet").err == ""
+
+
+@pytest.mark.parametrize(("command", "extends"), [("diagnose", True), ("calibrate", True), ("fit", False)])
+def test_help_says_whether_the_structure_is_kept(command: str, extends: bool, call: Call) -> None:
+    page = " ".join(call(command, "--help").out.split())
+    assert ("extended by the causes found" in page) is extends and ("its structure is kept" in page) is not extends

@@ -105,7 +105,7 @@ class FitResult:
         return sheets_figure(repr(self)[1:-1], [*torque_sheets(picture), *law_sheets(picture)])
 
     def _repr_html_(self) -> str:
-        return html_of(repr(self)[1:-1], fit_text.tables(self.estimator), fit_text.lines(self.estimator))
+        return html_of(repr(self)[1:-1], fit_text.tables(self.estimator), fit_text.lines(self.estimator), self.warnings)
 
 
 _TYPES: Mapping[str, Any] = {"start": float, "value": float, "standard_error": float, "identified": bool}
