@@ -22,7 +22,6 @@ from tendonfmu.report import diagnosis_report, diagnosis_sheets, diagnosis_text,
 from tendonfmu.statistics import Interval
 from tendonfmu.tasks import PhaseState
 
-
 _GAINS = (
     "The gain of a cause compares the model that has all causes with one that lacks only this cause; the gain of the "
     "diagnosis compares it with one that has none.",
