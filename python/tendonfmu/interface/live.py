@@ -208,7 +208,7 @@ def _refuse_masked(given: tuple[ArrayLike | None, ...]) -> None:
     """Raise InputError if a value is masked: the native part would read what is under the mask."""
     for name, values in zip(_INPUTS, given, strict=True):
         if np.ma.is_masked(values):
-            number = int(np.flatnonzero(np.ma.getmaskarray(values))[0]) + 1
+            number = int(np.flatnonzero(np.ma.getmaskarray(np.ma.asarray(values)))[0]) + 1
             raise InputError(f"{name}[{number}]: masked; expected a number")
 
 
