@@ -103,6 +103,13 @@ def test_tune(frame: pd.DataFrame, recording_file: Path, tmp_path: Path, call: C
 def test_score(tmp_path: Path, call: Call) -> None:
     pushes = pd.read_parquet(DEMO / "index_finger_pushes.parquet").iloc[:8000]
     pushes.rename(columns={"contact": "touch"}).to_parquet(tmp_path / "touch.parquet")
+    pushes.drop(columns="contact").iloc[:1000].to_parquet(tmp_path / "free.parquet")
+    free = call("score", INDEX, tmp_path / "free.parquet", "-o", tmp_path / "free.json")
+    assert (
+        free.err.count("no column contact") == 1
+        and "tendonfmu: warning: " in free.err
+        and "ScoreWarning" not in free.err
+    )
     answer = call("score", INDEX, tmp_path / "touch.parquet", "--labels", "touch", "-o", tmp_path / "s.json")
     assert answer.status == 0, answer
     touched = tf.read_recording(tmp_path / "touch.parquet", label="touch")
@@ -121,8 +128,8 @@ def test_score(tmp_path: Path, call: Call) -> None:
 
 
 def test_diagnose(frame: pd.DataFrame, tmp_path: Path) -> None:
-    """Five seconds, which need not tell anything: what a diagnosis finds is tested elsewhere."""
-    found = tf.diagnose(FINGER, frame.iloc[:2500])
+    """Ten seconds, which need not tell anything: what a diagnosis finds is tested elsewhere."""
+    found = tf.diagnose(FINGER, frame.iloc[:5000])
     assert found.verdict in ("adequate", "explained", "partly explained", "unexplained")
     assert found.report["verdict"] == found.verdict and found.report["gain"]["value"] == found.gain.value
     assert [each.effect for each in found.causes] == [each["effect"] for each in found.report["causes"]]
@@ -133,6 +140,16 @@ def test_diagnose(frame: pd.DataFrame, tmp_path: Path) -> None:
     tf.build(found.extended, tmp_path / "f.fmu")
     assert np.array_equal(tf.run(tmp_path / "f.fmu", frame.iloc[:100]).outputs["friction_torque"], torques)
     assert found.verdict in found._repr_html_()
+
+
+@pytest.mark.parametrize("tested", [False, True])
+def test_diagnose_refuses_what_is_too_short_to_hold_out(frame: pd.DataFrame, tested: bool) -> None:
+    """It said "adequate": but nothing can be named without parts that are held out."""
+    tests = [frame.iloc[5000:]] if tested else []
+    with pytest.raises(tf.InputError, match=r"DataFrame.*: 5 s of free motion; expected at least 8 s, better a minute"):
+        tf.diagnose(FINGER, frame.iloc[:2500], test=tests)
+    with pytest.raises(tf.InputError, match=r"^2 recordings: 6 s of free motion; expected at least 8 s"):
+        tf.diagnose(FINGER, [frame.iloc[:1500], frame.iloc[1500:3000]], test=tests)
 
 
 def test_sources_that_no_function_takes() -> None:
@@ -155,3 +172,9 @@ def test_a_command_says_once_which_columns_it_ignores(frame: pd.DataFrame, tmp_p
         assert first.startswith(f"tendonfmu: warning: {file}: ignored columns: 'current', 'phase'; a recording has ")
         assert not [line for line in rest if "warning" in line]
     assert call("run", FINGER, file, "-o", tmp_path / "out.csv", "--quiet").err == ""
+
+
+@pytest.mark.parametrize(("command", "extends"), [("diagnose", True), ("calibrate", True), ("fit", False)])
+def test_help_says_whether_the_structure_is_kept(command: str, extends: bool, call: Call) -> None:
+    page = " ".join(call(command, "--help").out.split())
+    assert ("extended by the causes found" in page) is extends and ("its structure is kept" in page) is not extends

@@ -89,6 +89,9 @@ def two_joints() -> tf.Runner:
         ((0.005, FORCE, POSITION), "time = 0.005 s: expected a finite number"),
         ((float("nan"), FORCE, POSITION), "time = nan s"),
         ((None, FORCE, POSITION), "time: None; expected seconds as a number"),
+        (("0.2", FORCE, POSITION), "time: '0.2'; expected seconds as a number"),
+        ((np.ma.masked, FORCE, POSITION), "time: masked; expected seconds as a number"),
+        ((0.02, np.ma.masked_equal(FORCE, 11.0), POSITION), "tendon_force[2]: masked; expected a number"),
         ((0.02, FORCE, POSITION, [0.0]), "joint_position: 1 numbers; expected 2"),
     ],
 )
@@ -138,7 +141,7 @@ def test_kinematics_are_checked(frame: pd.DataFrame, kinematics: Any) -> None:
         lambda: tf.Runner(INDEX, kinematics=kinematics),
         lambda: tf.run(INDEX, frame, kinematics=kinematics),
     ):
-        with pytest.raises(tf.InputError, match=r"kinematics = .*: expected 1, 2 or 3"):
+        with pytest.raises(tf.InputError, match=r"kinematics: .*; expected a whole number, 1 to 3"):
             function()
 
 

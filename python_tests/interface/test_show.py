@@ -20,7 +20,7 @@ pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not insta
 
 import tendonfmu as tf
 from tendonfmu.drawing import sheets_figure
-from tendonfmu.interface import Diagnosis
+from tendonfmu.interface import Diagnosis, diagnosing
 from tendonfmu.report import diagnosis_sheets
 
 INDEX = ROOT / "examples/demo_recording/index_finger_calibrated.json"
@@ -102,6 +102,36 @@ def test_warnings_name_the_line_of_the_caller() -> None:
     with pytest.warns(tf.TuneWarning) as found:
         tf.tune(INDEX, INDEX.with_name("index_finger_free.parquet"))
     assert {each.filename for each in found if each.category is tf.TuneWarning} == {__file__}
+
+
+def test_all_functions_warn_alike(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A recording without a label, and what a diagnosis says of its recordings."""
+    with pytest.warns(tf.ScoreWarning, match="no column contact") as found:
+        scored = tf.score(INDEX, pd.read_parquet(PUSHES).drop(columns="contact").iloc[:4000])
+    own = [each for each in found if each.category is tf.ScoreWarning]
+    assert {each.filename for each in own} == {__file__} and [str(each.message) for each in own] == scored.warnings
+    assert "<li>" in scored._repr_html_()
+    made = replace(examples.adequate(), warnings=("too little <motion>",))
+    monkeypatch.setattr(diagnosing, "find", lambda *_, **__: made)
+    with pytest.warns(tf.DiagnosisWarning, match="^too little <motion>$") as found:
+        diagnosed = tf.diagnose(INDEX, TRAINING)
+    assert [each.filename for each in found] == [__file__]
+    assert "<li>too little &lt;motion&gt;</li>" in diagnosed._repr_html_()
+
+
+@pytest.mark.filterwarnings("ignore::tendonfmu.estimate.fitting.FitWarning")
+def test_a_fit_lists_its_warnings_in_a_notebook() -> None:
+    path = "joints[1].friction.coulomb"
+    found = tf.fit(ROOT / "examples/demo_recording/two_joints.json", TRAINING, only=path, passes=2)
+    assert found.warnings and found._repr_html_().count("<li>") == len(found.warnings)
+
+
+def test_a_cause_has_a_short_text_and_its_gain_is_explained() -> None:
+    found = Diagnosis(examples.three_causes())
+    for cause in found.causes:
+        assert len(repr(cause)) < 160 and repr(cause).startswith(f"<Cause {cause.effect}") and cause.size in repr(cause)
+    assert "one that lacks only this cause" in found._repr_html_()
+    assert "lacks only" not in Diagnosis(examples.adequate())._repr_html_()
 
 
 def test_no_panel_is_no_error() -> None:

@@ -59,6 +59,12 @@ def test_a_dictionary_may_hold_numbers_of_numpy(finger: tf.Finger) -> None:
         ({"format": "tendonfmu-rig-1"}, "a rig; expected a finger description"),
         (3, "finger: int; expected a path, a dictionary or a Finger"),
         ({"format": "tendonfmu-finger-1", "name": object()}, "expected a number, text, list, dictionary or None"),
+        ("", "finger: ''; expected a path, a dictionary or a Finger"),
+        (FINGER.read_text(), "finger: a text; expected a path, a dictionary or a Finger, such as json.loads(text)"),
+        (
+            {"format": "tendonfmu-finger-1", "tendons": [{}, {"stiffness": np.float64("nan")}]},
+            "finger: tendons[2].stiffness = nan: expected a finite number",
+        ),
         ("missing.json", "missing.json: No such file or directory; expected a finger description"),
     ],
 )
@@ -107,7 +113,7 @@ def test_replace_makes_another_finger(finger: tf.Finger, tmp_path: Path) -> None
         ({"tendons[9].stiffness": 1.0}, "tendons[9]: no such path; expected 1 to 4"),
         ({"tendons[1].stiffnes": 1.0}, "tendons[1].stiffnes: unknown key; expected one of"),
         ({"tendons[1].stiffness": -1.0}, "tendons[1].stiffness = -1: expected above 0"),
-        ({"tendons[1].stiffness": float("nan")}, "stiffness"),
+        ({"tendons[1].stiffness": float("nan")}, "json: tendons[1].stiffness = nan: expected a finite number"),
         ({"name[1]": 2.0}, "name[1]: no such path; name is no list"),
         ({"tendons[0].stiffness": 1.0}, "'tendons[0].stiffness': expected a path such as"),
         ({"": 1.0}, "'': expected a path such as"),
@@ -217,6 +223,11 @@ def test_a_frame_may_have_numbers_of_any_kind() -> None:
         ({"tendon_force": [["a", "b"]] * 3}, "values; expected numbers [N, m]"),
         ({"time": [0.0, 2.0, 1.0]}, "column time, row 3: 1.0 s after 2.0 s; expected increasing times"),
         ({"time": [np.nan, 2.0, 3.0]}, "column time, row 1: nan"),
+        ({"time": np.ma.masked_equal([0.0, 1.0, 2.0], 1.0)}, "arrays: time: masked in row 2; expected numbers [N]"),
+        (
+            {"tendon_force": np.ma.masked_equal([[1.0, 2.0]] * 2 + [[3.0, 9.0]], 9.0)},
+            "arrays: tendon_force: masked in row 3; expected numbers [N, m]",
+        ),
         ({"contact": [0, 1, 2]}, "column contact, row 3: 2; expected 0 or 1"),
         ({"joint_position": np.zeros((3, 0))}, "joint_position: no columns; expected one per joint"),
         ({"time": [], "tendon_force": np.ones((0, 2)), "tendon_position": np.ones((0, 2))}, "no samples"),
@@ -233,3 +244,48 @@ def test_arrays_are_checked(changed: dict[str, Any], words: str) -> None:
 def test_what_is_no_recording_is_refused(source: Any) -> None:
     with pytest.raises(tf.InputError, match="expected a path, a DataFrame or a Recording"):
         tf.read_recording(source)
+
+
+def test_a_dictionary_of_columns_is_no_recording() -> None:
+    for function in (tf.run, tf.fit):
+        with pytest.raises(tf.InputError, match=r"dict; expected .*, such as Recording\.from_frame\(pd\.DataFrame"):
+            function(FINGER, SMALL)  # type: ignore[operator]
+
+
+@pytest.mark.parametrize(
+    ("index", "way"),
+    [
+        (
+            pd.to_datetime(["2026-01-01", "2026-01-02"]),
+            "df.assign(time=(df.index - df.index[0]).total_seconds()).reset_index(drop=True)",
+        ),
+        (pd.to_timedelta([0, 1], unit="s"), "df.assign(time=df.index.total_seconds()).reset_index(drop=True)"),
+        (pd.Index([0.0, 1.0], name="time"), "df.reset_index()"),
+    ],
+)
+def test_a_time_in_the_index_is_refused_with_a_way_that_works(index: Any, way: str) -> None:
+    df = pd.DataFrame({name: values for name, values in SMALL.items() if name != "time"}).set_axis(index)
+    with pytest.raises(tf.InputError) as refused:
+        tf.Recording.from_frame(df)
+    assert str(refused.value).startswith("DataFrame: no column time, only an index (")
+    assert str(refused.value).endswith(f"expected a column in s, such as {way}")
+    assert tf.Recording.from_frame(eval(way, {"df": df})).time[0] == 0.0
+
+
+@pytest.mark.parametrize("function", [tf.fit, tf.tune, tf.score, tf.diagnose])
+def test_messages_name_the_place_in_a_list(function: Any) -> None:
+    good, bad = pd.DataFrame(SMALL), pd.DataFrame({**SMALL, "time": [0.0, 0.0]})
+    with pytest.raises(tf.InputError, match=r"^DataFrame 2: column time, row 2"):
+        function(FINGER, [good, bad])
+    with pytest.raises(tf.InputError, match=r"^DataFrame: column time, row 2"):
+        function(FINGER, [bad])
+    with pytest.raises(tf.InputError, match=r"^recordings\[2\]: int; expected a path, a DataFrame or a Recording$"):
+        function(FINGER, [good, 3])
+
+
+def test_messages_name_the_list() -> None:
+    good, bad = pd.read_parquet(RECORDING), pd.DataFrame({**SMALL, "time": [0.0, 0.0]})
+    with pytest.raises(tf.InputError, match=r"^compare: DataFrame 2: column time, row 2"):
+        tf.fit(FINGER, good, compare=[good, bad])
+    with pytest.raises(tf.InputError, match=r"^test\[1\]: int; expected"):
+        tf.diagnose(FINGER, good, test=[3])  # type: ignore[list-item]

@@ -11,8 +11,8 @@ from tendonfmu.cli.console import PhaseDisplay, print_json, print_tables, say, s
 from tendonfmu.cli.options import (
     AsJson,
     Confidence,
+    ExtendedFinger,
     FalseAlarms,
-    FingerFile,
     FreeAtPretensions,
     Jobs,
     Kinematics,
@@ -29,7 +29,7 @@ def register(app: typer.Typer) -> None:
 
 
 def calibrate(
-    finger: FingerFile,
+    finger: ExtendedFinger,
     recordings: FreeAtPretensions,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder for page, finger and FMU")],
     test: Annotated[

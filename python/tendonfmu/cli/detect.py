@@ -135,22 +135,27 @@ def score(
     An alarm that begins neither in an event nor in the 100 ms after one is
     false. Every figure has its 95 % interval. Several recordings are pooled.
     """
+    import warnings
+
     from tendonfmu.detect import check_outputs, score_report
+    from tendonfmu.interface import ScoreWarning
     from tendonfmu.interface import score as score_finger
     from tendonfmu.report import score_text
 
     check_outputs(output, figures, [model, *recordings])
     with progress_bar(progress) as bar:
         task = bar.add_task("runs", total=None)
-        result = score_finger(
-            model,
-            recordings,
-            labels=labels,
-            force=force,
-            kinematics=kinematics,
-            seed=seed,
-            progress=lambda done, total: bar.update(task, completed=done, total=total),
-        )
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ScoreWarning)  # printed below, one line each
+            result = score_finger(
+                model,
+                recordings,
+                labels=labels,
+                force=force,
+                kinematics=kinematics,
+                seed=seed,
+                progress=lambda done, total: bar.update(task, completed=done, total=total),
+            )
     scored = result.scored
     for sentence in result.warnings:
         warn(sentence)

@@ -11,7 +11,17 @@ from typing import Annotated
 import typer
 
 from tendonfmu.cli.console import PhaseDisplay, print_json, print_tables, progress_bar, say, say_files, warn
-from tendonfmu.cli.options import AsJson, FingerFile, FreeRecordings, Jobs, Kinematics, LeastGain, Progress, Quiet, Seed
+from tendonfmu.cli.options import (
+    AsJson,
+    ExtendedFinger,
+    FreeRecordings,
+    Jobs,
+    Kinematics,
+    LeastGain,
+    Progress,
+    Quiet,
+    Seed,
+)
 from tendonfmu.cli.several_values import SeveralValues
 from tendonfmu.cli.standard_streams import check_table, name_of, write_table
 from tendonfmu.errors import InputError
@@ -23,7 +33,7 @@ def register(app: typer.Typer) -> None:
 
 
 def diagnose(
-    finger: FingerFile,
+    finger: ExtendedFinger,
     recordings: FreeRecordings,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder for page, report and model")],
     test: Annotated[
@@ -74,6 +84,9 @@ def diagnose(
     page history.html, history.csv and history.png: a line per recording and
     cause, and how fast each cause grows.
     """
+    import warnings
+
+    from tendonfmu.interface import DiagnosisWarning
     from tendonfmu.interface import diagnose as find
     from tendonfmu.report import REPORT, check_folder, diagnosis_text
 
@@ -89,17 +102,19 @@ def diagnose(
         raise InputError("--scheduler: given without --history; expected both or neither")
     check_folder(output, [finger, *recordings, *tests, *before])
     with PhaseDisplay(progress) as display:
-        diagnosed = find(
-            finger,
-            recordings,
-            test=tests,
-            reference=before or None,
-            kinematics=kinematics,
-            least_gain=least_gain,
-            seed=seed,
-            jobs=jobs,
-            progress=display,
-        )
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DiagnosisWarning)  # printed below, one line each
+            diagnosed = find(
+                finger,
+                recordings,
+                test=tests,
+                reference=before or None,
+                kinematics=kinematics,
+                least_gain=least_gain,
+                seed=seed,
+                jobs=jobs,
+                progress=display,
+            )
         display.note("writing the files")
         written = diagnosed.write(output)
     found = diagnosed.found

@@ -19,6 +19,10 @@ FingerFile = Annotated[
     Path,
     typer.Argument(metavar="FINGER.json", help="finger description; its structure is kept"),
 ]
+ExtendedFinger = Annotated[
+    Path,
+    typer.Argument(metavar="FINGER.json", help="finger description; it is kept, and extended by the causes found"),
+]
 Model = Annotated[
     Path,
     typer.Argument(metavar="FINGER.json|FINGER.fmu", help="finger description, or its FMU"),

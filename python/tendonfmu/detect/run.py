@@ -16,7 +16,17 @@ from numpy.typing import NDArray
 from tendonfmu.detect.counting import DetectionScore, Signals, pooled, score_detection
 from tendonfmu.errors import InputError
 from tendonfmu.fmu import check_model, outputs_of, run_fmu
-from tendonfmu.model import DEFAULTS, RANGES, Finger, FingerSource, inputs_used, native, read_finger, watches_motors
+from tendonfmu.model import (
+    DEFAULTS,
+    RANGES,
+    Finger,
+    FingerSource,
+    finger_file,
+    inputs_used,
+    native,
+    read_finger,
+    watches_motors,
+)
 from tendonfmu.recordings import Recording, model_alone
 
 Numbers = NDArray[np.float64]
@@ -108,7 +118,7 @@ def read_subject(source: FingerSource) -> Subject:
     if not isinstance(source, str | os.PathLike):
         finger = read_finger(source)
         return Subject(finger.path, finger, packed=False)
-    model = source if isinstance(source, Path) else Path(source)
+    model = finger_file(source)
     check_model(model)
     if model.suffix.lower() == ".json":
         return Subject(model, read_finger(model), packed=False)

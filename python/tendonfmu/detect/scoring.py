@@ -14,7 +14,7 @@ from tendonfmu.errors import InputError
 from tendonfmu.estimate import check_given_once
 from tendonfmu.files import check_output, check_output_folder
 from tendonfmu.model import FingerSource
-from tendonfmu.recordings import GROUP_PER, LABEL, Recording, RecordingSource, gaps, listed_sources, read_recording
+from tendonfmu.recordings import GROUP_PER, LABEL, Recording, RecordingSource, gaps, listed_sources, read_recordings
 
 Progress = Callable[[int, int], None]
 
@@ -88,7 +88,7 @@ def score_recordings(
     check_given_once(sources, [])
     subject = read_subject(model)
     column = LABEL if labels is None else labels
-    read = [_read(source, column, force) for source in sources]
+    read = _read(sources, column, force)
     if not read:
         raise InputError("no recording; expected at least one")
     warnings = [*_unlabelled(read, labels), *_without_force(read, force)]
@@ -132,18 +132,22 @@ def _roc(subject: Subject, tracks: Sequence[Track], kinematics: int, progress: P
     return roc(score_at)
 
 
-def _read(source: RecordingSource, labels: str, force: str | None) -> Recording:
-    path = source if isinstance(source, str | os.PathLike) else getattr(source, "path", "DataFrame")
-    for name in (labels, force):
-        if name is not None and (name == "time" or name.partition("[")[0] in GROUP_PER):
-            what = "a label, 0 or 1" if name == labels else "the sensed force in N"
-            raise InputError(f"{path}: column {name}: is a signal of the finger; expected a column that holds {what}")
-    if force is not None and force == labels:
-        raise InputError(f"{path}: column {force}: both label and sensed force; expected two columns")
-    recording = read_recording(source, label=labels, others=() if force is None else (force,))
-    if len(recording) < 2:
-        raise InputError(f"{path}: one sample; expected at least two")
-    return recording
+def _read(sources: Sequence[RecordingSource], labels: str, force: str | None) -> list[Recording]:
+    for source in sources:
+        path = source if isinstance(source, str | os.PathLike) else getattr(source, "path", "DataFrame")
+        for name in (labels, force):
+            if name is not None and (name == "time" or name.partition("[")[0] in GROUP_PER):
+                what = "a label, 0 or 1" if name == labels else "the sensed force in N"
+                raise InputError(
+                    f"{path}: column {name}: is a signal of the finger; expected a column that holds {what}"
+                )
+        if force is not None and force == labels:
+            raise InputError(f"{path}: column {force}: both label and sensed force; expected two columns")
+    read = read_recordings(sources, label=labels, others=() if force is None else (force,))
+    for recording in read:
+        if len(recording) < 2:
+            raise InputError(f"{recording.path}: one sample; expected at least two")
+    return read
 
 
 def _unlabelled(read: Sequence[Recording], labels: str | None) -> list[str]:

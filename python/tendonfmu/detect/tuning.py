@@ -33,7 +33,7 @@ from tendonfmu.detect.support import NotEnough, hours_by_pretension, supported
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import ConstructorArguments, check_given_once, own_copy
 from tendonfmu.model import FingerSource, description_text, finger_from_data, read_finger
-from tendonfmu.recordings import RecordingSource, admit, listed_sources, read_recording
+from tendonfmu.recordings import RecordingSource, admit, listed_sources, read_recordings
 
 Numbers = NDArray[np.float64]
 
@@ -193,7 +193,7 @@ class ContactTuning(ConstructorArguments):
         self.seconds_ = perf_counter() - begin
         self._judge()
         for sentence in self.warnings_:
-            warnings.warn(sentence, TuneWarning, stacklevel=3)  # at the call of tendonfmu.tune
+            warnings.warn(sentence, TuneWarning, stacklevel=4)  # at the call of tendonfmu.tune
         return self
 
     def _check_options(self) -> None:
@@ -219,7 +219,7 @@ class ContactTuning(ConstructorArguments):
         check_given_once(sources, [])
         if not sources:
             raise InputError("no recording; expected at least one of free motion")
-        recordings = [read_recording(each) for each in sources]
+        recordings = read_recordings(sources)
         parts: list[FreePart] = []
         self.warnings_: list[str] = [] if checked else admit(self.start_, recordings)
         for recording in recordings:

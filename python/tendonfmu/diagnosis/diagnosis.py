@@ -52,10 +52,10 @@ from tendonfmu.recordings import (
     admit,
     listed_sources,
     prepare,
-    read_recording,
+    read_recordings,
     require_noise,
 )
-from tendonfmu.statistics import Interval, standard_error
+from tendonfmu.statistics import FEWEST_STRETCHES, STRETCH, Interval, standard_error
 from tendonfmu.tasks import Phases, PhaseState
 
 Numbers = NDArray[np.float64]
@@ -139,6 +139,7 @@ def diagnose(
     phases = Phases(PHASES, progress or (lambda state: None))
     with threadpool_limits(limits=max(jobs, 1)):
         case = _case(finger, recordings, tests, kinematics, least_gain, checked)
+        _require_motion(case.whole)
         with phases.start(SIGNALS):
             chosen = choose(case.finger, case.whole, FitSettings(threads=jobs, path=case.finger.path))
         with own_fault("diagnosis"):  # all input has been checked and fitted once
@@ -177,6 +178,7 @@ def _case(
     least_gain: float,
     checked: bool,
     apart: Held = HELD,
+    role: str = "recordings",
 ) -> _Case:
     given_sources, test_sources = listed_sources(recordings), listed_sources(tests)
     if not given_sources:
@@ -187,7 +189,7 @@ def _case(
         raise InputError(f"least_gain = {least_gain!r}: expected 0 to 0.5")
     given = read_finger(finger)
     held = Held() if test_sources else apart
-    read, others = ([read_recording(each) for each in group] for group in (given_sources, test_sources))
+    read, others = read_recordings(given_sources, role), read_recordings(test_sources, "test")
     warnings = [] if checked else admit(given, [*read, *others], unfit=UNFIT_FOR_SEARCH)
     training = [prepare(given, each, kinematics, held) for each in read]
     unseen = [prepare(given, each, kinematics, Held()) for each in others]
@@ -197,6 +199,18 @@ def _case(
     if not checked:
         warnings += [f"{each.path.name}: {text}" for each in (*training, *unseen) for text in each.warnings]
     return _Case(given, training, unseen, tuple(warnings))
+
+
+def _require_motion(recordings: Sequence[FitRecording]) -> None:
+    """Raise InputError if no part can be held out: no cause could be named, so "adequate" would mean nothing."""
+    least = FEWEST_STRETCHES * STRETCH
+    found = sum(float(np.median(np.diff(each.time))) * int(each.train.sum()) for each in recordings)
+    if found < least - 0.01:  # the last sample has no duration
+        name = str(recordings[0].path) if len(recordings) == 1 else f"{len(recordings)} recordings"
+        raise InputError(
+            f"{name}: {found:.2g} s of free motion; expected at least {least:g} s, better a minute: causes are judged "
+            "on parts that are held out in turn"
+        )
 
 
 def change_case(
@@ -210,7 +224,7 @@ def change_case(
 ) -> ChangeCase:
     """Read and check the recordings of now and of the reference, each by itself and against each other."""
     own = _case(finger, now, tests, kinematics, least_gain, checked, HALF)
-    before = _case(own.finger, reference, [], kinematics, least_gain, checked)
+    before = _case(own.finger, reference, [], kinematics, least_gain, checked, role="reference")
     then = before.whole
     warnings = [*own.warnings, *(each for each in before.warnings if each not in own.warnings)]
     warnings += check_sides(own.finger, then, [*own.training, *own.tests])

@@ -111,7 +111,7 @@ class ChangedSize:
     by: tuple[Interval, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Cause:
     """An effect that was found, at one place or several.
 
@@ -150,6 +150,12 @@ class Cause:
     places: tuple[FoundPlace, ...] = ()
     evidence: tuple[Evidence, ...] = ()
     changed: ChangedSize | None = None
+
+    def __repr__(self) -> str:
+        place = "".join(
+            f" {kind} {number}" for kind, number in (("joint", self.joint), ("tendon", self.tendon)) if number
+        )
+        return f"<Cause {self.effect}{place}: gain {self.gain.value:.3g}; {self.size}>"
 
     @property
     def effect(self) -> str:

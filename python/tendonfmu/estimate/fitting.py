@@ -43,6 +43,7 @@ from tendonfmu.recordings import (
     motion_of,
     prepare,
     read_recording,
+    read_recordings,
     refuse_stillness,
     require_noise,
     slack_sentences,
@@ -201,7 +202,7 @@ class FrictionFit(ConstructorArguments):
         held = Held(self.holdout, self.holdout_block, strict=True)
         given, compared_with = listed_sources(recordings), listed_sources(compare)
         check_given_once(given, compared_with)
-        training, others = ([read_recording(each) for each in group] for group in (given, compared_with))
+        training, others = read_recordings(given), read_recordings(compared_with, "compare")
         if not training:
             raise InputError("no recording; expected at least one")
         found = [] if checked else admit(self.start_, [*training, *others])
@@ -348,7 +349,7 @@ class FrictionFit(ConstructorArguments):
         self.report_["warnings"] = list(self.warnings_)
         self.finished_ = True
         for sentence in self.warnings_:
-            warnings.warn(sentence, FitWarning, stacklevel=4)  # at the call of tendonfmu.fit
+            warnings.warn(sentence, FitWarning, stacklevel=5)  # at the call of tendonfmu.fit
 
     def _tell_uncertainty(self, learned: Learned) -> dict[str, Any]:
         """Write `contact.uncertainty` into the fitted description and return its entry in the report."""

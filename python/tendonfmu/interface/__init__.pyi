@@ -1,9 +1,11 @@
 from .building import build as build
 from .detecting import ScoreResult as ScoreResult
+from .detecting import ScoreWarning as ScoreWarning
 from .detecting import TuneResult as TuneResult
 from .detecting import score as score
 from .detecting import tune as tune
 from .diagnosing import Diagnosis as Diagnosis
+from .diagnosing import DiagnosisWarning as DiagnosisWarning
 from .diagnosing import diagnose as diagnose
 from .fitting import FitInterrupted as FitInterrupted
 from .fitting import FitResult as FitResult

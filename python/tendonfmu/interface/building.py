@@ -7,10 +7,12 @@ from pathlib import Path
 
 from tendonfmu.files import check_output
 from tendonfmu.fmu import build_fmu
-from tendonfmu.model import FingerSource, read_finger
+from tendonfmu.interface.options import with_checked_options
+from tendonfmu.model import FingerSource, finger_file, read_finger
 from tendonfmu.simulate import build_plant_fmu, is_rig, read_rig
 
 
+@with_checked_options
 def build(
     finger: FingerSource, output: str | os.PathLike[str], *, binaries: str | os.PathLike[str] | None = None
 ) -> Path:
@@ -38,7 +40,7 @@ def build(
     target = Path(output)
     folder = None if binaries is None else Path(binaries)
     if isinstance(finger, str | os.PathLike):
-        file = finger if isinstance(finger, Path) else Path(finger)
+        file = finger_file(finger)
         rig = is_rig(file)
         check_output(target, *(read_rig(file).files if rig else [file]))
         if rig:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +15,7 @@ from tendonfmu.detect import ContactTuning, Scored, score_recordings, score_repo
 from tendonfmu.drawing import GREY, ORANGE, SeriesRow, series_figure
 from tendonfmu.files import write_text
 from tendonfmu.interface.notebook import html_of
+from tendonfmu.interface.options import with_checked_options
 from tendonfmu.model import Finger, FingerSource
 from tendonfmu.recordings import RecordingSource, flagged_stretches
 from tendonfmu.report import score_text, tune_text
@@ -75,9 +77,10 @@ class TuneResult:
         return series_figure(repr(self)[1:-1], "factor on all bounds", factors, [SeriesRow("alarms (1/h)", counted)])
 
     def _repr_html_(self) -> str:
-        return html_of(repr(self)[1:-1], tune_text.tables(self.tuning), tune_text.lines(self.tuning))
+        return html_of(repr(self)[1:-1], tune_text.tables(self.tuning), tune_text.lines(self.tuning), self.warnings)
 
 
+@with_checked_options
 def tune(
     finger: FingerSource,
     recordings: RecordingSource | Sequence[RecordingSource],
@@ -142,6 +145,10 @@ def tune(
         progress=progress,
     )
     return TuneResult(tuning.tune(recordings))
+
+
+class ScoreWarning(UserWarning):
+    """A remark of a score on its recordings; also in `ScoreResult.warnings`."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -218,9 +225,10 @@ class ScoreResult:
         return series_figure(f"{track.recording.path}", "time (s)", time, rows, shaded)
 
     def _repr_html_(self) -> str:
-        return html_of(repr(self)[1:-1], score_text.tables(self.scored), score_text.lines(self.scored))
+        return html_of(repr(self)[1:-1], score_text.tables(self.scored), score_text.lines(self.scored), self.warnings)
 
 
+@with_checked_options
 def score(
     finger: FingerSource,
     recordings: RecordingSource | Sequence[RecordingSource],
@@ -259,8 +267,15 @@ def score(
     ------
     InputError
         A file, a column or an option does not allow a score.
+
+    Warns
+    -----
+    ScoreWarning
+        Remarks on the recordings; also in `ScoreResult.warnings`.
     """
     found = score_recordings(
         finger, recordings, labels=labels, force=force, kinematics=kinematics, seed=seed, progress=progress
     )
+    for sentence in found.warnings:
+        warnings.warn(sentence, ScoreWarning, stacklevel=3)  # at the call of tendonfmu.score
     return ScoreResult(found)

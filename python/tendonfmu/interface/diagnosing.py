@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,11 +15,21 @@ from tendonfmu.diagnosis import diagnose as find
 from tendonfmu.drawing import sheets_figure
 from tendonfmu.estimate import check_given_once
 from tendonfmu.interface.notebook import html_of
+from tendonfmu.interface.options import with_checked_options
 from tendonfmu.model import Finger, FingerSource, finger_from_data
 from tendonfmu.recordings import RecordingSource, listed_sources
 from tendonfmu.report import diagnosis_report, diagnosis_sheets, diagnosis_text, write_diagnosis
 from tendonfmu.statistics import Interval
 from tendonfmu.tasks import PhaseState
+
+_GAINS = (
+    "The gain of a cause compares the model that has all causes with one that lacks only this cause; the gain of the "
+    "diagnosis compares it with one that has none.",
+)
+
+
+class DiagnosisWarning(UserWarning):
+    """A remark of a diagnosis on its recordings and its result; also in `Diagnosis.warnings`."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -109,9 +120,11 @@ class Diagnosis:
         return sheets_figure(repr(self)[1:-1], sheets)
 
     def _repr_html_(self) -> str:
-        return html_of(repr(self)[1:-1], diagnosis_text.tables(self.found), diagnosis_text.lines(self.found))
+        lines = [*diagnosis_text.lines(self.found), *(_GAINS if self.found.causes else ())]
+        return html_of(repr(self)[1:-1], diagnosis_text.tables(self.found), lines, self.warnings)
 
 
+@with_checked_options
 def diagnose(
     finger: FingerSource,
     recordings: RecordingSource | Sequence[RecordingSource],
@@ -159,6 +172,11 @@ def diagnose(
     ------
     InputError
         A file or an option is at fault.
+
+    Warns
+    -----
+    DiagnosisWarning
+        Remarks on the recordings and the result; also in `Diagnosis.warnings`.
     """
     now, tests = listed_sources(recordings), listed_sources(test)
     before = [] if reference is None else listed_sources(reference)
@@ -175,4 +193,6 @@ def diagnose(
         reference=before or None,
         progress=progress,
     )
+    for sentence in found.warnings:
+        warnings.warn(sentence, DiagnosisWarning, stacklevel=3)  # at the call of tendonfmu.diagnose
     return Diagnosis(found)

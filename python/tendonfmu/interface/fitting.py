@@ -14,6 +14,7 @@ from tendonfmu.drawing import sheets_figure
 from tendonfmu.estimate import FrictionFit
 from tendonfmu.files import frame_of
 from tendonfmu.interface.notebook import html_of
+from tendonfmu.interface.options import with_checked_options
 from tendonfmu.model import Finger, FingerSource
 from tendonfmu.recordings import RecordingSource
 from tendonfmu.report import fit_text, law_sheets, torque_sheets
@@ -104,12 +105,13 @@ class FitResult:
         return sheets_figure(repr(self)[1:-1], [*torque_sheets(picture), *law_sheets(picture)])
 
     def _repr_html_(self) -> str:
-        return html_of(repr(self)[1:-1], fit_text.tables(self.estimator), fit_text.lines(self.estimator))
+        return html_of(repr(self)[1:-1], fit_text.tables(self.estimator), fit_text.lines(self.estimator), self.warnings)
 
 
 _TYPES: Mapping[str, Any] = {"start": float, "value": float, "standard_error": float, "identified": bool}
 
 
+@with_checked_options
 def fit(
     finger: FingerSource,
     recordings: RecordingSource | Sequence[RecordingSource],

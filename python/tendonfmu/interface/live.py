@@ -6,10 +6,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tendonfmu.errors import InputError
+from tendonfmu.interface.options import read_option
 from tendonfmu.model import FingerSource, inputs_used, native, read_finger, watches_motors
 
 Numbers = NDArray[np.float64]
 _INPUTS = ("tendon_force", "tendon_position", "joint_position", "joint_velocity")
+_MASKED = np.ma.MaskedArray
 
 
 class Sample:
@@ -95,8 +97,7 @@ class Runner:
     """
 
     def __init__(self, finger: FingerSource, kinematics: int = 1) -> None:
-        if kinematics not in (1, 2, 3):
-            raise InputError(f"kinematics = {kinematics!r}: expected 1, 2 or 3")
+        kinematics = read_option("kinematics", kinematics)
         self.finger = read_finger(finger)
         self.kinematics = kinematics
         self._instance = native.Instance(self.finger.image, kinematics)
@@ -144,6 +145,8 @@ class Runner:
         InputError
             The sample is refused. State and outputs stay those of the sample before.
         """
+        if _MASKED in (type(tendon_force), type(tendon_position), type(joint_position), type(joint_velocity)):
+            _refuse_masked((tendon_force, tendon_position, joint_position, joint_velocity))
         try:
             self._take(time, tendon_force, tendon_position, joint_position, joint_velocity)  # type: ignore[arg-type]
         except native.NativeError as refused:
@@ -201,12 +204,22 @@ def _row(name: str, values: ArrayLike | None) -> Numbers | None:
     return row
 
 
+def _refuse_masked(given: tuple[ArrayLike | None, ...]) -> None:
+    """Raise InputError if a value is masked: the native part would read what is under the mask."""
+    for name, values in zip(_INPUTS, given, strict=True):
+        if np.ma.is_masked(values):
+            number = int(np.flatnonzero(np.ma.getmaskarray(np.ma.asarray(values)))[0]) + 1
+            raise InputError(f"{name}[{number}]: masked; expected a number")
+
+
 def _size(name: str) -> str:
     return "m" if name.startswith("tendon") else "n"
 
 
 def _number(time: object) -> float:
     try:
+        if isinstance(time, str | bytes | _MASKED):
+            raise TypeError
         return float(time)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         raise InputError(f"time: {time!r}; expected seconds as a number") from None

@@ -8,7 +8,9 @@ from html import escape
 Row = Sequence[str]
 
 
-def html_of(title: str, tables: Iterable[tuple[str, Row, Sequence[Row]]], lines: Iterable[str]) -> str:
+def html_of(
+    title: str, tables: Iterable[tuple[str, Row, Sequence[Row]]], lines: Iterable[str], warnings: Iterable[str] = ()
+) -> str:
     """Return a result as an HTML element.
 
     Parameters
@@ -19,6 +21,8 @@ def html_of(title: str, tables: Iterable[tuple[str, Row, Sequence[Row]]], lines:
         (title, headings, rows) each, as the commands print them.
     lines
         Sentences below.
+    warnings
+        Remarks that the user should read; a list at the end.
 
     Returns
     -------
@@ -30,6 +34,8 @@ def html_of(title: str, tables: Iterable[tuple[str, Row, Sequence[Row]]], lines:
         parts += ["<table>", f'<caption style="text-align: left">{escape(caption)}</caption>', _row("th", headings)]
         parts += [*(_row("td", row) for row in rows), "</table>"]
     parts += [f"<p>{escape(line)}</p>" for line in lines if line]
+    remarks = "".join(f"<li>{escape(sentence)}</li>" for sentence in warnings)
+    parts += [f"<p>Warnings:</p><ul>{remarks}</ul>"] if remarks else []
     return f'<div style="font-size: 13px">{"".join(parts)}</div>'
 
 

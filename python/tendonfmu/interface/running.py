@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
@@ -15,7 +14,8 @@ from tendonfmu.files import frame_of, write_table
 from tendonfmu.fmu import columns_of, run_model
 from tendonfmu.fmu import summary as summary_of
 from tendonfmu.interface.notebook import html_of
-from tendonfmu.model import FingerSource
+from tendonfmu.interface.options import with_checked_options
+from tendonfmu.model import FingerSource, finger_file
 from tendonfmu.recordings import Recording, RecordingSource, flagged_stretches, read_recording
 
 if TYPE_CHECKING:
@@ -97,6 +97,7 @@ class RunResult:
         return html_of(f"{self.recording.path}", [("in N·m and rad", headings, rows)], [self.summary])
 
 
+@with_checked_options
 def run(
     finger: FingerSource,
     recording: RecordingSource,
@@ -130,5 +131,5 @@ def run(
         The finger or the recording is refused, or they do not fit.
     """
     samples = read_recording(recording)
-    model = Path(finger) if isinstance(finger, str) else finger
+    model = finger_file(finger) if isinstance(finger, str) else finger
     return RunResult(samples, run_model(model, samples, kinematics_source=kinematics, progress=progress))

@@ -7,6 +7,7 @@ from .description import Finger as Finger
 from .description import FingerSource as FingerSource
 from .description import Law as Law
 from .description import count as count
+from .description import finger_file as finger_file
 from .description import finger_from_data as finger_from_data
 from .description import finger_from_text as finger_from_text
 from .description import read_finger as read_finger

@@ -6,6 +6,7 @@ The native reader alone decides what a description may hold. `schema/finger.sche
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
@@ -216,10 +217,11 @@ def read_finger(source: FingerSource) -> Finger:
     if isinstance(source, Finger):
         return source
     if isinstance(source, Mapping):
-        return finger_from_data(_plain(dict(source)))
-    if not isinstance(source, str | os.PathLike):
-        raise InputError(f"finger: {type(source).__name__}; expected a path, a dictionary or a Finger")
-    path = source if isinstance(source, Path) else Path(source)
+        try:
+            return finger_from_data(_plain(dict(source)))
+        except _NoJson as refused:
+            raise InputError(f"{IN_MEMORY}: {refused}") from None
+    path = finger_file(source)
     try:
         text = path.read_bytes()
     except OSError as failed:
@@ -227,6 +229,29 @@ def read_finger(source: FingerSource) -> Finger:
     if text.startswith(b"PK\x03\x04"):
         raise InputError(f"{path}: an archive, such as an FMU; expected a finger description (JSON)")
     return finger_from_text(path, text)
+
+
+def finger_file(source: object) -> Path:
+    """Return the file that a source of a finger names.
+
+    Parameters
+    ----------
+    source
+        A path.
+
+    Raises
+    ------
+    InputError
+        It is no path, or it is the text of a description.
+    """
+    expected = "expected a path, a dictionary or a Finger"
+    if not isinstance(source, str | os.PathLike):
+        raise InputError(f"finger: {type(source).__name__}; {expected}")
+    if isinstance(source, str) and (not source.strip() or source.lstrip().startswith("{") or "\n" in source):
+        raise InputError(
+            f"finger: {'a text' if source.strip() else repr(source)}; {expected}, such as json.loads(text)"
+        )
+    return source if isinstance(source, Path) else Path(source)
 
 
 def finger_from_data(data: Mapping[str, Any], path: Path = IN_MEMORY) -> Finger:
@@ -280,6 +305,10 @@ def finger_from_text(path: Path, text: bytes) -> Finger:
     return Finger(path=path, text=text, data=json.loads(text), image=image)
 
 
+class _NoJson(InputError):
+    """A value is not what JSON has. The message names no file."""
+
+
 def _plain(data: dict[str, Any]) -> dict[str, Any]:
     """Return a copy with only what JSON has; numbers and arrays of numpy become plain ones."""
 
@@ -288,15 +317,29 @@ def _plain(data: dict[str, Any]) -> dict[str, Any]:
             return value.tolist()
         if isinstance(value, Mapping):
             return dict(value)
-        raise InputError(f"finger: {value!r}; expected a number, text, list, dictionary or None")
+        raise _NoJson(f"{value!r}; expected a number, text, list, dictionary or None")
 
     try:
         copied: dict[str, Any] = json.loads(json.dumps(data, default=plain))
     except (TypeError, ValueError, RecursionError) as refused:
         if isinstance(refused, InputError):
             raise
-        raise InputError(f"finger: {refused}; expected what JSON can hold") from None
+        raise _NoJson(f"{refused}; expected what JSON can hold") from None
+    for path, value in _not_finite("", copied):
+        raise _NoJson(f"{path} = {value!r}: expected a finite number")
     return copied
+
+
+def _not_finite(path: str, value: Any) -> Iterator[tuple[str, float]]:
+    """Yield the path of each infinity and NaN, with its value."""
+    if isinstance(value, dict):
+        for key, each in value.items():
+            yield from _not_finite(f"{path}.{key}" if path else key, each)
+    elif isinstance(value, list):
+        for number, each in enumerate(value, start=1):
+            yield from _not_finite(f"{path}[{number}]", each)
+    elif isinstance(value, float) and not math.isfinite(value):
+        yield path, value
 
 
 def _check_format(path: Path, text: bytes) -> None:

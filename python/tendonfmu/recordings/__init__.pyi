@@ -35,6 +35,7 @@ from .recording import RecordingSource as RecordingSource
 from .recording import flagged_stretches as flagged_stretches
 from .recording import listed_sources as listed_sources
 from .recording import read_recording as read_recording
+from .recording import read_recordings as read_recordings
 from .residuals import BiasSettings as BiasSettings
 from .residuals import Model as Model
 from .residuals import Residuals as Residuals

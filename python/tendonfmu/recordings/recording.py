@@ -99,6 +99,8 @@ class Recording:
             Columns are ignored.
         """
         file, known = Path(name), {LABEL, label, *others}
+        if is_frame(frame) and "time" not in frame.columns:
+            _refuse_time_in_index(file, frame)
         table = table_of_frame(file, frame, partial(read_columns, known=known), flags=(LABEL, label))
         return _of_table(file, table, label, others)
 
@@ -293,10 +295,55 @@ def read_recording(source: RecordingSource, *, label: str = LABEL, others: Colle
     if is_frame(source):
         return Recording.from_frame(source, label=label, others=others)
     if not isinstance(source, str | os.PathLike):
-        raise InputError(f"recording: {type(source).__name__}; expected a path, a DataFrame or a Recording")
+        raise InputError(f"recording: {_type_of(source)}")
     file = source if isinstance(source, Path) else Path(source)
     table = read_table(file, partial(read_columns, known={LABEL, label, *others}), flags=(LABEL, label))
     return _of_table(file, table, label, others)
+
+
+def _type_of(source: object) -> str:
+    """Describe what is no source of a recording."""
+    hint = ""
+    if isinstance(source, Mapping):
+        hint = ", such as Recording.from_frame(pd.DataFrame(dict)) or Recording.from_arrays(time, tendon_force, ...)"
+    return f"{type(source).__name__}; expected a path, a DataFrame or a Recording{hint}"
+
+
+def read_recordings(
+    sources: Sequence[RecordingSource], role: str = "recordings", *, label: str = LABEL, others: Collection[str] = ()
+) -> list[Recording]:
+    """Read and check several recordings; messages name a DataFrame by its place in the list.
+
+    Parameters
+    ----------
+    sources
+        From `listed_sources`.
+    role
+        Name of the list in messages.
+    label, others
+        As of `read_recording`.
+
+    Returns
+    -------
+    list of Recording
+        One per source.
+
+    Raises
+    ------
+    InputError
+        The source, column or row that is wrong, and what was expected.
+    """
+    found = []
+    for place, source in enumerate(sources, start=1):
+        if is_frame(source):
+            name = "DataFrame" if len(sources) == 1 else f"DataFrame {place}"
+            name = name if role == "recordings" else f"{role}: {name}"
+            found.append(Recording.from_frame(source, name=name, label=label, others=others))
+        elif isinstance(source, Recording | str | os.PathLike):
+            found.append(read_recording(source, label=label, others=others))
+        else:
+            raise InputError(f"{role}[{place}]: {_type_of(source)}")
+    return found
 
 
 def listed_sources(sources: RecordingSource | Sequence[RecordingSource]) -> list[RecordingSource]:
@@ -313,6 +360,8 @@ def listed_sources(sources: RecordingSource | Sequence[RecordingSource]) -> list
         The same, at least as many as given.
     """
     alone = isinstance(sources, Recording | str | os.PathLike) or is_frame(sources)
+    if isinstance(sources, Mapping):
+        raise InputError(f"recording: {_type_of(sources)}")
     try:
         return [sources] if alone else list(sources)  # type: ignore[list-item, arg-type]
     except TypeError:
@@ -369,6 +418,9 @@ def _numbers(file: Path, name: str, values: ArrayLike | None, dimensions: int) -
     """Return an array of numbers, without a copy where it is one."""
     shape = "[N]" if dimensions == 1 else "[N, m]" if GROUP_PER[name] == "tendon" else "[N, n]"
     try:
+        if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
+            row = int(np.argwhere(np.ma.getmaskarray(values))[0][0]) + 1 if np.ndim(values) else 1
+            raise ValueError(f"masked in row {row}")
         found = np.asarray(values)
         if found.dtype.kind not in "fiub":
             raise TypeError(f"{found.dtype} values")
@@ -407,6 +459,20 @@ def check_times(file: Path, time: NDArray[np.float64]) -> None:
             f"{file}: column time, row {row}: {float(time[row - 1])!r} s after {float(time[row - 2])!r} s; "
             "expected increasing times"
         )
+
+
+def _refuse_time_in_index(file: Path, frame: pd.DataFrame) -> None:
+    """Raise InputError if the index of a DataFrame without a column `time` looks like its times."""
+    index, kind = frame.index, frame.index.dtype.kind
+    if kind == "M":
+        way = "df.assign(time=(df.index - df.index[0]).total_seconds()).reset_index(drop=True)"
+    elif kind == "m":
+        way = "df.assign(time=df.index.total_seconds()).reset_index(drop=True)"
+    elif index.name == "time":
+        way = "df.reset_index()"
+    else:
+        return
+    raise InputError(f"{file}: no column time, only an index ({index.dtype}); expected a column in s, such as {way}")
 
 
 def _grouped(table: Mapping[str, NDArray[np.float64]]) -> dict[str, list[NDArray[np.float64]]]:

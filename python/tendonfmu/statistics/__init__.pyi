@@ -11,6 +11,8 @@ from .block_grams import standard_error as standard_error
 from .blocks import BlockSeries as BlockSeries
 from .effective_number import effective_samples as effective_samples
 from .effective_number import sample_weights as sample_weights
+from .folds import FEWEST_STRETCHES as FEWEST_STRETCHES
+from .folds import STRETCH as STRETCH
 from .folds import Folds as Folds
 from .folds import make_folds as make_folds
 from .interval import Interval as Interval
