@@ -111,7 +111,7 @@ def test_faults_are_listed(call: Call, tmp_path: Path) -> None:
     frame.to_csv(tmp_path / "log.csv", index=False)
     answer = call("convert", "inspect", "log.csv")
     assert answer.status == 0
-    for words in ("1 gaps", "1 repeated times", "200 Hz", "largest step 305 ms", "state", "run"):
+    for words in ("1 gap of", "1 repeated time", "200 Hz", "largest step 305 ms", "state", "run"):
         assert words in answer.out, words
     answer = call("convert", "inspect", "log.csv", "--json")
     found = json.loads(answer.out)
@@ -137,6 +137,120 @@ def test_joint_states_are_found_by_name(call: Call, tmp_path: Path) -> None:
     assert columns["tendon_force[1]"]["column"] == "/hand.force"
     assert columns["tendon_position[1]"]["column"] == "/hand.spool"
     assert columns["tendon_position[1]"]["comment"].startswith("guess: ")  # 4 m by REP 103, which is unusual
+
+
+FOUR = ("flex", "ext", "side", "back")
+
+
+def of_tendons(force: str, position: str, names: tuple[str, ...] = FOUR) -> dict[str, Any]:
+    """Forces in an order, positions in the other."""
+    columns = {"time [s]": T} | {force.format(name): FORCE for name in names}
+    return columns | {position.format(name): SPOOL for name in reversed(names)}
+
+
+@pytest.mark.parametrize(("force", "position"), [("F_{} [N]", "x_{} [m]"), ("force{}_N", "tendonpos{}_m")])
+def test_tendons_without_numbers_keep_the_order_of_the_log(
+    call: Call, tmp_path: Path, force: str, position: str
+) -> None:
+    """With equal arms `check` cannot notice tendons that are exchanged, so no line of a tendon is sure."""
+    lines = proposed(tmp_path, of_tendons(force, position))
+    for k, name in enumerate(FOUR, start=1):
+        assert lines[f"tendon_force[{k}]"].source == force.format(name)
+        assert lines[f"tendon_position[{k}]"].source == position.format(name)
+    assert {line.sure for name, line in lines.items() if name != "time"} == {"likely"}
+    said = "order of tendons as in the log, a guess; check it against the finger: 1 = "
+    answer = call("convert", "inspect", "log.csv")
+    assert answer.out.count(f"{said}{force.format('flex')} and {position.format('flex')}, 2 = ") == 1
+    found = json.loads(call("convert", "inspect", "log.csv", "--json").out)
+    (order,) = found["orders"]
+    assert (order["of"], order["sure"]) == ("tendons", "guess") and order["line"].startswith(said)
+    assert order["elements"][3] == [force.format("back"), position.format("back")]
+    assert found["map"]["comment"] == order["line"]
+
+
+def test_numbers_in_names_are_the_order(tmp_path: Path) -> None:
+    names = ("10", "2", "1")
+    lines = proposed(tmp_path, of_tendons("F{} [N]", "x{} [m]", names))
+    for k, name in enumerate(sorted(names, key=int), start=1):
+        assert lines[f"tendon_force[{k}]"].source == f"F{name} [N]"
+        assert lines[f"tendon_position[{k}]"].source == f"x{name} [m]"
+    assert lines["tendon_force[1]"].sure == "sure"
+    proposal = propose(inspect_log(tmp_path / "log.csv"))
+    assert [(order.of, order.sure) for order in proposal.orders] == [("tendons", "likely")]
+
+
+def test_a_position_has_the_index_of_its_force(tmp_path: Path) -> None:
+    """Of three tendons, one position is missing: that of the tendon without one is left to the user."""
+    columns = {"t": T, "F_flex": FORCE, "F_ext": FORCE, "F_side": FORCE, "x_side_mm": SPOOL, "x_flex_mm": SPOOL}
+    lines = proposed(tmp_path, columns)
+    assert [lines[f"tendon_position[{k}]"].source for k in (1, 2, 3)] == ["x_flex_mm", "?", "x_side_mm"]
+
+
+def test_positions_numbered_like_forces_are_those_of_tendons(tmp_path: Path) -> None:
+    numbers = tuple(str(k) for k in range(1, 12))
+    lines = proposed(tmp_path, of_tendons("F{}", "pos{}", numbers))
+    assert len(lines) == 23
+    for number in numbers:
+        line = lines[f"tendon_position[{number}]"]
+        assert (line.source, line.sure) == (f"pos{number}", "likely") and "as many as forces" in line.why
+    joints = proposed(tmp_path, of_tendons("F{}", "pos{}", numbers) | {"pos12": SPOOL})
+    assert "joint_position[12]" in joints  # not as many as forces: angles of joints, as by the word alone
+
+
+def test_missing_numbers_are_left_to_the_user(call: Call, tmp_path: Path) -> None:
+    force = FORCE.copy()
+    force[5] = np.nan
+    proposed(tmp_path, {"time [s]": T, "force [N]": force, "spool [m]": SPOOL})
+    answer = call("convert", "inspect", "log.csv", "-o", "new.json")
+    assert '"?" is left to you: log.missing' in answer.err
+    assert json.loads((tmp_path / "new.json").read_text(encoding="utf-8"))["log"]["missing"] == "?"
+    answer = call("convert", "table", "log.csv", "--map", "new.json", "-o", "rec.parquet")
+    assert answer.status == 2 and not (tmp_path / "rec.parquet").exists()
+    assert 'new.json: log.missing = "?": expected a decision' in answer.err
+    assert "refuse or leave out" in answer.err and len(answer.err.splitlines()) == 1
+    proposed(tmp_path, {"time [s]": T, "force [N]": FORCE, "spool [m]": SPOOL, "note": np.where(T > 1, T, np.nan)})
+    document = json.loads((tmp_path / "map.json").read_text(encoding="utf-8"))
+    assert "missing" not in document["log"]  # of a column that the map does not use
+
+
+# --- messages ---------------------------------------------------------------------------------------------------------
+
+
+def joint_states(folder: Path, topic: str, names: tuple[str, ...], **more: list[float]) -> dict[str, Line]:
+    """A topic of messages like JointState, with names, positions (m) and efforts."""
+    pytest.importorskip("mcap", reason="SKIPPED: tendonfmu is not installed with its extra logs")
+    from mcap.writer import Writer
+
+    with open(folder / "log.mcap", "wb") as raw:
+        writer = Writer(raw)
+        writer.start()
+        schema = writer.register_schema("State", "jsonschema", b'{"type": "object"}')
+        channel = writer.register_channel(topic, "json", schema)
+        for k, (force, spool) in enumerate(zip(FORCE, SPOOL, strict=True)):
+            message = {"t": k / 200, "name": names, "position": [spool] * len(names), "effort": [force] * len(names)}
+            ns = 1_700_000_000_000_000_000 + 5_000_000 * k
+            writer.add_message(channel, ns, json.dumps(message | more).encode(), ns, k)
+        writer.finish()
+    return {line.column: line for line in propose(inspect_log(folder / "log.mcap")).lines}
+
+
+def test_tendons_of_messages_keep_the_order_of_name(tmp_path: Path) -> None:
+    lines = joint_states(tmp_path, "/hand/tendons", FOUR)
+    for k, name in enumerate(FOUR, start=1):
+        assert lines[f"tendon_force[{k}]"].source == f"/hand/tendons.effort[{name}]"
+        assert lines[f"tendon_position[{k}]"].source == f"/hand/tendons.position[{name}]"
+    assert not any(name.startswith("external_torque") for name in lines)
+
+
+def test_the_name_of_one_element_does_not_make_it_an_external_torque(tmp_path: Path) -> None:
+    lines = joint_states(tmp_path, "/joint_states", ("tendon_flex", "ext", "tendon_side"))
+    assert [lines[f"tendon_force[{k}]"].source for k in (1, 2, 3)] == [
+        f"/joint_states.effort[{name}]" for name in ("tendon_flex", "ext", "tendon_side")
+    ]
+    assert lines["tendon_position[2]"].source == "/joint_states.position[ext]"
+    assert not any(name.startswith("external_torque") for name in lines)
+    lines = joint_states(tmp_path, "/tendons", ("flex", "ext"), external_torque=[1.0, 2.0])
+    assert lines["external_torque[2]"].source == "/tendons.external_torque[ext]"  # the array says so
 
 
 def test_bad_usage(call: Call, tmp_path: Path) -> None:

@@ -117,7 +117,7 @@ def _refuse_options(source: str, options: Mapping[str, Any], expected: str) -> N
 
 def _inspect(file: Path, output: Path | None) -> dict[str, Any]:
     """Print what is in a log, write the proposed map, and return both."""
-    from tendonfmu.files import check_output, write_text
+    from tendonfmu.files import check_output, counted, write_text
     from tendonfmu.recordings import inspect_log, inspection_document, propose
 
     if output is not None:
@@ -131,9 +131,8 @@ def _inspect(file: Path, output: Path | None) -> dict[str, Any]:
         warn(note)
     if output is not None:
         write_text(output, json.dumps(proposal.document, indent=1, ensure_ascii=False) + "\n")
-        undecided = [line.column for line in proposal.lines if "?" in (line.source, line.unit)]
-        left = f'; "?" is left to you: {", ".join(undecided)}' if undecided else ""
-        say(f"{output}: a map of {len(proposal.lines)} columns{left}")
+        left = f'; "?" is left to you: {", ".join(proposal.undecided)}' if proposal.undecided else ""
+        say(f"{output}: a map of {counted(len(proposal.lines), 'column')}{left}")
     return inspection_document(found, proposal)
 
 
@@ -144,8 +143,9 @@ def _print_inspection(found: Inspection, proposal: Proposal) -> None:
     for topic in found.topics:
         line = clock_line(topic, time_factor(proposal, topic))
         print_tables([(topic.topic.name, headings, list(field_rows(topic)))], [line], "")
+    orders = [order.line() for order in proposal.orders]
     columns = ("column", "field", "unit", "sure", "why")
-    print_tables([("proposed map", columns, list(proposal_rows(proposal)))], [], "why")
+    print_tables([("proposed map", columns, list(proposal_rows(proposal)))], orders, "why")
 
 
 def _convert_table(file: Path, output: Path, map_file: Path | None, finger: Path | None) -> dict[str, Any]:
@@ -174,14 +174,14 @@ def _convert_in_blocks(file: Path, output: Path, map_file: Path) -> dict[str, An
     conversion = Conversion(file, map_file)
     count, first, last = 0, 0.0, 0.0
 
-    def counted() -> Iterator[dict[str, NDArray[Any]]]:
+    def with_count() -> Iterator[dict[str, NDArray[Any]]]:
         nonlocal count, first, last
         for columns in conversion.recording():
             first = first if count else float(columns["time"][0])
             count, last = count + len(columns["time"]), float(columns["time"][-1])
             yield columns
 
-    write_blocks(output, counted())
+    write_blocks(output, with_count())
     return _written(output, count, last - first, conversion.notes)
 
 
@@ -201,13 +201,15 @@ def _convert_with_finger(file: Path, output: Path, map_file: Path, finger: Path)
 
 def _written(output: Path, count: int, duration: float, notes: list[str]) -> dict[str, Any]:
     """Say what was written and what was left out or recovered, and return it."""
+    from tendonfmu.files import counted
+
     for note in notes:
         # what the user should look at: doubtful units, and logs that were cut off
         if ": warning: " in note or " are kept" in note:
             warn(note.replace(": warning: ", ": ", 1))
         else:
             say(note)
-    say(f"{output}: {count} samples, {duration:.3f} s")
+    say(f"{output}: {counted(count, 'sample')}, {duration:.3f} s")
     return {
         "format": "tendonfmu-conversion-1",
         "recording": str(output),

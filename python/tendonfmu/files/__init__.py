@@ -2,7 +2,8 @@
 
 `writing` writes whole files, `tables` reads and writes tables of numbers (CSV, Parquet), `mcap_table` writes them for
 PlotJuggler and Foxglove, `extras` imports the libraries of the extra `logs`, `json_node` reads JSON and
-keeps the path of each value for error messages, and `finite_numbers` replaces numbers that JSON does not allow by null.
+keeps the path of each value for error messages, `finite_numbers` replaces numbers that JSON does not allow by null, and
+`counting` writes a number with its noun.
 """
 
 import lazy_loader

@@ -3,7 +3,6 @@ from .fmpy_client import run_fmu as run_fmu
 from .fmu_report import fmu_report as fmu_report
 from .model_variables import NOT_IN_XML as NOT_IN_XML
 from .model_variables import VariableTable as VariableTable
-from .model_variables import counted as counted
 from .model_variables import elements as elements
 from .model_variables import group_sizes as group_sizes
 from .model_variables import read_table as read_table

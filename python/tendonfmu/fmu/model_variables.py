@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from tendonfmu.files import counted
 from tendonfmu.model import (
     Dependencies,
     Finger,
@@ -82,24 +83,6 @@ def describe_model(description: Finger, table: VariableTable) -> dict[str, Any]:
         "directional_derivative": True,
         "default_experiment": {"start": 0.0, "stop": 10.0, "step": 0.001},
     }
-
-
-def counted(number: int, noun: str) -> str:
-    """Write a number with its noun.
-
-    Parameters
-    ----------
-    number
-        How many.
-    noun
-        In the singular.
-
-    Returns
-    -------
-    str
-        Such as `1 joint` or `2 joints`.
-    """
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def group_sizes(joints: int, tendons: int) -> dict[str, int]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from tendonfmu.fmu import NOT_IN_XML, VariableTable, counted, elements, group_sizes, units_of
+from tendonfmu.files import counted
+from tendonfmu.fmu import NOT_IN_XML, VariableTable, elements, group_sizes, units_of
 from tendonfmu.simulate.plant import INTEGRATORS, Settings
 from tendonfmu.simulate.rig import Rig
 

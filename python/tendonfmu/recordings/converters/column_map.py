@@ -214,6 +214,9 @@ def _read_log(node: Node) -> LogFormat:
     node.keys(("separator", "decimal", "skip", "header", "units_row", "encoding", "missing", "disorder", "clocks"))
     separator, decimal, skip = node.member("separator"), node.member("decimal"), node.member("skip")
     encoding, missing, disorder = node.member("encoding"), node.member("missing"), node.member("disorder")
+    for undecided, choices in ((missing, "refuse or leave out"), (disorder, "refuse or sort")):
+        if undecided.value == UNDECIDED:
+            undecided.refuse(f"a decision that `convert inspect` has left to you: {choices}")
     found = LogFormat(
         separator=None if separator.absent else separator.choice(*SEPARATORS),
         decimal=None if decimal.absent else decimal.choice(".", ","),

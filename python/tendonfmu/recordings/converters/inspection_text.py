@@ -6,6 +6,7 @@ import datetime
 from collections.abc import Iterator
 from typing import Any
 
+from tendonfmu.files import counted
 from tendonfmu.recordings.converters import units
 from tendonfmu.recordings.converters.inspection import ClockSummary, FieldSummary, Inspection, TopicSummary
 from tendonfmu.recordings.converters.log import TIME
@@ -28,7 +29,7 @@ def inspection_document(found: Inspection, proposal: Proposal) -> dict[str, Any]
     Returns
     -------
     dict
-        Keys `format`, `log`, `topics`, `proposal`, `unused`, `map`, `notes`.
+        Keys `format`, `log`, `topics`, `proposal`, `orders`, `undecided`, `unused`, `map`, `notes`.
     """
     return {
         "format": FORMAT,
@@ -38,6 +39,11 @@ def inspection_document(found: Inspection, proposal: Proposal) -> dict[str, Any]
             {"column": line.column, "source": line.source, "unit": line.unit, "sure": line.sure, "why": line.why}
             for line in proposal.lines
         ],
+        "orders": [
+            {"of": order.of, "sure": order.sure, "elements": order.elements, "line": order.line()}
+            for order in proposal.orders
+        ],
+        "undecided": proposal.undecided,
         "unused": proposal.unused,
         "map": proposal.document,
         "notes": found.notes,
@@ -117,16 +123,18 @@ def clock_line(topic: TopicSummary, factor: float | None) -> str:
         return f"{topic.topic.name or 'the log'}: no field looks like a time"
     step = clock.seconds(clock.step, factor)
     duration = clock.seconds(clock.last - clock.first, factor)
-    parts = [f"{clock.rows} rows by {clock.name}, from {_time(clock, clock.first)} to {_time(clock, clock.last)}"]
+    parts = [
+        f"{counted(clock.rows, 'row')} by {clock.name}, from {_time(clock, clock.first)} to {_time(clock, clock.last)}"
+    ]
     if step and duration is not None:
         parts.append(f"{duration:.6g} s at {1.0 / step:.4g} Hz")
         parts.append(f"largest step {1e3 * (clock.seconds(clock.largest, factor) or 0.0):.4g} ms")
     if clock.gaps:
-        parts.append(f"{clock.gaps} gaps of more than ten steps")
+        parts.append(f"{counted(clock.gaps, 'gap')} of more than ten steps")
     if clock.repeated:
-        parts.append(f"{clock.repeated} repeated times")
+        parts.append(counted(clock.repeated, "repeated time"))
     if clock.backwards:
-        parts.append(f"goes back {clock.backwards} times")
+        parts.append(f"goes back {counted(clock.backwards, 'time')}")
     return f"{topic.topic.name or 'the log'}: {', '.join(parts)}"
 
 

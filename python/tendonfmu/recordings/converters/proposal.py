@@ -6,13 +6,15 @@ What cannot be decided becomes "?" in the map, which `convert table` refuses.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Container, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from tendonfmu.recordings.converters.column_map import FORMAT, UNDECIDED
-from tendonfmu.recordings.converters.inspection import FieldSummary, Inspection, TopicSummary, is_numeric
-from tendonfmu.recordings.converters.unit_guess import SURE, Guess, stated, unit_of, unit_of_time
+from tendonfmu.recordings.converters.element_order import Order, in_order, matched, order_of
+from tendonfmu.recordings.converters.field_groups import KNOWN, Member, field_groups, words_of
+from tendonfmu.recordings.converters.inspection import FieldSummary, Inspection
+from tendonfmu.recordings.converters.unit_guess import GUESS, LIKELY, SURE, Guess, stated, unit_of, unit_of_time
 from tendonfmu.recordings.converters.unit_guess import UNDECIDED as NOT_SURE
 
 QUANTITY = {
@@ -23,35 +25,7 @@ QUANTITY = {
     "external_torque": "torque",
     "torque": "torque",
 }
-BY_QUANTITY = {"force": "tendon_force", "length": "tendon_position", "angle": "joint_position", "torque": "torque"}
-BY_QUANTITY["angular speed"] = "joint_velocity"
-
 SI = {"force": "N", "length": "m", "angle": "rad", "angular speed": "rad/s", "torque": "N.m"}
-
-TENDON = {"tendon", "tendons", "cable", "spool", "motor", "motors", "actuator", "wire", "winch", "excursion", "x0"}
-MOTION = {
-    "position",
-    "pos",
-    "length",
-    "displacement",
-    "stroke",
-    "excursion",
-    "travel",
-    "spool",
-    "x0",
-    "x",
-    "motor",
-    "encoder",
-}
-FORCES = {"tension", "tensions", "force", "forces", "loadcell", "f", "f0", "load"}
-TORQUES = {"torque", "torques", "tau", "effort", "moment", "trq"}
-SPEEDS = {"velocity", "velocities", "vel", "speed", "qd", "dq", "omega", "rate"}
-ANGLES = {"joint", "joints", "angle", "angles", "q", "theta", "phi", "position", "pos", "encoder", "ang"}
-REFERENCE = {"external", "ext", "reference", "ref", "ft", "sensor"}
-CONTACT = {"contact", "touch", "label", "touching"}
-# words that say that a signal is not measured, or no signal of a finger
-OTHERS = {"desired", "des", "target", "command", "cmd", "setpoint", "goal", "temperature", "temp", "current", "voltage"}
-OTHERS |= {"pwm", "error", "imu", "acceleration", "acc", "covariance", "seq", "status", "mode"}
 
 
 @dataclass(frozen=True)
@@ -91,11 +65,17 @@ class Proposal:
         Its lines.
     unused
         Names of fields that it does not use.
+    orders
+        How tendons and joints are numbered, where there are several.
+    undecided
+        Keys of the map that are "?".
     """
 
     document: dict[str, Any]
     lines: list[Line] = field(default_factory=list)
     unused: list[str] = field(default_factory=list)
+    orders: list[Order] = field(default_factory=list)
+    undecided: list[str] = field(default_factory=list)
 
 
 def propose(found: Inspection) -> Proposal:
@@ -111,89 +91,119 @@ def propose(found: Inspection) -> Proposal:
     Proposal
         The map, and why.
     """
-    groups: dict[str, list[tuple[TopicSummary, FieldSummary]]] = {}
-    for topic in found.topics:
-        for each in topic.fields:
-            group = group_of(each) if topic.clock is None or each.field.name != topic.clock.name else None
-            if group:
-                groups.setdefault(group, []).append((topic, each))
-    for members in groups.values():
-        members.sort(key=lambda member: _in_order(member[1].field.name))
+    groups, by_name = field_groups(found)
     one_joint = "tendon_force" not in groups and "torque" in groups
-    lines = _joint(found, groups) if one_joint else _finger(found, groups)
+    slots, orders = _numbered(groups)
+    if one_joint:
+        lines = _joint(found, groups)
+    else:
+        lines = [_doubtful(line, orders) for line in _finger(found, slots, by_name)]
+        lines += _contact(found, groups.get("contact", []))
     used = {line.source for line in lines}
     names = [f.field.name for topic in found.topics for f in topic.fields]
-    return Proposal(_document(found, lines, one_joint), lines, [name for name in names if name not in used])
+    log = _log_settings(found, lines)
+    undecided = [f"log.{key}" for key, value in log.items() if value == UNDECIDED]
+    undecided += [line.column for line in lines if UNDECIDED in (line.source, line.unit)]
+    shown = [] if one_joint else orders
+    document = _document(found, log, lines, shown, one_joint)
+    return Proposal(document, lines, [name for name in names if name not in used], shown, undecided)
 
 
-def words_of(name: str) -> list[str]:
-    """Return the words of a name in lower case: `TendonForce_2` is tendon, force."""
-    plain = re.sub(r"[\[(].*?[\])]", " ", name) if not re.search(r"\[\w+\]$", name) else name
-    apart = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", plain)
-    return [word.lower() for word in re.findall(r"[A-Za-z]+0?(?![A-Za-z])|[A-Za-z]+", apart)]
+# --- order ------------------------------------------------------------------------------------------------------------
+
+OF_TENDONS = ("tendon_force", "tendon_position")
+OF_JOINTS = ("joint_position", "joint_velocity", "external_torque")
+Slots = dict[str, list[Member | None]]
 
 
-def group_of(summary: FieldSummary) -> str | None:
-    """Return what a field likely is: a group of columns, "torque", or None."""
-    if not is_numeric(summary):
-        return None
-    words = set(words_of(summary.field.name))
-    if words & OTHERS:
-        return None
-    if words & CONTACT:
-        return "contact" if summary.only_flags else None
-    if words & TORQUES and words & REFERENCE:
-        return "external_torque"
-    said = stated(summary.field.name, summary.field.unit)
-    if said is not None:
-        quantity = said[1]
-        if quantity == "angle" and words & TENDON and not words & {"joint", "joints"}:
-            return "tendon_position"  # a motor's angle, which needs the radius of its spool
-        return BY_QUANTITY.get(quantity)
-    if words & SPEEDS:
-        return None if words & TENDON else "joint_velocity"
-    if words & FORCES or (words & TENDON and words & {"effort"}):
-        return "tendon_force"
-    if words & TORQUES:
-        return "torque"
-    if words & TENDON and words & MOTION:
-        return "tendon_position"
-    return "joint_position" if words & ANGLES else None
+def _numbered(groups: dict[str, list[Member]]) -> tuple[Slots, list[Order]]:
+    """Return the fields of each group by index, None where an element has none, and what the order is by."""
+    slots: Slots = {}
+    orders = []
+    for of, names in (("tendons", OF_TENDONS), ("joints", OF_JOINTS)):
+        here = [name for name in names if groups.get(name)]
+        if not here:
+            continue
+        most = max(len(groups[name]) for name in here)
+        first = next(name for name in here if len(groups[name]) == most)
+        leading, by_number = in_order(groups[first], _name)
+        for name in here:
+            if name == first:
+                slots[name] = list(leading)
+                continue
+            slots[name], known = _beside(leading, groups[name])
+            by_number &= known
+        if most > 1:
+            listed = [[_name(each) if each else "" for each in slots[name]] for name in here]
+            orders.append(order_of(of, by_number, listed))
+    return slots, orders
 
 
-def _in_order(name: str) -> list[Any]:
-    """Return a key by which F2 comes before F10."""
-    return [(0, int(part), "") if part.isdigit() else (1, 0, part) for part in re.split(r"(\d+)", name) if part]
+def _beside(leading: Sequence[Member], members: Sequence[Member]) -> tuple[list[Member | None], bool]:
+    """Return members at the indices of those with the same number or name, or else in an order of their own.
+
+    And whether their names tell this order.
+    """
+    places = matched([_name(each) for each in leading], [_name(each) for each in members])
+    if places is None:
+        own, numbered = in_order(members, _name)
+        return list(own), numbered
+    return [members[places.index(k)] if k in places else None for k in range(max(places) + 1)], True
+
+
+def _name(member: Member) -> str:
+    return member[1].field.name
+
+
+def _doubtful(line: Line, orders: Sequence[Order]) -> Line:
+    """Return a line, not surer than the index of its tendon or joint."""
+    of = "tendons" if line.column.startswith(OF_TENDONS) else "joints" if line.column.startswith(OF_JOINTS) else ""
+    guessed = any(order.of == of and order.sure == GUESS for order in orders)
+    return replace(line, sure=LIKELY) if guessed and line.sure == SURE else line
 
 
 # --- lines ------------------------------------------------------------------------------------------------------------
 
 
-def _finger(found: Inspection, groups: dict[str, list[tuple[TopicSummary, FieldSummary]]]) -> list[Line]:
-    forces = groups.get("tendon_force", [])
-    positions = groups.get("tendon_position", [])
+def _finger(found: Inspection, slots: Slots, by_name: Container[str]) -> list[Line]:
+    """Return the lines of a finger. by_name: tendon positions that are known only by names like those of the forces."""
+    present = {name: [each for each in members if each] for name, members in slots.items()}
+    forces, positions = (present.get(name, []) for name in OF_TENDONS)
     lines = [_time(found, next(iter(forces or positions), None))]
-    count = max(len(forces), len(positions), 1)
-    for name, members in (("tendon_force", forces), ("tendon_position", positions)):
+    count = max(*(len(slots.get(name, [])) for name in OF_TENDONS), 1)
+    for name in OF_TENDONS:
+        members = slots.get(name, [])
         for k in range(count):
-            column = f"{name}[{k + 1}]"
-            if k < len(members):
-                lines.append(_line(found, column, name, members[k][1], count > len(members)))
+            member = members[k] if k < len(members) else None
+            if member is not None:
+                line = _line(found, f"{name}[{k + 1}]", name, member[1], count > len(present[name]))
+                lines.append(_by_name(line) if _name(member) in by_name else line)
             else:
-                why = (
-                    f"{len(members)} fields look like {name}, and {max(len(forces), len(positions))} tendons are needed"
-                )
-                lines.append(Line(column, UNDECIDED, UNDECIDED, NOT_SURE, why))
-    for name in ("joint_position", "joint_velocity", "external_torque"):
-        for k, (_, each) in enumerate(groups.get(name, []), start=1):
-            lines.append(_line(found, f"{name}[{k}]", name, each, False))
-    contacts = groups.get("contact", [])
-    if len(contacts) == 1:
-        lines.append(Line("contact", _source(found, contacts[0][1]), "1", "likely", "its name, and it is only 0 or 1"))
+                why = f"{len(present.get(name, []))} fields look like {name}, and {count} tendons are needed"
+                lines.append(Line(f"{name}[{k + 1}]", UNDECIDED, UNDECIDED, NOT_SURE, why))
+    for name in OF_JOINTS:
+        for k, each in enumerate(slots.get(name, []), start=1):
+            if each is not None:
+                lines.append(_line(found, f"{name}[{k}]", name, each[1], False))
+            else:
+                why = f"{len(present[name])} fields look like {name}, and the log has more joints"
+                lines.append(Line(f"{name}[{k}]", UNDECIDED, UNDECIDED, NOT_SURE, why))
     return lines
 
 
-def _joint(found: Inspection, groups: dict[str, list[tuple[TopicSummary, FieldSummary]]]) -> list[Line]:
+def _contact(found: Inspection, members: Sequence[Member]) -> list[Line]:
+    if len(members) != 1:
+        return []
+    return [Line("contact", _source(found, members[0][1]), "1", "likely", "its name, and it is only 0 or 1")]
+
+
+def _by_name(line: Line) -> Line:
+    """Return the line of a position that may also be the angle of a joint."""
+    sure = LIKELY if line.sure == SURE else line.sure
+    return replace(line, sure=sure, why=f"as many as forces, with the same names or numbers; {line.why}")
+
+
+def _joint(found: Inspection, groups: dict[str, list[Member]]) -> list[Line]:
     """Return the lines of a machine with one joint. Of several joints the user has to choose one."""
     lines = [_time(found, groups["torque"][0])]
     for key, group in (("torque", "torque"), ("angle", "joint_position"), ("velocity", "joint_velocity")):
@@ -225,7 +235,7 @@ def _line(found: Inspection, column: str, group: str, summary: FieldSummary, sho
     else:
         guess = unit_of(named.name, named.unit, QUANTITY[group], summary.low, summary.high, found.messages)
     sure, why = guess.sure, f"named like {group}; {guess.why}"
-    if not words & (TENDON | FORCES | TORQUES | SPEEDS | ANGLES | REFERENCE):
+    if not words & KNOWN:
         sure, why = ("likely" if guess.sure == SURE else guess.sure), guess.why
     if short and sure == SURE:
         sure = "likely"
@@ -234,7 +244,7 @@ def _line(found: Inspection, column: str, group: str, summary: FieldSummary, sho
     return Line(column, _source(found, summary), guess.unit, sure, why)
 
 
-def _time(found: Inspection, beside: tuple[TopicSummary, FieldSummary] | None) -> Line:
+def _time(found: Inspection, beside: Member | None) -> Line:
     """Return the line of time: the clock of the topic with the forces."""
     topic = beside[0] if beside else next((each for each in found.topics if each.clock), found.topics[0])
     clock = topic.clock
@@ -260,13 +270,26 @@ def _source(found: Inspection, summary: FieldSummary) -> str | int:
 # --- the map ----------------------------------------------------------------------------------------------------------
 
 
-def _document(found: Inspection, lines: Sequence[Line], one_joint: bool) -> dict[str, Any]:
+def _log_settings(found: Inspection, lines: Sequence[Line]) -> dict[str, Any]:
+    """Return the key `log` of the map. What to do with missing numbers of its columns is left to the user."""
+    settings = dict(found.settings)
+    used = {line.source for line in lines}
+    if any(each.missing and _source(found, each) in used for topic in found.topics for each in topic.fields):
+        settings["missing"] = UNDECIDED
+    return settings
+
+
+def _document(
+    found: Inspection, log: dict[str, Any], lines: Sequence[Line], orders: Sequence[Order], one_joint: bool
+) -> dict[str, Any]:
     columns = {}
     for line in lines:
         columns[line.column] = {"column": line.source, "unit": line.unit, "comment": f"{line.sure}: {line.why}"}
     document: dict[str, Any] = {"format": FORMAT}
-    if found.settings:
-        document["log"] = dict(found.settings)
+    if orders:
+        document["comment"] = "; ".join(order.line() for order in orders)
+    if log:
+        document["log"] = log
     if one_joint:
         document["joint"] = {"name": re.sub(r"\W+", "_", found.file.name.split(".")[0]) or "joint", **columns}
     else:
