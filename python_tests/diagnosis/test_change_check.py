@@ -135,5 +135,5 @@ def test_bad_usage_is_one_line(call: Call, tmp_path: Path, arguments: str, words
     )
     answer = call("diagnose", "finger.json", *arguments.split(), "--kinematics", "3", "-o", "new")
     assert answer.status == 2 and words in answer.err, answer.err
-    assert answer.err.count("\n") == 1 and any(each in answer.err for each in ("expected", "No such", "exchanged with"))
+    assert answer.err.count("\n") == 1 and any(each in answer.err for each in ("expected", "No such", "exchange"))
     assert answer.out == "" and not (tmp_path / "new" / "diagnosis.json").exists()

@@ -106,10 +106,10 @@ def test_slack_tendons_are_named() -> None:
 @pytest.mark.parametrize(
     ("kinematics", "group", "factor", "words"),
     [
-        (1, "tendon_position", 1e3, "tendon_position[1..4]: scale 0.001"),
-        (2, "joint_position", 180 / np.pi, "joint_position[1..2]: scale 0.0174533"),
-        (3, "joint_velocity", -1.0, "joint_velocity[1]: sign -1"),
-        (1, "tendon_position", -1.0, "tendon_position[1..4]: sign -1"),
+        (1, "tendon_position", 1e3, 'at each of "tendon_position[1]" to "tendon_position[4]": "unit": "mm"'),
+        (2, "joint_position", 180 / np.pi, 'at each of "joint_position[1]", "joint_position[2]": "unit": "deg"'),
+        (3, "joint_velocity", -1.0, 'at "joint_velocity[1]": "sign": -1'),
+        (1, "tendon_position", -1.0, 'at each of "tendon_position[1]" to "tendon_position[4]": "sign": -1'),
     ],
 )
 def test_what_does_not_belong_is_refused(kinematics: int, group: str, factor: float, words: str) -> None:

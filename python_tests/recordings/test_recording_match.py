@@ -6,6 +6,7 @@ The systematic table is `bench/recording_check.py`.
 from __future__ import annotations
 
 import dataclasses
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -20,14 +21,16 @@ from tendonfmu.errors import InputError
 from tendonfmu.files.tables import write_table
 from tendonfmu.model.description import Finger, read_finger
 from tendonfmu.recordings.match import UNFIT_FOR_SEARCH, admit, belongs, refuse_errors
+from tendonfmu.recordings.match_text import verdict
 from tendonfmu.recordings.prepared import Held, prepare
-from tendonfmu.recordings.recording import Recording, read_recording
+from tendonfmu.recordings.recording import GROUPS, Recording, read_recording
 
 EXAMPLES = ROOT / "examples"
 INDEX = EXAMPLES / "fingers" / "index_finger.json"
 DEMO = EXAMPLES / "demo_recording"
 FREE = DEMO / "index_finger_free.parquet"
 SECONDS = 20
+SI = {"time": "s"} | {group: unit for group, (unit, _) in GROUPS.items()}
 Numbers = NDArray[np.float64]
 
 
@@ -289,7 +292,7 @@ def test_check_says_what_to_write(call: Call, tmp_path: Path, sound: Recording) 
     spoilt = written(scaled(sound, "tendon_force", at(8, 2)), tmp_path / "spoilt.parquet")
     answer = call("check", INDEX, spoilt, FREE)
     assert answer.status == 1
-    assert f"error: {spoilt}: tendon_force[2]: " in answer.out and "tendon_force[2]: sign -1" in answer.out
+    assert f"error: {spoilt}: tendon_force[2]: " in answer.out and 'at "tendon_force[2]": "sign": -1' in answer.out
     assert f"{FREE}: belongs" in answer.out
     assert answer.err.count("\n") == 1 and "1 of 2 recordings" in answer.err
 
@@ -297,7 +300,7 @@ def test_check_says_what_to_write(call: Call, tmp_path: Path, sound: Recording) 
 def test_check_of_warnings_alone_is_sound(call: Call, tmp_path: Path, sound: Recording) -> None:
     gap = written(part_of(sound, (sound.time < 8.0) | (sound.time > 9.5)), tmp_path / "gap.parquet")
     answer = call("check", INDEX, gap)
-    assert answer.status == 0 and f"warning: {gap}: time: 1 gaps" in answer.out
+    assert answer.status == 0 and f"warning: {gap}: time: 1 gap, " in answer.out
 
 
 def test_check_refuses_bad_recordings(call: Call, tmp_path: Path) -> None:
@@ -307,12 +310,61 @@ def test_check_refuses_bad_recordings(call: Call, tmp_path: Path) -> None:
     assert answer.status == 2 and "a rig" in answer.err
 
 
+@pytest.mark.parametrize("name", SPOILT)
+def test_the_advice_can_be_written_into_a_map(call: Call, tmp_path: Path, sound: Recording, name: str) -> None:
+    """The words name keys and values of a map; with these, the recording is converted, and belongs."""
+    spoilt = written(SPOILT[name][0](sound), tmp_path / "spoilt.parquet")
+    answer = call("check", INDEX, spoilt, "--json")
+    assert answer.status == 1
+    findings = json.loads(answer.out)["recordings"][0]["findings"]
+    names = ["time", *(f"{group}[{k + 1}]" for group, all_ in sound.groups.items() for k in range(all_.shape[1]))]
+    columns = {each: {"column": each, "unit": SI[each.split("[")[0]]} for each in names}
+    for finding in findings:
+        for column, keys in finding["map"].items():
+            columns[column] |= keys
+            said = [f'"{key}": {json.dumps(value)}' for key, value in keys.items() if key != "column"]
+            assert all(words in finding["write"] for words in said or [f'"{column}"']), finding["write"]
+    (tmp_path / "map.json").write_text(json.dumps({"format": "tendonfmu-map-1", "columns": columns}))
+    answer = call("convert", "table", spoilt, "--map", "map.json", "-o", "mended.parquet")
+    assert answer.status == 0, answer.err
+    answer = call("check", INDEX, "mended.parquet")
+    assert answer.status == 0 and "belongs to this finger" in answer.out
+
+
+@pytest.mark.parametrize("how", ["--quiet", "--json"])
+def test_the_first_error_is_on_standard_error_where_nothing_stands_above(
+    call: Call, tmp_path: Path, sound: Recording, how: str
+) -> None:
+    spoilt = written(scaled(sound, "tendon_force", at(8, 2)), tmp_path / "spoilt.parquet")
+    answer = call("check", INDEX, spoilt, how)
+    assert answer.status == 1 and len(answer.err.splitlines()) == 1
+    assert "see above" not in answer.err and 'at "tendon_force[2]": "sign": -1' in answer.err
+    assert "see above" in call("check", INDEX, spoilt).err
+
+
+def test_no_advice_is_said_twice(finger: Finger, sound: Recording) -> None:
+    """Even where two tendons changed places; one of something is in the singular."""
+    order = [1, 0, 2, 3, 4, 5, 6, 7]
+    spoilt = exchanged("tendon_position", order)(exchanged("tendon_force", order)(sound))
+    (finding,) = belongs(finger, [spoilt])
+    words = 'the keys "tendon_force[1]" and "tendon_force[2]", "tendon_position[1]" and "tendon_position[2]"'
+    assert finding.write.endswith(words) and "exchanged with" not in finding.seen
+    assert len(finding.line()) < 500
+    assert "1 error, 0 warnings" in verdict(spoilt, [finding])
+
+
 # --- the commands that fit --------------------------------------------------------------------------------------------
 
 STRANGERS: dict[str, tuple[Spoil, str]] = {
-    "exchanged": (exchanged("tendon_position", [0, 2, 1, 3, 4, 5, 6, 7]), "tendon_position[2] exchanged with"),
-    "degrees": (SPOILT["angles in degrees"][0], "joint_position[1..4]: scale 0.0174533"),
-    "milliseconds": (SPOILT["time in ms"][0], "time: scale 0.001"),
+    "exchanged": (
+        exchanged("tendon_position", [0, 2, 1, 3, 4, 5, 6, 7]),
+        'exchange in the map of columns the keys "tendon_position[2]" and "tendon_position[3]"',
+    ),
+    "degrees": (
+        SPOILT["angles in degrees"][0],
+        'at each of "joint_position[1]" to "joint_position[4]": "unit": "deg" in place of "rad"',
+    ),
+    "milliseconds": (SPOILT["time in ms"][0], 'at "time": "unit": "ms" in place of "s"'),
 }
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tendonfmu.cli.console import NO, fail, print_json, progress_bar, show, warn
+from tendonfmu.cli.console import NO, PRINTED, fail, print_json, progress_bar, show, warn
 from tendonfmu.cli.options import AsJson, Progress, Quiet, Subject
 from tendonfmu.cli.standard_streams import reads
 from tendonfmu.errors import InputError
@@ -68,8 +68,16 @@ def check(
     strangers = sum(not each["belongs"] for each in checked)
     if strangers:
         count = f"{strangers} of {len(checked)} recordings" if len(checked) > 1 else checked[0]["file"]
-        fail(f"{count}: does not belong to {file} as it is; see above for what to change")
+        fail(f"{count}: does not belong to {file} as it is; {_what_to_change(checked)}")
         raise typer.Exit(NO)
+
+
+def _what_to_change(checked: list[dict[str, Any]]) -> str:
+    """Point to the findings, or, where they do not stand above, give the first error."""
+    if not (PRINTED.quiet or PRINTED.json):
+        return "see above for what to change"
+    findings = [finding for each in checked for finding in each["findings"]]
+    return next(finding["line"] for finding in findings if finding["severity"] == "error")
 
 
 def _check_recordings(finger: Finger, files: list[Path], progress: bool | None) -> list[dict[str, Any]]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from tendonfmu.model import Finding
+from tendonfmu.recordings.match_map import map_keys
 from tendonfmu.recordings.match_text import verdict
 from tendonfmu.recordings.recording import Recording
 
@@ -66,4 +67,4 @@ def recording_report(recording: Recording, findings: Sequence[Finding]) -> dict[
 
 
 def _finding(finding: Finding) -> dict[str, Any]:
-    return {**asdict(finding), "path": str(finding.path), "line": finding.line()}
+    return {**asdict(finding), "path": str(finding.path), "map": map_keys(finding.entries), "line": finding.line()}

@@ -8,6 +8,7 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 from tendonfmu.errors import InputError, InputWarning
+from tendonfmu.files import counted
 
 # group: unit, and whether every recording has it
 GROUPS: dict[str, tuple[str, bool]] = {
@@ -145,4 +146,6 @@ def check_sizes(file: Path, sizes: Mapping[str, int]) -> None:
     for name, size in sizes.items():
         other = first.setdefault(GROUP_PER[name], name)
         if size != sizes[other]:
-            raise InputError(f"{file}: {size} columns {name}[...], expected {sizes[other]} as of {other}[...]")
+            raise InputError(
+                f"{file}: {counted(size, 'column')} {name}[...], expected {sizes[other]} as of {other}[...]"
+            )

@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.files import counted
 from tendonfmu.model import Finding
 from tendonfmu.recordings.channels import JITTER, LOST_SHARE, Clipped, Clock, Coarse, Held
 from tendonfmu.recordings.kinematics import Balance, Correction, Repair
+from tendonfmu.recordings.match_map import what_to_set, what_to_write
 from tendonfmu.recordings.recording import GROUP_PER, GROUPS, Recording
 
 Numbers = NDArray[np.float64]
@@ -48,9 +50,9 @@ def verdict(recording: Recording, findings: Sequence[Finding]) -> str:
     severities = [finding.severity for finding in findings]
     errors, warnings = severities.count("error"), severities.count("warning")
     words = "does not belong to this finger as it is" if errors else "belongs to this finger"
-    counts = f"{errors} errors, {warnings} warnings" if findings else "nothing found"
+    counts = f"{counted(errors, 'error')}, {counted(warnings, 'warning')}" if findings else "nothing found"
     length = recording.time[-1] - recording.time[0]
-    return f"{recording.path}: {words}: {len(recording)} samples, {length:.4g} s; {counts}"
+    return f"{recording.path}: {words}: {counted(len(recording), 'sample')}, {length:.4g} s; {counts}"
 
 
 # --- signs, order, units ----------------------------------------------------------------------------------------------
@@ -60,8 +62,8 @@ def repair(path: Path, found: Repair) -> Finding:
     """Describe a correction that makes the equations fit."""
     correction = found.correction
     seen = (
-        f"{EQUATION} leaves {_percent(found.misfit)} of the variance unexplained, and {_percent(found.left)} with "
-        f"{_in_words(correction)}"
+        f"{EQUATION} leaves {_percent(found.misfit)} of the variance unexplained, and {_percent(found.left)} once "
+        "corrected"
     )
     probably = _cause(correction)
     if found.alternatives:
@@ -100,7 +102,7 @@ def _of_correction(path: Path, correction: Correction, seen: str, probably: str)
         entries = {column: {"exchange": source} for column, source in correction.pairs}
     else:
         entries = {column: {correction.kind: correction.factor} for column in correction.columns}
-    write = f"write into the map of columns: {_in_words(correction)}"
+    write = what_to_write(correction)
     return Finding("error", correction.kind, path, correction.columns, seen, probably, write, entries)
 
 
@@ -144,8 +146,8 @@ def columns(path: Path, group: str, found: int, counts: Mapping[str, int]) -> Fi
         "columns",
         path,
         (group,),
-        f"{found} columns {group}[...], expected {counts[GROUP_PER[group]]}: the finger has {counts['joint']} joints "
-        f"and {counts['tendon']} tendons",
+        f"{counted(found, 'column')} {group}[...], expected {counts[GROUP_PER[group]]}: the finger has "
+        f"{counted(counts['joint'], 'joint')} and {counted(counts['tendon'], 'tendon')}",
         "a recording of another finger",
         f"give one {group}[...] for each {GROUP_PER[group]}",
     )
@@ -163,7 +165,7 @@ def unfit(path: Path, left: float, severity: str, balance: Balance) -> Finding:
         "or unit of columns corrects it",
         "moment_arms or stiffness of another finger, or positions in turns of a motor",
         "compare moment_arms, stiffness and the order of the tendons with the finger; for a motor's angle in rad write "
-        "scale = radius of its pulley in m",
+        'into the map "unit": "m" and "scale", the radius of its pulley in m',
     )
 
 
@@ -177,7 +179,7 @@ def against(path: Path, share: Numbers, joints: Sequence[str], turning: Sequence
     seen = f"{names} moves against the pull of its tendons ({_percent(-float(share.min()))} of its power)"
     by_hand = "a finger that was moved by hand"
     if not turning:
-        write = "write sign -1 into the map of columns for the reversed columns, or record without touching the finger"
+        write = 'write "sign": -1 into the map at the reversed columns, or record without touching the finger'
         return Finding("warning", "against", path, ("tendon_force", "tendon_position"), seen, by_hand, write)
     others = "".join(f", or equally likely {_in_words(other)}" for other in turning[1:4])
     return _of_correction(path, turning[0], seen, f"{_cause(turning[0])}{others}, or {by_hand}")
@@ -198,7 +200,10 @@ def pushing(path: Path, column: str, name: str, share: float, least: float, is_z
     seen = f"negative in {_percent(share)} of the samples, down to {least:.4g} N, but tendon {name} can only pull"
     if is_zero:
         severity = "error" if share > 0.5 else "warning"
-        write = f"add the force that the sensor had when it was zeroed: {column}: offset"
+        write = (
+            f'write into the map of columns, at "{column}": "offset", the reading of the sensor at zero force: minus '
+            "the force at which it was zeroed"
+        )
         return Finding(severity, "pushing", path, (column,), seen, "a sensor zeroed under load, or slack", write)
     return Finding(
         "error",
@@ -207,7 +212,7 @@ def pushing(path: Path, column: str, name: str, share: float, least: float, is_z
         (column,),
         seen,
         'a wrong sign, or a cable loop ("bidirectional": true)',
-        f"write into the map of columns: {column}: sign -1",
+        what_to_set((column,), {"sign": -1.0}),
         {column: {"sign": -1.0}},
     )
 
@@ -217,7 +222,7 @@ def pushing(path: Path, column: str, name: str, share: float, least: float, is_z
 
 def senseless_rate(path: Path, clock: Clock, samples: int) -> Finding:
     """Describe a sample rate that no control loop has."""
-    seen = f"{samples} samples {clock.step:.4g} s apart, {1 / clock.step:.4g} per second"
+    seen = f"{counted(samples, 'sample')} {clock.step:.4g} s apart, {1 / clock.step:.4g} per second"
     if clock.unit is None:
         return Finding("error", "clock", path, ("time",), seen, "a wrong unit", "give time in s")
     factor, unit = clock.unit
@@ -229,7 +234,7 @@ def senseless_rate(path: Path, clock: Clock, samples: int) -> Finding:
         ("time",),
         seen,
         f"time in {unit}{count}",
-        f"write into the map of columns: time: scale {factor:g}",
+        what_to_set(("time",), {"scale": factor}),
         {"time": {"scale": factor}},
     )
 
@@ -243,7 +248,7 @@ def clock_warnings(path: Path, clock: Clock, time: Numbers) -> Iterator[Finding]
             "gaps",
             path,
             ("time",),
-            f"{len(clock.gaps)} gaps, the first of {time[first] - time[first - 1]:.4g} s after row {first}",
+            f"{counted(len(clock.gaps), 'gap')}, the first of {time[first] - time[first - 1]:.4g} s after row {first}",
             "an interrupted log, or several put together",
             "split it there if the finger was touched meanwhile",
         )

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.files import Table, frame_of, is_frame, read_table, table_of_frame, write_table
+from tendonfmu.files import Table, counted, frame_of, is_frame, read_table, table_of_frame, write_table
 from tendonfmu.recordings.columns import GROUP_PER as GROUP_PER
 from tendonfmu.recordings.columns import GROUPS as GROUPS
 from tendonfmu.recordings.columns import LABEL as LABEL
@@ -66,7 +66,7 @@ class Recording:
         sizes = [f"{array.shape[1]} {name}" for name, array in self.groups.items()]
         labelled = [] if self.contact is None else [f"{int(self.contact.sum())} samples labelled {self.label}"]
         duration = self.time[-1] - self.time[0] if len(self) else 0.0
-        return ", ".join([f"{len(self)} samples in {duration:.6g} s", *sizes, *labelled])
+        return ", ".join([f"{counted(len(self), 'sample')} in {duration:.6g} s", *sizes, *labelled])
 
     @classmethod
     def from_frame(

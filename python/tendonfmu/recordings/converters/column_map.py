@@ -272,8 +272,8 @@ def _read_columns(node: Node) -> Iterator[tuple[str, MappedColumn]]:
         match = _COLUMN.fullmatch(name)
         group = match[1] if match else name
         if group not in units.OF_COLUMN or (match is None) != (group in ("time", LABEL)):
-            known = ("time", *(f"{each}[1]" for each in GROUPS), LABEL)
-            raise Refusal(f"{node.path}.{name}: unknown column; expected one of {units.nearest(name, known)}")
+            known = sorted(["time", *(f"{each}[1]" for each in GROUPS), LABEL])
+            raise Refusal(f"{node.path}.{name}: unknown column; expected one of {', '.join(known)}")
         yield name, _read_column(node.member(name), units.OF_COLUMN[group])
     if "time" not in names:
         node.member("time").refuse("the log's column of time")

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
+from tendonfmu.files import counted
 from tendonfmu.recordings.converters.column_map import ColumnMap, Resampling
 from tendonfmu.recordings.recording import LABEL
 
@@ -51,7 +52,9 @@ def on_one_clock(
             continue
         gaps, largest, limit = _gaps(columns["time"], time, rule)
         label = f"{name}: " if name else ""
-        notes.append(f"{file}: {label}interpolated onto one clock; its largest gap is {1e3 * largest:.4g} ms")
+        done = "has the same times" if np.isin(time, columns["time"]).all() else "interpolated onto one clock"
+        widest = 1e3 * np.diff(columns["time"]).max(initial=0.0)
+        notes.append(f"{file}: {label}{done}; its largest gap is {widest:.4g} ms")
         if gaps.any() and not rule.leave_out_gaps:
             at = float(time[int(np.argmax(gaps))])
             raise InputError(
@@ -60,7 +63,9 @@ def on_one_clock(
             )
         in_gap |= gaps
     if in_gap.any():
-        notes.append(f"{file}: {np.count_nonzero(in_gap)} of {len(time)} samples lie in gaps and are left out")
+        notes.append(
+            f"{file}: {np.count_nonzero(in_gap)} of {counted(len(time), 'sample')} lie in gaps and are left out"
+        )
         time = time[~in_gap]
     if not len(time):
         raise InputError(f'{file}: no sample outside gaps; expected a smaller "rate" or a larger "largest_gap"')
@@ -91,7 +96,7 @@ def _times(
     if rule.rate is None:
         inside = own[(own >= begin) & (own <= end)]
         lost = len(own) - len(inside)
-        notes = [f"{file}: {lost} samples before or after the other topics are left out"] if lost else []
+        notes = [f"{file}: left out before or after the other topics: {counted(lost, 'sample')}"] if lost else []
         return inside, notes
     count = int(np.floor((end - begin) * rule.rate * (1 + 1e-12))) + 1
     return begin + np.arange(count) / rule.rate, [f"{file}: resampled at {rule.rate:g} Hz"]
