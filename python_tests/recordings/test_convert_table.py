@@ -274,3 +274,11 @@ def test_the_schema_says_what_every_key_is() -> None:
         stamps = list(units.STAMPS) if name == "time" else []
         offered = SCHEMA["$defs"][name.replace(" ", "_")]["properties"]["unit"]["anyOf"][0]["enum"]
         assert offered == [*table, *stamps], name
+
+
+def test_an_unknown_column_lists_the_known_ones_in_order(tmp_path: Path) -> None:
+    _, wanted = written(tmp_path, wanted=edited(SMALL, "columns/tendon_position[1..4]", {"column": "x", "unit": "m"}))
+    with pytest.raises(InputError) as refused:
+        convert_table(tmp_path / "log.csv", wanted)
+    listed = str(refused.value).split("expected one of ")[1].split(", ")
+    assert listed == sorted(listed) and {"time", "contact", "tendon_position[1]"} < set(listed)

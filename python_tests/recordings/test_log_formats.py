@@ -30,8 +30,11 @@ from tendonfmu.recordings.converters.table import Conversion, convert_table
 # --- several clocks ---------------------------------------------------------------------------------------------------
 
 
-def two_topics(folder: Path, gap: int = 0, plugin: str = "SQLITE3") -> Path:
-    """A bag: tendons at 200 Hz, joint states at 100 Hz in changing order, 2 ms later; samples lost from 1 s on."""
+def two_topics(folder: Path, gap: int = 0, plugin: str = "SQLITE3", late: int = 2_000_000, every: int = 2) -> Path:
+    """A bag: tendons at 200 Hz, joint states at 100 Hz in changing order, 2 ms later; samples lost from 1 s on.
+
+    late: ns. every: tendon samples for each of the joint states.
+    """
     from rosbags.rosbag2 import StoragePlugin, Writer
 
     store = ros_store()
@@ -44,13 +47,13 @@ def two_topics(folder: Path, gap: int = 0, plugin: str = "SQLITE3") -> Path:
             ns = START + k * 5_000_000
             message = store.types[TYPE](header=header(store, ns), force=10.0 + k, spool=1.0)
             out.write(tendons, ns, store.serialize_cdr(message, TYPE))
-            if k % 2 or 200 <= k < 200 + gap:
+            if k % every or 200 <= k < 200 + gap:
                 continue
             angle = 0.001 * (k + 0.4)  # at its own time: 2 ms are 0.4 samples of the tendons
             names, position = (["tip", "knuckle"], [9.0, angle]) if k % 4 else (["knuckle", "tip"], [angle, 9.0])
-            stamp = header(store, ns + 2_000_000)
+            stamp = header(store, ns + late)
             state = joint_state(header=stamp, name=names, position=np.array(position), velocity=none, effort=none)
-            out.write(joints, ns + 2_000_000, store.serialize_cdr(state, "sensor_msgs/msg/JointState"))
+            out.write(joints, ns + late, store.serialize_cdr(state, "sensor_msgs/msg/JointState"))
     return folder / "bag"
 
 
@@ -79,7 +82,15 @@ def test_topics_come_onto_the_clock_of_the_time(tmp_path: Path, plugin: str) -> 
     assert found["time"][0] == pytest.approx(0.005) and len(found["time"]) == 398
     assert found["tendon_force[1]"] == pytest.approx(10 + found["time"] / 0.005)
     assert found["joint_position[1]"] == pytest.approx(0.001 * found["time"] / 0.005, abs=1e-12)
-    assert any("largest gap is 10 ms" in note for note in log.notes)
+    assert any("interpolated onto one clock; its largest gap is 10 ms" in note for note in log.notes)
+
+
+def test_topics_with_the_same_stamps_are_not_interpolated(tmp_path: Path) -> None:
+    bag = two_topics(tmp_path, late=0, every=1)
+    log = convert_table(bag, with_map(tmp_path, bag_map()))
+    (note,) = [each for each in log.notes if "largest gap" in each]
+    assert "joint_states: has a sample at each time, none is interpolated; its largest gap is 5 ms" in note
+    assert log.columns["joint_position[1]"] == pytest.approx(0.001 * (np.arange(400) + 0.4), abs=1e-12)
 
 
 def test_gaps_are_refused_or_left_out(tmp_path: Path) -> None:

@@ -58,11 +58,18 @@ const json_node& json_node::expect_object() const {
   return *this;
 }
 
+/* "numbers in m" becomes "number in m". */
+static std::string singular(const std::string& meaning) {
+  const std::size_t end = std::min(meaning.find_first_of(" ,"), meaning.size());
+  const bool is_plural = end > 0 && meaning[end - 1] == 's';
+  return is_plural ? meaning.substr(0, end - 1) + meaning.substr(end) : meaning;
+}
+
 const json_node& json_node::expect_list(std::size_t least, std::size_t most, const std::string& meaning) const {
   const std::string range = least == most
                                 ? std::to_string(most)
                                 : (least ? std::to_string(least) + " to " : "at most ") + std::to_string(most);
-  const std::string expectation = "a list of " + range + " " + meaning;
+  const std::string expectation = "a list of " + range + " " + (most == 1 ? singular(meaning) : meaning);
   if (!value_->is_array()) {
     refuse(expectation);
   }

@@ -52,9 +52,10 @@ def on_one_clock(
             continue
         gaps, largest, limit = _gaps(columns["time"], time, rule)
         label = f"{name}: " if name else ""
-        done = "has the same times" if np.isin(time, columns["time"]).all() else "interpolated onto one clock"
-        widest = 1e3 * np.diff(columns["time"]).max(initial=0.0)
-        notes.append(f"{file}: {label}{done}; its largest gap is {widest:.4g} ms")
+        is_there = bool(np.isin(time, columns["time"]).all())
+        done = "has a sample at each time, none is interpolated" if is_there else "interpolated onto one clock"
+        widest = _largest_step(columns["time"], time)
+        notes.append(f"{file}: {label}{done}; its largest gap is {1e3 * widest:.4g} ms")
         if gaps.any() and not rule.leave_out_gaps:
             at = float(time[int(np.argmax(gaps))])
             raise InputError(
@@ -112,6 +113,15 @@ def _gaps(own: Series, time: Series, rule: Resampling) -> tuple[NDArray[np.bool_
     around = np.where(own[after] == time, 0.0, steps[after])  # a sample of the topic itself lies in no gap
     around[time == own[-1]] = 0.0
     return around > limit, float(around.max(initial=0.0)), limit
+
+
+def _largest_step(own: Series, time: Series) -> float:
+    """Return the largest step (s) of a topic between the first and last of the common times."""
+    if not len(time):
+        return 0.0
+    first = max(int(np.searchsorted(own, time[0], side="right")) - 1, 0)
+    last = int(np.searchsorted(own, time[-1], side="left"))
+    return float(np.diff(own[first : last + 1]).max(initial=0.0))
 
 
 def _held(time: Series, own: Series, values: Series) -> Series:
