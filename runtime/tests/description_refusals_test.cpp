@@ -106,6 +106,7 @@ const std::vector<Fault> wrong_types = {
     {"/name", "\"a\\nb\"", "name = \"a\\nb\": expected a name of 1 to 200 bytes without control characters"},
     {"/joints/1/name", "[]", "joints[2].name = [...]: expected a text"},
     {"/tendons/0/name", "true", "tendons[1].name = true: expected a text"},
+    {"/joints", R"([{"name": "knuckle"}])", "tendons[1].moment_arms has 2 elements: expected a list of 1 number in m"},
     {"/joints", "{}", "joints = {...}: expected a list of 1 to 16 joints"},
     {"/joints/0", "3", "joints[1] = 3: expected an object"},
     {"/joints/0/cover", "[]", "joints[1].cover = [...]: expected an object"},

@@ -77,7 +77,7 @@ def _what_to_change(checked: list[dict[str, Any]]) -> str:
     if not (PRINTED.quiet or PRINTED.json):
         return "see above for what to change"
     findings = [finding for each in checked for finding in each["findings"]]
-    return next(finding["line"] for finding in findings if finding["severity"] == "error")
+    return str(next(finding["line"] for finding in findings if finding["severity"] == "error"))
 
 
 def _check_recordings(finger: Finger, files: list[Path], progress: bool | None) -> list[dict[str, Any]]:
