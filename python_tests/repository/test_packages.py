@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import graphlib
-from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -45,11 +45,15 @@ def package_of(module: Path) -> str:
     return module.relative_to(PACKAGE).parts[0] if module.parent != PACKAGE else ""
 
 
-def imported_modules(module: Path) -> Iterator[tuple[str, str]]:
+@cache
+def imported_modules(module: Path) -> tuple[tuple[str, str], ...]:
     """(module without "tendonfmu.", name) of each import from within the product, also late and type-only ones."""
-    for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "tendonfmu":
-            yield from ((node.module.partition(".")[2], alias.name) for alias in node.names)
+    return tuple(
+        (node.module.partition(".")[2], alias.name)
+        for node in ast.walk(ast.parse(module.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "tendonfmu"
+        for alias in node.names
+    )
 
 
 def exports(package: str) -> dict[str, str]:
