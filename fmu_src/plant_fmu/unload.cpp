@@ -4,8 +4,9 @@
 
 #ifdef __GLIBCXX__
 namespace __gnu_cxx {
-void __freeres();  // NOLINT(bugprone-reserved-identifier): libstdc++'s name
-}
+// NOLINTNEXTLINE(readability-identifier-naming): libstdc++'s name
+void __freeres();
+}  // namespace __gnu_cxx
 
 __attribute__((destructor)) static void free_reserve() {
   __gnu_cxx::__freeres();
