@@ -91,6 +91,8 @@ def test_one_hidden_effect_is_in_the_reported_set(effect: str, tmp_path: Path) -
 def test_nothing_is_named_where_nothing_is_hidden(seed: int, presliding: bool, wander: float, tmp_path: Path) -> None:
     found = diagnosed(tmp_path, cases.null(tmp_path, seed, presliding=presliding, wander=wander, **SHORT))
     assert found.causes == () and found.verdict == "adequate"
+    assert {each.where.effect for each in found.invisible} >= {"force_offset"}
+    assert "cover_hardening" not in {each.where.effect for each in found.invisible}  # one of ordinary size would show
     assert found.gain.value == 0.0 and found.extended == found.nominal
     assert 1e-3 < found.nominal.test_rms[0] < 4e-3  # N·m: the noise that the rig put in, 1.5 to 3 mN·m
 
@@ -129,9 +131,11 @@ def test_a_diagnosis_names_measures_and_extends(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-def test_absorbed_is_told_to_be_invisible(tmp_path: Path) -> None:
-    """A force sensor's offset is a constant torque: the bias takes it."""
-    found = diagnosed(tmp_path, cases.absorbed(tmp_path, "force_offset", 1, presliding=True, **SHORT))
-    listed = [each for each in found.invisible if each.where.effect == "force_offset"]
+@pytest.mark.parametrize("effect", ["force_offset", "gravity", "moment_arm"])
+def test_absorbed_is_told_to_be_invisible(effect: str, tmp_path: Path) -> None:
+    """A constant or slow torque goes into the bias. What is left of an arm that is off goes down in the noise."""
+    found = diagnosed(tmp_path, cases.absorbed(tmp_path, effect, 1, presliding=True, **SHORT))
+    listed = [each for each in found.invisible if each.where.effect == effect]
     assert listed and all(each.experiment for each in listed)
-    assert not any(cause.where.effect == "force_offset" for cause in found.causes)
+    assert all(each.absorbed or (each.ordinary_gain or 0.0) < found.least_gain for each in found.invisible)
+    assert not any(cause.where.effect == effect for cause in found.causes)

@@ -421,6 +421,16 @@ def test_many_effects_that_cannot_be_seen_are_counted() -> None:
     assert "8 effects are not visible in these data" in many and "(6 places, such as joint 1 (mcp)); a; b; c" in many
 
 
+def test_what_noise_hides_is_not_said_to_be_absorbed() -> None:
+    absorbed, small = examples.INVISIBLE
+    text = plain(diagnosis_page(replace(examples.adequate(), invisible=(small,))))
+    assert "One of ordinary size would raise the error by 1.1 %, too little to be a cause. To see it: record" in text
+    others = tuple(replace(absorbed, where=Where(name), title=name) for name in "ab")
+    text = plain(diagnosis_page(replace(examples.adequate(), invisible=(small, *others))))
+    assert "2 effects are not visible in these data, since refitting absorbs them: a; b." in text
+    assert "1 effect is visible only if larger than usual: the tendon gets stiffer" in text
+
+
 def test_names_and_warnings_are_escaped() -> None:
     found = examples.three_causes()
     nominal = json.loads(json.dumps(found.nominal_data))

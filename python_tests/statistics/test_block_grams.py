@@ -106,6 +106,19 @@ def test_surviving_share_is_what_refitting_leaves(made: tuple[Numbers, Numbers, 
     assert grams.surviving(np.zeros((7, 1))) == 0.0
 
 
+def test_ordinary_gain_is_what_adding_the_effect_and_correcting_it_shows(
+    made: tuple[Numbers, Numbers, Numbers],
+) -> None:
+    target, nominal, values = made
+    size = 1.5 * float(np.std(target))
+    before = grams_of(target, nominal, values)
+    found = before.ordinary_gain(np.eye(6)[:, :1], np.array([size]))
+    with_it = grams_of(target + size * values[:, :, 0], nominal, values)
+    assert found == pytest.approx(1.0 - np.sqrt(before.without / with_it.without), rel=0.1)
+    assert before.ordinary_gain(np.eye(6)[:, :2], np.array([size, 0.0])) < found
+    assert before.ordinary_gain(np.zeros((6, 1)), np.array([size])) == 0.0
+
+
 def test_residual_and_magnitudes_are_those_of_one_fit_of_everything(made: tuple[Numbers, Numbers, Numbers]) -> None:
     target, nominal, values = made
     grams = grams_of(target, nominal, values)

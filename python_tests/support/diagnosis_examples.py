@@ -184,12 +184,14 @@ INVISIBLE = (
         "the cover gets stiffer the more it is bent",
         0.002,
         "move joint 1 (mcp) over at least -0.9 to 1.2 rad",
+        ordinary_gain=0.0004,
     ),
     Invisible(
         Where("tendon_nonlinearity", tendon=3),
         "the tendon gets stiffer the more it is stretched",
-        0.006,
+        0.32,
         "record at a pretension of 30 N as well",
+        ordinary_gain=0.011,
     ),
 )
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.diagnosis.hypotheses import Hypothesis, Key
 from tendonfmu.diagnosis.least_sizes import LeastSizes
+from tendonfmu.diagnosis.result import ABSORBED
 from tendonfmu.statistics import Grams, standard_error
 
 Numbers = NDArray[np.float64]
@@ -26,7 +27,6 @@ SAME = 0.015  # of the error, about a quarter of what is material: a smaller dif
 COMMON = {"presliding", "time_delay"}  # presliding is in every finger, a delay in every way of recording
 FINER = 0.5  # standard errors by which a finer place must be better: both have as many numbers
 NEAR = 0.1  # of what an effect removes: its derivatives do not distinguish places that are this close
-LEAST_SHARE = 0.01  # of a candidate's variance that must survive the refit for it to be visible
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class Selection:
         effects = {each.effect for each in beside}
         found = []
         for hypothesis, share in zip(hypotheses, self.shares, strict=True):
-            if share < LEAST_SHARE or hypothesis.effect in effects:
+            if share < ABSORBED or hypothesis.effect in effects:
                 continue
             columns = self._beside.with_(hypothesis)
             magnitudes = grams.magnitudes(*columns)[len(self._beside.low) :]

@@ -21,7 +21,7 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from tendonfmu.diagnosis.cause_gains import Verified, verify
 from tendonfmu.diagnosis.cause_search import residual_alone, series_of
-from tendonfmu.diagnosis.cause_selection import CERTAIN, LEAST_SHARE
+from tendonfmu.diagnosis.cause_selection import CERTAIN, names_with
 from tendonfmu.diagnosis.changes.check import check_sides
 from tendonfmu.diagnosis.changes.diagnosis import PHASES as CHANGE_PHASES
 from tendonfmu.diagnosis.changes.diagnosis import ChangeCase, find_changes
@@ -33,10 +33,10 @@ from tendonfmu.diagnosis.evidence import evidence
 from tendonfmu.diagnosis.experiments.next_experiment import Experiments, Question, plan_experiments
 from tendonfmu.diagnosis.extension_fit import Accepted, FitSettings
 from tendonfmu.diagnosis.gain import require_unseen
-from tendonfmu.diagnosis.hypotheses import HERE, Hypothesis
+from tendonfmu.diagnosis.hypotheses import HERE, Hypothesis, Key
 from tendonfmu.diagnosis.remainder import Remainder, measure_remainder
 from tendonfmu.diagnosis.residual_views import residual_views, whiteness
-from tendonfmu.diagnosis.result import Cause, Diagnosis, Event, FoundPlace, Invisible, Unexplained, Where
+from tendonfmu.diagnosis.result import ABSORBED, Cause, Diagnosis, Event, FoundPlace, Invisible, Unexplained, Where
 from tendonfmu.diagnosis.search import NamedCause, Search, events_of, search, without_events
 from tendonfmu.diagnosis.series import make_grid
 from tendonfmu.diagnosis.signal_choice import choose
@@ -64,7 +64,7 @@ HELD = Held(0.2, 10.0)  # of the recordings, for the gain, if no tests are given
 HALF = Held(0.5, 10.0)  # for a change: its few numbers need less data, and single samples of r are mostly noise
 LEAST_GAIN = 0.03
 MOST_RIVALS = 3  # rivals of a cause for which an experiment is planned
-MOST_UNSEEN = 6  # invisible effects for which an experiment is planned
+SMALLEST_GAIN = 1e-6  # where every gain counts as material
 SIGNALS = "signals, delay and presliding"
 PHASES = {
     SIGNALS: 20.0,
@@ -402,13 +402,13 @@ class _Result:
             for rival in [_ordinary(each) for each in cause.alike[:MOST_RIVALS]]
             if all(each.place in each.candidate.places(nominal, source) for each in (cause.accepted[0], rival))
         ]  # only laws that the nominal description has
-        unseen = self._unseen()
+        unseen = self._unseen(verified)
         nearest: dict[str, Hypothesis] = {}
-        for hypothesis, _ in unseen:
-            own = _ordinary(hypothesis)
+        for each in unseen:
+            own = _ordinary(each.hypothesis)
             if own.place in own.candidate.places(nominal, source):  # only laws that the nominal description has
-                nearest.setdefault(hypothesis.effect, hypothesis)
-        asked = list(nearest)[:MOST_UNSEEN]
+                nearest.setdefault(each.hypothesis.effect, each.hypothesis)
+        asked = list(nearest)
         questions = [*rivals, *(Question(_ordinary(nearest[effect])) for effect in asked)]
         noise = self._left(self._found.extended.data)[self._series.used].std(axis=0)
         with self._phases.start("next experiment", len(questions) or None) as step:
@@ -425,21 +425,57 @@ class _Result:
             for k, effect in enumerate(asked)
         }
         return planned, tuple(
-            Invisible(where_of(each), _candidate(each).title, share, *said.get(each.effect, ("", {})))
-            for each, share in unseen
+            Invisible(
+                where_of(each.hypothesis),
+                _candidate(each.hypothesis).title,
+                each.share,
+                *said.get(each.hypothesis.effect, ("", {})),
+                ordinary_gain=each.gain,
+            )
+            for each in unseen
         )
 
-    def _unseen(self) -> list[tuple[Hypothesis, float]]:
-        """Return, for each invisible place, the shape that comes nearest to being visible, and its share.
+    def _unseen(self, verified: Verified) -> list[_Unseen]:
+        """Return, for each place at which an effect of ordinary size would not become a cause, its best shape.
 
-        The places nearest to being visible come first.
+        Refitting absorbs the effect, or what it leaves is too small beside the rest of the error. The places nearest
+        to being visible come first.
         """
         selection = self._found.last.selection
-        best: dict[tuple[str, int | None, int | None], tuple[Hypothesis, float]] = {}
+        known = [*verified.causes, *verified.dropped, *self._found.small]
+        places = {(cause.effect, each.place.joint, each.place.tendon) for cause in known for each in cause.accepted}
+        names = [cause.effect for cause in verified.causes]
+        best: dict[Key, _Unseen] = {}
         for each, share in zip(selection.hypotheses, selection.shares, strict=True):
-            if each.level == HERE and (each.key not in best or share > best[each.key][1]):
-                best[each.key] = (each, share)
-        return sorted((pair for pair in best.values() if pair[1] < LEAST_SHARE), key=lambda pair: -pair[1])
+            if each.level != HERE or each.key in places:
+                continue
+            gain = selection.grams.ordinary_gain(each.mix, np.array(each.members[0].shape.expected))
+            least = self._least_gain * names_with(each.effect, names)
+            own = _Unseen(each, share, gain, min(share / ABSORBED, gain / max(least, SMALLEST_GAIN)))
+            if each.key not in best or own.nearness > best[each.key].nearness:
+                best[each.key] = own
+        hidden = [each for each in best.values() if each.nearness < 1.0]
+        return sorted(hidden, key=lambda each: -each.nearness)
+
+
+@dataclass(frozen=True)
+class _Unseen:
+    """An effect at a place, and what keeps it from being seen.
+
+    Attributes
+    ----------
+    share
+        Share of its variance that survives the refit.
+    gain
+        1 − rms ratio that an ordinary size would bring.
+    nearness
+        From 1 on it is visible.
+    """
+
+    hypothesis: Hypothesis
+    share: float
+    gain: float
+    nearness: float
 
 
 def where_of(hypothesis: Hypothesis) -> Where:

@@ -173,9 +173,12 @@ class Cause:
         return self.where.tendon
 
 
+ABSORBED = 0.01  # of an effect's variance: if less survives the refit, it is not visible, however large it is
+
+
 @dataclass(frozen=True)
 class Invisible:
-    """An effect that these data cannot show.
+    """An effect that these data cannot show: refitting absorbs it, or an ordinary size would not become a cause.
 
     Attributes
     ----------
@@ -187,6 +190,8 @@ class Invisible:
         What would show it, in a sentence.
     motion
         The same in the form of `Experiment.motion`; empty if no experiment would show it.
+    ordinary_gain
+        1 − rms ratio that an effect of ordinary size would bring on these data; None for a change.
     """
 
     where: Where
@@ -194,6 +199,12 @@ class Invisible:
     surviving_share: float
     experiment: str
     motion: Mapping[str, Any] = field(default_factory=dict)
+    ordinary_gain: float | None = None
+
+    @property
+    def absorbed(self) -> bool:
+        """Whether refitting absorbs it, so that no size of it would show."""
+        return self.surviving_share < ABSORBED
 
 
 @dataclass(frozen=True)

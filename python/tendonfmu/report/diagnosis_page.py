@@ -100,7 +100,13 @@ def diagnosis_page(found: Diagnosis) -> str:
         detection=None if found.detection is None else _detection(found.detection, factor, unit),
         method=list(_method(found)),
         invisible=[
-            (each.title, names.place(each.where) or "everywhere", percent(each.surviving_share), each.experiment)
+            (
+                each.title,
+                names.place(each.where) or "everywhere",
+                percent(each.surviving_share),
+                "" if each.ordinary_gain is None else percent(each.ordinary_gain),
+                each.experiment,
+            )
             for each in found.invisible
         ],
         recordings=list(_recordings(found)),

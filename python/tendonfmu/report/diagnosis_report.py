@@ -198,6 +198,7 @@ def _invisible(found: Invisible) -> dict[str, Any]:
         **_where(found.where),
         "title": found.title,
         "surviving_share": found.surviving_share,
+        "ordinary_gain": found.ordinary_gain,
         "experiment": found.experiment,
     }
 

@@ -296,15 +296,18 @@ class Hidden:
     ----------
     title, places
         The effect and its places, in plain words.
-    share
-        Largest share that survives the refit.
+    why
+        Sentence: what hides it where it comes nearest to being visible.
+    absorbed
+        Whether refitting absorbs it everywhere.
     experiment
         Experiment that would show it.
     """
 
     title: str
     places: str
-    share: float
+    why: str
+    absorbed: bool
     experiment: str
 
 
@@ -315,22 +318,32 @@ def hidden(found: Diagnosis, names: Names) -> list[Hidden]:
         by_effect.setdefault(each.where.effect, []).append(each)
     effects = []
     for members in by_effect.values():
-        best = max(members, key=lambda each: each.surviving_share)
+        best = max(members, key=lambda each: (not each.absorbed, each.ordinary_gain or 0.0, each.surviving_share))
         places = [names.place(each.where) for each in members]
         text = "" if places == [""] else "; ".join(each or "the whole finger" for each in places)
         if len(places) > _MOST_PLACES:
             text = f"{len(places)} places, such as {places[0]}"
-        effects.append(Hidden(best.title, text, best.surviving_share, best.experiment))
+        effects.append(Hidden(best.title, text, _why_hidden(best), best.absorbed, best.experiment))
     return effects
+
+
+def _why_hidden(found: Invisible) -> str:
+    if found.absorbed or found.ordinary_gain is None:
+        return f"Refitting absorbs it; {percent(found.surviving_share)} would be left."
+    return f"One of ordinary size would raise the error by {percent(found.ordinary_gain)}, too little to be a cause."
 
 
 def hidden_sentences(found: Diagnosis, names: Names) -> Iterator[str]:
     """Describe what these data cannot show: up to `_TOLD` effects with an experiment each, more in one sentence."""
     effects = hidden(found, names)
     if len(effects) > _TOLD:
-        listed = "; ".join(f"{each.title} ({each.places})" if each.places else each.title for each in effects)
         absorbs = "what is shared with the reference" if found.kind == "change" else "refitting"
-        yield f"{len(effects)} effects are not visible in these data, since {absorbs} absorbs them: {listed}."
+        absorbed = [each for each in effects if each.absorbed]
+        small = [each for each in effects if not each.absorbed]
+        if absorbed:
+            yield f"{_counted(absorbed)} not visible in these data, since {absorbs} absorbs them: {_listed(absorbed)}."
+        if small:
+            yield f"{_counted(small)} visible only if larger than usual: {_listed(small)}."
         return
     for each in effects:
         place = f", at {each.places}" if each.places else ""
@@ -338,10 +351,15 @@ def hidden_sentences(found: Diagnosis, names: Names) -> Iterator[str]:
         experiment = f" To see it: {what[0].lower()}{what[1:].rstrip('.')}." if what else ""
         if what.startswith("No "):
             experiment = f" {what.rstrip('.')}."
-        yield (
-            f"Not visible in these data: {each.title}{place}. Refitting absorbs it; {percent(each.share)} would be "
-            f"left.{experiment}"
-        )
+        yield (f"Not visible in these data: {each.title}{place}. {each.why}{experiment}")
+
+
+def _counted(effects: Sequence[Hidden]) -> str:
+    return f"{len(effects)} effect is" if len(effects) == 1 else f"{len(effects)} effects are"
+
+
+def _listed(effects: Sequence[Hidden]) -> str:
+    return "; ".join(f"{each.title} ({each.places})" if each.places else each.title for each in effects)
 
 
 def next_sentence(found: Diagnosis) -> str:

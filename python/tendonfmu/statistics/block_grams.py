@@ -300,6 +300,27 @@ class Grams:
         left = root.T @ (after / (length[:, None] * length)) @ root
         return float(np.clip(np.linalg.eigvalsh(left)[-1], 0.0, 1.0))
 
+    def ordinary_gain(self, mix: Numbers, expected: Numbers) -> float:
+        """Return how far an effect of ordinary size would raise the error, or correcting it lower it again.
+
+        Parameters
+        ----------
+        mix
+            Combination [c, d].
+        expected
+            Ordinary magnitudes [d]. The effect has one of them, any of them as likely.
+
+        Returns
+        -------
+        float
+            1 − rms without the effect / rms with it, as seen after the refit of the nominal model.
+        """
+        used = np.flatnonzero(mix.any(axis=1))
+        part = mix[used] * expected
+        energy = np.diagonal(part.T @ self._whole.energy[np.ix_(used, used)] @ part)
+        there = max(float(np.mean(energy)), 0.0)
+        return 1.0 - float(np.sqrt(self.without / max(self.without + there, 1e-300)))
+
     def _raw_energy(self) -> Numbers:
         if not hasattr(self, "_raw"):
             values = self._table[:, :, self.nominal_count :].reshape(self._target.size, self.count)

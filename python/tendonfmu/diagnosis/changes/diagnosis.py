@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from tendonfmu.diagnosis.cause_search import residual_alone
-from tendonfmu.diagnosis.cause_selection import LEAST_SHARE
 from tendonfmu.diagnosis.changes.evidence import change_evidence
 from tendonfmu.diagnosis.changes.gain import interval_of
 from tendonfmu.diagnosis.changes.load import steady_load
@@ -30,6 +29,7 @@ from tendonfmu.diagnosis.gain import measure_gain
 from tendonfmu.diagnosis.hypotheses import HERE, Hypothesis, Key
 from tendonfmu.diagnosis.residual_views import residual_views, whiteness
 from tendonfmu.diagnosis.result import (
+    ABSORBED,
     Cause,
     ChangedSize,
     Diagnosis,
@@ -384,7 +384,7 @@ class _Changes:
         return tuple(
             Invisible(Where(each.effect, each.joint, each.tendon), _told(each)[0], share, REPEAT)
             for each, share in best.values()
-            if share < LEAST_SHARE
+            if share < ABSORBED
         )
 
     def _next(self, causes: Sequence[Cause]) -> str:
