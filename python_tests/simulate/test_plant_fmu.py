@@ -57,6 +57,7 @@ def test_everything_is_in(plant_fmu_path: Path) -> None:
     assert set(files) == {
         "modelDescription.xml",
         "model.png",
+        *(f"terminalsAndIcons/{name}" for name in ("terminalsAndIcons.xml", "icon.png", "input.png", "output.png")),
         "documentation/index.html",
         "documentation/licenses/license.txt",
         "documentation/licenses/third_party.txt",
