@@ -93,7 +93,8 @@ def check(table: dict[str, Any]) -> None:
 
 def row(group: dict[str, Any]) -> str:
     unit = group.get("unit", "")
-    numbers = ", ".join(repr(float(group.get(key, 0.0))) for key in ("min", "max", "start"))
+    accepted = {"min": -group["limit"], "max": group["limit"]} if "limit" in group else {}
+    numbers = ", ".join(repr(float((group | accepted).get(key, 0.0))) for key in ("min", "max", "start"))
     return (
         f'    {{"{group["name"]}", {group["base"]}u, VARIABLE_{group["type"].upper()}, SIZE_{group["size"].upper()}, '
         f'CAUSALITY_{group["causality"].upper()}, "{unit}", {numbers}, {int(group["variability"] == "discrete")}, '

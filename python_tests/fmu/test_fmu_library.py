@@ -9,7 +9,6 @@ import re
 import shutil
 import subprocess
 import sys
-import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
@@ -17,6 +16,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from fmi2_headers import FMPY_HEADERS
 from fmu_binary import ERROR, FINGER, OK, Instance, UnpackedFmu, motion, unpack
 from leak_count import least_growth, needs_count
 from repository_paths import SUPPORT
@@ -42,8 +42,8 @@ def tool(name: str) -> str:
 def test_exports_the_fmi_functions_only(small_fmu: UnpackedFmu) -> None:
     lines = run(tool("nm"), "-D", "--defined-only", small_fmu.binary).splitlines()
     names = {line.split()[-1] for line in lines}
-    header = next(path for path in (small_fmu.folder / "sources").iterdir() if path.name == "fmi2Functions.h")
-    assert names == set(re.findall(r"fmi2FullName\((fmi2\w+)\)", header.read_text()))
+    header = (FMPY_HEADERS / "fmi2Functions.h").read_text()
+    assert names == set(re.findall(r"fmi2FullName\((fmi2\w+)\)", header))
     assert len(names) == 44
 
 
@@ -54,7 +54,8 @@ def test_needs_libc_and_libm_only(small_fmu: UnpackedFmu) -> None:
     assert needed <= {"libc.so.6", "libm.so.6"} and "libc.so.6" in needed
     assert "SYMBOLIC" in headers
     versions = {tuple(map(int, v.split("."))) for v in re.findall(r"GLIBC_([\d.]+)", headers)}
-    assert max(versions) <= (2, 35)  # Ubuntu 22.04, the oldest system that ./run is for; release builds ask for less
+    print(f"{small_fmu.binary.name}: GLIBC {max(versions)}")
+    assert max(versions) <= (2, 17)  # of 2012, whatever the build's own is (fmu_src/glibc_floor.c)
 
 
 @linux
@@ -284,31 +285,3 @@ def test_fmpy_row_carries_the_sample_before(small_fmu_path: Path) -> None:
     torque = 0.007 * (5 + np.sin(rows["time"] * 9)) - 0.006 * 2.0
     assert rows["joint_torque[2]"][0] == rows["joint_torque[2]"][1]  # the first sample, and the step at its time
     np.testing.assert_allclose(rows["joint_torque[2]"][1:], torque[:-1], atol=1e-12)
-
-
-def test_the_flat_sources_give_the_same_results(small_fmu_path: Path, tmp_path: Path) -> None:
-    """Compiled as they are listed, without any flag and without optimisation: not a bit differs."""
-    compiler = tool("cc")
-    folder = tmp_path / "fmu"
-    with zipfile.ZipFile(small_fmu_path) as archive:
-        archive.extractall(folder)
-    element = ElementTree.parse(folder / "modelDescription.xml").getroot().find("CoSimulation")
-    assert element is not None
-    sources = [str(folder / "sources" / file.attrib["name"]) for file in element.iter("File")]
-    (binary,) = (folder / "binaries").rglob(f"{element.attrib['modelIdentifier']}.*")
-    binary.unlink()
-    subprocess.run([compiler, "-shared", "-fPIC", "-O0", *sources, "-o", str(binary), "-lm"], check=True)
-    assert simulated(folder).tobytes() == simulated(small_fmu_path).tobytes()
-
-
-@pytest.mark.long
-def test_source_fmu_compiled_by_fmpy_gives_the_same_results(small_fmu_path: Path, tmp_path: Path) -> None:
-    """Flat sources, fmpy's own flags; the results may not differ by a bit."""
-    from fmpy.build import build_platform_binary
-
-    tool("cmake")
-    with zipfile.ZipFile(small_fmu_path) as archive:
-        archive.extractall(tmp_path / "fmu")
-    shutil.rmtree(tmp_path / "fmu" / "binaries")
-    build_platform_binary(tmp_path / "fmu")
-    assert simulated(tmp_path / "fmu").tobytes() == simulated(small_fmu_path).tobytes()

@@ -3,6 +3,10 @@
  *
  *   driver LIBRARY GUID RESOURCES SAMPLES      RESOURCES: file URI; SAMPLES: text file, numbers in hexadecimal
  *
+ * Compiled with FMI2_FUNCTION_PREFIX it is linked with the FMU of that prefix, and LIBRARY is not looked at.
+ *
+ * The file of samples:
+ *
  *   inputs count, value references; real outputs count, value references; Boolean outputs count, value references;
  *   samples count; per sample: time, inputs (bits of doubles) */
 #include <stdint.h>
@@ -12,7 +16,13 @@
 
 #include "fmi2Functions.h"
 
-#ifdef _WIN32
+#ifdef FMI2_FUNCTION_PREFIX
+#define FUNCTION(name) (void)library
+static void* open_library(const char* path) {
+  return (void*)(uintptr_t)path;
+}
+#elif defined(_WIN32)
+#define FUNCTION(name) name##TYPE* name = (name##TYPE*)(uintptr_t)find(library, #name)
 #include <windows.h>
 static void* open_library(const char* path) {
   return (void*)LoadLibraryA(path);
@@ -21,6 +31,7 @@ static void* find(void* library, const char* name) {
   return (void*)(uintptr_t)GetProcAddress((HMODULE)library, name);
 }
 #else
+#define FUNCTION(name) name##TYPE* name = (name##TYPE*)(uintptr_t)find(library, #name)
 #include <dlfcn.h>
 static void* open_library(const char* path) {
   return dlopen(path, RTLD_NOW | RTLD_LOCAL);
@@ -91,7 +102,6 @@ int main(int count, char** arguments) {
   if (!library || !file) {
     fail(library ? "the file of samples cannot be opened" : "the library cannot be loaded");
   }
-#define FUNCTION(name) name##TYPE* name = (name##TYPE*)(uintptr_t)find(library, #name)
   FUNCTION(fmi2Instantiate);
   FUNCTION(fmi2SetupExperiment);
   FUNCTION(fmi2EnterInitializationMode);

@@ -34,6 +34,7 @@ BEYOND_C = {
     "quad_sse2.h": {"emmintrin.h"},
     "quad_avx2.h": {"immintrin.h"},
     "resource.c": {"windows.h"},
+    "glibc_floor.c": {"pthread.h", "sched.h"},
 }
 
 # --- Python: one module for each thing --------------------------------------------------------------------------------
@@ -68,6 +69,7 @@ DRAWING = {
     "drawing/finger_picture.py",
     "drawing/panels.py",
     "drawing/plot_style.py",
+    "drawing/terminal_picture.py",
     "report/plots.py",
     "report/score_plots.py",
     "report/tune_plots.py",

@@ -57,6 +57,7 @@ def test_everything_is_in(plant_fmu_path: Path) -> None:
     assert set(files) == {
         "modelDescription.xml",
         "model.png",
+        *(f"terminalsAndIcons/{name}" for name in ("terminalsAndIcons.xml", "icon.png", "input.png", "output.png")),
         "documentation/index.html",
         "documentation/licenses/license.txt",
         "documentation/licenses/third_party.txt",
@@ -108,6 +109,7 @@ def test_the_binary_is_small_and_needs_the_system_alone(plant_fmu: UnpackedFmu, 
     record_testsuite_property("plant_fmu_glibc_floor", ".".join(map(str, contents.glibc_floor)))
     if contents.format == "ELF":
         assert set(contents.libraries) <= SYSTEM_LIBRARIES
+        assert contents.glibc_floor <= (2, 17)  # of 2012, whatever the build's own is (fmu_src/plant_fmu/glibc_floor.c)
 
 
 @pytest.mark.parametrize(

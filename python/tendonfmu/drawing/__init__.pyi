@@ -32,3 +32,4 @@ from .panels import write_sheet as write_sheet
 from .plot_style import Target as Target
 from .plot_style import clean as clean
 from .plot_style import save as save
+from .terminal_picture import draw_terminal as draw_terminal

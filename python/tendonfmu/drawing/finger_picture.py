@@ -14,7 +14,10 @@ EDGE_RED = "#CC1F1A"
 TENDON_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, "#5A5A5A", "#332288", "#999933")
 
 
-def draw_finger(drawing: FingerDrawing, target: Target) -> None:
+PICTURE_DPI, ICON_DPI = 130, 26
+
+
+def draw_finger(drawing: FingerDrawing, target: Target, icon: Target | None = None) -> None:
     """Draw the routing of a finger as PNG, as in fig. 3 of the paper.
 
     It shows links, joints, tendons over and under them, pulleys, and edges (red).
@@ -25,6 +28,8 @@ def draw_finger(drawing: FingerDrawing, target: Target) -> None:
         Geometry of the drawing.
     target
         File name or binary stream.
+    icon
+        The same for a small square copy without words.
     """
     longest = max(len(tendon.name) for tendon in drawing.tendons)
     labels = 0.5 + 0.115 * longest  # room for names on the left, in drawing units
@@ -41,7 +46,20 @@ def draw_finger(drawing: FingerDrawing, target: Target) -> None:
     for i, tendon in enumerate(drawing.tendons):
         _draw_tendon(axes, tendon, TENDON_COLOURS[i % len(TENDON_COLOURS)], drawing.left, size)
     _draw_finger_legend(axes, drawing, size)
-    save(figure, target, 130)
+    save(figure, target, PICTURE_DPI)
+    if icon is not None:
+        _leave_words_out(figure, axes, drawing)
+        save(figure, icon, ICON_DPI)
+
+
+def _leave_words_out(figure: Figure, axes: Axes, drawing: FingerDrawing) -> None:
+    legend = axes.get_legend()
+    if legend is not None:
+        legend.remove()
+    for text in axes.texts:
+        text.set_visible(False)
+    axes.set_xlim(drawing.left, drawing.right)
+    figure.set_size_inches(figure.get_figwidth(), figure.get_figwidth())
 
 
 def _draw_skeleton(axes: Axes, drawing: FingerDrawing, size: float) -> None:

@@ -8,6 +8,7 @@ from .model_variables import group_sizes as group_sizes
 from .model_variables import read_table as read_table
 from .model_variables import units_of as units_of
 from .packaging import build_fmu as build_fmu
+from .packaging import draw_pictures as draw_pictures
 from .packaging import find_binaries as find_binaries
 from .packaging import guid as guid
 from .packaging import licenses as licenses
@@ -22,3 +23,4 @@ from .running import finger_of as finger_of
 from .running import outputs_of as outputs_of
 from .running import run_model as run_model
 from .running import summary as summary
+from .terminals import terminals_and_icons as terminals_and_icons

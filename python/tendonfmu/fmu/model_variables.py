@@ -19,6 +19,18 @@ from tendonfmu.model import (
     structure_of,
 )
 
+# Unit -> the unit in which a person reads it, and how many of them make one. Start values and limits stay in `unit`.
+DISPLAY_UNITS = {
+    "rad": ("deg", 57.29577951308232),
+    "rad/s": ("deg/s", 57.29577951308232),
+    "m": ("mm", 1e3),
+    "m/s": ("mm/s", 1e3),
+    "N.m": ("mN.m", 1e3),
+    "N/m": ("N/mm", 1e-3),
+}
+# Unit -> size of such a signal in a robot finger: importers scale tolerances and plots by it.
+NOMINAL_VALUES = {"N": 10.0, "m": 0.01, "rad": 1.0, "rad/s": 1.0, "N.m": 0.1}
+
 # Characters that XML 1.0 does not allow, even escaped.
 NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
@@ -119,10 +131,14 @@ def units_of(variables: list[dict[str, Any]], table: VariableTable) -> dict[str,
     Returns
     -------
     dict
-        Unit -> its base units.
+        Unit -> `base`, its base units, and `display`, the entry of `DISPLAY_UNITS` or None.
     """
     used = {variable.get("unit") for variable in variables}
-    return {unit: base for unit, base in table.data["units"].items() if unit in used}
+    return {
+        unit: {"base": base, "display": DISPLAY_UNITS.get(unit)}
+        for unit, base in table.data["units"].items()
+        if unit in used
+    }
 
 
 def _names(group: Mapping[str, Any], sizes: Mapping[str, int]) -> list[str]:
@@ -143,10 +159,13 @@ def elements(group: Mapping[str, Any], sizes: Mapping[str, int]) -> Iterator[dic
     Yields
     ------
     dict
-        Name, value reference, type, causality, variability, description and, where given, limits, unit and start.
+        Name, value reference, type, causality, variability, description and, where there are such, limits, unit, start,
+        nominal value and terminal.
     """
     given = {key: group[key] for key in ("type", "causality", "variability")}
-    where = {key: group[key] for key in ("initial", "unit", "min", "max", "start") if key in group}
+    where = {key: group[key] for key in ("initial", "unit", "min", "max", "start", "terminal") if key in group}
+    if group["causality"] != "parameter" and group.get("unit") in NOMINAL_VALUES:
+        where["nominal"] = NOMINAL_VALUES[group["unit"]]
     for i, name in enumerate(_names(group, sizes)):
         text = group["description"].replace("{i}", str(i + 1))
         yield {**given, **where, "name": name, "vr": group["base"] + i, "description": text}

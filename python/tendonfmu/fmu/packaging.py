@@ -18,7 +18,10 @@ from typing import TYPE_CHECKING, Any
 
 from tendonfmu.errors import InputError, InternalError
 from tendonfmu.files import whole_file
+from tendonfmu.fmu.documentation import documentation_page
 from tendonfmu.fmu.model_variables import VariableTable, describe_model, read_table
+from tendonfmu.fmu.schema_check import checked
+from tendonfmu.fmu.terminals import terminals_and_icons
 from tendonfmu.model import Finger, FingerSource, native, read_finger
 
 if TYPE_CHECKING:
@@ -180,8 +183,12 @@ def members(description: Finger, *, binaries: Path | None = None, illustrated: b
         "resources/model.image": description.image,
         "resources/finger.json": description.text,
     }
+    icon = None
     if illustrated:
-        content |= _for_readers(description, context)
+        pictures, icon = draw_pictures(description)
+        content |= pictures
+        content["documentation/index.html"] = documentation_page(description, context).encode()
+    content |= terminals_and_icons(context["variables"], icon)
     content |= licenses("license.txt")
     content |= {f"sources/{name}": data for name, data in sources.items()}
     libraries = find_binaries(binaries, BINARIES, BINARY_STEM, identifier)
@@ -189,17 +196,27 @@ def members(description: Finger, *, binaries: Path | None = None, illustrated: b
     return content
 
 
-def _for_readers(description: Finger, context: Mapping[str, Any]) -> dict[str, bytes]:
+def draw_pictures(finger: Finger) -> tuple[dict[str, bytes], bytes]:
+    """Draw a finger for the root of an FMU.
+
+    Parameters
+    ----------
+    finger
+        The finger.
+
+    Returns
+    -------
+    pictures : dict of bytes
+        Path in the archive -> PNG.
+    icon : bytes
+        The same, smaller.
+    """
     from tendonfmu.drawing import draw_finger
-    from tendonfmu.fmu.documentation import documentation_page
     from tendonfmu.model import finger_drawing
 
-    picture = io.BytesIO()
-    draw_finger(finger_drawing(description), picture)
-    return {
-        "model.png": picture.getvalue(),
-        "documentation/index.html": documentation_page(description, context).encode(),
-    }
+    picture, icon = io.BytesIO(), io.BytesIO()
+    draw_finger(finger_drawing(finger), picture, icon)
+    return {"model.png": picture.getvalue()}, icon.getvalue()
 
 
 # --- parts -----------------------------------------------------------------------------------------------------------
@@ -306,7 +323,7 @@ def model_description(context: Mapping[str, Any]) -> bytes:
     InternalError
         FMI's schema refuses the XML, or is not found.
     """
-    return _checked(_render_xml(context))
+    return checked(_render_xml(context), "fmi2/fmi2ModelDescription.xsd")
 
 
 def _render_xml(context: Mapping[str, Any]) -> bytes:
@@ -315,24 +332,6 @@ def _render_xml(context: Mapping[str, Any]) -> bytes:
     template = package_file("model_description/modelDescription.xml.jinja").read_text(encoding="utf-8")
     environment = jinja2.Environment(undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
     return environment.from_string(template).render(context).encode()
-
-
-def _checked(xml: bytes) -> bytes:
-    """Return the XML if FMI's schema accepts it.
-
-    The schema comes with fmpy, but fmpy is not imported, which would take half a second.
-    """
-    from lxml import etree
-
-    spec = importlib.util.find_spec("fmpy")
-    if spec is None or not spec.submodule_search_locations:
-        raise InternalError("modelDescription.xml: FMI's schema not found; expected the Python package fmpy")
-    schema_path = Path(spec.submodule_search_locations[0]) / "schema" / "fmi2" / "fmi2ModelDescription.xsd"
-    schema = etree.XMLSchema(etree.parse(str(schema_path)))
-    if not schema.validate(etree.fromstring(xml)):
-        error = schema.error_log[0]
-        raise InternalError(f"modelDescription.xml, line {error.line}: {error.message}")
-    return xml
 
 
 # --- archive ---------------------------------------------------------------------------------------------------------

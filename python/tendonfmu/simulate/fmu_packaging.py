@@ -6,13 +6,13 @@ The binary is the same for every rig; the rig is a resource. The same input give
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import Any
 
 from tendonfmu.errors import InputError
 from tendonfmu.files import whole_file
 from tendonfmu.fmu import (
+    draw_pictures,
     find_binaries,
     guid,
     licenses,
@@ -21,6 +21,7 @@ from tendonfmu.fmu import (
     pack,
     package_file,
     read_table,
+    terminals_and_icons,
 )
 from tendonfmu.model import count, native
 from tendonfmu.simulate.fmu_variables import describe_plant
@@ -65,9 +66,7 @@ def plant_members(rig: Rig, *, binaries: Path | None = None) -> dict[str, bytes]
 
     Raise InputError if the plant refuses the rig.
     """
-    from tendonfmu.drawing import draw_finger
     from tendonfmu.fmu import render_documentation
-    from tendonfmu.model import finger_drawing
 
     text = rig.json().encode()
     table = read_table(package_file("model_description/plant_variables.json").read_text(encoding="utf-8"))
@@ -80,14 +79,14 @@ def plant_members(rig: Rig, *, binaries: Path | None = None) -> dict[str, bytes]
         "source_files": [],
     }
     page = render_documentation("plant_documentation.html.jinja", context, summary=count(rig.finger), rig=rig)
-    picture = io.BytesIO()
-    draw_finger(finger_drawing(rig.finger), picture)
+    pictures, icon = draw_pictures(rig.finger)
     found = find_binaries(binaries, BINARIES, BINARY_STEM, identifier)
     return {
         "modelDescription.xml": model_description(context),
-        "model.png": picture.getvalue(),
+        **pictures,
         "documentation/index.html": page.encode(),
         "resources/rig.json": text,
+        **terminals_and_icons(context["variables"], icon),
         **licenses("license.txt", "third_party.txt"),
         **{f"binaries/{path}": data for path, data in found.items()},
     }
