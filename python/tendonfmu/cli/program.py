@@ -165,6 +165,10 @@ def options(
 def build(
     file: Subject,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FINGER.fmu", help="FMU to write")],
+    reference: Annotated[
+        Path | None,
+        typer.Option(metavar="REC", help="recording; the FMU carries its inputs and outputs for checks"),
+    ] = None,
     binaries: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="folder of binaries by FMI platform [default: those installed]"),
@@ -179,7 +183,7 @@ def build(
     from tendonfmu.fmu import fmu_report
     from tendonfmu.interface import build as build_fmu
 
-    build_fmu(file, output, binaries=binaries)
+    build_fmu(file, output, reference=reference, binaries=binaries)
     say(f"{output}: {output.stat().st_size / 1024:.0f} KiB")
     print_json(lambda: fmu_report(file, output))
 

@@ -16,6 +16,8 @@ from .packaging import model_description as model_description
 from .packaging import model_identifier as model_identifier
 from .packaging import pack as pack
 from .packaging import package_file as package_file
+from .reference_results import reference_files as reference_files
+from .reference_results import related_members as related_members
 from .running import check_model as check_model
 from .running import columns_of as columns_of
 from .running import finger_of as finger_of
