@@ -31,8 +31,14 @@ CHANGED = {
 Trace = Callable[[], Path]
 
 
-def check(fmu: Path, trace: Path, *more: str) -> Answer:
-    return run_script(EXAMPLE / "check_reference.py", fmu, trace, *more)
+@pytest.fixture(autouse=True)
+def beside_the_script(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The script imports a file of its folder, as it does when Python runs it."""
+    monkeypatch.syspath_prepend(EXAMPLE)
+
+
+def check(fmu: Path, *more: Path | str) -> Answer:
+    return run_script(EXAMPLE / "check_reference.py", fmu, *more)
 
 
 def number_at(description: dict[str, Any], path: str) -> float:

@@ -157,7 +157,7 @@ def _on_grid(finger: Finger, recording: Recording) -> tuple[Recording, float]:
             for name, signals in groups.items()
         }
     # the products that clients compute: what they set is then a sample, not something between two
-    times = step * np.arange(len(groups["tendon_force"]))
+    times = step * np.arange(len(groups["tendon_force"]), dtype=np.float64)
     return Recording(recording.path, times, groups), step
 
 
@@ -216,10 +216,10 @@ def _xml(root: Any) -> bytes:
 
 
 def _note(related: Sequence[Related]) -> str:
-    files = "".join(f"  {each.name}: {each.description.lower()}\n" for each in related)
+    files = "".join(f"  {each.name}: {each.description}\n" for each in related)
     rows = (
-        "The rows of the results are those of a client that calls fmi2DoStep(t, h), reads the outputs, and writes them\n"
-        "under the time t + h: the outputs belong to the sample at t. The first sample is in the first two rows.\n"
+        "The rows of the results are those of a client that calls fmi2DoStep(t, h), reads the outputs, and writes\n"
+        "them under the time t + h: the outputs belong to the sample at t. The first sample is in the first two rows.\n"
         "An output agrees if |result - reference| <= RelTol * max |reference| + AbsTol in every row.\n"
     )
     return f"Files in {FOLDER}:\n\n{files}\n" + (rows if any(each.role == "result" for each in related) else "")
