@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import warnings
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -103,6 +104,68 @@ def test_the_fmu_carries_it(ssv: Path, tmp_path: Path) -> None:
     assert related.attrib["role"] == "parameter" and related.attrib["type"] == "application/x-ssp-parameter-set"
     assert related.attrib["source"] == "fitted.ssv"
 
+
+# --- masters that read it from an SSP package -------------------------------------------------------------------------
+
+NAMES = ["joints[1].friction.coulomb", "joints[1].friction.static", "joints[2].friction.coulomb"]
+SYSTEM = """<?xml version="1.0" encoding="UTF-8"?>
+<ssd:SystemStructureDescription version="1.0" name="finger"
+    xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription"
+    xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon">
+  <ssd:System name="finger"><ssd:Elements>
+    <ssd:Component name="friction" type="application/x-fmu-sharedlibrary" source="resources/friction.fmu">
+      <ssd:Connectors>
+        <ssd:Connector name="contact" kind="output"><ssc:Boolean/></ssd:Connector>
+      </ssd:Connectors>
+      <ssd:ParameterBindings><ssd:ParameterBinding source="resources/fitted.ssv"/></ssd:ParameterBindings>
+    </ssd:Component>
+  </ssd:Elements></ssd:System>
+  <ssd:DefaultExperiment startTime="0.0" stopTime="1.0"/>
+</ssd:SystemStructureDescription>
+"""
+
+
+def values_in_ecos(package: Path) -> list[float]:
+    try:
+        from ecospy import EcosSimulation
+    except (ImportError, OSError) as missing:
+        pytest.skip(f"ECOS NOT TESTED: {missing}; it wants the packages ecospy (PyPI) and libtbb12")
+    with EcosSimulation(ssp_path=str(package), step_size=0.001) as simulation:
+        simulation.init(parameter_set="two_joints: fitted")
+        simulation.step()
+        return [simulation.get_real(f"friction::{name}") for name in NAMES]
+
+
+def values_in_libcosim(package: Path) -> list[float]:
+    try:
+        from libcosimpy.CosimExecution import CosimExecution
+        from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
+        from libcosimpy.CosimObserver import CosimObserver
+    except (ImportError, OSError) as missing:
+        pytest.skip(f"LIBCOSIM NOT TESTED: {missing}; it wants the package libcosimpy (PyPI)")
+    log_output_level(CosimLogLevel.FATAL)
+    with zipfile.ZipFile(package) as archive:
+        archive.extractall(package.parent / "unpacked")
+    execution = CosimExecution.from_ssp_file(str(package.parent / "unpacked"), step_size=1_000_000)
+    observer = CosimObserver.create_last_value()
+    execution.add_observer(observer)
+    index = execution.slave_index_from_instance_name("friction")
+    references = {variable.name.decode(): variable.reference for variable in execution.slave_variables(index)}
+    assert execution.step()
+    return [float(value) for value in observer.last_real_values(index, [references[name] for name in NAMES])]
+
+
+@pytest.mark.parametrize("values_in", [values_in_ecos, values_in_libcosim])
+def test_masters_apply_it(values_in: Callable[[Path], list[float]], ssv: Path, tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "finger.ssp", "w") as archive:
+        archive.writestr("SystemStructure.ssd", SYSTEM)
+        archive.write(tf.build(FINGER, tmp_path / "friction.fmu"), "resources/friction.fmu")
+        archive.write(ssv, "resources/fitted.ssv")
+    expected = {each.name: float(each.value) for each in read_ssv(str(ssv)).parameters}
+    assert values_in(tmp_path / "finger.ssp") == [expected[name] for name in NAMES]
+
+
+# --- sets that are refused --------------------------------------------------------------------------------------------
 
 REFUSED = {
     "of another finger": (r"joints\[1\]", "joints[7]", r"joints\[7\]\S*: not a parameter of two_joints\.json"),
