@@ -189,6 +189,30 @@ def test_the_fmu_agrees_with_what_it_carries(fmu: Path) -> None:
     assert done.out.splitlines()[-1] == f"cable_loop.fmu: 0 of {len(names)} variables differ from cable_loop"
 
 
+def test_fmpy_finds_no_outlier(fmu: Path, tmp_path: Path) -> None:
+    """fmpy's own functions for the FMI cross-check: they read the three files, and compare within a band."""
+    from fmpy.util import read_csv, read_ref_opt_file, validate_result
+
+    for name, content in members(fmu).items():
+        if name.startswith(FOLDER):
+            (tmp_path / Path(name).name).write_bytes(content)
+    options = read_ref_opt_file(tmp_path / "cable_loop_ref.opt")
+    reference = read_csv(tmp_path / "cable_loop_ref.csv")
+    result = fmpy.simulate_fmu(
+        str(fmu),
+        validate=False,
+        start_time=options["StartTime"],
+        stop_time=options["StopTime"],
+        output_interval=options["StepSize"],
+        input=read_csv(tmp_path / "cable_loop_in.csv"),
+        output=list(reference.dtype.names[1:]),
+    )
+    assert validate_result(result, reference, options["StopTime"]) == 0.0
+    moved = reference.copy()
+    moved["joint_angle[1]"] += 0.2 * np.ptp(reference["joint_angle[1]"])
+    assert validate_result(result, moved, options["StopTime"]) > 0.0
+
+
 def test_a_changed_parameter_or_finger_differs(fmu: Path, edited: Callable[[Edit], Path], tmp_path: Path) -> None:
     assert check(fmu, "--set", "bias.forget_rate=7").status == 1
     description = json.loads(DESCRIPTION.read_text(encoding="utf-8"))
