@@ -80,15 +80,20 @@ def read_model(path: Path) -> Any:
     return model
 
 
-def is_number(variable: Any) -> bool:
-    return variable.type in FMI_TYPES and not variable.dimensions
+def is_numeric(variable: Any) -> bool:
+    """A number, or an array of one dimension."""
+    return variable.type in FMI_TYPES and len(variable.dimensions) <= 1
+
+
+def size(variable: Any) -> int:
+    return int(np.prod(variable.shape)) if variable.shape else 1
 
 
 def expect_variables(model: Any, names: Iterable[str], where: object, causality: str | None = None) -> None:
     """Raises BadFile for a name that the FMU does not have, or has in another role."""
     known = {variable.name: variable for variable in model.modelVariables}
     for name in names:
-        if name not in known or not is_number(known[name]):
+        if name not in known or not is_numeric(known[name]):
             raise BadFile(f"{where}: {name} is not a numeric variable of the FMU")
         if causality and known[name].causality != causality:
             raise BadFile(f"{where}: {name} is of causality {known[name].causality}; expected {causality}")
@@ -99,7 +104,7 @@ def traces_of(path: Path, model: Any, prefix: str | None) -> list[Trace]:
     if prefix is not None:
         return [cross_check_trace(prefix, any(each.causality == "input" for each in model.modelVariables))]
     step = model.defaultExperiment.stepSize if model.defaultExperiment else None
-    not_numeric = [each.name for each in model.modelVariables if not is_number(each)]
+    not_numeric = [each.name for each in model.modelVariables if not is_numeric(each)]
     return carried_traces(path, None if step is None else float(step), not_numeric)
 
 
@@ -107,6 +112,11 @@ def check_names(model: Any, trace: Trace) -> None:
     """Raises BadFile where the FMU lacks a variable of the trace, or a complete trace lacks an output of the FMU."""
     expect_variables(model, columns(trace.inputs or {}), trace.inputs_source, "input")
     expect_variables(model, columns(trace.reference), trace.source)
+    sizes = {each.name: size(each) for each in model.modelVariables}
+    for where, table in ((trace.inputs_source, trace.inputs or {}), (trace.source, trace.reference)):
+        for name in columns(table):
+            if table[name][0].size != sizes[name]:
+                raise BadFile(f"{where}: {name}: {table[name][0].size} numbers in a cell; expected {sizes[name]}")
     outputs = [each.name for each in model.modelVariables if each.causality == "output"]
     missing = [name for name in outputs if name not in trace.reference]
     if trace.complete and missing:
@@ -154,16 +164,17 @@ def signals(model: Any, inputs: Mapping[str, Array] | None) -> Array | None:
     """The inputs as fmpy takes them."""
     if inputs is None:
         return None
-    types = {each.name: FMI_TYPES[each.type] for each in model.modelVariables if each.name in inputs}
-    found = np.zeros(len(inputs["time"]), dtype=[(name, types.get(name, np.float64)) for name in inputs])
+    variables = {each.name: each for each in model.modelVariables}
+    types: list[Any] = [("time", np.float64)]
+    types += [(name, FMI_TYPES[variables[name].type], inputs[name].shape[1:]) for name in columns(inputs)]
+    found = np.zeros(len(inputs["time"]), dtype=types)
     for name, values in inputs.items():
         found[name] = values
     return found
 
 
-def at_times(time: Array, result: Array, name: str) -> Array:
-    """A result column at the times of the reference: between rows a Real is a line, anything else holds."""
-    values, own = result[name], result["time"]
+def at_times(time: Array, own: Array, values: Array) -> Array:
+    """Results of the times `own` at the times of the reference: between rows a Real is a line, anything else holds."""
     if len(own) == len(time) and np.abs(own - time).max() <= SAME_TIME * np.diff(time).min():
         return values.astype(np.float64)
     if values.dtype.kind == "f":
@@ -175,13 +186,16 @@ def at_times(time: Array, result: Array, name: str) -> Array:
 
 
 def compare(trace: Trace, result: Array) -> list[Verdict]:
-    """A verdict for each column of the reference but `time`."""
+    """A verdict for each column of the reference but `time`, of an array for each element."""
     verdicts = []
     for name in columns(trace.reference):
-        expected = trace.reference[name]
-        deviation = np.abs(at_times(trace.reference["time"], result, name) - expected).max()
-        tolerance = trace.options["RelTol"] * np.abs(expected).max() + trace.options["AbsTol"]
-        verdicts.append(Verdict(name, float(deviation), float(tolerance)))
+        reference = trace.reference[name].reshape(len(trace.reference["time"]), -1)
+        found = result[name].reshape(len(result), -1)
+        for i, (expected, values) in enumerate(zip(reference.T, found.T, strict=True), start=1):
+            deviation = np.abs(at_times(trace.reference["time"], result["time"], values) - expected).max()
+            tolerance = trace.options["RelTol"] * np.abs(expected).max() + trace.options["AbsTol"]
+            element = f"{name}[{i}]" if found.shape[1] > 1 else name
+            verdicts.append(Verdict(element, float(deviation), float(tolerance)))
     return verdicts
 
 

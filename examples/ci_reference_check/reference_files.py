@@ -92,20 +92,32 @@ def _text(path: Path, expected: str) -> str:
 
 
 def read_table(text: str, where: object, leave_out: Collection[str] = ()) -> dict[str, Array]:
-    """Columns by name, `time` first and never decreasing. Raises BadFile."""
+    """Columns by name, `time` first and never decreasing: [N], or [N, k] where a cell has k numbers. Raises BadFile."""
     header, *rows = csv.reader(io.StringIO(text), skipinitialspace=True) if text.strip() else [[""]]
     if header[0] != "time" or len(set(header)) < len(header):
         raise BadFile(f"{where}, header: expected `time` first and no name twice")
-    read = [j for j, name in enumerate(header) if name not in leave_out]
-    values = np.empty((len(rows), len(read)))
+    found: dict[str, list[list[float]]] = {name: [] for name in header if name not in leave_out}
     for k, row in enumerate(rows):
         if len(row) != len(header):
             raise BadFile(f"{where}, line {k + 2}: {len(row)} columns; expected {len(header)}")
-        for i, j in enumerate(read):
-            values[k, i] = number(row[j], f"{where}, line {k + 2}, column {header[j]}")
-    if len(rows) < 2 or not (np.diff(values[:, 0]) >= 0).all() or values[0, 0] == values[-1, 0]:
+        for name, cell in zip(header, row, strict=True):
+            if name in found:
+                found[name].append(
+                    _numbers(cell, len(found[name][0]) if k else None, f"line {k + 2}, column {name}", where)
+                )
+    table = {name: np.array(cells) for name, cells in found.items()}
+    time = table["time"].reshape(-1)
+    if len(rows) < 2 or len(time) > len(rows) or not (np.diff(time) >= 0).all() or time[0] == time[-1]:
         raise BadFile(f"{where}, column time: expected two rows or more, none earlier than the one before")
-    return {header[j]: values[:, i] for i, j in enumerate(read)}
+    return {name: values.reshape(-1) if values.shape[1] == 1 else values for name, values in table.items()}
+
+
+def _numbers(cell: str, count: int | None, place: str, where: object) -> list[float]:
+    """The numbers of a cell: those of an array are separated by spaces."""
+    found = [number(text, f"{where}, {place}") for text in cell.split() or [cell]]
+    if count not in (None, len(found)):
+        raise BadFile(f"{where}, {place}: {len(found)} numbers; expected {count}, as in the row before")
+    return found
 
 
 def read_results(text: str, where: object, leave_out: Collection[str] = ()) -> dict[str, Array]:

@@ -22,7 +22,6 @@ from lxml import etree
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.files import csv_lines
 from tendonfmu.fmu.packaging import model_identifier
 from tendonfmu.fmu.running import columns_of, run_model
 from tendonfmu.model import Finger, inputs_used
@@ -70,7 +69,7 @@ class Related:
     description: str
 
 
-def reference_files(finger: Finger, recording: Recording) -> list[Related]:
+def reference_files(finger: Finger, recording: Recording, *, arrays: bool = False) -> list[Related]:
     """Run a finger over a recording, and return inputs, outputs and tolerance as files.
 
     Parameters
@@ -80,6 +79,9 @@ def reference_files(finger: Finger, recording: Recording) -> list[Related]:
     recording
         Signals of the same finger, for tendon positions as the source of the kinematics. Time starts at 0 in the files.
         Samples that are not evenly spaced are interpolated to the median step.
+    arrays
+        Whether the variables of the FMU are arrays, as of FMI 3.0: a cell then has the numbers of all elements,
+        separated by spaces. Else they are scalars of their own, such as `joint_torque[2]`.
 
     Returns
     -------
@@ -92,12 +94,13 @@ def reference_files(finger: Finger, recording: Recording) -> list[Related]:
         The recording does not fit the finger, or has fewer than two samples.
     """
     grid, step = _on_grid(finger, recording)
-    outputs = columns_of(run_model(finger, grid))
+    outputs = run_model(finger, grid)
     # A client reads after fmi2DoStep(t, h), under the time t + h, what belongs to the sample at t; the first sample is
     # taken by the initialisation.
     rows = np.maximum(np.arange(len(grid)) - 1, 0)
     reference = {name: values if name == "time" else values[rows] for name, values in outputs.items()}
     name, stop = model_identifier(finger.name), float(grid.time[-1])
+    inputs: Table = {"time": grid.time, **grid.groups}
     return [
         Related(
             f"{name}.exp",
@@ -106,8 +109,20 @@ def reference_files(finger: Finger, recording: Recording) -> list[Related]:
             "application/x-ma-hs-experiments",
             "The run that gave the reference results",
         ),
-        Related(f"{name}_in.csv", _csv(_inputs(grid)), "testcase", "text/csv", "Inputs of the reference results"),
-        Related(f"{name}_ref.csv", _csv(reference), "result", "text/csv", "Reference results: all outputs"),
+        Related(
+            f"{name}_in.csv",
+            _csv(inputs if arrays else columns_of(inputs)),
+            "testcase",
+            "text/csv",
+            "Inputs of the reference results",
+        ),
+        Related(
+            f"{name}_ref.csv",
+            _csv(reference if arrays else columns_of(reference)),
+            "result",
+            "text/csv",
+            "Reference results: all outputs",
+        ),
         Related(
             f"{name}_ref.opt",
             _options(stop, step),
@@ -161,15 +176,21 @@ def _on_grid(finger: Finger, recording: Recording) -> tuple[Recording, float]:
     return Recording(recording.path, times, groups), step
 
 
-def _inputs(recording: Recording) -> Table:
-    return {"time": recording.time, **columns_of(recording.groups)}
-
-
 # --- files ------------------------------------------------------------------------------------------------------------
 
 
 def _csv(table: Mapping[str, NDArray[Any]]) -> bytes:
-    return "".join(csv_lines(table)).encode()
+    """Return a table as CSV; of a column [N, k], each cell has k numbers."""
+    columns = [map(_cell, values.tolist()) for values in table.values()]
+    rows = (",".join(row) + "\n" for row in zip(*columns, strict=True))
+    return "".join([",".join(table) + "\n", *rows]).encode()
+
+
+def _cell(value: Any) -> str:
+    """Return a number, flag or list of these as text that reads back the same."""
+    if isinstance(value, list):
+        return " ".join(map(_cell, value))
+    return repr(int(value) if isinstance(value, bool) else value)
 
 
 def _options(stop: float, step: float) -> bytes:
