@@ -4,6 +4,7 @@
 #   set_up_system FLAVOUR   compiler, headers and a Python >= 3.10; FLAVOUR `run`, or `test`: GoogleTest as well
 #   set_up_sundials         SUNDIALS for the simulated finger, unpacked into build/sundials; going on without it is possible
 #   set_up_python           .venv with the locked packages
+#   set_up_java_clients     FMI4j and Maestro in build/clients, for the tests of ./test --all
 #   set_up_package          tendonfmu itself, rebuilt when a source changed
 #
 # Stamps make a second call skip what is done: each holds a digest of what its step depends on.
@@ -212,6 +213,20 @@ set_up_extra() {
   wanted=$(digest <"requirements-$1.lock")
   if is_stamped "$stamp" "$wanted"; then return; fi
   quietly "installing the Python extra $1" install_locked "requirements-$1.lock"
+  printf '%s\n' "$wanted" >"$stamp"
+}
+
+# FMI4j and Maestro, from Maven Central into build/clients: python_tests/pages/test_java_clients.py runs them.
+set_up_java_clients() {
+  local folder=build/clients stamp=build/clients/.java wanted
+  wanted=$(digest <tools/java_clients.xml)
+  if is_stamped "$stamp" "$wanted"; then return; fi
+  if ! command -v mvn >/dev/null || ! command -v javac >/dev/null; then
+    say "no mvn or no javac on the PATH"
+    return 1
+  fi
+  mkdir -p "$folder"
+  quietly "fetching FMI4j and Maestro" mvn --batch-mode --file tools/java_clients.xml package
   printf '%s\n' "$wanted" >"$stamp"
 }
 

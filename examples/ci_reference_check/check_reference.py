@@ -1,39 +1,49 @@
-"""Runs an FMI 2.0 co-simulation FMU over a reference trace. Exit 0: it agrees, 1: it does not, 2: bad usage or files.
+"""Runs a co-simulation FMU over reference results. Exit 0: it agrees, 1: it does not, 2: bad usage or files.
 
-    python check_reference.py MODEL.fmu FOLDER/NAME [--set VARIABLE=VALUE ...]
+    python check_reference.py MODEL.fmu [options]                  # the results that the FMU carries (fmi-ls-ref)
+    python check_reference.py MODEL.fmu FOLDER/NAME [options]      # a trace of the FMI cross-check:
 
     FOLDER/NAME_in.csv    time and inputs (may be absent when the FMU takes none)
     FOLDER/NAME_ref.csv   time and the outputs that `fmpy.simulate_fmu` must yield
     FOLDER/NAME_ref.opt   StartTime, StopTime, StepSize, RelTol, AbsTol, one `name,value` a line
 
-The form is that of the FMI cross-check. A variable agrees when each of its rows lies within
-RelTol · (largest magnitude of its reference) + AbsTol. Needs the Python packages fmpy and numpy only.
+A variable agrees when each of its rows lies within RelTol · (largest magnitude of its reference) + AbsTol. FMI 2.0 and
+3.0. Needs the Python packages fmpy and numpy only.
 """
 
 from __future__ import annotations
 
 import argparse
 import contextlib
-import csv
 import io
 import sys
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import fmpy
 import numpy as np
 from numpy.typing import NDArray
+from reference_files import SAME_TIME, BadFile, Trace, carried_traces, cross_check_trace
 
 Array = NDArray[Any]
-OPTIONS = ("StartTime", "StopTime", "StepSize", "RelTol", "AbsTol")
-FMI_TYPES: dict[str, Any] = {"Real": np.float64, "Integer": np.int32, "Enumeration": np.int32, "Boolean": np.bool_}
-SAME_TIME = 1e-9  # share of a step: reference and result rows closer than this are the same moment
-
-
-class BadFile(Exception):
-    """One line: where, what, what was expected."""
+FMI_TYPES: dict[str, Any] = {
+    "Real": np.float64,
+    "Integer": np.int32,
+    "Enumeration": np.int32,
+    "Boolean": np.bool_,
+    "Float32": np.float32,
+    "Float64": np.float64,
+    "Int8": np.int8,
+    "UInt8": np.uint8,
+    "Int16": np.int16,
+    "UInt16": np.uint16,
+    "Int32": np.int32,
+    "UInt32": np.uint32,
+    "Int64": np.int64,
+    "UInt64": np.uint64,
+}
 
 
 class RunFailed(Exception):
@@ -53,56 +63,7 @@ class Verdict:
         return self.deviation <= self.tolerance  # a deviation that is no number agrees with nothing
 
 
-# --- files -----------------------------------------------------------------------------------------------------------
-
-
-def read_table(path: Path) -> dict[str, Array]:
-    """Columns by name, `time` first and increasing. Raises BadFile."""
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            header, *rows = csv.reader(file, skipinitialspace=True)
-    except (OSError, ValueError):
-        raise BadFile(f"{path}: cannot be read; expected a CSV file with a header") from None
-    if header[0] != "time" or len(set(header)) < len(header):
-        raise BadFile(f"{path}, header: expected `time` first and no name twice")
-    values = np.empty((len(rows), len(header)))
-    for k, row in enumerate(rows):
-        if len(row) != len(header):
-            raise BadFile(f"{path}, line {k + 2}: {len(row)} columns; expected {len(header)}")
-        for j, cell in enumerate(row):
-            values[k, j] = number(cell, f"{path}, line {k + 2}, column {header[j]}")
-    if len(rows) < 2 or not (np.diff(values[:, 0]) > 0).all():
-        raise BadFile(f"{path}, column time: expected two rows or more, each later than the one before")
-    return {name: values[:, j] for j, name in enumerate(header)}
-
-
-def read_options(path: Path) -> dict[str, float]:
-    """The numbers of NAME_ref.opt; tolerances that are left out are 0. Raises BadFile."""
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, ValueError):
-        raise BadFile(f"{path}: cannot be read; expected lines `name,value`: {', '.join(OPTIONS)}") from None
-    found = {}
-    for line in filter(str.strip, lines):
-        name, _, value = (part.strip() for part in line.partition(","))
-        if name in OPTIONS:
-            found[name] = number(value, f"{path}, {name}")
-    missing = [name for name in OPTIONS[:3] if name not in found]
-    if missing:
-        raise BadFile(f"{path}: {', '.join(missing)} missing; expected lines `name,value`")
-    if not found["StopTime"] > found["StartTime"] or not found["StepSize"] > 0.0:
-        raise BadFile(f"{path}: expected StopTime after StartTime and StepSize above 0")
-    return {"RelTol": 0.0, "AbsTol": 0.0} | found
-
-
-def number(text: str, where: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = np.nan
-    if not np.isfinite(value):
-        raise BadFile(f"{where}: {text!r}; expected a finite number")
-    return value
+# --- the FMU ---------------------------------------------------------------------------------------------------------
 
 
 def read_model(path: Path) -> Any:
@@ -111,109 +72,155 @@ def read_model(path: Path) -> Any:
         model = fmpy.read_model_description(str(path), validate=False)
     except Exception as failed:  # fmpy has no error class of its own
         raise BadFile(f"{path}: {str(failed).splitlines()[0]}; expected an FMU") from None
-    if model.fmiVersion != "2.0" or model.coSimulation is None:
-        raise BadFile(f"{path}: FMI {model.fmiVersion}; expected an FMU of FMI 2.0 for co-simulation")
+    if model.fmiVersion.split(".")[0] not in ("2", "3") or model.coSimulation is None:
+        raise BadFile(f"{path}: FMI {model.fmiVersion}; expected an FMU of FMI 2.0 or 3.0 for co-simulation")
     platforms = fmpy.supported_platforms(str(path))
-    if fmpy.platform not in platforms:
+    if fmpy.platform not in platforms and fmpy.platform_tuple not in platforms:
         raise BadFile(f"{path}: binaries for {', '.join(platforms) or 'no platform'}; expected {fmpy.platform}")
     return model
 
 
-def expect_variables(model: Any, names: Sequence[str], where: object, causality: str | None = None) -> None:
+def is_numeric(variable: Any) -> bool:
+    """A number, or an array of one dimension."""
+    return variable.type in FMI_TYPES and len(variable.dimensions) <= 1
+
+
+def size(variable: Any) -> int:
+    return int(np.prod(variable.shape)) if variable.shape else 1
+
+
+def expect_variables(model: Any, names: Iterable[str], where: object, causality: str | None = None) -> None:
     """Raises BadFile for a name that the FMU does not have, or has in another role."""
     known = {variable.name: variable for variable in model.modelVariables}
     for name in names:
-        if name not in known or known[name].type not in FMI_TYPES:
+        if name not in known or not is_numeric(known[name]):
             raise BadFile(f"{where}: {name} is not a numeric variable of the FMU")
         if causality and known[name].causality != causality:
             raise BadFile(f"{where}: {name} is of causality {known[name].causality}; expected {causality}")
 
 
+def traces_of(path: Path, model: Any, prefix: str | None) -> list[Trace]:
+    """What to check: FOLDER/NAME, or what the FMU carries. Raises BadFile."""
+    if prefix is not None:
+        return [cross_check_trace(prefix, any(each.causality == "input" for each in model.modelVariables))]
+    step = model.defaultExperiment.stepSize if model.defaultExperiment else None
+    not_numeric = [each.name for each in model.modelVariables if not is_numeric(each)]
+    return carried_traces(path, None if step is None else float(step), not_numeric)
+
+
+def check_names(model: Any, trace: Trace) -> None:
+    """Raises BadFile where the FMU lacks a variable of the trace, or a complete trace lacks an output of the FMU."""
+    expect_variables(model, columns(trace.inputs or {}), trace.inputs_source, "input")
+    expect_variables(model, columns(trace.reference), trace.source)
+    sizes = {each.name: size(each) for each in model.modelVariables}
+    for where, table in ((trace.inputs_source, trace.inputs or {}), (trace.source, trace.reference)):
+        for name in columns(table):
+            if table[name][0].size != sizes[name]:
+                raise BadFile(f"{where}: {name}: {table[name][0].size} numbers in a cell; expected {sizes[name]}")
+    outputs = [each.name for each in model.modelVariables if each.causality == "output"]
+    missing = [name for name in outputs if name not in trace.reference]
+    if trace.complete and missing:
+        raise BadFile(f"{trace.source}: no column {', '.join(missing)}; expected one for each output of the FMU")
+
+
+def columns(table: Mapping[str, Array]) -> list[str]:
+    return [name for name in table if name != "time"]
+
+
 # --- run and comparison ----------------------------------------------------------------------------------------------
 
 
-def run(path: Path, model: Any, inputs: dict[str, Array] | None, options: dict[str, float], **more: Any) -> Array:
-    """What simulate_fmu yields, a structured array. more: output, start_values. Raises RunFailed."""
+def run(path: Path, model: Any, trace: Trace, start_values: Mapping[str, str]) -> Array:
+    """What simulate_fmu yields, a structured array. Raises RunFailed."""
     messages: list[str] = []
 
-    def log(_environment: Any, _name: bytes, status: int, _category: bytes, text: bytes) -> None:
+    def log(*arguments: Any) -> None:  # FMI 2.0: environment, instance, status, category, text; 3.0 has no instance
+        status, _category, text = arguments[-3:]
         if status > 0:
             messages.append(text.decode(errors="replace"))
 
-    signals = None
-    if inputs is not None:
-        types = {
-            variable.name: FMI_TYPES[variable.type] for variable in model.modelVariables if variable.name in inputs
-        }
-        columns = [("time", np.float64)] + [(name, types[name]) for name in inputs if name != "time"]
-        signals = np.zeros(len(inputs["time"]), dtype=columns)
-        for name, values in inputs.items():
-            signals[name] = values
     try:
         with contextlib.redirect_stdout(io.StringIO()):  # fmpy prints a warning for each input without a column
             result: Array = fmpy.simulate_fmu(
                 str(path),
                 validate=False,
                 fmi_type="CoSimulation",
-                start_time=options["StartTime"],
-                stop_time=options["StopTime"],
-                output_interval=options["StepSize"],
-                input=signals,
+                start_time=trace.options["StartTime"],
+                stop_time=trace.options["StopTime"],
+                output_interval=trace.options["StepSize"],
+                relative_tolerance=trace.solver_tolerance,
+                input=signals(model, trace.inputs),
+                output=columns(trace.reference),
+                start_values=dict(start_values),
                 logger=log,
                 debug_logging=True,
-                **more,
             )
     except Exception as failed:  # fmpy has no error class of its own
         raise RunFailed("; ".join([str(failed).splitlines()[0].rstrip("."), *messages])) from None
     return result
 
 
-def at_times(time: Array, result: Array, name: str) -> Array:
-    """A result column at the times of the reference: between rows a Real is a line, anything else holds."""
-    values, own = result[name], result["time"]
+def signals(model: Any, inputs: Mapping[str, Array] | None) -> Array | None:
+    """The inputs as fmpy takes them."""
+    if inputs is None:
+        return None
+    variables = {each.name: each for each in model.modelVariables}
+    types: list[Any] = [("time", np.float64)]
+    types += [(name, FMI_TYPES[variables[name].type], inputs[name].shape[1:]) for name in columns(inputs)]
+    found = np.zeros(len(inputs["time"]), dtype=types)
+    for name, values in inputs.items():
+        found[name] = values
+    return found
+
+
+def at_times(time: Array, own: Array, values: Array) -> Array:
+    """Results of the times `own` at the times of the reference: between rows a Real is a line, anything else holds."""
     if len(own) == len(time) and np.abs(own - time).max() <= SAME_TIME * np.diff(time).min():
         return values.astype(np.float64)
     if values.dtype.kind == "f":
         inside: Array = np.interp(time, own, values)
         return inside
-    held: Array = values[np.maximum(np.searchsorted(own, time, side="right") - 1, 0)]
+    nearly = SAME_TIME * np.diff(time).min()
+    held: Array = values[np.maximum(np.searchsorted(own, time + nearly, side="right") - 1, 0)]
     return held.astype(np.float64)
 
 
-def compare(reference: dict[str, Array], result: Array, options: dict[str, float]) -> list[Verdict]:
-    """A verdict for each column of the reference but `time`."""
+def compare(trace: Trace, result: Array) -> list[Verdict]:
+    """A verdict for each column of the reference but `time`, of an array for each element."""
     verdicts = []
-    for name, expected in reference.items():
-        if name != "time":
-            deviation = np.abs(at_times(reference["time"], result, name) - expected).max()
-            tolerance = options["RelTol"] * np.abs(expected).max() + options["AbsTol"]
-            verdicts.append(Verdict(name, float(deviation), float(tolerance)))
+    for name in columns(trace.reference):
+        reference = trace.reference[name].reshape(len(trace.reference["time"]), -1)
+        found = result[name].reshape(len(result), -1)
+        for i, (expected, values) in enumerate(zip(reference.T, found.T, strict=True), start=1):
+            deviation = np.abs(at_times(trace.reference["time"], result["time"], values) - expected).max()
+            tolerance = trace.options["RelTol"] * np.abs(expected).max() + trace.options["AbsTol"]
+            element = f"{name}[{i}]" if found.shape[1] > 1 else name
+            verdicts.append(Verdict(element, float(deviation), float(tolerance)))
     return verdicts
 
 
-def check(path: Path, trace: str, start_values: dict[str, str]) -> list[Verdict]:
-    """The verdicts on an FMU. Raises BadFile, RunFailed."""
+def check(
+    path: Path, prefix: str | None, settings: Mapping[str, str], tolerance: float | None
+) -> list[tuple[str, list[Verdict]]]:
+    """The verdicts on an FMU, by trace. Raises BadFile, RunFailed."""
     model = read_model(path)
-    input_file, reference_file = Path(f"{trace}_in.csv"), Path(f"{trace}_ref.csv")
-    options, reference = read_options(Path(f"{trace}_ref.opt")), read_table(reference_file)
-    inputs = None
-    if input_file.exists() or any(variable.causality == "input" for variable in model.modelVariables):
-        inputs = read_table(input_file)
-        expect_variables(model, list(inputs)[1:], input_file, "input")
-    expect_variables(model, list(reference)[1:], reference_file)
-    missing = [v.name for v in model.modelVariables if v.causality == "output" and v.name not in reference]
-    if missing:
-        raise BadFile(f"{reference_file}: no column {', '.join(missing)}; expected one for each output of the FMU")
-    expect_variables(model, list(start_values), "--set")
-    output = list(reference)[1:]
-    return compare(reference, run(path, model, inputs, options, output=output, start_values=start_values), options)
+    expect_variables(model, settings, "--set")
+    found = []
+    for trace in traces_of(path, model, prefix):
+        check_names(model, trace)
+        if tolerance is not None:
+            trace = replace(trace, options={**trace.options, "RelTol": tolerance})
+        known = {each.name for each in model.modelVariables}
+        start_values = {name: value for name, value in trace.start_values.items() if name in known} | dict(settings)
+        found.append((trace.name, compare(trace, run(path, model, trace, start_values))))
+    return found
 
 
 # --- command ---------------------------------------------------------------------------------------------------------
 
 
 def print_verdicts(verdicts: Sequence[Verdict]) -> None:
-    width = max(len(each.variable) for each in verdicts)
+    width = max([len(each.variable) for each in verdicts] + [len("variable")])
     print(f"{'variable':<{width}}  largest deviation  tolerance  verdict")
     for each in verdicts:
         verdict = "agrees" if each.agrees else "DIFFERS"
@@ -228,22 +235,31 @@ def setting(text: str) -> tuple[str, str]:
 
 
 def main(arguments: Sequence[str]) -> int:
-    parser = argparse.ArgumentParser(description="Compares an FMI 2.0 co-simulation FMU with a reference trace.")
+    parser = argparse.ArgumentParser(description="Compares a co-simulation FMU with reference results.")
     parser.add_argument("fmu", type=Path, metavar="MODEL.fmu")
-    parser.add_argument("trace", metavar="FOLDER/NAME", help="of NAME_in.csv, NAME_ref.csv and NAME_ref.opt")
+    parser.add_argument(
+        "trace",
+        nargs="?",
+        metavar="FOLDER/NAME",
+        help="of NAME_in.csv, NAME_ref.csv and NAME_ref.opt; without it, the results that the FMU carries",
+    )
     parser.add_argument("--set", type=setting, action="append", default=[], metavar="VARIABLE=VALUE", dest="settings")
+    parser.add_argument("--tolerance", type=float, metavar="RELTOL", help="in place of the one of the trace")
     options = parser.parse_args(arguments)
     try:
-        verdicts = check(options.fmu, options.trace, dict(options.settings))
+        found = check(options.fmu, options.trace, dict(options.settings), options.tolerance)
     except BadFile as bad:
         print(f"check_reference: {bad}", file=sys.stderr)
         return 2
     except RunFailed as failed:
         print(f"check_reference: {options.fmu}: {failed}", file=sys.stderr)
         return 1
-    print_verdicts(verdicts)
-    differing = sum(not each.agrees for each in verdicts)
-    print(f"{options.fmu.name}: {differing} of {len(verdicts)} variables differ from {Path(options.trace).name}")
+    differing = 0
+    for name, verdicts in found:
+        print_verdicts(verdicts)
+        count = sum(not each.agrees for each in verdicts)
+        print(f"{options.fmu.name}: {count} of {len(verdicts)} variables differ from {name}")
+        differing += count
     return 1 if differing else 0
 
 

@@ -19,7 +19,7 @@ pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not insta
 
 import tendonfmu as tf
 from tendonfmu.cli import detect, diagnose, program, run
-from tendonfmu.interface.options import OPTIONS, Kind, Number, Texts, read_option
+from tendonfmu.interface.options import OPTIONS, Kind, Number, Paths, Texts, read_option
 
 DEMO = ROOT / "examples/demo_recording"
 FINGER, RECORDING = DEMO / "two_joints.json", DEMO / "two_joints_training.parquet"
@@ -56,6 +56,7 @@ SOURCES = {"test", "reference", "compare"}
         (tf.score, {"labels": 1}, "labels: 1; expected the name of a column or None"),
         (tf.run, {"kinematics": 1.0}, "kinematics: 1.0; expected a whole number, 1 to 3"),
         (tf.build, {"binaries": 3}, "binaries: 3; expected a path or None"),
+        (tf.build, {"ssv": 3}, "ssv: 3; expected a path or a list of paths"),
     ],
 )
 def test_a_value_that_an_option_cannot_have(
@@ -99,6 +100,8 @@ def test_types_and_ranges_are_those_of_the_command(command: Callable[..., Any], 
             assert option.optional == (type(None) in inner)
         elif isinstance(option, Texts):
             assert kind == list[str]
+        elif isinstance(option, Paths):
+            assert kind == list[Path]
         else:
             assert isinstance(option, Kind) and kind in (*option.types, Path)
         checked.add(name)

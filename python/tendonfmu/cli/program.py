@@ -165,6 +165,14 @@ def options(
 def build(
     file: Subject,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FINGER.fmu", help="FMU to write")],
+    reference: Annotated[
+        Path | None,
+        typer.Option(metavar="REC", help="recording; the FMU carries its inputs and outputs for checks"),
+    ] = None,
+    ssv: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="SET.ssv", help="parameter set that the FMU carries; may be repeated"),
+    ] = None,
     binaries: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="folder of binaries by FMI platform [default: those installed]"),
@@ -179,7 +187,7 @@ def build(
     from tendonfmu.fmu import fmu_report
     from tendonfmu.interface import build as build_fmu
 
-    build_fmu(file, output, binaries=binaries)
+    build_fmu(file, output, reference=reference, ssv=ssv or [], binaries=binaries)
     say(f"{output}: {output.stat().st_size / 1024:.0f} KiB")
     print_json(lambda: fmu_report(file, output))
 
@@ -327,6 +335,9 @@ def fit(
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FITTED.json", help="description to write")],
     method: Annotated[str, typer.Option(metavar="batch|ekf", help="maximum likelihood or Kalman filter")] = "batch",
     report: Report = None,
+    ssv: Annotated[
+        Path | None, typer.Option(metavar="FITTED.ssv", help="parameter set of SSP to write, for FMUs of the finger")
+    ] = None,
     figures: Annotated[Path | None, typer.Option(metavar="DIR", help="folder for figures and report.html")] = None,
     compare: Annotated[
         list[Path] | None, typer.Option(metavar="RECORDING", help="recording to judge, not to fit; may be repeated")
@@ -397,12 +408,15 @@ def fit(
     """
     from tendonfmu.estimate import FitWarning, check_outputs, fit_report, write_unfinished
     from tendonfmu.files import write_text
+    from tendonfmu.fmu import check_parameter_set_path
     from tendonfmu.interface import FitInterrupted
     from tendonfmu.interface import fit as fit_finger
     from tendonfmu.report import fit_text
 
     inputs = [finger, *recordings, *(compare or []), *(each for each in (previous, resume) if each is not None)]
     check_outputs(output, report, figures, inputs)
+    if ssv is not None:
+        check_parameter_set_path(ssv, *inputs)
     with progress_bar(progress) as bar:
         try:
             with warnings.catch_warnings():
@@ -443,6 +457,8 @@ def fit(
     text = fit_report.report_text(found.report)
     if report is not None:
         write_text(report, text)
+    if ssv is not None:
+        found.write(ssv)
     print_json(lambda: text)
     print_tables(fit_text.tables(fitting), fit_text.lines(fitting), left="joint")
     say(f"{output}: {len(fitting.parameters_)} numbers estimated")

@@ -17,6 +17,12 @@ from .packaging import model_description as model_description
 from .packaging import model_identifier as model_identifier
 from .packaging import pack as pack
 from .packaging import package_file as package_file
+from .parameter_set import SetParameter as SetParameter
+from .parameter_set import check_parameter_set_path as check_parameter_set_path
+from .parameter_set import parameter_sets as parameter_sets
+from .parameter_set import write_parameter_set as write_parameter_set
+from .reference_results import reference_files as reference_files
+from .reference_results import related_members as related_members
 from .running import check_model as check_model
 from .running import columns_of as columns_of
 from .running import finger_of as finger_of

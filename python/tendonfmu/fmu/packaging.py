@@ -76,7 +76,12 @@ RESERVED = frozenset(
 
 
 def build_fmu(
-    finger: FingerSource, output_path: Path, *, binaries: Path | None = None, illustrated: bool = True
+    finger: FingerSource,
+    output_path: Path,
+    *,
+    binaries: Path | None = None,
+    illustrated: bool = True,
+    extra: Mapping[str, bytes] | None = None,
 ) -> Path:
     """Package the FMU of a finger description.
 
@@ -90,6 +95,8 @@ def build_fmu(
         A folder of <FMI platform>/tendonfmu.<so, dll or dylib>, used instead of the installed ones.
     illustrated
         Whether to add pictures and a page for readers. Packaging is faster without them.
+    extra
+        Other files of the archive, such as those of `related_members`: path -> content.
 
     Returns
     -------
@@ -101,7 +108,8 @@ def build_fmu(
     InputError
         The description is refused, binaries are missing, or the output cannot be written.
     """
-    archive = pack(members(read_finger(finger), binaries=binaries, illustrated=illustrated))
+    content = members(read_finger(finger), binaries=binaries, illustrated=illustrated)
+    archive = pack(content | dict(extra or {}))
     with whole_file(output_path) as file:
         file.write_bytes(archive)
     return output_path

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,9 +14,10 @@ from numpy.typing import NDArray
 from tendonfmu.drawing import sheets_figure
 from tendonfmu.estimate import FrictionFit
 from tendonfmu.files import frame_of
+from tendonfmu.fmu import SetParameter, write_parameter_set
 from tendonfmu.interface.notebook import html_of
 from tendonfmu.interface.options import with_checked_options
-from tendonfmu.model import Finger, FingerSource
+from tendonfmu.model import Finger, FingerSource, native
 from tendonfmu.recordings import RecordingSource
 from tendonfmu.report import fit_text, law_sheets, torque_sheets
 
@@ -90,8 +92,35 @@ class FitResult:
         return list(self.estimator.warnings_)
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Write the fitted description, as `tendonfmu fit -o`. Raises InputError if it cannot be written."""
-        self.finger.write(path)
+        """Write the fitted description, or the estimated numbers as a parameter set of SSP.
+
+        Parameters
+        ----------
+        path
+            A .json file, as of `tendonfmu fit -o`; or a .ssv file, as of `--ssv`: the values that an FMU of the finger
+            takes, with their standard errors as annotations.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
+        """
+        file = Path(path)
+        if file.suffix.lower() == ".ssv":
+            write_parameter_set(file, f"{self.finger.name}: fitted", self._set_parameters(), self.finger)
+        else:
+            self.finger.write(path)
+
+    def _set_parameters(self) -> list[SetParameter]:
+        """Return the estimated numbers, and static friction that is equal to an estimated Coulomb friction."""
+        finger = native.Instance(self.finger.image)
+        known = {each.path for each in finger.parameters()}
+        return [
+            SetParameter(path, finger.get(path), each.standard_error, each.identified)
+            for each in self.estimator.numbers_
+            for path in (each.number.path, each.number.with_path)
+            if path in known
+        ]
 
     def plot(self) -> Any:
         """Draw the torque with the model's prediction, on what was trained on, held out and compared, and the laws.

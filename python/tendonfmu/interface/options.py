@@ -87,6 +87,21 @@ class Texts:
         return found
 
 
+class Paths:
+    """One path or several."""
+
+    def __str__(self) -> str:
+        return "a path or a list of paths"
+
+    def read(self, value: Any) -> list[str | os.PathLike[str]]:
+        """Return a list. Raises ValueError if there is anything else in it."""
+        alone = isinstance(value, str | os.PathLike) or not isinstance(value, Iterable)
+        found = [value] if alone else list(value)
+        if not all(isinstance(each, str | os.PathLike) for each in found):
+            raise ValueError
+        return found
+
+
 class Function:
     """A function that is called with what is done, or None."""
 
@@ -105,7 +120,7 @@ _PATH = Kind("a path", (str, os.PathLike), optional=True)
 _CHOICE, _YES = Kind("True, False", (bool, np.bool_), optional=True), Kind("True or False", (bool, np.bool_))
 
 # python_tests/interface/test_options.py holds types and ranges to those of the commands
-OPTIONS: dict[str, Number | Kind | Texts | Function] = {
+OPTIONS: dict[str, Number | Kind | Texts | Paths | Function] = {
     "asymmetric": _CHOICE,
     "bias_time": Number(1e-3, 1e4, optional=True),
     "binaries": _PATH,
@@ -133,6 +148,7 @@ OPTIONS: dict[str, Number | Kind | Texts | Function] = {
     "scale": Texts(),
     "seed": Number(0, 2**53, whole=True),
     "share": Texts(),
+    "ssv": Paths(),
     "strict": _YES,
     "tolerance": Number(1e-9, 0.5),
     "uncertainty": _YES,

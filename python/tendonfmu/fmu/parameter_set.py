@@ -1,0 +1,211 @@
+"""Parameter sets for FMUs: files SSV of the standard SSP 1.0, whose parameters have the names of the FMU's.
+
+The standard error of a value is an annotation of its parameter, which readers of SSV skip if they do not know it:
+
+    <ssv:Parameter name="joints[1].friction.coulomb">
+      <ssv:Real value="0.0061" unit="N.m"/>
+      <ssv:Annotations>
+        <ssc:Annotation type="tendonfmu.uncertainty">
+          <uncertainty standardError="0.0002" identified="true"/>
+        </ssc:Annotation>
+      </ssv:Annotations>
+    </ssv:Parameter>
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tendonfmu.errors import InputError
+from tendonfmu.files import check_output, whole_file
+from tendonfmu.fmu.model_variables import NOT_IN_XML, read_table
+from tendonfmu.fmu.packaging import package_file
+from tendonfmu.fmu.reference_results import Related
+from tendonfmu.model import Finger, native
+
+ANNOTATION = "tendonfmu.uncertainty"
+MIME_TYPE = "application/x-ssp-parameter-set"
+_SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
+_SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
+
+
+@dataclass(frozen=True)
+class SetParameter:
+    """One parameter of a set.
+
+    Attributes
+    ----------
+    path
+        Name of the FMU's variable.
+    value
+        In the unit of the variable.
+    standard_error
+        Of the value, in the same unit; None if it is not known.
+    identified
+        Whether the standard error is at most 30 % of the value.
+    """
+
+    path: str
+    value: float
+    standard_error: float | None = None
+    identified: bool = False
+
+
+def check_parameter_set_path(path: Path, *inputs: Path) -> None:
+    """Check that a parameter set can be written. Raises InputError, also if it would replace one of the inputs."""
+    if path.suffix.lower() != ".ssv":
+        raise InputError(f"{path}: expected a name that ends in .ssv")
+    check_output(path, *inputs)
+
+
+def write_parameter_set(path: Path, name: str, parameters: Sequence[SetParameter], finger: Finger) -> Path:
+    """Write a parameter set, whole or not at all.
+
+    Parameters
+    ----------
+    path
+        A .ssv file.
+    name
+        Name of the set.
+    parameters
+        The parameters, with names of `finger`'s.
+    finger
+        A finger, for the units.
+
+    Returns
+    -------
+    Path
+        `path`.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written.
+    """
+    with whole_file(path) as file:
+        file.write_bytes(_parameter_set(name, parameters, finger))
+    return path
+
+
+def _parameter_set(name: str, parameters: Sequence[SetParameter], finger: Finger) -> bytes:
+    from lxml import etree
+
+    units = {each.path: each.unit for each in native.Instance(finger.image).parameters()}
+    base_units = read_table(package_file("model_description/variables.json").read_text(encoding="utf-8")).data["units"]
+    plain_name = NOT_IN_XML.sub("?", name)
+    root = etree.Element(f"{{{_SSV}}}ParameterSet", version="1.0", name=plain_name, nsmap={"ssv": _SSV, "ssc": _SSC})
+    listed = etree.SubElement(root, f"{{{_SSV}}}Parameters")
+    for each in parameters:
+        parameter = etree.SubElement(listed, f"{{{_SSV}}}Parameter", name=each.path)
+        unit = {"unit": units[each.path]} if units[each.path] in base_units else {}
+        etree.SubElement(parameter, f"{{{_SSV}}}Real", value=repr(each.value), **unit)
+        if each.standard_error is not None and np.isfinite(each.standard_error):
+            annotations = etree.SubElement(parameter, f"{{{_SSV}}}Annotations")
+            annotation = etree.SubElement(annotations, f"{{{_SSC}}}Annotation", type=ANNOTATION)
+            etree.SubElement(
+                annotation,
+                "uncertainty",
+                standardError=repr(each.standard_error),
+                identified=str(each.identified).lower(),
+            )
+    used = sorted({units[each.path] for each in parameters} & set(base_units))
+    if used:
+        defined = etree.SubElement(root, f"{{{_SSV}}}Units")
+        for unit_name in used:
+            unit_element = etree.SubElement(defined, f"{{{_SSC}}}Unit", name=unit_name)
+            exponents: Mapping[str, Any] = base_units[unit_name]
+            etree.SubElement(unit_element, f"{{{_SSC}}}BaseUnit", {key: str(exponents[key]) for key in exponents})
+    return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
+
+
+def read_parameter_set(path: Path, finger: Finger) -> dict[str, float]:
+    """Read a parameter set, and check it against a finger.
+
+    Parameters
+    ----------
+    path
+        A .ssv file.
+    finger
+        The finger of the FMU.
+
+    Returns
+    -------
+    dict of float
+        Value by name, in the order of the file.
+
+    Raises
+    ------
+    InputError
+        The file is no parameter set, a name is none of the FMU's parameters, or the finger refuses a value.
+    """
+    from lxml import etree
+
+    try:
+        root = etree.fromstring(path.read_bytes())
+    except (OSError, etree.XMLSyntaxError) as wrong:
+        raise InputError(f"{path}: {wrong}; expected a parameter set of SSP (.ssv)") from None
+    if root.tag != f"{{{_SSV}}}ParameterSet":
+        raise InputError(f"{path}: element {root.tag}; expected a parameter set of SSP (.ssv)")
+    known = {each.path: each.unit for each in native.Instance(finger.image).parameters()}
+    values: dict[str, float] = {}
+    for name, value, unit in _entries(path, root):
+        if name not in known:
+            raise InputError(f"{path}: {name}: not a parameter of {finger.path.name}; expected names of its FMU")
+        if unit not in (None, known[name]):
+            raise InputError(f"{path}: {name}: unit {unit}; expected {known[name]}")
+        if name in values:
+            raise InputError(f"{path}: {name}: given twice; expected each parameter once")
+        values[name] = value
+    if not values:
+        raise InputError(f"{path}: no parameters; expected at least one")
+    try:
+        native.Instance(finger.image).set(values)
+    except native.NativeError as refused:
+        raise InputError(f"{path}: {refused}") from None
+    return values
+
+
+def _entries(path: Path, root: Any) -> Iterator[tuple[str, float, str | None]]:
+    """Yield name, value and unit of each parameter."""
+    for parameter in root.iterfind(f"{{{_SSV}}}Parameters/{{{_SSV}}}Parameter"):
+        name, real = parameter.get("name", ""), parameter.find(f"{{{_SSV}}}Real")
+        try:
+            yield name, float("" if real is None else real.get("value", "")), None if real is None else real.get("unit")
+        except ValueError:
+            raise InputError(f"{path}: {name}: no Real with a number; expected one") from None
+
+
+def parameter_sets(paths: Sequence[Path], finger: Finger) -> list[Related]:
+    """Return parameter sets as related files of an FMU.
+
+    Parameters
+    ----------
+    paths
+        .ssv files with different names.
+    finger
+        The finger of the FMU.
+
+    Returns
+    -------
+    list of Related
+        With the role `parameter`.
+
+    Raises
+    ------
+    InputError
+        A file is refused (`read_parameter_set`), is not named .ssv, or two have the same name.
+    """
+    found: list[Related] = []
+    for path in paths:
+        if path.suffix.lower() != ".ssv":
+            raise InputError(f"{path}: expected a parameter set of SSP, with the suffix .ssv")
+        if any(each.name == path.name for each in found):
+            raise InputError(f"{path}: a second file of this name; expected different names")
+        count = len(read_parameter_set(path, finger))
+        found.append(Related(path.name, path.read_bytes(), "parameter", MIME_TYPE, f"Values of {count} parameters"))
+    return found

@@ -1,0 +1,246 @@
+"""Reference results inside an FMU, in the form of FMI's layered standard for related files (fmi-ls-ref).
+
+The folder FOLDER of the FMU contains a manifest, an experiment (format ma-hs-experiments) with the files that it names,
+and the options of the FMI cross-check, which alone has a place for the tolerance of a comparison:
+
+    fmi-ls-manifest.xml     lists the other files with their roles
+    NAME.exp                start, stop, step; names NAME_in.csv and NAME_ref.csv
+    NAME_in.csv             time and inputs
+    NAME_ref.csv            time and all outputs
+    NAME_ref.opt            StartTime, StopTime, StepSize, RelTol, AbsTol
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from lxml import etree
+from numpy.typing import NDArray
+
+from tendonfmu.errors import InputError
+from tendonfmu.fmu.packaging import model_identifier
+from tendonfmu.fmu.running import columns_of, run_model
+from tendonfmu.model import Finger, inputs_used
+from tendonfmu.recordings import Recording
+
+FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
+NOTE = "documentation/fmi-ls-ref.txt"
+VERSION = "1.0.0-alpha.1"  # of fmi-ls-ref
+
+# The agreement that the semantics ask of two implementations (docs/reference/semantics.md).
+RELATIVE, ABSOLUTE = 1e-9, 1e-12
+UNEVEN = 1e-6  # share of a step by which a sample may be off the grid before it is interpolated
+DIGITS = 12  # of the step: 0.002 s rather than 0.0020000000000000005 s
+
+_SPACE = "http://fmi-standard.org/fmi-ls-manifest"
+_ROOT_ATTRIBUTES = {
+    "fmi-ls-name": "org.fmi-standard.fmi-ls-ref",
+    "fmi-ls-version": VERSION,
+    "fmi-ls-description": "Layered Standard providing information on related files included in an FMU.",
+}
+
+Table = dict[str, NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class Related:
+    """A file of the folder.
+
+    Attributes
+    ----------
+    name
+        Name in the folder.
+    content
+        The file.
+    role, kind
+        Role of fmi-ls-ref, and MIME type.
+    description
+        One sentence.
+    """
+
+    name: str
+    content: bytes
+    role: str
+    kind: str
+    description: str
+
+
+def reference_files(finger: Finger, recording: Recording, *, arrays: bool = False) -> list[Related]:
+    """Run a finger over a recording, and return inputs, outputs and tolerance as files.
+
+    Parameters
+    ----------
+    finger
+        The finger of the FMU.
+    recording
+        Signals of the same finger, for tendon positions as the source of the kinematics. Time starts at 0 in the files.
+        Samples that are not evenly spaced are interpolated to the median step.
+    arrays
+        Whether the variables of the FMU are arrays, as of FMI 3.0: a cell then has the numbers of all elements,
+        separated by spaces. Else they are scalars of their own, such as `joint_torque[2]`.
+
+    Returns
+    -------
+    list of Related
+        Experiment, inputs, outputs and options.
+
+    Raises
+    ------
+    InputError
+        The recording does not fit the finger, or has fewer than two samples.
+    """
+    grid, step = _on_grid(finger, recording)
+    outputs = run_model(finger, grid)
+    # A client reads after fmi2DoStep(t, h), under the time t + h, what belongs to the sample at t; the first sample is
+    # taken by the initialisation.
+    rows = np.maximum(np.arange(len(grid)) - 1, 0)
+    reference = {name: values if name == "time" else values[rows] for name, values in outputs.items()}
+    name, stop = model_identifier(finger.name), float(grid.time[-1])
+    inputs: Table = {"time": grid.time, **grid.groups}
+    return [
+        Related(
+            f"{name}.exp",
+            _experiments(name, stop, step, recording.path.name),
+            "experiment/smoke-test",
+            "application/x-ma-hs-experiments",
+            "The run that gave the reference results",
+        ),
+        Related(
+            f"{name}_in.csv",
+            _csv(inputs if arrays else columns_of(inputs)),
+            "testcase",
+            "text/csv",
+            "Inputs of the reference results",
+        ),
+        Related(
+            f"{name}_ref.csv",
+            _csv(reference if arrays else columns_of(reference)),
+            "result",
+            "text/csv",
+            "Reference results: all outputs",
+        ),
+        Related(
+            f"{name}_ref.opt",
+            _options(stop, step),
+            "configuration",
+            "text/csv",
+            "Step and tolerance of the comparison, in the form of the FMI cross-check",
+        ),
+    ]
+
+
+def related_members(related: Sequence[Related]) -> dict[str, bytes]:
+    """Return the members of an FMU for related files.
+
+    Parameters
+    ----------
+    related
+        At least one file, each with another name.
+
+    Returns
+    -------
+    dict of bytes
+        Path in the FMU -> content: the files, their manifest, and a note for readers. Empty without files.
+    """
+    if not related:
+        return {}
+    files = {f"{FOLDER}/{each.name}": each.content for each in related}
+    return files | {f"{FOLDER}/fmi-ls-manifest.xml": _manifest(related), NOTE: _note(related).encode()}
+
+
+# --- signals ----------------------------------------------------------------------------------------------------------
+
+
+def _on_grid(finger: Finger, recording: Recording) -> tuple[Recording, float]:
+    """Return the inputs of the default kinematics at 0, h, 2 h, ..., and h (s)."""
+    used = inputs_used(1, False)
+    recording.require(finger.joints, finger.tendons, used)
+    if len(recording) < 2:
+        raise InputError(f"{recording.path}: one sample; expected two or more as a reference")
+    time = recording.time - recording.time[0]
+    step = float(f"{time[-1] / (len(time) - 1):.{DIGITS}g}")
+    groups = {name: recording.groups[name] for name in used}
+    if np.abs(time - step * np.arange(len(time))).max() > UNEVEN * step:
+        step = float(f"{np.median(np.diff(time)):.{DIGITS}g}")
+        grid = step * np.arange(int(time[-1] / step + UNEVEN) + 1)
+        groups = {
+            name: np.column_stack([np.interp(grid, time, column) for column in signals.T])
+            for name, signals in groups.items()
+        }
+    # the products that clients compute: what they set is then a sample, not something between two
+    times = step * np.arange(len(groups["tendon_force"]), dtype=np.float64)
+    return Recording(recording.path, times, groups), step
+
+
+# --- files ------------------------------------------------------------------------------------------------------------
+
+
+def _csv(table: Mapping[str, NDArray[Any]]) -> bytes:
+    """Return a table as CSV; of a column [N, k], each cell has k numbers."""
+    columns = [map(_cell, values.tolist()) for values in table.values()]
+    rows = (",".join(row) + "\n" for row in zip(*columns, strict=True))
+    return "".join([",".join(table) + "\n", *rows]).encode()
+
+
+def _cell(value: Any) -> str:
+    """Return a number, flag or list of these as text that reads back the same."""
+    if isinstance(value, list):
+        return " ".join(map(_cell, value))
+    return repr(int(value) if isinstance(value, bool) else value)
+
+
+def _options(stop: float, step: float) -> bytes:
+    values = {"StartTime": 0.0, "StopTime": stop, "StepSize": step, "RelTol": RELATIVE, "AbsTol": ABSOLUTE}
+    return "".join(f"{name},{value!r}\n" for name, value in values.items()).encode()
+
+
+def _experiments(name: str, stop: float, step: float, source: str) -> bytes:
+    root = etree.Element("Experiments", name=f"{name}: reference results")
+    experiment = etree.SubElement(
+        root,
+        "Experiment",
+        name=name,
+        description=f"All outputs over {source}",
+        startTime=repr(0.0),
+        stopTime=repr(stop),
+        stepSize=repr(step),
+        tolerance=repr(RELATIVE),
+    )
+    etree.SubElement(experiment, "Stimuli", source=f"{name}_in.csv", type="text/csv")
+    etree.SubElement(experiment, "References", source=f"{name}_ref.csv", type="text/csv")
+    return _xml(root)
+
+
+def _manifest(related: Sequence[Related]) -> bytes:
+    attributes = {f"{{{_SPACE}}}{name}": value for name, value in _ROOT_ATTRIBUTES.items()}
+    root = etree.Element("fmiReferences", attributes, nsmap={"fmi-ls": _SPACE})
+    for each in related:
+        etree.SubElement(
+            root,
+            "Related",
+            type=each.kind,
+            source=each.name,
+            role=each.role,
+            description=each.description,
+            checksum=hashlib.sha3_256(each.content).hexdigest(),
+            checksumType="SHA3-256",
+        )
+    return _xml(root)
+
+
+def _xml(root: Any) -> bytes:
+    return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
+
+
+def _note(related: Sequence[Related]) -> str:
+    files = "".join(f"  {each.name}: {each.description}\n" for each in related)
+    rows = (
+        "The rows of the results are those of a client that calls fmi2DoStep(t, h), reads the outputs, and writes\n"
+        "them under the time t + h: the outputs belong to the sample at t. The first sample is in the first two rows.\n"
+        "An output agrees if |result - reference| <= RelTol * max |reference| + AbsTol in every row.\n"
+    )
+    return f"Files in {FOLDER}:\n\n{files}\n" + (rows if any(each.role == "result" for each in related) else "")
