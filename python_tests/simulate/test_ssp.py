@@ -194,6 +194,27 @@ def test_what_is_in_the_package(package: Path, tmp_path: Path) -> None:
     assert build_ssp(package.parent / "rig.json", tmp_path / "again.ssp").read_bytes() == package.read_bytes()
 
 
+def test_omsimulator_is_told_step_and_tolerance_of_the_plant(package: Path) -> None:
+    """In an annotation, since SSP 1.0 has no place for them. OMSimulator compares names with their prefixes."""
+    import fmpy
+    from lxml import etree
+
+    with zipfile.ZipFile(package) as archive:
+        text = archive.read("SystemStructure.ssd")
+        with zipfile.ZipFile(archive.open("resources/TendonFinger.fmu")) as fmu:
+            default = ElementTree.fromstring(fmu.read("modelDescription.xml")).find("DefaultExperiment")
+    schema = Path(fmpy.__file__).parent / "ssp" / "schema" / "SystemStructureDescription.xsd"
+    root = etree.fromstring(text)
+    etree.XMLSchema(etree.parse(str(schema))).assertValid(root)
+    (annotation,) = root.findall("ssd:System/ssd:Annotations/ssc:Annotation", root.nsmap)
+    assert annotation.attrib["type"] == "org.openmodelica"
+    (master,) = annotation.findall("oms:Annotations/oms:SimulationInformation/oms:FixedStepMaster", root.nsmap)
+    assert b"<oms:FixedStepMaster " in text and default is not None
+    assert master.attrib["description"] == "oms-ma"
+    assert float(master.attrib["stepSize"]) == float(default.attrib["stepSize"])
+    assert float(master.attrib["relativeTolerance"]) == float(default.attrib["tolerance"])
+
+
 def test_the_package_never_takes_the_place_of_its_rig(tmp_path: Path) -> None:
     from tendonfmu.errors import InputError
     from tendonfmu.simulate.ssp import build_ssp

@@ -1,6 +1,8 @@
 """How an SSP package couples a simulated finger with the friction FMU of the same finger (SSP 1.0).
 
 The package is plain: one system without connectors, two components, and connections between them. Masters need no more.
+SSP 1.0 has no place for a step and a tolerance. OMSimulator reads both from an annotation of its own, which is in the
+package; other masters skip it.
 Some masters pass nothing before the first step; for them the package contains the start values of the friction FMU's
 inputs.
 """
@@ -18,6 +20,7 @@ from tendonfmu.files import check_output, whole_file
 from tendonfmu.fmu import NOT_IN_XML, members, pack
 from tendonfmu.model import INPUTS
 from tendonfmu.simulate.fmu_packaging import plant_members
+from tendonfmu.simulate.fmu_variables import STEP
 from tendonfmu.simulate.plant import refused_by
 from tendonfmu.simulate.rig import Rig, read_rig
 from tendonfmu.simulate.simulation import plant_of
@@ -35,9 +38,11 @@ _SPACES = {
     "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
     "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
     "ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues",
+    "oms": "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd",
 }
 _SSC = ElementMaker(namespace=_SPACES["ssc"])
-_SSD = ElementMaker(namespace=_SPACES["ssd"], nsmap={key: _SPACES[key] for key in ("ssd", "ssc")})
+_SSD = ElementMaker(namespace=_SPACES["ssd"], nsmap={key: _SPACES[key] for key in ("ssd", "ssc", "oms")})
+_OMS = ElementMaker(namespace=_SPACES["oms"])
 _SSV = ElementMaker(namespace=_SPACES["ssv"], nsmap={"ssv": _SPACES["ssv"]})
 
 
@@ -88,6 +93,7 @@ def system_structure(rig: Rig) -> bytes:
                         for name in coupled
                     )
                 ),
+                _SSD.Annotations(_master_of_omsimulator(_relative_tolerance(rig))),
                 name="finger",
             ),
             _SSD.DefaultExperiment(startTime="0.0", stopTime=str(DURATION if rig.duration is None else rig.duration)),
@@ -110,6 +116,23 @@ def start_values(rig: Rig) -> bytes:
     }
     parameters = (_SSV.Parameter(_SSV.Real(value=repr(value)), name=name) for name, value in values.items())
     return _text(_SSV.ParameterSet(_SSV.Parameters(*parameters), version="1.0", name="start_values"))
+
+
+def _relative_tolerance(rig: Rig) -> float:
+    """Return the rig's tolerance, which is that of the plant's default experiment."""
+    with refused_by(rig.path):
+        return float(plant_of(rig).settings.relative_tolerance)
+
+
+def _master_of_omsimulator(tolerance: float) -> Any:
+    """Return OMSimulator's annotation of a system that it couples with a fixed step.
+
+    It hands the tolerance to both FMUs; without the annotation, its own stands above that of the rig.
+    """
+    master = _OMS.FixedStepMaster(
+        description="oms-ma", stepSize=repr(STEP), absoluteTolerance=repr(tolerance), relativeTolerance=repr(tolerance)
+    )
+    return _SSC.Annotation(_OMS.Annotations(_OMS.SimulationInformation(master)), type="org.openmodelica")
 
 
 def _component(name: str, fmu: str, connectors: list[tuple[str, str]]) -> Any:
