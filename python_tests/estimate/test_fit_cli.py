@@ -8,6 +8,7 @@ import re
 import signal
 import subprocess
 import sys
+import zipfile
 from importlib.resources import files as files_of
 from pathlib import Path
 
@@ -56,6 +57,23 @@ def test_a_fit_writes_a_description_and_a_report(call: Call, files: tuple[Path, 
     assert "held out" in answer.out and "batch: converged" in answer.out
     assert call("check", "fitted.json").status == 0
     assert call("run", "fitted.json", recording, "-o", "out.csv", "--kinematics", "3").status == 0
+
+
+def test_a_fit_writes_a_parameter_set_that_an_fmu_carries(call: Call, files: tuple[Path, Path]) -> None:
+    finger, recording = files
+    refused = call("fit", finger, recording, "-o", "f.json", "--ssv", "f.json", *FIT)
+    assert refused.status == 2 and "f.json: expected a name that ends in .ssv" in refused.err
+    short = ("--passes", "2", *FIT)
+    assert call("fit", finger, recording, "-o", "f.json", "--report", "r.json", "--ssv", "f.ssv", *short).status == 0
+    text = Path("f.ssv").read_text()
+    for parameter in json.loads(Path("r.json").read_text())["parameters"]:
+        assert f'name="{parameter["path"]}"' in text and f'value="{parameter["value"]}"' in text
+        assert f'standardError="{parameter["standard_error"]!r}"' in text
+    built = call("build", finger, "-o", "f.fmu", "--ssv", "f.ssv", "--reference", recording, "--json", "-q")
+    assert built.status == 0, built.err
+    with zipfile.ZipFile("f.fmu") as archive:
+        carried = {name.partition("/")[2] for name in archive.namelist() if name.startswith("extra/")}
+    assert {"f.ssv", "fmi-ls-manifest.xml"} < {name.partition("/")[2] for name in carried} and len(carried) == 6
 
 
 def test_the_report_is_as_its_schema_says(call: Call, files: tuple[Path, Path]) -> None:

@@ -27,13 +27,13 @@ OF_COMMANDS = {"output", "report", "figures", "progress", "as_json", "quiet"}
 COMMANDS: dict[str, tuple[Callable[..., Any], Callable[..., Any], set[str]]] = {
     "build": (program.build, tf.build, set()),
     "run": (run.run, tf.run, set()),
-    "fit": (program.fit, tf.fit, set()),
+    "fit": (program.fit, tf.fit, {"ssv"}),  # FitResult.write writes it
     "tune": (detect.tune, tf.tune, set()),
     "score": (detect.score, tf.score, set()),
     "diagnose": (diagnose.diagnose, tf.diagnose, {"history", "scheduler"}),
 }
 # what a function takes in place of a command's None
-EMPTY = {"compare", "only", "fix", "share", "scale", "test"}
+EMPTY = {"compare", "only", "fix", "share", "scale", "ssv", "test"}
 
 
 @pytest.mark.parametrize("name", COMMANDS)
