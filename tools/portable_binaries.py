@@ -79,11 +79,12 @@ def zig_command() -> list[str]:
 
 
 def cmake_list(path: Path, name: str) -> list[str]:
-    """The words of set(NAME ...) in a CMake file, without comments."""
+    """The words of set(NAME ...) in a CMake file, without comments; ${OTHER} is the list of that name."""
     found = re.search(rf"set\({name}\b(.*?)\)", re.sub(r"#.*", "", path.read_text(encoding="utf-8")), re.DOTALL)
     if not found:
         raise BuildError(f"{path}: no list {name}; expected set({name} ...)")
-    return found[1].split()
+    lists = {word: re.fullmatch(r"\$\{(\w+)\}", word) for word in found[1].split()}
+    return [each for word, other in lists.items() for each in (cmake_list(path, other[1]) if other else [word])]
 
 
 def core_sources() -> list[Path]:

@@ -64,8 +64,9 @@ def test_the_lists_name_every_source() -> None:
 
 
 def test_a_missing_list_is_named(tmp_path: Path) -> None:
-    (tmp_path / "CMakeLists.txt").write_text("# set(SOURCES a.c)\nset(OTHERS a.c # why\n  b.c)\n")
+    (tmp_path / "CMakeLists.txt").write_text("# set(SOURCES a.c)\nset(OTHERS a.c # why\n  b.c)\nset(ALL ${OTHERS} c.c)\n")
     assert portable.cmake_list(tmp_path / "CMakeLists.txt", "OTHERS") == ["a.c", "b.c"]
+    assert portable.cmake_list(tmp_path / "CMakeLists.txt", "ALL") == ["a.c", "b.c", "c.c"]
     with pytest.raises(portable.BuildError, match=r"CMakeLists.txt: no list SOURCES; expected set\(SOURCES"):
         portable.cmake_list(tmp_path / "CMakeLists.txt", "SOURCES")
 
