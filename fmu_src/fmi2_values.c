@@ -17,7 +17,7 @@ fmi2Status fmi2GetBoolean(fmi2Component instance, const fmi2ValueReference vr[],
 }
 
 fmi2Status fmi2GetString(fmi2Component instance, const fmi2ValueReference vr[], size_t nvr, fmi2String value[]) {
-  return (fmi2Status)values_refuse(instance, CALL_GET_STRING, VARIABLE_STRING, vr, nvr, value);
+  return (fmi2Status)values_refuse(instance, CALL_GET_STRING, "String", vr, nvr, value);
 }
 
 fmi2Status fmi2SetReal(fmi2Component instance, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[]) {
@@ -35,5 +35,5 @@ fmi2Status fmi2SetBoolean(fmi2Component instance, const fmi2ValueReference vr[],
 }
 
 fmi2Status fmi2SetString(fmi2Component instance, const fmi2ValueReference vr[], size_t nvr, const fmi2String value[]) {
-  return (fmi2Status)values_refuse(instance, CALL_SET_STRING, VARIABLE_STRING, vr, nvr, value);
+  return (fmi2Status)values_refuse(instance, CALL_SET_STRING, "String", vr, nvr, value);
 }

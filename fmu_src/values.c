@@ -153,11 +153,11 @@ fmu_status values_set(component* c, fmu_function function, variable_type type, c
   return FMU_OK;
 }
 
-fmu_status values_refuse(component* c, fmu_function function, variable_type type, const unsigned references[],
+fmu_status values_refuse(component* c, fmu_function function, const char* type, const unsigned references[],
                          size_t count, const void* values) {
   variable found = {0};
   if (!may_access(c, function, count, references, values)) {
     return FMU_ERROR;
   }
-  return count && find_of_type(c, function, type, references[0], &found) ? FMU_ERROR : FMU_OK;
+  return count ? fail_of_type(c, function, references[0], type, &found) : FMU_OK;
 }

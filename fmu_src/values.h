@@ -16,7 +16,7 @@ fmu_status values_set(component* c, fmu_function function, variable_type type, c
                       size_t count, value_format format, const void* values, size_t value_count);
 
 /* The same for a type that no variable has: says what the first one is. */
-fmu_status values_refuse(component* c, fmu_function function, variable_type type, const unsigned references[],
+fmu_status values_refuse(component* c, fmu_function function, const char* type, const unsigned references[],
                          size_t count, const void* values);
 
 #endif

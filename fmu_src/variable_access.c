@@ -8,23 +8,30 @@ fmu_status fail_at(component* c, fmu_function function, const variable* found, c
   return component_fail(c, &text);
 }
 
-int find_of_type(component* c, fmu_function function, variable_type type, unsigned reference, variable* found) {
-  if (variables_find(&c->values, reference, found)) {
-    log_text text = log_start(call_name(function), "no variable has the value reference ");
+fmu_status fail_of_type(component* c, fmu_function function, unsigned reference, const char* type, variable* found) {
+  log_text text = log_start(call_name(function), "");
+  const int is_known = variables_find(&c->values, reference, found) == 0;
+  if (is_known) {
+    variables_append_name(&text, c->model, found);
+  } else if (is_time(reference, VARIABLE_REAL)) {
+    log_append(&text, "time");
+  } else {
+    log_append(&text, "no variable has the value reference ");
     log_append_count(&text, reference);
-    component_fail(c, &text);
-    return -1;
+    return component_fail(c, &text);
   }
-  if (variable_type_of(found) == type) {
+  log_append(&text, " is of type ");
+  log_append(&text, this_fmi.types[is_known ? variable_type_of(found) : VARIABLE_REAL]);
+  log_append(&text, ", expected ");
+  log_append(&text, type);
+  return component_fail(c, &text);
+}
+
+int find_of_type(component* c, fmu_function function, variable_type type, unsigned reference, variable* found) {
+  if (variables_find(&c->values, reference, found) == 0 && variable_type_of(found) == type) {
     return 0;
   }
-  log_text text = log_start(call_name(function), "");
-  variables_append_name(&text, c->model, found);
-  log_append(&text, " is of type ");
-  log_append(&text, this_fmi.types[variable_type_of(found)]);
-  log_append(&text, ", expected ");
-  log_append(&text, this_fmi.types[type]);
-  component_fail(c, &text);
+  fail_of_type(c, function, reference, this_fmi.types[type], found);
   return -1;
 }
 

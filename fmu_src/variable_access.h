@@ -11,6 +11,9 @@ int may_access(component* c, fmu_function function, size_t count, const void* re
 /* 0 for a variable of the type; otherwise says what it is, or that there is none, and fails. */
 int find_of_type(component* c, fmu_function function, variable_type type, unsigned reference, variable* found);
 
+/* Fails with what the variable is instead of the type, or that there is none. */
+fmu_status fail_of_type(component* c, fmu_function function, unsigned reference, const char* type, variable* found);
+
 /* 1 for the independent variable, which is no other variable's and has one element. */
 int is_time(unsigned reference, variable_type type);
 
