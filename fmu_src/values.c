@@ -1,7 +1,5 @@
 #include "values.h"
 
-#include <stdbool.h>
-
 #include "variable_access.h"
 
 /* --- elements of arrays of the importer --------------------------------------------------------------------------- */
@@ -9,7 +7,7 @@
 static double element(const void* values, value_format format, size_t at) {
   switch (format) {
     case VALUES_INT: return ((const int*)values)[at];
-    case VALUES_BOOL: return ((const bool*)values)[at];
+    case VALUES_BOOL: return ((const _Bool*)values)[at];
     default: return ((const double*)values)[at];
   }
 }
@@ -17,7 +15,7 @@ static double element(const void* values, value_format format, size_t at) {
 static void put_element(void* values, value_format format, size_t at, double value) {
   switch (format) {
     case VALUES_INT: ((int*)values)[at] = (int)value; break;
-    case VALUES_BOOL: ((bool*)values)[at] = value != 0.0; break;
+    case VALUES_BOOL: ((_Bool*)values)[at] = value != 0.0; break;
     default: ((double*)values)[at] = value; break;
   }
 }
