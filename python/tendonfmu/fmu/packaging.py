@@ -209,6 +209,7 @@ def members(
         model = in_arrays(model, table, group_sizes(len(description.data["joints"]), len(description.data["tendons"])))
     context: dict[str, Any] = {
         **model,
+        "fmi": fmi,
         "model_identifier": identifier,
         "guid": guid(description.image, table),
         "version": native.version(),
