@@ -7,7 +7,6 @@
 
 from __future__ import annotations
 
-import csv
 import importlib.util
 import json
 import os
@@ -24,7 +23,9 @@ import numpy as np
 import pytest
 
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-fmpy = pytest.importorskip("fmpy", reason="SKIPPED: fmpy is not installed")
+pytest.importorskip("fmpy", reason="SKIPPED: fmpy is not installed")
+
+import fmpy
 
 from fmi3_binary import UnpackedFmu3, fmi3_platform, unpack3
 from fmu_binary import FINGER, OK, Instance, UnpackedFmu, motion
@@ -124,9 +125,7 @@ def test_a_program_linked_with_the_sources(
     assert len(names) > 200 and [name for name in names if not name.startswith("left_")] == []
     run("cc", *options, DRIVER, *objects, "-o", tmp_path / "driver", "-lm")
     write_samples(small_fmu3, small_fmu, tmp_path / "samples.txt")
-    out = run(
-        tmp_path / "driver", "linked", small_fmu3.token, small_fmu3.resources.decode(), tmp_path / "samples.txt"
-    )
+    out = run(tmp_path / "driver", "linked", small_fmu3.token, small_fmu3.resources.decode(), tmp_path / "samples.txt")
     numbers = small_fmu3.count(small_fmu3.names("output"))
     assert [line.strip() for line in out.splitlines()] == printed(expected[:1] + expected[1:-1], numbers)
 
@@ -147,11 +146,11 @@ def signals(fmu: UnpackedFmu3, fmu2: UnpackedFmu) -> Any:
     return found
 
 
-def simulate(path: Path, fmu: UnpackedFmu3, fmu2: UnpackedFmu) -> list[list[float]]:
+def simulate(path: Path, fmu: UnpackedFmu3, fmu2: UnpackedFmu, validate: bool = True) -> list[list[float]]:
     names = [*fmu.names("output"), *fmu.names("output", "Boolean")]
     found = fmpy.simulate_fmu(
         str(path),
-        validate=True,
+        validate=validate,
         input=signals(fmu, fmu2),
         output=names,
         step_size=STEP,
@@ -185,6 +184,68 @@ def test_fmpy_compiles_the_sources(
     assert simulate(compiled, fmu, small_fmu) == expected
 
 
+# --- FMU Manipulation Toolbox -----------------------------------------------------------------------------------------
+
+
+def toolbox(name: str) -> str:
+    """A command of the Python package fmu-manipulation-toolbox, beside this Python or on the path."""
+    found = shutil.which(name, path=str(Path(sys.executable).parent)) or shutil.which(name)
+    if not found:
+        pytest.skip(f"SKIPPED: {name} is not installed (pip install fmu-manipulation-toolbox)")
+    return found
+
+
+def test_fmutool_finds_nothing_to_complain_of(small_fmu3_path: Path) -> None:
+    said = run(toolbox("fmutool"), "-input", small_fmu3_path, "-check")
+    assert "This FMU seems to be compliant with FMI-3.0." in said
+    assert "No semantic error against the FMI-3 standard." in said
+    assert "ERROR" not in said and "WARNING" not in said
+
+
+def test_in_a_container(
+    small_fmu: UnpackedFmu,
+    small_fmu3: UnpackedFmu3,
+    small_fmu3_path: Path,
+    expected: list[list[float]],
+    tmp_path: Path,
+) -> None:
+    """The container is an FMU in C that loads and steps others: a client with arrays."""
+    shutil.copy(small_fmu3_path, tmp_path / "small_finger.fmu")
+    (tmp_path / "box.csv").write_text("rule;from_fmu;from_port;to_fmu;to_port\nFMU;small_finger.fmu;;;\n")
+    run(toolbox("fmucontainer"), "-container", f"box.csv:{STEP!r}", "-fmi", "3", cwd=tmp_path)
+    assert simulate(tmp_path / "box.fmu", small_fmu3, small_fmu, validate=False) == expected
+
+
+# --- ecos -------------------------------------------------------------------------------------------------------------
+
+
+def test_ecos_with_one_joint_and_one_tendon(tmp_path: Path) -> None:
+    """ecos 0.7 takes an array for a scalar, which is right where it has one element."""
+    ecospy = pytest.importorskip("ecospy", reason="SKIPPED: ecospy is not installed (requirements-coupling.lock)")
+    from tendonfmu.fmu import build_fmu
+
+    finger = {
+        **FINGER,
+        "joints": FINGER["joints"][:1],
+        "tendons": [{**FINGER["tendons"][1], "moment_arms": [0.008]}],
+        "contact": {"threshold": [0.03]},
+    }
+    (tmp_path / "finger.json").write_text(json.dumps(finger))
+    found = {}
+    for fmi, index in ((2, "[1]"), (3, "")):
+        structure = ecospy.EcosSimulationStructure()
+        structure.add_model("finger", str(build_fmu(tmp_path / "finger.json", tmp_path / f"{fmi}.fmu", fmi=fmi)))
+        with ecospy.EcosSimulation(structure=structure, step_size=STEP) as simulation:
+            simulation.init()
+            found[fmi] = []
+            for k in range(SAMPLES):
+                simulation.set_real(f"finger::tendon_force{index}", 5.0 + 0.1 * k)
+                simulation.set_real(f"finger::tendon_position{index}", 0.001 * (k % 13))
+                simulation.step()
+                found[fmi].append(simulation.get_real(f"finger::compensated_torque{index}"))
+    assert found[2] == found[3] and len(set(found[2])) > 0.9 * SAMPLES
+
+
 # --- fmi-sim ----------------------------------------------------------------------------------------------------------
 
 
@@ -193,5 +254,3 @@ def fmi_sim() -> str:
     if not found:
         pytest.skip("SKIPPED: fmi-sim is not installed (cargo install fmi-sim)")
     return found
-
-

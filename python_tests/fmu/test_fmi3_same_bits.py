@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import json
 import random
 import struct
 from collections.abc import Sequence
@@ -13,8 +14,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fmi3_binary import Instance3, UnpackedFmu3
-from fmu_binary import ERROR, OK, STATIC, Instance, UnpackedFmu, motion
+from fmi3_binary import Instance3, UnpackedFmu3, unpack3
+from fmu_binary import ERROR, FINGER, OK, STATIC, Instance, UnpackedFmu, motion, unpack
 from repository_paths import ROOT, TESTS
 
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
@@ -134,6 +135,30 @@ def test_a_recording_gives_the_same_columns(tmp_path: Path) -> None:
     assert len(np.unique(two["compensated_torque[1]"])) > 0.9 * len(recording)  # it moves
 
 
+def test_all_outputs_that_there_may_be(tmp_path: Path) -> None:
+    """Force at the tip, link of a contact (an Int32), contact at rest, faults of sensors."""
+    description = {
+        **FINGER,
+        "links": [{"axis": [0, 0, 1]}, {"axis": [0, 0, 1], "offset": [0.05, 0, 0]}],
+        "tip": [0.04, 0, 0],
+        "contact": {"threshold": [0.03, 0.02], "rest": {"travel": 1e-4, "threshold": [0.1, 0.1]}},
+        "sensor_fault": {},
+    }
+    (tmp_path / "finger.json").write_text(json.dumps(description))
+    fmus = [build_fmu(tmp_path / "finger.json", tmp_path / f"{k}.fmu", illustrated=False, fmi=k) for k in (2, 3)]
+    pair = Pair(unpack(fmus[0], tmp_path / "2"), unpack3(fmus[1], tmp_path / "3"))
+    assert "contact_observable" in pair.three.fmu.variables and "contact_at_rest" in pair.three.fmu.variables
+    links = set()
+    with pair.two, pair.three:
+        pair.begin(0.0, 1)
+        for k in range(400):
+            pair.step(0.005, k // 100)
+            assert pair.two.get_integers(["contact_link"]) == list(pair.three.get(["contact_link"], "Int32"))
+            links |= set(pair.two.get_integers(["contact_link"]))
+    assert len(links) > 1
+    assert pair.three.fmu.variables["fingertip_force"].size == 3
+
+
 # --- derivatives ------------------------------------------------------------------------------------------------------
 
 
@@ -207,8 +232,6 @@ def test_parts_of_arrays_lists_and_repeated_variables(small_fmu3: UnpackedFmu3) 
 def test_both_versions_refuse_a_state_of_another_finger(
     small_fmu: UnpackedFmu, small_fmu3: UnpackedFmu3, tmp_path: Path
 ) -> None:
-    from fmi3_binary import unpack3
-
     other = build_fmu(
         ROOT / "examples" / "fingers" / "index_finger.json", tmp_path / "other.fmu", illustrated=False, fmi=3
     )
