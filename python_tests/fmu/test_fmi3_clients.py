@@ -10,6 +10,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
+import re
 import shutil
 import struct
 import subprocess
@@ -29,7 +30,7 @@ import fmpy
 
 from fmi3_binary import UnpackedFmu3, fmi3_platform, unpack3
 from fmu_binary import FINGER, OK, Instance, UnpackedFmu, motion
-from repository_paths import TESTS
+from repository_paths import ROOT, TESTS
 
 SAMPLES, STEP = 60, 1 / 512  # a step that is exact in binary: every client then adds up the same times
 DRIVER = TESTS / "portable" / "driver_fmi3.c"
@@ -164,6 +165,18 @@ def test_fmpy(
     small_fmu: UnpackedFmu, small_fmu3: UnpackedFmu3, small_fmu3_path: Path, expected: list[list[float]]
 ) -> None:
     assert simulate(small_fmu3_path, small_fmu3, small_fmu) == expected
+
+
+def test_the_example_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from tendonfmu.fmu import build_fmu
+
+    build_fmu(ROOT / "examples" / "fingers" / "index_finger.json", tmp_path / "index_finger.fmu", fmi=3)
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs/reference/fmi3.md").read_text(), re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {}
+    exec(code, names)
+    assert names["result"]["compensated_torque"].shape == (1000, 4)
+    assert np.abs(names["result"]["joint_torque"]).max() > 0.01
 
 
 @pytest.mark.long
