@@ -3,7 +3,7 @@
     python tools/portable_binaries.py OUTDIR [--only PLATFORM ...]
     tendonfmu build FINGER.json -o FINGER.fmu --binaries OUTDIR/binaries
 
-OUTDIR/binaries holds one folder per FMI platform (docs/reference/portable_binaries.md). FMI 2.0 and FMI 3.0 have different
+OUTDIR/binaries holds one folder per FMI platform (docs/reference/portable_binaries.md). FMI 2.0 and 3.0 have different
 names for them; a folder of both has two libraries.
 The folder appears whole or not at all.
 Exit status: 0 done, 1 a binary is not portable, 2 bad usage, or it cannot be built here.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from tendonfmu.fmu.model_variables import VariableTable
+from tendonfmu.fmu.model_variables import VariableTable, units_of
 
 # The same numbers as in FMI 2.0 have other names of their types.
 TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "String": "String"}
@@ -44,14 +44,12 @@ def in_arrays(model: Mapping[str, Any], table: VariableTable, sizes: Mapping[str
             variables.append({**variable, "type": TYPES[variable["type"]]})
         first_of[index] = variables[-1]["vr"]
     outputs = _outputs(model["outputs"], first_of)
-    units = dict(model["units"])
-    units.setdefault("s", table.data["units"]["s"])
     return {
         **model,
         "variables": variables,
         "outputs": outputs,
         "initial_unknowns": [output["vr"] for output in outputs],
-        "units": units,
+        "units": units_of(variables, table),
     }
 
 
