@@ -1,8 +1,11 @@
-/* Which function may be called when: the table of FMI 2.0.5, section 4.2.4, for co-simulation. */
+/* Which function may be called when, and what it and its arguments are called: one table for each version of FMI
+ * (fmi2_call_table.c, fmi3_call_table.c). A library has one of them; all else in it is the same. */
 #ifndef TENDONFMU_CALL_TABLE_H
 #define TENDONFMU_CALL_TABLE_H
 
-/* States of an instance. Steps are carried out at once, so stepInProgress, stepFailed and stepCanceled never occur. */
+/* States of an instance. Steps are carried out at once, so stepInProgress, stepFailed and stepCanceled never occur.
+ * There are no events and no structural parameters, so the Event and Configuration Modes of FMI 3.0 never occur either.
+ */
 typedef enum fmu_phase {
   PHASE_INSTANTIATED,
   PHASE_INITIALISATION,
@@ -12,6 +15,7 @@ typedef enum fmu_phase {
   PHASE_ERROR = PHASE_COUNT /* on top of one of the others */
 } fmu_phase;
 
+/* Functions of both versions under the name that they have in FMI 2.0: fmi3SetFloat64 is CALL_SET_REAL. */
 typedef enum fmu_function {
   CALL_SET_DEBUG_LOGGING,
   CALL_SETUP_EXPERIMENT,
@@ -34,17 +38,62 @@ typedef enum fmu_function {
   CALL_SERIALIZE_FMU_STATE,
   CALL_DESERIALIZE_FMU_STATE,
   CALL_GET_DIRECTIONAL_DERIVATIVE,
+  CALL_GET_ADJOINT_DERIVATIVE,
   CALL_SET_REAL_INPUT_DERIVATIVES,
   CALL_GET_REAL_OUTPUT_DERIVATIVES,
   CALL_DO_STEP,
+  /* of FMI 2.0 only */
   CALL_CANCEL_STEP,
   CALL_GET_STATUS,
   CALL_GET_REAL_STATUS,
   CALL_GET_INTEGER_STATUS,
   CALL_GET_BOOLEAN_STATUS,
   CALL_GET_STRING_STATUS,
+  /* of FMI 3.0 only, for types that no variable has */
+  CALL_GET_FLOAT32,
+  CALL_GET_INT8,
+  CALL_GET_UINT8,
+  CALL_GET_INT16,
+  CALL_GET_UINT16,
+  CALL_GET_UINT32,
+  CALL_GET_INT64,
+  CALL_GET_UINT64,
+  CALL_GET_BINARY,
+  CALL_GET_CLOCK,
+  CALL_SET_FLOAT32,
+  CALL_SET_INT8,
+  CALL_SET_UINT8,
+  CALL_SET_INT16,
+  CALL_SET_UINT16,
+  CALL_SET_UINT32,
+  CALL_SET_INT64,
+  CALL_SET_UINT64,
+  CALL_SET_BINARY,
+  CALL_SET_CLOCK,
   CALL_COUNT
 } fmu_function;
+
+typedef struct fmu_call {
+  const char* name;
+  int allowed; /* bit 1 << phase */
+} fmu_call;
+
+typedef struct fmi_version {
+  fmu_call calls[CALL_COUNT]; /* name NULL: the version has no such function */
+  const char* phases[PHASE_ERROR + 1];
+  const char* types[4]; /* by variable_type */
+  const char* instantiate;
+  const char* identifier; /* argument: the GUID of modelDescription.xml */
+  const char* resources;  /* argument: where the folder resources is */
+  const char* state;      /* argument: a saved state */
+  const char* references; /* argument: value references */
+  const char* values;     /* argument: values of variables */
+  int arrays;             /* a value reference stands for all elements of a group, not for one */
+  int time_is_variable;   /* VARIABLE_TIME_REFERENCE is the independent variable */
+} fmi_version;
+
+/* Of this library. */
+extern const fmi_version this_fmi;
 
 const char* call_name(fmu_function function);
 int call_is_allowed(fmu_function function, fmu_phase phase);

@@ -19,7 +19,7 @@ component* component_create(const log_target* log, model* m) {
   c->log = *log;
   c->instance_name = copy_text(log->instance_name);
   c->log.instance_name = c->instance_name;
-  if (variables_create(&c->values, m) || !c->instance_name) {
+  if (variables_create(&c->values, m, this_fmi.arrays) || !c->instance_name) {
     component_destroy(c);
     return NULL;
   }
@@ -63,13 +63,13 @@ int component_may_call(component* c, fmu_function function) {
   return 0;
 }
 
-fmi2Status component_fail(component* c, const log_text* text) {
+fmu_status component_fail(component* c, const log_text* text) {
   c->failed = 1;
-  log_send(&c->log, fmi2Error, LOG_STATUS_ERROR, text);
-  return fmi2Error;
+  log_send(&c->log, FMU_ERROR, LOG_STATUS_ERROR, text);
+  return FMU_ERROR;
 }
 
-fmi2Status component_fail_because(component* c, const char* function, const char* reason) {
+fmu_status component_fail_because(component* c, const char* function, const char* reason) {
   const log_text text = log_start(function, reason);
   return component_fail(c, &text);
 }

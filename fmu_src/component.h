@@ -1,4 +1,4 @@
-/* One instance of the FMU: a model, its variables, and where it stands in the life that FMI 2.0 prescribes. */
+/* One instance of the FMU: a model, its variables, and where it stands in the life that FMI prescribes. */
 #ifndef TENDONFMU_COMPONENT_H
 #define TENDONFMU_COMPONENT_H
 
@@ -14,7 +14,7 @@ typedef struct component {
   variables values;
 
   fmu_phase phase;
-  int failed;          /* fmi2Error was returned: state "error" on top of the phase */
+  int failed;          /* an error was returned: state "error" on top of the phase */
   int outputs_pending; /* in initialisation mode: outputs do not belong to the present inputs */
   int stop_time_defined;
   double start_time, stop_time, end_of_step;
@@ -30,10 +30,10 @@ void component_reset(component* c);
 /* 1 when the function may be called now; otherwise logs and fails. c may be NULL: 0. */
 int component_may_call(component* c, fmu_function function);
 
-/* Logs the text as an error, enters the state "error" and returns fmi2Error. */
-fmi2Status component_fail(component* c, const log_text* text);
+/* Logs the text as an error, enters the state "error" and returns FMU_ERROR. */
+fmu_status component_fail(component* c, const log_text* text);
 /* The same with "<function>: <reason>". */
-fmi2Status component_fail_because(component* c, const char* function, const char* reason);
+fmu_status component_fail_because(component* c, const char* function, const char* reason);
 
 /* In initialisation mode: brings the outputs up to the present inputs. 0, or -1 with everything as it was and the
  * reason in model_last_error(). */

@@ -101,14 +101,14 @@ static int values_are_sound(const component* c, const unsigned char* from) {
     const variable_group* group = &variable_groups[g];
     const size_t count = group->causality == CAUSALITY_INPUT ? variables_group_count(&c->values, group) : 0;
     for (size_t i = 0; i < count; ++i) {
-      const variable input = {group, (variable_group_id)g, i};
+      const variable input = {group, (variable_group_id)g, i, 0};
       if (!variables_accept(c->model, &input, get_number(from, at++))) {
         return 0;
       }
     }
   }
   for (size_t i = 0; i < c->values.parameter_count; ++i) {
-    const variable parameter = {NULL, GROUP_COUNT, i};
+    const variable parameter = {NULL, GROUP_COUNT, i, 0};
     const double value = get_number(from, at++);
     if (value != c->values.parameters[i] && !variables_accept(c->model, &parameter, value)) {
       return 0;
@@ -130,7 +130,7 @@ const char* component_refuse_block(const component* c, const void* bytes) {
 
 const char* component_check_state(component* c, const void* bytes, size_t size) {
   if (size != component_state_size(c)) {
-    return "size is not that of fmi2SerializedFMUstateSize";
+    return "expected as many bytes as this FMU's states have";
   }
   const char* reason = component_refuse_block(c, bytes);
   if (reason) {

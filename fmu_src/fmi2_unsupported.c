@@ -9,8 +9,8 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component instance, const fmi2ValueRe
   if (!component_may_call(instance, CALL_SET_REAL_INPUT_DERIVATIVES)) {
     return fmi2Error;
   }
-  return component_fail_because(instance, "fmi2SetRealInputDerivatives",
-                                "inputs are not interpolated: canInterpolateInputs is false");
+  return (fmi2Status)component_fail_because(instance, "fmi2SetRealInputDerivatives",
+                                            "inputs are not interpolated: canInterpolateInputs is false");
 }
 
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component instance, const fmi2ValueReference vr[], size_t nvr,
@@ -19,14 +19,14 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component instance, const fmi2ValueR
   if (!component_may_call(instance, CALL_GET_REAL_OUTPUT_DERIVATIVES)) {
     return fmi2Error;
   }
-  return component_fail_because(instance, "fmi2GetRealOutputDerivatives",
-                                "outputs have no derivatives by time: maxOutputDerivativeOrder is 0");
+  return (fmi2Status)component_fail_because(instance, "fmi2GetRealOutputDerivatives",
+                                            "outputs have no derivatives by time: maxOutputDerivativeOrder is 0");
 }
 
 /* --- model exchange ----------------------------------------------------------------------------------------------- */
 
 static fmi2Status refuse(component* c, const char* function) {
-  return c ? component_fail_because(c, function, "belongs to model exchange, this FMU is for co-simulation")
+  return c ? (fmi2Status)component_fail_because(c, function, "belongs to model exchange, this FMU is for co-simulation")
            : fmi2Error;
 }
 

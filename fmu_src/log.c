@@ -54,26 +54,10 @@ log_text log_start(const char* function, const char* reason) {
   return text;
 }
 
-/* the text as a format string that prints it */
-static void escape_percent(char* to, const char* from) {
-  for (; *from; ++from) {
-    *to++ = *from;
-    if (*from == '%') {
-      *to++ = '%';
-    }
+void log_send(const log_target* target, fmu_status status, log_category category, const log_text* text) {
+  if (target->logger && (target->wanted & (1u << category))) {
+    target->send(target, status, log_category_names[category], text->bytes);
   }
-  *to = '\0';
-}
-
-void log_send(const log_target* target, fmi2Status status, log_category category, const log_text* text) {
-  char format[2 * LOG_TEXT_BYTES];
-  if (!target->logger || !(target->wanted & (1u << category))) {
-    return;
-  }
-  /* Importers that drop the variable arguments see the text in the message, those that format it print it unchanged;
-   * the text is passed once more for the few that expect an argument always. */
-  escape_percent(format, text->bytes);
-  target->logger(target->environment, target->instance_name, status, log_category_names[category], format, text->bytes);
 }
 
 log_category log_find_category(const char* name) {

@@ -4,8 +4,7 @@
 
 #include <stddef.h>
 
-#include "fmi2FunctionTypes.h"
-#include "fmi2TypesPlatform.h"
+#include "status.h"
 #include "variable_table.h"
 
 enum { LOG_TEXT_BYTES = 512 };
@@ -23,17 +22,18 @@ void log_append_count(log_text* text, size_t value);
 /* "<function>: <reason>" */
 log_text log_start(const char* function, const char* reason);
 
-/* Where messages go and which are wanted. */
+/* Where messages go and which are wanted. The importer's logger is of another type in each version of FMI. */
 typedef struct log_target {
-  fmi2CallbackLogger logger; /* may be NULL */
-  fmi2ComponentEnvironment environment;
+  void (*logger)(void); /* may be NULL; `send` knows its type */
+  void (*send)(const struct log_target* target, fmu_status status, const char* category, const char* text);
+  void* environment;
   const char* instance_name;
   unsigned wanted; /* bit 1 << category */
 } log_target;
 
 enum { LOG_NOTHING = 0, LOG_EVERYTHING = (1 << LOG_CATEGORY_COUNT) - 1 };
 
-void log_send(const log_target* target, fmi2Status status, log_category category, const log_text* text);
+void log_send(const log_target* target, fmu_status status, log_category category, const log_text* text);
 
 /* Category of a declared name; LOG_CATEGORY_COUNT when there is none. */
 log_category log_find_category(const char* name);

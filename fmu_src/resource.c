@@ -77,7 +77,7 @@ static FILE* open_file(const char* path) {
 #endif
 }
 
-static void* read_all(FILE* file, size_t* size, const char** reason) {
+static void* read_all(FILE* file, size_t* size, log_text* reason) {
   size_t capacity = 1 << 14, used = 0;
   char* block = malloc(capacity);
   while (block) {
@@ -93,11 +93,11 @@ static void* read_all(FILE* file, size_t* size, const char** reason) {
     block = larger;
   }
   if (!block) {
-    *reason = "file too large for the memory";
+    log_append(reason, "file too large for the memory");
     return NULL;
   }
   if (ferror(file) || used == 0) {
-    *reason = "cannot be read, or is empty";
+    log_append(reason, "cannot be read, or is empty");
     free(block);
     return NULL;
   }
@@ -123,14 +123,17 @@ static FILE* open_in(const char* location, const char* name, int is_uri, int dec
   return file;
 }
 
-void* resource_read(const char* location, const char* name, size_t* size, const char** reason) {
+void* resource_read(const char* location, const char* name, size_t* size, const char* argument, log_text* reason) {
+  reason->length = 0;
   if (!location || !*location) {
-    *reason = "fmuResourceLocation is NULL or empty: expected the URI of the folder resources";
+    log_append(reason, argument);
+    log_append(reason, " is NULL or empty: expected where the folder resources is");
     return NULL;
   }
   const int is_uri = starts_with(location, "file:");
   if (!is_uri && strstr(location, "://")) {
-    *reason = "fmuResourceLocation: expected a file URI, file:///...";
+    log_append(reason, argument);
+    log_append(reason, ": expected a file URI, file:///..., or a path");
     return NULL;
   }
   FILE* file = open_in(location, name, is_uri, 1);
@@ -138,7 +141,9 @@ void* resource_read(const char* location, const char* name, size_t* size, const 
     file = open_in(location, name, is_uri, 0);
   }
   if (!file) {
-    *reason = "not found in the folder that fmuResourceLocation names";
+    log_append(reason, "not found in the folder that ");
+    log_append(reason, argument);
+    log_append(reason, " names");
     return NULL;
   }
   void* block = read_all(file, size, reason);

@@ -1,6 +1,6 @@
 #include "variable_access.h"
 
-fmi2Status fail_at(component* c, fmu_function function, const variable* found, const char* reason) {
+fmu_status fail_at(component* c, fmu_function function, const variable* found, const char* reason) {
   log_text text = log_start(call_name(function), "");
   variables_append_name(&text, c->model, found);
   log_append(&text, ": ");
@@ -8,24 +8,30 @@ fmi2Status fail_at(component* c, fmu_function function, const variable* found, c
   return component_fail(c, &text);
 }
 
-int find_of_type(component* c, fmu_function function, variable_type type, fmi2ValueReference reference,
-                 variable* found) {
-  if (variables_find(&c->values, reference, found)) {
-    log_text text = log_start(call_name(function), "no variable has the value reference ");
+fmu_status fail_of_type(component* c, fmu_function function, unsigned reference, const char* type, variable* found) {
+  log_text text = log_start(call_name(function), "");
+  const int is_known = variables_find(&c->values, reference, found) == 0;
+  if (is_known) {
+    variables_append_name(&text, c->model, found);
+  } else if (is_time(reference, VARIABLE_REAL)) {
+    log_append(&text, "time");
+  } else {
+    log_append(&text, "no variable has the value reference ");
     log_append_count(&text, reference);
-    component_fail(c, &text);
-    return -1;
+    return component_fail(c, &text);
   }
-  if (variable_type_of(found) == type) {
+  log_append(&text, " is of type ");
+  log_append(&text, this_fmi.types[is_known ? variable_type_of(found) : VARIABLE_REAL]);
+  log_append(&text, ", expected ");
+  log_append(&text, type);
+  return component_fail(c, &text);
+}
+
+int find_of_type(component* c, fmu_function function, variable_type type, unsigned reference, variable* found) {
+  if (variables_find(&c->values, reference, found) == 0 && variable_type_of(found) == type) {
     return 0;
   }
-  log_text text = log_start(call_name(function), "");
-  variables_append_name(&text, c->model, found);
-  log_append(&text, " is of type ");
-  log_append(&text, variable_type_name(variable_type_of(found)));
-  log_append(&text, ", expected ");
-  log_append(&text, variable_type_name(type));
-  component_fail(c, &text);
+  fail_of_type(c, function, reference, this_fmi.types[type], found);
   return -1;
 }
 
@@ -34,8 +40,40 @@ int may_access(component* c, fmu_function function, size_t count, const void* re
     return 0;
   }
   if (count && (!references || !values)) {
-    component_fail_because(c, call_name(function), references ? "value is NULL" : "vr is NULL");
+    log_text text = log_start(call_name(function), references ? this_fmi.values : this_fmi.references);
+    log_append(&text, " is NULL");
+    component_fail(c, &text);
     return 0;
   }
   return 1;
+}
+
+int is_time(unsigned reference, variable_type type) {
+  return this_fmi.time_is_variable && reference == VARIABLE_TIME_REFERENCE && type == VARIABLE_REAL;
+}
+
+int check_value_count(component* c, fmu_function function, variable_type type, const unsigned references[],
+                      size_t count, size_t value_count, const char* argument) {
+  variable found = {0};
+  size_t expected = this_fmi.arrays ? 0 : count;
+  for (size_t i = 0; this_fmi.arrays && i < count; ++i) {
+    if (is_time(references[i], type)) {
+      ++expected;
+    } else if (find_of_type(c, function, type, references[i], &found)) {
+      return -1;
+    } else {
+      expected += variables_extent(&c->values, &found);
+    }
+  }
+  if (expected == value_count) {
+    return 0;
+  }
+  log_text text = log_start(call_name(function), argument);
+  log_append(&text, " = ");
+  log_append_count(&text, value_count);
+  log_append(&text, ": expected ");
+  log_append_count(&text, expected);
+  log_append(&text, ", the elements of all variables together");
+  component_fail(c, &text);
+  return -1;
 }

@@ -9,10 +9,20 @@
 int may_access(component* c, fmu_function function, size_t count, const void* references, const void* values);
 
 /* 0 for a variable of the type; otherwise says what it is, or that there is none, and fails. */
-int find_of_type(component* c, fmu_function function, variable_type type, fmi2ValueReference reference,
-                 variable* found);
+int find_of_type(component* c, fmu_function function, variable_type type, unsigned reference, variable* found);
+
+/* Fails with what the variable is instead of the type, or that there is none. */
+fmu_status fail_of_type(component* c, fmu_function function, unsigned reference, const char* type, variable* found);
+
+/* 1 for the independent variable, which is no other variable's and has one element. */
+int is_time(unsigned reference, variable_type type);
+
+/* 0 when the variables of a type have value_count elements together; otherwise says how many `argument` should have, or
+ * what is wrong with a variable, and fails. */
+int check_value_count(component* c, fmu_function function, variable_type type, const unsigned references[],
+                      size_t count, size_t value_count, const char* argument);
 
 /* Fails with "<function>: <variable>: <reason>". */
-fmi2Status fail_at(component* c, fmu_function function, const variable* found, const char* reason);
+fmu_status fail_at(component* c, fmu_function function, const variable* found, const char* reason);
 
 #endif

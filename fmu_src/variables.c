@@ -56,8 +56,9 @@ static size_t share_out_flags(variables* v, unsigned char* block) {
   return used;
 }
 
-int variables_create(variables* v, const model* m) {
+int variables_create(variables* v, const model* m, int arrays) {
   memset(v, 0, sizeof *v);
+  v->arrays = arrays;
   v->joints = model_joint_count(m);
   v->tendons = model_tendon_count(m);
   v->parameter_count = model_parameter_count(m);
@@ -108,13 +109,13 @@ static int in_group(const variables* v, unsigned value_reference, variable_group
   if (value_reference < group->base || value_reference - group->base >= variables_group_count(v, group)) {
     return 0;
   }
-  *found = (variable){group, id, value_reference - group->base};
-  return 1;
+  *found = (variable){group, id, value_reference - group->base, v->arrays && group->size != SIZE_SCALAR};
+  return !v->arrays || found->index == 0;
 }
 
 int variables_find(const variables* v, unsigned value_reference, variable* last) {
   if (value_reference >= VARIABLE_PARAMETER_BASE) {
-    *last = (variable){NULL, GROUP_COUNT, value_reference - VARIABLE_PARAMETER_BASE};
+    *last = (variable){NULL, GROUP_COUNT, value_reference - VARIABLE_PARAMETER_BASE, 0};
     return last->index < v->parameter_count ? 0 : -1;
   }
   if (last->group && in_group(v, value_reference, last->id, last)) {
@@ -126,6 +127,14 @@ int variables_find(const variables* v, unsigned value_reference, variable* last)
     }
   }
   return -1;
+}
+
+size_t variables_extent(const variables* v, const variable* found) {
+  return found->whole ? variables_group_count(v, found->group) : 1;
+}
+
+variable variables_element(const variable* whole, size_t i) {
+  return (variable){whole->group, whole->id, whole->index + i, 0};
 }
 
 variable_type variable_type_of(const variable* found) {
@@ -183,14 +192,9 @@ void variables_append_name(log_text* text, const model* m, const variable* found
     return;
   }
   log_append(text, found->group->name);
-  if (found->group->size != SIZE_SCALAR) {
+  if (found->group->size != SIZE_SCALAR && !found->whole) {
     log_append(text, "[");
     log_append_count(text, found->index + 1);
     log_append(text, "]");
   }
-}
-
-const char* variable_type_name(variable_type type) {
-  static const char* const names[] = {"Real", "Integer", "Boolean", "String"};
-  return names[type];
 }

@@ -12,6 +12,7 @@
 typedef struct variables {
   size_t joints, tendons, parameter_count;
   int has_links, watches_rest, watches_sensors;
+  int arrays;                       /* a value reference stands for a whole group, not for one element */
   double* numbers;                  /* one block: what the pointers below point into */
   unsigned char* flags;             /* likewise */
   size_t input_count, output_count; /* inputs stand first in the block, then Real and Integer outputs, then settings */
@@ -26,10 +27,11 @@ typedef struct variable {
   const variable_group* group; /* NULL: a parameter by path */
   variable_group_id id;        /* of the group */
   size_t index;                /* from 0, in the group or among the parameters */
+  int whole;                   /* all elements of the group from `index` on */
 } variable;
 
 /* 0, or -1 when memory is out; then variables_destroy() is still to be called. */
-int variables_create(variables* v, const model* m);
+int variables_create(variables* v, const model* m, int arrays);
 void variables_destroy(variables* v);
 
 /* Inputs to 0, outputs to 0, settings and parameters to those of the model. */
@@ -44,6 +46,12 @@ size_t variables_group_count(const variables* v, const variable_group* group);
 /* 0 when there is such a variable. `last` is the one found before, or zeros: neighbours are found fast. */
 int variables_find(const variables* v, unsigned value_reference, variable* last);
 
+/* Numbers that the variable has: those of its group when it is whole, otherwise 1. */
+size_t variables_extent(const variables* v, const variable* found);
+
+/* Element i of a variable, a variable by itself. */
+variable variables_element(const variable* whole, size_t i);
+
 variable_type variable_type_of(const variable* found);
 variable_causality variable_causality_of(const variable* found);
 
@@ -56,8 +64,7 @@ int variables_accept(const model* m, const variable* found, double value);
 /* Appends "<name> = <value>: expected <range> <unit>". */
 void variables_append_refusal(log_text* text, const model* m, const variable* found, double value);
 
-/* Name as in the XML, such as "tendon_force[2]" or "contact". */
+/* Name as in the XML, such as "tendon_force[2]" or "contact"; of a whole group "tendon_force". */
 void variables_append_name(log_text* text, const model* m, const variable* found);
-const char* variable_type_name(variable_type type);
 
 #endif

@@ -26,6 +26,7 @@ HEADER = """\
 
 #define VARIABLE_TABLE_SALT {salt}ull /* hash of the table, part of every GUID */
 #define VARIABLE_PARAMETER_BASE {parameter_base}u /* value reference of the first parameter */
+#define VARIABLE_TIME_REFERENCE {time}u /* of the independent variable, which FMI 3.0 wants */
 
 /* In the order of variables.json. */
 typedef enum variable_group_id {{
@@ -73,6 +74,11 @@ def salt(table: dict[str, Any]) -> int:
     return int.from_bytes(hashlib.sha256(text.encode("ascii")).digest()[:8], "big")
 
 
+def time_reference(table: dict[str, Any]) -> int:
+    """Value reference of the independent variable of FMI 3.0: no group reaches the one before the first parameter."""
+    return int(table["parameters"]["base"]) - 1
+
+
 def check(table: dict[str, Any]) -> None:
     """Raises ValueError naming the group whose entry cannot be."""
     last = -MAX_GROUP
@@ -107,6 +113,7 @@ def header(table: dict[str, Any]) -> str:
     return HEADER.format(
         salt=hex(salt(table)),
         parameter_base=table["parameters"]["base"],
+        time=time_reference(table),
         ids="\n".join(f"  GROUP_{group['name'].upper().replace('.', '_')}," for group in table["groups"]),
         rows="\n".join(row(group) for group in table["groups"]),
         categories="\n".join(f"  {constant(name)}," for name in categories),

@@ -14,6 +14,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import pytest
 
 from command import Answer, Call
+from fmi3_binary import UnpackedFmu3, unpack3
 from fmu_binary import FINGER, UnpackedFmu, unpack
 from plant_fmu_rig import fmu_rig
 from real_browser import BROWSERS, find_browser
@@ -34,6 +35,22 @@ def small_fmu_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def small_fmu(small_fmu_path: Path) -> UnpackedFmu:
     """The same, unpacked and loaded."""
     return unpack(small_fmu_path, small_fmu_path.parent / "unpacked")
+
+
+@pytest.fixture(scope="session")
+def small_fmu3_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The packed FMU of fmu_binary.FINGER in FMI 3.0."""
+    from tendonfmu.fmu import build_fmu
+
+    folder = tmp_path_factory.mktemp("small_fmu3")
+    (folder / "finger.json").write_text(json.dumps(FINGER))
+    return build_fmu(folder / "finger.json", folder / "small_finger.fmu", fmi=3)
+
+
+@pytest.fixture(scope="session")
+def small_fmu3(small_fmu3_path: Path) -> UnpackedFmu3:
+    """The same, unpacked and loaded."""
+    return unpack3(small_fmu3_path, small_fmu3_path.parent / "unpacked")
 
 
 @pytest.fixture(scope="session")

@@ -1,9 +1,10 @@
-"""Cross-compiles the FMU's shared library for Linux, Windows and macOS with the Python package ziglang.
+"""Cross-compiles the FMU's shared libraries for Linux, Windows and macOS with the Python package ziglang.
 
     python tools/portable_binaries.py OUTDIR [--only PLATFORM ...]
     tendonfmu build FINGER.json -o FINGER.fmu --binaries OUTDIR/binaries
 
-OUTDIR/binaries holds one folder per FMI platform (docs/reference/portable_binaries.md).
+OUTDIR/binaries holds one folder per FMI platform (docs/reference/portable_binaries.md). FMI 2.0 and 3.0 have different
+names for them; a folder of both has two libraries.
 The folder appears whole or not at all.
 Exit status: 0 done, 1 a binary is not portable, 2 bad usage, or it cannot be built here.
 """
@@ -26,7 +27,9 @@ from pathlib import Path
 from binary_contents import Contents, read_contents
 
 ROOT = Path(__file__).resolve().parent.parent
-STEM = "tendonfmu"
+STEMS = {2: "tendonfmu", 3: "tendonfmu_fmi3"}  # by the version of FMI
+EXPORTS = {2: "exports.map", 3: "fmi3_exports.map"}
+SOURCES = {2: "TENDONFMU_FMU_SOURCES", 3: "TENDONFMU_FMI3_FMU_SOURCES"}
 FLAGS = ("-std=c11", "-O2", "-DNDEBUG", "-ffp-contract=off", "-fvisibility=hidden", "-Wall", "-Wextra", "-Werror")
 GLIBC = (2, 17)  # RHEL 7; of the year 2012
 # What a library may need: the C library and libm of its system, nothing of a compiler.
@@ -45,26 +48,41 @@ class BuildError(Exception):
     """One line: what failed, where, what was expected."""
 
 
+_GLIBC_NAME = ".".join(map(str, GLIBC))
+
+
 @dataclass(frozen=True)
 class Target:
-    """triple: zig's name. Targets of one platform become one file (macOS: one library for both processors)."""
+    """triple: zig's name. fmi: version. Targets of one library become one file (macOS: one for both processors)."""
 
     platform: str
     triple: str
     suffix: str
-    options: tuple[str, ...] = ()
+    fmi: int = 2
 
+    @property
+    def library(self) -> str:
+        """Path in the folder of all libraries."""
+        return f"{self.platform}/{STEMS[self.fmi]}{self.suffix}"
 
-_LINUX = ("-fPIC", f"-Wl,--version-script={ROOT / 'fmu_src' / 'exports.map'}", "-Wl,-Bsymbolic")
-_MACOS = (f"-Wl,-install_name,@rpath/{STEM}.dylib",)
-_GLIBC_NAME = ".".join(map(str, GLIBC))
+    @property
+    def options(self) -> tuple[str, ...]:
+        if self.suffix == ".so":
+            return ("-fPIC", f"-Wl,--version-script={ROOT / 'fmu_src' / EXPORTS[self.fmi]}", "-Wl,-Bsymbolic")
+        return (f"-Wl,-install_name,@rpath/{STEMS[self.fmi]}.dylib",) if self.suffix == ".dylib" else ()
+
 
 TARGETS = (
-    Target("linux64", f"x86_64-linux-gnu.{_GLIBC_NAME}", ".so", _LINUX),
-    Target("aarch64-linux", f"aarch64-linux-gnu.{_GLIBC_NAME}", ".so", _LINUX),
+    Target("linux64", f"x86_64-linux-gnu.{_GLIBC_NAME}", ".so"),
+    Target("aarch64-linux", f"aarch64-linux-gnu.{_GLIBC_NAME}", ".so"),
     Target("win64", "x86_64-windows-gnu", ".dll"),
-    Target("darwin64", "x86_64-macos.11.0", ".dylib", _MACOS),
-    Target("darwin64", "aarch64-macos.11.0", ".dylib", _MACOS),
+    Target("darwin64", "x86_64-macos.11.0", ".dylib"),
+    Target("darwin64", "aarch64-macos.11.0", ".dylib"),
+    Target("x86_64-linux", f"x86_64-linux-gnu.{_GLIBC_NAME}", ".so", 3),
+    Target("aarch64-linux", f"aarch64-linux-gnu.{_GLIBC_NAME}", ".so", 3),
+    Target("x86_64-windows", "x86_64-windows-gnu", ".dll", 3),
+    Target("x86_64-darwin", "x86_64-macos.11.0", ".dylib", 3),
+    Target("aarch64-darwin", "aarch64-macos.11.0", ".dylib", 3),
 )
 PLATFORMS = tuple(dict.fromkeys(target.platform for target in TARGETS))
 
@@ -79,11 +97,12 @@ def zig_command() -> list[str]:
 
 
 def cmake_list(path: Path, name: str) -> list[str]:
-    """The words of set(NAME ...) in a CMake file, without comments."""
+    """The words of set(NAME ...) in a CMake file, without comments; ${OTHER} is the list of that name."""
     found = re.search(rf"set\({name}\b(.*?)\)", re.sub(r"#.*", "", path.read_text(encoding="utf-8")), re.DOTALL)
     if not found:
         raise BuildError(f"{path}: no list {name}; expected set({name} ...)")
-    return found[1].split()
+    lists = {word: re.fullmatch(r"\$\{(\w+)\}", word) for word in found[1].split()}
+    return [each for word, other in lists.items() for each in (cmake_list(path, other[1]) if other else [word])]
 
 
 def core_sources() -> list[Path]:
@@ -92,10 +111,8 @@ def core_sources() -> list[Path]:
     return [runtime / name for name in names if name.endswith(".c")]
 
 
-def fmu_sources() -> list[Path]:
-    return [
-        ROOT / "fmu_src" / name for name in cmake_list(ROOT / "fmu_src" / "CMakeLists.txt", "TENDONFMU_FMU_SOURCES")
-    ]
+def fmu_sources(fmi: int = 2) -> list[Path]:
+    return [ROOT / "fmu_src" / name for name in cmake_list(ROOT / "fmu_src" / "CMakeLists.txt", SOURCES[fmi])]
 
 
 def version() -> str:
@@ -107,7 +124,7 @@ def version() -> str:
 
 
 def fmi_headers() -> Path:
-    """The folder of fmi2Functions.h, which the package fmpy brings along."""
+    """The folder of fmi2Functions.h and fmi3Functions.h, which the package fmpy brings along."""
     spec = importlib.util.find_spec("fmpy")
     folder = Path(spec.submodule_search_locations[0]) / "c-code" if spec and spec.submodule_search_locations else None
     if folder is None or not (folder / "fmi2Functions.h").is_file():
@@ -127,10 +144,10 @@ def compile_library(target: Target, folder: Path) -> Path:
     generate_table(folder)
     core = ROOT / "runtime" / "core"
     include = [folder, ROOT / "runtime" / "include", core, core / "effects", core / "kernel", ROOT / "fmu_src"]
-    library = folder / f"{STEM}{target.suffix}"
+    library = folder / f"{STEMS[target.fmi]}{target.suffix}"
     command = [*zig_command(), "-target", target.triple, *FLAGS, f'-DTENDONFMU_VERSION="{version()}"', "-shared", "-s"]
     command += [f"-I{each}" for each in include] + ["-isystem", str(fmi_headers()), *target.options]
-    _run([*command, *map(str, core_sources() + fmu_sources()), "-o", str(library)], target.triple)
+    _run([*command, *map(str, core_sources() + fmu_sources(target.fmi)), "-o", str(library)], target.triple)
     return library
 
 
@@ -156,14 +173,14 @@ def universal(libraries: Iterable[bytes]) -> bytes:
 # --- checking --------------------------------------------------------------------------------------------------------
 
 
-def findings(contents: Contents) -> list[str]:
+def findings(contents: Contents, fmi: int = 2) -> list[str]:
     """What makes a library less portable than promised; empty for a good one."""
     found = []
-    foreign = {name for name in contents.exports - LINKER_MARKS if not name.startswith("fmi2")}
+    foreign = {name for name in contents.exports - LINKER_MARKS if not name.startswith(f"fmi{fmi}")}
     if foreign:
-        found.append(f"exports {', '.join(sorted(foreign))}; expected fmi2* only")
-    if "fmi2DoStep" not in contents.exports:
-        found.append("does not export fmi2DoStep")
+        found.append(f"exports {', '.join(sorted(foreign))}; expected fmi{fmi}* only")
+    if f"fmi{fmi}DoStep" not in contents.exports:
+        found.append(f"does not export fmi{fmi}DoStep")
     allowed = SYSTEM_LIBRARIES[contents.format]
     others = [name for name in contents.libraries if not allowed.fullmatch(name)]
     if others:
@@ -173,12 +190,12 @@ def findings(contents: Contents) -> list[str]:
     return found
 
 
-def build_platform(platform: str, folder: Path) -> tuple[bytes, list[Contents]]:
-    """The library of one platform, and the contents of each of its parts. Raises BuildError."""
+def build_library(library: str, folder: Path) -> tuple[bytes, list[Contents]]:
+    """The library of one platform and version, and the contents of each of its parts. Raises BuildError."""
     parts = []
     for target in TARGETS:
-        if target.platform == platform:
-            scratch = folder / target.triple
+        if target.library == library:
+            scratch = folder / f"{target.triple}-{target.fmi}"
             scratch.mkdir()
             parts.append(compile_library(target, scratch).read_bytes())
     return parts[0] if len(parts) == 1 else universal(parts), [read_contents(part) for part in parts]
@@ -193,22 +210,22 @@ def build_all(platforms: Sequence[str], output: Path) -> int:
     status = 0
     with tempfile.TemporaryDirectory(dir=output, prefix=".building-") as name:
         finished = Path(name) / "binaries"
-        for platform in platforms:
+        libraries = {target.library: target for target in TARGETS if target.platform in platforms}
+        for library, target in libraries.items():
             started = time.monotonic()
-            if platform == "win64":
+            if target.platform == "win64":
                 print("win64: the first time takes minutes (zig compiles the C library of Windows) ...", flush=True)
-            data, contents = build_platform(platform, Path(name))
-            suffix = next(target.suffix for target in TARGETS if target.platform == platform)
-            (finished / platform).mkdir(parents=True)
-            (finished / platform / f"{STEM}{suffix}").write_bytes(data)
+            data, contents = build_library(library, Path(name))
+            (finished / library).parent.mkdir(parents=True, exist_ok=True)
+            (finished / library).write_bytes(data)
             seconds = time.monotonic() - started
             for part in contents:
                 glibc = f", GLIBC {part.glibc[-1]}" if part.glibc else ""
-                print(f"{platform}: {part.machine} {part.format}, {len(part.exports - LINKER_MARKS)} exports{glibc}")
-                for finding in findings(part):
+                print(f"{library}: {part.machine} {part.format}, {len(part.exports - LINKER_MARKS)} exports{glibc}")
+                for finding in findings(part, target.fmi):
                     status = 1
-                    print(f"portable_binaries: {platform}, {part.machine}: {finding}", file=sys.stderr)
-            print(f"{platform}: {len(data) / 1024:.0f} KiB, {seconds:.1f} s", flush=True)
+                    print(f"portable_binaries: {library}, {part.machine}: {finding}", file=sys.stderr)
+            print(f"{library}: {len(data) / 1024:.0f} KiB, {seconds:.1f} s", flush=True)
         if status == 0:
             shutil.rmtree(output / "binaries", ignore_errors=True)
             finished.replace(output / "binaries")
@@ -216,7 +233,7 @@ def build_all(platforms: Sequence[str], output: Path) -> int:
 
 
 def main(arguments: Sequence[str]) -> int:
-    parser = argparse.ArgumentParser(description="Cross-compiles the FMU's shared library with the package ziglang.")
+    parser = argparse.ArgumentParser(description="Cross-compiles the FMU's shared libraries with the package ziglang.")
     parser.add_argument("output", type=Path, metavar="OUTDIR")
     parser.add_argument("--only", nargs="+", choices=PLATFORMS, default=PLATFORMS, metavar="PLATFORM")
     options = parser.parse_args(arguments)

@@ -1,14 +1,14 @@
 """Collects the C sources of the friction FMU flat in one folder, for source FMUs.
 
-    python collect_sources.py LIST FOLDER VERSION
+    python collect_sources.py LIST FOLDER VERSION FMI
 
-LIST is a file with one path a line. FOLDER is made anew. In it, beside the copies:
+LIST is a file with one path a line, FMI the version of FMI, 2 or 3. FOLDER is made anew. In it, beside the copies:
 
     sources.txt                the C files, in order: all of them are compiled
     external_names_begin.h     included first by every C file: renames what other files see (see below)
     external_names_end.h       included last by every C file
 
-Two source FMUs can be linked into one program when each is compiled with its own FMI2_FUNCTION_PREFIX. The headers of
+Two source FMUs can be linked into one program when each is compiled with its own FMI2_FUNCTION_PREFIX (FMI 3.0: FMI3_FUNCTION_PREFIX). The headers of
 FMI put it before the names of FMI's functions; external_names_begin.h puts it before all other external names of
 these sources. Without a prefix it hides them, so that a shared library exports FMI's functions alone.
 """
@@ -34,13 +34,13 @@ BEGIN_TEXT = """\
 
 #define TENDONFMU_VERSION "{version}"
 
-/* The prefix of FMI's functions, by the rules of fmi2Functions.h. */
-#if defined(FMI2_OVERRIDE_FUNCTION_PREFIX)
-#if defined(FMI2_ACTUAL_FUNCTION_PREFIX)
-#define TENDONFMU_PREFIX FMI2_ACTUAL_FUNCTION_PREFIX
+/* The prefix of FMI's functions, by the rules of fmi{fmi}Functions.h. */
+#if defined(FMI{fmi}_OVERRIDE_FUNCTION_PREFIX)
+#if defined(FMI{fmi}_ACTUAL_FUNCTION_PREFIX)
+#define TENDONFMU_PREFIX FMI{fmi}_ACTUAL_FUNCTION_PREFIX
 #endif
-#elif defined(FMI2_FUNCTION_PREFIX)
-#define TENDONFMU_PREFIX FMI2_FUNCTION_PREFIX
+#elif defined(FMI{fmi}_FUNCTION_PREFIX)
+#define TENDONFMU_PREFIX FMI{fmi}_FUNCTION_PREFIX
 #endif
 
 #if defined(TENDONFMU_PREFIX)
@@ -49,7 +49,7 @@ BEGIN_TEXT = """\
 #define TENDONFMU_PREFIXED(name) TENDONFMU_PASTE_VALUES(TENDONFMU_PREFIX, name)
 {definitions}
 #elif defined(__GNUC__) && !defined(_WIN32) && !defined(__CYGWIN__)
-#define TENDONFMU_HIDES_NAMES /* all but FMI's functions, which fmi2Functions.h exports by name */
+#define TENDONFMU_HIDES_NAMES /* all but FMI's functions, which fmi{fmi}Functions.h exports by name */
 #pragma GCC visibility push(hidden)
 #endif
 
@@ -114,7 +114,7 @@ def external_names(text: str) -> set[str]:
     return names
 
 
-def external_names_header(texts: Iterable[str], version: str) -> str:
+def external_names_header(texts: Iterable[str], version: str, fmi: str) -> str:
     """Return external_names_begin.h of these sources and headers."""
     names: set[str] = set()
     includes: set[str] = set()
@@ -124,14 +124,15 @@ def external_names_header(texts: Iterable[str], version: str) -> str:
     return BEGIN_TEXT.format(
         includes="\n".join(f"#include <{name}>" for name in sorted(includes)),
         version=version,
+        fmi=fmi,
         # FMI's own are the business of its headers
         definitions="\n".join(
-            f"#define {name} TENDONFMU_PREFIXED({name})" for name in sorted(names) if not name.startswith("fmi2")
+            f"#define {name} TENDONFMU_PREFIXED({name})" for name in sorted(names) if not name.startswith(f"fmi{fmi}")
         ),
     )
 
 
-def collect(paths: Iterable[Path], folder: Path, version: str) -> None:
+def collect(paths: Iterable[Path], folder: Path, version: str, fmi: str) -> None:
     """Copy the files into the folder, which is made anew, and add what this module's text names."""
     by_name: dict[str, Path] = {}
     for path in paths:
@@ -142,7 +143,7 @@ def collect(paths: Iterable[Path], folder: Path, version: str) -> None:
     code = [text for name, text in texts.items() if name.endswith((".c", ".h"))]
     for name in sources:
         texts[name] = f'#include "{BEGIN}"\n{texts[name]}#include "{END}"\n'
-    texts |= {BEGIN: external_names_header(code, version), END: END_TEXT, "sources.txt": "\n".join(sources) + "\n"}
+    texts |= {BEGIN: external_names_header(code, version, fmi), END: END_TEXT, "sources.txt": "\n".join(sources) + "\n"}
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     for name, text in texts.items():
@@ -150,7 +151,7 @@ def collect(paths: Iterable[Path], folder: Path, version: str) -> None:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 4:
-        sys.exit("usage: collect_sources.py LIST FOLDER VERSION")
+    if len(sys.argv) != 5 or sys.argv[4] not in ("2", "3"):
+        sys.exit("usage: collect_sources.py LIST FOLDER VERSION FMI")
     listed = Path(sys.argv[1]).read_text(encoding="utf-8").split("\n")
-    collect([Path(line) for line in listed if line], Path(sys.argv[2]), sys.argv[3])
+    collect([Path(line) for line in listed if line], Path(sys.argv[2]), *sys.argv[3:])

@@ -35,6 +35,7 @@ import portable_binaries as portable  # noqa: E402
 FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
 RECORDING = TESTS / "reference" / "index_finger_in.csv"
 ARM_LIBRARIES = Path("/usr/aarch64-linux-gnu")  # of the package libc6-arm64-cross
+FUNCTIONS = {2: 44, 3: 75}  # all of the headers of FMI 2.0 and 3.0
 Bits = NDArray[np.uint64]
 
 
@@ -50,6 +51,12 @@ def installed_library() -> Path:
     return next(Path(spec.submodule_search_locations[0]).glob("binaries/*64/tendonfmu.*"))
 
 
+def installed_fmi3_library() -> Path:
+    spec = importlib.util.find_spec("tendonfmu")
+    assert spec and spec.submodule_search_locations
+    return next(Path(spec.submodule_search_locations[0]).glob("binaries/*-*/tendonfmu_fmi3.*"))
+
+
 def tool(*arguments: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, str(ROOT / "tools" / "portable_binaries.py"), *arguments]
     return subprocess.run(command, capture_output=True, text=True, check=False)
@@ -60,12 +67,19 @@ def tool(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 def test_the_lists_name_every_source() -> None:
     assert sorted(portable.core_sources()) == sorted((ROOT / "runtime" / "core").rglob("*.c"))
-    assert sorted(portable.fmu_sources()) == sorted((ROOT / "fmu_src").glob("*.c"))
+    of_both = set(portable.fmu_sources(2)) | set(portable.fmu_sources(3))
+    # zig links for an old C library: what lowers the floor of other linkers is not among them
+    assert of_both == set((ROOT / "fmu_src").glob("*.c")) - {ROOT / "fmu_src" / "glibc_floor.c"}
+    for fmi, other in ((2, 3), (3, 2)):
+        assert not [path for path in portable.fmu_sources(fmi) if path.name.startswith(f"fmi{other}_")]
 
 
 def test_a_missing_list_is_named(tmp_path: Path) -> None:
-    (tmp_path / "CMakeLists.txt").write_text("# set(SOURCES a.c)\nset(OTHERS a.c # why\n  b.c)\n")
+    (tmp_path / "CMakeLists.txt").write_text(
+        "# set(SOURCES a.c)\nset(OTHERS a.c # why\n  b.c)\nset(ALL ${OTHERS} c.c)\n"
+    )
     assert portable.cmake_list(tmp_path / "CMakeLists.txt", "OTHERS") == ["a.c", "b.c"]
+    assert portable.cmake_list(tmp_path / "CMakeLists.txt", "ALL") == ["a.c", "b.c", "c.c"]
     with pytest.raises(portable.BuildError, match=r"CMakeLists.txt: no list SOURCES; expected set\(SOURCES"):
         portable.cmake_list(tmp_path / "CMakeLists.txt", "SOURCES")
 
@@ -88,8 +102,11 @@ def test_contents_agree_with_readelf() -> None:
 
 
 def test_the_installed_library_exports_and_needs_what_it_may() -> None:
-    contents = binary_contents.read_contents(installed_library().read_bytes())
-    assert all("GLIBC" in finding for finding in portable.findings(contents))  # an ordinary build asks for the host's
+    for library, fmi in ((installed_library(), 2), (installed_fmi3_library(), 3)):
+        contents = binary_contents.read_contents(library.read_bytes())
+        findings = portable.findings(contents, fmi)
+        assert all("GLIBC" in finding for finding in findings)  # an ordinary build asks for the host's
+        assert len(contents.exports - portable.LINKER_MARKS) == FUNCTIONS[fmi]
 
 
 def test_a_finding_for_each_promise_that_is_broken() -> None:
@@ -104,6 +121,7 @@ def test_a_finding_for_each_promise_that_is_broken() -> None:
     assert changed(libraries=("libc.so.6", "libstdc++.so.6"))[0].startswith("needs libstdc++.so.6; expected")
     assert changed(exports=frozenset({"fmi2DoStep", "malloc"})) == ["exports malloc; expected fmi2* only"]
     assert changed(exports=frozenset({"fmi2Reset"})) == ["does not export fmi2DoStep"]
+    assert portable.findings(good, 3) == ["exports fmi2DoStep; expected fmi3* only", "does not export fmi3DoStep"]
 
 
 @pytest.mark.parametrize("data", [b"", b"#!/bin/sh\n", b"\x7fELF\x01" + bytes(60)])
@@ -158,18 +176,23 @@ EXPECTED = {
     "aarch64-linux": ["aarch64 ELF"],
     "win64": ["x86_64 PE"],
     "darwin64": ["x86_64 Mach-O", "aarch64 Mach-O"],
+    "x86_64-linux": ["x86_64 ELF"],
+    "x86_64-windows": ["x86_64 PE"],
+    "x86_64-darwin": ["x86_64 Mach-O"],
+    "aarch64-darwin": ["aarch64 Mach-O"],
 }
+LIBRARIES = dict.fromkeys((target.library, target.platform, target.fmi) for target in portable.TARGETS)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("platform", EXPECTED)
-def test_a_portable_library_keeps_its_promises(binaries: Path, platform: str) -> None:
-    (library,) = (binaries / platform).iterdir()
+@pytest.mark.parametrize(("name", "platform", "fmi"), LIBRARIES)
+def test_a_portable_library_keeps_its_promises(binaries: Path, name: str, platform: str, fmi: int) -> None:
+    library = binaries / name
     found = [binary_contents.read_contents(part) for part in parts(library)]
     assert [f"{each.machine} {each.format}" for each in found] == EXPECTED[platform]
     for contents in found:
-        assert portable.findings(contents) == []
-        assert len(contents.exports - portable.LINKER_MARKS) == 44  # all functions of FMI 2.0 for co-simulation
+        assert portable.findings(contents, fmi) == []
+        assert len(contents.exports - portable.LINKER_MARKS) == FUNCTIONS[fmi]
     # Our own code is 250 to 390 kB of it; a C library or an exception runtime linked in by mistake would double it.
     assert library.stat().st_size < 500_000 * len(found)
 
@@ -214,7 +237,7 @@ class Emulated:
         return f"file:///Z:{folder}" if self.is_windows else folder.as_uri()  # wine's drive Z: is the host's root
 
     def compile_driver(self, folder: Path) -> Path:
-        target = next(target for target in portable.TARGETS if target.platform == self.platform)
+        target = next(target for target in portable.TARGETS if target.platform == self.platform and target.fmi == 2)
         driver = folder / f"driver-{self.platform}{'.exe' if self.is_windows else ''}"
         command = [*portable.zig_command(), "-target", target.triple, "-std=c11", "-O2", "-Wall", "-Wextra", "-Werror"]
         command += ["-isystem", str(portable.fmi_headers()), str(TESTS / "portable" / "driver.c"), "-o", str(driver)]
@@ -308,12 +331,32 @@ def test_a_portable_fmu_yields_the_reference_trace(binaries: Path, tmp_path: Pat
     assert done.returncode == 0, done.stderr
     with zipfile.ZipFile(fmu) as archive:
         packed = [name for name in archive.namelist() if name.startswith("binaries/")]
-    suffixes = {target.platform: target.suffix for target in portable.TARGETS}
+    suffixes = {target.platform: target.suffix for target in portable.TARGETS if target.fmi == 2}
     assert sorted(packed) == sorted(f"binaries/{name}/index_finger{suffix}" for name, suffix in suffixes.items())
     script = ROOT / "examples" / "ci_reference_check" / "check_reference.py"
     command = [sys.executable, str(script), str(fmu), str(TESTS / "reference" / "index_finger")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.long
+def test_a_portable_fmu_of_fmi3_gives_the_numbers_of_the_native_one(binaries: Path, tmp_path: Path) -> None:
+    from tendonfmu.fmu import build_fmu, run_fmu
+    from tendonfmu.recordings import read_recording
+
+    platforms = {"linux": "linux", "darwin": "darwin", "win32": "windows"}
+    here = f"{os.uname().machine.replace('arm64', 'aarch64')}-{platforms[sys.platform]}"
+    for name, folder in (("native", None), ("portable", binaries)):
+        build_fmu(FINGER, tmp_path / f"{name}.fmu", binaries=folder, fmi=3)
+    with zipfile.ZipFile(tmp_path / "portable.fmu") as archive:
+        packed = {name.split("/")[1] for name in archive.namelist() if name.startswith("binaries/")}
+    assert packed == {target.platform for target in portable.TARGETS if target.fmi == 3} and here in packed
+    recording = read_recording(RECORDING)
+    native, found = (run_fmu(tmp_path / f"{name}.fmu", recording) for name in ("native", "portable"))
+    assert len(np.unique(native["compensated_torque[1]"])) > 0.9 * len(recording)  # it moves
+    assert {name: column.tobytes() for name, column in native.items()} == {
+        name: column.tobytes() for name, column in found.items()
+    }
 
 
 @pytest.mark.long
@@ -324,7 +367,7 @@ def test_a_portable_library_gives_the_bits_of_the_native_one(
     """Zero ulps: one rounding for each operation everywhere, no function of the system's libm but sqrt and floor."""
     here, there = emulated("linux64"), emulated(platform)
     native = here.run(here.compile_driver(tmp_path), installed_library(), fmu, tmp_path)
-    (library,) = (binaries / platform).iterdir()
+    (library,) = (binaries / platform).glob("tendonfmu.*")
     found = there.run(there.compile_driver(tmp_path), library, fmu, tmp_path)
     assert native.shape[0] == fmu.count
     assert len(np.unique(native[:, 0])) > 0.9 * fmu.count  # it moves

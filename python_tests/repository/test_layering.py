@@ -333,7 +333,7 @@ def test_c_needs_the_c_library_alone(part: str) -> None:
 def test_the_fmu_knows_fmi_and_the_c_interface_only() -> None:
     folder = ROOT / "fmu_src"
     own = {file.name for file in folder.glob("*.h")}
-    outside = {"fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h", "tendonfmu.h", "variable_table.h"}
+    outside = {"fmi2Functions.h", "fmi3Functions.h", "tendonfmu.h", "variable_table.h"}
     sources = sorted(folder.glob("*.[ch]"))
     assert len(sources) > 10
     wrong = [
@@ -345,9 +345,23 @@ def test_the_fmu_knows_fmi_and_the_c_interface_only() -> None:
     assert wrong == []
 
 
+def test_only_the_files_of_a_version_of_fmi_know_it() -> None:
+    """What both versions do is in files that know neither."""
+    folder = ROOT / "fmu_src"
+    users = {
+        (file.name, name)
+        for file in (*folder.glob("*.[ch]"), *folder.glob("plant_fmu/*.[ch]"))
+        for _, name in includes_of(file)
+        if re.match(r"fmi[23]", name) and not (folder / name).exists()
+    }
+    assert {name for file, name in users if file.startswith("fmi2_")} == {"fmi2Functions.h"}
+    assert {name for file, name in users if file.startswith("fmi3_")} == {"fmi3Functions.h"}
+    assert [file for file, _ in users if not re.match(r"fmi[23]_", file)] == []
+
+
 def test_the_core_knows_nothing_of_fmi() -> None:
     for file in (ROOT / "runtime" / "core").rglob("*.[ch]"):
-        assert not re.search(r"fmi2|fmu_src", file.read_text(encoding="utf-8")), file.name
+        assert not re.search(r"fmi[23]|fmu_src", file.read_text(encoding="utf-8")), file.name
 
 
 def test_only_the_description_reader_knows_json() -> None:

@@ -19,13 +19,13 @@ from binary_contents import Contents, read_contents
 
 # The C library in its parts, as they were before GLIBC 2.34.
 SYSTEM = re.compile(r"lib(c|m|dl|rt|pthread)\.so\.\d|ld-linux-x86-64\.so\.2")
-WANTED = ("_estimation", "_native", "_plant", "tendonfmu", "tendonfmu_plant")
+WANTED = ("_estimation", "_native", "_plant", "tendonfmu", "tendonfmu_fmi3", "tendonfmu_plant")
 
 
 def findings(name: str, contents: Contents, glibc: tuple[int, ...]) -> list[str]:
     """What is wrong with one library; empty for a good one."""
     stem = name.rsplit("/", 1)[-1].split(".")[0]
-    allowed = rf"PyInit_{stem}" if stem.startswith("_") else r"fmi2\w+"
+    allowed = rf"PyInit_{stem}" if stem.startswith("_") else r"fmi3\w+" if stem.endswith("_fmi3") else r"fmi2\w+"
     found = []
     foreign = sorted(each for each in contents.exports if not re.fullmatch(allowed, each))
     if foreign:

@@ -177,17 +177,20 @@ def build(
         Path | None,
         typer.Option(metavar="DIR", help="folder of binaries by FMI platform [default: those installed]"),
     ] = None,
+    fmi: Annotated[
+        int, typer.Option(min=2, max=3, metavar="2|3", help="version of FMI; 3: forces and torques as arrays")
+    ] = 2,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Pack an FMI 2.0 co-simulation FMU: the friction of a finger, or the simulated finger of a rig.
+    """Pack a co-simulation FMU: the friction of a finger, or the simulated finger of a rig.
 
     Needs no compiler. The same input gives the same bytes.
     """
     from tendonfmu.fmu import fmu_report
     from tendonfmu.interface import build as build_fmu
 
-    build_fmu(file, output, reference=reference, ssv=ssv or [], binaries=binaries)
+    build_fmu(file, output, reference=reference, ssv=ssv or [], binaries=binaries, fmi=fmi)
     say(f"{output}: {output.stat().st_size / 1024:.0f} KiB")
     print_json(lambda: fmu_report(file, output))
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,39 +21,29 @@ from tendonfmu.model import FLAGS, INPUTS, NUMBERS, OPTIONAL_NUMBERS, PLACE, RES
 from tendonfmu.recordings import Recording
 
 Progress = Callable[[int], None]
+Pointer = Any  # to the first number of an array of ctypes
+KINDS = ("Real", "Boolean", "Integer")
+# Types of FMI 3.0 by the names that they have in FMI 2.0.
+KIND_OF = {"Float64": "Real", "Int32": "Integer"}
 
 
 @dataclass(frozen=True)
-class Variables:
-    """Variables of one FMU.
+class Group:
+    """A group of variables, such as the forces of all tendons.
 
     Attributes
     ----------
+    names
+        Of the elements, in the order of their index.
     references
-        Group -> name -> value reference, in the order of their index.
-    types
-        Group -> FMI type.
+        Value references: one of each element in FMI 2.0, one of the whole array in FMI 3.0.
+    kind
+        "Real", "Integer" or "Boolean".
     """
 
-    references: Mapping[str, Mapping[str, int]]
-    types: Mapping[str, str]
-
-    def of_type(self, kind: str) -> dict[str, int]:
-        """Return name -> value reference of all groups of an FMI type."""
-        return {
-            name: reference
-            for group, names in self.references.items()
-            if self.types[group] == kind
-            for name, reference in names.items()
-        }
-
-    @property
-    def joints(self) -> int:
-        return len(self.references["compensated_torque"])
-
-    @property
-    def tendons(self) -> int:
-        return len(self.references["slack"])
+    names: tuple[str, ...]
+    references: tuple[int, ...]
+    kind: str
 
 
 def run_fmu(
@@ -66,13 +56,13 @@ def run_fmu(
 ) -> dict[str, NDArray[Any]]:
     """Run a friction FMU over a recording.
 
-    For sample k the inputs are set, fmi2DoStep takes the sample at t_k, and the outputs after it belong to t_k. The
+    For sample k the inputs are set, the step takes the sample at t_k, and the outputs after it belong to t_k. The
     last step goes one sample beyond the recording.
 
     Parameters
     ----------
     path
-        The FMU.
+        The FMU, of FMI 2.0 or 3.0.
     recording
         Signals of the same finger.
     kinematics_source
@@ -94,7 +84,7 @@ def run_fmu(
     """
     with _unpacked(path) as folder:
         run = _Run(path, folder, parameters or {})
-        recording.require(run.variables.joints, run.variables.tendons, run.inputs(kinematics_source))
+        recording.require(run.joints, run.tendons, run.inputs(kinematics_source))
         return run.over(recording, kinematics_source, progress)
 
 
@@ -122,35 +112,155 @@ def _unpacked(path: Path) -> Iterator[Path]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
+class _Slave(Protocol):
+    """An instance of a version of FMI, as `_Run` uses it. fmpy raises bare exceptions when the FMU refuses a call."""
+
+    numbers: ClassVar[Mapping[str, type[np.generic]]]  # C type of the values by kind
+
+    def instantiate(self, log: Callable[[int, bytes], None]) -> None: ...
+    def initialise(self, start: float, whole: Mapping[int, int], real: Mapping[int, float]) -> None:
+        """Write settings by value reference, and enter the initialisation mode."""
+
+    def exit_initialisation(self) -> None: ...
+    def writer(self, references: list[int], count: int) -> Callable[[Pointer], None]:
+        """Return a function that writes `count` numbers to Real variables."""
+
+    def reader(self, kind: str, references: list[int], count: int) -> Callable[[Pointer], None]:
+        """Return a function that reads `count` values."""
+
+    def step(self, time: float, step: float) -> None: ...
+    def terminate(self) -> None: ...
+    def free(self) -> None: ...
+
+
+class _Slave2:
+    """FMI 2.0."""
+
+    numbers: ClassVar[Mapping[str, type[np.generic]]] = {"Real": np.float64, "Boolean": np.int32, "Integer": np.int32}
+
+    def __init__(self, **facts: Any) -> None:
+        from fmpy.fmi2 import FMU2Slave
+
+        self._slave = FMU2Slave(**facts)
+
+    def instantiate(self, log: Callable[[int, bytes], None]) -> None:
+        from fmpy import calloc, free
+        from fmpy.fmi2 import (
+            fmi2CallbackAllocateMemoryTYPE,
+            fmi2CallbackFreeMemoryTYPE,
+            fmi2CallbackFunctions,
+            fmi2CallbackLoggerTYPE,
+        )
+
+        self._callbacks = fmi2CallbackFunctions()
+        self._callbacks.logger = fmi2CallbackLoggerTYPE(lambda _e, _name, status, _c, text: log(status, text))
+        self._callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
+        self._callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
+        self._slave.instantiate(callbacks=self._callbacks, loggingOn=True)
+
+    def initialise(self, start: float, whole: Mapping[int, int], real: Mapping[int, float]) -> None:
+        self._slave.setupExperiment(startTime=start)
+        self._slave.setInteger(list(whole), list(whole.values()))
+        self._slave.setReal(list(real), list(real.values()))
+        self._slave.enterInitializationMode()
+
+    def exit_initialisation(self) -> None:
+        self._slave.exitInitializationMode()
+
+    def writer(self, references: list[int], count: int) -> Callable[[Pointer], None]:
+        vr, write, component = _references(references), self._slave.fmi2SetReal, self._slave.component
+        return lambda values: write(component, vr, count, values)
+
+    def reader(self, kind: str, references: list[int], count: int) -> Callable[[Pointer], None]:
+        vr, read, component = _references(references), getattr(self._slave, f"fmi2Get{kind}"), self._slave.component
+        return lambda values: read(component, vr, count, values)
+
+    def step(self, time: float, step: float) -> None:
+        self._slave.fmi2DoStep(self._slave.component, time, step, 1)
+
+    def terminate(self) -> None:
+        self._slave.terminate()
+
+    def free(self) -> None:
+        self._slave.freeInstance()
+
+
+class _Slave3:
+    """FMI 3.0."""
+
+    numbers: ClassVar[Mapping[str, type[np.generic]]] = {"Real": np.float64, "Boolean": np.bool_, "Integer": np.int32}
+
+    def __init__(self, **facts: Any) -> None:
+        from fmpy.fmi3 import FMU3Slave
+
+        self._slave = FMU3Slave(**facts)
+
+    def instantiate(self, log: Callable[[int, bytes], None]) -> None:
+        self._slave.instantiate(loggingOn=True, logMessage=lambda _e, status, _c, text: log(status, text))
+        flags = [ctypes.c_bool() for _ in range(3)]
+        self._answers = (*map(ctypes.byref, flags), ctypes.byref(ctypes.c_double()))
+
+    def initialise(self, start: float, whole: Mapping[int, int], real: Mapping[int, float]) -> None:
+        self._slave.setInt32(list(whole), list(whole.values()))
+        self._slave.setFloat64(list(real), list(real.values()))
+        self._slave.enterInitializationMode(startTime=start)
+
+    def exit_initialisation(self) -> None:
+        self._slave.exitInitializationMode()
+
+    def writer(self, references: list[int], count: int) -> Callable[[Pointer], None]:
+        vr, write, component = _references(references), self._slave.fmi3SetFloat64, self._slave.component
+        return lambda values: write(component, vr, len(vr), values, count)
+
+    def reader(self, kind: str, references: list[int], count: int) -> Callable[[Pointer], None]:
+        name = {other: name for name, other in KIND_OF.items()}.get(kind, kind)
+        vr, read, component = _references(references), getattr(self._slave, f"fmi3Get{name}"), self._slave.component
+        return lambda values: read(component, vr, len(vr), values, count)
+
+    def step(self, time: float, step: float) -> None:
+        self._slave.fmi3DoStep(self._slave.component, time, step, True, *self._answers)
+
+    def terminate(self) -> None:
+        self._slave.terminate()
+
+    def free(self) -> None:
+        self._slave.freeInstance()
+
+
 class _Run:
-    """One instance of an FMU. Its arrays are laid out once, so that a step is three calls."""
+    """One instance of an FMU. Its arrays are laid out once, so that a step is a few calls."""
 
     def __init__(self, path: Path, folder: Path, parameters: Mapping[str, float]) -> None:
         from fmpy import read_model_description
-        from fmpy.fmi2 import FMU2Slave
 
         self.path = path
         self._at = str(path)  # place in error messages: the FMU, later the recording's row
         self._parameters = parameters
         self._messages: list[str] = []
         description = read_model_description(str(folder), validate=False)
-        if description.fmiVersion != "2.0" or description.coSimulation is None:
-            raise InputError(f"{path}: FMI {description.fmiVersion}; expected an FMI 2.0 co-simulation FMU")
+        slaves: dict[str, Callable[..., _Slave]] = {"2": _Slave2, "3": _Slave3}
+        slave = slaves.get(str(description.fmiVersion).partition(".")[0])
+        if slave is None or description.coSimulation is None:
+            raise InputError(f"{path}: FMI {description.fmiVersion}; expected a co-simulation FMU of FMI 2.0 or 3.0")
         self._all = {variable.name: variable for variable in description.modelVariables}
-        missing = {group for group in (*OPTIONAL_NUMBERS, *PLACE, *REST, *SENSORS) if not self._has(group)}
-        present = [
-            group for group in (*NUMBERS, *OPTIONAL_NUMBERS, *FLAGS, *PLACE, *REST, *SENSORS) if group not in missing
-        ]
-        outputs = {group: self._group(group) for group in present}
-        types = {group: str(self._all[next(iter(names))].type) for group, names in outputs.items()}
-        self.variables = Variables(outputs, types)
+        wanted = (*NUMBERS, *OPTIONAL_NUMBERS, *FLAGS, *PLACE, *REST, *SENSORS)
+        optional = (*OPTIONAL_NUMBERS, *PLACE, *REST, *SENSORS)
+        self._outputs = {name: self._group(name) for name in wanted if name not in optional or self._has(name)}
         self._inputs = {group: self._group(group) for group in INPUTS}
-        self._slave = FMU2Slave(
+        self._slave: _Slave = slave(
             guid=description.guid,
             unzipDirectory=str(folder),
             modelIdentifier=description.coSimulation.modelIdentifier,
             instanceName=description.modelName,
         )
+
+    @property
+    def joints(self) -> int:
+        return len(self._outputs["compensated_torque"].names)
+
+    @property
+    def tendons(self) -> int:
+        return len(self._outputs["slack"].names)
 
     def inputs(self, source: int) -> tuple[str, ...]:
         """Return the groups of inputs that the FMU uses."""
@@ -159,16 +269,21 @@ class _Run:
     def _has(self, group: str) -> bool:
         return group in self._all or f"{group}[1]" in self._all
 
-    def _group(self, group: str) -> dict[str, int]:
+    def _group(self, group: str) -> Group:
         if group in self._all:
-            return {group: self._all[group].valueReference}
+            variable = self._all[group]
+            kind = KIND_OF.get(str(variable.type), str(variable.type))
+            sizes = [int(dimension.start) for dimension in variable.dimensions or ()]
+            names = tuple(f"{group}[{i}]" for i in range(1, sizes[0] + 1)) if sizes else (group,)
+            return Group(names, (variable.valueReference,), kind)
         found = {}
         for name, variable in self._all.items():
             if match := re.fullmatch(rf"{group}\[(\d+)\]", name):
-                found[int(match[1])] = variable.valueReference
+                found[int(match[1])] = variable
         if not found:
             raise InputError(f"{self.path}: no variable {group}[1]; expected a friction FMU of `tendonfmu build`")
-        return {f"{group}[{i}]": found[i] for i in sorted(found)}
+        names = tuple(f"{group}[{i}]" for i in sorted(found))
+        return Group(names, tuple(found[i].valueReference for i in sorted(found)), str(found[min(found)].type))
 
     @contextmanager
     def _refusals(self) -> Iterator[None]:
@@ -181,96 +296,77 @@ class _Run:
             reason = self._messages[-1] if self._messages else str(error)
             raise InputError(f"{self._at}: {reason}") from None
 
-    def _instantiate(self) -> None:
-        from fmpy import calloc, free
-        from fmpy.fmi2 import (
-            fmi2CallbackAllocateMemoryTYPE,
-            fmi2CallbackFreeMemoryTYPE,
-            fmi2CallbackFunctions,
-            fmi2CallbackLoggerTYPE,
-        )
-
-        def log(_environment: Any, _instance: bytes, status: int, _category: bytes, message: bytes) -> None:
-            if status > 1:
-                self._messages.append(message.decode("utf-8", "replace").replace("%%", "%"))
-
-        self._callbacks = fmi2CallbackFunctions()
-        self._callbacks.logger = fmi2CallbackLoggerTYPE(log)
-        self._callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
-        self._callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
-        self._slave.instantiate(callbacks=self._callbacks, loggingOn=True)
+    def _log(self, status: int, message: bytes) -> None:
+        if status > 1:
+            self._messages.append(message.decode("utf-8", "replace").replace("%%", "%"))
 
     def _initialise(self, start: float, source: int) -> None:
-        self._slave.setupExperiment(startTime=start)
         if "kinematics_source" not in self._all:
             raise InputError(
                 f"{self.path}: no parameter kinematics_source; expected a friction FMU of `tendonfmu build`"
             )
-        self._slave.setInteger([self._all["kinematics_source"].valueReference], [source])
-        for path, value in self._parameters.items():
+        for path in self._parameters:
             if path not in self._all:
                 raise InputError(f"{self.path}: no parameter {path!r} in this FMU")
-            self._slave.setReal([self._all[path].valueReference], [value])
-        self._slave.enterInitializationMode()
+        real = {self._all[path].valueReference: value for path, value in self._parameters.items()}
+        self._slave.initialise(start, {self._all["kinematics_source"].valueReference: source}, real)
 
     def over(self, recording: Recording, source: int, progress: Progress | None) -> dict[str, NDArray[Any]]:
         with self._refusals():
-            self._instantiate()
+            self._slave.instantiate(self._log)
         try:
             with self._refusals():
                 self._initialise(float(recording.time[0]), source)
                 columns = self._step(recording, self.inputs(source), progress)
                 self._slave.terminate()
         finally:
-            self._slave.freeInstance()
-        ordered = (name for names in self.variables.references.values() for name in names)
+            self._slave.free()
+        ordered = (name for group in self._outputs.values() for name in group.names)
         return {"time": recording.time, **{name: columns[name] for name in ordered}}
 
     def _step(
         self, recording: Recording, groups: tuple[str, ...], progress: Progress | None
     ) -> dict[str, NDArray[Any]]:
-        slave, component = self._slave, self._slave.component
-        set_vr = _references([vr for group in groups for vr in self._inputs[group].values()])
-        kinds = ("Real", "Boolean", "Integer")
-        get_vr, flag_vr, whole_vr = (_references(list(self.variables.of_type(kind).values())) for kind in kinds)
+        slave = self._slave
         samples = np.ascontiguousarray(np.hstack([recording.groups[group] for group in groups]))
-        numbers = np.empty((len(recording), len(get_vr)))
-        flags = np.empty((len(recording), len(flag_vr)), dtype=np.int32)
-        whole = np.empty((len(recording), len(whole_vr)), dtype=np.int32)
-        inputs, real, boolean, integer = (_rows(table) for table in (samples, numbers, flags, whole))
+        write = slave.writer([vr for group in groups for vr in self._inputs[group].references], samples.shape[1])
+        inputs = _rows(samples)
+        reading = []
+        columns: dict[str, tuple[str, NDArray[Any]]] = {}
+        for kind in KINDS:
+            of_kind = [group for group in self._outputs.values() if group.kind == kind]
+            names = [name for group in of_kind for name in group.names]
+            if names:
+                table = np.empty((len(recording), len(names)), dtype=slave.numbers[kind])
+                references = [vr for group in of_kind for vr in group.references]
+                reading.append((slave.reader(kind, references, len(names)), _rows(table)))
+                columns |= {name: (kind, table[:, i]) for i, name in enumerate(names)}
         times = recording.time.tolist()
         steps = np.diff(recording.time).tolist()
         steps.append(steps[-1] if steps else 1e-3)
 
         self._at = f"{recording.path}: row 1"
-        slave.fmi2SetReal(component, set_vr, len(set_vr), inputs(0))
-        slave.exitInitializationMode()
+        write(inputs(0))
+        slave.exit_initialisation()
         for k, (time, step) in enumerate(zip(times, steps, strict=True)):
             self._at = f"{recording.path}: row {k + 1}"
-            slave.fmi2SetReal(component, set_vr, len(set_vr), inputs(k))
-            slave.fmi2DoStep(component, time, step, 1)
-            slave.fmi2GetReal(component, get_vr, len(get_vr), real(k))
-            slave.fmi2GetBoolean(component, flag_vr, len(flag_vr), boolean(k))
-            if len(whole_vr):
-                slave.fmi2GetInteger(component, whole_vr, len(whole_vr), integer(k))
+            write(inputs(k))
+            slave.step(time, step)
+            for read, row in reading:
+                read(row(k))
             if progress and (k + 1) % 500 == 0:
                 progress(k + 1)
         if progress:
             progress(len(times))
-        tables: tuple[NDArray[Any], ...] = (numbers, flags.astype(bool), whole)
-        return {
-            name: table[:, i]
-            for kind, table in zip(kinds, tables, strict=True)
-            for i, name in enumerate(self.variables.of_type(kind))
-        }
+        return {name: values.astype(bool) if kind == "Boolean" else values for name, (kind, values) in columns.items()}
 
 
 def _references(values: list[int]) -> Any:
     return (ctypes.c_uint * len(values))(*values)
 
 
-def _rows(rows: NDArray[Any]) -> Callable[[int], Any]:
-    """Return a function from k to row k in place, as FMI's array of numbers."""
-    row = (ctypes.c_double if rows.dtype == np.float64 else ctypes.c_int) * rows.shape[1]
+def _rows(rows: NDArray[Any]) -> Callable[[int], Pointer]:
+    """Return a function from k to row k in place, as FMI's array of values."""
+    row = np.ctypeslib.as_ctypes_type(rows.dtype) * rows.shape[1]
     first, stride = rows.ctypes.data, rows.strides[0]
     return lambda k: row.from_address(first + k * stride)

@@ -11,6 +11,7 @@ import re
 import unicodedata
 import zipfile
 from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from types import ModuleType
@@ -18,8 +19,9 @@ from typing import TYPE_CHECKING, Any
 
 from tendonfmu.errors import InputError, InternalError
 from tendonfmu.files import whole_file
+from tendonfmu.fmu.array_variables import in_arrays
 from tendonfmu.fmu.documentation import documentation_page
-from tendonfmu.fmu.model_variables import VariableTable, describe_model, read_table
+from tendonfmu.fmu.model_variables import VariableTable, describe_model, group_sizes, read_table
 from tendonfmu.fmu.schema_check import checked
 from tendonfmu.fmu.terminals import terminals_and_icons
 from tendonfmu.model import Finger, FingerSource, native, read_finger
@@ -28,7 +30,24 @@ if TYPE_CHECKING:
     from importlib.abc import Traversable
 
 BINARY_SUFFIXES = (".so", ".dll", ".dylib")
-BINARIES, BINARY_STEM = "binaries", "tendonfmu"
+BINARIES = "binaries"
+
+
+@dataclass(frozen=True)
+class _Version:
+    """What the FMUs of a version of FMI are made of: names of files in the package, and FMI's schema."""
+
+    binary_stem: str
+    sources: str
+    template: str
+    schema: str
+
+
+VERSIONS = {
+    2: _Version("tendonfmu", "sources", "modelDescription.xml.jinja", "fmi2/fmi2ModelDescription.xsd"),
+    3: _Version("tendonfmu_fmi3", "sources_fmi3", "modelDescription_fmi3.xml.jinja", "fmi3/fmi3ModelDescription.xsd"),
+}
+BUILD_TEMPLATE, BUILD_SCHEMA = "buildDescription.xml.jinja", "fmi3/fmi3BuildDescription.xsd"
 
 # A model identifier names files and C functions, so words reserved by C or by a file system are excluded.
 RESERVED = frozenset(
@@ -82,6 +101,7 @@ def build_fmu(
     binaries: Path | None = None,
     illustrated: bool = True,
     extra: Mapping[str, bytes] | None = None,
+    fmi: int = 2,
 ) -> Path:
     """Package the FMU of a finger description.
 
@@ -92,11 +112,14 @@ def build_fmu(
     output_path
         The FMU. It is written whole or not at all.
     binaries
-        A folder of <FMI platform>/tendonfmu.<so, dll or dylib>, used instead of the installed ones.
+        A folder of <FMI platform>/tendonfmu.<so, dll or dylib>, used instead of the installed ones; of FMI 3.0,
+        <FMI platform>/tendonfmu_fmi3.<so, dll or dylib>.
     illustrated
         Whether to add pictures and a page for readers. Packaging is faster without them.
     extra
         Other files of the archive, such as those of `related_members`: path -> content.
+    fmi
+        Version of FMI, 2 or 3.
 
     Returns
     -------
@@ -108,7 +131,7 @@ def build_fmu(
     InputError
         The description is refused, binaries are missing, or the output cannot be written.
     """
-    content = members(read_finger(finger), binaries=binaries, illustrated=illustrated)
+    content = members(read_finger(finger), binaries=binaries, illustrated=illustrated, fmi=fmi)
     archive = pack(content | dict(extra or {}))
     with whole_file(output_path) as file:
         file.write_bytes(archive)
@@ -155,14 +178,16 @@ def guid(resource: bytes, table: VariableTable) -> str:
     return native.image_guid(resource, variable_generator().salt(table.data))
 
 
-def members(description: Finger, *, binaries: Path | None = None, illustrated: bool = True) -> dict[str, bytes]:
+def members(
+    description: Finger, *, binaries: Path | None = None, illustrated: bool = True, fmi: int = 2
+) -> dict[str, bytes]:
     """Return all files of the FMU.
 
     Parameters
     ----------
     description
         A valid description.
-    binaries, illustrated
+    binaries, illustrated, fmi
         See `build_fmu`.
 
     Returns
@@ -177,17 +202,21 @@ def members(description: Finger, *, binaries: Path | None = None, illustrated: b
     """
     table = read_table(package_file("model_description/variables.json").read_text(encoding="utf-8"))
     identifier = model_identifier(description.name)
-    sources = _sources()
+    version = VERSIONS[fmi]
+    sources = _sources(version.sources)
     model = describe_model(description, table)
+    if fmi == 3:
+        model = in_arrays(model, table, group_sizes(len(description.data["joints"]), len(description.data["tendons"])))
     context: dict[str, Any] = {
         **model,
+        "fmi": fmi,
         "model_identifier": identifier,
         "guid": guid(description.image, table),
         "version": native.version(),
         "source_files": sources.pop("sources.txt").decode("ascii").split(),
     }
     content = {
-        "modelDescription.xml": model_description(context),
+        "modelDescription.xml": model_description(context, fmi),
         "resources/model.image": description.image,
         "resources/finger.json": description.text,
     }
@@ -199,7 +228,9 @@ def members(description: Finger, *, binaries: Path | None = None, illustrated: b
     content |= terminals_and_icons(context["variables"], icon)
     content |= licenses("license.txt")
     content |= {f"sources/{name}": data for name, data in sources.items()}
-    libraries = find_binaries(binaries, BINARIES, BINARY_STEM, identifier)
+    if fmi == 3:
+        content["sources/buildDescription.xml"] = checked(_render_xml(BUILD_TEMPLATE, context), BUILD_SCHEMA)
+    libraries = find_binaries(binaries, BINARIES, version.binary_stem, identifier)
     content |= {f"binaries/{path}": data for path, data in libraries.items()}
     return content
 
@@ -273,8 +304,8 @@ def licenses(*names: str) -> dict[str, bytes]:
     return {f"documentation/licenses/{name}": package_file(f"licenses/{name}").read_bytes() for name in names}
 
 
-def _sources() -> dict[str, bytes]:
-    return {file.name: file.read_bytes() for file in package_file("sources").iterdir() if file.is_file()}
+def _sources(folder: str) -> dict[str, bytes]:
+    return {file.name: file.read_bytes() for file in package_file(folder).iterdir() if file.is_file()}
 
 
 def find_binaries(folder: Path | None, installed: str, stem: str, identifier: str) -> dict[str, bytes]:
@@ -313,13 +344,15 @@ def find_binaries(folder: Path | None, installed: str, stem: str, identifier: st
     return found
 
 
-def model_description(context: Mapping[str, Any]) -> bytes:
+def model_description(context: Mapping[str, Any], fmi: int = 2) -> bytes:
     """Render the XML of an FMU, and check it with FMI's schema.
 
     Parameters
     ----------
     context
         Context of the template (modelDescription/README.md).
+    fmi
+        Version of FMI, 2 or 3.
 
     Returns
     -------
@@ -331,15 +364,16 @@ def model_description(context: Mapping[str, Any]) -> bytes:
     InternalError
         FMI's schema refuses the XML, or is not found.
     """
-    return checked(_render_xml(context), "fmi2/fmi2ModelDescription.xsd")
+    version = VERSIONS[fmi]
+    return checked(_render_xml(version.template, context), version.schema)
 
 
-def _render_xml(context: Mapping[str, Any]) -> bytes:
+def _render_xml(template: str, context: Mapping[str, Any]) -> bytes:
     import jinja2
 
-    template = package_file("model_description/modelDescription.xml.jinja").read_text(encoding="utf-8")
+    text = package_file(f"model_description/{template}").read_text(encoding="utf-8")
     environment = jinja2.Environment(undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
-    return environment.from_string(template).render(context).encode()
+    return environment.from_string(text).render(context).encode()
 
 
 # --- archive ---------------------------------------------------------------------------------------------------------

@@ -23,8 +23,9 @@ def build(
     reference: RecordingSource | None = None,
     ssv: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = (),
     binaries: str | os.PathLike[str] | None = None,
+    fmi: int = 2,
 ) -> Path:
-    """Pack an FMI 2.0 co-simulation FMU. Needs no compiler; the same input gives the same bytes.
+    """Pack a co-simulation FMU, of FMI 2.0 or 3.0. Needs no compiler; the same input gives the same bytes.
 
     Parameters
     ----------
@@ -40,6 +41,8 @@ def build(
         `FitResult.write`. One alone needs no list.
     binaries
         Folder of binaries by FMI platform. None: those installed.
+    fmi
+        Version of FMI: 2, or 3 for a finger. With 3, forces, positions and torques are arrays.
 
     Returns
     -------
@@ -49,8 +52,8 @@ def build(
     Raises
     ------
     InputError
-        The description, the recording or a parameter set is refused, binaries are missing, or the output cannot be
-        written.
+        The description, the recording or a parameter set is refused, binaries are missing, the output cannot be
+        written, or `fmi` is 3 with a rig.
     """
     target = Path(output)
     folder = None if binaries is None else Path(binaries)
@@ -60,6 +63,8 @@ def build(
         file = finger_file(finger)
         rig = is_rig(file)
         check_output(target, *(read_rig(file).files if rig else [file]), *others)
+        if rig and fmi != 2:
+            raise InputError(f"fmi = {fmi}: the simulated finger of a rig is an FMI 2.0 FMU; expected 2")
         if rig:
             if reference is not None or sets:
                 raise InputError(f"{file}: a rig; expected a finger description with a reference or parameter sets")
@@ -67,6 +72,6 @@ def build(
     else:
         check_output(target, *others)
     model = read_finger(finger)
-    related = [] if reference is None else reference_files(model, read_recording(reference))
+    related = [] if reference is None else reference_files(model, read_recording(reference), arrays=fmi == 3)
     related += parameter_sets(sets, model)
-    return build_fmu(model, target, binaries=folder, extra=related_members(related))
+    return build_fmu(model, target, binaries=folder, extra=related_members(related), fmi=fmi)

@@ -130,6 +130,7 @@ OPTIONS: dict[str, Number | Kind | Texts | Paths | Function] = {
     "effective_samples": _CHOICE,
     "false_alarms_per_hour": Number(1e-3, 3600.0),
     "fix": Texts(),
+    "fmi": Number(2, 3, whole=True),
     "force": _COLUMN,
     "holdout": Number(0.0, 0.9),
     "holdout_block": Number(1.0),

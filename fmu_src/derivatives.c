@@ -1,0 +1,172 @@
+#include "derivatives.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "finger_model.h"
+#include "finger_signals.h"
+#include "variable_access.h"
+
+/* Directions of the inputs and derivatives of the outputs, laid out as the variables are, in room of the model. */
+static variables lay_out(const component* c) {
+  variables view = c->values;
+  double* room = model_derivatives(c->model);
+  memset(room, 0, (view.input_count + view.output_count) * sizeof *room);
+  for (int g = 0; g < GROUP_COUNT; ++g) {
+    const int laid_out = variable_groups[g].causality != CAUSALITY_PARAMETER && view.number[g];
+    view.flag[g] = NULL;
+    view.number[g] = laid_out ? room + (view.number[g] - view.numbers) : NULL;
+  }
+  return view;
+}
+
+/* --- finding ------------------------------------------------------------------------------------------------------ */
+
+/* 0 when the reference is a Real input or output, as wanted */
+static int find_for_derivative(component* c, fmu_function function, unsigned reference, variable_causality wanted,
+                               variable* found) {
+  if (find_of_type(c, function, VARIABLE_REAL, reference, found)) {
+    return -1;
+  }
+  if (variable_causality_of(found) != wanted) {
+    fail_at(c, function, found,
+            wanted == CAUSALITY_INPUT ? "not a known: derivatives are by the inputs"
+                                      : "not an unknown: derivatives are those of the Real outputs");
+    return -1;
+  }
+  if (found->group->discrete) {
+    fail_at(c, function, found, "discrete: it has no derivative");
+    return -1;
+  }
+  return 0;
+}
+
+static int check_references(component* c, fmu_function function, const unsigned references[], size_t count,
+                            variable_causality wanted) {
+  variable found = {0};
+  for (size_t i = 0; i < count; ++i) {
+    if (find_for_derivative(c, function, references[i], wanted, &found)) {
+      return -1;
+    }
+  }
+  return 0;
+}
+
+/* 1 when the call is allowed and the request is one; otherwise logs and fails. `in` are the variables of the seed. */
+static int is_sound(component* c, fmu_function function, const partials* p, const references* in,
+                    const references* out) {
+  if (!may_access(c, function, out->count, out->references, p->sensitivity) ||
+      !may_access(c, function, in->count, in->references, p->seed) ||
+      check_references(c, function, p->knowns.references, p->knowns.count, CAUSALITY_INPUT) ||
+      check_references(c, function, p->unknowns.references, p->unknowns.count, CAUSALITY_OUTPUT) ||
+      check_value_count(c, function, VARIABLE_REAL, in->references, in->count, p->seed_count, "nSeed") ||
+      check_value_count(c, function, VARIABLE_REAL, out->references, out->count, p->sensitivity_count,
+                        "nSensitivity")) {
+    return 0;
+  }
+  for (size_t i = 0; i < p->seed_count; ++i) {
+    if (!isfinite(p->seed[i])) {
+      component_fail_because(c, call_name(function), "a number of the seed (dvKnown) is not finite");
+      return 0;
+    }
+  }
+  return 1;
+}
+
+/* --- numbers ------------------------------------------------------------------------------------------------------ */
+
+/* The next element of a list of variables; NULL after the last one. Starts with zeros. */
+typedef struct place {
+  size_t at, element;
+  variable found;
+} place;
+
+static double* next_number(const variables* view, const references* list, place* p) {
+  while (p->at < list->count) {
+    variables_find(view, list->references[p->at], &p->found);
+    if (p->element < variables_extent(view, &p->found)) {
+      const variable one = variables_element(&p->found, p->element++);
+      return variables_number(view, &one);
+    }
+    ++p->at;
+    p->element = 0;
+  }
+  return NULL;
+}
+
+/* In initialisation mode derivatives are those of the first sample, taken for the time being. */
+static int begin_derivatives(component* c) {
+  const int trial = !c->failed && c->phase == PHASE_INITIALISATION;
+  return trial && model_begin_trial(c->model, &c->values, c->start_time) ? -1 : 0;
+}
+
+/* Ends what begin_derivatives() began. 0 for the status OK; otherwise says why and fails. */
+static fmu_status end_derivatives(component* c, fmu_function function, tendonfmu_status status) {
+  if (!c->failed && c->phase == PHASE_INITIALISATION) {
+    model_end_trial(c->model);
+  }
+  return status == TENDONFMU_OK ? FMU_OK : component_fail_because(c, call_name(function), model_last_error(c->model));
+}
+
+static tendonfmu_status derive(component* c, const variables* view) {
+  const tendonfmu_inputs direction = variables_inputs(view);
+  const tendonfmu_outputs derivative = variables_outputs(view);
+  return tendonfmu_get_directional_derivative(model_finger(c->model), &direction, &derivative);
+}
+
+/* --- calls -------------------------------------------------------------------------------------------------------- */
+
+fmu_status derivatives_directional(component* c, const partials* p) {
+  const fmu_function function = CALL_GET_DIRECTIONAL_DERIVATIVE;
+  place known = {0}, unknown = {0};
+  if (!is_sound(c, function, p, &p->knowns, &p->unknowns)) {
+    return FMU_ERROR;
+  }
+  const variables view = lay_out(c);
+  const double* seed = p->seed;
+  for (double* number; (number = next_number(&view, &p->knowns, &known)) != NULL;) {
+    *number += *seed++;
+  }
+  if (begin_derivatives(c)) {
+    return component_fail_because(c, call_name(function), model_last_error(c->model));
+  }
+  const fmu_status status = end_derivatives(c, function, derive(c, &view));
+  double* sensitivity = p->sensitivity;
+  for (const double* number; status == FMU_OK && (number = next_number(&view, &p->unknowns, &unknown)) != NULL;) {
+    *sensitivity++ = *number;
+  }
+  return status;
+}
+
+/* the seed times the derivatives that stand in the layout */
+static double weighted_sum(const variables* view, const partials* p) {
+  place unknown = {0};
+  double sum = 0.0;
+  const double* seed = p->seed;
+  for (const double* number; (number = next_number(view, &p->unknowns, &unknown)) != NULL;) {
+    sum += *seed++ * *number;
+  }
+  return sum;
+}
+
+/* One directional derivative for each element of the knowns: at most 160 of them. */
+fmu_status derivatives_adjoint(component* c, const partials* p) {
+  const fmu_function function = CALL_GET_ADJOINT_DERIVATIVE;
+  place known = {0};
+  if (!is_sound(c, function, p, &p->unknowns, &p->knowns)) {
+    return FMU_ERROR;
+  }
+  const variables view = lay_out(c);
+  if (begin_derivatives(c)) {
+    return component_fail_because(c, call_name(function), model_last_error(c->model));
+  }
+  tendonfmu_status status = TENDONFMU_OK;
+  double* sensitivity = p->sensitivity;
+  for (double* number; status == TENDONFMU_OK && (number = next_number(&view, &p->knowns, &known)) != NULL;) {
+    *number = 1.0;
+    status = derive(c, &view);
+    *number = 0.0;
+    *sensitivity++ = weighted_sum(&view, p);
+  }
+  return end_derivatives(c, function, status);
+}

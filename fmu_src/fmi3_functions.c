@@ -1,0 +1,122 @@
+/* FMI 3.0, creation, life cycle and steps. */
+#include "fmi3Functions.h"
+#include "life_cycle.h"
+
+/* --- inquiry and logging ------------------------------------------------------------------------------------------ */
+
+const char* fmi3GetVersion(void) {
+  return fmi3Version;
+}
+
+fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories,
+                               const fmi3String categories[]) {
+  return (fmi3Status)life_set_logging(instance, loggingOn, nCategories, categories);
+}
+
+static void send_message(const log_target* target, fmu_status status, const char* category, const char* text) {
+  const fmi3LogMessageCallback log_message = (fmi3LogMessageCallback)target->logger;
+  log_message(target->environment, (fmi3Status)status, category, text);
+}
+
+/* Why there is no instance is said whatever loggingOn says: nobody could ask afterwards. */
+static log_target target_of(fmi3String instanceName, fmi3InstanceEnvironment environment,
+                            fmi3LogMessageCallback logMessage) {
+  return (log_target){.logger = (void (*)(void))logMessage,
+                      .send = send_message,
+                      .environment = environment,
+                      .instance_name = instanceName ? instanceName : "",
+                      .wanted = LOG_EVERYTHING};
+}
+
+/* --- creation ----------------------------------------------------------------------------------------------------- */
+
+fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String instantiationToken,
+                                         fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn,
+                                         fmi3Boolean eventModeUsed, fmi3Boolean earlyReturnAllowed,
+                                         const fmi3ValueReference requiredIntermediateVariables[],
+                                         size_t nRequiredIntermediateVariables,
+                                         fmi3InstanceEnvironment instanceEnvironment, fmi3LogMessageCallback logMessage,
+                                         fmi3IntermediateUpdateCallback intermediateUpdate) {
+  (void)visible, (void)earlyReturnAllowed, (void)requiredIntermediateVariables, (void)intermediateUpdate;
+  const log_target log = target_of(instanceName, instanceEnvironment, logMessage);
+  if (eventModeUsed) {
+    return life_refuse(&log, "eventModeUsed: expected false, there is no Event Mode", "");
+  }
+  if (nRequiredIntermediateVariables) {
+    return life_refuse(&log, "nRequiredIntermediateVariables: expected 0, there are no intermediate values", "");
+  }
+  component* c = life_create(&log, instantiationToken, resourcePath);
+  if (c) {
+    c->log.wanted = loggingOn ? LOG_EVERYTHING : LOG_NOTHING;
+  }
+  return c;
+}
+
+fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String instantiationToken,
+                                          fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn,
+                                          fmi3InstanceEnvironment instanceEnvironment,
+                                          fmi3LogMessageCallback logMessage) {
+  (void)instantiationToken, (void)resourcePath, (void)visible, (void)loggingOn;
+  const log_target log = target_of(instanceName, instanceEnvironment, logMessage);
+  return life_refuse(&log, "this FMU is for co-simulation, not for model exchange", "");
+}
+
+fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3String instantiationToken,
+                                               fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn,
+                                               fmi3InstanceEnvironment instanceEnvironment,
+                                               fmi3LogMessageCallback logMessage, fmi3ClockUpdateCallback clockUpdate,
+                                               fmi3LockPreemptionCallback lockPreemption,
+                                               fmi3UnlockPreemptionCallback unlockPreemption) {
+  (void)instantiationToken, (void)resourcePath, (void)visible, (void)loggingOn;
+  (void)clockUpdate, (void)lockPreemption, (void)unlockPreemption;
+  const log_target log = target_of(instanceName, instanceEnvironment, logMessage);
+  return life_refuse(&log, "this FMU is for co-simulation, not for scheduled execution", "");
+}
+
+void fmi3FreeInstance(fmi3Instance instance) {
+  if (instance) {
+    component_destroy(instance);
+  }
+}
+
+/* --- life cycle --------------------------------------------------------------------------------------------------- */
+
+fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
+                                       fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime) {
+  const experiment e = {toleranceDefined, stopTimeDefined, tolerance, startTime, stopTime};
+  const fmu_status status = life_set_experiment(instance, CALL_ENTER_INITIALIZATION_MODE, &e);
+  return (fmi3Status)(status == FMU_OK ? life_enter_initialisation(instance) : status);
+}
+
+fmi3Status fmi3ExitInitializationMode(fmi3Instance instance) {
+  return (fmi3Status)life_exit_initialisation(instance);
+}
+
+fmi3Status fmi3Terminate(fmi3Instance instance) {
+  return (fmi3Status)life_terminate(instance);
+}
+
+fmi3Status fmi3Reset(fmi3Instance instance) {
+  return (fmi3Status)life_reset(instance);
+}
+
+static void put_flag(fmi3Boolean* flag) {
+  if (flag) {
+    *flag = fmi3False;
+  }
+}
+
+/* Every step is carried out to its end, and none asks for an event or for the end of the simulation. */
+fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoint, fmi3Float64 communicationStepSize,
+                      fmi3Boolean noSetFMUStatePriorToCurrentPoint, fmi3Boolean* eventHandlingNeeded,
+                      fmi3Boolean* terminateSimulation, fmi3Boolean* earlyReturn, fmi3Float64* lastSuccessfulTime) {
+  (void)noSetFMUStatePriorToCurrentPoint;
+  const fmu_status status = life_step(instance, currentCommunicationPoint, communicationStepSize);
+  put_flag(eventHandlingNeeded);
+  put_flag(terminateSimulation);
+  put_flag(earlyReturn);
+  if (instance && lastSuccessfulTime) {
+    *lastSuccessfulTime = ((const component*)instance)->end_of_step;
+  }
+  return (fmi3Status)status;
+}

@@ -1,0 +1,231 @@
+#include "life_cycle.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "resource.h"
+
+static void log_event(const component* c, fmu_function function, const char* event, const char* more) {
+  log_text text = log_start(call_name(function), event);
+  log_append(&text, more);
+  log_send(&c->log, FMU_OK, LOG_EVENTS, &text);
+}
+
+/* --- creation ----------------------------------------------------------------------------------------------------- */
+
+component* life_refuse(const log_target* log, const char* reason, const char* more) {
+  log_text text = log_start(this_fmi.instantiate, reason);
+  log_append(&text, more);
+  log_send(log, FMU_ERROR, LOG_STATUS_ERROR, &text);
+  return NULL;
+}
+
+static component* refuse_resource(const log_target* log, const char* reason) {
+  log_text text = log_start(this_fmi.instantiate, model_text.resource);
+  log_append(&text, ": ");
+  log_append(&text, reason);
+  log_send(log, FMU_ERROR, LOG_STATUS_ERROR, &text);
+  return NULL;
+}
+
+/* the model of the resource, after a check that resource and variable table are those of the modelDescription.xml */
+static model* create_model(const log_target* log, const void* resource, size_t size, const char* identifier) {
+  char expected[39] = "", message[256] = "";
+  model* m = model_create(resource, size, message, sizeof message);
+  if (!m) {
+    refuse_resource(log, message);
+    return NULL;
+  }
+  model_guid(resource, size, expected);
+  if (!identifier || strcmp(identifier, expected) != 0) {
+    log_text reason = {.length = 0};
+    log_append(&reason, this_fmi.identifier);
+    log_append(&reason, " is not that of this FMU: expected ");
+    model_destroy(m);
+    life_refuse(log, reason.bytes, expected);
+    return NULL;
+  }
+  return m;
+}
+
+component* life_create(const log_target* log, const char* identifier, const char* resources) {
+  log_text reason;
+  size_t size = 0;
+  void* resource = resource_read(resources, model_text.resource, &size, this_fmi.resources, &reason);
+  if (!resource) {
+    return refuse_resource(log, reason.bytes);
+  }
+  model* m = create_model(log, resource, size, identifier);
+  free(resource);
+  if (!m) {
+    return NULL;
+  }
+  component* c = component_create(log, m);
+  return c ? c : life_refuse(log, "out of memory", "");
+}
+
+/* --- logging ------------------------------------------------------------------------------------------------------ */
+
+fmu_status life_set_logging(component* c, int on, size_t count, const char* const categories[]) {
+  const char* function = call_name(CALL_SET_DEBUG_LOGGING);
+  fmu_status status = FMU_OK;
+  if (!component_may_call(c, CALL_SET_DEBUG_LOGGING)) {
+    return FMU_ERROR;
+  }
+  if (count && !categories) {
+    return component_fail_because(c, function, "categories is NULL");
+  }
+  unsigned named = count ? LOG_NOTHING : LOG_EVERYTHING;
+  for (size_t i = 0; i < count; ++i) {
+    const log_category category = log_find_category(categories[i]);
+    if (category < LOG_CATEGORY_COUNT) {
+      named |= 1u << category;
+      continue;
+    }
+    log_text text = log_start(function, "no category \"");
+    log_append(&text, categories[i] ? categories[i] : "NULL");
+    log_append(&text, "\": expected those of LogCategories in modelDescription.xml; ignored");
+    log_send(&c->log, FMU_WARNING, LOG_STATUS_WARNING, &text);
+    status = FMU_WARNING;
+  }
+  c->log.wanted = on ? named : c->log.wanted & ~named;
+  return status;
+}
+
+/* --- life cycle --------------------------------------------------------------------------------------------------- */
+
+/* a time that any model takes; says so otherwise */
+static int time_is_sound(component* c, fmu_function function, const char* name, double time) {
+  if (fabs(time) <= 1e15) {
+    return 1;
+  }
+  log_text text = log_start(call_name(function), name);
+  log_append(&text, " = ");
+  log_append_number(&text, time);
+  log_append(&text, " s: expected a finite number of magnitude at most 1e15 s");
+  component_fail(c, &text);
+  return 0;
+}
+
+/* Importers give tolerances of their own (Maestro 0.1), meant for all FMUs of a system: a model that cannot take it
+ * uses the nearest that it can, and says so. */
+static int set_tolerance(component* c, fmu_function function, double tolerance) {
+  double used = tolerance;
+  const char* expected = model_set_tolerance(c->model, &used);
+  if (!expected && !(used < tolerance || used > tolerance)) {
+    return 1;
+  }
+  log_text text = log_start(call_name(function), "tolerance = ");
+  log_append_number(&text, tolerance);
+  log_append(&text, expected ? ": expected " : ": this FMU goes on with ");
+  if (expected) {
+    log_append(&text, expected);
+    component_fail(c, &text);
+    return 0;
+  }
+  log_append_number(&text, used);
+  log_send(&c->log, FMU_WARNING, LOG_STATUS_WARNING, &text);
+  return 1;
+}
+
+fmu_status life_set_experiment(component* c, fmu_function function, const experiment* e) {
+  if (!component_may_call(c, function) || !time_is_sound(c, function, "startTime", e->start_time)) {
+    return FMU_ERROR;
+  }
+  if (e->stop_time_defined && !(e->stop_time >= e->start_time)) {
+    log_text text = log_start(call_name(function), "stopTime = ");
+    log_append_number(&text, e->stop_time);
+    log_append(&text, " s: expected at least startTime = ");
+    log_append_number(&text, e->start_time);
+    log_append(&text, " s");
+    return component_fail(c, &text);
+  }
+  if (e->tolerance_defined && !set_tolerance(c, function, e->tolerance)) {
+    return FMU_ERROR;
+  }
+  variables_fetch_settings(&c->values, c->model);
+  c->start_time = c->end_of_step = e->start_time;
+  c->stop_time_defined = e->stop_time_defined;
+  c->stop_time = e->stop_time_defined ? e->stop_time : 0.0;
+  return FMU_OK;
+}
+
+fmu_status life_enter_initialisation(component* c) {
+  if (!component_may_call(c, CALL_ENTER_INITIALIZATION_MODE)) {
+    return FMU_ERROR;
+  }
+  c->phase = PHASE_INITIALISATION;
+  c->outputs_pending = 1;
+  return FMU_OK;
+}
+
+fmu_status life_exit_initialisation(component* c) {
+  if (!component_may_call(c, CALL_EXIT_INITIALIZATION_MODE)) {
+    return FMU_ERROR;
+  }
+  if (model_initialise(c->model, &c->values, c->start_time)) {
+    return component_fail_because(c, call_name(CALL_EXIT_INITIALIZATION_MODE), model_last_error(c->model));
+  }
+  model_fetch_outputs(c->model, &c->values);
+  c->phase = PHASE_STEP_COMPLETE;
+  c->outputs_pending = 0;
+  log_event(c, CALL_EXIT_INITIALIZATION_MODE, model_text.initialised, "");
+  return FMU_OK;
+}
+
+fmu_status life_terminate(component* c) {
+  if (!component_may_call(c, CALL_TERMINATE)) {
+    return FMU_ERROR;
+  }
+  c->phase = PHASE_TERMINATED;
+  log_event(c, CALL_TERMINATE, "terminated", "");
+  return FMU_OK;
+}
+
+fmu_status life_reset(component* c) {
+  if (!component_may_call(c, CALL_RESET)) {
+    return FMU_ERROR;
+  }
+  component_reset(c);
+  log_event(c, CALL_RESET, "as after ", this_fmi.instantiate);
+  return FMU_OK;
+}
+
+/* --- steps -------------------------------------------------------------------------------------------------------- */
+
+/* Why there is no step from `time` over `step`; NULL when there is one. A step past the stop time by rounding is one.
+ */
+static const char* refuse_step(const component* c, double time, double step) {
+  if (!isfinite(step) || !(step > 0.0)) {
+    return "expected a finite communicationStepSize above 0 s";
+  }
+  if (c->stop_time_defined && time > c->stop_time + 0.5 * step) {
+    return "expected a currentCommunicationPoint not past the stop time";
+  }
+  return model_refuse_step(c->model, time, step, c->end_of_step);
+}
+
+fmu_status life_step(component* c, double time, double step) {
+  if (!component_may_call(c, CALL_DO_STEP) || !time_is_sound(c, CALL_DO_STEP, "currentCommunicationPoint", time)) {
+    return FMU_ERROR;
+  }
+  const char* reason = refuse_step(c, time, step);
+  if (reason) {
+    log_text text = log_start(call_name(CALL_DO_STEP), reason);
+    log_append(&text, ", got point ");
+    log_append_number(&text, time);
+    log_append(&text, " s and step ");
+    log_append_number(&text, step);
+    log_append(&text, " s, after the sample at ");
+    log_append_number(&text, model_get_time(c->model));
+    log_append(&text, " s");
+    return component_fail(c, &text);
+  }
+  if (model_step(c->model, &c->values, time, step)) {
+    return component_fail_because(c, call_name(CALL_DO_STEP), model_last_error(c->model));
+  }
+  model_fetch_outputs(c->model, &c->values);
+  c->end_of_step = time + step;
+  return FMU_OK;
+}

@@ -1,0 +1,136 @@
+#include "states.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "component_state.h"
+
+static fmu_status fail(component* c, fmu_function function, const char* reason) {
+  return component_fail_because(c, call_name(function), reason);
+}
+
+/* "<function>: <what the version calls a state> is NULL" */
+static fmu_status fail_without_state(component* c, fmu_function function) {
+  log_text text = log_start(call_name(function), this_fmi.state);
+  log_append(&text, " is NULL");
+  return component_fail(c, &text);
+}
+
+/* A block of another FMU may be shorter than those of this one. */
+static int is_own_block(component* c, fmu_function function, const void* block) {
+  const char* reason = block ? component_refuse_block(c, block) : NULL;
+  if (!block) {
+    fail_without_state(c, function);
+  } else if (reason) {
+    fail(c, function, reason);
+  }
+  return block && !reason;
+}
+
+fmu_status states_get(component* c, void** state) {
+  if (!component_may_call(c, CALL_GET_FMU_STATE)) {
+    return FMU_ERROR;
+  }
+  if (!state) {
+    return fail_without_state(c, CALL_GET_FMU_STATE);
+  }
+  if (*state && !is_own_block(c, CALL_GET_FMU_STATE, *state)) {
+    return FMU_ERROR;
+  }
+  if (!*state) {
+    *state = malloc(component_state_size(c));
+  }
+  if (!*state) {
+    return fail(c, CALL_GET_FMU_STATE, "out of memory");
+  }
+  component_save(c, *state);
+  return FMU_OK;
+}
+
+fmu_status states_set(component* c, const void* state) {
+  if (!component_may_call(c, CALL_SET_FMU_STATE)) {
+    return FMU_ERROR;
+  }
+  if (!state) {
+    return fail_without_state(c, CALL_SET_FMU_STATE);
+  }
+  const char* reason = component_restore(c, state);
+  return reason ? fail(c, CALL_SET_FMU_STATE, reason) : FMU_OK;
+}
+
+fmu_status states_free(component* c, void** state) {
+  if (!component_may_call(c, CALL_FREE_FMU_STATE)) {
+    return FMU_ERROR;
+  }
+  if (state) { /* a state that is NULL is no error, by the standard */
+    free(*state);
+    *state = NULL;
+  }
+  return FMU_OK;
+}
+
+fmu_status states_serialized_size(component* c, const void* state, size_t* size) {
+  if (!component_may_call(c, CALL_SERIALIZED_FMU_STATE_SIZE)) {
+    return FMU_ERROR;
+  }
+  if (!is_own_block(c, CALL_SERIALIZED_FMU_STATE_SIZE, state)) {
+    return FMU_ERROR;
+  }
+  if (!size) {
+    return fail(c, CALL_SERIALIZED_FMU_STATE_SIZE, "size is NULL");
+  }
+  *size = component_state_size(c);
+  return FMU_OK;
+}
+
+/* Common part of the two below: bytes of the right number. */
+static int has_bytes(component* c, fmu_function function, const void* bytes, size_t size) {
+  if (bytes && size == component_state_size(c)) {
+    return 1;
+  }
+  log_text text = log_start(call_name(function), bytes ? "size = " : "serializedState is NULL, size = ");
+  log_append_count(&text, size);
+  log_append(&text, ": expected ");
+  log_append_count(&text, component_state_size(c));
+  log_append(&text, " bytes");
+  component_fail(c, &text);
+  return 0;
+}
+
+fmu_status states_serialize(component* c, const void* state, void* bytes, size_t size) {
+  if (!component_may_call(c, CALL_SERIALIZE_FMU_STATE)) {
+    return FMU_ERROR;
+  }
+  if (!is_own_block(c, CALL_SERIALIZE_FMU_STATE, state) || !has_bytes(c, CALL_SERIALIZE_FMU_STATE, bytes, size)) {
+    return FMU_ERROR;
+  }
+  memcpy(bytes, state, size);
+  return FMU_OK;
+}
+
+fmu_status states_deserialize(component* c, const void* bytes, size_t size, void** state) {
+  if (!component_may_call(c, CALL_DESERIALIZE_FMU_STATE)) {
+    return FMU_ERROR;
+  }
+  if (!state) {
+    return fail_without_state(c, CALL_DESERIALIZE_FMU_STATE);
+  }
+  if (!has_bytes(c, CALL_DESERIALIZE_FMU_STATE, bytes, size)) {
+    return FMU_ERROR;
+  }
+  const char* reason = component_check_state(c, bytes, size);
+  if (reason) {
+    return fail(c, CALL_DESERIALIZE_FMU_STATE, reason);
+  }
+  if (*state && !is_own_block(c, CALL_DESERIALIZE_FMU_STATE, *state)) {
+    return FMU_ERROR;
+  }
+  if (!*state) {
+    *state = malloc(size);
+  }
+  if (!*state) {
+    return fail(c, CALL_DESERIALIZE_FMU_STATE, "out of memory");
+  }
+  memcpy(*state, bytes, size);
+  return FMU_OK;
+}
