@@ -55,7 +55,7 @@ def test_needs_libc_and_libm_only(small_fmu: UnpackedFmu) -> None:
     assert "SYMBOLIC" in headers
     versions = {tuple(map(int, v.split("."))) for v in re.findall(r"GLIBC_([\d.]+)", headers)}
     print(f"{small_fmu.binary.name}: GLIBC {max(versions)}")
-    assert max(versions) <= (2, 17)  # of 2012, whatever the build's own is (fmu_src/glibc_floor.c)
+    assert max(versions) <= (2, 17)  # of 2012, whatever the build's own is (fmu_src/glibc_floor)
 
 
 @linux

@@ -34,7 +34,7 @@ BEYOND_C = {
     "quad_sse2.h": {"emmintrin.h"},
     "quad_avx2.h": {"immintrin.h"},
     "resource.c": {"windows.h"},
-    "glibc_floor.c": {"pthread.h", "sched.h"},
+    "of_cpp.c": {"pthread.h", "sched.h"},
 }
 
 # --- Python: one module for each thing --------------------------------------------------------------------------------

@@ -109,7 +109,7 @@ def test_the_binary_is_small_and_needs_the_system_alone(plant_fmu: UnpackedFmu, 
     record_testsuite_property("plant_fmu_glibc_floor", ".".join(map(str, contents.glibc_floor)))
     if contents.format == "ELF":
         assert set(contents.libraries) <= SYSTEM_LIBRARIES
-        assert contents.glibc_floor <= (2, 17)  # of 2012, whatever the build's own is (fmu_src/plant_fmu/glibc_floor.c)
+        assert contents.glibc_floor <= (2, 17)  # of 2012, whatever the build's own is (fmu_src/glibc_floor)
 
 
 @pytest.mark.parametrize(
