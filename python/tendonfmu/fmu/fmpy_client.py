@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import ctypes
+import errno
 import os
 import re
 import shutil
+import stat
+import struct
 import tempfile
+import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -21,6 +25,9 @@ from tendonfmu.model import FLAGS, INPUTS, NUMBERS, OPTIONAL_NUMBERS, PLACE, RES
 from tendonfmu.recordings import Recording
 
 Progress = Callable[[int], None]
+
+# An FMU of `tendonfmu build` has some 4 MB in 200 files; what is larger by far is no FMU and would fill the disk.
+LARGEST_UNPACKED, MOST_MEMBERS = 1 << 30, 10_000
 
 
 @dataclass(frozen=True)
@@ -100,40 +107,89 @@ def run_fmu(
 
 @contextmanager
 def _unpacked(path: Path) -> Iterator[Path]:
-    from fmpy import extract
-
     if not path.is_file():
         raise InputError(f"{path}: no such file")
     folder = Path(tempfile.mkdtemp(prefix="tendonfmu-"))
     try:
-        extract(os.fspath(path), unzipdir=str(folder))
-        if not (folder / "modelDescription.xml").is_file():
-            raise InputError(f"{path}: no modelDescription.xml in it; expected an FMU of `tendonfmu build`")
+        _unpack(path, folder)
         yield folder
-    except (OSError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{path}: not an FMU ({error})") from None
-    except Exception as error:  # fmpy raises bare exceptions for broken archives
-        if type(error) is not Exception and type(error).__module__ != "zipfile":
-            raise
-        raise InputError(f"{path}: not an FMU ({error})") from None
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def _unpack(path: Path, folder: Path) -> None:
+    """Unpack an FMU. Whatever zipfile and fmpy fail with is for the file, unless it is for the folder."""
+    from fmpy import extract
+
+    try:
+        _check_members(path)
+        extract(os.fspath(path), unzipdir=str(folder))
+    except (InputError, MemoryError):
+        raise
+    except OSError as error:
+        if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS):
+            raise InputError(f"{path}: cannot be unpacked into {folder.parent} ({error.strerror})") from None
+        raise InputError(f"{path}: not an FMU ({_one_line(error)})") from None
+    except Exception as error:
+        raise InputError(f"{path}: not an FMU ({_one_line(error)})") from None
+    if not (folder / "modelDescription.xml").is_file():
+        raise InputError(f"{path}: no modelDescription.xml in it; expected an FMU of `tendonfmu build`")
+    for library in folder.glob("binaries/*/*.so"):
+        if not _is_whole(library.read_bytes()):
+            raise InputError(f"{path}: {library.name} ends early; expected a whole library")
+
+
+def _is_whole(library: bytes) -> bool:
+    """Return whether a 64-bit ELF library has all its sections: loading one without ends the process (SIGBUS)."""
+    if library[:6] != b"\x7fELF\x02\x01" or len(library) < 64:
+        return True  # of another kind: the loader refuses what it does not know
+    (table,) = struct.unpack_from("<Q", library, 40)
+    size, count = struct.unpack_from("<HH", library, 58)
+    return len(library) >= table + size * count
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def _check_members(path: Path) -> None:
+    """Refuse an archive whose members would lie outside of its folder or fill the disk, before any is unpacked."""
+    with zipfile.ZipFile(path) as archive:
+        members = archive.infolist()
+    if len(members) > MOST_MEMBERS:
+        raise InputError(f"{path}: {len(members)} files in it; expected an FMU, of at most {MOST_MEMBERS}")
+    size = sum(member.file_size for member in members)  # no more is unpacked, whatever the data hold
+    if size > LARGEST_UNPACKED:
+        raise InputError(f"{path}: {size / 1e9:.3g} GB when unpacked; expected an FMU, of at most 1.07 GB")
+    for member in members:
+        if ".." in member.filename.split("/") or stat.S_ISLNK(member.external_attr >> 16):
+            raise InputError(f"{path}: {member.filename!r} is a link or leads out of it; expected an FMU")
+
+
+def _description_of(path: Path, folder: Path) -> Any:
+    """Return fmpy's ModelDescription. Whatever it fails with is for the file: it takes any XML to be one."""
+    from fmpy import read_model_description
+
+    try:
+        return read_model_description(str(folder), validate=False)
+    except MemoryError:
+        raise
+    except Exception as error:
+        reason = f"modelDescription.xml: {_one_line(error)}"
+        raise InputError(f"{path}: {reason}; expected an FMU of `tendonfmu build`") from None
 
 
 class _Run:
     """One instance of an FMU. Its arrays are laid out once, so that a step is three calls."""
 
     def __init__(self, path: Path, folder: Path, parameters: Mapping[str, float]) -> None:
-        from fmpy import read_model_description
         from fmpy.fmi2 import FMU2Slave
 
         self.path = path
         self._at = str(path)  # place in error messages: the FMU, later the recording's row
         self._parameters = parameters
         self._messages: list[str] = []
-        description = read_model_description(str(folder), validate=False)
+        description = _description_of(path, folder)
         if description.fmiVersion != "2.0" or description.coSimulation is None:
             raise InputError(f"{path}: FMI {description.fmiVersion}; expected an FMI 2.0 co-simulation FMU")
         self._all = {variable.name: variable for variable in description.modelVariables}
@@ -145,12 +201,19 @@ class _Run:
         types = {group: str(self._all[next(iter(names))].type) for group, names in outputs.items()}
         self.variables = Variables(outputs, types)
         self._inputs = {group: self._group(group) for group in INPUTS}
-        self._slave = FMU2Slave(
-            guid=description.guid,
-            unzipDirectory=str(folder),
-            modelIdentifier=description.coSimulation.modelIdentifier,
-            instanceName=description.modelName,
-        )
+        try:
+            self._slave = FMU2Slave(
+                guid=description.guid,
+                unzipDirectory=str(folder),
+                modelIdentifier=description.coSimulation.modelIdentifier,
+                instanceName=description.modelName,
+            )
+        except (InputError, TypeError, AttributeError, NameError, AssertionError, MemoryError):
+            raise
+        except (
+            Exception
+        ) as error:  # no library for this system, or none that can be loaded: fmpy raises bare exceptions
+            raise InputError(f"{path}: not an FMU ({_one_line(error).replace(str(folder), '')})") from None
 
     def inputs(self, source: int) -> tuple[str, ...]:
         """Return the groups of inputs that the FMU uses."""
