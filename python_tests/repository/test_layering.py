@@ -448,3 +448,24 @@ def test_the_oracle_is_for_tests_alone() -> None:
         if name.startswith("python/") and "oracle" in (ROOT / name).read_text(encoding="utf-8", errors="replace")
     ]
     assert users == []
+
+
+QUAD_ACCESS = r"\b(?:quad_load|quad_store)\({name}\b|\btendon_sum\([^;()]*\b{name}\b"  # 32 bytes at once
+
+
+def unaligned(text: str) -> list[str]:
+    """Local arrays that quads are loaded from and that are not declared as aligned to 32 bytes."""
+    found = []
+    for body in re.split(r"^\}", text, flags=re.MULTILINE):
+        for declared in re.findall(r"^ +double ([^;]*\[[^;]*);", body, re.MULTILINE):
+            names = re.findall(r"(\w+)\[", declared)
+            found += [name for name in names if re.search(QUAD_ACCESS.format(name=name), body)]
+    return found
+
+
+def test_quads_are_loaded_from_aligned_arrays() -> None:
+    """Compilers align a large array when they optimise; without that, an aligned load of another one is a fault."""
+    assert unaligned("void f(void) {\n  double a[8], b[8];\n  quad_store(a + i, quad_load(c));\n}\n") == ["a"]
+    assert unaligned("void f(void) {\n  _Alignas(32) double a[8];\n  quad_store(a + i, x);\n}\n") == []
+    kernel = ROOT / "runtime" / "core" / "kernel"
+    assert {file.name: names for file in kernel.glob("*.h") if (names := unaligned(file.read_text()))} == {}

@@ -12,7 +12,7 @@ build=${2-build/fuzz}
 if [[ $# -lt 2 ]]; then
   command -v clang++ >/dev/null || { echo "run_fuzzers.sh: clang++ not found; libFuzzer comes with clang" >&2; exit 2; }
   CC=clang CXX=clang++ cmake -S . -B "$build" -DCMAKE_BUILD_TYPE=RelWithDebInfo -DTENDONFMU_BUILD_FUZZERS=ON \
-    -DTENDONFMU_SANITIZE=ON -DTENDONFMU_BUILD_TESTS=OFF -DTENDONFMU_BUILD_FMU=OFF >/dev/null
+    -DTENDONFMU_SANITIZE=ON -DTENDONFMU_BUILD_TESTS=OFF >/dev/null
   cmake --build "$build" --parallel 2 >/dev/null
 fi
 

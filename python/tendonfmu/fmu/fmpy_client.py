@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import errno
 import os
 import re
 import shutil
@@ -17,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
+from tendonfmu.fmu.archive_check import check_members, is_whole, one_line
 from tendonfmu.model import FLAGS, INPUTS, NUMBERS, OPTIONAL_NUMBERS, PLACE, REST, SENSORS, inputs_used
 from tendonfmu.recordings import Recording
 
@@ -90,26 +92,49 @@ def run_fmu(
 
 @contextmanager
 def _unpacked(path: Path) -> Iterator[Path]:
-    from fmpy import extract
-
     if not path.is_file():
         raise InputError(f"{path}: no such file")
     folder = Path(tempfile.mkdtemp(prefix="tendonfmu-"))
     try:
-        extract(os.fspath(path), unzipdir=str(folder))
-        if not (folder / "modelDescription.xml").is_file():
-            raise InputError(f"{path}: no modelDescription.xml in it; expected an FMU of `tendonfmu build`")
+        _unpack(path, folder)
         yield folder
-    except (OSError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{path}: not an FMU ({error})") from None
-    except Exception as error:  # fmpy raises bare exceptions for broken archives
-        if type(error) is not Exception and type(error).__module__ != "zipfile":
-            raise
-        raise InputError(f"{path}: not an FMU ({error})") from None
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def _unpack(path: Path, folder: Path) -> None:
+    """Unpack an FMU. Whatever zipfile and fmpy fail with is for the file, unless it is for the folder."""
+    from fmpy import extract
+
+    try:
+        check_members(path)
+        extract(os.fspath(path), unzipdir=str(folder))
+    except (InputError, MemoryError):
+        raise
+    except OSError as error:
+        if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS):
+            raise InputError(f"{path}: cannot be unpacked into {folder.parent} ({error.strerror})") from None
+        raise InputError(f"{path}: not an FMU ({one_line(error)})") from None
+    except Exception as error:
+        raise InputError(f"{path}: not an FMU ({one_line(error)})") from None
+    if not (folder / "modelDescription.xml").is_file():
+        raise InputError(f"{path}: no modelDescription.xml in it; expected an FMU of `tendonfmu build`")
+    for library in folder.glob("binaries/*/*.so"):
+        if not is_whole(library.read_bytes()):
+            raise InputError(f"{path}: {library.name} ends early; expected a whole library")
+
+
+def _description_of(path: Path, folder: Path) -> Any:
+    """Return fmpy's ModelDescription. Whatever it fails with is for the file: it takes any XML to be one."""
+    from fmpy import read_model_description
+
+    try:
+        return read_model_description(str(folder), validate=False)
+    except MemoryError:
+        raise
+    except Exception as error:
+        reason = f"modelDescription.xml: {one_line(error)}"
+        raise InputError(f"{path}: {reason}; expected an FMU of `tendonfmu build`") from None
 
 
 class _Slave(Protocol):
@@ -231,13 +256,12 @@ class _Run:
     """One instance of an FMU. Its arrays are laid out once, so that a step is a few calls."""
 
     def __init__(self, path: Path, folder: Path, parameters: Mapping[str, float]) -> None:
-        from fmpy import read_model_description
 
         self.path = path
         self._at = str(path)  # place in error messages: the FMU, later the recording's row
         self._parameters = parameters
         self._messages: list[str] = []
-        description = read_model_description(str(folder), validate=False)
+        description = _description_of(path, folder)
         slaves: dict[str, Callable[..., _Slave]] = {"2": _Slave2, "3": _Slave3}
         slave = slaves.get(str(description.fmiVersion).partition(".")[0])
         if slave is None or description.coSimulation is None:
@@ -247,12 +271,18 @@ class _Run:
         optional = (*OPTIONAL_NUMBERS, *PLACE, *REST, *SENSORS)
         self._outputs = {name: self._group(name) for name in wanted if name not in optional or self._has(name)}
         self._inputs = {group: self._group(group) for group in INPUTS}
-        self._slave: _Slave = slave(
-            guid=description.guid,
-            unzipDirectory=str(folder),
-            modelIdentifier=description.coSimulation.modelIdentifier,
-            instanceName=description.modelName,
-        )
+        try:
+            self._slave: _Slave = slave(
+                guid=description.guid,
+                unzipDirectory=str(folder),
+                modelIdentifier=description.coSimulation.modelIdentifier,
+                instanceName=description.modelName,
+            )
+        except (InputError, TypeError, AttributeError, NameError, AssertionError, MemoryError):
+            raise
+        # no library for this system, or none that can be loaded: fmpy raises bare exceptions
+        except Exception as error:
+            raise InputError(f"{path}: not an FMU ({one_line(error).replace(str(folder), '')})") from None
 
     @property
     def joints(self) -> int:

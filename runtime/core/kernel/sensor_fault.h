@@ -42,7 +42,8 @@ HOT_INLINE void find_joint_side(tendonfmu_finger* f, double* joint_side) {
   const finger_scratch* s = &f->scratch;
   const size_t n = f->joints, lanes = f->tendon_lanes;
   const int by_tendons = (int)f->remembered.scalar[STATE_SOURCE] == TENDONFMU_TENDON_POSITIONS;
-  double spring_end[MODEL_MAX_TENDONS], angle[MODEL_MAX_JOINTS];
+  _Alignas(32) double spring_end[MODEL_MAX_TENDONS];
+  double angle[MODEL_MAX_JOINTS];
   for (size_t i = 0; i < lanes; i += 4) {
     const quad stretch = quad_mul(quad_load(s->force + i), quad_load(f->derived.inverse_stiffness + i));
     quad_store(spring_end + i, quad_sub(quad_load(s->position + i), stretch));
@@ -231,7 +232,7 @@ COLD_STATIC int recover(tendonfmu_finger* f, const watched* w, size_t i, double 
 /* q of the sample before by the rows in use, plus `sign` times that into angle_shift [N] */
 COLD_STATIC void shift_angles(tendonfmu_finger* f, double sign) {
   double* before = f->remembered.sensor;
-  double spring_end[MODEL_MAX_TENDONS];
+  _Alignas(32) double spring_end[MODEL_MAX_TENDONS];
   for (size_t i = 0; i < f->tendon_lanes; ++i) {
     const double stretch = sensor_row(f, before, SENSOR_FORCE)[i] * f->derived.inverse_stiffness[i];
     spring_end[i] = sensor_row(f, before, SENSOR_POSITION)[i] - stretch;

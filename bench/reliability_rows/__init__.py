@@ -1,0 +1,1 @@
+"""The rows of docs/evidence/reliability.md, for bench/reliability.py; the programs in C that they compile."""

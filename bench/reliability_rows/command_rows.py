@@ -1,0 +1,264 @@
+"""R17 and R18: commands that are killed, and machines that have no room left."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import random
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+from .programs import call_program, compiler, small
+from .row import ROOT, Outcome, Row, Run, called
+
+DEMO = ROOT / "examples" / "demo_recording"
+COMMAND = [sys.executable, "-m", "tendonfmu.cli"]
+SECONDS = 12.0  # of motion: commands have to end within seconds
+
+COMMANDS: dict[str, list[str]] = {
+    "build": ["build", "finger.json", "-o", "out/finger.fmu"],
+    "fit": ["fit", "finger.json", "free.parquet", "-o", "out/fitted.json", "--report", "out/report.json"],
+    "diagnose": ["diagnose", "finger.json", "free.parquet", "-o", "out/diagnosis"],
+    "calibrate": ["calibrate", "finger.json", "free.parquet", "-o", "out/calibrated"],
+    "campaign": ["campaign", "cases.json", "-o", "out/rows"],
+}
+
+
+def inputs(folder: Path) -> None:
+    """finger.json, free.parquet and cases.json of the demo's small finger."""
+    import pandas as pd
+
+    shutil.rmtree(folder, ignore_errors=True)
+    (folder / "out").mkdir(parents=True)
+    shutil.copy(DEMO / "two_joints.json", folder / "finger.json")
+    frame = pd.read_parquet(DEMO / "two_joints_training.parquet")
+    frame[frame["time"] < frame["time"].iloc[0] + SECONDS].to_parquet(folder / "free.parquet")
+    cases = [
+        {"name": f"case_{k}", "group": "null", "finger": "finger.json", "recordings": ["free.parquet"], "seed": k}
+        for k in range(2)
+    ]
+    (folder / "cases.json").write_text(json.dumps({"format": "tendonfmu-campaign-1", "cases": cases}))
+
+
+# --- is a file whole? -------------------------------------------------------------------------------------------------
+
+
+def is_whole(file: Path) -> bool:
+    content = file.read_bytes()
+    if file.suffix == ".json":
+        try:
+            json.loads(content)
+        except ValueError:
+            return False
+    elif file.suffix in (".fmu", ".npz"):
+        try:
+            with zipfile.ZipFile(file) as archive:
+                return archive.testzip() is None
+        except zipfile.BadZipFile:
+            return False
+    elif file.suffix == ".html":
+        return content.rstrip().endswith(b"</html>")
+    elif file.suffix == ".png":
+        return content.endswith(b"IEND\xaeB`\x82")
+    elif file.suffix == ".parquet":
+        return content.startswith(b"PAR1") and content.endswith(b"PAR1")
+    return bool(content)
+
+
+def results(folder: Path) -> dict[str, Path]:
+    """Files that a user sees: no part of the name begins with a dot."""
+    found = {path.relative_to(folder): path for path in folder.rglob("*") if path.is_file()}
+    return {str(name): path for name, path in found.items() if not any(part.startswith(".") for part in name.parts)}
+
+
+def hidden(folder: Path) -> list[Path]:
+    return [path for path in folder.rglob("*") if any(part.startswith(".") for part in path.relative_to(folder).parts)]
+
+
+# --- killed -----------------------------------------------------------------------------------------------------------
+
+
+def start(folder: Path, words: list[str]) -> subprocess.Popen[bytes]:
+    said = (folder / "said.txt").open("wb")
+    return subprocess.Popen([*COMMAND, *words, "--quiet"], cwd=folder, stdout=said, stderr=said, start_new_session=True)
+
+
+def killed(folder: Path, words: list[str], chance: random.Random, longest: float, at_a_write: bool) -> bool:
+    """True when it was killed before it had ended. at_a_write: when the first new file appears, else anywhere."""
+    process = start(folder, words)
+    began, known = time.monotonic(), set((folder / "out").rglob("*"))
+    limit = longest * (3.0 if at_a_write else chance.random())
+    while process.poll() is None and time.monotonic() - began < limit:
+        if at_a_write and set((folder / "out").rglob("*")) - known:
+            time.sleep(chance.choice([0.0, 0.001, 0.01, 0.1]))
+            break
+        time.sleep(0.0005 if at_a_write else 0.01)
+    alive = process.poll() is None
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)  # its own session: its helpers go with it
+    process.wait()
+    return alive
+
+
+def kills(run: Run) -> Outcome:
+    chance = random.Random(1)
+    each = run.count(40, 2)
+    total = 0
+    wrong: list[str] = []
+    left = 0
+    for name, words in COMMANDS.items():
+        folder = run.work / name
+        inputs(folder)
+        began = time.monotonic()
+        status = start(folder, words).wait()
+        took = time.monotonic() - began
+        whole = set(results(folder / "out"))
+        if status or not whole:
+            wrong.append(f"{name}: {(folder / 'said.txt').read_text()[-300:]}")
+            continue
+        shutil.rmtree(folder / "out")
+        (folder / "out").mkdir()
+        for k in range(each):
+            total += killed(folder, words, chance, took, at_a_write=k % 2 == 0)
+            halves = [file for file, path in results(folder / "out").items() if not is_whole(path)]
+            wrong += [f"{name}: half of {file}" for file in halves]
+        if start(folder, words).wait():
+            wrong.append(f"{name}: does not go on: {(folder / 'said.txt').read_text()[-300:]}")
+        elif set(results(folder / "out")) != whole:
+            wrong.append(f"{name}: other files than without a kill: {sorted(set(results(folder / 'out')) ^ whole)[:4]}")
+        left += len(hidden(folder / "out"))
+    number = f"kill -9 {total} times in {', '.join(COMMANDS)}: at random, and as a file is being written"
+    result = f"{len(wrong)} half files or commands that do not go on; {left} hidden temporary files left"
+    return Outcome(number, "; ".join([result, *wrong[:4]]), not wrong)
+
+
+# --- no room ----------------------------------------------------------------------------------------------------------
+
+SMALL_COMMANDS: dict[str, list[str]] = {
+    "build": ["build", "finger.json", "-o", "out/finger.fmu"],
+    "run": ["run", "finger.json", "free.parquet", "-o", "out/free.csv"],
+    "run to Parquet": ["run", "finger.json", "free.parquet", "-o", "out/free.parquet"],
+    "excite": ["excite", "finger.json", "-o", "out/motion.csv", "--duration", "20"],
+    "fit": ["fit", "finger.json", "free.parquet", "-o", "out/fitted.json"],
+    "diagnose": ["diagnose", "finger.json", "free.parquet", "-o", "out/diagnosis"],
+    "calibrate": ["calibrate", "finger.json", "free.parquet", "-o", "out/calibrated"],
+}
+
+
+def refused(folder: Path, name: str, command: list[str], limit: Callable[[], None] | None = None) -> str:
+    """ "" when the command fails in one line and leaves no half file; "ended" when there was room enough."""
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(
+        command, cwd=folder, capture_output=True, text=True, preexec_fn=limit, env=environment, timeout=600
+    )
+    halves = [file for file, path in results(folder / "out").items() if not is_whole(path)]
+    if halves:
+        return f"{name}: half of {halves[0]}"
+    if done.returncode == 0:
+        return "ended"
+    if limit is not None and "memory" in name and done.returncode not in (2, 3):
+        return "lost"  # a library ended the process, or Python could not begin
+    lines = done.stderr.strip().splitlines()
+    if done.returncode != 2 or len(lines) != 1 or not lines[0].startswith("tendonfmu: "):
+        return f"{name}: status {done.returncode}: {len(lines)} lines: {' / '.join(lines)[:300]}"
+    return ""
+
+
+def on_a_small_disk(options: str, then: str, words: list[str]) -> list[str]:
+    """The command with a file system of its own at out/: in a mount namespace, gone when the command has ended."""
+    script = f'mount -t tmpfs -o {options} tmpfs out && {then} exec "$@"'
+    return ["unshare", "-m", "sh", "-c", script, "sh", *COMMAND, *words, "--quiet"]
+
+
+def can_mount() -> bool:
+    return (
+        shutil.which("unshare") is not None
+        and not subprocess.run(
+            ["unshare", "-m", "mount", "-t", "tmpfs", "tmpfs", "/mnt"], capture_output=True
+        ).returncode
+    )
+
+
+def file_limit(size: int) -> Callable[[], None]:
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+    return limit
+
+
+def memory_limit(size: int) -> Callable[[], None]:
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_AS, (size, size))
+
+    return limit
+
+
+def no_room(run: Run) -> Outcome:
+    folder = run.work / "disk"
+    tried = ended = lost = 0
+    wrong: list[str] = []
+    mounts = can_mount()
+    names = list(SMALL_COMMANDS)[: run.count(len(SMALL_COMMANDS), 4)]
+    for name in names:
+        words = SMALL_COMMANDS[name]
+        plain = [*COMMAND, *words, "--quiet"]
+        trials: list[tuple[str, list[str], Callable[[], None] | None]] = [
+            (f"{name}, files of at most {size} bytes", plain, file_limit(size)) for size in (0, 1, 4096, 65536)
+        ]
+        if mounts:
+            trials += [
+                (f"{name}, disk of {size}", on_a_small_disk(f"size={size}", "", words), None)
+                for size in ("4k", "16k", "64k")
+            ]
+            trials += [
+                (f"{name}, read-only disk", on_a_small_disk("size=1m", "mount -o remount,ro out &&", words), None)
+            ]
+        trials += [(f"{name}, {size} MiB of memory", plain, memory_limit(size << 20)) for size in (250, 350, 500, 700)]
+        for title, command, limit in trials:
+            inputs(folder)
+            said = refused(folder, title, command, limit)
+            tried += 1
+            ended += said == "ended"
+            lost += said == "lost"
+            wrong += [said] if said not in ("", "ended", "lost") else []
+    program = call_program(run, "O2", ["-O2"], compiler("gcc", "clang"))
+    allocations, refusals, words_said, leaked = map(int, called(program, "hungry", *small(run).words(), "0").split())
+    (run.work / "wrong.txt").write_text("\n".join(wrong))
+    fmu_sound = leaked == 0
+    disks = "full and read-only disks, " if mounts else ""
+    number = (
+        f"{tried} runs of {', '.join(names)} with {disks}short files, little memory; "
+        f"an FMU in which each of {allocations} allocations fails"
+    )
+    result = (
+        f"{tried - ended - lost - len(wrong)} refused in one line, {ended} had room enough, {lost} with little memory "
+        f"ended by a library or by Python itself, no half file; FMU: {refusals} calls refused, "
+        f"{words_said} with a word about memory, {leaked} leaks; {len(wrong)} wrong"
+    )
+    return Outcome(number, "; ".join([result, *wrong[:4]]), not wrong and fmu_sound)
+
+
+ROWS = [
+    Row(
+        "R17",
+        "Commands that are killed",
+        "200 kills",
+        "a machine that loses power: files are not flushed to the disk (fsync)",
+        kills,
+    ),
+    Row(
+        "R18",
+        "No room, no right, no memory",
+        "all",
+        "quotas, network disks; the kernel's out-of-memory killer (R17)",
+        no_room,
+    ),
+]

@@ -1,0 +1,223 @@
+"""R1 and R14: libFuzzer on calls and parsers; in Python, recordings, maps and descriptions that are wrong."""
+
+from __future__ import annotations
+
+import copy
+import json
+import math
+import random
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from .programs import CALIBRATED
+from .row import ROOT, Outcome, Row, Run, Unavailable, called, spoken
+
+BUILD = ROOT / "build" / "fuzz"
+
+
+def fuzzer(name: str) -> Path:
+    """Built as runtime/fuzz/run_fuzzers.sh builds it; clang only."""
+    if shutil.which("clang++") is None:
+        raise Unavailable("clang++ is not installed; libFuzzer comes with it")
+    settings = [
+        "-DCMAKE_BUILD_TYPE=RelWithDebInfo",
+        "-DTENDONFMU_BUILD_FUZZERS=ON",
+        "-DTENDONFMU_SANITIZE=ON",
+        "-DTENDONFMU_BUILD_TESTS=OFF",
+    ]
+    tools = ["-DCMAKE_C_COMPILER=clang", "-DCMAKE_CXX_COMPILER=clang++", f"-DPython_EXECUTABLE={sys.executable}"]
+    if not (BUILD / "CMakeCache.txt").is_file():
+        called("cmake", "-S", ROOT, "-B", BUILD, *settings, *tools)
+    called("cmake", "--build", BUILD, "--parallel", "1", "--target", name, "fuzz_seeds")
+    return next(path for path in BUILD.rglob(name) if path.is_file())
+
+
+def fuzzed(run: Run, name: str, full: int, minutes: float, *options: str) -> tuple[int, str]:
+    """Inputs tried, and what was found ("" nothing: no crash, no sanitizer, no leak, nothing longer than 10 s)."""
+    program, corpus = fuzzer(name), BUILD / "corpus" / name
+    corpus.mkdir(parents=True, exist_ok=True)
+    seeds = program.parent / "corpus" / name
+    limits = [f"-runs={run.count(full)}", f"-max_total_time={max(1, round(60 * minutes))}", "-timeout=10"]
+    limits += ["-rss_limit_mb=4096", "-len_control=0", "-print_final_stats=1", f"-artifact_prefix={run.work}/{name}-"]
+    command = [program, *limits, *options, corpus, *([seeds] if seeds.is_dir() else [])]
+    log = run.work / f"{name}.log"
+    with log.open("w") as said:
+        status = subprocess.run([str(word) for word in command], stdout=said, stderr=said).returncode
+    text = log.read_text(errors="replace")
+    tried = re.search(r"stat::number_of_executed_units: *(\d+)", text)
+    broken = re.search(r"broken: .*|SUMMARY: .*|ERROR: .*", text)
+    return int(tried[1]) if tried else 0, "" if status == 0 else f"{name}: {broken[0] if broken else status}"
+
+
+def calls(run: Run) -> Outcome:
+    tried, found = fuzzed(run, "fuzz_fmi2", 10_000_000, run.minutes, "-max_len=150")
+    number = (
+        f"{spoken(tried)} sequences of FMI 2.0 calls, up to 150 bytes (some 50 calls) (libFuzzer, ASan, UBSan, leaks)"
+    )
+    return Outcome(
+        number, found or "0 crashes, hangs, leaks; each refused call left no byte of the state changed", not found
+    )
+
+
+# --- parsers ----------------------------------------------------------------------------------------------------------
+
+
+def spoilt(chance: random.Random, content: bytes) -> bytes:
+    """Some bytes changed, cut out, doubled, or replaced by words that parsers stumble over."""
+    words = (
+        b"nan",
+        b"-inf",
+        b"1e999",
+        b'"',
+        b"{",
+        b"]",
+        b",",
+        b"\n",
+        b"\r",
+        b"\0",
+        b"\xff\xfe",
+        b"null",
+        b"-0",
+        b"1e-400",
+        b";",
+        b"\t",
+        b"[0]",
+        b"\xc3",
+    )
+    made = bytearray(content)
+    for _ in range(chance.randint(1, 6)):
+        at, length = chance.randrange(len(made) + 1), chance.randint(0, 40)
+        kind = chance.randrange(4)
+        if kind == 0 and made:
+            made[min(at, len(made) - 1)] = chance.randrange(256)
+        elif kind == 1:
+            del made[at : at + length]
+        elif kind == 2:
+            made[at:at] = made[at : at + length]
+        else:
+            made[at:at] = chance.choice(words)
+    return bytes(made)
+
+
+def readers(run: Run) -> dict[str, tuple[Path, bytes, Callable[[Path], Any]]]:
+    """Name -> file, its sound content, what reads it."""
+    from log_cases import FORMATS, sound, write
+    from tendonfmu.interface import read_recording
+    from tendonfmu.recordings.converters.table import convert_table
+
+    folder = run.work / "parsers"
+    folder.mkdir(parents=True, exist_ok=True)
+    form = FORMATS["CSV"]
+    log = write(folder, form, {name: values[:30] for name, values in sound().items()})
+    rows = ["time,tendon_force[1],tendon_position[1]", *(f"{0.01 * k},{5 + 0.1 * k},{1e-4 * k}" for k in range(40))]
+    return {
+        "recording.csv": (folder / "recording.csv", "\n".join(rows).encode(), read_recording),
+        "map.json": (
+            folder / "map.json",
+            json.dumps(form.map(), indent=1).encode(),
+            lambda file: convert_table(log, file),
+        ),
+    }
+
+
+def spoil_and_read(run: Run) -> tuple[str, list[str]]:
+    from tendonfmu.errors import InputError
+
+    wrong: list[str] = []
+    counts = []
+    for name, (file, content, read) in readers(run).items():
+        refused = 0
+        tried = run.count(20_000)
+        for seed in range(tried):
+            file.write_bytes(spoilt(random.Random(seed), content))
+            try:
+                read(file)
+            except InputError as error:
+                refused += 1
+                if "\n" in str(error) or (file.name not in str(error) and "log.csv" not in str(error)):
+                    wrong.append(f"{name} {seed}: {error}")
+            except Exception as error:
+                wrong.append(f"{name} {seed}: {type(error).__name__}: {error}")
+        counts.append(f"{tried:,} of {name} ({refused:,} refused in one line)")
+    return ", ".join(counts), wrong
+
+
+def numbers_of(tree: Any, path: str = "") -> Iterator[tuple[str, Any, Any]]:
+    """Path, container and key of each number in a description."""
+    pairs = tree.items() if isinstance(tree, dict) else enumerate(tree, start=1)
+    for key, value in pairs:
+        here = (f"{path}.{key}" if path else key) if isinstance(tree, dict) else f"{path}[{key}]"
+        if isinstance(value, dict | list):
+            yield from numbers_of(value, here)
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            yield here, tree, key if isinstance(tree, dict) else key - 1
+
+
+BAD_NUMBERS = ("text", True, [], {}, 1e300, -1e300, math.nan, math.inf)
+
+
+def bad_descriptions(run: Run) -> tuple[int, list[str]]:
+    """Each number replaced by what is none, and a misspelt key beside it: refused with its path."""
+    from tendonfmu.errors import InputError
+    from tendonfmu.model import read_finger
+
+    sound = json.loads(CALIBRATED.read_text())
+    chance, file, tried = random.Random(1), run.work / "bad.json", 0
+    wrong: list[str] = []
+    places = [path for path, _, _ in numbers_of(sound)]
+    for path in chance.sample(places, min(len(places), run.count(60, 10))):
+        for bad in (*BAD_NUMBERS, "misspelt"):
+            spoiled = copy.deepcopy(sound)
+            _, container, key = next(each for each in numbers_of(spoiled) if each[0] == path)
+            if bad == "misspelt" and isinstance(container, dict):
+                container[f"{key}x"] = container.pop(key)
+            else:
+                container[key] = bad
+            expected = f"{key}x" if bad == "misspelt" and isinstance(container, dict) else path
+            file.write_text(json.dumps(spoiled))
+            tried += 1
+            try:
+                read_finger(file)
+                wrong.append(f"{path} = {bad}: taken")
+            except InputError as refused:
+                parent = path.rpartition("[")[0] if bad in ([], {}) else path
+                if (
+                    expected not in str(refused) and parent not in str(refused) and str(bad) not in str(refused)
+                ) or "\n" in str(refused):
+                    wrong.append(f"{path} = {bad}: {refused}")
+    return tried, wrong
+
+
+def parsers(run: Run) -> Outcome:
+    tried, found = fuzzed(run, "fuzz_json", 10_000_000, run.minutes / 2, f"-dict={BUILD}/runtime/fuzz/keys.dict")
+    rigs, found_in_rigs = 0, ""
+    if any(path.is_file() for path in BUILD.rglob("fuzz_rig")):
+        rigs, found_in_rigs = fuzzed(
+            run, "fuzz_rig", 1_000_000, run.minutes / 2, f"-dict={BUILD}/runtime/fuzz/keys.dict"
+        )
+    counts, wrong = spoil_and_read(run)
+    bad, unnamed = bad_descriptions(run)
+    number = (
+        f"{spoken(tried)} descriptions and {spoken(rigs)} rigs (libFuzzer, ASan, UBSan), {counts}; "
+        f"{bad} descriptions with one wrong number or key"
+    )
+    findings = [each for each in (found, found_in_rigs, *wrong[:3], *unnamed[:3]) if each]
+    result = "no crash, no error but a refusal in one line; each wrong number and key is named with its path"
+    return Outcome(number, "; ".join(findings) if findings else result, not findings)
+
+
+ROWS = [
+    Row(
+        "R1",
+        "Sequences of FMI calls",
+        "1e7",
+        "FMI 3.0; the simulated finger (its random calls are among the tests)",
+        calls,
+    ),
+    Row("R14", "Inputs of the parsers", "1e7", "logs of the binary formats beyond R15", parsers),
+]
