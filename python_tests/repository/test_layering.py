@@ -382,7 +382,7 @@ def lines_of(file: Path) -> int:
     """Lines of a source; of Python without docstrings, whose lists of parameters are read apart from the code."""
     text = file.read_text(encoding="utf-8")
     count = len(text.splitlines())
-    if file.suffix != ".py":
+    if file.suffix != ".py" or count <= LONGEST:
         return count
     with_docstring = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
     for node in ast.walk(ast.parse(text)):
