@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
 # Before numpy is imported. The matrices of the tests are small: a second thread of its linear algebra mostly waits, at
@@ -13,11 +14,14 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
 
-from command import Answer, Call
+from command import Answer, Call, DemoRun, run_script
 from fmi3_binary import UnpackedFmu3, unpack3
 from fmu_binary import FINGER, UnpackedFmu, unpack
+from made_once import made_once
 from plant_fmu_rig import fmu_rig
 from real_browser import BROWSERS, find_browser
+
+pytest_plugins = ["processor_time"]
 
 
 @pytest.fixture(scope="session")
@@ -67,6 +71,24 @@ def plant_fmu_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def plant_fmu(plant_fmu_path: Path) -> UnpackedFmu:
     """The same, unpacked and loaded."""
     return unpack(plant_fmu_path, plant_fmu_path.parent / "unpacked")
+
+
+@pytest.fixture(scope="session")
+def demo_run(tmp_path_factory: pytest.TempPathFactory) -> DemoRun:
+    """`tendonfmu demo`. Its calibration is that of any user with the same finger and recordings."""
+    import tendonfmu.cli
+
+    def run(folder: Path) -> None:
+        before = Path.cwd()
+        os.chdir(folder)
+        try:
+            answer = run_script(Path(tendonfmu.cli.__file__).with_name("__main__.py"), "demo")
+        finally:
+            os.chdir(before)
+        (folder / "answer.json").write_text(json.dumps(asdict(answer)), encoding="utf-8")
+
+    folder = made_once(tmp_path_factory, "demo", run)
+    return DemoRun(folder / "tendonfmu-demo", Answer(**json.loads((folder / "answer.json").read_text("utf-8"))))
 
 
 @pytest.fixture(scope="session")

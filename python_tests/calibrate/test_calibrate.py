@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
 
-from command import Call
+from command import Call, DemoRun
 from tendonfmu.calibrate import calibration
 from tendonfmu.calibrate.calibration import Calibration, Options, calibrate
 from tendonfmu.calibrate.files import write_calibration
@@ -77,9 +77,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def calibrated(folder: Path) -> tuple[Calibration, Path]:
-    """The result, and the folder that it is written to."""
+def calibrated(folder: Path, demo_run: DemoRun) -> tuple[Calibration, Path]:
+    """The result, and the folder that it is written to: that of the demo, without pushes, goes on."""
     out = folder / "out"
+    shutil.copytree(demo_run.folder / "calibration", out)
     found = calibrate(
         folder / FINGER, [folder / FREE], out, tests=[folder / UNSEEN], pushes=[folder / "pushes.parquet"]
     )

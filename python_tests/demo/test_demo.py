@@ -13,7 +13,7 @@ import pytest
 
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not installed with its estimation")
 
-from command import Call
+from command import DemoRun
 from real_browser import Elements, find_browser, measure, needs_nothing_else
 from repository_paths import ROOT
 from tendonfmu.demo import demo
@@ -27,10 +27,9 @@ CHAPTERS = ("calibrate", "detect", "diagnose", "fit", "run")
 
 
 @pytest.mark.slow
-def test_the_demo_tells_the_whole_story(call: Call, tmp_path: Path) -> None:
-    answer = call("demo")
+def test_the_demo_tells_the_whole_story(demo_run: DemoRun, tmp_path: Path) -> None:
+    folder, answer = demo_run
     assert answer.status == 0, answer
-    folder = tmp_path / "tendonfmu-demo"
     says_every_chapter(answer.out, answer.err)
     leaves_what_it_lists(folder, answer.out)
     finds_what_was_hidden(folder, answer.out)

@@ -238,6 +238,7 @@ def test_the_next_experiment_is_written(call: Call, tmp_path: Path) -> None:
 # --- for real ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_hidden_spring_is_found(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A spring hidden in recordings that code of its own has made: the command names it and writes a model with it."""
     monkeypatch.syspath_prepend(str(TESTS / "hidden_effects"))

@@ -56,7 +56,7 @@ def fmus(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
     folder = tmp_path_factory.mktemp("fmus")
     for name in NAMES:
-        build_fmu(traces.TRACES[name][0], folder / f"{name}.fmu")
+        build_fmu(traces.TRACES[name][0], folder / f"{name}.fmu", illustrated=False)
     return folder
 
 
@@ -95,7 +95,7 @@ def test_a_rebuilt_fmu_of_another_finger_fails(tmp_path: Path) -> None:
     description = traces.read_description("asymmetric_pair")
     description["tendons"][0]["stiffness"] *= 1.001
     (tmp_path / "other.json").write_text(json.dumps(description))
-    build_fmu(tmp_path / "other.json", tmp_path / "other.fmu")
+    build_fmu(tmp_path / "other.json", tmp_path / "other.fmu", illustrated=False)
     done = check(tmp_path / "other.fmu", REFERENCE / "asymmetric_pair")
     assert done.status == 1, done.err
     assert "DIFFERS" in done.out

@@ -50,7 +50,7 @@ def dependencies(fmu: UnpackedFmu) -> dict[str, set[str]]:
 def test_fmu_is_the_native_finger(seed: int, source: int, tmp_path: Path) -> None:
     description, recording = random_case(seed, SAMPLES, extensions=True)
     (tmp_path / "finger.json").write_text(json.dumps(description))
-    fmu = unpack(build_fmu(tmp_path / "finger.json", tmp_path / "finger.fmu"), tmp_path / "unpacked")
+    fmu = unpack(build_fmu(tmp_path / "finger.json", tmp_path / "finger.fmu", illustrated=False), tmp_path / "unpacked")
     declared, outputs, inputs = dependencies(fmu), fmu.with_derivatives(), fmu.names("input")
     native = native_model.Instance.from_description(description, source)
     native.run({name: series[:1] for name, series in recording.items()})

@@ -141,7 +141,7 @@ def other_fmu(tmp_path_factory: pytest.TempPathFactory) -> UnpackedFmu:
 
     folder = tmp_path_factory.mktemp("other_fmu")
     (folder / "finger.json").write_text(json.dumps(SECOND))
-    build_fmu(folder / "finger.json", folder / "other.fmu")
+    build_fmu(folder / "finger.json", folder / "other.fmu", illustrated=False)
     return unpack(folder / "other.fmu", folder / "unpacked")
 
 

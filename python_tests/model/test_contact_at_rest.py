@@ -289,7 +289,7 @@ def test_the_fmu_has_the_outputs_only_with_the_key(tmp_path: Path) -> None:
     names = {}
     for name, data in (("rest", description), ("plain", plain)):
         (tmp_path / f"{name}.json").write_text(json.dumps(data), encoding="utf-8")
-        fmu = product("fmu.packaging").build_fmu(tmp_path / f"{name}.json", tmp_path / f"{name}.fmu")
+        fmu = product("fmu.packaging").build_fmu(tmp_path / f"{name}.json", tmp_path / f"{name}.fmu", illustrated=False)
         variables = fmpy.read_model_description(str(fmu)).modelVariables
         names[name] = {variable.name: variable for variable in variables}
     added = set(names["rest"]) - set(names["plain"])

@@ -15,7 +15,7 @@ from random_fingers import Description, Recording, random_case
 from repetitions import repeated
 from runners import ORACLE, RUNNERS, Runner
 
-FINGERS, FEWER = 50, 25
+FINGERS, FEWER = 50, 15
 SOURCES = (1, 2, 3)
 SLOW = ("single_steps", "fmu")  # a call from Python for each sample; packing
 DETECTION_FINGERS = range(100, 136)  # with a subset of the optional keys of the detection each

@@ -377,7 +377,7 @@ def test_the_fmu_has_the_outputs_only_with_the_key(tmp_path: Path) -> None:
     names = {}
     for name, data in (("watched", pair()), ("plain", {k: v for k, v in pair().items() if k != "sensor_fault"})):
         (tmp_path / f"{name}.json").write_text(json.dumps(data), encoding="utf-8")
-        fmu = product("fmu.packaging").build_fmu(tmp_path / f"{name}.json", tmp_path / f"{name}.fmu")
+        fmu = product("fmu.packaging").build_fmu(tmp_path / f"{name}.json", tmp_path / f"{name}.fmu", illustrated=False)
         variables = fmpy.read_model_description(str(fmu)).modelVariables
         names[name] = {variable.name: variable for variable in variables}
     added = set(names["watched"]) - set(names["plain"])
@@ -398,7 +398,7 @@ def test_the_fmu_has_every_output_at_once(tmp_path: Path) -> None:
     data["contact"] = data["contact"] | {"rest": rest, "drift": {"threshold": [0.01] * joints}}
     data |= {"links": [{"axis": [0, 0, 1], "offset": [0.05, 0, 0]}] * joints, "tip": [0.05, 0, 0]}
     (tmp_path / "all.json").write_text(json.dumps(data), encoding="utf-8")
-    fmu = product("fmu.packaging").build_fmu(tmp_path / "all.json", tmp_path / "all.fmu")
+    fmu = product("fmu.packaging").build_fmu(tmp_path / "all.json", tmp_path / "all.fmu", illustrated=False)
     outputs = {each.variable.name: each for each in fmpy.read_model_description(str(fmu)).outputs}
     assert {"contact_change[1]", "contact_at_rest", "contact_link", "sensor_fault[1]"} <= set(outputs)
     for name in ("contact_at_rest", "sensor_fault[1]"):

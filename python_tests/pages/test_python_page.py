@@ -5,8 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
-import subprocess
-import sys
+import warnings
 from pathlib import Path
 
 import pandas as pd
@@ -15,6 +14,7 @@ import pytest
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not installed with its estimation")
 
 import tendonfmu as tf
+from command import run_script
 from repository_paths import ROOT
 
 PAGE = (ROOT / "docs/reference/python.md").read_text(encoding="utf-8")
@@ -44,12 +44,17 @@ tf.Recording.from_arrays(rec.time, tendon_force=force, tendon_position=position)
 
 
 def run(code: str, folder: Path) -> str:
-    environment = os.environ | {"PYTHONWARNINGS": "ignore"}
-    answer = subprocess.run(
-        [sys.executable, "-c", code], cwd=folder, env=environment, capture_output=True, text=True, check=False
-    )
-    assert answer.returncode == 0, answer.stderr
-    return answer.stdout
+    script, before = folder / "example.py", Path.cwd()
+    script.write_text(code, encoding="utf-8")
+    os.chdir(folder)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            answer = run_script(script)
+    finally:
+        os.chdir(before)
+    assert answer.status == 0, answer.err
+    return answer.out
 
 
 def test_the_example_of_the_contract(tmp_path: Path) -> None:

@@ -75,13 +75,17 @@ def without_angles(recording: Recording) -> Recording:
 
 @pytest.mark.parametrize(
     ("description", "name"),
-    [
-        (INDEX, "index_finger_free"),
-        (INDEX, "index_finger_free_x4"),
-        (INDEX, "index_finger_pushes"),
-        (DEMO / "two_joints.json", "two_joints_training"),
-        (DEMO / "two_joints.json", "two_joints_unseen"),
-    ],
+    repeated(
+        [
+            (INDEX, "index_finger_free"),
+            (INDEX, "index_finger_free_x4"),
+            (INDEX, "index_finger_pushes"),
+            (DEMO / "two_joints.json", "two_joints_training"),
+            (DEMO / "two_joints.json", "two_joints_unseen"),
+        ],
+        2,
+        4,
+    ),
 )
 def test_sound_recordings_have_no_findings(description: Path, name: str) -> None:
     recording = read_recording(DEMO / f"{name}.parquet")
@@ -310,7 +314,7 @@ def test_check_refuses_bad_recordings(call: Call, tmp_path: Path) -> None:
     assert answer.status == 2 and "a rig" in answer.err
 
 
-@pytest.mark.parametrize("name", SPOILT)
+@pytest.mark.parametrize("name", repeated(SPOILT, 1, 3, 6, 8))
 def test_the_advice_can_be_written_into_a_map(call: Call, tmp_path: Path, sound: Recording, name: str) -> None:
     """The words name keys and values of a map; with these, the recording is converted, and belongs."""
     spoilt = written(SPOILT[name][0](sound), tmp_path / "spoilt.parquet")

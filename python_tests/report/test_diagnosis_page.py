@@ -22,6 +22,7 @@ pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not insta
 
 import diagnosis_examples as examples
 from real_browser import Elements, figures_of, framed, measure, needs_nothing_else, visit
+from repetitions import repeated
 from tendonfmu.diagnosis.reported import reported_causes
 from tendonfmu.diagnosis.result import Diagnosis, FoundPlace, ModelErrors, Where
 from tendonfmu.diagnosis.size import size_of
@@ -447,7 +448,7 @@ def test_names_and_warnings_are_escaped() -> None:
 # --- in a real browser ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("width", [1280, 390])
+@pytest.mark.parametrize("width", repeated([1280, 390], 1))
 def test_a_browser_shows_it_at_any_width(browser: str, page: str, tmp_path: Path, width: int) -> None:
     """All figures there, nothing wider than the page, nothing asked for from elsewhere."""
     found = measure(browser, tmp_path, page, width)

@@ -21,6 +21,7 @@ pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not insta
 
 from fit_pictures import made_up_picture
 from real_browser import Elements, figures_of, framed, measure, needs_nothing_else, visit
+from repetitions import repeated
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.picture import FitPicture
 from tendonfmu.files.tables import write_table
@@ -116,7 +117,7 @@ def test_rms_of_all_joints_is_their_mean_power(written: Written) -> None:
 
 
 def changed(picture: FitPicture, **changes: Any) -> FitPicture:
-    return dataclasses.replace(picture, report=copy.deepcopy(dict(picture.report)) | changes)
+    return dataclasses.replace(picture, report={**picture.report, **changes})
 
 
 def text_of(picture: FitPicture) -> str:
@@ -274,7 +275,7 @@ def test_the_command_writes_it(tmp_path: Path) -> None:
 # --- in a real browser ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("width", [1280, 400])
+@pytest.mark.parametrize("width", repeated([1280, 400], 1))
 def test_a_browser_shows_it_at_any_width(browser: str, page: str, tmp_path: Path, width: int) -> None:
     """All figures there, nothing wider than the page; only tables scroll, each in its own box."""
     found = measure(browser, tmp_path, page, width)
@@ -294,7 +295,7 @@ def test_a_browser_has_nothing_to_complain_of(browser: str, written: Written, tm
     assert "CONSOLE" not in visit(browser, file, "--dump-dom").stderr
 
 
-@pytest.mark.parametrize("width", [1280, 400])
+@pytest.mark.parametrize("width", repeated([1280, 400], 0))
 def test_screenshots_are_not_blank(browser: str, page: str, tmp_path: Path, width: int) -> None:
     shot = tmp_path / "shot.png"
     visit(

@@ -15,6 +15,8 @@ pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not insta
 from plant_rigs import needs_plant
 from repository_paths import ROOT
 from tendonfmu.report.plant_figures import (
+    LoopFigure,
+    PreslidingFigure,
     bristle_numbers,
     led,
     loop_figure,
@@ -32,6 +34,16 @@ JOINT, TENDON = 1, 4
 @pytest.fixture(scope="module")
 def rig() -> Rig:
     return read_rig(RIGS / "index_finger.json")
+
+
+@pytest.fixture(scope="module")
+def presliding(rig: Rig) -> PreslidingFigure:
+    return presliding_figure(rig, JOINT, TENDON)
+
+
+@pytest.fixture(scope="module")
+def loops(rig: Rig) -> LoopFigure:
+    return loop_figure(rig, JOINT)
 
 
 def test_the_drawing_is_to_scale(rig: Rig) -> None:
@@ -60,14 +72,13 @@ def test_every_law_along_a_tendon_has_its_mark(rig: Rig) -> None:
 
 
 @needs_plant
-def test_the_bristles_are_those_named(rig: Rig) -> None:
+def test_the_bristles_are_those_named(rig: Rig, presliding: PreslidingFigure) -> None:
     """After a reversal w = −1 + 2 exp(−angle/d): the joint by its own distance, pulley and edge over this tendon's
     moment arm, a little earlier since the joints beyond move as well."""
-    figure = presliding_figure(rig, JOINT, TENDON)
     arm = rig.finger.data["tendons"][TENDON]["moment_arms"][JOINT]
     expected = {"pulley": (25e-6 / arm, 0.15), "edge": (40e-6 / arm, 0.15), "joint": (0.004, 0.02)}
-    assert [contact.label.split(":")[0] for contact in figure.contacts] == list(expected)
-    for contact, (distance, tolerance) in zip(figure.contacts, expected.values(), strict=True):
+    assert [contact.label.split(":")[0] for contact in presliding.contacts] == list(expected)
+    for contact, (distance, tolerance) in zip(presliding.contacts, expected.values(), strict=True):
         bending = (contact.bristle < 0.9) & (contact.bristle > -0.3)
         slope = np.polyfit(contact.angle[bending], np.log1p(contact.bristle[bending]), 1)[0]
         assert -1.0 / slope == pytest.approx(distance, rel=tolerance)
@@ -75,9 +86,9 @@ def test_the_bristles_are_those_named(rig: Rig) -> None:
 
 
 @needs_plant
-def test_the_loops_tell_what_the_page_says(rig: Rig) -> None:
+def test_the_loops_tell_what_the_page_says(loops: LoopFigure) -> None:
     """In the middle of a stroke the model is a few percent off; after a reversal as much as the friction itself."""
-    for loop in loop_figure(rig, JOINT).loops:
+    for loop in loops.loops:
         sliding = (loop.angle > 0.3) & (loop.angle < 0.8)
         size = np.sqrt(np.mean(loop.rig[sliding] ** 2))
         assert np.sqrt(np.mean((loop.model - loop.rig)[sliding] ** 2)) < 0.05 * size
@@ -85,27 +96,24 @@ def test_the_loops_tell_what_the_page_says(rig: Rig) -> None:
 
 
 @needs_plant
-def test_the_models_jumps_are_drawn_once(rig: Rig) -> None:
+def test_the_models_jumps_are_drawn_once(loops: LoopFigure, presliding: PreslidingFigure) -> None:
     """Where the joint stands the model's torque jumps with each trembling of the velocity; its line has one jump at
     either end of the loop, and one after the reversal."""
 
     def jumps(torque: NDArray[np.float64]) -> int:
         return int(np.sum(np.abs(np.diff(np.sign(torque))) > 0))
 
-    loops = loop_figure(rig, JOINT).loops
-    assert max(jumps(loop.model) for loop in loops) > 2
-    assert [jumps(loop.model_line[:, 1]) for loop in loops] == [2, 2]
-    for loop in loops:
+    assert max(jumps(loop.model) for loop in loops.loops) > 2
+    assert [jumps(loop.model_line[:, 1]) for loop in loops.loops] == [2, 2]
+    for loop in loops.loops:
         assert np.abs(np.diff(loop.model_line[:-1, 0])).min() >= 1e-4
-    reversals = presliding_figure(rig, JOINT, TENDON).reversals
-    assert [jumps(loop.model_line[:, 1]) for loop in reversals] == [1, 1]
+    assert [jumps(loop.model_line[:, 1]) for loop in presliding.reversals] == [1, 1]
 
 
 @needs_plant
-def test_the_small_moves_are_numbered_where_they_turn(rig: Rig) -> None:
+def test_the_small_moves_are_numbered_where_they_turn(presliding: PreslidingFigure) -> None:
     """To and fro by 2 to 21 mrad, as the page says."""
-    figure = presliding_figure(rig, JOINT, TENDON)
-    moves = 1e3 * np.diff([0.0, *figure.small.angle[figure.turns]])
+    moves = 1e3 * np.diff([0.0, *presliding.small.angle[presliding.turns]])
     assert len(moves) == 6 and np.all(moves[:-1] * moves[1:] < 0.0) and moves[0] < 0.0
     sizes = np.abs(moves)
     assert round(sizes.min()) == 2 and round(sizes.max()) == 21

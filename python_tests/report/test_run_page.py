@@ -15,6 +15,7 @@ pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not insta
 from command import Call
 from fmu_binary import FINGER
 from real_browser import figures_of, measure, needs_nothing_else
+from repetitions import repeated
 from tendonfmu.files.tables import read_table, write_table
 from tendonfmu.report.run_page import run_page
 from tendonfmu.report.run_report import run_report
@@ -110,7 +111,7 @@ def test_nothing_happened_is_said(table: Table) -> None:
     assert "in_contact" not in text
 
 
-@pytest.mark.parametrize("width", [1280, 390])
+@pytest.mark.parametrize("width", repeated([1280, 390], 1))
 def test_the_page_fits_screens(browser: str, page: str, tmp_path: Path, width: int) -> None:
     found = measure(browser, tmp_path, page, width)
     assert found["out"] == [] and found["scroll"] <= found["width"] and found["requests"] == []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import re
 import subprocess
 from collections.abc import Iterator
@@ -86,11 +87,20 @@ def imports_of(tree: ast.AST) -> Iterator[str]:
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
+@functools.cache
+def names_by_module() -> dict[str, tuple[str, ...]]:
+    """What each module imports."""
+    return {
+        module.relative_to(PACKAGE).as_posix(): tuple(imports_of(ast.parse(module.read_text(encoding="utf-8"))))
+        for module in MODULES
+    }
+
+
 def users_of(library: str) -> set[str]:
     return {
-        module.relative_to(PACKAGE).as_posix()
-        for module in MODULES
-        for name in imports_of(ast.parse(module.read_text(encoding="utf-8")))
+        module
+        for module, names in names_by_module().items()
+        for name in names
         if name == library or name.startswith(f"{library}.")
     }
 
@@ -388,7 +398,7 @@ def lines_of(file: Path) -> int:
     """Lines of a source; of Python without docstrings, whose lists of parameters are read apart from the code."""
     text = file.read_text(encoding="utf-8")
     count = len(text.splitlines())
-    if file.suffix != ".py":
+    if file.suffix != ".py" or count <= LONGEST:
         return count
     with_docstring = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
     for node in ast.walk(ast.parse(text)):

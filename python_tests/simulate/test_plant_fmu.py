@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
+from command import Call
 from fmu_binary import ERROR, FINGER, OK, Instance, UnpackedFmu, fmi_platform, unpack
 from plant_fmu_rig import SEED, TOLERANCE, fmu_rig, plant_binary, play
 from plant_rigs import needs_plant
@@ -127,11 +128,10 @@ def test_a_rig_that_is_refused_leaves_no_file(tmp_path: Path, change: dict[str, 
     assert [path.name for path in tmp_path.iterdir()] == ["rig.json"]
 
 
-def test_the_command_chooses_by_format(tmp_path: Path) -> None:
+def test_the_command_chooses_by_format(call: Call, tmp_path: Path) -> None:
     for name, data, kind in (("rig", fmu_rig(), "TendonFinger_small"), ("finger", FINGER, "small_finger")):
         (tmp_path / f"{name}.json").write_text(json.dumps(data))
-        command = [sys.executable, "-m", "tendonfmu.cli", "build", f"{name}.json", "-o", f"{name}.fmu"]
-        subprocess.run(command, check=True, cwd=tmp_path, capture_output=True)
+        assert call("build", f"{name}.json", "-o", f"{name}.fmu").status == 0
         description = fmpy.read_model_description(str(tmp_path / f"{name}.fmu"))
         assert description.coSimulation.modelIdentifier == kind
 

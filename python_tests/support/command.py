@@ -8,6 +8,7 @@ from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 from unittest import mock
 
 
@@ -19,6 +20,13 @@ class Answer:
 
 
 Call = Callable[..., Answer]
+
+
+class DemoRun(NamedTuple):
+    """The folder that `tendonfmu demo` leaves, for reading, and its answer."""
+
+    folder: Path
+    answer: Answer
 
 
 def run_script(script: Path, *arguments: str | Path) -> Answer:

@@ -233,11 +233,13 @@ class FingerOracle:
     ) -> tuple[Places, Places, Places]:  # fmt: skip
         """Step 2: F, b and, of the stuck effects, |F| at the present |v| on the side of their last motion (for H)."""
         F, b, hidden = (Places.zeros(self.m, self.n) for _ in range(3))
+        seen = q.tolist(), v.tolist(), x_dot.tolist()
+        travelled = self.travelled[0].tolist(), self.travelled[1].tolist()
         for (kind, at, effect), rows in zip(self.places, self.grips, strict=True):
-            velocity, angle, key = self._seen_by(kind, at, q, v, x_dot)
+            velocity, angle, key = self._seen_by(kind, at, *seen)
             factor = self.extensions.factor(rows, abs(velocity), time)
             if (displacement := self.extensions.slides(rows, effect.threshold)) is not None:
-                travel = self._seen_by(kind, at, q, *self.travelled)[0]
+                travel = self._seen_by(kind, at, seen[0], *travelled)[0]
                 taken = self._slide(effect, displacement, velocity, angle, travel, key), 0.0
                 whole = abs(effect.value(self.extensions.side_of(effect, key), abs(velocity), angle))
                 self.start.slides(effect, travel, displacement, factor * whole, first)
@@ -256,14 +258,16 @@ class FingerOracle:
     def _slide(self, effect: Effect, displacement: float, v: float, angle: float, travel: float, key: Key) -> float:
         return self.extensions.sliding_friction(effect, displacement, key, v, angle, travel)
 
-    def _seen_by(self, kind: str, at: tuple[int, ...], q: Array, v: Array, x_dot: Array) -> tuple[float, float, Key]:
+    def _seen_by(
+        self, kind: str, at: tuple[int, ...], q: list[float], v: list[float], x_dot: list[list[float]]
+    ) -> tuple[float, float, Key]:
         """Velocity and angle of one place, and the key of its decision: who sees the same velocity decides together."""
         if kind == "edge":
             i, j = at
-            return x_dot[i, j], q[j - 1] if j > 0 else 0.0, ("tendon", i, j)
+            return x_dot[i][j], q[j - 1] if j > 0 else 0.0, ("tendon", i, j)
         if kind == "pulley":
             i, j = at
-            return x_dot[i, j + 1], 0.0, ("tendon", i, j + 1)
+            return x_dot[i][j + 1], 0.0, ("tendon", i, j + 1)
         return v[at[0]], 0.0, ("joint", at[0])
 
     def _take_effect(
@@ -364,15 +368,16 @@ class FingerOracle:
                 return 0.0
             return force
 
+        given_forces, before, at_pulley = f0.tolist(), F_B.tolist(), F_A.tolist()
         for i in range(self.m):
             # f0 is an input: every implementation compares the same number, so it is never "near" (but interpolated)
-            f_A = checked(float(f0[i]), i, "spring", 0, computed=self.extensions.forces_are_computed)
+            f_A = checked(given_forces[i], i, "spring", 0, computed=self.extensions.forces_are_computed)
             for j in range(self.n):
                 f_before_edge[i, j] = f_A
                 # a force of 0 stays 0 whatever the friction: nothing is decided there by rounding
-                f_B = checked(f_A - self._load(i, f_A) * F_B[i, j], i, "between", j, computed=f_A != 0.0)
+                f_B = checked(f_A - self._load(i, f_A) * before[i][j], i, "between", j, computed=f_A != 0.0)
                 f_between[i, j] = f_B
-                f_A = checked(f_B - self._load(i, f_B) * F_A[i, j], i, "at", j, computed=f_B != 0.0)
+                f_A = checked(f_B - self._load(i, f_B) * at_pulley[i][j], i, "at", j, computed=f_B != 0.0)
         return f_between, f_before_edge, slack
 
     def _load(self, i: int, force: float) -> float:

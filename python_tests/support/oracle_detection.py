@@ -26,7 +26,7 @@ FASTEST = 10.0  # the evidence of `cusum` grows at most this many seconds a seco
 
 def direction_above(v: float, limit: float, key: tuple[Any, ...], decide: Callable[..., Any], out: Any) -> int:
     """sgn(v) where |v| > limit, else 0."""
-    sign = int(np.sign(v))
+    sign = int(v > 0.0) - int(v < 0.0)
     margin = abs(abs(v) - limit)
     out.velocity_margin = min(out.velocity_margin, margin)
     direction = sign if abs(v) > limit else 0

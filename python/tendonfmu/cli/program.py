@@ -7,12 +7,15 @@ Exit status: 0 done, 1 the answer is no, 2 bad usage or input, 3 internal fault 
 
 from __future__ import annotations
 
+import functools
 import sys
 import warnings
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, NoReturn, TextIO
+from typing import Annotated, Any, NoReturn, TextIO
 
 import typer
+from typer.main import get_command
 
 from tendonfmu.cli import calibrate as cli_calibrate
 from tendonfmu.cli import campaign as cli_campaign
@@ -69,6 +72,12 @@ app = typer.Typer(
 cli_check.register(app)
 
 
+@functools.cache
+def _commands() -> Callable[..., Any]:
+    """Return what `app` runs at each call. To read the options of all commands takes 50 ms: once in a process."""
+    return get_command(app)
+
+
 def main() -> None:
     """Run the command.
 
@@ -79,7 +88,7 @@ def main() -> None:
     warnings.simplefilter("default", InputWarning)  # each text once
     with ended_by_signals() as ending:
         try:
-            status = app(prog_name="tendonfmu", standalone_mode=False)
+            status = _commands()(prog_name="tendonfmu", standalone_mode=False)
         except (InputError, OSError) as refused:
             if isinstance(refused, BrokenPipeError):  # the reader of standard output has closed it, as `head` does
                 sys.stderr.close()
