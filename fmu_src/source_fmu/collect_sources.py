@@ -8,9 +8,10 @@ LIST is a file with one path a line, FMI the version of FMI, 2 or 3. FOLDER is m
     external_names_begin.h     included first by every C file: renames what other files see (see below)
     external_names_end.h       included last by every C file
 
-Two source FMUs can be linked into one program when each is compiled with its own FMI2_FUNCTION_PREFIX (FMI 3.0: FMI3_FUNCTION_PREFIX). The headers of
-FMI put it before the names of FMI's functions; external_names_begin.h puts it before all other external names of
-these sources. Without a prefix it hides them, so that a shared library exports FMI's functions alone.
+Two source FMUs can be linked into one program when each is compiled with its own FMI2_FUNCTION_PREFIX (FMI 3.0:
+FMI3_FUNCTION_PREFIX). The headers of FMI put it before the names of FMI's functions; external_names_begin.h puts it
+before all other external names of these sources. Without a prefix it hides them, so that a shared library exports
+FMI's functions alone.
 """
 
 from __future__ import annotations
