@@ -189,6 +189,34 @@ def test_the_fmu_agrees_with_what_it_carries(fmu: Path) -> None:
     assert done.out.splitlines()[-1] == f"cable_loop.fmu: 0 of {len(names)} variables differ from cable_loop"
 
 
+def test_arrays_of_fmi_3_0(tmp_path: Path) -> None:
+    """A cell of an array has the numbers of its elements: the same numbers as in the columns of FMI 2.0."""
+    recording = INPUTS.with_name("asymmetric_pair_in.csv")
+    built = {
+        version: tf.build(
+            DESCRIPTION.with_name("asymmetric_pair.json"), tmp_path / f"{version}.fmu", reference=recording, fmi=version
+        )
+        for version in (2, 3)
+    }
+    tables = {version: members(fmu)[f"{FOLDER}/asymmetric_pair_ref.csv"].decode() for version, fmu in built.items()}
+    numbers = {version: sorted(re.split(r"[, \n]", text.partition("\n")[2])) for version, text in tables.items()}
+    assert "joint_torque[2]" in tables[2] and "joint_torque[" not in tables[3] and numbers[2] == numbers[3]
+    for fmu in built.values():
+        done = check(fmu)
+        assert done.status == 0 and "joint_torque[2] " in done.out and " 0 of 20 variables differ" in done.out, done.err
+        done = check(fmu, "--set", "bias.forget_rate=6")
+        assert done.status == 1 and re.search(r"compensated_torque\[\d\] .* DIFFERS", done.out)
+
+
+def test_cells_of_two_sizes_are_named(edited: Callable[[Edit], Path]) -> None:
+    def edit(files: dict[str, bytes]) -> None:
+        files[RESULT] = re.sub(rb"\n0\.0,", b"\n0.0,1.0 ", files[RESULT], count=1)
+        files[MANIFEST] = re.sub(rb' checksum="[^"]*"', b"", files[MANIFEST])
+
+    done = check(edited(edit))
+    assert done.status == 2 and "line 3, column compensated_torque[1]: 1 numbers; expected 2" in done.err, done.err
+
+
 def test_fmpy_finds_no_outlier(fmu: Path, tmp_path: Path) -> None:
     """fmpy's own functions for the FMI cross-check: they read the three files, and compare within a band."""
     from fmpy.util import read_csv, read_ref_opt_file, validate_result
