@@ -76,22 +76,25 @@ fmu_status values_get(component* c, fmu_function function, variable_type type, c
 
 /* --- writing ------------------------------------------------------------------------------------------------------ */
 
+static int refuse_fixed(component* c, fmu_function function, const variable* found) {
+  log_text reason;
+  reason.length = 0;
+  log_append(&reason, "a fixed parameter is written before ");
+  log_append(&reason, call_name(CALL_EXIT_INITIALIZATION_MODE));
+  log_append(&reason, " only");
+  fail_at(c, function, found, reason.bytes);
+  return -1;
+}
+
 /* 0 when the variable may be written now, whatever the value */
 static int check_writable(component* c, fmu_function function, const variable* found) {
-  log_text reason = {.length = 0};
   switch (variable_causality_of(found)) {
     case CAUSALITY_INPUT: return 0;
     case CAUSALITY_OUTPUT: fail_at(c, function, found, "an output is not written"); return -1;
     default: break;
   }
-  if (c->phase == PHASE_STEP_COMPLETE && (found->group || !model_parameter_range(c->model, found->index).tunable)) {
-    log_append(&reason, "a fixed parameter is written before ");
-    log_append(&reason, call_name(CALL_EXIT_INITIALIZATION_MODE));
-    log_append(&reason, " only");
-    fail_at(c, function, found, reason.bytes);
-    return -1;
-  }
-  return 0;
+  const int is_fixed = found->group || !model_parameter_range(c->model, found->index).tunable;
+  return c->phase == PHASE_STEP_COMPLETE && is_fixed ? refuse_fixed(c, function, found) : 0;
 }
 
 /* 0 when the variable may have the value */

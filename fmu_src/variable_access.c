@@ -48,10 +48,6 @@ int may_access(component* c, fmu_function function, size_t count, const void* re
   return 1;
 }
 
-int is_time(unsigned reference, variable_type type) {
-  return this_fmi.time_is_variable && reference == VARIABLE_TIME_REFERENCE && type == VARIABLE_REAL;
-}
-
 int check_value_count(component* c, fmu_function function, variable_type type, const unsigned references[],
                       size_t count, size_t value_count, const char* argument) {
   variable found = {0};

@@ -15,7 +15,9 @@ int find_of_type(component* c, fmu_function function, variable_type type, unsign
 fmu_status fail_of_type(component* c, fmu_function function, unsigned reference, const char* type, variable* found);
 
 /* 1 for the independent variable, which is no other variable's and has one element. */
-int is_time(unsigned reference, variable_type type);
+static inline int is_time(unsigned reference, variable_type type) {
+  return reference == VARIABLE_TIME_REFERENCE && type == VARIABLE_REAL && this_fmi.time_is_variable;
+}
 
 /* 0 when the variables of a type have value_count elements together; otherwise says how many `argument` should have, or
  * what is wrong with a variable, and fails. */

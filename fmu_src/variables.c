@@ -129,26 +129,6 @@ int variables_find(const variables* v, unsigned value_reference, variable* last)
   return -1;
 }
 
-size_t variables_extent(const variables* v, const variable* found) {
-  return found->whole ? variables_group_count(v, found->group) : 1;
-}
-
-variable variables_element(const variable* whole, size_t i) {
-  return (variable){whole->group, whole->id, whole->index + i, 0};
-}
-
-variable_type variable_type_of(const variable* found) {
-  return found->group ? found->group->type : VARIABLE_REAL;
-}
-
-variable_causality variable_causality_of(const variable* found) {
-  return found->group ? found->group->causality : CAUSALITY_PARAMETER;
-}
-
-double* variables_number(const variables* v, const variable* found) {
-  return (found->group ? v->number[found->id] : v->parameters) + found->index;
-}
-
 /* unit, minimum, maximum of an input or parameter */
 static model_range range_of(const model* m, const variable* found) {
   if (!found->group) {

@@ -47,16 +47,27 @@ size_t variables_group_count(const variables* v, const variable_group* group);
 int variables_find(const variables* v, unsigned value_reference, variable* last);
 
 /* Numbers that the variable has: those of its group when it is whole, otherwise 1. */
-size_t variables_extent(const variables* v, const variable* found);
+static inline size_t variables_extent(const variables* v, const variable* found) {
+  return found->whole ? variables_group_count(v, found->group) : 1;
+}
 
 /* Element i of a variable, a variable by itself. */
-variable variables_element(const variable* whole, size_t i);
+static inline variable variables_element(const variable* whole, size_t i) {
+  return (variable){whole->group, whole->id, whole->index + i, 0};
+}
 
-variable_type variable_type_of(const variable* found);
-variable_causality variable_causality_of(const variable* found);
+static inline variable_type variable_type_of(const variable* found) {
+  return found->group ? found->group->type : VARIABLE_REAL;
+}
+
+static inline variable_causality variable_causality_of(const variable* found) {
+  return found->group ? found->group->causality : CAUSALITY_PARAMETER;
+}
 
 /* Where the number lives. Not for Boolean outputs. */
-double* variables_number(const variables* v, const variable* found);
+static inline double* variables_number(const variables* v, const variable* found) {
+  return (found->group ? v->number[found->id] : v->parameters) + found->index;
+}
 
 /* 1 when the variable may have the value, whatever the others have. */
 int variables_accept(const model* m, const variable* found, double value);

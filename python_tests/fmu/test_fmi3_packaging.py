@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 import zipfile
 from pathlib import Path
 from xml.etree import ElementTree
@@ -20,11 +22,10 @@ from command import Call
 from fmi3_binary import UnpackedFmu3
 from fmu_binary import FINGER, UnpackedFmu
 from repository_paths import ROOT
+from tendonfmu.recordings import Recording, read_recording
 
-LARGE = [
-    ROOT / "examples" / "fingers" / "index_finger.json",
-    ROOT / "examples/demo_recording/index_finger_calibrated.json",
-]
+EXAMPLES = ROOT / "examples"
+LARGE = [EXAMPLES / "fingers/index_finger.json", EXAMPLES / "demo_recording/index_finger_calibrated.json"]
 
 
 def model_of(fmu: Path) -> ElementTree.Element:
@@ -128,6 +129,20 @@ def test_command_and_function(call: Call, tmp_path: Path) -> None:
     three = tf.build(tf.read_finger(tmp_path / "finger.json"), tmp_path / "three.fmu", fmi=3)
     assert three.read_bytes() == (tmp_path / "command.fmu").read_bytes()
     assert (model_of(two).attrib["fmiVersion"], model_of(three).attrib["fmiVersion"]) == ("2.0", "3.0")
+
+
+def test_reference_results_of_arrays(tmp_path: Path) -> None:
+    """The check that is copied into a user's CI runs the FMU in fmpy, and finds no deviation."""
+    finger = EXAMPLES / "demo_recording" / "two_joints.json"
+    recording = read_recording(EXAMPLES / "demo_recording" / "two_joints_unseen.parquet")
+    beginning = Recording(
+        recording.path, recording.time[:500], {name: each[:500] for name, each in recording.groups.items()}
+    )
+    fmu = tf.build(finger, tmp_path / "finger.fmu", fmi=3, reference=beginning)
+    command = [sys.executable, str(EXAMPLES / "ci_reference_check" / "check_reference.py"), str(fmu)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "0 of 21 variables differ" in done.stdout
 
 
 @pytest.mark.parametrize("version", ["1", "4", "three"])
