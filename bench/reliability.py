@@ -68,10 +68,12 @@ def table(work: Path) -> str:
     head = ("row", "what is tried", "number", "result", "time of one core", "what that leaves open")
     lines = [f"| {' | '.join(head)} |", "| --- | --- | --- | --- | ---: | --- |"]
     for row in ROWS.values():
-        if found := kept(row.name, work):
+        found = kept(row.name, work)
+        cells = [row.name, row.title, f"of {row.full}", "not measured", "", row.leaves]
+        if found is not None:
             mark = "" if found.sound else "**found:** "
-            cells = (row.name, row.title, found.number, mark + found.result, spoken(found.seconds), row.leaves)
-            lines.append(f"| {' | '.join(cells)} |")
+            cells[2:5] = found.number, mark + found.result, spoken(found.seconds)
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 
 

@@ -163,8 +163,9 @@ def same_bits(run: Run) -> Outcome:
     hashes: dict[str, set[str]] = {}
     fingers, samples = models(run), str(run.count(20_000, 500))
     builds = 0
+    levels = LEVELS if run.scale >= 0.5 else ("-O0", "-O3")
     for name, command in compilers().items():
-        for level in LEVELS:
+        for level in levels:
             program = core_program(run, name + level, [level], command)
             builds += 1
             for finger, model in fingers.items():
@@ -173,7 +174,7 @@ def same_bits(run: Run) -> Outcome:
     kernels = [line.split()[0] for line in called(program, "trace", fingers["index"], "10").splitlines()]
     apart = sum(len(each) - 1 for each in hashes.values())
     number = (
-        f"{', '.join(compilers())} × {', '.join(LEVELS)} × kernels {', '.join(kernels)}: {builds * len(kernels)} ways, "
+        f"{', '.join(compilers())} × {', '.join(levels)} × kernels {', '.join(kernels)}: {builds * len(kernels)} ways, "
         f"{samples} samples of {len(fingers)} fingers"
     )
     return Outcome(number, f"{apart} results differ by a bit", apart == 0)

@@ -73,11 +73,20 @@ def library(run: Run, name: str, flags: Sequence[str], by: Sequence[str]) -> Pat
     return out
 
 
+def is_current(program: Path) -> bool:
+    """Whether it is younger than all that it is made from: fifteen builds take minutes."""
+    folders = (ROOT / "runtime" / "core", ROOT / "runtime" / "include", HERE)
+    newest = max(file.stat().st_mtime for folder in folders for file in folder.rglob("*.[ch]"))
+    return program.is_file() and program.stat().st_mtime > newest
+
+
 def core_program(run: Run, name: str, flags: Sequence[str], by: Sequence[str]) -> Path:
     """core_steps.c with the core, compiled and linked in one call."""
     run.work.mkdir(parents=True, exist_ok=True)
     out = run.work / f"core_steps-{name}"
     sources = [str(each) for each in portable.core_sources()]
+    if is_current(out):
+        return out
     called(*by, *BASE, *flags, *includes(run.work), HERE / "core_steps.c", *sources, "-lm", "-o", out)
     return out
 
