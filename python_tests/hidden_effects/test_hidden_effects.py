@@ -68,6 +68,7 @@ def of_long(effect: str) -> Any:
     return pytest.param(effect, marks=[pytest.mark.long, *([unnamed] if effect in NOT_YET else [])])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("effect", [*DEFAULT, *map(of_long, LONG)])
 def test_one_hidden_effect_is_in_the_reported_set(effect: str, tmp_path: Path) -> None:
     strength, presliding = (DEFAULT | LONG)[effect]
