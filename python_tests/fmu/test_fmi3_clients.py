@@ -5,8 +5,8 @@
 - a container of the FMU Manipulation Toolbox
 - ecos and fmi-sim (Rust), which know scalars only
 
-Those that are not installed are skipped. `cargo install fmi-sim`; TENDONFMU_FMI_SIM names the program where it is not on
-the path.
+Those that are not installed are skipped. `cargo install fmi-sim`; TENDONFMU_FMI_SIM names the program where it is not
+on the path.
 """
 
 from __future__ import annotations
