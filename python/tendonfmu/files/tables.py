@@ -31,7 +31,7 @@ Table = dict[str, NDArray[np.float64]]
 CheckNames = Callable[[Path, list[str]], Sequence[str] | None]
 
 # float() accepts more (1_000, nan, infinity), but such text is no measurement.
-_NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*")
+_NUMBER = re.compile(r"[ \t\r\n]*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?[ \t\r\n]*")
 _FLAGS = {"true": 1.0, "false": 0.0}
 
 
