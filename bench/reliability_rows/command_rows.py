@@ -206,7 +206,7 @@ def no_room(run: Run) -> Outcome:
     tried = ended = lost = 0
     wrong: list[str] = []
     mounts = can_mount()
-    names = list(SMALL_COMMANDS)[: run.count(len(SMALL_COMMANDS), 4)]
+    names = list(SMALL_COMMANDS)[: run.count(len(SMALL_COMMANDS), 2)]
     for name in names:
         words = SMALL_COMMANDS[name]
         plain = [*COMMAND, *words, "--quiet"]

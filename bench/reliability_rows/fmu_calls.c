@@ -590,7 +590,7 @@ static void save(long samples, const char* path) {
 /* --- no memory ------------------------------------------------------------------------------------------------------
  */
 
-static long messages; /* that say memory, of all trials */
+static long messages; /* that say memory, of the last trial */
 
 static void log_line(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status, fmi2String category,
                      fmi2String message, ...) {
@@ -636,11 +636,15 @@ static void hungry(void) {
   short_of_one(-1, &left);
   allocations_of_one = allocations;
   for (long n = 0; n < allocations_of_one; ++n) {
-    for (int again = 0; again < 3; ++again) { /* the allocator keeps what the first ones free for the next */
+    long total = 0;
+    for (int again = 0; again < 50; ++again) { /* the allocator keeps what the first ones free for the next */
+      const long before = messages;
       const int no = short_of_one(n, &left);
-      refused += again == 2 && no;
+      messages = again == 49 ? messages : before;
+      refused += again == 49 && no;
+      total += again < 10 ? 0 : left;
     }
-    leaked += left > 0;
+    leaked += total >= 40;
   }
   printf("%ld %ld %ld %ld\n", allocations_of_one, refused, messages, leaked);
 }

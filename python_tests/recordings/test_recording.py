@@ -251,6 +251,16 @@ def test_a_last_line_cut_off_anywhere(tmp_path: Path, cut: int) -> None:
     assert "2 rows" in line
 
 
+@pytest.mark.parametrize("text", [HEADER + "\n0,1,2,\r3,4\n", "time\rx,tendon_force[1]\n0,1\n"], ids=["row", "header"])
+def test_a_lone_carriage_return(tmp_path: Path, text: str) -> None:
+    assert "new-line character seen in unquoted field" in refusal(written(tmp_path, text))
+
+
+def test_a_separator_of_groups_before_a_number(tmp_path: Path) -> None:
+    """U+001D: white space for regular expressions, none for float()."""
+    assert "row 1: '\\x1d.2'" in refusal(written(tmp_path, HEADER + "\n0,1,\x1d.2,3,4\n1,x,2,3,4\n"))
+
+
 def test_a_last_line_cut_in_its_first_field_of_one_row(tmp_path: Path) -> None:
     line = refusal(written(tmp_path, f"{HEADER}\n0.0,1"))
     assert "truncated" in line and "0 rows" in line

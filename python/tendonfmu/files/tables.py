@@ -31,7 +31,7 @@ Table = dict[str, NDArray[np.float64]]
 CheckNames = Callable[[Path, list[str]], Sequence[str] | None]
 
 # float() accepts more (1_000, nan, infinity), but such text is no measurement.
-_NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*")
+_NUMBER = re.compile(r"[ \t\r\n]*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?[ \t\r\n]*")
 _FLAGS = {"true": 1.0, "false": 0.0}
 
 
@@ -172,7 +172,7 @@ def _numbers(file: Path, name: str, column: Any, flags: Collection[str]) -> NDAr
 
 def _read_csv(file: Path, check_names: CheckNames, flags: Collection[str]) -> Table:
     header, rows, cut_off = _lines(file)
-    names = [name.strip() for name in next(csv.reader([header]), [])]
+    names = [name.strip() for _, fields in _fields(file, [header], 0) for name in fields]
     if not any(names):
         raise InputError(f"{file}: empty file; expected a line of column names")
     check_duplicates(file, names)
@@ -215,13 +215,24 @@ def _parse_fast(rows: list[str], columns: int, read: Sequence[int]) -> NDArray[n
         return None
 
 
+def _fields(file: Path, lines: Iterable[str], first: int) -> Iterator[tuple[int, list[str]]]:
+    """Yield number and fields of each row. Raises InputError for what is no CSV, such as a lone carriage return."""
+    row = first
+    try:
+        for row, fields in enumerate(csv.reader(lines), start=first):
+            yield row, fields
+    except csv.Error as error:
+        reason = str(error).partition(" - ")[0]
+        raise InputError(f"{file}: after row {row}: {reason}; expected numbers with commas between them") from None
+
+
 def _parse_by_field(
     file: Path, names: list[str], read: Sequence[int], rows: Iterable[str], flags: Collection[str], cut_off: str
 ) -> NDArray[np.float64]:
     """Return the same, field by field, and refuse the first invalid field by name."""
     parsed = []
     lines = list(rows)
-    for row, fields in enumerate(csv.reader(lines), start=1):
+    for row, fields in _fields(file, lines, 1):
         if len(fields) < len(names) and row == len(lines) and not cut_off:
             raise InputError(
                 f"{file}: truncated last line, row {row}: {len(fields)} of {len(names)} columns; "
