@@ -1,6 +1,6 @@
 // A byte string drives a sequence of FMI 2.0 calls on one instance. Whatever is called, in whatever state and with
 // whatever arguments: a call that is refused leaves no trace in the saved state, one that the standard does not allow
-// is refused, messages are one line, and outputs are finite. fmi2_session.h holds what is checked; a wrapper of another
+// is refused, messages are one line, and outputs are finite. fmi2_session.hpp holds what is checked; a wrapper of another
 // version of FMI gets a file like this one.
 #include <fuzzer/FuzzedDataProvider.h>
 
@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "../tests/test_finger.h"
-#include "fmi2_session.h"
+#include "fmi2_session.hpp"
 
 extern "C" {
 #include "bytes.h"
