@@ -342,6 +342,7 @@ static void quiet(long samples) {
 
 #include "fmu_host_modes.h"
 #include "fmu_saved_states.h"
+#endif
 
 int main(int count, char** words) {
   if (count < 7) {

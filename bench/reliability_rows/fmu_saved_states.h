@@ -195,5 +195,3 @@ static void hungry(void) {
   }
   printf("%ld %ld %ld %ld\n", allocations_of_one, refused, messages, leaked);
 }
-
-#endif
