@@ -26,6 +26,7 @@ NBSP = "\u00a0"
 _NUMBERS = ("No", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine", "Ten")
 _MOST_PLACES = 4  # listed at most
 _TOLD = 2  # invisible effects described one by one; more share a sentence
+_PLACED = 4  # of which so many are listed with their places
 Row = tuple[str, ...]
 
 
@@ -341,7 +342,9 @@ def hidden_sentences(found: Diagnosis, names: Names) -> Iterator[str]:
         absorbed = [each for each in effects if each.absorbed]
         small = [each for each in effects if not each.absorbed]
         if absorbed:
-            yield f"{_counted(absorbed)} not visible in these data, since {absorbs} absorbs them: {_listed(absorbed)}."
+            them = "it" if len(absorbed) == 1 else "them"
+            are = _counted(absorbed)
+            yield f"{are} not visible in these data, since {absorbs} absorbs {them}: {_listed(absorbed)}."
         if small:
             yield f"{_counted(small)} visible only if larger than usual: {_listed(small)}."
         return
@@ -359,7 +362,9 @@ def _counted(effects: Sequence[Hidden]) -> str:
 
 
 def _listed(effects: Sequence[Hidden]) -> str:
-    return "; ".join(f"{each.title} ({each.places})" if each.places else each.title for each in effects)
+    """List effects, a few of them with their places; the table on the page has all places."""
+    placed = len(effects) <= _PLACED
+    return "; ".join(f"{each.title} ({each.places})" if placed and each.places else each.title for each in effects)
 
 
 def next_sentence(found: Diagnosis) -> str:
