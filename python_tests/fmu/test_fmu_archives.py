@@ -28,11 +28,14 @@ def recording() -> Recording:
 
 
 def outcome(file: Path, recording: Recording) -> str:
-    """What the refusal says, or "run"."""
+    """What the refusal says, or "run". The current folder is the same afterwards."""
+    before = Path.cwd()
     try:
         fmpy_client.run_fmu(file, recording)
     except InputError as refused:
         return str(refused)
+    finally:
+        assert Path.cwd() == before
     return "run"
 
 

@@ -428,11 +428,17 @@ def test_many_effects_that_cannot_be_seen_are_counted() -> None:
 def test_what_noise_hides_is_not_said_to_be_absorbed() -> None:
     absorbed, small = examples.INVISIBLE
     text = plain(diagnosis_page(replace(examples.adequate(), invisible=(small,))))
-    assert "One of ordinary size would raise the error by 1.1 %, too little to be a cause. To see it: record" in text
+    assert (
+        "One of ordinary size would raise the error by 1.1 %, too little to be a cause: it takes 3.0 %. To see it"
+        in text
+    )
     others = tuple(replace(absorbed, where=Where(name), title=name) for name in "ab")
     text = plain(diagnosis_page(replace(examples.adequate(), invisible=(small, *others))))
     assert "2 effects are not visible in these data, since refitting absorbs them: a; b." in text
-    assert "1 effect is visible only if larger than usual: the tendon gets stiffer" in text
+    assert (
+        "1 effect is visible only if larger than usual (a cause has to lower the error by 3.0 %): the tendon gets"
+        in text
+    )
 
 
 def test_names_and_warnings_are_escaped() -> None:

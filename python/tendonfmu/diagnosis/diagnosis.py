@@ -431,6 +431,7 @@ class _Result:
                 each.share,
                 *said.get(each.hypothesis.effect, ("", {})),
                 ordinary_gain=each.gain,
+                needed_gain=each.needed,
             )
             for each in unseen
         )
@@ -451,7 +452,7 @@ class _Result:
                 continue
             gain = selection.grams.ordinary_gain(each.mix, np.array(each.members[0].shape.expected))
             least = self._least_gain * names_with(each.effect, names)
-            own = _Unseen(each, share, gain, min(share / ABSORBED, gain / max(least, SMALLEST_GAIN)))
+            own = _Unseen(each, share, gain, least)
             if each.key not in best or own.nearness > best[each.key].nearness:
                 best[each.key] = own
         hidden = [each for each in best.values() if each.nearness < 1.0]
@@ -466,16 +467,19 @@ class _Unseen:
     ----------
     share
         Share of its variance that survives the refit.
-    gain
-        1 − rms ratio that an ordinary size would bring.
-    nearness
-        From 1 on it is visible.
+    gain, needed
+        1 − rms ratio that an ordinary size would bring, and that a cause has to bring.
     """
 
     hypothesis: Hypothesis
     share: float
     gain: float
-    nearness: float
+    needed: float
+
+    @property
+    def nearness(self) -> float:
+        """How near it is to being visible; from 1 on it is."""
+        return min(self.share / ABSORBED, self.gain / max(self.needed, SMALLEST_GAIN))
 
 
 def where_of(hypothesis: Hypothesis) -> Where:

@@ -192,6 +192,8 @@ class Invisible:
         The same in the form of `Experiment.motion`; empty if no experiment would show it.
     ordinary_gain
         1 − rms ratio that an effect of ordinary size would bring on these data; None for a change.
+    needed_gain
+        1 − rms ratio that it would need to become a cause beside those that are named; None for a change.
     """
 
     where: Where
@@ -200,6 +202,7 @@ class Invisible:
     experiment: str
     motion: Mapping[str, Any] = field(default_factory=dict)
     ordinary_gain: float | None = None
+    needed_gain: float | None = None
 
     @property
     def absorbed(self) -> bool:

@@ -271,6 +271,7 @@ class _Run:
         optional = (*OPTIONAL_NUMBERS, *PLACE, *REST, *SENSORS)
         self._outputs = {name: self._group(name) for name in wanted if name not in optional or self._has(name)}
         self._inputs = {group: self._group(group) for group in INPUTS}
+        before = Path.cwd()
         try:
             self._slave: _Slave = slave(
                 guid=description.guid,
@@ -283,6 +284,8 @@ class _Run:
         # no library for this system, or none that can be loaded: fmpy raises bare exceptions
         except Exception as error:
             raise InputError(f"{path}: not an FMU ({one_line(error).replace(str(folder), '')})") from None
+        finally:
+            os.chdir(before)  # fmpy loads a library in its folder, and stays there if that fails
 
     @property
     def joints(self) -> int:

@@ -27,6 +27,7 @@ from tendonfmu.report.diagnosis_text import (
     error_rows,
     error_sentence,
     headline,
+    hidden,
     hidden_sentences,
     left_of,
     left_sentence,
@@ -102,12 +103,12 @@ def diagnosis_page(found: Diagnosis) -> str:
         invisible=[
             (
                 each.title,
-                names.place(each.where) or "everywhere",
-                percent(each.surviving_share),
-                "" if each.ordinary_gain is None else percent(each.ordinary_gain),
+                each.places or "everywhere",
+                percent(each.share),
+                "" if each.gain is None else percent(each.gain),
                 each.experiment,
             )
-            for each in found.invisible
+            for each in hidden(found, names)
         ],
         recordings=list(_recordings(found)),
     )

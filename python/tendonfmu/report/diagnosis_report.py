@@ -199,6 +199,7 @@ def _invisible(found: Invisible) -> dict[str, Any]:
         "title": found.title,
         "surviving_share": found.surviving_share,
         "ordinary_gain": found.ordinary_gain,
+        "needed_gain": found.needed_gain,
         "experiment": found.experiment,
     }
 

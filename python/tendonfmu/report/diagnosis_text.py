@@ -299,6 +299,8 @@ class Hidden:
         The effect and its places, in plain words.
     why
         Sentence: what hides it where it comes nearest to being visible.
+    share, gain
+        There: the share that survives the refit, and what an ordinary size would raise the error by; None for a change.
     absorbed
         Whether refitting absorbs it everywhere.
     experiment
@@ -308,30 +310,35 @@ class Hidden:
     title: str
     places: str
     why: str
+    share: float
+    gain: float | None
     absorbed: bool
     experiment: str
 
 
 def hidden(found: Diagnosis, names: Names) -> list[Hidden]:
-    """List the effects that these data cannot show, each with the experiment of the place that shows most."""
+    """List the effects that these data cannot show, each with the experiment of its first place, which shows most."""
     by_effect: dict[str, list[Invisible]] = {}
     for each in found.invisible:
         by_effect.setdefault(each.where.effect, []).append(each)
     effects = []
     for members in by_effect.values():
-        best = max(members, key=lambda each: (not each.absorbed, each.ordinary_gain or 0.0, each.surviving_share))
+        best = members[0]
         places = [names.place(each.where) for each in members]
         text = "" if places == [""] else "; ".join(each or "the whole finger" for each in places)
         if len(places) > _MOST_PLACES:
             text = f"{len(places)} places, such as {places[0]}"
-        effects.append(Hidden(best.title, text, _why_hidden(best), best.absorbed, best.experiment))
+        share, gain = best.surviving_share, best.ordinary_gain
+        effects.append(Hidden(best.title, text, _why_hidden(best), share, gain, best.absorbed, best.experiment))
     return effects
 
 
 def _why_hidden(found: Invisible) -> str:
     if found.absorbed or found.ordinary_gain is None:
         return f"Refitting absorbs it; {percent(found.surviving_share)} would be left."
-    return f"One of ordinary size would raise the error by {percent(found.ordinary_gain)}, too little to be a cause."
+    gain = percent(found.ordinary_gain)
+    limit = "" if found.needed_gain is None else f": it takes {percent(found.needed_gain)}"
+    return f"One of ordinary size would raise the error by {gain}, too little to be a cause{limit}."
 
 
 def hidden_sentences(found: Diagnosis, names: Names) -> Iterator[str]:
@@ -346,7 +353,7 @@ def hidden_sentences(found: Diagnosis, names: Names) -> Iterator[str]:
             are = _counted(absorbed)
             yield f"{are} not visible in these data, since {absorbs} absorbs {them}: {_listed(absorbed)}."
         if small:
-            yield f"{_counted(small)} visible only if larger than usual: {_listed(small)}."
+            yield f"{_counted(small)} visible only if larger than usual{_limit(found)}: {_listed(small)}."
         return
     for each in effects:
         place = f", at {each.places}" if each.places else ""
@@ -355,6 +362,11 @@ def hidden_sentences(found: Diagnosis, names: Names) -> Iterator[str]:
         if what.startswith("No "):
             experiment = f" {what.rstrip('.')}."
         yield (f"Not visible in these data: {each.title}{place}. {each.why}{experiment}")
+
+
+def _limit(found: Diagnosis) -> str:
+    needed = [each.needed_gain for each in found.invisible if each.needed_gain is not None and not each.absorbed]
+    return f" (a cause has to lower the error by {percent(max(needed))})" if needed else ""
 
 
 def _counted(effects: Sequence[Hidden]) -> str:

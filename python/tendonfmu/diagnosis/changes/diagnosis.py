@@ -383,7 +383,7 @@ class _Changes:
                 best[each.key] = (each, share)
         return tuple(
             Invisible(Where(each.effect, each.joint, each.tendon), _told(each)[0], share, REPEAT)
-            for each, share in best.values()
+            for each, share in sorted(best.values(), key=lambda pair: -pair[1])
             if share < ABSORBED
         )
 

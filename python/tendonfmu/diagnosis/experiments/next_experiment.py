@@ -86,11 +86,14 @@ class Answer:
     def tells(self) -> bool:
         """Whether the entry is worth recording.
 
-        The size of an effect that was never seen is unknown. For such an effect it is enough that a refit leaves some
-        of it, and more than before.
+        The size of an effect that was never seen is unknown. For such an effect it is enough, and necessary, that a
+        refit leaves some of it, and clearly more than in the present recordings.
         """
-        better = self.distance >= max(_BETTER * self.now, _FAINTEST)
-        return self.share >= SHARE and (self.distance >= VISIBLE or (self.question.rival is None and better))
+        if self.question.rival is None:
+            shown = self.distance >= max(_BETTER * self.now, _FAINTEST)
+        else:
+            shown = self.distance >= VISIBLE
+        return self.share >= SHARE and shown
 
     @property
     def where(self) -> Where:
