@@ -110,10 +110,10 @@ def test_the_hosts_floating_point_stays(plant_fmu: UnpackedFmu) -> None:
 
 @needs_count
 def test_instances_leave_nothing(plant_fmu: UnpackedFmu) -> None:
-    """No handle, and less than a byte each by the allocator's own count (the smallest lost block has 32)."""
+    """No handle, and less than half of the smallest block (32 bytes) each by the allocator's own count."""
     count = 120
     used, opened = least_growth(plant_fmu, "bare", count)
-    assert used < count and opened == 0
+    assert used < 16 * count and opened == 0
 
 
 @needs_count

@@ -14,6 +14,7 @@ from tendonfmu.diagnosis.span import Span
 NAME = "pulley_eccentricity"
 MOST_TURNS = 12.0  # of a pulley that the tendon turns, per turn of the joint: arm over radius
 _APART = 2.0  # rad, over the joint's range, between neighbours in the grid: halfway both fit well
+_MOST_SHAPES = 60  # a joint that turns many times, or angles that the arms do not determine, would ask for millions
 _FEWEST = 1.5 * 2.0 * np.pi  # rad, over the joint's range, of a fast pulley: less looks like any function
 
 
@@ -25,7 +26,8 @@ def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
     """Return the forms: the pulley turns with the joint, or so much faster that it makes more than one turn."""
     low, high = span.angle[(place.joint or 1) - 1]
     reach = max(float(high - low), _APART / MOST_TURNS)
-    fast = np.arange(_FEWEST / reach, MOST_TURNS, _APART / reach)
+    first = _FEWEST / reach
+    fast = np.arange(first, MOST_TURNS, max(_APART / reach, (MOST_TURNS - first) / _MOST_SHAPES))
     return [{"turns": float(turns)} for turns in (1.0, *fast)]
 
 
