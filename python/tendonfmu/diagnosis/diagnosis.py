@@ -27,7 +27,7 @@ from tendonfmu.diagnosis.changes.diagnosis import PHASES as CHANGE_PHASES
 from tendonfmu.diagnosis.changes.diagnosis import ChangeCase, find_changes
 from tendonfmu.diagnosis.contact_gain import detection_gain
 from tendonfmu.diagnosis.effects import Candidate
-from tendonfmu.diagnosis.effects.friction_law_places import thresholds
+from tendonfmu.diagnosis.effects.friction_law_places import law_of, thresholds
 from tendonfmu.diagnosis.event_gain import event_gain
 from tendonfmu.diagnosis.evidence import evidence
 from tendonfmu.diagnosis.experiments.next_experiment import Experiments, Question, plan_experiments
@@ -41,6 +41,7 @@ from tendonfmu.diagnosis.search import NamedCause, Search, events_of, search, wi
 from tendonfmu.diagnosis.series import make_grid
 from tendonfmu.diagnosis.signal_choice import choose
 from tendonfmu.diagnosis.size import size_of
+from tendonfmu.diagnosis.span import span_of
 from tendonfmu.errors import InputError, own_fault
 from tendonfmu.estimate import check_unseen
 from tendonfmu.model import Finger, FingerSource, read_finger
@@ -395,18 +396,17 @@ class _Result:
 
         Each invisible effect is one question, at the place that comes nearest to being visible.
         """
-        nominal, source = self._found.nominal.data, self._found.fitted_to[0].kinematics
+        nominal = self._found.nominal.data
         rivals = [
             Question(cause.accepted[0], rival)
             for cause in verified.causes
             for rival in [_ordinary(each) for each in cause.alike[:MOST_RIVALS]]
-            if all(each.place in each.candidate.places(nominal, source) for each in (cause.accepted[0], rival))
-        ]  # only laws that the nominal description has
+            if all(self._is_in_nominal(each) for each in (cause.accepted[0], rival))
+        ]
         unseen = self._unseen(verified)
         nearest: dict[str, Hypothesis] = {}
         for each in unseen:
-            own = _ordinary(each.hypothesis)
-            if own.place in own.candidate.places(nominal, source):  # only laws that the nominal description has
+            if self._is_in_nominal(_ordinary(each.hypothesis)):
                 nearest.setdefault(each.hypothesis.effect, each.hypothesis)
         asked = list(nearest)
         questions = [*rivals, *(Question(_ordinary(nearest[effect])) for effect in asked)]
@@ -435,6 +435,17 @@ class _Result:
             )
             for each in unseen
         )
+
+    def _is_in_nominal(self, effect: Accepted) -> bool:
+        """Return whether the nominal description has the place, and the law there that the effect belongs to.
+
+        The extended description may have a second law at the place, such as friction by the load, as a cause.
+        """
+        nominal, recordings = self._found.nominal.data, self._found.fitted_to
+        if effect.place not in effect.candidate.places(nominal, recordings[0].kinematics):
+            return False
+        shapes = effect.candidate.find_shapes(nominal, effect.place, span_of(nominal, recordings))
+        return any(law_of(shape) == law_of(effect.shape) for shape in shapes)
 
     def _unseen(self, verified: Verified) -> list[_Unseen]:
         """Return, for each place at which an effect of ordinary size would not become a cause, its best shape.

@@ -28,6 +28,11 @@ def kind_shape(effect: Effect) -> dict[str, float]:
     return {"pulley_friction": {"pulley": 1.0}, "load_friction": {"load": 1.0}}.get(effect.kind, {})
 
 
+def law_of(shape: Mapping[str, float]) -> str:
+    """Return which of the two laws of a place a shape belongs to: "pulley", "load", or "" for the other one."""
+    return next((kind for kind in ("pulley", "load") if shape.get(kind)), "")
+
+
 def law_path(place: Place, shape: Mapping[str, float]) -> str:
     """Return the path of the effect at a place; `shape` holds what `kind_shape` returned."""
     if place.tendon is None:
