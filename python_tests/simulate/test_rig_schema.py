@@ -67,7 +67,7 @@ CHANGES: list[Any] = ["DELETE", "ADD", None, True, "text", [], {}, -1, 0, 3, 1e1
 # What reader and plant refuse and a schema cannot express: relations between values in different places.
 BEYOND_THE_SCHEMA = {
     "lengths of lists and the finger's size": r"expected a list of \d+( numbers|, one (link|angle) per joint.*)$",
-    "lengths that plain numbers may have, too": r"has \d+ elements?: expected a list of \d+ numbers",
+    "lengths that plain numbers may have, too": r"has \d+ elements?: expected a list of \d+ numbers?",
     "indices and the finger's size": r"\.(link|joint|tendon) = \d+: expected a whole number from [12] to",
     "an edge that the finger has not": r"expected a joint where the finger's tendon has an edge",
     "an order of two numbers": r"the second not below the first",
