@@ -281,7 +281,11 @@ def test_a_result_alone_takes_inputs_and_options_that_lie_beside_it(edited: Call
 
 
 def test_an_experiment_without_a_tolerance_gets_a_stated_one(edited: Callable[[Edit], Path]) -> None:
-    fmu = edited(lambda files: files.pop(OPTIONS) and None)
+    def without_options(files: dict[str, bytes]) -> None:
+        files.pop(OPTIONS)
+        files[MANIFEST] = re.sub(rb"<Related [^>]*ref\.opt[^>]*>", b"", files[MANIFEST])
+
+    fmu = edited(without_options)
     done = check(fmu)
     assert done.status == 0, done.err
     assert " 7.483e-05 " in done.out  # 1e-3 of the largest
@@ -312,6 +316,11 @@ SPOILED: dict[str, tuple[str, bytes | None, str]] = {
     "no XML": (MANIFEST, b"<a>", "manifest.xml: .*; expected XML"),
     "nothing to compare": (MANIFEST, b"<fmiReferences/>", "no experiment with references and no result"),
     "result missing": (RESULT, None, r"cable_loop_ref\.csv: not in the FMU"),
+    "options missing": (
+        OPTIONS,
+        None,
+        r"cable_loop_ref\.opt: not in the FMU; expected it, as .*manifest\.xml lists it",
+    ),
     "file elsewhere": (
         MANIFEST,
         b'<fmiReferences><Related source="https://example.org/a.csv" role="result"/></fmiReferences>',
@@ -331,6 +340,27 @@ def test_a_bad_file_in_the_fmu_is_named(edited: Callable[[Edit], Path], spoiled:
     done = check(edited(edit))
     assert done.status == 2 and done.err.count("\n") == 1 and done.out == ""
     assert re.search(message, done.err), done.err
+
+
+def test_a_file_of_the_fmu_outside_of_its_folder_may_be_listed(edited: Callable[[Edit], Path]) -> None:
+    def edit(files: dict[str, bytes]) -> None:
+        listed = b'<Related source="../../documentation/%s" role="documentation"/></fmiReferences>'
+        files[MANIFEST] = files[MANIFEST].replace(b"</fmiReferences>", listed % b"index.html")
+
+    assert check(edited(edit)).status == 0
+
+
+@pytest.mark.parametrize("member", [RESULT, OPTIONS, "sources/finger_model.c"])
+def test_a_damaged_member_is_named(fmu: Path, tmp_path: Path, member: str) -> None:
+    """One byte in the middle of what the archive holds of it, where a checksum or the decompression finds it."""
+    with zipfile.ZipFile(fmu) as archive:
+        where = archive.getinfo(member)
+    content = bytearray(fmu.read_bytes())
+    content[where.header_offset + 30 + len(member) + where.compress_size // 2] ^= 0xFF
+    (tmp_path / "damaged.fmu").write_bytes(content)
+    done = check(tmp_path / "damaged.fmu")
+    assert done.status == 2 and done.err.count("\n") == 1 and done.out == ""
+    assert "damaged.fmu: " in done.err and "whole" in done.err
 
 
 # --- FMUs of another tool ---------------------------------------------------------------------------------------------
