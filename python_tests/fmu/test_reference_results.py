@@ -8,6 +8,7 @@ import json
 import re
 import subprocess
 import sys
+import warnings
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -154,14 +155,43 @@ def test_an_uneven_recording_is_interpolated_to_its_median_step(tmp_path: Path) 
     time[200:] += 0.1
     position = 0.01 * np.sin(8 * (time - time[0]))[:, None]
     recording = tf.Recording.from_arrays(time, tendon_force=5.0 + 100.0 * position, tendon_position=position)
-    fmu = tf.build(DESCRIPTION, tmp_path / "uneven.fmu", reference=recording)
+    with pytest.warns(tf.InputWarning) as warned:
+        fmu = tf.build(DESCRIPTION, tmp_path / "uneven.fmu", reference=recording)
     signals = table(members(fmu)[STIMULI])
+    (said,) = [str(each.message) for each in warned]
+    assert f"gaps, over which 50 of {len(signals)} rows of the reference are interpolated" in said
     step = np.median(np.diff(time))
     assert np.abs(np.diff(signals["time"]) - step).max() < 1e-12 and signals["time"][0] == 0.0
     assert time[-1] - time[0] - step < signals["time"][-1] <= time[-1] - time[0] + 1e-9
     assert np.abs(signals["tendon_position[1]"] - 0.01 * np.sin(8 * signals["time"])).max() < 0.01 * (8 * 0.11) ** 2 / 8
     done = check(fmu)
     assert done.status == 0, done.out + done.err
+
+
+def test_a_recording_of_another_finger_is_warned_of(tmp_path: Path) -> None:
+    """The same that `tendonfmu check` calls an error; the recording of the finger itself raises no warning."""
+    demo = ROOT / "examples" / "demo_recording"
+    signals = tf.read_recording(demo / "two_joints_unseen.parquet").frame[:2000]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        tf.build(demo / "two_joints.json", tmp_path / "same.fmu", reference=signals)
+    signals["tendon_position[2]"] *= -1
+    with pytest.warns(tf.InputWarning, match=r"tendon_position\[2\]: .*; probably a wrong sign.*") as found:
+        tf.build(demo / "two_joints.json", tmp_path / "other.fmu", reference=signals)
+    assert len(found) == 1 and found[0].filename == __file__
+    assert (tmp_path / "other.fmu").exists()
+
+
+@pytest.mark.parametrize("name", ["finger.zip", "finger", ".fmu", "finger.fmu.json"])
+@pytest.mark.parametrize("source", [DESCRIPTION, ROOT / "examples/rigs/index_finger.json"])
+def test_an_output_of_another_suffix_is_refused(tmp_path: Path, source: Path, name: str) -> None:
+    with pytest.raises(tf.InputError, match=rf"{re.escape(name)}: expected a name that ends in \.fmu"):
+        tf.build(source, tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_suffix_may_be_in_capitals(tmp_path: Path) -> None:
+    assert tf.build(DESCRIPTION, tmp_path / "FINGER.FMU").exists()
 
 
 def test_what_cannot_be_a_reference_is_refused(tmp_path: Path) -> None:
